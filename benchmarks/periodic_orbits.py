@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.orbit.runs.flight import Flights
+from nonsmooth.orbit.runs.leg_integration import LegIntegrator
 
 from .peers import scipy_shooting
 from .timing import Timing, alternate
@@ -260,11 +260,11 @@ def gradients(quick: bool) -> dict[str, Any]:
 def leg(quick: bool) -> dict[str, Any]:
     """The walker's step with all derivatives by its start, beside heyoka's variational equations."""
     orbit = walker().solve()
-    flights = Flights(orbit.system, orbit.problem.legs)
+    integrator = LegIntegrator(orbit.system, orbit.problem.legs)
     starts, durations = orbit.evaluation.starts, orbit.evaluation.durations
     p = orbit.parameter_vector
-    work: dict[str, Callable[[], Any]] = {"nonsmooth": lambda: flights(starts, durations, p)}
-    found = {"nonsmooth": flights(starts, durations, p).by_start[0]}
+    work: dict[str, Callable[[], Any]] = {"nonsmooth": lambda: integrator(starts, durations, p)}
+    found = {"nonsmooth": integrator(starts, durations, p).by_start[0]}
     compiled = {"nonsmooth": 0.0}
     try:
         begin = time.process_time()

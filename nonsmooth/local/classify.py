@@ -27,7 +27,7 @@ from ..model.checks import positive
 from .checks import MARGIN, require_linear
 from .point.intersections import Intersection, Meeting
 from .point.regions import region_of
-from .point.surface_point import FIELDS, SIDES, Numbers, Place, place
+from .point.surface_point import FIELDS, SIDES, LocalSurface, Numbers, surface_at
 from .read_only import ReadOnly
 from .searches.boundary_equilibria import boundary_equilibrium_of
 from .searches.equilibria import equilibrium_distance, kind_of
@@ -161,7 +161,7 @@ def classify(
     meeting = meeting_at(system, point, parameters, t, mode, tol)
     if meeting is not None:
         return classify_intersection(meeting, tol, margin)
-    where, x = place(system, point, parameters, t, surface, mode)
+    where, x = surface_at(system, point, parameters, t, surface, mode)
     require_linear(system, surface, "classify")
     numbers = where.finite_at(x)
     if not np.any(numbers.gradient):
@@ -179,7 +179,7 @@ def classify(
 class _Classifier:
     """One point with the numbers, tolerances and margins that its classification uses."""
 
-    def __init__(self, where: Place, numbers: Numbers, tol: float, margin: float):
+    def __init__(self, where: LocalSurface, numbers: Numbers, tol: float, margin: float):
         self.where, self.numbers, self.tol, self.margin = where, numbers, tol, margin
         self.n = where.system.dimension
         self.derivatives = where.jacobians(numbers.x)

@@ -23,7 +23,7 @@ from .errors import (
     explain,
 )
 from .laws import complementarity
-from .laws.coupled import Coupled, Yardsticks, coupled_of
+from .laws.coupled import Coupled, ErrorScales, coupled_of
 from .laws.evaluators import Evaluator, Resets, Surfaces, evaluator
 from .laws.layer import Layer, LayerNumbers, Loop, layer_of, loop_at
 from .laws.motion import Motion, followed, mode_field, motion, watched_functions
@@ -40,6 +40,7 @@ __all__ = [
     "Coupled",
     "DefinitionError",
     "DegenerateError",
+    "ErrorScales",
     "Evaluator",
     "FilippovSystem",
     "Guard",
@@ -60,7 +61,6 @@ __all__ = [
     "StartMap",
     "Stop",
     "Surfaces",
-    "Yardsticks",
     "call",
     "complementarity",
     "coupled_of",

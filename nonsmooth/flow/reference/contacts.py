@@ -112,7 +112,7 @@ class Contacts:
         stuck = [i for i, letter in letters.items() if letter == "s"]
         unknown = [*stuck, *[m + j for j in taking]]
         none = np.zeros(coupled.count)
-        slope = coupled.yardsticks(x, held, none, self._p).slope
+        slope = coupled.error_scales(x, held, none, self._p).slope
         h, gradient = self._surfaces.values(x, self._p)
         wanted = np.concatenate([-h[stuck], target[list(taking)]])
         try:
@@ -125,7 +125,7 @@ class Contacts:
         # With the impulses in place of reactions the factors are the limits of friction.
         reactions = held.copy()
         reactions[m:] = normal
-        limits = np.abs(coupled.yardsticks(x, reactions, none, self._p).factors[:m])
+        limits = np.abs(coupled.error_scales(x, reactions, none, self._p).factors[:m])
         pulls = not plastic and np.any(normal[list(taking)] < 0.0)
         slips = np.any(np.abs(every[stuck]) > limits[stuck] * (1 + 1e-9) + 1e-300)
         if not np.all(np.isfinite(impulses)) or pulls or (slips and not plastic):

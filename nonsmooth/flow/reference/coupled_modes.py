@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ...model import Array, Coupled, FilippovSystem, Guard, Yardsticks, coupled_of
+from ...model import Array, Coupled, ErrorScales, FilippovSystem, Guard, coupled_of
 from ...model.laws.coupled import MultiplierSeries, set_values
 from ...model.laws.frozen import Frozen, frozen
 from ...model.laws.layer import spirals_in
@@ -52,7 +52,7 @@ class CoupledModes:
         sliding = self.coupled.sliding(mode)
         coupled = self.coupled
         held = coupled.known_multipliers(mode, x, unknowns, self._p)
-        marks = coupled.yardsticks(x, held, coupled.acting(mode, unknowns), self._p)
+        marks = coupled.error_scales(x, held, coupled.acting(mode, unknowns), self._p)
         law = MultiplierSeries(
             coupled, mode, unknowns, held, marks.slope, marks.factors, self._options.order
         )
@@ -101,9 +101,9 @@ class CoupledModes:
         surface: Array,
         unknowns: Array,
         limits: Array,
-        marks: Yardsticks,
+        marks: ErrorScales,
     ) -> list[float]:
-        """Yardsticks of the guards of a set, from those of its functions and of its multipliers."""
+        """Error scales of the guards of a set, from those of its functions and of its multipliers."""
         own, letter = list(members), mode[members[0]]
         if letter == "l":
             return [float(surface[own].sum())]
@@ -125,7 +125,7 @@ class CoupledModes:
         stops: Array,
         count: int,
     ) -> Array:
-        """Yardsticks of the guards, from those of surfaces, of sliding multipliers and of stops."""
+        """Error scales of the guards, from those of surfaces, of sliding multipliers and of stops."""
         rows: list[float] = []
         for i, sign in enumerate(self._system.parse_letters(mode)):
             if i in self._system.set_of:
@@ -140,7 +140,7 @@ class CoupledModes:
     def gradient(self, mode: str, x: Array) -> Array:
         """Magnitudes of the derivatives of the guards of a mode in which nothing slides."""
         none = np.zeros(self.coupled.count)
-        marks = self.coupled.yardsticks(x, self.coupled.held(mode), none, self._p)
+        marks = self.coupled.error_scales(x, self.coupled.held(mode), none, self._p)
         return np.concatenate([marks.surface_gradient, marks.stop_gradient])
 
     def at(self, e: Expansion, s: float, nudge: Array | float = 0.0) -> tuple[Array, Array, Array]:
@@ -167,7 +167,7 @@ class CoupledModes:
         for side in (1.0, -1.0):
             held = self.coupled.known_multipliers(mode, x, none, self._p)
             held[surface] = side
-            marks = self.coupled.yardsticks(x, held, none, self._p)
+            marks = self.coupled.error_scales(x, held, none, self._p)
             if self.coupled.scaled[surface] and marks.slope[surface, surface]:
                 return None
             scale = rounding_scale(marks.layer_gradient[surface], x, self._options.size)
@@ -186,7 +186,7 @@ class CoupledModes:
             return None
         held = coupled.known_multipliers(mode, x, np.zeros(coupled.count), self._p)
         held[list(active)] = 0.0
-        marks = coupled.yardsticks(x, held, np.zeros(coupled.count), self._p)
+        marks = coupled.error_scales(x, held, np.zeros(coupled.count), self._p)
         if any(marks.factors[i] == 0.0 for i in active):
             return None
         turn = np.where(np.arange(coupled.count) < first, 1.0, -1.0)  # reactions open contacts

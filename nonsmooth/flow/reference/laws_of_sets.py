@@ -38,7 +38,7 @@ def unknowns_of_sets(
         sliding = coupled.sliding(mode)
         if sliding:
             held = coupled.known_multipliers(mode, x, unknowns, p)
-            marks = coupled.yardsticks(x, held, np.zeros(coupled.count), p)
+            marks = coupled.error_scales(x, held, np.zeros(coupled.count), p)
             slope = marks.slope[np.ix_(sliding, sliding)]
             try:
                 unknowns[sliding] = -np.linalg.solve(slope, marks.layer[sliding])

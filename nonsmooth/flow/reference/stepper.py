@@ -91,7 +91,7 @@ class Stepper:
         moves = e.allowed > 0.0  # time is exact
         h = _bound(e.states[moves], e.allowed[moves], self.order)
         if e.guards.size:
-            # A guard without gradient here (a double zero) has no yardstick of its own.
+            # A guard without gradient here (a double zero) has no error scale of its own.
             guard_allowed = e.guard_allowed + self.rtol * np.abs(e.guards[:, 0])
             known = guard_allowed > 0
             h = min(h, _bound(e.guards[known], guard_allowed[known], self.order))

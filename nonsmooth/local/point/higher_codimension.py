@@ -154,7 +154,7 @@ def law_at(
     coupled = coupled_of(system)
     h = coupled.heights_at(x, p)
     letters = _letters(system, h, members, mode)
-    marks = coupled.yardsticks(x, coupled.held(letters), np.zeros(coupled.count), p)
+    marks = coupled.error_scales(x, coupled.held(letters), np.zeros(coupled.count), p)
     own = list(members)
     slope = float(np.linalg.norm(marks.surface_gradient[own]))
     distance = float(np.linalg.norm(h[own]))

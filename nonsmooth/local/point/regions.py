@@ -11,7 +11,7 @@ from ...model import Array, FilippovSystem, Parameters, PointError, call, motion
 from ...model.checks import positive
 from ...model.laws.frozen import Frozen
 from .higher_codimension import law_at
-from .surface_point import TOLERANCE, Numbers, on_surface, place
+from .surface_point import TOLERANCE, Numbers, on_surface, surface_at
 
 
 class Region(Enum):
@@ -121,7 +121,7 @@ def region(
     if system.sets and _is_set(system, surface):
         tol = positive(tol, "tol")
         return _region_of_set(law_at(system, point, parameters, t, surface, mode, tol), tol)
-    where, x = place(system, point, parameters, t, surface, mode)
+    where, x = surface_at(system, point, parameters, t, surface, mode)
     return region_of(on_surface(where, x, positive(tol, "tol")), tol)
 
 
@@ -194,7 +194,7 @@ def alpha(
     >>> round(alpha(s, [0.2, 0.0]), 12)
     0.75
     """
-    where, x = place(system, point, parameters, t, surface, mode)
+    where, x = surface_at(system, point, parameters, t, surface, mode)
     numbers = on_surface(where, x, positive(tol, "tol"))
     found = region_of(numbers, tol)
     _refuse_crossing(numbers, found, "alpha")
@@ -249,7 +249,7 @@ def sliding_field(
     >>> sliding_field(s, [0.2, 1.0]).round(12) + 0.0
     array([1., 0.])
     """
-    where, x = place(system, point, parameters, t, surface, mode)
+    where, x = surface_at(system, point, parameters, t, surface, mode)
     numbers = on_surface(where, x, positive(tol, "tol"))
     found = region_of(numbers, tol)
     _refuse_crossing(numbers, found, "sliding field")

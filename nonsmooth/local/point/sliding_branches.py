@@ -103,7 +103,7 @@ def sliding_branches(
     x, p = system.extended_point(point, t), system.parameter_vector(parameters)
     sliding, branches = coupled.sliding(mode), []
     for unknowns in sliding_multipliers(coupled, mode, x, p, stable_only=False):
-        marks = coupled.yardsticks(x, held, unknowns, p)
+        marks = coupled.error_scales(x, held, unknowns, p)
         multipliers = (unknowns / marks.factors)[sliding]
         if np.abs(multipliers).max(initial=0.0) > 1.0 + 1e-9:
             continue

@@ -139,7 +139,7 @@ class ManyNumbers:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class LocalSurface:
     """One surface of a system with values of its parameters."""
 
     system: FilippovSystem
@@ -286,7 +286,7 @@ class Place:
         return states, (1.0 if letter == "+" else -1.0) * guards[self.surface]
 
 
-def place(
+def surface_at(
     system: FilippovSystem,
     point: ArrayLike,
     parameters: Parameters | None = None,
@@ -295,7 +295,7 @@ def place(
     mode: str | None = None,
     *,
     smooth: bool = False,
-) -> tuple[Place, Array]:
+) -> tuple[LocalSurface, Array]:
     """Check the arguments of a function at a point; ``smooth`` allows a system without surfaces."""
     require_system(system)
     x = system.extended_point(point, t)
@@ -306,7 +306,7 @@ def place(
                 f"surface and mode: received {surface!r} and {mode!r}, but the system has no surface. "
                 "Leave them out."
             )
-        return Place(system, 0, "", p), x
+        return LocalSurface(system, 0, "", p), x
     require_surface(system)
     system.surface_function(surface)  # refuses a wrong index
     letters = list(_signs(system, x, p, surface) if mode is None else mode)
@@ -319,7 +319,7 @@ def place(
             f"{letters.count('s')}. Give + or - to the others; for several sliding surfaces use "
             "sliding_branches or intersection_range."
         )
-    return Place(system, int(surface), "".join(letters), p), x
+    return LocalSurface(system, int(surface), "".join(letters), p), x
 
 
 def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
@@ -345,7 +345,7 @@ def _switches(system: FilippovSystem, x: Array, p: Array) -> Array:
     return np.array([v.item() for v in call(system.function(("local", "surfaces"), build), x, p)])
 
 
-def on_surface(where: Place, x: Array, tol: float) -> Numbers:
+def on_surface(where: LocalSurface, x: Array, tol: float) -> Numbers:
     """Evaluate at a point whose distance from the surface is at most ``tol (1 + |x|)``."""
     numbers = where.finite_at(x)
     if not np.any(numbers.gradient):

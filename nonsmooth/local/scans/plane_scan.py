@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem
 from ...solvers.newton import solve_many
-from ..point.surface_point import SIDES, ManyNumbers, Place, Side
+from ..point.surface_point import SIDES, LocalSurface, ManyNumbers, Side
 from ..searches.equilibria import Equilibrium, find_equilibrium
 from ..searches.folds import Fold, find_fold
 from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
@@ -42,13 +42,13 @@ class Piece:
 class PlaneScan:
     """A planar system with one surface in a box."""
 
-    where: Place
+    where: LocalSurface
     box: Box
 
     @classmethod
     def of(cls, system: FilippovSystem, parameters: Mapping[str, float], box: Box) -> PlaneScan:
         """Scan a system of two states, one surface and no explicit time."""
-        return cls(Place(system, 0, "s", system.parameter_vector(parameters)), box)
+        return cls(LocalSurface(system, 0, "s", system.parameter_vector(parameters)), box)
 
     def at(self, points: Array) -> ManyNumbers:
         """Numbers at points (k, 2)."""

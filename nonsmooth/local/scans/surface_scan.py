@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...model import Array, DefinitionError, FilippovSystem, NonsmoothError, evaluator
 from ...solvers.newton import solve_many
 from ..point.regions import Region
-from ..point.surface_point import FIELDS, SIDES, ManyNumbers, Place, Side, side_index
+from ..point.surface_point import FIELDS, SIDES, LocalSurface, ManyNumbers, Side, side_index
 from ..searches.find_two_fold import TwoFold, find_two_fold
 from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
 from ..searches.search import find_all, search
@@ -44,7 +44,7 @@ class FoldCurve:
 class SurfaceScan:
     """The surface of a system of three states over a box of two of them."""
 
-    where: Place
+    where: LocalSurface
     box: Box
     shown: tuple[int, int]
     left_out: int
@@ -71,7 +71,7 @@ class SurfaceScan:
                     "Leave it out to draw over the two along which the surface is flattest."
                 )
             pairs = [(names.index(chosen[0]), names.index(chosen[1]))]
-        where = Place(system, 0, "s", system.parameter_vector(parameters))
+        where = LocalSurface(system, 0, "s", system.parameter_vector(parameters))
         scans = [cls(where, box, p, 3 - sum(p), guess) for p in pairs]
         best = max(scans, key=lambda scan: scan._steepness())
         if not best._steepness() > 0:

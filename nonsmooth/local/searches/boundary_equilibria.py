@@ -27,7 +27,15 @@ from ..checks import (
     require_autonomous,
     require_linear,
 )
-from ..point.surface_point import FIELDS, SIDES, Place, Side, on_surface, place, side_index
+from ..point.surface_point import (
+    FIELDS,
+    SIDES,
+    LocalSurface,
+    Side,
+    on_surface,
+    side_index,
+    surface_at,
+)
 from ..read_only import ReadOnly
 from .equilibria import equilibrium_distance
 from .search import search
@@ -170,7 +178,7 @@ def boundary_equilibrium(
     ('BF4', 'persistence')
     """
     positive(tol, "tol"), positive(margin, "margin")
-    where, x = place(system, point, parameters, 0.0, surface, mode)
+    where, x = surface_at(system, point, parameters, 0.0, surface, mode)
     require_linear(system, surface, "boundary equilibrium")
     numbers, derivatives = on_surface(where, x, tol), where.jacobians(x)
     found = [
@@ -345,11 +353,11 @@ def find_boundary_equilibrium(
     """
     k = side_index(side)
     require_autonomous(system, "boundary equilibrium")
-    where, x = place(system, near, parameters, 0.0, surface, mode)
+    where, x = surface_at(system, near, parameters, 0.0, surface, mode)
     advice = "An equilibrium is on the surface at isolated values of a parameter."
     j, n = parameter_index(system, vary, "vary", advice), x.size
 
-    def at(value: float) -> Place:
+    def at(value: float) -> LocalSurface:
         p = where.parameters.copy()
         p[j] = value
         return replace(where, parameters=p)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, Parameters
 from ..checks import require_autonomous
-from ..point.surface_point import FIELDS, TOLERANCE, Place, Side, place, side_index
+from ..point.surface_point import FIELDS, TOLERANCE, LocalSurface, Side, side_index, surface_at
 from .search import Found, search
 
 #: Eigenvalues whose real part is below this, relative to the largest, decide nothing.
@@ -156,7 +156,7 @@ def find_equilibrium(
     """
     k = side_index(side)
     require_autonomous(system, "equilibrium")
-    where, x = place(system, near, parameters, 0.0, surface, mode, smooth=True)
+    where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True)
     if not system.surface_count and side != "+":
         raise OptionError(
             f"side: expected '+', as a smooth system has one field, received {side!r}. Leave it out."
@@ -170,7 +170,7 @@ def find_equilibrium(
     return equilibrium_at(where, found, side)
 
 
-def equilibrium_at(where: Place, found: Found, side: Side) -> Equilibrium:
+def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium:
     """Describe the equilibrium at a point where a field vanishes."""
     x, numbers = found.x, where.at(found.x)
     eigenvalues = by_real_part(where.jacobians(x)[side_index(side)])

@@ -20,7 +20,7 @@ from ...model.checks import positive
 from ...notebook import card, quadrants
 from ...solvers.newton import solve_many
 from ..point.regions import coincide
-from ..point.surface_point import FIELDS, SIDES, Numbers, Place, on_surface, place
+from ..point.surface_point import FIELDS, SIDES, LocalSurface, Numbers, on_surface, surface_at
 from ..read_only import ReadOnly
 from ..two_folds import Boundary, Classification, NormalForm, classify_two_fold, normal_form
 from .search import Found, search, unknowns
@@ -285,7 +285,7 @@ class TwoFold:
 class Chart:
     """The coordinates (z1, z2, z3) near a two-fold, and their inverse."""
 
-    where: Place
+    where: LocalSurface
     point: Array  # the two-fold (N,)
     scales: Array  # of h, L1 and L2 (3,)
 
@@ -464,7 +464,7 @@ def independence(numbers: Numbers) -> float:
     return float(np.linalg.svd(scaled, compute_uv=False)[-1])
 
 
-def _build(where: Place, found: Found) -> TwoFold:
+def _build(where: LocalSurface, found: Found) -> TwoFold:
     system, numbers = where.system, where.finite_at(found.x)
     _refuse_degenerate(numbers, found.linear)
     lie = numbers.second
@@ -538,7 +538,7 @@ def two_fold(
     >>> fold.kind, fold.sigma, fold.nu, fold.label
     ('visible', (1, -1), (1.0, 2.0), 'VV-F')
     """
-    where, x = place(system, point, parameters, t, surface, mode)
+    where, x = surface_at(system, point, parameters, t, surface, mode)
     if system.dimension < 3:
         unknowns(system, (), 3, "two-fold")
     numbers = on_surface(where, x, positive(tol, "tol"))
@@ -618,13 +618,13 @@ def find_two_fold(
       are spirals of flights along the diabolo.
       Found 0.141 from the start in 1 iteration, residual 0.
     """
-    where, x = place(system, near, parameters, t, surface, mode)
+    where, x = surface_at(system, near, parameters, t, surface, mode)
     free = unknowns(system, hold, 3, "two-fold")
     return search_two_fold(where, x, free, tol, max_iterations)
 
 
 def search_two_fold(
-    where: Place, x: Array, free: Sequence[int], tol: float, max_iterations: int
+    where: LocalSurface, x: Array, free: Sequence[int], tol: float, max_iterations: int
 ) -> TwoFold:
     """Find a two-fold from the extended point ``x``, changing the states ``free`` only."""
 

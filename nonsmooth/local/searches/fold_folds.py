@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, require_system
 from ...model.checks import positive
 from ..checks import MARGIN, relative_difference
-from ..point.surface_point import Numbers, Place, on_surface, place
+from ..point.surface_point import LocalSurface, Numbers, on_surface, surface_at
 from ..read_only import ReadOnly
 from .folds import bend
 
@@ -106,7 +106,7 @@ def fold_fold(
     """
     positive(tol, "tol"), positive(margin, "margin")
     require_planar(system, "fold-fold")
-    where, x = place(system, point, parameters, 0.0, surface, mode)
+    where, x = surface_at(system, point, parameters, 0.0, surface, mode)
     numbers = on_surface(where, x, tol)
     if np.any(np.abs(numbers.angles) > tol):
         raise PointError(
@@ -117,7 +117,7 @@ def fold_fold(
     return fold_fold_of(where, numbers, margin)
 
 
-def fold_fold_of(where: Place, numbers: Numbers, margin: float = MARGIN) -> FoldFold:
+def fold_fold_of(where: LocalSurface, numbers: Numbers, margin: float = MARGIN) -> FoldFold:
     """Class from the numbers at the point; F1 and F2 must not vanish."""
     tangent = numbers.tangents[:, 0]
     a = numbers.fields @ tangent
@@ -155,7 +155,7 @@ def require_planar(system: FilippovSystem, what: str) -> None:
         )
 
 
-def fused_focus(where: Place, numbers: Numbers) -> float:
+def fused_focus(where: LocalSurface, numbers: Numbers) -> float:
     """Stability of a fused focus (II2): positive if orbits spiral in."""
     # A flight of the field (a + p x + q y, b x + r x^2 + s y) maps x to -x + beta x^2 with
     # beta = 2 (b p + b s - a r)/(3 a b); one flight each gives x + (beta2 - beta1) x^2.

@@ -18,12 +18,12 @@ from ...model.checks import positive
 from ..point.surface_point import (
     FIELDS,
     TOLERANCE,
+    LocalSurface,
     Numbers,
-    Place,
     Side,
     on_surface,
-    place,
     side_index,
+    surface_at,
 )
 from .search import Found, search, unknowns
 
@@ -81,7 +81,7 @@ class Fold:
         return f"{FIELDS[self.side]} at {self.point.tolist()}: {contact}{found}."
 
 
-def contact(where: Place, x: Array, side: Side, max_order: int, tol: float) -> Array:
+def contact(where: LocalSurface, x: Array, side: Side, max_order: int, tol: float) -> Array:
     """Derivatives L^k h for k = 0..max_order, with rounding-level values set to zero."""
     # The k-th Taylor coefficient counts as zero below ``tol |grad h| |F| r^(k-1)``, where r is the
     # rate, per time, at which the coefficients of the orbit and of h grow.
@@ -115,7 +115,7 @@ def _kind(order: int | None, value: float, side: Side) -> str:
     return "cusp" if order == 3 else "degenerate"
 
 
-def fold_at(where: Place, found: Found, side: Side, max_order: int, tol: float) -> Fold:
+def fold_at(where: LocalSurface, found: Found, side: Side, max_order: int, tol: float) -> Fold:
     """Describe the fold at a point where L_i h = 0."""
     lie = contact(where, found.x, side, max_order, tol)
     lie[1] = 0.0
@@ -188,7 +188,7 @@ def fold(
     """
     k = side_index(side)
     _check_order(max_order)
-    where, x = place(system, point, parameters, t, surface, mode)
+    where, x = surface_at(system, point, parameters, t, surface, mode)
     numbers = on_surface(where, x, positive(tol, "tol"))
     if abs(numbers.angles[k]) > tol:
         raise PointError(
@@ -267,7 +267,7 @@ def find_fold(
     """
     k = side_index(side)
     _check_order(max_order)
-    where, x = place(system, near, parameters, t, surface, mode)
+    where, x = surface_at(system, near, parameters, t, surface, mode)
     free = unknowns(system, hold, 2, "fold")
 
     def equations(u: Array) -> tuple[Array, Array]:

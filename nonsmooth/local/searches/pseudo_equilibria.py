@@ -27,7 +27,7 @@ from ...model import (
 from ..checks import require_autonomous, require_linear
 from ..point.intersections import Meeting
 from ..point.regions import Region, region_of
-from ..point.surface_point import TOLERANCE, Numbers, Place, place
+from ..point.surface_point import TOLERANCE, LocalSurface, Numbers, surface_at
 from .equilibria import by_real_part, kind_of
 from .search import Found, search
 
@@ -170,7 +170,7 @@ def find_pseudo_equilibrium(
         return find_on_intersection(
             system, near, mode, parameters, tol=tol, max_iterations=max_iterations
         )
-    where, x = place(system, near, parameters, 0.0, surface, mode)
+    where, x = surface_at(system, near, parameters, 0.0, surface, mode)
     require_linear(system, surface, "pseudo-equilibrium")
     numbers = where.finite_at(x)
     n, (l1, l2) = x.size, numbers.lie
@@ -197,7 +197,7 @@ def find_pseudo_equilibrium(
     return pseudo_equilibrium_at(where, replace(found, x=found.x[:n], distance=away))
 
 
-def pseudo_equilibrium_at(where: Place, found: Found) -> PseudoEquilibrium:
+def pseudo_equilibrium_at(where: LocalSurface, found: Found) -> PseudoEquilibrium:
     """Describe the pseudo-equilibrium at a point where the sliding field vanishes."""
     x = found.x
     numbers, derivatives = where.finite_at(x), where.jacobians(x)
@@ -245,7 +245,7 @@ def sliding_matrix(numbers: Numbers, derivatives: Array) -> tuple[Array, Array]:
     return basis.T @ dg @ basis, basis
 
 
-def sliding_expansion(where: Place, numbers: Numbers) -> tuple[float, float]:
+def sliding_expansion(where: LocalSurface, numbers: Numbers) -> tuple[float, float]:
     """Slope and second derivative of the planar sliding speed at a pseudo-equilibrium."""
     # g = c1 x + c2 x^2 + ... in the tangent coordinate; c1 = 0 != c2 is a pseudo-saddle-node.
     x, (l1, l2) = numbers.x, numbers.lie

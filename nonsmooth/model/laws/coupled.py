@@ -40,7 +40,7 @@ from .switches import Guard, event_guards
 
 
 @dataclass(frozen=True)
-class Yardsticks:
+class ErrorScales:
     """Numbers at the start of a step."""
 
     layer: Array
@@ -290,17 +290,17 @@ class Coupled:
     # numbers -----------------------------------------------------------------------------------
 
     @cached_property
-    def _yardsticks(self) -> Evaluator:
+    def _error_scales(self) -> Evaluator:
         return self._evaluator([self.layer, self.slope, self.factors, *self.gradients])
 
     def _evaluator(self, outputs: Sequence[ca.SX]) -> Evaluator:
         return Evaluator(ca.Function("at", self._symbols, self.awake(outputs), {"cse": True}))
 
-    def yardsticks(self, x: Array, multipliers: Array, unknowns: Array, p: Array) -> Yardsticks:
+    def error_scales(self, x: Array, multipliers: Array, unknowns: Array, p: Array) -> ErrorScales:
         """Evaluate at an extended state, with lambda where nothing slides (else 0) and nu (else 0)."""
-        values = self._yardsticks.copied(self._inputs(x, multipliers, unknowns), p)
+        values = self._error_scales.copied(self._inputs(x, multipliers, unknowns), p)
         layer, slope, factors, *gradients = values
-        return Yardsticks(
+        return ErrorScales(
             layer.ravel(), slope, factors.ravel(), *[np.abs(gradient) for gradient in gradients]
         )
 

@@ -59,7 +59,7 @@ def frozen(
     """The rates of the switching functions ``own`` as a - M lambda."""
     held = coupled.known_multipliers(mode, x, unknowns, p)
     held[list(own)] = 0.0
-    marks = coupled.yardsticks(x, held, np.zeros(coupled.count), p)
+    marks = coupled.error_scales(x, held, np.zeros(coupled.count), p)
     slope = marks.slope * marks.factors
     others = [i for i in coupled.sliding(mode) if i not in own]
     chosen = list(own)
@@ -90,7 +90,7 @@ def field_at(
     acting = np.zeros(coupled.count)
     others = [i for i in coupled.sliding(mode) if i not in own]
     if others:
-        marks = coupled.yardsticks(x, held, acting, p)
+        marks = coupled.error_scales(x, held, acting, p)
         slope = marks.slope[np.ix_(others, others)]
         acting[others] = -np.linalg.lstsq(slope, marks.layer[others], rcond=None)[0]
     return coupled.values(x, held, acting, p)[0]

@@ -73,7 +73,7 @@ class Motion:
         return self.system.function(("jet", self.mode, order, self._key), build, self.states)
 
     def gradient_function(self) -> ca.Function:
-        """Return (x, p) -> gradients of the guard functions (m, N), the yardstick of rounding."""
+        """Return (x, p) -> gradients of the guard functions (m, N), the error scale of rounding."""
 
         def build() -> Sequence[ca.SX]:
             return [ca.jacobian(self.functions, self.states)]

@@ -46,7 +46,7 @@ def _is_solution(
 ) -> bool:
     sliding = of.sliding(mode)
     held = of.known_multipliers(mode, x, unknowns, p)
-    marks = of.yardsticks(x, held, of.acting(mode, unknowns), p)
+    marks = of.error_scales(x, held, of.acting(mode, unknowns), p)
     slope = marks.slope[np.ix_(sliding, sliding)]
     g = marks.layer[sliding]
     small = np.abs(g).max() <= 1e-10 * (1.0 + np.abs(slope).max())
@@ -72,7 +72,7 @@ def newton_multipliers(
     held, sliding = of.known_multipliers(mode, x, unknowns, p), of.sliding(mode)
     result = unknowns.copy()
     for _ in range(iterations):
-        marks = of.yardsticks(x, held, of.acting(mode, result), p)
+        marks = of.error_scales(x, held, of.acting(mode, result), p)
         try:
             step = np.linalg.solve(marks.slope[np.ix_(sliding, sliding)], marks.layer[sliding])
         except np.linalg.LinAlgError:

@@ -1,8 +1,8 @@
-"""What is watched along a branch of periodic orbits: its itinerary, and smooth bifurcations.
+"""Test functions along a branch of periodic orbits: itinerary changes and smooth bifurcations.
 
 Some functions are positive while the itinerary holds; others vanish at smooth bifurcations.
 
-An itinerary ceases to hold where a leg's duration ends, where a guard is grazed inside a leg, where a
+An itinerary ceases to hold where a leg's duration vanishes, where a guard is grazed inside a leg, where a
 guard fails at the start of the next leg or at the end of one, or where an event is no longer crossed
 (the table of sliding bifurcations: di Bernardo, Kowalczyk & Nordmark 2002; with resets Nordmark 1991).
 Each test is a smooth function along the branch, which goes on, virtual, beyond its zero.
@@ -34,7 +34,7 @@ _NO_DIGITS = 1e10
 
 @dataclass(frozen=True)
 class Condition:
-    """What a test of an itinerary is about.
+    """The condition behind a test function of an itinerary.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ def is_smooth(name: str) -> bool:
 def conditions_of(
     problem: BoundaryProblem, at: Evaluation, p: Array, known: dict[str, Condition]
 ) -> dict[str, float]:
-    """All tests of an orbit; what they are about is added to ``known``."""
+    """All test functions of an orbit; their conditions are added to ``known``."""
     system, legs = problem.system, problem.legs
     tests: _Tests = system.cached(("tests of legs", legs), lambda: _Tests(system, legs))
     found: dict[str, float] = {}
@@ -133,7 +133,7 @@ def _pairs(count: int) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 class _Tests:
-    """What is watched of the legs of an orbit, and by which guards."""
+    """Test functions of the legs of an orbit, and their guards."""
 
     def __init__(self, system: FilippovSystem, legs: tuple[Leg, ...]):
         self.system, self.legs, self.guards = system, legs, LegGuards(system, legs)
@@ -145,18 +145,18 @@ class _Tests:
 
     def __call__(self, at: Evaluation, p: Array) -> list[tuple[Condition, float]]:
         durations, found = at.durations.tolist(), list[tuple[Condition, float]]()
-        speeds = (at.flight.gradient * at.flight.rate).sum(axis=1).tolist()
+        speeds = (at.flows.gradient * at.flows.rate).sum(axis=1).tolist()
         watched = zip(*self.guards(at.starts, p, at.durations), strict=True)
         for i, (rows, begin, values) in enumerate(watched):
             first = begin[len(begin) - len(self.inside[i]) :].tolist()
             found.append((self.durations[i], durations[i]))
             found += [(condition, first[k][order]) for k, order, condition in self.starts[i]]
-            met, sign, others = self.ends[i]
-            if met is not None:
-                found.append((met, sign * speeds[i]))
+            own, sign, others = self.ends[i]
+            if own is not None:
+                found.append((own, sign * speeds[i]))
             if others:
                 if not durations[i] > 0.0:
-                    state = at.flown[i].end
+                    state = at.by_leg[i].end
                     values = guard_values(self.system, self.legs[i].mode)(state, p)[1][:, 0]
                 found += [(condition, float(values[k])) for k, condition in others]
             found += _interior(self.inside[i], rows)
@@ -173,7 +173,7 @@ def _starting(
 
 
 def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
-    """Order at which a guard is positive after the event of the leg before; None if not watched."""
+    """Order at which a guard is positive after the event of the leg before; None without a test."""
     # A crossing leaves the guard zero and its rate positive. After an exit or release the rate is zero
     # too, and its positive second derivative is the transversality of that event.
     if guard.kind not in ("surface", "exit", "impact", "release"):
@@ -190,7 +190,7 @@ def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
 def _ending(
     i: int, leg: Leg, guards: Sequence[Guard]
 ) -> tuple[Condition | None, int, list[tuple[int, Condition]]]:
-    """How fast a leg's event is met, with the sign of that; guards of sliding that end together with it."""
+    """Transversality of a leg's event with its sign, and the other guards of sliding."""
     own = [g for g in guards if g.ends(leg.kind, leg.element, leg.side)]
     if not own:
         return None, 0, []

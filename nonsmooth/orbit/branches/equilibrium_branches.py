@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...local.checks import parameter_index, require_autonomous, require_linear
-from ...local.point.surface_point import SIDES, Place, Side, place, side_index
+from ...local.point.surface_point import SIDES, LocalSurface, Side, side_index, surface_at
 from ...local.read_only import ReadOnly
 from ...local.searches.boundary_equilibria import boundary_equilibrium_of
 from ...local.searches.equilibria import Equilibrium, by_real_part, equilibrium_at, find_equilibrium
@@ -44,12 +44,12 @@ _ROUNDING = 1e-13
 class Equilibria(BranchCurve):
     """Equations and events common to equilibria and pseudo-equilibria."""
 
-    def __init__(self, where: Place, free: tuple[int, ...], scale: Array):
+    def __init__(self, where: LocalSurface, free: tuple[int, ...], scale: Array):
         self.where, self.free, self.scale = where, free, scale
         self.system, self.n = where.system, where.system.dimension
 
-    def place_at(self, u: Array) -> Place:
-        """The place with the parameters of a point."""
+    def local_surface(self, u: Array) -> LocalSurface:
+        """The surface with the parameters of a point."""
         return replace(self.where, parameters=self.parameters_at(u))
 
     def parameters_at(self, u: Array) -> Array:
@@ -58,7 +58,7 @@ class Equilibria(BranchCurve):
         return p
 
     def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
-        here, k = self.place_at(u), u.size - len(self.free)
+        here, k = self.local_surface(u), u.size - len(self.free)
         curve = copy(self)
         curve.where, curve.free = here, free
         curve.scale = np.append(self.scale[:k], widths)
@@ -144,7 +144,7 @@ class Equilibria(BranchCurve):
 
     def boundary(self, zero: Zero, k: int) -> BranchEvent:
         """The boundary equilibrium of F1 (k = 0) or F2 (k = 1) on this curve."""
-        x, here = zero.point.u[: self.n], self.place_at(zero.point.u)
+        x, here = zero.point.u[: self.n], self.local_surface(zero.point.u)
         numbers = here.finite_at(x)
         found = boundary_equilibrium_of(
             x, k, numbers.gradient, numbers.fields[1 - k], here.jacobians(x)[k]
@@ -162,7 +162,7 @@ class Equilibria(BranchCurve):
 
     def boundary_numbers(self, u: Array, k: int) -> Mapping[str, float]:
         """Functions that vanish where a boundary equilibrium of F1 (k = 0) or F2 (k = 1) changes class."""
-        x, here = u[: self.n], self.place_at(u)
+        x, here = u[: self.n], self.local_surface(u)
         numbers, a = here.finite_at(x), here.jacobians(x)[k]
         other, sign = numbers.fields[1 - k], 1.0 - 2.0 * k
         bordered = np.block([[a, other[:, None]], [numbers.gradient[None, :], np.zeros((1, 1))]])
@@ -181,7 +181,7 @@ class Equilibria(BranchCurve):
 class EquilibriumCurve(Equilibria):
     """F_k(x, p) = 0 in the unknowns (x, p), for continuation."""
 
-    def __init__(self, where: Place, free: tuple[int, ...], scale: Array, side: Side):
+    def __init__(self, where: LocalSurface, free: tuple[int, ...], scale: Array, side: Side):
         super().__init__(where, free, scale)
         self.side, self.k = side, side_index(side)
 
@@ -189,17 +189,17 @@ class EquilibriumCurve(Equilibria):
         return self.where.side(self.side)
 
     def equations(self, u: Array) -> tuple[Array, Array]:
-        here, x = self.place_at(u), u[: self.n]
+        here, x = self.local_surface(u), u[: self.n]
         by_parameter = here.parameter_derivatives(x)[1][self.k][:, list(self.free)]
         return here.at(x).fields[self.k], np.column_stack([here.jacobians(x)[self.k], by_parameter])
 
     def eigenvalues(self, u: Array) -> NDArray[Any]:
-        return by_real_part(self.place_at(u).jacobians(u[: self.n])[self.k])
+        return by_real_part(self.local_surface(u).jacobians(u[: self.n])[self.k])
 
     def tests(self, point: Point) -> Mapping[str, float]:
         found = dict[str, float]()
         if self.where.mode:
-            switches = self.place_at(point.u).switches(point.u[: self.n])
+            switches = self.local_surface(point.u).switches(point.u[: self.n])
             found = {self._boundary_of(j): float(h) for j, h in enumerate(switches)}
         if self.n > 1:
             found["Hopf"] = self.hopf(point.u)
@@ -229,7 +229,7 @@ class EquilibriumCurve(Equilibria):
         return name.startswith("boundary equilibrium")
 
     def describe(self, u: Array) -> Equilibrium:
-        return equilibrium_at(self.place_at(u), Found(u[: self.n]), self.side)
+        return equilibrium_at(self.local_surface(u), Found(u[: self.n]), self.side)
 
     def event(self, zero: Zero) -> BranchEvent | None:
         if self.ends(zero.name):
@@ -257,7 +257,7 @@ class _PseudoEquilibriumCurve(Equilibria):
         return self.where.mode
 
     def equations(self, u: Array) -> tuple[Array, Array]:
-        n, here, x, a = self.n, self.place_at(u), u[: self.n], u[self.n]
+        n, here, x, a = self.n, self.local_surface(u), u[: self.n], u[self.n]
         at, (d1, d2) = here.at(x), here.jacobians(x)
         dh, df = here.parameter_derivatives(x)
         f1, f2 = at.fields
@@ -269,14 +269,14 @@ class _PseudoEquilibriumCurve(Equilibria):
         return np.append((1 - a) * f1 + a * f2, at.h), matrix
 
     def eigenvalues(self, u: Array) -> NDArray[Any]:
-        here, x = self.place_at(u), u[: self.n]
+        here, x = self.local_surface(u), u[: self.n]
         return by_real_part(sliding_matrix(here.at(x), here.jacobians(x))[0])
 
     def tests(self, point: Point) -> Mapping[str, float]:
         u = point.u
-        numbers = self.place_at(u).at(u[: self.n])
+        numbers = self.local_surface(u).at(u[: self.n])
         found = {"alpha = 0": u[self.n], "alpha = 1": 1 - u[self.n]}
-        switches = self.place_at(u).switches(u[: self.n])
+        switches = self.local_surface(u).switches(u[: self.n])
         found.update({name: float(switches[j]) for name, j in self._met.items()})
         found["two-fold"] = float(numbers.lie[1] - numbers.lie[0])
         if self.n > 2 and found["two-fold"] != 0:
@@ -297,7 +297,7 @@ class _PseudoEquilibriumCurve(Equilibria):
         return name in _ALPHA or name in self._met
 
     def describe(self, u: Array) -> Any:
-        return pseudo_equilibrium_at(self.place_at(u), Found(u[: self.n]))
+        return pseudo_equilibrium_at(self.local_surface(u), Found(u[: self.n]))
 
     def event(self, zero: Zero) -> BranchEvent | None:
         if zero.name in _ALPHA:
@@ -308,7 +308,7 @@ class _PseudoEquilibriumCurve(Equilibria):
             )
             return self.described(zero, "intersection", far_side=FarSide("", verdict))
         if zero.name == "two-fold":
-            numbers = self.place_at(zero.point.u).at(zero.point.u[: self.n])
+            numbers = self.local_surface(zero.point.u).at(zero.point.u[: self.n])
             side = FarSide("", "sliding changes between attracting and repelling")
             event = BranchEvent("two-fold", self.value(zero.point.u), numbers.x, side)
             return replace(event, curve=self, point=zero.point, test=zero.name)
@@ -322,8 +322,8 @@ class _PseudoEquilibriumCurve(Equilibria):
         scale = np.append(self.scale[: self.n], self.scale[-1])
         curve = EquilibriumCurve(self.where, self.free, scale, SIDES[k])
         start = np.append(u[: self.n], u[-1])
-        gradient = curve.place_at(start).at(start[: self.n]).gradient
-        dh = curve.place_at(start).parameter_derivatives(start[: self.n])[0][list(self.free)]
+        gradient = curve.local_surface(start).at(start[: self.n]).gradient
+        dh = curve.local_surface(start).parameter_derivatives(start[: self.n])[0][list(self.free)]
         return _leave(curve, start, np.append((1.0 - 2.0 * k) * gradient, (1.0 - 2.0 * k) * dh))
 
 
@@ -431,7 +431,7 @@ def continue_equilibrium(
     positive(step, "step")
     whole(max_points, "max_points", least=2)
     index = parameter_index(system, parameter)
-    where, _ = place(system, near, parameters, 0.0, surface, mode, smooth=side is not None)
+    where, _ = surface_at(system, near, parameters, 0.0, surface, mode, smooth=side is not None)
     value = float(where.parameters[index])
     low, high = check_bounds(bounds, value, parameter)
     given: dict[str, Any] = dict(parameters=parameters, surface=surface, mode=mode)

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...local.point.surface_point import SIDES, Place, Side, place
+from ...local.point.surface_point import SIDES, LocalSurface, Side, surface_at
 from ...local.searches.boundary_equilibria import find_boundary_equilibrium
 from ...model import Array, FilippovSystem, NonsmoothError
 from ...model.derivatives.variational import variational_field
@@ -24,7 +24,7 @@ from ...solvers.continuation import Point, Zero
 from ...solvers.newton import Secant, converge
 from ..periodic.boundary_value_problem import BoundaryProblem
 from ..periodic.orbit import PeriodicOrbit
-from ..runs.legs import fly, surface_of
+from ..runs.legs import integrate_leg, surface_of
 from .branch import BranchEvent, FarSide
 from .equilibrium_branches import EquilibriumCurve
 
@@ -78,7 +78,7 @@ def extent(problem: BoundaryProblem, u: Array, p: Array) -> float:
     starts, durations = problem.split(u)
     n, seen = problem.system.dimension, list[Array]()
     for leg, x, duration in zip(problem.legs, starts, durations, strict=True):
-        seen += [x[:n], fly(problem.system, leg, x, 0.5 * float(duration), p).end[:n]]
+        seen += [x[:n], integrate_leg(problem.system, leg, x, 0.5 * float(duration), p).end[:n]]
     states = np.array(seen)
     if problem.symmetry is not None:
         states = np.vstack([states, states @ problem.symmetry.T])
@@ -138,7 +138,7 @@ def _equilibrium(
         if not found.distance < reach:
             return None
         values = dict(found.parameters)
-        where, point = place(system, found.point, values, 0.0, surface, mode)
+        where, point = surface_at(system, found.point, values, 0.0, surface, mode)
         free, scale = (system.parameter_names.index(parameter),), np.ones(system.dimension + 1)
         curve, u = EquilibriumCurve(where, free, scale, side), np.append(point, found.value)
         zero = Zero("boundary equilibrium", Point(u, np.zeros(u.size)), 0.0)
@@ -158,12 +158,12 @@ def _two_fold(
     system, (surface, mode) = orbit.system, at
     index = system.parameter_names.index(parameter)
 
-    def place_at(value: float) -> Place:
+    def local_surface(value: float) -> LocalSurface:
         values = {**orbit.parameters, parameter: value}
-        return place(system, x, values, 0.0, surface, mode)[0]
+        return surface_at(system, x, values, 0.0, surface, mode)[0]
 
     def equations(u: Array) -> Array:
-        numbers = place_at(float(u[-1])).at(u[:-1])
+        numbers = local_surface(float(u[-1])).at(u[:-1])
         return np.array([numbers.h, *numbers.lie])
 
     start = np.append(x, orbit.parameter_vector[index])

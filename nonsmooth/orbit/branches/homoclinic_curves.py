@@ -14,7 +14,7 @@ from ...solvers.continuation import Point
 from ..homoclinic.homoclinic_orbits import Connection, connection_of, find_homoclinic
 from ..homoclinic.loops import Loop
 from ..periodic.orbit import PeriodicOrbit
-from ..runs.legs import fly
+from ..runs.legs import integrate_leg
 from .branch import BranchCurve, BranchEvent, FarSide
 
 #: Largest distance of the parameters of a periodic and a homoclinic orbit, relative to the bounds.
@@ -105,8 +105,8 @@ def _slowest(orbit: PeriodicOrbit) -> tuple[str, Array]:
         orbit.problem.legs, orbit.evaluation.starts, orbit.evaluation.durations, strict=True
     ):
         for part in np.linspace(0.0, 1.0, 41):
-            flown = fly(orbit.system, leg, x, float(part * duration), p)
-            speed = float(np.linalg.norm(flown.rate[:n]))
+            flow = integrate_leg(orbit.system, leg, x, float(part * duration), p)
+            speed = float(np.linalg.norm(flow.rate[:n]))
             if speed < best[0]:
-                best = (speed, leg.mode, flown.end[:n])
+                best = (speed, leg.mode, flow.end[:n])
     return best[1], best[2]

@@ -1,4 +1,4 @@
-"""Editing an itinerary where a bifurcation changes it: the legs on the far side, and a start there.
+"""Itinerary beyond a discontinuity-induced bifurcation, and initial unknowns for the orbit there.
 
 | bifurcation | fewer legs | more legs |
 |---|---|---|
@@ -31,97 +31,15 @@ from ..periodic.boundary_value_problem import (
     neighbours,
 )
 from ..runs.itinerary import leg_between
-from ..runs.legs import Leg, fly, surface_of
+from ..runs.legs import Leg, integrate_leg, surface_of
 from .conditions import Condition, touching
 
-# Guesses for an orbit whose new legs have begun to grow.
-
-
-def grown(problem: BoundaryProblem, u: Array, p: Array, fresh: Sequence[int], by: float) -> Array:
-    """Unknowns near an orbit whose legs ``fresh`` last for ``by``."""
-    # A flight that is added inside a slide begins before the point where the slide touched its boundary
-    # and ends after it: h = L11 t^2/2 + L111 t^3/6 with an exit at -t/3 of a flight of the duration t.
-    starts, durations = (np.array(part) for part in problem.split(u))
-    legs = problem.legs
-    for i in fresh:
-        durations[i] = by
-        added = 0 < i < len(legs) - 1 and legs[i].kind == "entry" and legs[i - 1].kind == "exit"
-        if not added or durations[i - 1] < by or durations[i + 1] < by:
-            continue
-        durations[i - 1] -= by / 3
-        durations[i + 1] -= 2 * by / 3
-        for k in (i - 1, i):
-            flown = fly(problem.system, legs[k], starts[k], float(durations[k]), p)
-            starts[k + 1] = flown.end[: problem.dimension]
-    return problem.pack(starts, durations)
-
-
-# Itineraries beside a corner, where two events happen at one time.
-
-#: Legs that are shorter than this part of the orbit vanish.
-_SHORT = 1e-7
-
-
-def swapped(chain: Chain, i: int) -> Edited | None:
-    """Two events at one time in the other order."""
-    system, (first, second) = chain.problem.system, chain.legs[i - 1 : i + 1]
-    a, b = surface_of(system, first), surface_of(system, second)
-    if a < 0 or b < 0 or a == b:
-        return None
-    between = with_letter(first.mode, b, mode_after(second)[b])
-    chain.legs[i - 1] = leg_between(system, first.mode, between)
-    chain.legs[i] = leg_between(system, between, with_letter(between, a, second.mode[a]))
-    return chain.done(i)
-
-
-def round_corner(chain: Chain, i: int, guard: Guard, p: Array) -> Edited | None:
-    """A second surface is crossed before the crossing that leads to leg ``i``, and back after it."""
-    system, k = chain.problem.system, (i - 1) % len(chain.legs)
-    before, far = chain.legs[k], guard.element
-    if guard.kind != "surface" or before.kind != "crossing":
-        return None
-    flown = fly(system, before, chain.starts[k], chain.durations[k], p)
-    start = before.at_end(system, flown.end, p).after
-    turned = before.mode[far].translate(TURNED)
-    modes = [before.mode, with_letter(before.mode, far, turned)]
-    modes += [with_letter(mode_after(before), far, turned), mode_after(before)]
-    legs = [leg_between(system, a, b) for a, b in pairwise(modes)]
-    chain.legs[k] = legs[0]
-    chain.insert(k + 1, legs[1], start)
-    chain.insert(k + 2, legs[2], start)
-    return chain.done(k + 1, k + 2)
-
-
-def cut_corner(before: Edited, i: int, p: Array) -> Edited | None:
-    """Two short legs beyond a second surface, left out; None where there are no such two."""
-    system, count = before.problem.system, len(before.problem.legs)
-    durations = before.problem.split(before.u)[1]
-    short = [
-        j for j in ((i + 1) % count, (i - 1) % count) if durations[j] < _SHORT * sum(durations)
-    ]
-    if count < 4 or not short:
-        return None
-    turned = rotated(before, ((i if short[0] == (i + 1) % count else short[0]) - 1) % count, p)
-    chain = Chain(turned.problem, turned.u, turned.origin)
-    first, between, last = chain.legs[:3]
-    far, own = surface_of(system, first), surface_of(system, between)
-    crossed = all(leg.kind == "crossing" for leg in (first, between, last))
-    if not crossed or surface_of(system, last) != far or own == far:
-        return None
-    chain.legs[0] = leg_between(system, first.mode, mode_after(last))
-    chain.remove(2)
-    chain.remove(1)
-    guards = guarded_field(system, mode_after(last)).motion.guards
-    guard = next(g for g in guards if g.kind == "surface" and g.element == far)
-    return chain.done(test=Condition("start", 1, guard))
-
-
-# The legs of a periodic orbit while its itinerary is edited.
+# Insertion and removal of legs.
 
 
 @dataclass(frozen=True, eq=False)
-class Edited:
-    """An itinerary on the other side of a bifurcation."""
+class ChangedItinerary:
+    """An itinerary beyond a bifurcation."""
 
     problem: BoundaryProblem
     u: Array
@@ -134,8 +52,8 @@ class Edited:
         return tuple(i for i, before in enumerate(self.origin) if before == -2)
 
 
-class Chain:
-    """The legs of a problem while they are edited."""
+class LegEditor:
+    """Legs of a problem, with insertion and removal."""
 
     def __init__(self, problem: BoundaryProblem, u: Array, origin: Sequence[int]):
         self.problem, self.legs, self.origin = problem, list(problem.legs), list(origin)
@@ -153,16 +71,16 @@ class Chain:
         for rows in (self.legs, self.starts, self.durations, self.origin):
             del rows[k]
 
-    def done(self, *fresh: int, test: Condition | None = None) -> Edited:
+    def done(self, *fresh: int, test: Condition | None = None) -> ChangedItinerary:
         whole = replace(self.problem, legs=tuple(self.legs))
         u = whole.pack(np.array(self.starts), np.array(self.durations))
         for k in fresh:
             self.origin[k] = -2
-        return Edited(whole, u, tuple(self.origin), "" if test is None else test.name)
+        return ChangedItinerary(whole, u, tuple(self.origin), "" if test is None else test.name)
 
 
 def mode_after(leg: Leg) -> str:
-    """The mode that follows the event of a leg, where its letters tell it; else empty."""
+    """The mode that follows the event of a leg, if its letters determine it; else empty."""
     if leg.kind not in ("crossing", "entry", "exit"):
         return ""
     turned = leg.mode[leg.element].translate(TURNED)
@@ -174,8 +92,8 @@ def with_letter(mode: str, surface: int, letter: str) -> str:
     return mode[:surface] + letter + mode[surface + 1 :]
 
 
-def rotated(before: Edited, k: int, p: Array) -> Edited:
-    """The same orbit from leg ``k``; legs moved to the end are those of the next round."""
+def rotated(before: ChangedItinerary, k: int, p: Array) -> ChangedItinerary:
+    """The same orbit from leg ``k``; legs moved to the end belong to the next period."""
     problem, (starts, durations) = before.problem, before.problem.split(before.u)
     legs = (*problem.legs[k:], *(mirrored(problem, leg) for leg in problem.legs[:k]))
     shift = np.zeros(problem.dimension)
@@ -185,7 +103,7 @@ def rotated(before: Edited, k: int, p: Array) -> Edited:
     moved = [*starts[k:], *(back @ (x + shift) for x in starts[:k])]
     whole = replace(problem, legs=legs)
     u = whole.pack(np.array(moved), np.concatenate([durations[k:], durations[:k]]))
-    return Edited(whole, u, (*before.origin[k:], *before.origin[:k]))
+    return ChangedItinerary(whole, u, (*before.origin[k:], *before.origin[:k]))
 
 
 #: Sine of the angle at which a field is tangent to a surface.
@@ -236,7 +154,7 @@ def _grazed(
     if guard.kind == "release":
         return "release"
     t = touching(problem.system, leg, guard, at.starts[test.leg], float(at.durations[test.leg]), p)
-    y = fly(problem.system, leg, at.starts[test.leg], t, p).end[: problem.dimension]
+    y = integrate_leg(problem.system, leg, at.starts[test.leg], t, p).end[: problem.dimension]
     other = (
         leg.mode[: guard.element] + ("-" if guard.side > 0 else "+") + leg.mode[guard.element + 1 :]
     )
@@ -250,11 +168,11 @@ def _grazed(
     return "grazing-sliding" if across > 0.0 else "grazing, escaping"
 
 
-def edited(
+def changed_itinerary(
     problem: BoundaryProblem, kind: str, conditions: Sequence[Condition], u: Array, p: Array
-) -> Edited | None:
+) -> ChangedItinerary | None:
     """The itinerary beyond a bifurcation; None where nothing continues it."""
-    found: Edited | None = Edited(problem, u, tuple(range(len(problem.legs))))
+    found: ChangedItinerary | None = ChangedItinerary(problem, u, tuple(range(len(problem.legs))))
     for condition in conditions:
         assert found is not None
         if condition.leg not in found.origin:
@@ -267,21 +185,23 @@ def edited(
     return found
 
 
-# more legs ---------------------------------------------------------------------------------------
+# added legs ---------------------------------------------------------------------------------------
 
 
-def _longer(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None:
-    chain, i = Chain(before.problem, before.u, before.origin), at.leg
+def _longer(
+    before: ChangedItinerary, kind: str, at: Condition, p: Array
+) -> ChangedItinerary | None:
+    editor, i = LegEditor(before.problem, before.u, before.origin), at.leg
     if kind in ("crossing-sliding", "switching-sliding"):
-        return _inserted(chain, kind, i, p)
+        return _inserted(editor, kind, i, p)
     if kind == "corner" and at.what == "start" and at.guard is not None:
-        return round_corner(chain, i, at.guard, p)
+        return round_corner(editor, i, at.guard, p)
     if at.guard is None or at.what != "interior" or kind == "grazing, escaping":
         return None
     problem = before.problem
-    leg, x, duration = chain.legs[i], chain.starts[i], chain.durations[i]
+    leg, x, duration = editor.legs[i], editor.starts[i], editor.durations[i]
     t = touching(problem.system, leg, at.guard, x, duration, p)
-    y = fly(problem.system, leg, x, t, p).end[: problem.dimension]
+    y = integrate_leg(problem.system, leg, x, t, p).end[: problem.dimension]
     added = _added(problem, leg, at.guard, kind, y, p)
     if added is None:
         return None
@@ -294,31 +214,31 @@ def _longer(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None
         shift[-1] = problem.advance(p)[0] if problem.forcing is not None else 0.0
         later = [state + shift for state in states[: len(legs) - 1]]
         v = whole.pack(np.array([states[-1], *later]), np.array(times))
-        return Edited(whole, v, (*[0, *[-1] * len(legs)][: len(legs) - 1], -2))
+        return ChangedItinerary(whole, v, (*[0, *[-1] * len(legs)][: len(legs) - 1], -2))
     for k, (new, start) in enumerate(zip([*between[1:], leg], states, strict=True)):
-        chain.insert(i + 1 + k, new, start)
-    chain.legs[i], chain.durations[i] = between[0], t
-    chain.durations[i + len(states)] = duration - t
-    return chain.done(*([i + 1] if len(states) > 1 else []))
+        editor.insert(i + 1 + k, new, start)
+    editor.legs[i], editor.durations[i] = between[0], t
+    editor.durations[i + len(states)] = duration - t
+    return editor.done(*([i + 1] if len(states) > 1 else []))
 
 
-def _inserted(chain: Chain, kind: str, i: int, p: Array) -> Edited:
+def _inserted(editor: LegEditor, kind: str, i: int, p: Array) -> ChangedItinerary:
     """A short leg between a crossing or entry and leg ``i``."""
-    system, k = chain.problem.system, (i - 1) % len(chain.legs)
-    before = chain.legs[k]
+    system, k = editor.problem.system, (i - 1) % len(editor.legs)
+    before = editor.legs[k]
     surface = surface_of(system, before)
-    flown = fly(system, before, chain.starts[k], chain.durations[k], p)
-    start = before.at_end(system, flown.end, p).after
+    flow = integrate_leg(system, before, editor.starts[k], editor.durations[k], p)
+    start = before.at_end(system, flow.end, p).after
     if kind == "crossing-sliding":
-        chain.legs[k] = replace(before, kind="entry")
+        editor.legs[k] = replace(before, kind="entry")
         slide = with_letter(before.mode, surface, "s")
         new = leg_between(system, slide, mode_after(before))
     else:
-        chain.legs[k] = replace(before, kind="crossing")
+        editor.legs[k] = replace(before, kind="crossing")
         far = with_letter(before.mode, surface, before.mode[surface].translate(TURNED))
         new = leg_between(system, far, with_letter(far, surface, "s"))
-    chain.insert(k + 1, new, start)
-    return chain.done(k + 1)
+    editor.insert(k + 1, new, start)
+    return editor.done(k + 1)
 
 
 def _added(
@@ -338,10 +258,12 @@ def _added(
     return None
 
 
-# fewer legs --------------------------------------------------------------------------------------
+# removed legs --------------------------------------------------------------------------------------
 
 
-def _shorter(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None:
+def _shorter(
+    before: ChangedItinerary, kind: str, at: Condition, p: Array
+) -> ChangedItinerary | None:
     if kind in ("impact grazing", "grazing of a reset"):
         return _missed(before, at.leg, p)
     if kind == "corner" and at.what == "duration":
@@ -350,51 +272,51 @@ def _shorter(before: Edited, kind: str, at: Condition, p: Array) -> Edited | Non
             return cut
     turned = _turned(before, at.leg, p)
     i = turned.origin.index(before.origin[at.leg])
-    chain = Chain(turned.problem, turned.u, turned.origin)
-    legs = chain.legs
+    editor = LegEditor(turned.problem, turned.u, turned.origin)
+    legs = editor.legs
     if i == 0:
         return None
     if kind in ("crossing-sliding", "switching-sliding"):
         became = "crossing" if kind == "crossing-sliding" else "entry"
         guard = _start_guard(turned.problem, legs, i)
         legs[i - 1] = replace(legs[i - 1], kind=became)
-        chain.remove(i)
-        return chain.done(test=Condition("start", i % len(legs), guard))
+        editor.remove(i)
+        return editor.done(test=Condition("start", i % len(legs), guard))
     if kind in ("grazing-sliding", "adding-sliding") and at.what == "duration":
         if len(legs) == 2:
-            return _smooth(chain, p)
+            return _smooth(editor, p)
         if i + 1 == len(legs):
             return None
         guard = _guard(turned.problem, legs[i - 1])
         legs[i - 1] = replace(legs[i + 1], mode=legs[i - 1].mode)
-        chain.durations[i - 1] += chain.durations[i] + chain.durations[i + 1]
-        chain.remove(i + 1)
-        chain.remove(i)
-        return chain.done(test=Condition("interior", i - 1, guard))
-    return swapped(chain, i) if kind == "corner" and at.what == "duration" else None
+        editor.durations[i - 1] += editor.durations[i] + editor.durations[i + 1]
+        editor.remove(i + 1)
+        editor.remove(i)
+        return editor.done(test=Condition("interior", i - 1, guard))
+    return swapped(editor, i) if kind == "corner" and at.what == "duration" else None
 
 
-def _missed(before: Edited, i: int, p: Array) -> Edited:
+def _missed(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary:
     """An impact or reset that is only touched, left out."""
     count = len(before.problem.legs)
     turned = rotated(before, i, p) if i + 1 == count > 1 else before
     i = 0 if turned is not before else i
-    chain = Chain(turned.problem, turned.u, turned.origin)
+    editor = LegEditor(turned.problem, turned.u, turned.origin)
     if count == 1:
-        return _smooth(chain, p)
-    guard = _guard(turned.problem, chain.legs[i])
-    chain.legs[i] = replace(chain.legs[i + 1], mode=chain.legs[i].mode)
-    chain.durations[i] += chain.durations[i + 1]
-    chain.remove(i + 1)
-    return chain.done(test=Condition("interior", i, guard))
+        return _smooth(editor, p)
+    guard = _guard(turned.problem, editor.legs[i])
+    editor.legs[i] = replace(editor.legs[i + 1], mode=editor.legs[i].mode)
+    editor.durations[i] += editor.durations[i + 1]
+    editor.remove(i + 1)
+    return editor.done(test=Condition("interior", i, guard))
 
 
-def _smooth(chain: Chain, p: Array) -> Edited:
-    """An orbit that no event is left of: its one leg gets a phase condition."""
-    problem, leg, period = chain.problem, chain.legs[0], sum(chain.durations)
+def _smooth(editor: LegEditor, p: Array) -> ChangedItinerary:
+    """An orbit left without events: its one leg gets a phase condition."""
+    problem, leg, period = editor.problem, editor.legs[0], sum(editor.durations)
     guard, n = _guard(problem, leg), problem.dimension
     # away from where it touches, which is to be inside the leg
-    start = fly(problem.system, leg, chain.starts[0], 0.4 * period, p).end[:n]
+    start = integrate_leg(problem.system, leg, editor.starts[0], 0.4 * period, p).end[:n]
     phase = np.zeros(n)
     if problem.system.time_dependent:
         phase[-1] = 1.0
@@ -403,7 +325,7 @@ def _smooth(chain: Chain, p: Array) -> Edited:
         phase = rate / np.linalg.norm(rate)
     whole = replace(problem, legs=(Leg(leg.mode),), phase=phase, reference=start.copy())
     u = whole.pack(np.array([start]), np.array([period]))
-    return Edited(whole, u, (chain.origin[0],), Condition("interior", 0, guard).name)
+    return ChangedItinerary(whole, u, (editor.origin[0],), Condition("interior", 0, guard).name)
 
 
 def _guard(problem: BoundaryProblem, leg: Leg) -> Guard:
@@ -429,9 +351,91 @@ def _start_guard(problem: BoundaryProblem, legs: Sequence[Leg], i: int) -> Guard
 # shared ------------------------------------------------------------------------------------------
 
 
-def _turned(before: Edited, i: int, p: Array) -> Edited:
+def _turned(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary:
     """The same orbit from another leg, so that leg ``i`` has neighbours on both sides."""
     count = len(before.problem.legs)
     if 0 < i < count - 1 or (count == 2 and i == 1) or count == 1:
         return before
     return rotated(before, 1 if count == 2 else (i - 1) % count, p)
+
+
+# Itineraries next to a corner, where two events occur at one time.
+
+#: Legs that are shorter than this part of the orbit vanish.
+_SHORT = 1e-7
+
+
+def swapped(editor: LegEditor, i: int) -> ChangedItinerary | None:
+    """Two events at one time in the other order."""
+    system, (first, second) = editor.problem.system, editor.legs[i - 1 : i + 1]
+    a, b = surface_of(system, first), surface_of(system, second)
+    if a < 0 or b < 0 or a == b:
+        return None
+    between = with_letter(first.mode, b, mode_after(second)[b])
+    editor.legs[i - 1] = leg_between(system, first.mode, between)
+    editor.legs[i] = leg_between(system, between, with_letter(between, a, second.mode[a]))
+    return editor.done(i)
+
+
+def round_corner(editor: LegEditor, i: int, guard: Guard, p: Array) -> ChangedItinerary | None:
+    """A second surface is crossed before the crossing that leads to leg ``i``, and back after it."""
+    system, k = editor.problem.system, (i - 1) % len(editor.legs)
+    before, far = editor.legs[k], guard.element
+    if guard.kind != "surface" or before.kind != "crossing":
+        return None
+    flow = integrate_leg(system, before, editor.starts[k], editor.durations[k], p)
+    start = before.at_end(system, flow.end, p).after
+    turned = before.mode[far].translate(TURNED)
+    modes = [before.mode, with_letter(before.mode, far, turned)]
+    modes += [with_letter(mode_after(before), far, turned), mode_after(before)]
+    legs = [leg_between(system, a, b) for a, b in pairwise(modes)]
+    editor.legs[k] = legs[0]
+    editor.insert(k + 1, legs[1], start)
+    editor.insert(k + 2, legs[2], start)
+    return editor.done(k + 1, k + 2)
+
+
+def cut_corner(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | None:
+    """Two short legs beyond a second surface, left out; None where there are no such two."""
+    system, count = before.problem.system, len(before.problem.legs)
+    durations = before.problem.split(before.u)[1]
+    short = [
+        j for j in ((i + 1) % count, (i - 1) % count) if durations[j] < _SHORT * sum(durations)
+    ]
+    if count < 4 or not short:
+        return None
+    turned = rotated(before, ((i if short[0] == (i + 1) % count else short[0]) - 1) % count, p)
+    editor = LegEditor(turned.problem, turned.u, turned.origin)
+    first, between, last = editor.legs[:3]
+    far, own = surface_of(system, first), surface_of(system, between)
+    crossed = all(leg.kind == "crossing" for leg in (first, between, last))
+    if not crossed or surface_of(system, last) != far or own == far:
+        return None
+    editor.legs[0] = leg_between(system, first.mode, mode_after(last))
+    editor.remove(2)
+    editor.remove(1)
+    guards = guarded_field(system, mode_after(last)).motion.guards
+    guard = next(g for g in guards if g.kind == "surface" and g.element == far)
+    return editor.done(test=Condition("start", 1, guard))
+
+
+# Guesses for an orbit with new short legs.
+
+
+def grown(problem: BoundaryProblem, u: Array, p: Array, fresh: Sequence[int], by: float) -> Array:
+    """Unknowns near an orbit whose legs ``fresh`` last for ``by``."""
+    # A leg that is added inside a slide begins before the point where the slide touched its boundary
+    # and ends after it: h = L11 t^2/2 + L111 t^3/6 with an exit at -t/3 of a leg of the duration t.
+    starts, durations = (np.array(part) for part in problem.split(u))
+    legs = problem.legs
+    for i in fresh:
+        durations[i] = by
+        added = 0 < i < len(legs) - 1 and legs[i].kind == "entry" and legs[i - 1].kind == "exit"
+        if not added or durations[i - 1] < by or durations[i + 1] < by:
+            continue
+        durations[i - 1] -= by / 3
+        durations[i + 1] -= 2 * by / 3
+        for k in (i - 1, i):
+            flow = integrate_leg(problem.system, legs[k], starts[k], float(durations[k]), p)
+            starts[k + 1] = flow.end[: problem.dimension]
+    return problem.pack(starts, durations)

@@ -188,9 +188,9 @@ class _Around:
 
     def _returning(self, at: Evaluation) -> tuple[Array, Array]:
         """The condition, for an orbit without events, of its return to its plane, and the derivative."""
-        problem, flown = self.problem, at.flown[0]
+        problem, flow = self.problem, at.by_leg[0]
         assert problem.phase is not None and problem.reference is not None
-        back = problem.wrap @ flown.end[: problem.dimension] - problem.reference
+        back = problem.wrap @ flow.end[: problem.dimension] - problem.reference
         back[-1] -= problem.advance(self.p)[0]
         gap = float(problem.phase @ back)
-        return np.array([gap]), np.array([[at.flight.gradient[0] @ flown.rate]])
+        return np.array([gap]), np.array([[at.flows.gradient[0] @ flow.rate]])

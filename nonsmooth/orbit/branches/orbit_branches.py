@@ -36,8 +36,8 @@ from ...solvers.newton import converge
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, eliminated
 from ..periodic.multipliers import leg_maps, return_map
 from ..periodic.orbit import PeriodicOrbit, faults_of, named
-from ..periodic.symmetry import halves, mirrored, once_round, require_symmetric
-from ..runs.legs import Leg, fly
+from ..periodic.symmetry import halves, mirrored, prime_period, require_symmetric
+from ..runs.legs import Leg, integrate_leg
 from .branch import (
     Branch,
     BranchCurve,
@@ -50,7 +50,7 @@ from .branch import (
 from .conditions import Condition, condition_row, conditions_of, is_smooth, minima
 from .family_ends import extent, hopf_point, surface_end
 from .homoclinic_curves import homoclinic_end
-from .itinerary_changes import Edited, edited, grown, kind_of
+from .itinerary_changes import ChangedItinerary, changed_itinerary, grown, kind_of
 from .normal_forms import normal_form, torus_pair
 from .unfoldings import contact_at, contact_numbers, far_side, touched
 
@@ -161,7 +161,7 @@ class OrbitCurve(OrbitEquations):
         found = conditions_of(self.problem, at, p, self.known)
         if self._on_plane:  # the flow across the plane on which the orbit starts
             assert self.problem.phase is not None
-            found["Hopf"] = float(self.problem.phase @ at.flown[0].rate[: self.problem.dimension])
+            found["Hopf"] = float(self.problem.phase @ at.by_leg[0].rate[: self.problem.dimension])
         return found
 
     def restart(self, u: Array) -> None:
@@ -206,7 +206,7 @@ class OrbitCurve(OrbitEquations):
     def _across(self, u: Array) -> float:
         """Cosine of the angle between the flow at the start and the normal of the plane."""
         assert self.problem.phase is not None
-        rate = self.evaluation(u).flown[0].rate[: self.problem.dimension]
+        rate = self.evaluation(u).by_leg[0].rate[: self.problem.dimension]
         return float(self.problem.phase @ rate) / (float(np.linalg.norm(rate)) or 1.0)
 
     def point(self, u: Array, before: Array, chord: Array, arclength: float) -> Point | None:
@@ -219,7 +219,7 @@ class OrbitCurve(OrbitEquations):
         """Renew the plane of an orbit without events where it is oblique to the flow."""
         if not self._on_plane or self._across(u) > _OBLIQUE:
             return None
-        rate = self.evaluation(u).flown[0].rate[: self.problem.dimension]
+        rate = self.evaluation(u).by_leg[0].rate[: self.problem.dimension]
         self.restart(u)
         ahead = tangent * self.scale  # without the component along the orbit
         ahead[: rate.size] -= float(rate @ ahead[: rate.size]) / float(rate @ rate) * rate
@@ -379,7 +379,7 @@ class OrbitCurve(OrbitEquations):
         """The Hopf point of the equilibrium to which the orbit shrinks."""
         u, leg = zero.point.u, self.problem.legs[0]
         p, (starts, durations) = self.parameters_at(u), self.problem.split(u)
-        opposite = fly(self.system, leg, starts[0], 0.5 * float(durations[0]), p).end
+        opposite = integrate_leg(self.system, leg, starts[0], 0.5 * float(durations[0]), p).end
         n = self.system.dimension
         middle = 0.5 * (starts[0] + opposite[: self.problem.dimension])[:n]
         found = hopf_point(self.system, leg.mode, middle, p, self.free[-1])
@@ -390,9 +390,11 @@ class OrbitCurve(OrbitEquations):
         numbers = ReadOnly({"frequency": found[2]})
         return replace(event, parameter=found[1], coefficients=numbers)
 
-    def _edited(self, kind: str, conditions: list[Condition], u: Array, p: Array) -> Edited | None:
+    def _edited(
+        self, kind: str, conditions: list[Condition], u: Array, p: Array
+    ) -> ChangedItinerary | None:
         try:
-            return edited(self.problem, kind, conditions, u[: self.problem.size], p)
+            return changed_itinerary(self.problem, kind, conditions, u[: self.problem.size], p)
         except NonsmoothError:
             return None  # no itinerary with such modes
 
@@ -517,7 +519,7 @@ Located = tuple[str, OrbitCurve, Point, str, FarSide]
 def _as_doubling(curve: OrbitCurve, zero: Zero) -> Located | None:
     """Recognise a branch point as the period doubling of an orbit of half the period."""
     u, p = zero.point.u, curve.parameters_at(zero.point.u)
-    problem, once = once_round(curve.problem, u[: curve.problem.size], p)
+    problem, once = prime_period(curve.problem, u[: curve.problem.size], p)
     whole = float(curve.problem.split(u)[1].sum())
     if round(whole / float(problem.split(once)[1].sum())) != 2:
         return None
@@ -636,7 +638,7 @@ def _beginnings(
     y = variational_field(system, problem.legs[i].mode).states_at(at.starts[i], p)
     order = 2 if problem.legs[i - 1].kind == "crossing" else 1
     before = at.events[i - 1]
-    rate = at.flown[i - 1].rate[: before.gradient.size]
+    rate = at.by_leg[i - 1].rate[: before.gradient.size]
     return {
         "cusp with the other sliding bifurcation": float(field.jets(y, p)[1][k, order]),
         "two-fold": float(before.gradient @ rate),
@@ -753,11 +755,9 @@ def _alternating(curve: OrbitCurve, u: Array) -> tuple[Array, Array]:
     values, vectors = np.linalg.eig(whole)
     d = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
     changes, times = [], []
-    for step, flown, event in zip(maps, at.flown, at.events, strict=True):
+    for step, flow, event in zip(maps, at.by_leg, at.events, strict=True):
         changes.append(d)
-        times.append(
-            -float(event.gradient @ flown.by_start @ d) / float(event.gradient @ flown.rate)
-        )
+        times.append(-float(event.gradient @ flow.by_start @ d) / float(event.gradient @ flow.rate))
         d = step @ d
     return np.array(changes), np.array(times)
 

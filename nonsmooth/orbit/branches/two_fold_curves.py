@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...local.point.surface_point import Place, place
+from ...local.point.surface_point import LocalSurface, surface_at
 from ...local.searches.find_two_fold import TwoFold, search_two_fold
 from ...local.searches.search import unknowns
 from ...model import (
@@ -121,7 +121,7 @@ def trace_two_folds(
     for value in numbers:
         given = _given(parameters, {} if state else {name: value})
         last = folds[-1].point if folds else start
-        where, x = place(system, last, given, t, surface, mode)
+        where, x = surface_at(system, last, given, t, surface, mode)
         x = x.copy()
         if state:
             x[system.state_names.index(name)] = value
@@ -160,7 +160,7 @@ def _given(parameters: Parameters | None, changed: dict[str, float]) -> dict[str
 class TwoFoldCurve(Curve):
     """h = L1 = L2 = 0 in three states and a parameter, or a fourth state, for continuation."""
 
-    def __init__(self, where: Place, x: Array, free: Sequence[int], name: str):
+    def __init__(self, where: LocalSurface, x: Array, free: Sequence[int], name: str):
         names = where.system.state_names
         self.where, self.x, self.free = where, x, list(free)
         self.state = names.index(name) if name in names else -1

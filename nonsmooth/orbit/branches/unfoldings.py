@@ -21,10 +21,10 @@ from ...model.derivatives.event_maps import surface_map
 from ...model.derivatives.higher_derivatives import contact_expansion, guard_rate_gradient
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import leg_maps, return_map
-from ..runs.legs import Leg, fly
+from ..runs.legs import Leg, integrate_leg
 from .branch import FarSide
 from .conditions import Condition, touching
-from .itinerary_changes import Edited
+from .itinerary_changes import ChangedItinerary
 
 #: Sine of the angle between orbit and surface below which an event is a grazing.
 _TANGENT = 1e-6
@@ -51,7 +51,7 @@ def far_side(
     at: Evaluation,
     p: Array,
     itinerary: str,
-    beyond: Edited | None = None,
+    beyond: ChangedItinerary | None = None,
 ) -> FarSide:
     """Classify an event."""
     try:
@@ -163,9 +163,9 @@ def impact_numbers(
 
 def _require_one_touch(at: Evaluation) -> None:
     """Raise if an event is grazed too, as where a symmetric orbit touches two points."""
-    for event, flown in zip(at.events, at.flown, strict=True):
-        speed = abs(float(event.gradient @ flown.rate))
-        size = float(np.linalg.norm(event.gradient) * np.linalg.norm(flown.rate))
+    for event, flow in zip(at.events, at.by_leg, strict=True):
+        speed = abs(float(event.gradient @ flow.rate))
+        size = float(np.linalg.norm(event.gradient) * np.linalg.norm(flow.rate))
         if size and speed < _TANGENT * size:
             raise DegenerateError("another event is grazed at the same orbit")
 
@@ -176,10 +176,12 @@ def touched(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     assert guard is not None
     x, duration = at.starts[i], float(at.durations[i])
     t = touching(problem.system, problem.legs[i], guard, x, duration, p)
-    return fly(problem.system, problem.legs[i], x, t, p).end[: problem.dimension]
+    return integrate_leg(problem.system, problem.legs[i], x, t, p).end[: problem.dimension]
 
 
-def _orders(problem: BoundaryProblem, at: Evaluation, beyond: Edited, p: Array) -> dict[str, float]:
+def _orders(
+    problem: BoundaryProblem, at: Evaluation, beyond: ChangedItinerary, p: Array
+) -> dict[str, float]:
     """Determinants at a corner: o with the order of events before it, i with the other one."""
     maps, first = leg_maps(problem, at), beyond.origin[0]
     outside, n = np.eye(problem.dimension), problem.dimension
@@ -202,10 +204,10 @@ def _around(
     assert guard is not None
     leg, x, duration = problem.legs[i], at.starts[i], float(at.durations[i])
     t = touching(system, leg, guard, x, duration, p)
-    first = fly(system, leg, x, t, p)
+    first = integrate_leg(system, leg, x, t, p)
     across = np.eye(n) - np.outer(own, section) / float(section @ own)
     maps = leg_maps(problem, at)
-    rest = fly(system, leg, first.end[:n], duration - t, p)
+    rest = integrate_leg(system, leg, first.end[:n], duration - t, p)
     if not leg.timed:
         event = at.events[i]
         speed = float(event.gradient @ rest.rate)

@@ -40,7 +40,7 @@ from ...model.derivatives.variational import variational_field
 from ..periodic.orbit import named
 from ..periodic.orbit_run import OrbitLeg, orbit_leg
 from ..runs.guards import watch
-from ..runs.legs import Flown, Leg, fly
+from ..runs.legs import Leg, LegFlow, integrate_leg
 
 
 class Loop(ABC):
@@ -133,45 +133,43 @@ class Loop(ABC):
         """Sizes of the unknowns between the durations and the parameters."""
         return np.zeros(0)
 
-    def chain(self, u: Array, values: Array, jacobian: Array, row: int) -> tuple[int, Flown]:
+    def chain(self, u: Array, values: Array, jacobian: Array, row: int) -> tuple[int, LegFlow]:
         """Fill the rows of the chain of legs; return the next row and the end of the last leg."""
         starts, durations = self.split(u)
         p, free, n = self.parameters_at(u), list(self.free), self.system.dimension
-        count, k, flown = len(self.legs), len(free), None
+        count, k, flow = len(self.legs), len(free), None
         self.iterations += 1
         for i, leg in enumerate(self.legs):
-            flown = fly(self.system, leg, starts[i], float(durations[i]), p, self.free)
+            flow = integrate_leg(self.system, leg, starts[i], float(durations[i]), p, self.free)
             if i + 1 == count:
                 break
             own, time, rows = slice(i * n, (i + 1) * n), count * n + i, slice(row, row + n)
             held = self.held[i]
             if held is not None:
-                values[rows] = flown.end - starts[i + 1]
-                jacobian[rows, own], jacobian[rows, time] = flown.by_start, flown.rate
+                values[rows] = flow.end - starts[i + 1]
+                jacobian[rows, own], jacobian[rows, time] = flow.by_start, flow.rate
                 jacobian[rows, (i + 1) * n : (i + 2) * n] = -np.eye(n)
-                jacobian[rows, -k:] = flown.by_parameters
+                jacobian[rows, -k:] = flow.by_parameters
                 values[row + n], jacobian[row + n, time] = durations[i] - held, 1.0
                 if held == 0.0:
                     values[row + n] -= durations[i + 1]
                     jacobian[row + n, time + 1] = -1.0
                 row += n + 1
                 continue
-            at = leg.at_end(self.system, flown.end, p)
+            at = leg.at_end(self.system, flow.end, p)
             values[rows] = at.after - starts[i + 1]
-            jacobian[rows, own] = at.after_state @ flown.by_start
-            jacobian[rows, time] = at.after_state @ flown.rate
+            jacobian[rows, own] = at.after_state @ flow.by_start
+            jacobian[rows, time] = at.after_state @ flow.rate
             jacobian[rows, (i + 1) * n : (i + 2) * n] = -np.eye(n)
-            jacobian[rows, -k:] = (
-                at.after_state @ flown.by_parameters + at.after_parameters[:, free]
-            )
+            jacobian[rows, -k:] = at.after_state @ flow.by_parameters + at.after_parameters[:, free]
             row += n
             values[row] = at.value
-            jacobian[row, own] = at.gradient @ flown.by_start
-            jacobian[row, time] = at.gradient @ flown.rate
-            jacobian[row, -k:] = at.gradient @ flown.by_parameters + at.by_parameters[free]
+            jacobian[row, own] = at.gradient @ flow.by_start
+            jacobian[row, time] = at.gradient @ flow.rate
+            jacobian[row, -k:] = at.gradient @ flow.by_parameters + at.by_parameters[free]
             row += 1
-        assert flown is not None
-        return row, flown
+        assert flow is not None
+        return row, flow
 
     def described(self, u: Array) -> tuple[tuple[OrbitLeg, ...], tuple[str, ...]]:
         """The legs with their numbers, and the guards that they violate."""
@@ -324,7 +322,7 @@ class SaddleLoop(Loop):
     def prolonged(self, u: Array, wait: float, far: float) -> tuple[SaddleLoop, Array]:
         """The orbit with one more part of the duration ``wait``, ending at ``far`` from the saddle."""
         (starts, durations), p = self.split(u), self.parameters_at(u)
-        last = fly(self.system, self.legs[-1], starts[-1], float(durations[-1]), p).end
+        last = integrate_leg(self.system, self.legs[-1], starts[-1], float(durations[-1]), p).end
         held = (*self.held[:-1], float(durations[-1]), None)
         legs = (*self.legs, self.legs[-1])
         point = self.spectrum(p).point
@@ -344,10 +342,10 @@ class SaddleLoop(Loop):
             values[row], jacobian[row, :n] = at.value, at.gradient
             jacobian[row, -k:] = at.by_parameters[list(self.free)]
             row += 1
-        row, flown = self.chain(u, values, jacobian, row)
+        row, flow = self.chain(u, values, jacobian, row)
         last = len(self.legs) - 1
         ends = [(first, True, np.eye(n), slice(0, n))]
-        ends.append((flown.end, False, flown.by_start, slice(last * n, (last + 1) * n)))
+        ends.append((flow.end, False, flow.by_start, slice(last * n, (last + 1) * n)))
         here = self.spectrum(p)
         if np.abs(here.point - self._at).max() < self.near + self.far:
             self._at = here.point
@@ -360,8 +358,8 @@ class SaddleLoop(Loop):
                 change = self._at_end(high, x, begins)[0] - self._at_end(low, x, begins)[0]
                 jacobian[rows, u.size - k + j] = change / width
             if not begins:
-                jacobian[rows, len(self.legs) * n + last] = by_x @ flown.rate
-                jacobian[rows, -k:] += by_x @ flown.by_parameters
+                jacobian[rows, len(self.legs) * n + last] = by_x @ flow.rate
+                jacobian[rows, -k:] += by_x @ flow.by_parameters
             row += found.size
         return values, jacobian
 
@@ -466,13 +464,13 @@ class PseudoSaddleLoop(Loop):
             e = condition(self.split(u)[0][0], p)
             values[row], jacobian[row, :n] = e.value, e.gradient
             jacobian[row, -k:] = e.by_parameters[free]
-        row, flown = self.chain(u, values, jacobian, 2)
+        row, flow = self.chain(u, values, jacobian, 2)
         rows = slice(row, row + n)
-        values[rows] = flown.end - at
-        jacobian[rows, last * n : (last + 1) * n] = flown.by_start
-        jacobian[rows, len(self.legs) * n + last] = flown.rate
+        values[rows] = flow.end - at
+        jacobian[rows, last * n : (last + 1) * n] = flow.by_start
+        jacobian[rows, len(self.legs) * n + last] = flow.rate
         jacobian[rows, place : place + n] = -np.eye(n)
-        jacobian[rows, -k:] = flown.by_parameters
+        jacobian[rows, -k:] = flow.by_parameters
         row += n
         e = surface_map(self.system, 0)(at, p)
         values[row], jacobian[row, place : place + n] = e.value, e.gradient

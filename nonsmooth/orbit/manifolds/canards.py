@@ -27,7 +27,7 @@ from ...flow.options import Tolerances
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
 from ...local.point.regions import coincide
-from ...local.point.surface_point import Numbers, Place
+from ...local.point.surface_point import LocalSurface, Numbers
 from ...model import Array, OptionError, Surfaces, motion
 
 #: Relative time at which a path along an eigenline begins, and relative L2 - L1 at which one of a node
@@ -59,7 +59,7 @@ class Path:
 class Slider:
     """Follows the sliding flow of one surface to the end of its region."""
 
-    where: Place
+    where: LocalSurface
     surfaces: Surfaces
     t_end: float
     tolerances: Tolerances

@@ -24,7 +24,7 @@ from ...flow.follow import follow
 from ...flow.saving import Savable, savable
 from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
-from ...local.point.surface_point import Numbers, place
+from ...local.point.surface_point import Numbers, surface_at
 from ...local.searches.find_two_fold import TwoFold
 from ...model import (
     Array,
@@ -540,7 +540,7 @@ class EventPassages:
 
     def numbers(self, x: Array, t: float = 0.0) -> Numbers:
         """h, L1, L2 and their gradients at a state."""
-        where, extended = place(self.system, x, self.parameters, t)
+        where, extended = surface_at(self.system, x, self.parameters, t)
         return where.at(extended)
 
     def passage(self, u: Array, itinerary: str) -> Passage:

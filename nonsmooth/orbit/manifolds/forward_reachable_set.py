@@ -19,7 +19,7 @@ from ...flow.simulate import simulate
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
 from ...local import TwoFold, find_two_fold
-from ...local.point.surface_point import Numbers, Place, place
+from ...local.point.surface_point import LocalSurface, Numbers, surface_at
 from ...model import (
     Array,
     FilippovSystem,
@@ -280,7 +280,7 @@ class _Sampler:
         self.tolerances = tolerances
         self.x = self.system.extended_point(past.x[-1], self.t)
         self.surfaces = Surfaces(self.system)
-        self.where = self._place()
+        self.where = self._surface()
         self.slider = Slider(self.where, self.surfaces, t_end, tolerances)
         self.members: list[Trajectory] = []
         self.departures: list[Departure] = []
@@ -316,7 +316,7 @@ class _Sampler:
             past=self.past if len(self.past.t) > 1 else None,
         )
 
-    def _place(self) -> Place:
+    def _surface(self) -> LocalSurface:
         """The one surface through the point."""
         parameters = self.past.parameters
         p = self.system.parameter_vector(parameters)
@@ -333,7 +333,7 @@ class _Sampler:
                 f"point {self.x.tolist()} has {kind}. Choose a continuation with simulate(start_mode=...)."
             )
         n = self.system.dimension
-        where, _ = place(self.system, self.x[:n], parameters, self.t, int(active[0]))
+        where, _ = surface_at(self.system, self.x[:n], parameters, self.t, int(active[0]))
         return where
 
     def _two_fold(self) -> TwoFold:

@@ -20,7 +20,7 @@ from ...flow.status import Status
 from ...flow.trajectory import Trajectory
 from ...local import Equilibrium, Fold, FoldFold, PseudoEquilibrium
 from ...local.point.regions import Region
-from ...local.point.surface_point import place
+from ...local.point.surface_point import surface_at
 from ...local.searches.find_two_fold import TwoFold
 from ...model import (
     Array,
@@ -38,7 +38,7 @@ from ...model import (
 )
 from ..periodic.multipliers import leg_maps
 from ..periodic.orbit import PeriodicOrbit
-from ..runs.legs import fly
+from ..runs.legs import integrate_leg
 from .canards import Slider, paths_from
 from .dividing_surfaces import DividingCurves, dividing_curves, plane_of, read_begin, require_event
 
@@ -266,15 +266,15 @@ def _direction(orbit: PeriodicOrbit, stable: bool) -> tuple[float, Array, Array,
     for step in maps[:best]:
         v = step @ v
     p, half = orbit.parameter_vector, 0.5 * float(at.durations[best])
-    flown = fly(orbit.system, problem.legs[best], at.starts[best], half, p)
-    v = flown.by_start[:n] @ v
-    return float(values[outside][0].real), flown.end[:n], v / np.linalg.norm(v), orbit.period
+    flow = integrate_leg(orbit.system, problem.legs[best], at.starts[best], half, p)
+    v = flow.by_start[:n] @ v
+    return float(values[outside][0].real), flow.end[:n], v / np.linalg.norm(v), orbit.period
 
 
 def _canard_curve(fold: TwoFold, follower: Follower, stable: bool) -> Callable[[float], Array]:
     """The canard of a two-fold in attracting (or repelling) sliding, by a parameter in [0, 1]."""
     system = reversed_system(follower.system) if stable else follower.system
-    where, s = place(system, fold.point, follower.parameters)
+    where, s = surface_at(system, fold.point, follower.parameters)
     surfaces = Surfaces(system)
     speed = max(float(np.linalg.norm(f)) for f in where.at(s).fields) or 1.0
     span = 20.0 * follower.length / speed

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ...flow import Status, follow
-from ...local.point.surface_point import SIDES, place
+from ...local.point.surface_point import SIDES, surface_at
 from ...local.scans.surface_scan import SurfaceScan
 from ...local.searches.find_two_fold import TwoFold
 from ...local.searches.pseudo_equilibria import PseudoEquilibrium, sliding_matrix
@@ -109,7 +109,7 @@ class SlidingOrbits:
     def manifolds(self, found: PseudoEquilibrium) -> Iterator[Array]:
         """Manifolds (m, 2) of a saddle of the sliding flow, in the direction of time; else nothing."""
         scan = self.scan
-        where, x = place(scan.where.system, found.point, scan.where.values)
+        where, x = surface_at(scan.where.system, found.point, scan.where.values)
         matrix, basis = sliding_matrix(where.at(x), where.jacobians(x))
         values, vectors = np.linalg.eig(matrix)
         if np.any(np.imag(values)) or not values[0] * values[1] < 0:

@@ -23,9 +23,9 @@ import numpy as np
 from ...flow.follow import follow
 from ...flow.names import event_name
 from ...flow.status import Status
-from ...local.point.surface_point import place
+from ...local.point.surface_point import surface_at
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem, Parameters, evaluator
-from ..runs.legs import Leg, fly
+from ..runs.legs import Leg, integrate_leg
 
 #: Distance from the two-fold at which sliding orbits begin, relative to the size of the problem; the
 #: error is of second order.
@@ -59,7 +59,7 @@ class TwoFoldSheet:
         self, system: FilippovSystem, fold: Array, size: float, parameters: Parameters | None = None
     ):
         self.system, self.size, self.fold = system, size, fold
-        self.where, _ = place(system, fold, parameters)
+        self.where, _ = surface_at(system, fold, parameters)
         self.parameters = self.where.parameters
         self._values = self.where.values
         self.root = self._root(fold)
@@ -109,9 +109,9 @@ class TwoFoldSheet:
         """The point of the sheet a duration before a two-fold; derivatives by both."""
         e, by_fold = self._direction(fold)
         start = fold + self.distance * e
-        flown = fly(self.system, Leg("s"), start, -duration, self.parameters)
+        flow = integrate_leg(self.system, Leg("s"), start, -duration, self.parameters)
         turn = np.eye(fold.size) + self.distance * by_fold
-        return flown.end, flown.by_start @ turn, -flown.rate
+        return flow.end, flow.by_start @ turn, -flow.rate
 
     def guess(self, point: Array, leaves: Array, duration: float) -> Meeting:
         """A first meeting, from an orbit that slides from a point and leaves close to a two-fold."""

@@ -1,4 +1,4 @@
-"""The boundary value problem of a periodic orbit with a fixed itinerary.
+"""Boundary value problem of a periodic orbit with a fixed itinerary: residual, Jacobian, elimination.
 
 Unknowns are the start x_i (extended by the time where the system depends on it) and the duration T_i of
 every leg. With the flow phi of the leg's mode, its event e_i and reset g_i,
@@ -9,8 +9,7 @@ and the last leg leads back to the first: R g_N - d - x_1 = 0, where R is a symm
 d advances the time of a forced system. The Jacobian holds plain variational matrices; saltation appears
 by itself when the durations are eliminated.
 
-Nothing here asks whether the guards agree: a solution may be virtual, and branches pass through such
-points smoothly. Source: Dercole & Kuznetsov 2005 (SlideCont), Thota & Dankowicz 2008 (TC-HAT), with Taylor
+Guards are not checked here: a solution may be virtual, and branches pass through such points smoothly. Source: Dercole & Kuznetsov 2005 (SlideCont), Thota & Dankowicz 2008 (TC-HAT), with Taylor
 legs in place of collocation.
 """
 
@@ -29,12 +28,12 @@ from ...flow.fixed import TOLERANCE
 from ...model import Array, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, surface_map
 from ...model.derivatives.forcing import Forcing
-from ..runs.flight import Flight, Flights, flights_of
-from ..runs.legs import Flown, Leg, fly, surface_of
+from ..runs.leg_integration import LegFlows, LegIntegrator, leg_integrator
+from ..runs.legs import Leg, LegFlow, integrate_leg, surface_of
 
 
-class Places(NamedTuple):
-    """Where the equations of legs are in their matrix (m, m + q), row after row.
+class JacobianIndices(NamedTuple):
+    """Flat indices of the legs' equations in their matrix (m, m + q).
 
     Attributes
     ----------
@@ -51,24 +50,24 @@ class Places(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def places_of(count: int, n: int, q: int = 0) -> Places:
-    """The places for so many legs of n states, with q parameters."""
+def jacobian_indices(count: int, n: int, q: int = 0) -> JacobianIndices:
+    """Indices for ``count`` legs of n states, with q parameters."""
     size = count * (n + 1)
-    places = np.arange(size * (size + q)).reshape(size, size + q)
+    indices = np.arange(size * (size + q)).reshape(size, size + q)
     rows = np.arange(count * n).reshape(count, n)
     times = np.arange(count * n, size)[:, None]
     more = np.broadcast_to(np.arange(size, size + q), (count, q))
     own, columns = np.hstack([rows, times]), np.hstack([rows, times, more])
     next_leg = np.roll(np.arange(count), -1)
-    return Places(
-        places[own[:, :, None], columns[:, None, :]], places[rows, rows[next_leg]], next_leg
+    return JacobianIndices(
+        indices[own[:, :, None], columns[:, None, :]], indices[rows, rows[next_leg]], next_leg
     )
 
 
 #: Up to so many unknowns a dense solution is faster than elimination from leg to leg.
 _DENSE = 80
 
-#: Up to so many legs the states where they start do not tell the size of the orbit.
+#: Up to so many legs the states where they start do not determine the size of the orbit.
 _FEW = 4
 
 
@@ -81,7 +80,7 @@ class Evaluation:
     residual : ndarray (m,)
     whole : ndarray (m, m + q)
         Derivatives by the unknowns, then by the chosen parameters.
-    flight : Flight
+    flows : LegFlows
         The legs, with the events at their ends; for a leg without an event the identity and the phase
         condition.
     starts : ndarray (N, n)
@@ -90,7 +89,7 @@ class Evaluation:
 
     residual: Array
     whole: Array
-    flight: Flight
+    flows: LegFlows
     starts: Array
     durations: Array
 
@@ -105,14 +104,14 @@ class Evaluation:
         return self.whole[:, len(self.whole) :]
 
     @property
-    def flown(self) -> tuple[Flown, ...]:
+    def by_leg(self) -> tuple[LegFlow, ...]:
         """Leg by leg."""
-        return self.flight.flown
+        return self.flows.by_leg
 
     @property
     def events(self) -> tuple[AtEvent, ...]:
         """Event by event."""
-        return self.flight.events
+        return self.flows.events
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,27 +211,31 @@ class BoundaryProblem:
         Raises
         ------
         ConvergenceError, DegenerateError
-            A leg cannot be flown.
+            A leg cannot be integrated.
         """
         starts, durations = self.split(u)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
-            flight = self.flights(chosen)(starts, durations, p, tol)
-            return self._assembled(flight, starts, durations, p, list(chosen))
+            flows = self.integrator(chosen)(starts, durations, p, tol)
+            return self._assembled(flows, starts, durations, p, list(chosen))
 
     def _assembled(
-        self, flight: Flight, starts: Array, durations: Array, p: Array, chosen: list[int]
+        self, flows: LegFlows, starts: Array, durations: Array, p: Array, chosen: list[int]
     ) -> Evaluation:
         (count, n), q, size = starts.shape, len(chosen), self.size
-        at, residual, whole = places_of(count, n, q), np.empty(size), np.zeros((size, size + q))
-        moved = [flight.by_start, flight.rate[:, :, None], flight.by_parameters]
+        at, residual, whole = (
+            jacobian_indices(count, n, q),
+            np.empty(size),
+            np.zeros((size, size + q)),
+        )
+        moved = [flows.by_start, flows.rate[:, :, None], flows.by_parameters]
         ends = np.concatenate(moved if q else moved[:2], axis=2)
-        after = flight.after
+        after = flows.after
         entries = np.empty((count, n + 1, n + 1 + q))
-        np.matmul(flight.after_state, ends, out=entries[:, :n])
-        np.matmul(flight.gradient[:, None, :], ends, out=entries[:, n:])
+        np.matmul(flows.after_state, ends, out=entries[:, :n])
+        np.matmul(flows.gradient[:, None, :], ends, out=entries[:, n:])
         if q:
-            entries[:, :n, n + 1 :] += flight.after_parameters[:, :, chosen]
-            entries[:, n, n + 1 :] += flight.value_parameters[:, chosen]
+            entries[:, :n, n + 1 :] += flows.after_parameters[:, :, chosen]
+            entries[:, n, n + 1 :] += flows.value_parameters[:, chosen]
         if self.symmetry is not None:
             after = after.copy()
             after[-1], entries[-1, :n] = self.wrap @ after[-1], self.wrap @ entries[-1, :n]
@@ -240,17 +243,17 @@ class BoundaryProblem:
         flat[at.own] = entries
         flat[at.following] -= 1.0
         residual[: count * n] = (after - starts[at.next_leg]).reshape(-1)
-        residual[count * n :] = flight.value
+        residual[count * n :] = flows.value
         jacobian, by_parameters = whole[:, :size], whole[:, size:]
         if self.forcing is not None:
             value, slope = self.advance(p)
             residual[count * n - 1] -= value
             by_parameters[count * n - 1] -= slope[chosen]
         if self.phase is not None:
-            self._phased(residual, jacobian, by_parameters, flight, starts[0])
+            self._phased(residual, jacobian, by_parameters, flows, starts[0])
         if self.kept:
             self._keep(residual, jacobian, by_parameters, starts[0], p, chosen)
-        return Evaluation(residual, whole, flight, starts, durations)
+        return Evaluation(residual, whole, flows, starts, durations)
 
     def residual(self, u: Array, p: Array, extended: bool = False) -> Array | None:
         """Residual without derivatives, if wanted in extended precision; None where legs do not allow it.
@@ -264,7 +267,7 @@ class BoundaryProblem:
         starts, durations = self.split(u)
         if self.phase is not None or self.kept:
             return None
-        found = self.flights(()).ends(starts, durations, p, extended)
+        found = self.integrator(()).ends(starts, durations, p, extended)
         if found is None:
             return None
         after, rest, value = found
@@ -272,22 +275,22 @@ class BoundaryProblem:
             for part in (after, rest) if self.symmetry is not None else ():
                 if part is not None:
                     part[-1] = self.wrap @ part[-1]
-            gap = after - starts[places_of(*starts.shape).next_leg]
+            gap = after - starts[jacobian_indices(*starts.shape).next_leg]
             gap[-1, -1] -= self.advance(p)[0]
             if rest is not None:
                 gap += rest
         return np.concatenate([gap.ravel(), value])
 
-    def flights(self, chosen: tuple[int, ...] = ()) -> Flights:
-        """The legs, ready to be flown with derivatives by chosen parameters."""
-        made = _FLIGHTS.setdefault(self, {})
+    def integrator(self, chosen: tuple[int, ...] = ()) -> LegIntegrator:
+        """The legs, ready to be integrated with derivatives by chosen parameters."""
+        made = _INTEGRATORS.setdefault(self, {})
         found = made.get(chosen)
         if found is None:
-            found = made[chosen] = flights_of(self.system, self.legs, chosen)
+            found = made[chosen] = leg_integrator(self.system, self.legs, chosen)
         return found
 
     def _phased(
-        self, residual: Array, jacobian: Array, by_parameters: Array, flight: Flight, start: Array
+        self, residual: Array, jacobian: Array, by_parameters: Array, flows: LegFlows, start: Array
     ) -> None:
         """The phase condition in place of the event that the one leg does not have."""
         assert self.phase is not None and self.reference is not None
@@ -296,7 +299,7 @@ class BoundaryProblem:
         jacobian[n] = 0.0
         jacobian[n, :n] = self.phase
         by_parameters[n] = 0.0
-        flight.gradient[0, :n] = self.phase @ self.wrap
+        flows.gradient[0, :n] = self.phase @ self.wrap
 
     def _keep(
         self,
@@ -307,7 +310,7 @@ class BoundaryProblem:
         p: Array,
         columns: Sequence[int],
     ) -> None:
-        """An orbit that slides all the time keeps h whatever it is."""
+        """Replace the redundant equations of surfaces that are never left by h = 0."""
         n = self.dimension
         first = (len(self.legs) - 1) * n
         taken: list[int] = []
@@ -325,7 +328,7 @@ class BoundaryProblem:
         """The problem with the plane through an orbit's start across the flow there.
 
         An autonomous orbit without events starts on a plane, which may miss the orbits that it
-        becomes as a parameter varies. Problems with events, or with forcing, are as they were.
+        becomes as a parameter varies. Problems with events, or with forcing, do not change.
         """
         if self.phase is None or self.system.time_dependent:
             return self
@@ -358,7 +361,7 @@ class BoundaryProblem:
         seen = starts
         if p is not None and len(self.legs) <= _FEW:
             inside = [
-                fly(self.system, leg, x, part * float(duration), p).end[: self.dimension]
+                integrate_leg(self.system, leg, x, part * float(duration), p).end[: self.dimension]
                 for leg, x, duration in zip(self.legs, starts, durations, strict=True)
                 for part in (0.2, 0.4, 0.6, 0.8)
             ]
@@ -372,11 +375,13 @@ class BoundaryProblem:
         return np.array((size + more) * count + [span] * count)
 
 
-#: Legs of a problem ready to be flown, by the chosen parameters.
-_FLIGHTS: WeakKeyDictionary[BoundaryProblem, dict[tuple[int, ...], Flights]] = WeakKeyDictionary()
+#: Legs of a problem ready to be integrated, by the chosen parameters.
+_INTEGRATORS: WeakKeyDictionary[BoundaryProblem, dict[tuple[int, ...], LegIntegrator]] = (
+    WeakKeyDictionary()
+)
 
 
-# Legs as the symmetry of an orbit maps them: the other half of one that is solved for as a half.
+# Symmetry action on legs.
 
 TURNED = str.maketrans("+-", "-+")
 
@@ -416,8 +421,8 @@ def _turning(problem: BoundaryProblem) -> list[bool]:
 
 
 @dataclass(frozen=True, eq=False)
-class Small:
-    """What elimination leaves of bordered equations.
+class ReducedEquations:
+    """Bordered equations after elimination of the legs.
 
     Attributes
     ----------
@@ -445,7 +450,7 @@ class Small:
         return np.concatenate([(self.starts @ few).ravel(), self.durations @ few, few[n:-1]])
 
 
-def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
+def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> ReducedEquations:
     """Reduce equations (m + k, m + k): those of an orbit, then k rows of a border."""
     # Durations first, then the starts of all legs but the first: n^3 operations for each leg.
     # Columns and rows may be scaled. The last columns of blocks are their constant parts.
@@ -481,4 +486,4 @@ def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
     small[n:] += matrix[m:, count * n : m] @ durations
     small[n:, n:] += np.hstack([matrix[m:, m:], -right[m:, None]])
     pivots = float(np.prod(pivot / np.linalg.norm(own, axis=1)))
-    return Small(small[:, :-1], -small[:, -1], starts, durations, pivots)
+    return ReducedEquations(small[:, :-1], -small[:, -1], starts, durations, pivots)

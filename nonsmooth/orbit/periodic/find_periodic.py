@@ -1,4 +1,4 @@
-"""The verb ``periodic_orbit``: from a guess to a periodic orbit, or to the reason why there is none."""
+"""Find a periodic orbit from a guess by Newton's method on its boundary value problem."""
 
 from __future__ import annotations
 
@@ -28,101 +28,7 @@ from ..runs.legs import leg_name
 from .boundary_value_problem import BoundaryProblem, Evaluation
 from .guess import Start, about_of, is_about, start_of
 from .orbit import PeriodicOrbit, faults_of, named
-from .symmetry import mirror_of, once_round, require_symmetric
-
-# What a solution of the equations of an orbit must be to count as one.
-
-#: A period below this part of the guess is that of a point.
-_POINT = 1e-9
-
-#: One below this part of it is too, where the equations are singular to ``_SINGULAR``: as an orbit
-#: shrinks to a point, its duration is determined ever less.
-_SHRUNK, _SINGULAR = 1e-2, 1e-9
-
-#: Motion by fewer spacings of numbers of the size of a state is lost in rounding.
-_SPACINGS = 8.0
-
-#: What moves by no more than this part of its size rests.
-_STILL = 1e-6
-
-
-def require_motion(problem: BoundaryProblem, at: Evaluation, start: Start) -> None:
-    """Refuse a point: every equilibrium solves the equations of an orbit, of no or any duration."""
-    # So does, with any duration, every point so far away that motion is lost in its rounding.
-    n = problem.system.dimension
-    guess = float(np.abs(start.problem.split(start.unknowns)[1]).sum())
-    period, x = float(np.abs(at.durations).sum()), at.starts[0, :n]
-    _require_resolved(problem, at)
-    way = float(np.abs(at.flight.rate[0]).max()) * period
-    rests = problem.legs[-1].timed and not problem.system.time_dependent
-    shrunk = period <= _SHRUNK * guess and _singular(problem, at)
-    if period > _POINT * guess and not shrunk:
-        guessed = float(np.abs(start.problem.split(start.unknowns)[0][:, :n]).max())
-        size = max(min(1.0, guessed), float(np.abs(x).max()))
-        if not (rests and way <= _STILL * size):
-            return
-    raise ConvergenceError(
-        f"periodic orbit: expected a period near {guess:.6g}, received {period:.2g}: Newton's method "
-        f"shrank the orbit to a point, {x.tolist()}. It is an equilibrium, or a point "
-        "where legs vanish: start closer to the orbit.",
-        point=x,
-    )
-
-
-def _require_resolved(problem: BoundaryProblem, at: Evaluation) -> None:
-    """Refuse an orbit whose states are so large that they do not change by what its legs move."""
-    n, count = problem.system.dimension, len(problem.legs)
-    ways = np.abs(at.flight.rate[:count, :n]) * np.abs(at.durations[:, None])
-    spacings = np.spacing(np.abs(at.starts[:, :n]).max(axis=0))
-    if (ways > _SPACINGS * spacings).any() or not ways.any() or not _singular(problem, at):
-        return  # or at rest where the equations say so
-    raise ConvergenceError(
-        f"periodic orbit: expected an orbit that moves, received the state {at.starts[0, :n].tolist()}, "
-        f"which moves by {ways.max():.2g} at most: less than {_SPACINGS:g} spacings of numbers of that "
-        f"size, of {spacings.max():.2g}, so it closes by rounding. Start closer to the orbit.",
-        point=at.starts[0, :n],
-    )
-
-
-def _singular(problem: BoundaryProblem, at: Evaluation) -> bool:
-    """Whether the equations, in units of the orbit, say next to nothing of it in some direction."""
-    jacobian = at.jacobian * problem.scales(problem.pack(at.starts, at.durations))
-    rows = np.linalg.norm(jacobian, axis=1)
-    values = np.linalg.svd(jacobian / np.where(rows > 0.0, rows, 1.0)[:, None], compute_uv=False)
-    return bool(values[-1] <= _SINGULAR * values[0])
-
-
-def require_duration(problem: BoundaryProblem, at: Evaluation, about: float | None) -> None:
-    """Refuse an orbit that takes another time than was said."""
-    period = float(at.durations.sum()) * (1 if problem.symmetry is None else 2)
-    if about is None or is_about(period, about):
-        return
-    raise ConvergenceError(
-        f"periodic orbit: expected one that takes about period = {about:.6g}, received one of period "
-        f"{period:.10g}, at {at.starts[0, : problem.system.dimension].tolist()}. Start closer to the "
-        "orbit, or leave period= out.",
-        point=at.starts[0, : problem.system.dimension],
-    )
-
-
-def require_simple(orbit: PeriodicOrbit) -> None:
-    """Refuse orbits through two-folds; grazing is refused by the multipliers."""
-    system, p = orbit.system, orbit.parameter_vector
-    for i, leg in enumerate(orbit.problem.legs):
-        if leg.kind != "exit" or system.coupled:
-            continue
-        flight = orbit.evaluation.flight
-        end = flight.end[i, : flight.sizes[i]]
-        at = replace(leg, side=-leg.side).at_end(system, end, p)
-        size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
-        if abs(at.value) <= 1e-9 * size:
-            raise DegenerateError(
-                f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
-                f"{leg_name(system, leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
-                f"{end[: system.dimension].tolist()}. The orbit is not unique there: vary a parameter."
-            )
-    orbit.floquet  # noqa: B018  # DegenerateError where an event is grazed
-
+from .symmetry import prime_period, require_symmetric, symmetry_matrix
 
 #: No leg may grow to so many times the guess of the whole orbit.
 _LONGEST = 10.0
@@ -143,7 +49,7 @@ def periodic_orbit(
     """Find a periodic orbit, stable or not, with all digits, its multipliers and its margins.
 
     The itinerary is read off the guess and kept; the boundary value problem of its legs is solved by
-    Newton's method with exact derivatives; then the guards are asked whether the orbit is real.
+    Newton's method with exact derivatives; then the guards are checked along the orbit.
 
     Parameters
     ----------
@@ -160,18 +66,18 @@ def periodic_orbit(
         The period of the forcing, if the system depends on time. Found by itself where the time only
         enters sines and cosines of one frequency. The orbit may take several. Of a system without
         time about how long the whole orbit takes: shorter and longer ones, by more than a factor of
-        1.5, are passed over in the guess and refused as the result.
+        1.5, are skipped in the guess and refused as the result.
     symmetry : "odd" or array_like (n, n), optional
         R, if R x solves the equations when x does (half a forcing period later, if there is one): the
-        orbit is looked for as a half, which R maps to the other half. ``"odd"`` is $R = -1$.
+        orbit is solved for as a half, which R maps to the other half. ``"odd"`` is $R = -1$.
     parameters : mapping, optional
         Values that replace those of the guess, or defaults.
     t_start : float, optional
         Time of a state.
     virtual : bool, optional
-        Accept an orbit that no motion takes because guards disagree.
+        Accept an orbit that violates guards.
     max_iterations : int, optional
-        Newton's method gives up after this many.
+        Maximum number of Newton steps.
 
     Returns
     -------
@@ -183,7 +89,7 @@ def periodic_orbit(
     ConvergenceError
         The guess does not close, or Newton's method fails.
     VirtualOrbitError
-        The equations have a solution that is no motion; it is the error's attribute ``orbit``.
+        The solution violates guards; it is the error's attribute ``orbit``.
     DegenerateError
         The orbit grazes, or passes a two-fold or a corner.
     DefinitionError
@@ -222,14 +128,14 @@ def periodic_orbit(
     max_iterations = whole(max_iterations, "max_iterations")
     if not isinstance(virtual, (bool, np.bool_)):
         raise OptionError(f"virtual: expected True or False, received {virtual!r}.")
-    mirror = mirror_of(system, symmetry)
-    start = start_of(system, guess, itinerary, period, mirror, parameters, t_start)
+    matrix = symmetry_matrix(system, symmetry)
+    start = start_of(system, guess, itinerary, period, matrix, parameters, t_start)
     begun, guessed = start.problem, start.unknowns
     if not begun.legs[-1].timed:
-        begun, guessed = once_round(begun, guessed, start.p)
+        begun, guessed = prime_period(begun, guessed, start.p)
     solver = _Solver(begun, start.p)
     u, at = solver.solve(guessed, max_iterations)
-    problem, once = once_round(begun, u, start.p)
+    problem, once = prime_period(begun, u, start.p)
     if problem is not begun:
         u, at = _Solver(problem, start.p).solve(once, max_iterations)
     require_motion(problem, at, start)
@@ -249,7 +155,7 @@ _CLOSE = 1e-10
 #: Steps below this, relative to the orbit, are rounding.
 _ROUNDING = 1e-14
 
-#: Legs far from the orbit are flown with local errors up to this.
+#: Legs far from the orbit are integrated with local errors up to this.
 _COARSE = 1e-8
 
 #: Steps below this, relative to the orbit, change its derivatives by rounding: Newton's method ends.
@@ -269,7 +175,7 @@ _LARGE, _CLOSED = 1000, 1e-9
 
 
 class _Solver:
-    """Newton's method on the equations of an orbit, with what it knows where it fails."""
+    """Newton's method on the equations of an orbit, with diagnostics on failure."""
 
     def __init__(self, problem: BoundaryProblem, p: Array):
         self.problem, self.p, self.iterations = problem, p, 0
@@ -432,7 +338,7 @@ class _Solver:
         return there, replace(at, residual=residual, starts=starts, durations=durations)
 
     def _largest(self, at: Evaluation) -> str:
-        """The leg whose equations are least satisfied, in words."""
+        """The leg whose equations have the largest residual."""
         count, n = len(self.problem.legs), self.problem.dimension
         sizes = np.abs(at.residual[: count * n]).reshape(count, n).max(axis=1)
         ends = np.abs(at.residual[count * n :])
@@ -455,28 +361,122 @@ class _Solver:
                 backward = faults_of(self.problem, at, self.p)
             except NonsmoothError:
                 backward = []
-        told = f" {reason}" if reason else ""
+        why = f" {reason}" if reason else ""
         if at is not None and not backward:
             backward = [self._largest(at)]
         where = f" At the last iterate {backward[0]}." if backward else ""
-        words = " ".join(leg.mode or "o" for leg in legs[:40])
-        words += f" ... ({len(legs)} legs)" * (len(legs) > 40)
+        modes = " ".join(leg.mode or "o" for leg in legs[:40])
+        modes += f" ... ({len(legs)} legs)" * (len(legs) > 40)
         return ConvergenceError(
-            f"periodic orbit: expected Newton's method to converge with the itinerary {words!r}, "
-            f"received none after {self.iterations} steps, residual {size:.2g}.{told}{where} Simulate "
+            f"periodic orbit: Newton's method did not converge with the itinerary {modes!r} in "
+            f"{self.iterations} steps, residual {size:.2g}.{why}{where} Simulate "
             "longer, start closer to the orbit, or try the itinerary of a run from there.",
             residual=size,
             point=u,
         )
 
 
+# Checks of a solution: motion, period, and no two-fold.
+
+#: A period below this part of the guess is that of a point.
+_POINT = 1e-9
+
+#: One below this part of it is too, where the equations are singular to ``_SINGULAR``: as an orbit
+#: shrinks to a point, its duration is determined ever less.
+_SHRUNK, _SINGULAR = 1e-2, 1e-9
+
+#: Motion by fewer spacings of numbers of the size of a state is lost in rounding.
+_SPACINGS = 8.0
+
+#: What moves by no more than this part of its size rests.
+_STILL = 1e-6
+
+
+def require_motion(problem: BoundaryProblem, at: Evaluation, start: Start) -> None:
+    """Refuse a point: every equilibrium solves the equations of an orbit, of no or any duration."""
+    # So does, with any duration, every point so far away that motion is lost in its rounding.
+    n = problem.system.dimension
+    guess = float(np.abs(start.problem.split(start.unknowns)[1]).sum())
+    period, x = float(np.abs(at.durations).sum()), at.starts[0, :n]
+    _require_resolved(problem, at)
+    way = float(np.abs(at.flows.rate[0]).max()) * period
+    rests = problem.legs[-1].timed and not problem.system.time_dependent
+    shrunk = period <= _SHRUNK * guess and _singular(problem, at)
+    if period > _POINT * guess and not shrunk:
+        guessed = float(np.abs(start.problem.split(start.unknowns)[0][:, :n]).max())
+        size = max(min(1.0, guessed), float(np.abs(x).max()))
+        if not (rests and way <= _STILL * size):
+            return
+    raise ConvergenceError(
+        f"periodic orbit: Newton's method shrank the orbit to a point, {x.tolist()}, of period "
+        f"{period:.2g} (guess {guess:.6g}). It is an equilibrium, or a point "
+        "where legs vanish: start closer to the orbit.",
+        point=x,
+    )
+
+
+def _require_resolved(problem: BoundaryProblem, at: Evaluation) -> None:
+    """Refuse an orbit whose states are so large that they do not change by what its legs move."""
+    n, count = problem.system.dimension, len(problem.legs)
+    ways = np.abs(at.flows.rate[:count, :n]) * np.abs(at.durations[:, None])
+    spacings = np.spacing(np.abs(at.starts[:, :n]).max(axis=0))
+    if (ways > _SPACINGS * spacings).any() or not ways.any() or not _singular(problem, at):
+        return  # or at rest where the equations say so
+    raise ConvergenceError(
+        f"periodic orbit: expected an orbit that moves, received the state {at.starts[0, :n].tolist()}, "
+        f"which moves by {ways.max():.2g} at most: less than {_SPACINGS:g} spacings of numbers of that "
+        f"size, of {spacings.max():.2g}, so it closes by rounding. Start closer to the orbit.",
+        point=at.starts[0, :n],
+    )
+
+
+def _singular(problem: BoundaryProblem, at: Evaluation) -> bool:
+    """Whether the equations, in units of the orbit, say next to nothing of it in some direction."""
+    jacobian = at.jacobian * problem.scales(problem.pack(at.starts, at.durations))
+    rows = np.linalg.norm(jacobian, axis=1)
+    values = np.linalg.svd(jacobian / np.where(rows > 0.0, rows, 1.0)[:, None], compute_uv=False)
+    return bool(values[-1] <= _SINGULAR * values[0])
+
+
+def require_duration(problem: BoundaryProblem, at: Evaluation, about: float | None) -> None:
+    """Refuse an orbit whose period is not near the given one."""
+    period = float(at.durations.sum()) * (1 if problem.symmetry is None else 2)
+    if about is None or is_about(period, about):
+        return
+    raise ConvergenceError(
+        f"periodic orbit: period = {about:.6g} was requested, but the solution has the period "
+        f"{period:.10g}, at {at.starts[0, : problem.system.dimension].tolist()}. Start closer to the "
+        "orbit, or leave period= out.",
+        point=at.starts[0, : problem.system.dimension],
+    )
+
+
+def require_simple(orbit: PeriodicOrbit) -> None:
+    """Refuse orbits through two-folds; grazing is refused by the multipliers."""
+    system, p = orbit.system, orbit.parameter_vector
+    for i, leg in enumerate(orbit.problem.legs):
+        if leg.kind != "exit" or system.coupled:
+            continue
+        flows = orbit.evaluation.flows
+        end = flows.end[i, : flows.sizes[i]]
+        at = replace(leg, side=-leg.side).at_end(system, end, p)
+        size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
+        if abs(at.value) <= 1e-9 * size:
+            raise DegenerateError(
+                f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
+                f"{leg_name(system, leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
+                f"{end[: system.dimension].tolist()}. The orbit is not unique there: vary a parameter."
+            )
+    orbit.floquet  # noqa: B018  # DegenerateError where an event is grazed
+
+
 class VirtualOrbitError(ConvergenceError):
-    """An orbit of the equations that no motion takes.
+    """A solution of the orbit's equations that violates guards.
 
     Attributes
     ----------
     orbit : PeriodicOrbit
-        The orbit that solves the equations and is no motion of the system.
+        The virtual orbit.
     """
 
     def __init__(self, message: str, orbit: PeriodicOrbit):
@@ -487,8 +487,8 @@ class VirtualOrbitError(ConvergenceError):
 def _virtual(orbit: PeriodicOrbit) -> VirtualOrbitError:
     more = f" (and {len(orbit.faults) - 1} more)" if len(orbit.faults) > 1 else ""
     return VirtualOrbitError(
-        f"periodic orbit: expected one that a motion takes, received a virtual one: "
-        f"{orbit.faults[0]}{more}. Try the itinerary of a simulation from there, or say virtual=True "
-        "if it is meant; it is the attribute `orbit` of this error.",
+        f"periodic orbit: the solution is virtual, it violates a guard: {orbit.faults[0]}{more}. Try "
+        "the itinerary of a simulation from there, or accept it with virtual=True. The solution is the "
+        "attribute `orbit` of this error.",
         orbit,
     )

@@ -33,7 +33,7 @@ from ...model.derivatives.forcing import Forcing, frequencies
 from ...model.derivatives.variational import plain_field
 from ..runs.guards import march
 from ..runs.itinerary import Itinerary, lone_leg, word_legs
-from ..runs.legs import Leg, Stretch, fly, leg_name, stretches
+from ..runs.legs import Leg, Stretch, integrate_leg, leg_name, stretches
 from .boundary_value_problem import BoundaryProblem
 from .orbit import PeriodicOrbit, named
 
@@ -440,10 +440,10 @@ def _nearest(start: Start, x: Array, span: float) -> Start:
         return start
     (y,), (duration,) = problem.split(start.unknowns)
     n, found = problem.system.dimension, list[Array]()
-    there = fly(problem.system, problem.legs[0], x, -float(x[-1]) % span, p).end[:n]
+    there = integrate_leg(problem.system, problem.legs[0], x, -float(x[-1]) % span, p).end[:n]
     for _ in range(round(problem.periods)):
         found.append(y.copy())
-        y = fly(problem.system, problem.legs[0], y, span, p).end[: n + 1].copy()
+        y = integrate_leg(problem.system, problem.legs[0], y, span, p).end[: n + 1].copy()
         y[-1] = found[0][-1]
     best = min(found, key=lambda state: float(np.abs(state[:n] - there).max()))
     phased = replace(problem, reference=best)
@@ -503,7 +503,11 @@ def _problem(
             span = forcing(p)[0]
             wait = -starts[0, -1] % span
             wait = 0.0 if wait > span * (1.0 - 1e-12) else wait
-            starts = fly(system, legs[0], starts[0], wait, p).end[None, : starts.shape[1]].copy()
+            starts = (
+                integrate_leg(system, legs[0], starts[0], wait, p)
+                .end[None, : starts.shape[1]]
+                .copy()
+            )
             starts[0, -1] = 0.0
             phase[-1] = 1.0
         else:
@@ -539,7 +543,7 @@ def _from_mode(system: FilippovSystem, x: Array, leg: Leg, forcing: Forcing, p: 
     """Integrate one mode over the number of periods of the forcing after which it closes best."""
     span, n, y, apart = _span_of(forcing, p) or 1.0, system.dimension, x, list[float]()
     for _ in range(_MOST_PERIODS):
-        y = fly(system, leg, y, span, p).end[: x.size]
+        y = integrate_leg(system, leg, y, span, p).end[: x.size]
         apart.append(float(np.abs(y[:n] - x[:n]).max()))
     count = 1 + int(np.argmin(apart))
     durations = np.array([count * span])
@@ -583,7 +587,7 @@ def _simulated(
     starts = [x]
     if system.resets:
         try:
-            later = fly(system, Leg(_mode(system, x, p)), x, _LATER * natural, p).end
+            later = integrate_leg(system, Leg(_mode(system, x, p)), x, _LATER * natural, p).end
             starts = [later[: x.size], x]
         except NonsmoothError:
             pass

@@ -21,7 +21,7 @@ from ...model import Array
 from ...model.derivatives.event_maps import surface_map
 from ..runs.legs import leg_name
 from ..runs.saltation import passages, saltations
-from .boundary_value_problem import BoundaryProblem, Evaluation, places_of
+from .boundary_value_problem import BoundaryProblem, Evaluation, jacobian_indices
 
 #: A direction of which a leg leaves no more than this part is lost.
 _LOST = 1e-12
@@ -33,7 +33,7 @@ _AT_ZERO = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Multipliers of the map of the legs, and how they follow.
+    """Multipliers of the map of the legs, with the condensed map.
 
     Attributes
     ----------
@@ -94,11 +94,11 @@ def _sorted(values: NDArray[Any]) -> NDArray[np.complex128]:
 
 def leg_maps(problem: BoundaryProblem, at: Evaluation) -> Array:
     """Derivatives (L, N, N) of the maps from the start of each leg to that of the next, across the flow."""
-    flight = at.flight
-    row = flight.gradient[:, None, :] @ flight.by_start
-    speed = (flight.gradient * flight.rate).sum(axis=1)
-    across = flight.by_start - flight.rate[:, :, None] * (row / speed[:, None, None])
-    maps = flight.after_state @ across
+    flows = at.flows
+    row = flows.gradient[:, None, :] @ flows.by_start
+    speed = (flows.gradient * flows.rate).sum(axis=1)
+    across = flows.by_start - flows.rate[:, :, None] * (row / speed[:, None, None])
+    maps = flows.after_state @ across
     if problem.symmetry is not None:
         maps[-1] = problem.wrap @ maps[-1]
     return np.asarray(maps)
@@ -120,13 +120,13 @@ def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
 
 
 def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
-    """The return map on perturbations across the flow, in the smallest subspace that they pass."""
-    # in units of the orbit: what is lost is told by sizes, and states and time have units of their own
+    """The return map on perturbations across the flow, in the smallest invariant subspace."""
+    # in units of the orbit: sizes decide what is lost, and states and time have different units
     units = _units(problem, at)
-    passages(at.flight, *_events(problem, at))  # DegenerateError where an event is grazed
+    passages(at.flows, *_events(problem, at))  # DegenerateError where an event is grazed
     maps = leg_maps(problem, at) * (units / units[:, None])
-    flown = at.flight.by_start[:, : problem.dimension] * (units / units[:, None])
-    return reduced_map(maps, flown, _kept(problem, at, p, units))
+    flow = at.flows.by_start[:, : problem.dimension] * (units / units[:, None])
+    return reduced_map(maps, flow, _sliding_directions(problem, at, p, units))
 
 
 def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
@@ -134,7 +134,7 @@ def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
     n, own = problem.dimension, problem.system.dimension
     units = problem.scales(problem.pack(at.starts, at.durations))[:n]
     if problem.system.time_dependent:
-        ways = np.abs(at.flight.rate[: len(at.durations), :own] * at.durations[:, None]).max(
+        ways = np.abs(at.flows.rate[: len(at.durations), :own] * at.durations[:, None]).max(
             initial=0.0
         )
         if np.abs(at.starts[:, :own]).max() < _AT_ZERO * ways:
@@ -142,17 +142,17 @@ def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
     return units
 
 
-def reduced_map(maps: Array, flown: Array, basis: Array) -> Array:
+def reduced_map(maps: Array, flow: Array, basis: Array) -> Array:
     """Product of maps (L, n, n) of legs on what these leave of some directions (n, r)."""
-    # Directions are lost beside those that the legs carry, ``flown`` (L, n, n).
+    # Directions are lost beside those that the legs carry, ``flow`` (L, n, n).
     count, n = len(maps), maps.shape[1]
     bases: list[Array] = [np.eye(n)] * count
     for i in range(2 * count):
         k, following = i % count, (i + 1) % count
-        size = _length(flown[k] @ basis) if basis.size else 0.0
+        size = _length(flow[k] @ basis) if basis.size else 0.0
         basis = _range(maps[k] @ basis, size)
         if i >= count and basis.shape[1] == bases[following].shape[1]:
-            break  # the second time round nothing more is lost
+            break  # nothing more is lost in the second pass
         bases[following] = basis
     first = min(range(count), key=lambda i: bases[i].shape[1])
     product: Array = np.eye(bases[first].shape[1])
@@ -162,7 +162,7 @@ def reduced_map(maps: Array, flown: Array, basis: Array) -> Array:
     return product
 
 
-def _kept(problem: BoundaryProblem, at: Evaluation, p: Array, units: Array) -> Array:
+def _sliding_directions(problem: BoundaryProblem, at: Evaluation, p: Array, units: Array) -> Array:
     """Directions that remain on the surfaces on which the orbit slides all the time, in given units."""
     if not problem.kept:
         return np.eye(problem.dimension)
@@ -187,9 +187,9 @@ def _range(matrix: Array, size: float) -> Array:
 
 def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
     """Product of state-transition and saltation matrices over the legs, (N, N)."""
-    jumps = saltations(at.flight, *_events(problem, at)).matrix
+    jumps = saltations(at.flows, *_events(problem, at)).matrix
     product: Array = np.eye(problem.dimension)
-    for step in jumps @ at.flight.by_start:
+    for step in jumps @ at.flows.by_start:
         product = step @ product
     return np.asarray(problem.wrap @ product, float)
 
@@ -210,8 +210,8 @@ def _events(
     problem: BoundaryProblem, at: Evaluation
 ) -> tuple[Array, Callable[[int], str], NDArray[np.bool_]]:
     """Fields after the events of legs, their names, and which legs have one."""
-    following = places_of(len(problem.legs), problem.dimension).next_leg
-    after = at.flight.before[following, : problem.dimension]
+    following = jacobian_indices(len(problem.legs), problem.dimension).next_leg
+    after = at.flows.before[following, : problem.dimension]
     if problem.symmetry is not None:
         after[-1] = np.linalg.solve(problem.wrap, after[-1])
     legs = problem.legs

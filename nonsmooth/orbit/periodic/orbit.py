@@ -1,4 +1,4 @@
-"""Periodic orbits: what is returned, with multipliers, stability, margins, and the orbit as a run."""
+"""Periodic orbit with multipliers, stability, margins, derivatives, and its run over one period."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class PeriodicOrbit:
     iterations : int
         Newton steps that it took.
     faults : tuple of str
-        What its guards contradict; empty unless it is virtual.
+        Violations of guards; empty unless the orbit is virtual.
     """
 
     system: FilippovSystem
@@ -97,7 +97,7 @@ class PeriodicOrbit:
     iterations: int
     faults: tuple[str, ...] = ()
 
-    # what it is ---------------------------------------------------------------------------------
+    # properties ---------------------------------------------------------------------------------
 
     @cached_property
     def parameter_vector(self) -> Array:
@@ -106,7 +106,7 @@ class PeriodicOrbit:
 
     @property
     def is_virtual(self) -> bool:
-        """Whether no motion takes it, because guards disagree."""
+        """Whether guards are violated, so that no motion follows the orbit."""
         return bool(self.faults)
 
     @property
@@ -210,7 +210,7 @@ class PeriodicOrbit:
         """Largest entry that is left of the equations that were solved."""
         return float(np.abs(self.evaluation.residual).max())
 
-    # neighbours ---------------------------------------------------------------------------------
+    # derivatives and margins ---------------------------------------------------------------------------------
 
     def derivative(self, parameter: str) -> OrbitDerivative:
         """Derivatives of the orbit by a parameter.
@@ -260,7 +260,7 @@ class PeriodicOrbit:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        """How a notebook shows the orbit: its period, its legs, its multipliers."""
+        """Notebook representation: period, itinerary and multipliers."""
         rows = (
             ("period", f"{self.period:.12g}"),
             ("itinerary", self.itinerary),
@@ -298,8 +298,8 @@ def mirrored_mode(orbit: PeriodicOrbit, mode: str, x: Array, duration: float) ->
 
 
 def faults_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
-    """What the guards of a solution contradict, leg by leg."""
-    speeds = (at.flight.gradient * at.flight.rate).sum(axis=1)
+    """Violations of guards along a solution, leg by leg."""
+    speeds = (at.flows.gradient * at.flows.rate).sum(axis=1)
     closes = problem.symmetry is None
     return faults_along(problem.system, problem.legs, at.starts, at.durations, speeds, p, closes)
 
@@ -314,10 +314,10 @@ def _margins(orbit: PeriodicOrbit) -> list[Margin]:
         verb = "slides" if "s" in leg.mode else "lasts"
         if not leg.timed:
             result.append(Margin(i, f"{verb} for", duration, duration / orbit.period, ends))
-            gradient, rate = at.events[i].gradient[: size.size], at.flown[i].rate[: size.size]
+            gradient, rate = at.events[i].gradient[: size.size], at.by_leg[i].rate[: size.size]
             length = float(np.linalg.norm(gradient * size) * np.linalg.norm(rate / size)) or 1.0
             name = leg.name(problem.system)
-            angle = float(at.events[i].gradient @ at.flown[i].rate) / length
+            angle = float(at.events[i].gradient @ at.by_leg[i].rate) / length
             result.append(Margin(i, f"meets {name} at the angle", angle, angle, ends))
         if duration <= 0.0:
             continue

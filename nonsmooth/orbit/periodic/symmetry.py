@@ -1,6 +1,7 @@
-"""Symmetries by which half of an orbit is solved for: what is accepted as one, and whether an orbit has it.
+"""Symmetries of periodic orbits: multiplicity, half orbits, and a check that an orbit is symmetric.
 
-The equations of a half are solved whether or not the system has the symmetry, so the other half is flown.
+The equations of a half are solved even if the system lacks the symmetry, so the other half is integrated
+and compared.
 """
 
 from __future__ import annotations
@@ -17,32 +18,32 @@ from ...flow.simulate import simulate
 from ...model import Array, FilippovSystem, NonsmoothError, OptionError, Surfaces, explain
 from ...model.checks import real_array
 from ...model.derivatives.variational import plain_field, variational_field
-from ..runs.legs import fly
+from ..runs.legs import integrate_leg
 from .boundary_value_problem import BoundaryProblem, mirrored
 from .orbit import PeriodicOrbit
 
-# Orbits whose legs go round several times, and the same orbits once.
+# Reduction to the prime period, and to half orbits.
 
-#: An orbit without an event is asked whether it goes round up to so many times.
-_MOST_ROUNDS = 60
+#: Largest multiplicity that is tested for an orbit without events.
+_MOST_MULTIPLICITY = 60
 
 #: Halves of an orbit that are each other's image to this part of it are so at a branch point.
 _MIRRORED = 1e-6
 
-#: States of which the mirrors are tried one by one.
+#: Up to so many states all reflections of coordinates are tried.
 _MOST_STATES = 8
 
 #: Starts of legs that are as near as this, relative to the orbit, are one.
 _SAME = 1e-7
 
 
-def once_round(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryProblem, Array]:
-    """The orbit once, where the legs go round it several times."""
-    # The half of a symmetric orbit goes round an odd number of times.
+def prime_period(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryProblem, Array]:
+    """Reduce an orbit that is traversed several times to its prime period."""
+    # A half of a symmetric orbit has odd multiplicity.
     starts, durations = problem.split(u)
     count, n = len(problem.legs), problem.system.dimension
     if problem.legs[-1].timed:
-        return _leg_once(problem, starts[0], float(durations[0]), p)
+        return _prime_period_of_leg(problem, starts[0], float(durations[0]), p)
     size = problem.scales(u)[:n] if count > 1 else np.ones(n)
     whole = float(np.abs(durations).sum()) or 1.0
     for k in range(1, count // 2 + 1):
@@ -62,19 +63,20 @@ def once_round(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryPr
     return problem, u
 
 
-def _leg_once(
+def _prime_period_of_leg(
     problem: BoundaryProblem, x: Array, duration: float, p: Array
 ) -> tuple[BoundaryProblem, Array]:
-    """The same for an orbit without an event."""
+    """The same for an orbit without events."""
     n, half = problem.system.dimension, problem.symmetry is not None
     size = np.abs(x[:n]).max() or 1.0
-    rounds = round(2 * problem.periods) if half else round(problem.periods)
-    most = rounds if problem.forcing is not None else _MOST_ROUNDS
+    multiplicity = round(2 * problem.periods) if half else round(problem.periods)
+    most = multiplicity if problem.forcing is not None else _MOST_MULTIPLICITY
     for k in range(most, 1, -1):
-        if (half and k % 2 == 0) or (problem.forcing is not None and rounds % k):
+        if (half and k % 2 == 0) or (problem.forcing is not None and multiplicity % k):
             continue
         there = (
-            problem.wrap[:n, :n] @ fly(problem.system, problem.legs[0], x, duration / k, p).end[:n]
+            problem.wrap[:n, :n]
+            @ integrate_leg(problem.system, problem.legs[0], x, duration / k, p).end[:n]
         )
         if np.abs(there - x[:n]).max() < _SAME * size:
             once = replace(problem, periods=problem.periods / k)
@@ -83,9 +85,8 @@ def _leg_once(
 
 
 def halves(problem: BoundaryProblem, u: Array, p: Array) -> Iterator[tuple[BoundaryProblem, Array]]:
-    """The same orbit as a half, for every reflection of coordinates that maps this to the other
-    half."""
-    # Whether the system has that symmetry too is not asked.
+    """The same orbit as a half, for every reflection of coordinates that maps it to the other half."""
+    # Whether the system has that symmetry is not checked.
     n, count = problem.system.dimension, len(problem.legs)
     single = problem.legs[-1].timed
     if problem.symmetry is not None or n > _MOST_STATES or (not single and count % 2):
@@ -94,7 +95,9 @@ def halves(problem: BoundaryProblem, u: Array, p: Array) -> Iterator[tuple[Bound
     k = count if single else count // 2
     spans = durations / 2 if single else durations[:k]
     if single:
-        other = fly(problem.system, problem.legs[0], starts[0], float(spans[0]), p).end[None, :]
+        other = integrate_leg(problem.system, problem.legs[0], starts[0], float(spans[0]), p).end[
+            None, :
+        ]
     else:
         other = starts[k:]
         if np.abs(durations[k:] - spans).max() > _MIRRORED * np.abs(durations).sum():
@@ -104,10 +107,12 @@ def halves(problem: BoundaryProblem, u: Array, p: Array) -> Iterator[tuple[Bound
     if (np.abs(np.abs(other[:, :n]) - np.abs(starts[:k, :n])) > close).any():
         return
     for signs in product((-1.0, 1.0), repeat=n):
-        mirror = np.diag(signs)
-        if (np.abs(other[:, :n] @ mirror - starts[:k, :n]) > close).any() or min(signs) > 0.0:
+        reflection = np.diag(signs)
+        if (np.abs(other[:, :n] @ reflection - starts[:k, :n]) > close).any() or min(signs) > 0.0:
             continue
-        half = replace(problem, legs=problem.legs[:k], symmetry=mirror, periods=problem.periods / 2)
+        half = replace(
+            problem, legs=problem.legs[:k], symmetry=reflection, periods=problem.periods / 2
+        )
         if not single and any(
             mirrored(half, leg) != then
             for leg, then in zip(half.legs, problem.legs[k:], strict=True)
@@ -120,7 +125,7 @@ def halves(problem: BoundaryProblem, u: Array, p: Array) -> Iterator[tuple[Bound
 _MISS = 1e-8
 
 
-def mirror_of(system: FilippovSystem, symmetry: ArrayLike | str | None) -> Array | None:
+def symmetry_matrix(system: FilippovSystem, symmetry: ArrayLike | str | None) -> Array | None:
     """The matrix of a symmetry, (n, n); None for none."""
     n = system.dimension
     if symmetry is None:
@@ -153,7 +158,7 @@ def require_symmetric(orbit: PeriodicOrbit) -> None:
     if not surface and _fields_agree(orbit):
         return
     try:
-        closed = any("c" in leg.mode for leg in orbit.legs)  # which contact that is, a run says
+        closed = any("c" in leg.mode for leg in orbit.legs)  # a run decides which contact
         miss, where = (0.0, "") if closed else _miss_of_legs(orbit)
         jumps = closed or any(leg.kind in ("reset", "impact") for leg in orbit.legs)
         if miss <= _MISS and jumps and not orbit.is_virtual:
@@ -182,7 +187,7 @@ def _surface_missed(orbit: PeriodicOrbit) -> str:
     surfaces = system.cached("surfaces of symmetric orbits", lambda: Surfaces(system))
     here, there = (np.sort(np.abs(surfaces.values(x, p)[0])) for x in _beside(orbit, 0))
     if (np.abs(here - there) <= 1e-10 * here).all():
-        return ""  # far quicker than to look at the events, which decide where units differ
+        return ""  # far quicker than evaluating the events, which decide where units differ
     legs, count = orbit.legs, len(orbit.problem.legs)
     units = orbit.problem.scales(orbit.unknowns)[: system.dimension]
     for leg, after in pairwise([*legs[count - 1 :], legs[0]]):
@@ -209,7 +214,7 @@ def _beside(orbit: PeriodicOrbit, i: int) -> tuple[Array, Array]:
 
 def _fields_agree(orbit: PeriodicOrbit) -> bool:
     """Whether the fields of all modes are those of their mirror images, beside the orbit."""
-    # That is enough where nothing jumps, and far quicker than to fly; where they are not, flying decides.
+    # That suffices without jumps and is far quicker than integration, which decides otherwise.
     problem, p, system = orbit.problem, orbit.parameter_vector, orbit.system
     legs, wrap, n = problem.legs, problem.wrap, system.dimension
     if system.impacts or system.resets or problem.symmetry is None:
@@ -234,7 +239,7 @@ def _fields_agree(orbit: PeriodicOrbit) -> bool:
 
 
 def _miss_of_legs(orbit: PeriodicOrbit) -> tuple[float, str]:
-    """By how much the mirrored legs, flown in their modes, end beside the mirror images of the ends."""
+    """By how much the mirrored legs, integrated in their modes, end beside the mirror images of the ends."""
     problem, at, p = orbit.problem, orbit.evaluation, orbit.parameter_vector
     system, n, count = orbit.system, orbit.system.dimension, len(problem.legs)
     units = problem.scales(orbit.unknowns)[:n]
@@ -244,9 +249,9 @@ def _miss_of_legs(orbit: PeriodicOrbit) -> tuple[float, str]:
         start = system.extended_point(leg.start, leg.t)
         y = field.states_at(start, p)
         end = flow_for(plain_field(system, leg.mode), y, p, leg.duration)[:n]
-        flown = at.flown[i]
-        grows = float(np.abs(flown.by_start[:n, :n] * (units / units[:, None])).max(initial=1.0))
-        off = np.abs(end - problem.wrap[:n, :n] @ flown.end[:n]) / units
+        flow = at.by_leg[i]
+        grows = float(np.abs(flow.by_start[:n, :n] * (units / units[:, None])).max(initial=1.0))
+        off = np.abs(end - problem.wrap[:n, :n] @ flow.end[:n]) / units
         miss = float(off.max()) / max(1.0, grows)
         if not miss <= worst:
             worst, where = miss, f"leg {count + i + 1}, in mode {leg.mode or 'o'}"

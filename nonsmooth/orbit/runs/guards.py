@@ -1,7 +1,7 @@
-"""Guards along a leg: where they come near to zero, and whether the leg can be left as it says.
+"""Extrema of guards along a leg, and the guards that the leg violates.
 
-Along a step a guard is a polynomial, so its least values inside a leg are roots of a polynomial's
-derivative: an itinerary is judged by them, not by samples.
+Along a step a guard is a polynomial. Its extrema are roots of the derivative, so an itinerary is checked
+without samples.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ class Approach:
 
 @dataclass(frozen=True)
 class Watch:
-    """What the guards of a leg do inside it."""
+    """Extrema of the guards inside a leg, and violations."""
 
     approaches: list[Approach]
     faults: list[str]
 
 
 def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array) -> Watch:
-    """Look at all guards inside a leg."""
+    """Find the extrema of all guards inside a leg, and the violations."""
     field = guarded_field(system, mode)
     y = variational_field(system, mode).states_at(x, p)
     rows = watched(field, y, p, duration, _ENDS * duration)
-    return Watch(_approaches(field, rows, p), _faults_seen(field, rows, p))
+    return Watch(_approaches(field, rows, p), _violations_along(field, rows, p))
 
 
 def _approaches(field: GuardedField, rows: Array, p: Array) -> list[Approach]:
@@ -66,7 +66,7 @@ def _approaches(field: GuardedField, rows: Array, p: Array) -> list[Approach]:
 
 
 class LegGuards:
-    """The guards of legs that follow each other, to be watched again and again."""
+    """The guards of consecutive legs, evaluated repeatedly."""
 
     def __init__(self, system: FilippovSystem, legs: Sequence[Leg]):
         self.fields = [guarded_field(system, leg.mode) for leg in legs]
@@ -81,8 +81,8 @@ class LegGuards:
         return self._watch(states, p, durations, _ENDS)
 
 
-def _faults_seen(field: GuardedField, rows: Array, p: Array) -> list[str]:
-    """What guards contradict, from their extrema and values at the ends of steps."""
+def _violations_along(field: GuardedField, rows: Array, p: Array) -> list[str]:
+    """Violations, from extrema of guards and values at the ends of steps."""
     if not len(rows) or float(rows[:, 2].min()) >= 0.0:
         return []
     guards = field.motion.guards
@@ -97,13 +97,15 @@ def _faults_seen(field: GuardedField, rows: Array, p: Array) -> list[str]:
             scale = float(slope @ np.abs(row[4:])) + math.sqrt(float(slope @ slope)) * 1e-3
         seen[k].append((t, value, scale))
     system = field.motion.system
-    return [f for g, values in zip(guards, seen, strict=True) for f in _faults(system, g, values)]
+    return [
+        f for g, values in zip(guards, seen, strict=True) for f in _violations(system, g, values)
+    ]
 
 
-def _faults(
+def _violations(
     system: FilippovSystem, guard: Guard, values: Sequence[tuple[float, float, float]]
 ) -> list[str]:
-    """What a guard's values inside a leg contradict, earliest first."""
+    """Violations of one guard inside a leg, earliest first."""
     ordered = sorted(values)
     if guard.kind in ("stop", "reset", "zero"):
         for (_, a, _), (t, b, _) in pairwise(ordered):
@@ -121,7 +123,7 @@ def _faults(
 def change_fault(
     system: FilippovSystem, leg: Leg, following: str, end: Array, after: Array, p: Array
 ) -> str:
-    """Why a leg cannot be followed by a mode as its event says; empty if it can."""
+    """Why a mode cannot follow a leg after its event; empty if it can."""
     if leg.timed:
         return ""
     own, rate = leg.at_end(system, end, p), leg.field(system).rate.copied(end, p)[0][:, 0]
@@ -147,7 +149,7 @@ def _change_fault(
     guard = own.guard
     if guard.kind in ("surface", "exit", "impact", "release") and speed > 0.0:
         condition, name = described(system, guard), leg.name(system)
-        return f"at its end {condition} is about to hold, not to fail ({name})"
+        return f"at its end {condition} starts to hold instead of failing ({name})"
     if guard.kind in ("stop", "reset") and guard.side * speed < 0.0:
         return f"{guard.kind} {leg.name(system)!r} is met from the wrong side at its end"
     return _following_fault(field, begin, p)
@@ -160,7 +162,7 @@ def _following_fault(field: GuardedField, begin: Array, p: Array) -> str:
 
 
 def _negative(field: GuardedField, begin: Array, p: Array) -> str:
-    """The first guard whose first coefficient that is not zero is negative, in words."""
+    """Describe the first guard whose first nonzero coefficient is negative."""
     guards = field.motion.guards
     states, rows = begin[: len(begin) - len(guards)], begin[len(begin) - len(guards) :]
     if not len(rows) or float(rows.min()) >= 0.0:
@@ -189,7 +191,7 @@ def faults_along(
     p: Array,
     closes: bool,
 ) -> list[str]:
-    """What the guards contradict along legs that follow each other, leg by leg."""
+    """Violations of guards along consecutive legs, leg by leg."""
     made = lambda: LegGuards(system, legs)  # kept for an orbit, which is one of many of a family
     guards = system.cached(("guards of legs", tuple(legs)), made) if closes else made()
     fields, (rows, begins, _) = guards.fields, guards(starts, p, durations)
@@ -200,7 +202,7 @@ def faults_along(
                 f"leg {i + 1} {leg_name(system, leg)} has the duration {durations[i]:.6g}"
             )
             continue
-        found, following = _faults_seen(fields[i], rows[i], p), (i + 1) % count
+        found, following = _violations_along(fields[i], rows[i], p), (i + 1) % count
         if not leg.timed and (closes or following):
             field, begin = fields[following], begins[following]
             fault = _change_fault(system, leg, float(speeds[i]), field, begin, p)
@@ -218,7 +220,7 @@ def ending(system: FilippovSystem, leg: Leg) -> tuple[int, int]:
 
 
 def march(system: FilippovSystem, leg: Leg, x: Array, p: Array, t_max: float) -> float | None:
-    """Time until the event of a leg, whatever other guards say; None if it does not come."""
+    """Time until the event of a leg, ignoring other guards; None if it does not occur."""
     # A zero where the leg starts is not counted.
     field = guarded_field(system, leg.mode)
     row, direction = ending(system, leg)

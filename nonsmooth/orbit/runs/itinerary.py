@@ -1,8 +1,7 @@
-"""Fixed itineraries: the smooth map that a sequence of modes defines, and whether a motion takes it.
+"""Flow map of a fixed itinerary, and a check that the guards admit it.
 
-With the modes and their events fixed the end of a motion is a smooth function of its start, whatever
-the guards say; so Newton's method works across changes of itinerary. Whether a motion really moves so
-is a second question, which the guards answer in words (``Arrival.fault``).
+With modes and events fixed, the end of a motion is a smooth function of its start, so Newton's method
+works across changes of itinerary. ``Arrival.fault`` describes the first guard that is violated.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from ...model.derivatives.variational import guarded_field, variational_field
 from ...model.laws.explicit import explicit
 from ...model.laws.switches import event_guards
 from .guards import change_fault
-from .legs import Flown, Leg, fly
+from .legs import Leg, LegFlow, integrate_leg
 from .saltation import saltation
 
 #: An Euler step of this length leaves a power law's zero, where a field has no Taylor series; its
@@ -42,7 +41,7 @@ from .saltation import saltation
 _INSTANT = 1e-13
 
 #: Parts of a leg's duration beside its ends in which a zero of a guard is that of the end's event. Both
-#: exits of sliding vanish at a two-fold, which is met with rounding.
+#: exits of sliding vanish at a two-fold, which is reached up to rounding.
 _NEAR = {"surface": 1e-7, "exit": 1e-5, "impact": 1e-7, "release": 1e-7}
 
 
@@ -57,7 +56,7 @@ class Arrival:
     t, entry : float
         Time of the end, and of the beginning of the last leg.
     fault : str
-        Empty if a motion really moves so, else why not, in terms of guards.
+        The first violation of a guard; empty if there is none.
     legs : tuple of Leg
     starts : tuple of ndarray (N,)
         Extended states at the starts of the legs.
@@ -92,14 +91,14 @@ def read_word(system: FilippovSystem, word: str | Sequence[str]) -> list[str]:
 
 
 def leg_between(system: FilippovSystem, mode: str, following: str, name: str = "") -> Leg:
-    """The leg of a mode that another mode follows, where the letters tell by which event."""
+    """The leg of a mode that another mode follows; the letters or ``name`` decide the event."""
     events = {guard_name(system, guard): guard for guard in event_guards(system)}
     if name in events:
         return Leg(mode, events[name].kind, events[name].element, events[name].side)
     if name in system.impacts:
         return _of_contact(system, mode, system.impacts.index(name))
     names = [*events, *system.impacts]
-    leg = _told(system, mode, following, names)
+    leg = _by_letters(system, mode, following, names)
     names.append(leg.name(system))
     if name not in ("", names[-1]):
         raise OptionError(
@@ -114,8 +113,8 @@ def leg_between(system: FilippovSystem, mode: str, following: str, name: str = "
     return leg
 
 
-def _told(system: FilippovSystem, mode: str, following: str, named: list[str]) -> Leg:
-    """The leg that the letters of two modes tell."""
+def _by_letters(system: FilippovSystem, mode: str, following: str, named: list[str]) -> Leg:
+    """The leg between two modes, from the letter that changes."""
     changed = [i for i, (a, b) in enumerate(zip(mode, following, strict=False)) if a != b]
     if not changed and len(system.resets) + len(system.impacts) == 1:
         return leg_between(system, mode, following, [*dict(system.resets), *system.impacts][0])
@@ -155,7 +154,7 @@ class FixedItinerary:
         Modes in order, e.g. ``"+ s"``; ``modes`` has them one by one.
     until : str or expression
         What ends the last leg: the name of an event, or a function of states, parameters and time.
-        What else its guards say is a fault, not an end.
+        Other zeros of guards are violations, not the end.
     parameters : mapping, optional
         Values of parameters; default the system's.
     tol : float, optional
@@ -201,12 +200,12 @@ class FixedItinerary:
         Returns
         -------
         Arrival
-            Its end ``x`` and ``t``, its legs, and ``fault``: what guards contradict, or nothing.
+            Its end ``x`` and ``t``, its legs, and ``fault``: the first violation, or empty.
 
         Raises
         ------
         ConvergenceError
-            A leg does not come to its event.
+            A leg does not reach its event.
         """
         system, p = self.system, self.system.parameter_vector(self.parameters)
         x, t, entry, fault = np.asarray(start, float), float(t_start), float(t_start), ""
@@ -281,25 +280,25 @@ class FixedItinerary:
         Parameters
         ----------
         mode, t, x
-            The mode, whatever its guards say, and the start.
+            The mode, whose guards are ignored, and the start.
         until, t_end
             The events, and the time that ends it in place of an event.
 
         Raises
         ------
         ConvergenceError
-            The mode does not come there; ``point`` is the run.
+            The mode does not reach the event; ``point`` is the run.
         """
         run = self._run(mode, t, x, until, t_end)
         if run.status is Status.NOT_FINITE and len(run.t) == 1:
             rate = self._rate(mode, t, x)
             if rate is not None:
                 run = self._run(mode, t, x + _INSTANT * rate, until, t_end)
-        wanted = Status.STOPPED if t_end is None else Status.REACHED_END
-        if run.status is not wanted:
+        required = Status.STOPPED if t_end is None else Status.REACHED_END
+        if run.status is not required:
             raise ConvergenceError(
                 f"leg in mode {mode!r} from {np.array2string(np.asarray(x), precision=6)} at "
-                f"t = {t:.6g}: expected its end, {until!r}, received {run.status}: {run.message}",
+                f"t = {t:.6g}: {until!r} was not reached. {run.status}: {run.message}",
                 point=run,
             )
         return run
@@ -334,64 +333,64 @@ class FixedItinerary:
         """
         system, p, n = self.system, self.system.parameter_vector(self.parameters), self._n
         dx = np.eye(system.extended_dimension)
-        flown: Flown | None = None
+        flow: LegFlow | None = None
         for k, leg in enumerate(arrival.legs):
-            flown = fly(system, leg, arrival.starts[k], arrival.durations[k], p)
-            dx = flown.by_start @ dx
+            flow = integrate_leg(system, leg, arrival.starts[k], arrival.durations[k], p)
+            dx = flow.by_start @ dx
             if k + 1 < len(arrival.legs):
-                at = leg.at_end(system, flown.end, p)
+                at = leg.at_end(system, flow.end, p)
                 following = arrival.legs[k + 1].field(system)
                 y = following.states_at(at.after, p)
                 rate = following.rate.copied(y, p)[0][: system.extended_dimension, 0]
-                dx = saltation(at, flown.rate, rate, f"leg {k + 1} ({leg.mode})").matrix @ dx
-        assert flown is not None
-        return dx[:n, :n], self._on_event(arrival, flown, dx, p)[:n, :n]
+                dx = saltation(at, flow.rate, rate, f"leg {k + 1} ({leg.mode})").matrix @ dx
+        assert flow is not None
+        return dx[:n, :n], self._on_event(arrival, flow, dx, p)[:n, :n]
 
     @property
     def _n(self) -> int:
         return self.system.dimension
 
-    def _on_event(self, arrival: Arrival, flown: Flown, dx: Array, p: Array) -> Array:
+    def _on_event(self, arrival: Arrival, flow: LegFlow, dx: Array, p: Array) -> Array:
         mode = arrival.legs[-1].mode
         system, until = self.system, self.until
         if isinstance(until, str):
             guards = explicit(system, mode).guards
             own = next(g for g in guards if guard_name(system, g) == until)
-            at = event_map(system, mode, own.kind, own.element, own.side)(flown.end, p)
+            at = event_map(system, mode, own.kind, own.element, own.side)(flow.end, p)
         else:
-            at = function_map(system, mode, until)(flown.end, p)
-        speed = float(at.gradient @ flown.rate)
+            at = function_map(system, mode, until)(flow.end, p)
+        speed = float(at.gradient @ flow.rate)
         if not math.isfinite(speed) or speed == 0.0:
             return np.full_like(dx, np.nan)
-        return dx - np.outer(flown.rate, at.gradient @ dx) / speed
+        return dx - np.outer(flow.rate, at.gradient @ dx) / speed
 
 
-# An itinerary as it is given, a word or a list, and the legs that it means.
+# Conversion of an itinerary, given as a string or a list, to legs.
 
 Itinerary = str | Sequence[str] | Sequence[tuple[str, str]]
 
 
 def word_legs(system: FilippovSystem, itinerary: Itinerary, mirrored: bool) -> tuple[Leg, ...]:
-    """The legs of an itinerary, of which the first follows the last one, or its mirror image does."""
+    """The legs of a closed itinerary; if ``mirrored``, the image of the first follows the last."""
     word: Any = itinerary if isinstance(itinerary, str) else _listed(itinerary)
 
-    def read() -> tuple[Leg, ...]:
+    def legs() -> tuple[Leg, ...]:
         modes = read_word(system, word) if isinstance(word, str) or not word else word
         pairs = [(e, "") if isinstance(e, str) else e for e in modes]
         following = [mode for mode, _ in pairs[1:]] + [pairs[0][0]]
         if mirrored:
             following[-1] = following[-1].translate(str.maketrans("+-", "-+"))
-        told = zip(pairs, following, strict=True)
-        return tuple(leg_between(system, mode, then, name) for (mode, name), then in told)
+        both = zip(pairs, following, strict=True)
+        return tuple(leg_between(system, mode, then, name) for (mode, name), then in both)
 
     try:
-        return system.cached(("word", word, mirrored), read)
+        return system.cached(("word", word, mirrored), legs)
     except TypeError:  # of lists, which are no keys
-        return read()
+        return legs()
 
 
 def lone_leg(system: FilippovSystem, itinerary: Itinerary) -> Leg | None:
-    """The leg without an event that one mode alone means; None where something can happen to the mode."""
+    """The leg without an event that a single mode means; None with resets or contacts."""
     if system.resets or system.impacts:
         return None
     word: Any = itinerary if isinstance(itinerary, str) else _listed(itinerary)

@@ -1,6 +1,6 @@
-"""Legs: stretches of one mode, each with the event that ends it; as words and with numbers.
+"""Legs of a run: one mode and the event that ends it, with flow and derivatives.
 
-A run is a chain of legs. What happens at one instant is one event: a reset and the change of mode
+A run is a sequence of legs. Changes at one instant are one event: a reset and the change of mode
 that it causes, an impact and the sliding that follows. Two guards that vanish at the same instant
 without one causing the other are a corner, where a derivative depends on which comes first.
 """
@@ -83,7 +83,7 @@ class Leg:
 
 
 def leg_name(system: FilippovSystem, leg: Leg) -> str:
-    """A leg in words: its mode, and what ends it."""
+    """Describe a leg by its mode and its event."""
     end = "" if leg.timed else f", ended by {leg.name(system)}"
     return f"({leg.mode or 'o'}{end})"
 
@@ -101,8 +101,8 @@ def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
 
 
 @dataclass(frozen=True, eq=False)
-class Flown:
-    """A leg with numbers: the flow of its mode from its start over its duration.
+class LegFlow:
+    """Flow of a leg from its start over its duration.
 
     Attributes
     ----------
@@ -120,21 +120,21 @@ class Flown:
     rate: Array
 
 
-def fly(
+def integrate_leg(
     system: FilippovSystem,
     leg: Leg,
     x: Array,
     duration: float,
     p: Array,
     chosen: tuple[int, ...] = (),
-) -> Flown:
+) -> LegFlow:
     """The flow of a leg's mode from ``x`` (N,) over a duration, with derivatives."""
     field = leg.field(system, chosen)
     start = field.start(x, p)
     whole = field.blocks.unpack(flow_for(field, start, p, duration))
     n, end = field.blocks.starts, whole[:, 0]
     rate = field.rate.copied(end, p)[0][:, 0]
-    return Flown(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], rate)
+    return LegFlow(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], rate)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ class Stretch:
 
 
 def stretches(run: Trajectory) -> list[Stretch]:
-    """Split a run into legs, one for each instant at which something happens."""
+    """Split a run into legs, one for each instant with events."""
     system, p = run.system, run.system.parameter_vector(run.parameters)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
@@ -222,12 +222,12 @@ def leg_of(system: FilippovSystem, event: Event, p: Array) -> Leg:
 
 
 def _require_one_surface(system: FilippovSystem, event: Event) -> None:
-    """Refuse an event at which the motion comes to two surfaces at once."""
+    """Refuse an event on two surfaces at once."""
     if event.kind not in ("crossing", "entry", "exit"):
         return
     letters = zip(event.mode_before, event.mode_after, strict=False)
-    met = [k for k, (a, b) in enumerate(letters) if a != b and a in "+-"]
-    others = [k for k in met if k != event.element]
+    changed = [k for k, (a, b) in enumerate(letters) if a != b and a in "+-"]
+    others = [k for k in changed if k != event.element]
     if others:
         other = event_name(system, event.mode_before, event.kind, others[0])
         raise DegenerateError(corner(event.t, event.name, other))

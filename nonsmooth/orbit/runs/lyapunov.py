@@ -26,7 +26,7 @@ from ...model import (
     require_system,
     whole,
 )
-from .legs import Flown, Stretch, fly, stretches
+from .legs import LegFlow, Stretch, integrate_leg, stretches
 from .variation import saltation_after
 
 #: Relative size of a column of R at an event below which a direction is lost, as in an entry to sliding.
@@ -225,9 +225,9 @@ class _Frame:
         complete = True
         try:
             for j, part in enumerate(parts):
-                flown = self._leg(part)
+                flow = self._leg(part)
                 following = parts[j + 1] if j + 1 < len(parts) else None
-                self._event(part, flown, following)
+                self._event(part, flow, following)
                 bar.update(1)
         except KeyboardInterrupt:
             complete = False
@@ -237,23 +237,23 @@ class _Frame:
             bar.close()
         return self._spectrum(complete)
 
-    def _leg(self, part: Stretch) -> Flown:
+    def _leg(self, part: Stretch) -> LegFlow:
         """Integrate a leg in pieces that end at the bounds of blocks."""
         end = part.t + part.duration
         inner = self.bounds[(self.bounds > part.t) & (self.bounds < end)].tolist()
         cuts = [*inner, end]
         x, t = part.start, part.t
         for cut in cuts:
-            flown = self._piece(part, x, t, cut - t, 0)
-            x, t = flown.end[: len(x)], cut
+            flow = self._piece(part, x, t, cut - t, 0)
+            x, t = flow.end[: len(x)], cut
         self.t = end
-        return flown
+        return flow
 
-    def _piece(self, part: Stretch, x: Array, t: float, duration: float, depth: int) -> Flown:
-        flown = fly(self.system, part.leg, x, duration, self.p)
+    def _piece(self, part: Stretch, x: Array, t: float, duration: float, depth: int) -> LegFlow:
+        flow = integrate_leg(self.system, part.leg, x, duration, self.p)
         if not self.q.shape[1]:
-            return flown
-        q, r = np.linalg.qr(flown.by_start[: self.n, : self.n] @ self.q)
+            return flow
+        q, r = np.linalg.qr(flow.by_start[: self.n, : self.n] @ self.q)
         growth = np.abs(np.diag(r))
         if depth < 40 and not _resolved(growth):
             half = self._piece(part, x, t, duration / 2, depth + 1)
@@ -261,10 +261,10 @@ class _Frame:
         self._count(q, growth, t + duration / 2)
         if t >= self.bounds[0] and self.q.shape[1] == self.n:
             self.volume += self._divergence(part.leg.mode, t, duration)
-        return flown
+        return flow
 
-    def _event(self, part: Stretch, flown: Flown, following: Stretch | None) -> None:
-        event = saltation_after(self.run, part, flown, following, self.p)
+    def _event(self, part: Stretch, flow: LegFlow, following: Stretch | None) -> None:
+        event = saltation_after(self.run, part, flow, following, self.p)
         if event is None or part.leg.kind == "end" or not self.q.shape[1]:
             return
         matrix = event.matrix[: self.n, : self.n]

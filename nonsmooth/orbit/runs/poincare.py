@@ -25,7 +25,7 @@ from ...model import (
     require_system,
     whole,
 )
-from .legs import Flown, Stretch, fly, stretches
+from .legs import LegFlow, Stretch, integrate_leg, stretches
 from .saltation import Saltation
 from .sensitivity import sensitivity
 from .variation import saltation_after
@@ -107,31 +107,31 @@ class PoincareOrbit(Savable, points="m n", t="m"):
         first = 0 if since < 0 else int(np.argmin(np.abs(ends - self.t[since])))
         dx = np.eye(system.extended_dimension)
         for j in range(first, last):
-            flown, event = self._passage(parts, j, p)
+            flow, event = self._passage(parts, j, p)
             if j == first and since >= 0:  # from the section itself
                 dx = dx if self.section.after else event.matrix[:, : len(dx)]
             else:
-                dx = event.matrix @ (flown.by_start @ dx)
-        flown, event = self._passage(parts, last, p)
-        dx = flown.by_start @ dx
+                dx = event.matrix @ (flow.by_start @ dx)
+        flow, event = self._passage(parts, last, p)
+        dx = flow.by_start @ dx
         moved = event.time_by_state @ dx
         if not self.section.after:
-            return (dx + np.outer(flown.rate, moved))[:n, :n]
+            return (dx + np.outer(flow.rate, moved))[:n, :n]
         following = parts[last + 1] if last + 1 < len(parts) else None
         if following is None:
             raise OptionError(
                 f"k = {k} is the last return, after which the field is not known. Compute one more return."
             )
-        rate = fly(system, following.leg, following.start, 0.0, p).rate
+        rate = integrate_leg(system, following.leg, following.start, 0.0, p).rate
         return (event.matrix @ dx + np.outer(rate, moved))[:n, :n]
 
-    def _passage(self, parts: list[Stretch], j: int, p: Array) -> tuple[Flown, Saltation]:
+    def _passage(self, parts: list[Stretch], j: int, p: Array) -> tuple[LegFlow, Saltation]:
         """A leg and the event that ends it, with derivatives."""
         run, part = self.run, parts[j]
-        flown = fly(run.system, part.leg, part.start, part.duration, p)
-        event = saltation_after(run, part, flown, parts[j + 1] if parts[j + 1 :] else None, p)
+        flow = integrate_leg(run.system, part.leg, part.start, part.duration, p)
+        event = saltation_after(run, part, flow, parts[j + 1] if parts[j + 1 :] else None, p)
         assert event is not None  # all legs up to a return end with an event
-        return flown, event
+        return flow, event
 
     def __repr__(self) -> str:
         return (

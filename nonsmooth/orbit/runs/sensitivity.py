@@ -152,7 +152,7 @@ def gradient(
     parts = passages(run, chosen)
     p = system.parameter_vector(run.parameters)
     last = parts[-1]
-    at = _cost(system, last.stretch.leg.mode, cost)(last.flown.end, p)
+    at = _cost(system, last.stretch.leg.mode, cost)(last.flow.end, p)
     row, by_parameters = _pulled(parts, at.gradient, chosen, stopped=_stopped(last))
     by_parameters = by_parameters + at.by_parameters[list(chosen)]
     numbers = dict(zip(names, by_parameters.tolist(), strict=True))
@@ -240,7 +240,7 @@ def vjp(
         return row @ found.dx_dx0, row @ found.dx_dp
     chosen = tuple(system.parameter_names.index(name) for name in _names(run, wrt))
     parts = passages(run, chosen)
-    whole = np.zeros(len(parts[-1].flown.end))
+    whole = np.zeros(len(parts[-1].flow.end))
     whole[:n] = row
     back, by_parameters = _pulled(parts, whole, chosen, stopped=_stopped(parts[-1]))
     return back[:n], by_parameters
@@ -255,7 +255,7 @@ def _pulled(
 ) -> tuple[Array, Array]:
     """Pull a row at the end of the flow of the last leg back to the start."""
     by_parameters = np.zeros(len(chosen))
-    last, event = parts[-1].flown, parts[-1].event
+    last, event = parts[-1].flow, parts[-1].event
     if stopped and event is not None:
         along_flow = float(row @ last.rate)
         by_parameters = by_parameters + along_flow * event.time_by_parameters[list(chosen)]

@@ -1,4 +1,4 @@
-"""The variational equation of systems with sets of codimension two and three, and its jumps at the sets.
+"""Variational equation of systems with sets of codimension two and three, with jumps at the sets.
 
 Off a set the multiplier u = h/|h| moves with the state, du = (1 - u u^T) dh/|h|; on it lambda keeps h at
 zero, as multipliers of sliding surfaces and reactions of closed contacts do. The variational equation is
@@ -40,7 +40,7 @@ _NODES = 10
 _GONE = 1e-16
 
 #: Steps of Newton's method for multipliers that do not enter linearly together.
-_TURNS = 30
+_MOST_STEPS = 30
 
 #: A set is left tangentially where |h'| is below this part of its rates.
 _TANGENTIAL = 1e-8
@@ -71,13 +71,12 @@ class Variation:
         self.idle = [s for s in system.sets if not multiplier_enters(system, s, p)]
 
     def at(self, x: Array, acting: Array | None = None) -> AtMode:
-        """Values at an extended state, with what acts there; nothing by default."""
+        """Values at an extended state with given multipliers and reactions; default zero."""
         given = np.zeros(self._of.size) if acting is None else acting
         return self._of.at(x, given, self.p, self.chosen)
 
     def moving(self, mode: str, x: Array, slip: Array | None = None) -> tuple[AtMode, Array, Array]:
-        """Values at a state of a mode, with the derivatives of what acts by states and
-        parameters."""
+        """Values at a state of a mode, with derivatives of its multipliers and reactions."""
         # ``slip`` is h with all its digits, where it is known. A set that is left at h = 0 is left in
         # the direction in which the motion goes.
         acting = np.zeros(self._of.size)
@@ -111,12 +110,12 @@ class Variation:
         return here, by_state, by_p
 
     def _sliding(self, mode: str, but: Sequence[int] = ()) -> tuple[list[int], list[int]]:
-        """What slides in a mode and is closed, and where its unknowns are among what acts."""
+        """Sliding surfaces and closed contacts of a mode, and the columns of their unknowns."""
         sliding = [i for i in self._coupled.sliding(mode) if i not in but]
         return sliding, [self._of.column[i] for i in sliding]
 
     def _balanced(self, mode: str, x: Array, acting: Array, but: Sequence[int] = ()) -> AtMode:
-        """Values with the unknowns of what slides, which are written into ``acting``."""
+        """Values with the solved multipliers of sliding surfaces, written into ``acting``."""
         sliding, columns = self._sliding(mode, but)
         here = self.at(x, acting)
         if not sliding:
@@ -125,7 +124,7 @@ class Variation:
         if not linear:
             acting[columns] = self._near(mode, x, columns)
             here = self.at(x, acting)
-        for _ in range(1 if linear else _TURNS):
+        for _ in range(1 if linear else _MOST_STEPS):
             step = np.linalg.solve(
                 here.rates.a[np.ix_(sliding, columns)], here.rates.value[sliding]
             )
@@ -136,7 +135,7 @@ class Variation:
         return here
 
     def _near(self, mode: str, x: Array, columns: Sequence[int]) -> Array:
-        """Where Newton's method for multipliers that do not enter linearly begins: those nearby."""
+        """Start of Newton's method for multipliers that enter nonlinearly: the last ones, or solved anew."""
         if self.acting[list(columns)].any():
             return np.asarray(self.acting[list(columns)])
         found = sliding_multipliers(self._coupled, mode, x, self.p)
@@ -171,7 +170,7 @@ class Variation:
             )
         return leaving_direction(law.a, law.m)[1]
 
-    # along steps --------------------------------------------------------------------------------
+    # integration along steps --------------------------------------------------------------------------------
 
     def across(self, mode: str, c: Array, dt: float, y: Array, leaving: Sequence[int]) -> Array:
         """Carry derivatives over a step with the Taylor coefficients c of the states."""
@@ -216,7 +215,7 @@ class Variation:
             found[own, i] = (linear + bent)[own]
         return found
 
-    # at sets ------------------------------------------------------------------------------------
+    # jumps at sets ------------------------------------------------------------------------------------
 
     def hit(self, mode: str, members: tuple[int, ...], x: Array, y: Array) -> Array:
         """Derivatives after a set is reached, from those just before; ``mode`` is that before."""
@@ -225,8 +224,8 @@ class Variation:
         sliding, columns = self._sliding(held)
         miss = here.heights.x @ y
         miss[:, len(x) :] += here.heights.p
-        wanted = np.where(np.isin(sliding, members)[:, None], miss[sliding], 0.0)
-        back = np.linalg.solve(here.rates.a[np.ix_(sliding, columns)], wanted)
+        required = np.where(np.isin(sliding, members)[:, None], miss[sliding], 0.0)
+        back = np.linalg.solve(here.rates.a[np.ix_(sliding, columns)], required)
         return np.asarray(y - here.field.a[:, columns] @ back)
 
     def time_of_hit(self, mode: str, members: tuple[int, ...], x: Array, y: Array) -> Array:
@@ -280,7 +279,7 @@ class Variation:
     def _towards(
         self, mode: str, own: Sequence[int], x: Array, u: Array, dx: Array, du: Array
     ) -> tuple[AtMode, Callable[[Derived], Array]]:
-        """Values where a set's multiplier is u, and what changes of the state and of u make of them."""
+        """Values with a set's multiplier u, and their linear change with the state and u."""
         slip = self.at(x).heights.value
         slip[own] = u
         here, by_state, by_p = self.moving(mode, x, slip)
@@ -319,7 +318,7 @@ class Variation:
         return np.asarray(-change / (g_x @ here.field.value))
 
 
-# Derivatives of runs with friction in the plane: through sets of codimension two and three.
+# Sensitivities of runs through sets of codimension two and three.
 
 
 def set_sensitivity(run: Trajectory, names: Sequence[str]) -> Sensitivity:
@@ -357,7 +356,7 @@ _ON_SET = 1e-14
 
 
 class _Passage:
-    """Derivatives on their way along a run."""
+    """Derivatives carried along a run."""
 
     def __init__(self, run: Trajectory, law: Variation):
         self.run, self.law, self.system = run, law, run.system
@@ -420,7 +419,7 @@ class _Passage:
                 f"{event.name!r} that accumulate at t = {event.t:.10g}. End the run before, or give a "
                 "restitution of 0."
             )
-        met = self._met(event)
+        met = self._members(event)
         if event.kind in _CHANGES and not event.side and len(met) < 2:
             raise DegenerateError(
                 f"run: the {event.kind} at t = {event.t:.10g} is no zero of a function and has no "
@@ -442,14 +441,14 @@ class _Passage:
             raise DegenerateError(corner(event.t, previous.name, event.name))
 
     def _follows(self, event: Event, previous: Event) -> bool:
-        """Whether neighbours meet an event at the instant of the one before, which led onto its zero."""
+        """Whether the previous event causes this one, so that neighbours have both at one instant."""
         if _ends_sliding(previous):
             return False
         one = self._at(self.system.widened(previous.mode_before), previous)
         other = self._at(self.system.widened(event.mode_before), event)
         return parallel(other.gradient @ one.after_state, one.gradient)
 
-    def _met(self, event: Event) -> tuple[int, ...]:
+    def _members(self, event: Event) -> tuple[int, ...]:
         """Switching functions of the surface or set that an event belongs to."""
         own = event.kind in _CHANGES and 0 <= event.element < len(self.system.entries)
         return self.system.entries[event.element] if own else ()
@@ -467,7 +466,7 @@ class _Passage:
         """Carry the derivatives through an event."""
         # ``before`` are the states and derivatives at the steps since the last event.
         x, following = self._extended(event.x, event.t), self.system.widened(event.mode_after)
-        met = self._met(event)
+        met = self._members(event)
         self.times.append(event.t)
         if event.kind == "entry" and len(met) > 1:
             self.rows.append(self._time_of_hit(mode, met, before))

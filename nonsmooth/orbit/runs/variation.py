@@ -21,9 +21,9 @@ from ...flow.names import described
 from ...flow.trajectory import Trajectory
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent
-from .flight import Flight, Flights
 from .guards import watch
-from .legs import Flown, Leg, Stretch, fly, leg_name, stretches
+from .leg_integration import LegFlows, LegIntegrator
+from .legs import Leg, LegFlow, Stretch, integrate_leg, leg_name, stretches
 from .saltation import Saltation, saltation, saltations
 
 # Grazings within the error of a run ---------------------------------------------------------------
@@ -49,8 +49,8 @@ def _require_certain(system: FilippovSystem, parts: Sequence[Passage], p: Array)
     n = system.extended_dimension
     error = np.zeros(n)  # of the run, relative to the orbit from its start
     for k, part in enumerate(parts[: flat[-1] + 1]):
-        error = part.flown.by_start @ error
-        error[:n] += part.stretch.end - part.flown.end[:n]
+        error = part.flow.by_start @ error
+        error[:n] += part.stretch.end - part.flow.end[:n]
         if part.event is None:
             error = error[:n]
             continue
@@ -61,21 +61,21 @@ def _require_certain(system: FilippovSystem, parts: Sequence[Passage], p: Array)
 
 def _require_deep(system: FilippovSystem, part: Passage, error: Array, p: Array) -> None:
     """Raise for a grazing that is no deeper than the error (N + k,) of the run."""
-    leg, flown = part.stretch.leg, part.flown
-    at = leg.at_end(system, flown.end, p)
+    leg, flow = part.stretch.leg, part.flow
+    at = leg.at_end(system, flow.end, p)
     if part.event is None or np.array_equal(part.event.matrix, at.after_state):
         return  # it leaves the derivative continuous
-    speed = _speed(at, flown.rate)
-    size, length = math.hypot(*flown.end), math.hypot(*flown.rate)
+    speed = _speed(at, flow.rate)
+    size, length = math.hypot(*flow.end), math.hypot(*flow.rate)
     step = _INSTANT * min(part.stretch.duration, size / length if size and length else math.inf)
-    before = flown.end - step * flown.rate
+    before = flow.end - step * flow.rate
     rate = leg.field(system).rate.copied(before, p)[0][:, 0]
     turning = (speed - _speed(leg.at_end(system, before, p), rate)) / step if step else 0.0
     if not turning * speed < 0.0:
         return  # it does not turn back
     depth = 0.5 * speed**2 / abs(turning)
     wrong = abs(float(at.gradient @ error))
-    wrong += _ROUNDING * float(np.abs(at.gradient) @ np.abs(flown.end))
+    wrong += _ROUNDING * float(np.abs(at.gradient) @ np.abs(flow.end))
     if depth > _CERTAIN * wrong:
         return
     raise DegenerateError(
@@ -96,7 +96,7 @@ _STAGES = 12
 
 def _collocated(
     run: Trajectory, leg: Leg, t_start: float, t_end: float, p: Array, chosen: tuple[int, ...]
-) -> Flown:
+) -> LegFlow:
     """Derivatives of a leg of a run between two times, by Gauss collocation."""
     field = leg.field(run.system, chosen)
     n, starts = field.blocks.starts, run.steps.starts
@@ -118,7 +118,7 @@ def _collocated(
         b[:, :, n:] = np.array([v[1][:, list(chosen)] for v in values])
         derivatives = derivatives + h * _increment(a, b, derivatives, h * inner, weights)
     end, rate = _polynomial(run, last - 1, t_end, n)
-    return Flown(end, derivatives[:, :n], derivatives[:, n:], rate)
+    return LegFlow(end, derivatives[:, :n], derivatives[:, n:], rate)
 
 
 def _polynomial(run: Trajectory, step: int, t: float, n: int) -> tuple[Array, Array]:
@@ -154,13 +154,13 @@ class Passage:
     """A leg of a run and the event that ends it, with derivatives."""
 
     stretch: Stretch
-    flown: Flown
+    flow: LegFlow
     event: Saltation | None  # None where a time ends the leg
 
     def forward(self, dx: Array, dp: Array) -> tuple[Array, Array]:
         """Carry derivatives by start (N, m) and parameters (N, q) to the end of the leg's flow."""
-        by_start = self.flown.by_start
-        return by_start @ dx, by_start @ dp + self.flown.by_parameters
+        by_start = self.flow.by_start
+        return by_start @ dx, by_start @ dp + self.flow.by_parameters
 
     def through(self, dx: Array, dp: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
         """Carry derivatives at the end of the flow through the event."""
@@ -181,8 +181,8 @@ class Passage:
         if self.event is not None:
             by_parameters += cotangent @ self.event.by_parameters[:, list(chosen)]
             cotangent = cotangent @ self.event.matrix
-        by_parameters += cotangent @ self.flown.by_parameters
-        return cotangent @ self.flown.by_start, by_parameters
+        by_parameters += cotangent @ self.flow.by_parameters
+        return cotangent @ self.flow.by_start, by_parameters
 
 
 def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
@@ -191,47 +191,47 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     p = system.parameter_vector(run.parameters)
     parts = stretches(run)
     try:
-        flight = Flights(system, [part.leg for part in parts], chosen)(
+        flows = LegIntegrator(system, [part.leg for part in parts], chosen)(
             np.array([part.start for part in parts]), np.array([part.duration for part in parts]), p
         )
     except ConvergenceError:
         found = _one_by_one(run, parts, p, chosen)
         _require_certain(system, found, p)
         return found
-    found = _together(system, parts, flight)
+    found = _together(system, parts, flows)
     if not parts[-1].leg.timed and run.events[-1].kind == "end":  # the run ends at the very event
         last = found[-1]
-        jump = saltation_after(run, last.stretch, last.flown, None, p)
+        jump = saltation_after(run, last.stretch, last.flow, None, p)
         found[-1] = replace(last, event=jump)
     _require_certain(system, found, p)
     return found
 
 
-def _together(system: FilippovSystem, parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
+def _together(system: FilippovSystem, parts: Sequence[Stretch], flows: LegFlows) -> list[Passage]:
     """Legs that were integrated together, with the saltation of their events."""
-    n = flight.after.shape[1]
-    after = np.roll(flight.before[:, :n], -1, axis=0)
-    carried = (flight.after_state @ flight.rate[:, :, None])[:, :, 0]
+    n = flows.after.shape[1]
+    after = np.roll(flows.before[:, :n], -1, axis=0)
+    carried = (flows.after_state @ flows.rate[:, :, None])[:, :, 0]
     ends: NDArray[Any] = ~np.all(np.isfinite(after), axis=1)
     ends[-1] = True
     after[ends] = carried[ends]
     events = np.array([not part.leg.timed for part in parts])
-    found = saltations(flight, after, lambda k: _at(system, parts[k]), events)
+    found = saltations(flows, after, lambda k: _at(system, parts[k]), events)
     rows = zip(
         parts,
-        flight.flown,
+        flows.by_leg,
         events.tolist(),
         found.matrix,
         found.by_parameters,
         found.time_by_state,
         found.time_by_parameters,
         found.angle.tolist(),
-        flight.sizes,
+        flows.sizes,
         strict=True,
     )
     return [
-        Passage(part, flown, Saltation(s[:, :k], sp, t[:k], tp, angle) if event else None)
-        for part, flown, event, s, sp, t, tp, angle, k in rows
+        Passage(part, flow, Saltation(s[:, :k], sp, t[:k], tp, angle) if event else None)
+        for part, flow, event, s, sp, t, tp, angle, k in rows
     ]
 
 
@@ -245,40 +245,40 @@ def _one_by_one(
     """Legs, some of which have no Taylor series at an end."""
     result: list[Passage] = []
     for k, part in enumerate(parts):
-        flown = _flown(run, part, p, chosen)
+        flow = _flow(run, part, p, chosen)
         following = parts[k + 1] if k + 1 < len(parts) else None
-        result.append(Passage(part, flown, saltation_after(run, part, flown, following, p)))
+        result.append(Passage(part, flow, saltation_after(run, part, flow, following, p)))
     return result
 
 
-def _flown(run: Trajectory, part: Stretch, p: Array, chosen: tuple[int, ...]) -> Flown:
+def _flow(run: Trajectory, part: Stretch, p: Array, chosen: tuple[int, ...]) -> LegFlow:
     try:
-        return fly(run.system, part.leg, part.start, part.duration, p, chosen)
+        return integrate_leg(run.system, part.leg, part.start, part.duration, p, chosen)
     except ConvergenceError:
         # A field such as a power law has a derivative, but no Taylor series at zero.
         return _collocated(run, part.leg, part.t, part.t + part.duration, p, chosen)
 
 
 def saltation_after(
-    run: Trajectory, part: Stretch, flown: Flown, following: Stretch | None, p: Array
+    run: Trajectory, part: Stretch, flow: LegFlow, following: Stretch | None, p: Array
 ) -> Saltation | None:
     """The saltation of the event that ends a leg; None where a time ends it."""
     # At the end of a run the field after it is that of the mode reached.
     if part.leg.timed:
         return None
     system, n = run.system, len(part.start)
-    at = part.leg.at_end(system, flown.end, p)
+    at = part.leg.at_end(system, flow.end, p)
     ends = run.events[-1]
     leg = following.leg if following else Leg(ends.mode_before) if ends.kind == "end" else None
     if part.leg.kind == "stop" or leg is None:
-        after = at.after_state @ flown.rate
+        after = at.after_state @ flow.rate
     else:
         field = leg.field(system)
         start = field.states_at(at.after, p)
         after = field.rate.copied(start, p)[0][:n, 0]
         if not np.all(np.isfinite(after)):
-            after = at.after_state @ flown.rate
-    return saltation(at, flown.rate, after, _at(system, part))
+            after = at.after_state @ flow.rate
+    return saltation(at, flow.rate, after, _at(system, part))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -373,7 +373,7 @@ def along(run: Trajectory, names: Sequence[str]) -> tuple[list[Passage], Sensiti
             by_parameters.append(t_p)
             if part.stretch.leg.kind == "stop":
                 end_x, end_p = t_x, t_p
-                rate = part.flown.rate
+                rate = part.flow.rate
                 dx, dp = dx + np.outer(rate, t_x), dp + np.outer(rate, t_p)
                 continue
         dx, dp = part.through(dx, dp, chosen)

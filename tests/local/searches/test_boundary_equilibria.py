@@ -12,7 +12,7 @@ from nonsmooth.local import (
     find_boundary_equilibrium,
     find_equilibrium,
 )
-from nonsmooth.local.point.surface_point import place
+from nonsmooth.local.point.surface_point import surface_at
 from nonsmooth.local.searches.boundary_equilibria import fold_orbit_landing
 
 X, Y, Z = (ca.SX.sym(s) for s in "xyz")
@@ -96,7 +96,7 @@ def test_derivatives_by_parameters_are_those_of_the_expressions():
         below=[X, a**3],
         parameters={a: 0.7, b: 1.3},
     )
-    where, x = place(system, [0.4, 0.9])
+    where, x = surface_at(system, [0.4, 0.9])
     h, fields = where.parameter_derivatives(x)
     assert h == pytest.approx([-0.16, 0.0])
     assert fields[0] == pytest.approx(np.array([[1.3, 0.7], [0.0, 0.4 * np.cos(0.52)]]))

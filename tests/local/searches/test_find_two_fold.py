@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import nonsmooth as ns
 from nonsmooth.local import find_two_fold, two_fold
-from nonsmooth.local.point.surface_point import place
+from nonsmooth.local.point.surface_point import surface_at
 from nonsmooth.orbit import TraceError, trace_two_folds
 from nonsmooth.solvers.newton import solve
 from tests.drawing import at_most
@@ -411,7 +411,7 @@ def test_threads_share_a_system():
 
 def test_numbers_at_a_point_outlive_the_next_evaluation():
     system, s, _ = hidden((1, -1), (0.5, 1.5), 3)
-    where, x = place(system, s)
+    where, x = surface_at(system, s)
     first = where.at(x)
     kept = first.lie_gradients.copy(), first.fields.copy(), first.gradient.copy()
     where.at(x + 0.3)

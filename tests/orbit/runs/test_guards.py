@@ -9,7 +9,7 @@ from nonsmooth.flow import fixed
 from nonsmooth.flow.names import described
 from nonsmooth.model import Guard
 from nonsmooth.orbit.runs.guards import change_fault, faults_along, watch
-from nonsmooth.orbit.runs.legs import Leg, fly, leg_name
+from nonsmooth.orbit.runs.legs import Leg, integrate_leg, leg_name
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,10 @@ def test_legs_are_judged_together_as_one_by_one(monkeypatch):
     ]
     starts = np.array([[0, 0.2, 0.7], [7, -0.3, 0], [0, 0.0, 1], [0, 0.1, -1], [0, 1, 0.0]])
     durations, p = np.array([5.0, 1.0, 2.6, 0.0, 9.0]), np.zeros(0)
-    ends = [fly(system, leg, s, d, p) for leg, s, d in zip(legs, starts, durations, strict=True)]
+    ends = [
+        integrate_leg(system, leg, s, d, p)
+        for leg, s, d in zip(legs, starts, durations, strict=True)
+    ]
     speeds = np.array([end.rate[1] * (-1) ** i for i, end in enumerate(ends)])
     expected = []
     for i, leg in enumerate(legs):

@@ -19,7 +19,7 @@ static int freeze(Run *r, const int8_t *letter, const double *x, const double *u
     if (mine) r->held[i] = 0;
     else if (letter[i] == 0 && !is_idle(r, letter, i)) others[count++] = i;
   }
-  yardsticks(r, x, r->held, r->none);
+  error_scales(r, x, r->held, r->none);
   for (int i = 0; i < k; i++) {
     a[i] = layer_of(r, own[i]);
     for (int j = 0; j < k; j++) m[i * k + j] = -r->slope[own[i] * w + own[j]] * factor_of(r, own[j]);
@@ -55,7 +55,7 @@ static int field_with(Run *r, const int8_t *letter, const double *x, const doubl
   }
   if (count) {
     double *d = r->work, *b = d + (int64_t)count * count;
-    yardsticks(r, x, r->held, r->none);
+    error_scales(r, x, r->held, r->none);
     for (int i = 0; i < count; i++) {
       for (int j = 0; j < count; j++) d[i * count + j] = r->slope[others[i] * w + others[j]];
       b[i] = -layer_of(r, others[i]);
@@ -347,7 +347,7 @@ static int without_friction(Run *r) {
     int f = first_of(r, s), k = size_of(r, s), enters = 0;
     for (int trial = 0; trial < 3 && !enters; trial++) {
       for (int i = 0; i < n_of(r); i++) x[i] = r->x[i] + trial * (0.37 + 0.11 * i);
-      yardsticks(r, x, r->none, r->none);
+      error_scales(r, x, r->none, r->none);
       for (int i = f; i < f + k; i++)
         for (int j = f; j < f + k; j++) enters |= r->slope[i * width_of(r) + j] * factor_of(r, j) != 0;
     }

@@ -11,7 +11,7 @@ static int impulses_fit(Run *r, const double *x, const int32_t *involved, int co
   for (int i = 0; i < carries; i++) if (letter[carried[i]] == 0) unknown[k++] = carried[i];
   int stuck = k;
   for (int i = 0; i < takes; i++) unknown[k++] = m + taking[i];
-  yardsticks(r, x, held_of(r, letter), r->none);
+  error_scales(r, x, held_of(r, letter), r->none);
   for (int i = 0; i < k; i++)
     for (int j = 0; j < k; j++) a[i * k + j] = r->slope[unknown[i] * w + unknown[j]];
   surface_values(r, x);
@@ -26,7 +26,7 @@ static int impulses_fit(Run *r, const double *x, const int32_t *involved, int co
   for (int i = 0; i < w; i++)
     for (int j = 0; j < k; j++) if (b[j] != 0) h[i] += r->slope[i * w + unknown[j]] * b[j];
   for (int j = 0; j < c_of(r); j++) r->held[m + j] = every[m + j]; /* impulses in place of reactions */
-  yardsticks(r, x, r->held, r->none);
+  error_scales(r, x, r->held, r->none);
   for (int i = 0; i < m; i++) limit[i] = fabs(factor_of(r, i));
   for (int i = 0; i < takes; i++) if (!plastic && every[m + taking[i]] < 0) return 0;
   for (int i = 0; i < stuck; i++)

@@ -209,7 +209,7 @@ static int improve(Run *r, const Layout *l, const double *x, double *unknowns, i
   for (int iteration = 0; slides && iteration < steps; iteration++) {
     double largest = 0, most = 0;
     aim(r, l->letter, x, unknowns);
-    yardsticks(r, x, held_of(r, l->letter), unknowns);
+    error_scales(r, x, held_of(r, l->letter), unknowns);
     double *a = r->work, *b = a + slides * slides;
     for (int i = 0; i < slides; i++) {
       for (int j = 0; j < slides; j++) a[i * slides + j] = r->slope[l->sliding[i] * w + l->sliding[j]];

@@ -88,7 +88,7 @@ static double out_of(const Values *t, const double *w, int k) { return w[t->outp
 #endif
 
 /* Layer, factors, slope and gradients at a point; r->slope is dense. */
-static void yardsticks(Run *r, const double *x, const double *held, const double *unknowns) {
+static void error_scales(Run *r, const double *x, const double *held, const double *unknowns) {
   const Entries *slope = &r->s->slope;
   set_inputs(r, x, held, unknowns);
   r->stamp++;
@@ -134,7 +134,7 @@ static inline double weighed(double slope, double x, int finite_only) {
 static void point_sums(const Run *r, int is_free, const double *vector, int finite_only, const Sums *to);
 #endif
 
-/* Yardsticks of the guards from those of surfaces, of sliding multipliers and of stops. */
+/* Error scales of the guards from those of surfaces, of sliding multipliers and of stops. */
 static void guard_sums(Run *r, const Expansion *e, const double *vector, int finite_only, double *result) {
   const Layout *l = &e->l;
   int w = width_of(r), slides = l->slides, stops = stops_of(r) + resets_of(r);
@@ -166,7 +166,7 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
   }
 }
 
-/* The values that an expansion's yardsticks are made of; its sets are aimed at. */
+/* The values that an expansion's error scales are made of; its sets are aimed at. */
 static void weigh_point(Run *r, Expansion *e, const double *x, const double *unknowns) {
   if (e->l.is_free) {
     const double *held = held_of(r, e->l.letter);
@@ -175,7 +175,7 @@ static void weigh_point(Run *r, Expansion *e, const double *x, const double *unk
       set_inputs(r, x, held, unknowns);
       run_free_point(&r->s->point, r->input, r->p, r->point);
     }
-  } else yardsticks(r, x, held_of(r, e->l.letter), unknowns);
+  } else error_scales(r, x, held_of(r, e->l.letter), unknowns);
   e->stamp = r->stamp;
 }
 

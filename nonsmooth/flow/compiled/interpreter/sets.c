@@ -257,7 +257,7 @@ static void set_row(Run *r, const Layout *l, int row, const double *series, int 
   }
 }
 
-/* Yardsticks of these guards, from those of switching functions, multipliers and factors. */
+/* Error scales of these guards, from those of switching functions, multipliers and factors. */
 static double set_sum(Run *r, const Expansion *e, int row, const double *height, const double *layer,
                       const double *factor) {
   int i = e->l.index[row], size = size_of(r, set_of(r, i)), letter = e->l.letter[i];

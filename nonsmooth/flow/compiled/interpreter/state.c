@@ -121,7 +121,7 @@ typedef struct {
   int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
   const double *times;
   double *sample_t, *sample_x;
-  /* programs' values, inputs, yardsticks */
+  /* programs' values, inputs, error scales */
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
   int32_t *pending, *sparse, *involved;

@@ -9,7 +9,7 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
   for (int side = 1; side >= -1; side -= 2) {
     held_of(r, letter);
     r->held[surface] = side;
-    yardsticks(r, r->x, r->held, r->none);
+    error_scales(r, r->x, r->held, r->none);
     if (r->s->scaled[surface] && r->slope[surface * width_of(r) + surface] != 0) return 0;
     gradient_sums(r, &r->s->point, r->point, 2 * width_of(r) + r->s->slope.count, &r->s->layer_gradient, width_of(r), near,
                   1, r->small);
@@ -35,7 +35,7 @@ static int rates(Run *r, const int8_t *letter) {
     for (int j = 0; j < k; j++)
       if (r->active[j] >= m_of(r) && r->s->carries[own * c_of(r) + r->active[j] - m_of(r)]) return 0;
   }
-  yardsticks(r, r->x, r->held, r->none);
+  error_scales(r, r->x, r->held, r->none);
   for (int i = 0; i < n_of(r); i++) near[i] = r->size + fabs(r->x[i]);
   gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
   for (int i = 0; i < w; i++) if (!(fabs(layer_of(r, i)) < INFINITY)) return 0;
@@ -143,7 +143,7 @@ static int continuation(Run *r, const int8_t *letter, const Known *known, int kn
   if (e->l.slides) {
     if (!is_known(r, &e->l)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
     if (!improve(r, &e->l, r->x, result->unknowns, 1)) return 0;
-    yardsticks(r, r->x, held_of(r, letter), result->unknowns);
+    error_scales(r, r->x, held_of(r, letter), result->unknowns);
     int stable = meets_sets(r) ? 1 : is_stable(r, &e->l); /* M of sets is definite where they are decided */
     if (stable < 0) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
     if (!stable) return 0;

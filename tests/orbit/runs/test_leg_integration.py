@@ -1,4 +1,4 @@
-"""Legs flown together are those flown one by one, and in extended precision they have more digits."""
+"""Legs integrated together equal those integrated one by one; extended precision gives more digits."""
 
 import casadi as ca
 import mpmath as mp
@@ -9,9 +9,9 @@ import nonsmooth as ns
 from nonsmooth.flow import fixed
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.model.derivatives.variational import guarded_field
-from nonsmooth.orbit.runs import flight
-from nonsmooth.orbit.runs.flight import Flights
+from nonsmooth.orbit.runs import leg_integration
 from nonsmooth.orbit.runs.guards import watch
+from nonsmooth.orbit.runs.leg_integration import LegIntegrator
 from nonsmooth.orbit.runs.legs import Leg
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
@@ -45,10 +45,10 @@ MIXED = [
 
 def together_and_apart(monkeypatch, system, legs, starts, durations, chosen):
     p = system.parameter_vector()
-    flights = Flights(system, legs, chosen)
-    together = flights(np.array(starts), np.array(durations), p)
-    monkeypatch.setattr(flight, "has_interpreter", lambda: False)
-    return together, flights(np.array(starts), np.array(durations), p)
+    integrator = LegIntegrator(system, legs, chosen)
+    together = integrator(np.array(starts), np.array(durations), p)
+    monkeypatch.setattr(leg_integration, "has_interpreter", lambda: False)
+    return together, integrator(np.array(starts), np.array(durations), p)
 
 
 @pytest.mark.parametrize(
@@ -64,11 +64,9 @@ def together_and_apart(monkeypatch, system, legs, starts, durations, chosen):
         (HIDDEN, [Leg("s"), Leg("+", "entry", 0, 1)], [[0.1, 0.0], [0.2, 0.1]], [0.3, 0.2]),
     ],
 )
-def test_legs_flown_together_are_those_flown_one_by_one(
-    monkeypatch, system, legs, starts, durations
-):
+def test_legs_together_equal_legs_one_by_one(monkeypatch, system, legs, starts, durations):
     both = together_and_apart(monkeypatch, system, legs, starts, durations, (0,))
-    for name in flight.Flight.__dataclass_fields__:
+    for name in leg_integration.LegFlows.__dataclass_fields__:
         one, two = (np.asarray(getattr(found, name)) for found in both)
         np.testing.assert_allclose(one, two, rtol=1e-12, atol=1e-13, err_msg=name)
 
@@ -77,14 +75,14 @@ def test_a_leg_that_fails_is_named():
     system = ns.FilippovSystem([x], surface=x - 9, above=[1], below=[x**2])
     legs = [Leg("-"), Leg("-", "crossing", 0, -1)]
     with pytest.raises(ns.ConvergenceError, match=r"leg 2 \(-, ended by h0\)"):
-        Flights(system, legs)(np.array([[0.1], [1.0]]), np.array([1.0, 2.0]), np.zeros(0))
+        LegIntegrator(system, legs)(np.array([[0.1], [1.0]]), np.array([1.0, 2.0]), np.zeros(0))
 
 
 def test_residuals_have_more_digits_than_doubles():
     """x'' = -4 x, y' = x y from binary numbers, against the closed form with 40 digits."""
     system = ns.FilippovSystem([x, y, z], surface=x, above=[y, -4 * x, x * z], below=[1, 0, 0])
     start, duration = np.array([[0.75, 1.5, 1.25]]), np.array([0.875])
-    found = Flights(system, [Leg("+", "crossing", 0, 1)]).ends(
+    found = LegIntegrator(system, [Leg("+", "crossing", 0, 1)]).ends(
         start, duration, np.zeros(0), extended=True
     )
     if found is None or np.finfo(np.longdouble).eps > 1e-18:

@@ -1,7 +1,7 @@
-"""All legs of an orbit or a run flown in one call, with their derivatives and those of their events.
+"""Integration of all legs of an orbit or run in one call, with derivatives of legs and events.
 
-What :func:`~nonsmooth.orbit.runs.legs.fly` and :meth:`~nonsmooth.orbit.runs.legs.Leg.at_end` say of one leg is
-stacked here, legs on the first axis.
+The results of :func:`~nonsmooth.orbit.runs.legs.integrate_leg` and
+:meth:`~nonsmooth.orbit.runs.legs.Leg.at_end` are stacked, legs on the first axis.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from ...flow.fixed import MOST_STEPS, TOLERANCE, has_interpreter, legs_program, 
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent
 from ...model.derivatives.variational import plain_field
-from .legs import Flown, Leg, fly, leg_name
+from .legs import Leg, LegFlow, integrate_leg, leg_name
 
 #: Local errors of the steps in extended precision.
 EXTENDED = 2.0**-64
 
 
 @dataclass(frozen=True, eq=False)
-class Flight:
-    """Legs with numbers; rows of legs with fewer states than S end in zeros.
+class LegFlows:
+    """Flows of legs; rows of legs with fewer states than S end in zeros.
 
     Attributes
     ----------
@@ -58,10 +58,10 @@ class Flight:
     value_parameters: Array
 
     @cached_property
-    def flown(self) -> tuple[Flown, ...]:
+    def by_leg(self) -> tuple[LegFlow, ...]:
         """Leg by leg."""
         rows = zip(self.sizes, self.end, self.by_start, self.by_parameters, self.rate, strict=True)
-        return tuple(Flown(end[:k], x[:k], by_p[:k], rate[:k]) for k, end, x, by_p, rate in rows)
+        return tuple(LegFlow(end[:k], x[:k], by_p[:k], rate[:k]) for k, end, x, by_p, rate in rows)
 
     @cached_property
     def events(self) -> tuple[AtEvent, ...]:
@@ -80,13 +80,13 @@ class Flight:
 
 
 @lru_cache(maxsize=256)
-def _event_places(n: int, most: int, q: int) -> tuple[int, ...]:
+def _event_offsets(n: int, most: int, q: int) -> tuple[int, ...]:
     """Where g, g_x, g_p, e, e_x and e_p begin and end."""
     return (0, *accumulate((n, n * most, n * q, 1, most, q)))
 
 
-class Flights:
-    """Legs to be flown again and again.
+class LegIntegrator:
+    """Legs that are integrated repeatedly.
 
     Parameters
     ----------
@@ -146,15 +146,15 @@ class Flights:
                 return None
             results, rest = found
             return results[:, :n], rest[:, :n], results[:, n]
-        flown = program(starts, p, durations, TOLERANCE, MOST_STEPS)
-        if flown.failed >= 0:
+        flow = program(starts, p, durations, TOLERANCE, MOST_STEPS)
+        if flow.failed >= 0:
             return None
-        return flown.results[:, :n], None, flown.results[:, n]
+        return flow.results[:, :n], None, flow.results[:, n]
 
     @cached_property
     def _template(self) -> tuple[Array, Array, NDArray[Any], NDArray[Any]]:
         """States of all legs at a start 0, and matrices (x, X, P)^T of entries that do not move."""
-        # Then places of the entries that move: in these matrices, and in the states.
+        # Then indices of the entries that move: in these matrices, and in the states.
         width, columns = self._program.width, self.fields[0].blocks.moving.shape[1]
         count, most = len(self.legs), self._most
         start, fixed = np.zeros((count, width)), np.zeros((count, columns, most))
@@ -170,8 +170,10 @@ class Flights:
                 start[i, : len(ours[-1])] = b.pack(np.eye(b.states, columns, 1))
         return start, fixed, np.concatenate(ours), np.concatenate(theirs)
 
-    def __call__(self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE) -> Flight:
-        """Fly all legs."""
+    def __call__(
+        self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE
+    ) -> LegFlows:
+        """Integrate all legs."""
         if len(set(self.sizes)) > 1 or not has_interpreter():
             return self._one_by_one(starts, durations, p)
         n, most = starts.shape[1], self._most
@@ -183,30 +185,30 @@ class Flights:
             for i, field in enumerate(self.fields):
                 own = field.start(starts[i], p)
                 z[i, : own.size] = own
-        flown = self._program(z, p, durations, tol, MOST_STEPS)
-        if flown.failed >= 0:
-            i = flown.failed
-            error = stuck(float(durations[i]), flown.left, flown.ends[i, : self.sizes[i]])
+        flow = self._program(z, p, durations, tol, MOST_STEPS)
+        if flow.failed >= 0:
+            i = flow.failed
+            error = stuck(float(durations[i]), flow.left, flow.ends[i, : self.sizes[i]])
             raise ConvergenceError(f"{self._named(i)}: {error}", point=error.point)
         whole = fixed.copy()
-        whole.ravel()[ours] = flown.ends.ravel()[theirs]
+        whole.ravel()[ours] = flow.ends.ravel()[theirs]
         whole = whole.swapaxes(1, 2)
         end, x, by_p = whole[:, :, 0], whole[:, :, 1 : 1 + n], whole[:, :, 1 + n :]
-        result = Flight(
+        result = LegFlows(
             self.sizes,
             end,
-            flown.before[:, :most],
-            flown.after[:, :most],
+            flow.before[:, :most],
+            flow.after[:, :most],
             x,
             by_p,
-            *self._events(flown.results, n, p.size),
+            *self._events(flow.results, n, p.size),
         )
         return self._completed(result, p)
 
     def _events(self, results: Array, n: int, q: int) -> tuple[Array, ...]:
-        """What the events' programs give: g, g_x, g_p, e, e_x, e_p."""
+        """Outputs of the events' programs: g, g_x, g_p, e, e_x, e_p."""
         count, most = len(self.legs), self._most
-        at = _event_places(n, most, q)
+        at = _event_offsets(n, most, q)
         if not results.shape[1]:
             results = np.zeros((count, at[-1]))
         g, gx, gp, e, ex, ep = [results[:, a:b] for a, b in pairwise(at)]
@@ -219,31 +221,31 @@ class Flights:
             ep,
         )
 
-    def _completed(self, flight: Flight, p: Array) -> Flight:
-        """Fill in legs that end at a time, and events at which several things happen."""
+    def _completed(self, flows: LegFlows, p: Array) -> LegFlows:
+        """Fill in legs that end at a time, and events with several changes at one instant."""
         if not self._plain and not self._composed:
-            return flight
+            return flows
         for i in self._composed:
             k = self.sizes[i]
-            self._fill(flight, i, self.legs[i].at_end(self.system, flight.end[i, :k], p))
-        n = flight.after.shape[1]
+            self._fill(flows, i, self.legs[i].at_end(self.system, flows.end[i, :k], p))
+        n = flows.after.shape[1]
         for i in self._plain:
-            flight.after[i] = flight.end[i, :n]
-            flight.after_state[i] = np.eye(n, self._most)
-            for rows in (flight.after_parameters, flight.gradient, flight.value_parameters):
+            flows.after[i] = flows.end[i, :n]
+            flows.after_state[i] = np.eye(n, self._most)
+            for rows in (flows.after_parameters, flows.gradient, flows.value_parameters):
                 rows[i] = 0.0
-            flight.value[i] = 0.0
-        return flight
+            flows.value[i] = 0.0
+        return flows
 
-    def _fill(self, flight: Flight, i: int, at: AtEvent) -> None:
+    def _fill(self, flows: LegFlows, i: int, at: AtEvent) -> None:
         k = self.sizes[i]
-        flight.after[i], flight.after_state[i, :, :k] = at.after, at.after_state
-        flight.after_parameters[i], flight.value[i] = at.after_parameters, at.value
-        flight.gradient[i, :k], flight.value_parameters[i] = at.gradient, at.by_parameters
+        flows.after[i], flows.after_state[i, :, :k] = at.after, at.after_state
+        flows.after_parameters[i], flows.value[i] = at.after_parameters, at.value
+        flows.gradient[i, :k], flows.value_parameters[i] = at.gradient, at.by_parameters
 
-    def _one_by_one(self, starts: Array, durations: Array, p: Array) -> Flight:
+    def _one_by_one(self, starts: Array, durations: Array, p: Array) -> LegFlows:
         count, n, most, q = len(self.legs), starts.shape[1], self._most, len(self.chosen)
-        flight = Flight(
+        flows = LegFlows(
             self.sizes,
             np.zeros((count, most)),
             np.zeros((count, most)),
@@ -255,26 +257,28 @@ class Flights:
         for i, leg in enumerate(self.legs):
             k, field = self.sizes[i], self.fields[i]
             try:
-                part = fly(self.system, leg, starts[i], float(durations[i]), p, self.chosen)
+                part = integrate_leg(
+                    self.system, leg, starts[i], float(durations[i]), p, self.chosen
+                )
             except ConvergenceError as error:
                 message = f"{self._named(i)}: {error}"
                 raise ConvergenceError(message, point=error.point) from None
             except DegenerateError as error:
                 raise DegenerateError(f"{self._named(i)}: {error}") from None
-            flight.end[i, :k], flight.rate[i, :k] = part.end, part.rate
-            flight.by_start[i, :k], flight.by_parameters[i, :k] = part.by_start, part.by_parameters
+            flows.end[i, :k], flows.rate[i, :k] = part.end, part.rate
+            flows.by_start[i, :k], flows.by_parameters[i, :k] = part.by_start, part.by_parameters
             at = field.states_at(starts[i], p)
-            flight.before[i, :k] = field.rate.copied(at, p)[0][:, 0]
+            flows.before[i, :k] = field.rate.copied(at, p)[0][:, 0]
             if not leg.timed:
-                self._fill(flight, i, leg.at_end(self.system, part.end, p))
-        return self._completed(flight, p)
+                self._fill(flows, i, leg.at_end(self.system, part.end, p))
+        return self._completed(flows, p)
 
     def _named(self, i: int) -> str:
         return f"leg {i + 1} {leg_name(self.system, self.legs[i])}"
 
 
-def flights_of(
+def leg_integrator(
     system: FilippovSystem, legs: tuple[Leg, ...], chosen: tuple[int, ...] = ()
-) -> Flights:
-    """Return the flights of some legs, made once per system."""
-    return system.cached(("flights", legs, chosen), lambda: Flights(system, legs, chosen))
+) -> LegIntegrator:
+    """Return the integrator of some legs, made once per system."""
+    return system.cached(("integrator", legs, chosen), lambda: LegIntegrator(system, legs, chosen))

@@ -262,7 +262,7 @@ def test_a_user_without_a_home_has_a_folder_for_the_process(monkeypatch):
 HOMELESS = """
 import grp, os, pwd, shutil, sys, warnings
 sys.path[:0] = {path!r}
-from nonsmooth.flow.compiled import store
+from nonsmooth.flow.compiled.building import store
 from nonsmooth.flow.compiled.building.build import build
 os.umask(0)
 if os.geteuid() == 0:

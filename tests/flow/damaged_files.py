@@ -209,7 +209,7 @@ def replaced(rng, tree, junk=JUNK):
         tree = tree[key]
     new, choice = copy.deepcopy(junk[rng.integers(len(junk))]), rng.integers(4)
     if choice == 0 and isinstance(tree[last], (int, float)):
-        new = type(tree[last])(tree[last] + rng.integers(-2, 3))
+        new = type(tree[last])(tree[last] + int(rng.integers(-2, 3)))
     if choice == 1:
         del tree[last]
     elif choice == 2 and isinstance(tree, list):

@@ -259,6 +259,10 @@ def _lifted(value: Any) -> tuple[LiftedSwitch, ...]:
     return tuple(value)
 
 
+#: Shapes of no entry, which CasADi joins with columns of any length.
+_EMPTY = {(0, 0), (0, 1), (1, 0)}
+
+
 def _require_shapes(d: Definition) -> None:
     """Refuse expressions that are not as many as states, multipliers and events."""
     n, guards = d.states.numel(), len(d.stops) + len(d.resets)
@@ -274,9 +278,11 @@ def _require_shapes(d: Definition) -> None:
     _require(d.reactions.numel() == contacts, "a reaction of each impact")
     for name, rows in columns.items():
         shape = getattr(d, name).shape
-        _require(shape == (rows, 1) or (not rows and 0 in shape), f"{name} of {rows} rows")
+        _require(shape == (rows, 1) or (not rows and shape in _EMPTY), f"{name} of {rows} rows")
     k = len(d.resets)
-    _require(d.maps.shape == (n, k) or (not k and 0 in d.maps.shape), f"maps of shape {(n, k)}")
+    _require(
+        d.maps.shape == (n, k) or (not k and d.maps.shape in _EMPTY), f"maps of shape {(n, k)}"
+    )
     sizes = sum(d.sizes) == d.multipliers.numel() and max(d.sizes, default=1) > 1
     _require(not d.sizes or sizes, "sizes of the sets")
     names = [*(n for n, _ in (*d.stops, *d.resets)), *d.impacts]

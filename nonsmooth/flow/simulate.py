@@ -128,7 +128,9 @@ def simulate(
     p = system.parameter_vector(parameters)
     require_start_mode(system, x, p, options)
     sampling = read_sampling(system, t_eval, at, options.t_start, options.t_end, p)
-    options, times = replace(options, hits=sampling.hits), sampling.times
+    times = sampling.times
+    if sampling.hits is not None:
+        options = replace(options, hits=sampling.hits)
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
     return _with_samples(_run(system, x, p, options, engine), options, times, p)

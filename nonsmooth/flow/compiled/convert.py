@@ -38,11 +38,13 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
 
 def _events(system: FilippovSystem, run: Run) -> list[Event]:
     modes, found = run.letters, []
-    known: dict[tuple[int, int, int], tuple[str, str, str, int, int]] = {}
+    known: dict[tuple[str, str, int], tuple[str, str, str, int, int]]
+    known = system.cached("events of compiled runs", dict)
     numbers = (run.event_before, run.event_after, run.event_guards)
-    for k, key in enumerate(zip(*(a.tolist() for a in numbers), strict=True)):
+    for k, (one, two, row) in enumerate(zip(*(a.tolist() for a in numbers), strict=True)):
+        key = (modes[one], modes[two], row)
         if key not in known:
-            known[key] = _named(system, run, modes[key[0]], modes[key[1]], key[2])
+            known[key] = _named(system, run, *key)
         before, after, name, *of = known[key]
         t, kind = float(run.event_t[k]), KINDS[run.event_kinds[k]]
         states = run.event_x[k].copy(), run.event_after_x[k].copy()

@@ -131,7 +131,8 @@ def ensemble(
     number = _event_number(at_event)
     p = starts.p if at is None else starts.every_parameter()
     sampling = read_sampling(system, t_eval, at, options.t_start, options.t_end, p)
-    options = replace(options, hits=sampling.hits)
+    if sampling.hits is not None:
+        options = replace(options, hits=sampling.hits)
     if options.hits is not None and sampling.room is None:
         raise OptionError(
             "at is a section at events without a count, which an ensemble needs. Give "

@@ -136,7 +136,7 @@ class ValuesProgram:
 
 
 class FlownLegs(NamedTuple):
-    """Legs flown in one call."""
+    """Legs integrated in one call."""
 
     ends: Array
     before: Array
@@ -147,7 +147,7 @@ class FlownLegs(NamedTuple):
 
 
 class LegsProgram:
-    """Legs of smooth fields, with what happens at their ends, flown in one call."""
+    """Legs of smooth fields, with the events at their ends, integrated in one call."""
 
     def __init__(
         self,

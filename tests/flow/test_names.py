@@ -142,6 +142,7 @@ def test_followed_modes_name_their_zeros_alike():
 
 
 def test_saved_runs_keep_elements_and_sides(tmp_path):
+    pytest.importorskip("pandas")
     run = ns.simulate(stick_slip(), [0.0, 0.0], 12.0)
     run.save(tmp_path / "run.npz")
     kept = ns.load(tmp_path / "run.npz")

@@ -396,6 +396,7 @@ static void step(Run *r) {
     note_sides(r, e, dt);
     memset(r->fired, 0, sizeof(int32_t) * (resets_of(r) + 1));
   }
+  r->falls = row >= 0 && is_steep(r, e, row, dt);
   last &= dt == h;
   if (!advance(r, e, dt)) return;
   if (last) {

@@ -107,7 +107,7 @@ typedef struct {
   int8_t *letter, *start; /* present ones, and those that a choice is made from */
   Layout now; /* of the present mode */
   Met met;
-  int32_t mode, status, reason, where, due, due_impact, *drop, *side, *fired;
+  int32_t mode, status, reason, where, due, due_impact, falls, *drop, *side, *fired;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode;
   double interval[HISTORY];

@@ -203,6 +203,11 @@ static double blur(const double *c, int order, double dt) {
   return noise < 1e-9 * dt * slope ? noise / slope : 0;
 }
 
+/* Whether a guard passes its root with a slope that is no rounding. */
+static int is_steep(const Run *r, const Expansion *e, int row, double dt) {
+  return blur(e->guards + (int64_t)row * stride_of(r), order_of(r), dt) > 0;
+}
+
 static int32_t *side_of(const Run *r, const Layout *l, int row) {
   return r->side + l->index[row] + (l->kind[row] == RESET_GUARD ? stops_of(r) : 0);
 }

@@ -195,6 +195,40 @@ static int no_motion(Run *r, int contacts) {
   return 0;
 }
 
+/* One active surface whose rates of h on both sides decide, without series: crossing, entry, and exit where the
+ * multiplier is known to pass its bound. The choice to r->chosen; 0 where it is not clear. */
+static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  int own = r->active[0], w = width_of(r), exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
+  double rate[2], *near = r->vector + n_of(r) + w; /* not where inputs are put together */
+  if (own >= m_of(r) || !r->s->affine || r->s->scaled[own] || is_idle(r, letter, own)) return 0;
+  if (known_count && !(exits && r->falls)) return 0;
+  aim(r, letter, r->x, r->unknowns);
+  for (int i = 0; i < n_of(r); i++) near[i] = r->size + fabs(r->x[i]);
+  for (int q = 0; q < 2; q++) {
+    held_of(r, letter);
+    r->held[own] = q ? 1 : -1;
+    error_scales(r, r->x, r->held, r->none);
+    gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
+    rate[q] = layer_of(r, own);
+    if (!(fabs(rate[q]) > (VANISHES + TANGENT) * r->small[own] && fabs(rate[q]) < INFINITY)) rate[q] = 0;
+  }
+  if (exits) { /* the other side still leads onto the surface; the rate of this one is zero */
+    chosen = known[0].side;
+    if (!(rate[chosen < 0] * chosen > 0)) return 0;
+  } else if (rate[0] * rate[1] > 0) chosen = rate[0] > 0 ? 1 : -1;
+  else if (!(rate[0] > 0 && rate[1] < 0)) return 0;
+  Layout *l = &r->trial.l;
+  memcpy(r->chosen.letter, letter, w);
+  r->chosen.letter[own] = (int8_t)chosen;
+  keep_carried(r, r->chosen.letter, r->chosen.unknowns);
+  lay_out(r, r->chosen.letter, l);
+  if (l->slides && !improve(r, l, r->x, r->chosen.unknowns, 1)) return 0;
+  memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
+  for (int row = 0; row < l->rows; row++)
+    if (l->kind[row] == SURFACE_GUARD && l->index[row] == own) r->chosen.drop[row] = exits ? 2 : 1;
+  return 1;
+}
+
 static int decide_sets(Run *r, const int8_t *letter, const Known *known, int known_count);
 
 /* Choose, as r->chosen, the motion that continues from a point of the active surfaces; 0 if the run ends.
@@ -203,6 +237,7 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
   int k = r->active_count, contacts = 0, strict = 0, found = 0, resting = 0, total = 1;
   int8_t *possible = (int8_t *)r->lam + sizeof(double) * width_of(r), *trial = possible + width_of(r);
   if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
+  if (k == 1 && decide_by_rates(r, letter, known, known_count)) return 1;
   for (int i = 0; i < k; i++) contacts |= r->active[i] >= m_of(r);
   if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {
     finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);

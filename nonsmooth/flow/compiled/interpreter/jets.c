@@ -79,7 +79,6 @@ static void follow_layer(Run *r, Expansion *e, int k, const int32_t *start) {
   }
 }
 
-#ifndef GENERATED
 /* Coefficient k of states and multipliers as the inputs of the series. */
 static void inputs_of(Run *r, const Expansion *e, int k) {
   double *x = r->vector, *lam = x + n_of(r);
@@ -93,6 +92,7 @@ static void next_states(Run *r, Expansion *e, int k) {
   for (int i = 0; i < n_of(r); i++) e->states[(int64_t)i * stride_of(r) + k + 1] = row_of(r, i)[k] * part;
 }
 
+#ifndef GENERATED
 /* Coefficients of all that a mode needs in which something slides; ``start`` are places in the inverse. */
 static void sliding_series(Run *r, Expansion *e, const int32_t *start) {
   const Series *t = &r->s->series;

@@ -79,7 +79,6 @@ def few_compilations(
     """Replace programs of one system by the driver in C, and compile lanes without optimisation."""
     slow = request.node.get_closest_marker("slow") is not None
     if not slow and request.path.name != "test_special.py":
-        monkeypatch.setattr(tape.TapeEngine, "compile", lambda engine: tape.library())
         monkeypatch.setattr(tape, "_LONG", 500_000)
     names = {"/".join(request.path.parts[-2:]), request.node.name}
     shipped = bool(names & SHIPPED) or (WHOLE and COMPILED in request.path.parents)

@@ -300,14 +300,6 @@ class TapeEngine:
             source = lambda: special_source(tape, self.coupled, order)
             self._special = Background(source, _declared)
 
-    def compile(self) -> None:
-        """Wait for the program generated for the system; very large ones have none."""
-        if self._special is not None:
-            self._special.start()  # beside the interpreter, where that is not there yet
-        library()
-        if self._special is not None:
-            self._special.wait()
-
     def _driver(self, steps: int) -> ctypes.CDLL:
         """The library to go on with, after some more steps."""
         self._steps += steps

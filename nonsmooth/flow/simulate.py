@@ -155,12 +155,8 @@ def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: s
     if not use_compiled(engine, tape is not None) or tape is None:
         return Driver(system, x, p, options).run()
 
-    def work() -> Run:
-        if engine == "compiled":
-            tape.compile()
-        return tape.run(x, p, options)
-
-    return _converted(system, x, p, options, compiled_or_none(engine, library, work))
+    run = compiled_or_none(engine, library, lambda: tape.run(x, p, options))
+    return _converted(system, x, p, options, run)
 
 
 def _converted(

@@ -182,8 +182,7 @@ def engine_for(
     if lanes is not None and count >= few:
         found = compiled_or_none(engine, lanes, lambda: lanes.library)
         return "reference" if found is None else "lanes"
-    work = tape.compile if engine == "compiled" else library
-    done = compiled_or_none(engine, library, lambda: (work(), True))
+    done = compiled_or_none(engine, library, library)
     return "reference" if done is None else "tape"
 
 

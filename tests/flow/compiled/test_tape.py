@@ -176,6 +176,33 @@ def test_zero_over_zero_is_no_number(f):
     assert {ns.Status(s) for s in many.status} == {ns.Status.NOT_FINITE}
 
 
+def test_terms_that_a_mode_leaves_out():
+    """Beside what slides and what does not; functions of the other sides have no values on the way."""
+    z, w = ca.SX.sym("z"), ca.SX.sym("w")
+    grows = ca.sign(x) * ca.sqrt(0.01 + ca.fabs(x))
+    empties = -ca.if_else(z > 0.25, ca.sqrt(z), 0.5)
+    made = ns.FilippovSystem.from_expression([x, z, w], [grows, empties, -ca.sign(w)])
+    run = ns.simulate(made, [0.005, 1.0, 0.5], 3.0)
+    exact = [(np.sqrt(0.015) + 1.5) ** 2 - 0.01, 0.25 - 0.5 * 2.0, 0.0]
+    assert run.status == ns.Status.REACHED_END
+    np.testing.assert_allclose(run.x[-1], exact, atol=1e-9)
+
+
+def test_quotients_whose_divisors_overflow():
+    """Friction 2/(1 + exp(-v/e)) - 1 = tanh(v/2e) at speeds of 900 e, where exp is infinite or nearly."""
+    width = 1e-2
+    forms = [2 / (1 + ca.exp(-y / width)) - 1, 2 * (1 + ca.exp(-y / width)) ** -1.0 - 1]
+    forms.append(2 / (1 + ca.exp(-y / width / 2) ** 2) - 1)
+    ends = []
+    for friction in [ca.tanh(y / (2 * width)), *forms]:
+        run = ns.simulate(
+            ns.FilippovSystem([x, y], field=[y, -x - 0.4 * friction]), [-10.0, 0.0], 12.0
+        )
+        assert run.status == ns.Status.REACHED_END and len(run.t) < 200
+        ends.append(run.x[-1])
+    np.testing.assert_allclose(ends[1:], [ends[0]] * 3, atol=1e-8)
+
+
 def test_interruption_is_heard(monkeypatch):
     """Between bursts of steps; the burst is shortened here, so that no clock is needed."""
     import nonsmooth.flow.compiled.tape as module

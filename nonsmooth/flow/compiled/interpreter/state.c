@@ -9,32 +9,6 @@
 #define FEW 3 /* surfaces of which all modes are tried where no matrix is known to have one solution */
 #define SEVERAL 16 /* modes that can continue, for the message */
 
-/* Sizes: constants in a program generated for one system. */
-#ifdef GENERATED
-#define n_of(r) STATES
-#define dimension_of(r) DIMENSION
-#define timed_of(r) TIMED
-#define m_of(r) SURFACES
-#define c_of(r) CONTACTS
-#define width_of(r) (SURFACES + CONTACTS)
-#define stops_of(r) STOPS
-#define resets_of(r) RESETS
-#define sets_of(r) SETS
-#define order_of(r) P
-#define stride_of(r) (P + 1)
-#else
-#define n_of(r) ((r)->n)
-#define dimension_of(r) ((r)->s->dimension)
-#define timed_of(r) ((r)->s->timed)
-#define m_of(r) ((r)->m)
-#define c_of(r) ((r)->c)
-#define width_of(r) ((r)->width)
-#define stops_of(r) ((r)->s->stops)
-#define resets_of(r) ((r)->s->resets)
-#define sets_of(r) ((r)->s->sets)
-#define order_of(r) ((r)->order)
-#define stride_of(r) ((r)->stride)
-#endif
 #define TINY 2.2250738585072014e-308
 
 /* Entries of a sparse matrix in the order of a program's outputs. */
@@ -107,7 +81,7 @@ typedef struct {
   int8_t *letter, *start; /* present ones, and those that a choice is made from */
   Layout now; /* of the present mode */
   Met met;
-  int32_t mode, status, reason, where, due, due_impact, *drop, *side, *fired;
+  int32_t mode, status, reason, where, due, due_impact, falls, *drop, *side, *fired;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode;
   double interval[HISTORY];

@@ -133,7 +133,7 @@ def simulate(
         options = replace(options, hits=sampling.hits)
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
-    return _with_samples(_run(system, x, p, options, engine), options, times, p)
+    return _with_samples(_run(system, x, p, options, engine, times), options, times, p)
 
 
 def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Array) -> Trajectory:
@@ -149,13 +149,16 @@ def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Arr
     return replace(run, sample_t=t, sample_x=x)
 
 
-def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: str) -> Trajectory:
+def _run(
+    system: FilippovSystem, x: Array, p: Array, options: Options, engine: str, times: Times | None
+) -> Trajectory:
     """Choose the engine, by the problem alone, so that the same call gives the same bits."""
     tape = tape_for(system, options)
     if not use_compiled(engine, tape is not None) or tape is None:
         return Driver(system, x, p, options).run()
 
-    run = compiled_or_none(engine, library, lambda: tape.run(x, p, options))
+    asked = None if times is None else times.of(p)
+    run = compiled_or_none(engine, library, lambda: tape.run(x, p, options, asked))
     return _converted(system, x, p, options, run)
 
 

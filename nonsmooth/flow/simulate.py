@@ -127,7 +127,7 @@ def simulate(
         options = replace(options, hits=sampling.hits)
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
-    return _with_samples(_run(system, x, p, options), options, times, p)
+    return _with_samples(_run(system, x, p, options, times), options, times, p)
 
 
 def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Array) -> Trajectory:
@@ -143,9 +143,11 @@ def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Arr
     return replace(run, sample_t=t, sample_x=x)
 
 
-def _run(system: FilippovSystem, x: Array, p: Array, options: Options) -> Trajectory:
-    tape = tape_for(system, options)
-    run = None if tape is None else tape.run(x, p, options)
+def _run(
+    system: FilippovSystem, x: Array, p: Array, options: Options, times: Times | None
+) -> Trajectory:
+    tape, asked = tape_for(system, options), None if times is None else times.of(p)
+    run = None if tape is None else tape.run(x, p, options, asked)
     if run is None or run.status == HAND_OVER:
         return Driver(system, x, p, options).run()
     return trajectory(system, p, options, run)

@@ -4,12 +4,12 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
 static int change_kind(const Run *r, int before, int after);
 
 /* The mode in which a step is shown. */
-static int shown_mode(const Run *r) { return sets_of(r) ? r->shown : r->mode; }
+static int shown_mode(const Run *r) { return r->s->sets ? r->shown : r->mode; }
 
 /* h' = a - M lambda of the functions ``own``, with what else slides eliminated; 0 where that is impossible. */
 static int freeze(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
                   double *a, double *m) {
-  int w = width_of(r), count = 0;
+  int w = r->width, count = 0;
   int32_t *others = r->pending;
   aim(r, letter, x, unknowns);
   held_of(r, letter);
@@ -43,7 +43,7 @@ static int freeze(Run *r, const int8_t *letter, const double *x, const double *u
 /* The field with given multipliers of a set, and what slides elsewhere in balance. */
 static int field_with(Run *r, const int8_t *letter, const double *x, const double *unknowns, int first, int k,
                       const double *lam, double *field) {
-  int w = width_of(r), count = 0;
+  int w = r->width, count = 0;
   int32_t *others = r->pending;
   double *acting = r->later;
   aim(r, letter, x, unknowns);
@@ -65,7 +65,7 @@ static int field_with(Run *r, const int8_t *letter, const double *x, const doubl
   }
   set_inputs(r, x, r->held, acting);
   first_values(r, 0);
-  for (int i = 0; i < n_of(r); i++) field[i] = row_of(r, i)[0];
+  for (int i = 0; i < r->n; i++) field[i] = row_of(r, i)[0];
   return 1;
 }
 
@@ -116,7 +116,7 @@ static int leaving_direction(const double *a, const double *m, int stride, int k
 
 /* The step along a straight line that is too short for a series. */
 static void jump(Run *r, const double *rate, double dt) {
-  int n = n_of(r), stride = stride_of(r);
+  int n = r->n, stride = r->stride;
   Expansion *e = &r->trial;
   for (int i = 0; i < n; i++) {
     double *c = e->states + (int64_t)i * stride;
@@ -132,15 +132,16 @@ static void jump(Run *r, const double *rate, double dt) {
   if (r->times) sample_step(r, e, dt);
   for (int i = 0; i < n; i++) r->x[i] += dt * rate[i];
   r->t += dt;
+  r->since += dt;
   r->step_count++;
   r->segment_steps++;
-  if (timed_of(r)) r->x[n - 1] = r->t;
+  if (r->s->timed) r->x[n - 1] = r->t;
   memset(r->drop, 0, sizeof(int32_t) * r->guards);
   note(r);
 }
 
 /* Time to a set below which coefficients of series are too large for numbers. */
-static double shortest(const Run *r) { return pow(OVERFLOW, -1.0 / order_of(r)); }
+static double shortest(const Run *r) { return pow(OVERFLOW, -1.0 / r->order); }
 
 /* Whether the state is on a set, or as close as no series can begin; after surface_values. */
 static int is_met(Run *r, const int8_t *letter, int set, const double *h, const double *scales_of) {
@@ -157,7 +158,7 @@ static int is_met(Run *r, const int8_t *letter, int set, const double *h, const 
 /* |h| has fallen tenfold, or is small: the set is reached or passed now, or looked at again nearer. What has
  * fallen to rounding is zero, whatever its direction says. */
 static void near_set(Run *r, int row, int fell) {
-  int f = r->now.index[row], s = set_of(r, f), k = size_of(r, s), n = n_of(r), before = r->mode;
+  int f = r->now.index[row], s = set_of(r, f), k = size_of(r, s), n = r->n, before = r->mode;
   int32_t own[3];
   double h[3], a[3], m[9], u[3], b[3], mean[3], scale = 0, dt, c = 0;
   if (r->letter[f] == 0) return; /* friction's limit has fallen: the next step sees its digits */
@@ -211,7 +212,7 @@ static void near_set(Run *r, int row, int fell) {
       for (int i = 0; i < n; i++) turn[i] = fabs(field[i] - other[i]);
       field_with(r, r->letter, end, r->unknowns, f, k, mean, other);
       for (int i = 0; i < n; i++) {
-        double allowed = i < dimension_of(r) ? REACHED * SAFETY * (r->o.atol + r->o.rtol * fabs(r->x[i])) : 0;
+        double allowed = i < r->s->dimension ? REACHED * SAFETY * (r->o.atol + r->o.rtol * fabs(r->x[i])) : 0;
         allowed += EPSILON * (r->size + fabs(r->x[i]));
         if ((turn[i] + fabs(field[i] - other[i])) * dt > allowed) return;
       }
@@ -225,7 +226,7 @@ static void near_set(Run *r, int row, int fell) {
   for (int i = 0; i < r->active_count; i++) r->involved[kept++] = r->active[i];
   project(r, r->involved, kept);
   renote(r);
-  memcpy(r->start, r->letter, width_of(r));
+  memcpy(r->start, r->letter, r->width);
   if (choose(r, r->start, 0, 0) && r->mode != before) event(r, change_kind(r, before, r->mode), before, row, r->x);
 }
 
@@ -234,7 +235,7 @@ static void after_step(Run *r) {
   int changed = 0, carried = 0;
   double *level = r->later;
   const double *scales_of = 0;
-  for (int s = 0; s < sets_of(r); s++) {
+  for (int s = 0; s < r->s->sets; s++) {
     int f = first_of(r, s), k = size_of(r, s), letter = r->letter[f];
     if (letter != LEAVING && letter != LEFT_BEHIND) continue;
     if (!scales_of) { surface_values(r, r->x); scales_of = surface_scales(r, r->x); }
@@ -294,14 +295,14 @@ static int continuation(Run *r, const int8_t *letter, const Known *known, int kn
   }
   expand(r, letter, r->x, result->unknowns, e);
   if (!e->finite) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
-  memcpy(result->letter, letter, width_of(r));
+  memcpy(result->letter, letter, r->width);
   result->strict = 1;
   memset(result->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < e->l.rows; row++) {
     int kind = e->l.kind[row], index = e->l.index[row], of = index, active = 0, zeros = 0;
     if (kind == STOP_GUARD || kind == RESET_GUARD) continue;
     if (kind == NEAR_GUARD && letter[index] == 0) continue; /* ends steps only */
-    if (kind == IMPACT_GUARD || kind == RELEASE_GUARD) of += m_of(r);
+    if (kind == IMPACT_GUARD || kind == RELEASE_GUARD) of += r->m;
     for (int i = 0; i < r->active_count; i++) active |= r->active[i] == of;
     if (!active) continue;
     for (int i = 0; i < known_count; i++)
@@ -312,20 +313,20 @@ static int continuation(Run *r, const int8_t *letter, const Known *known, int kn
     int k = leading(r, e, row, zeros, &value);
     if (value < 0) return 0;
     if (value == 0) result->strict = 0;
-    result->drop[row] = value != 0 ? (k < order_of(r) ? k : order_of(r)) : order_of(r) + 1;
+    result->drop[row] = value != 0 ? (k < r->order ? k : r->order) : r->order + 1;
   }
   return 1;
 }
 
 static void copy_continuation(const Run *r, Continuation *to, const Continuation *from) {
-  memcpy(to->letter, from->letter, width_of(r));
+  memcpy(to->letter, from->letter, r->width);
   memcpy(to->drop, from->drop, sizeof(int32_t) * r->guards);
-  memcpy(to->unknowns, from->unknowns, sizeof(double) * width_of(r));
+  memcpy(to->unknowns, from->unknowns, sizeof(double) * r->width);
   to->strict = from->strict;
 }
 
 static int rests(const Run *r, const int8_t *letter) {
-  for (int i = 0; i < width_of(r); i++) if (letter[i] == 0) return 1;
+  for (int i = 0; i < r->width; i++) if (letter[i] == 0) return 1;
   return 0;
 }
 
@@ -335,9 +336,9 @@ static int decide_sets(Run *r, const int8_t *letter, const Known *known, int kno
   enum { MOST = 24 };
   int n = r->active_count, sets = 0, first[MOST + 1], undecided[MOST], open = 0, strict = 0, found = 0, resting = 0;
   double a[MOST], m[MOST * MOST], lam[MOST];
-  int8_t *trial = (int8_t *)r->lam + sizeof(double) * width_of(r) + width_of(r);
+  int8_t *trial = (int8_t *)r->lam + sizeof(double) * r->width + r->width;
   int32_t own[MOST];
-  if (n > MOST || n * n > width_of(r) * width_of(r)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+  if (n > MOST || n * n > r->width * r->width) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
   for (int i = 0; i < n; i++) {
     own[i] = r->active[i];
     if (set_of(r, own[i]) < 0) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
@@ -348,7 +349,7 @@ static int decide_sets(Run *r, const int8_t *letter, const Known *known, int kno
     finish(r, HAND_OVER, NO_REASON, 0);
     return 0;
   }
-  memcpy(trial, letter, width_of(r));
+  memcpy(trial, letter, r->width);
   for (int s = 0; s < sets; s++) {
     int f = first[s], k = first[s + 1] - f, left = 0;
     double size = 0, rates[3];
@@ -389,13 +390,13 @@ static int decide_sets(Run *r, const int8_t *letter, const Known *known, int kno
 /* Whether the multiplier of a set is seen to make no difference, here and elsewhere: no friction. */
 static int without_friction(Run *r) {
   double *x = r->at_work;
-  for (int s = 0; s < sets_of(r); s++) {
+  for (int s = 0; s < r->s->sets; s++) {
     int f = first_of(r, s), k = size_of(r, s), enters = 0;
     for (int trial = 0; trial < 3 && !enters; trial++) {
-      for (int i = 0; i < n_of(r); i++) x[i] = r->x[i] + trial * (0.37 + 0.11 * i);
+      for (int i = 0; i < r->n; i++) x[i] = r->x[i] + trial * (0.37 + 0.11 * i);
       error_scales(r, x, r->none, r->none);
       for (int i = f; i < f + k; i++)
-        for (int j = f; j < f + k; j++) enters |= r->slope[i * width_of(r) + j] * factor_of(r, j) != 0;
+        for (int j = f; j < f + k; j++) enters |= r->slope[i * r->width + j] * factor_of(r, j) != 0;
     }
     if (!enters) return 1;
   }

@@ -28,7 +28,7 @@ typedef struct {
 /* Of a guard that ended the mode before so many coefficients vanish. */
 typedef struct { int kind, index, side, zeros; } Known;
 
-static int degree_of(const Run *r, int i) { return i < m_of(r) ? 1 : 2; }
+static int degree_of(const Run *r, int i) { return i < r->m ? 1 : 2; }
 
 /* Linear equations that may be singular ------------------------------------------------------------ */
 
@@ -506,7 +506,7 @@ static int solve_single(const Block *k, double *found) {
 /* The law at a point --------------------------------------------------------------------------------- */
 
 static int element_of(const Run *r, const Known *known) {
-  return known->index + (known->kind == IMPACT_GUARD || known->kind == RELEASE_GUARD ? m_of(r) : 0);
+  return known->index + (known->kind == IMPACT_GUARD || known->kind == RELEASE_GUARD ? r->m : 0);
 }
 
 /* Bounds that are negative turn the law around: the unknown changes its sign. */
@@ -555,24 +555,24 @@ static void find_blocks(Decision *d) {
 
 /* Rows, matrix and bounds at the present point with all active unknowns zero; 0 where they are no numbers. */
 static int read_law(Run *r, Decision *d, const int8_t *letter) {
-  int k = d->count, w = width_of(r), carried = 0;
-  double *near = r->vector + n_of(r) + w; /* not where inputs are put together */
+  int k = d->count, w = r->width, carried = 0;
+  double *near = r->vector + r->n + w; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
   held_of(r, letter);
   for (int i = 0; i < k; i++) r->held[r->active[i]] = 0;
   error_scales(r, r->x, r->held, r->none);
-  for (int i = 0; i < n_of(r); i++) near[i] = r->size + fabs(r->x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
   gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
   memset(d->share, 0, sizeof(double) * k * k);
   for (int i = 0; i < k; i++) {
     int own = d->own[i] = r->active[i];
-    d->is_contact[i] = own >= m_of(r);
+    d->is_contact[i] = own >= r->m;
     d->turn[i] = d->is_contact[i] ? -1 : 1;
     d->a[i] = d->turn[i] * layer_of(r, own);
     d->floor[i] = VANISHES * r->small[own];
-    d->is_idle[i] = own < m_of(r) && r->s->continuous[own];
+    d->is_idle[i] = own < r->m && r->s->continuous[own];
     d->b[i] = d->is_contact[i] || d->is_idle[i] ? 0 : factor_of(r, own);
-    for (int j = 0; j < c_of(r) && own < m_of(r); j++) carried |= r->s->carries[own * c_of(r) + j];
+    for (int j = 0; j < r->c && own < r->m; j++) carried |= r->s->carries[own * r->c + j];
     if (!isfinite(d->a[i]) || !isfinite(d->b[i])) return 0;
   }
   for (int i = 0; i < k; i++)
@@ -638,40 +638,40 @@ static void find_touched(Decision *d, const int8_t *letter) {
 /* Coefficients ``order`` of all that is known without the unknowns of that order. */
 static void open_order(Run *r, Expansion *e, int order) {
   const Series *t = &r->s->series;
-  for (int i = 0; i < r->active_count; i++) e->series[(int64_t)r->active[i] * stride_of(r) + order] = 0;
-  if (!sets_of(r)) {
+  for (int i = 0; i < r->active_count; i++) e->series[(int64_t)r->active[i] * r->stride + order] = 0;
+  if (!r->s->sets) {
     inputs_of(r, e, order);
-    series_rules(t, order ? t->later : t->moving, order ? t->later_count : t->moving_count, order, stride_of(r), r->input, r->series);
+    series_rules(t, order ? t->later : t->moving, order ? t->later_count : t->moving_count, order, r->stride, r->input, r->series);
     return;
   }
   inputs_of_sets(r, e, order);
-  if (!order) series_rules(t, t->moving, t->moving_count, 0, stride_of(r), r->input, r->series);
-  else series_rules(t, r->s->early, r->s->early_count, order, stride_of(r), r->input, r->series);
+  if (!order) series_rules(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
+  else series_rules(t, r->s->early, r->s->early_count, order, r->stride, r->input, r->series);
   follow_sets(r, e, order);
   inputs_of_sets(r, e, order);
-  if (order) series_rules(t, t->late, t->late_count, order, stride_of(r), r->input, r->series);
+  if (order) series_rules(t, t->late, t->late_count, order, r->stride, r->input, r->series);
 }
 
 /* The same with them, and the states of the next order. */
 static void close_order(Run *r, Expansion *e, int order) {
   const Series *t = &r->s->series;
-  if (sets_of(r)) inputs_of_sets(r, e, order); else inputs_of(r, e, order);
-  series_rules(t, order ? t->late : t->moving, order ? t->late_count : t->moving_count, order, stride_of(r), r->input, r->series);
-  if (sets_of(r)) close_sets(r, e, order);
+  if (r->s->sets) inputs_of_sets(r, e, order); else inputs_of(r, e, order);
+  series_rules(t, order ? t->late : t->moving, order ? t->late_count : t->moving_count, order, r->stride, r->input, r->series);
+  if (r->s->sets) close_sets(r, e, order);
   next_states(r, e, order);
 }
 
 static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
   Expansion *e = &r->trial;
-  int w = width_of(r), stride = stride_of(r);
+  int w = r->width, stride = r->stride;
   memset(e->series, 0, sizeof(double) * w * stride);
-  for (int i = 0; i < n_of(r); i++) e->states[(int64_t)i * stride] = r->x[i];
+  for (int i = 0; i < r->n; i++) e->states[(int64_t)i * stride] = r->x[i];
   aim(r, letter, r->x, r->unknowns);
   held_of(r, letter);
   for (int i = 0; i < d->count; i++) r->held[d->own[i]] = 0;
-  if (!sets_of(r)) return;
+  if (!r->s->sets) return;
   memset(e->lambda, 0, sizeof(double) * w * stride);
-  for (int i = 0; i < m_of(r); i++) {
+  for (int i = 0; i < r->m; i++) {
     e->lambda[(int64_t)i * stride] = r->direction[i];
     if (letter[i] == LEFT_BEHIND) e->series[(int64_t)i * stride] = r->unknowns[i];
   }
@@ -682,10 +682,10 @@ static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
 /* Rounding of the states' coefficients, and of the rows of each order: what is zero at rest is not compared with
  * itself. */
 static void read_noise(Run *r, Decision *d) {
-  int k = d->count, w = width_of(r), m = m_of(r), c = c_of(r), all = m + 2 * c, first = 2 * w + r->s->slope.count;
-  double *ones = r->vector + n_of(r) + w, *steep = r->small, *height = r->rates + all;
+  int k = d->count, w = r->width, m = r->m, c = r->c, all = m + 2 * c, first = 2 * w + r->s->slope.count;
+  double *ones = r->vector + r->n + w, *steep = r->small, *height = r->rates + all;
   d->field = d->rate = 0;
-  for (int i = 0; i < n_of(r); i++) ones[i] = 1;
+  for (int i = 0; i < r->n; i++) ones[i] = 1;
   error_scales(r, r->x, r->held, r->none);
   gradient_sums(r, &r->s->point, r->point, first, &r->s->layer_gradient, w, ones, 1, steep);
   surface_values(r, r->x);
@@ -703,14 +703,14 @@ static void read_noise(Run *r, Decision *d) {
 /* Rows and bounds of an order after the first. */
 static void read_order(Run *r, Decision *d, int order) {
   Expansion *e = &r->trial;
-  int k = d->count, w = width_of(r);
+  int k = d->count, w = r->width;
   double speed = 0, drift = VANISHES * d->field;
   for (int i = 2; i <= order; i++) drift *= d->rate / i;
-  for (int i = 0; i < n_of(r); i++) speed = larger(fabs(e->states[(int64_t)i * stride_of(r) + order]), speed);
+  for (int i = 0; i < r->n; i++) speed = larger(fabs(e->states[(int64_t)i * r->stride + order]), speed);
   for (int i = 0; i < k; i++) {
     int at = order * k + i;
-    d->a[at] = d->turn[i] * row_of(r, n_of(r) + d->own[i])[order];
-    d->b[at] = d->is_contact[i] || d->is_idle[i] ? 0 : d->sign[i] * row_of(r, n_of(r) + 2 * w + d->own[i])[order];
+    d->a[at] = d->turn[i] * row_of(r, r->n + d->own[i])[order];
+    d->b[at] = d->is_contact[i] || d->is_idle[i] ? 0 : d->sign[i] * row_of(r, r->n + 2 * w + d->own[i])[order];
     d->floor[at] = d->steep[i] * (VANISHES * (order + 1) * speed + drift);
     if (d->state[at] == UNDECIDED && !d->is_contact[i]) turn_bound(d, i, d->b + at);
   }
@@ -719,7 +719,7 @@ static void read_order(Run *r, Decision *d, int order) {
 /* Motions ------------------------------------------------------------------------------------------------ */
 
 /* A block's part of the law at an order, with what blocks before it add. */
-static Block block_of(Decision *d, int order, int which) {
+static Block part_of_law(Decision *d, int order, int which) {
   int k = d->count, first = d->first[which], n = d->first[which + 1] - first, at = order * k;
   Block b = {.size = n, .own = d->order + first, .a = d->block, .state = d->block_state, .is_contact = d->block_state + k};
   b.b = b.a + n; b.floor = b.b + n; b.matrix = b.floor + n; b.share = b.matrix + n * n;
@@ -754,7 +754,7 @@ static int certificate_of(Decision *d, const Block *b, int which) {
 
 /* Solutions of a block at an order; where the old unknowns are one, what its guard says of an element is known. */
 static int solutions_of(Run *r, Decision *d, int order, int which, double *found, int8_t *class) {
-  Block b = block_of(d, order, which);
+  Block b = part_of_law(d, order, which);
   int n = b.size, count;
   int8_t *position = b.is_contact + d->count;
   for (int i = 0; i < n; i++) {
@@ -885,15 +885,15 @@ static void add_motion(Run *r, Decision *d, int orders) {
   for (int i = 0; i < k; i++) {
     int order = 0;
     while (order < orders && d->state[(order + 1) * k + i] < INSIDE) order++;
-    own->order[i] = (int8_t)(order < orders ? order : order_of(r) + 1);
+    own->order[i] = (int8_t)(order < orders ? order : r->order + 1);
     own->before[i] = order ? d->state[(order < orders ? order : orders) * k + i] : UNDECIDED;
     own->state[i] = (int8_t)final_state(d, i, orders);
     own->nu[i] = d->sign[i] * d->nu[i];
   }
   own->terms = orders < COMPARED ? orders : COMPARED;
-  for (int i = 0; i < n_of(r); i++)
+  for (int i = 0; i < r->n; i++)
     for (int j = 1; j <= own->terms; j++)
-      own->series[i * COMPARED + j - 1] = r->trial.states[(int64_t)i * stride_of(r) + j];
+      own->series[i * COMPARED + j - 1] = r->trial.states[(int64_t)i * r->stride + j];
 }
 
 /* Close an order with the unknowns that were found. */
@@ -901,7 +901,7 @@ static void close_with(Run *r, Decision *d, int order) {
   Expansion *e = &r->trial;
   if (order == 0) { begin_orders(r, d, d->letter); open_order(r, e, 0); }
   for (int i = 0; i < d->count; i++)
-    e->series[(int64_t)d->own[i] * stride_of(r) + order] = d->sign[i] * d->nu[order * d->count + i];
+    e->series[(int64_t)d->own[i] * r->stride + order] = d->sign[i] * d->nu[order * d->count + i];
   close_order(r, e, order);
 }
 
@@ -915,7 +915,7 @@ static void explore(Run *r, Decision *d, int order, int which) {
     if (which == d->blocks) {
       int open = 0, more = order < (d->branches ? COMPARED : 0) - 1;
       for (int i = 0; i < k; i++) open |= d->state[(order + 1) * k + i] < INSIDE;
-      if ((!open && !more) || order + 1 == ORDERS || order + 1 >= order_of(r)) { /* the series is closed if it is compared */
+      if ((!open && !more) || order + 1 == ORDERS || order + 1 >= r->order) { /* the series is closed if it is compared */
         if (d->branches) close_with(r, d, order);
         add_motion(r, d, order + 1);
         return;
@@ -950,9 +950,9 @@ static int is_same_motion(const Run *r, const Motion *one, const Motion *two) {
   int terms = one->terms < two->terms ? one->terms : two->terms;
   for (int j = 0; j < terms; j++) {
     double most = 0;
-    for (int i = 0; i < n_of(r); i++)
+    for (int i = 0; i < r->n; i++)
       most = larger(most, larger(fabs(one->series[i * COMPARED + j]), fabs(two->series[i * COMPARED + j])));
-    for (int i = 0; i < n_of(r); i++)
+    for (int i = 0; i < r->n; i++)
       if (fabs(one->series[i * COMPARED + j] - two->series[i * COMPARED + j]) > MERGED * most) return 0;
   }
   return 1;
@@ -960,7 +960,7 @@ static int is_same_motion(const Run *r, const Motion *one, const Motion *two) {
 
 /* Letters of a motion. */
 static void letters_of_motion(const Run *r, const Decision *d, const Motion *own, int8_t *letter) {
-  memcpy(letter, d->letter, width_of(r));
+  memcpy(letter, d->letter, r->width);
   for (int i = 0; i < d->count; i++) {
     int side = own->state[i] == INSIDE ? 0 : own->state[i] == ABOVE ? 1 : -1;
     letter[d->own[i]] = (int8_t)(d->is_contact[i] ? side != 0 : side);
@@ -978,7 +978,7 @@ static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   lay_out(r, to->letter, l);
   memset(to->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < l->rows; row++) {
-    int kind = l->kind[row], of = l->index[row] + (kind == IMPACT_GUARD || kind == RELEASE_GUARD ? m_of(r) : 0);
+    int kind = l->kind[row], of = l->index[row] + (kind == IMPACT_GUARD || kind == RELEASE_GUARD ? r->m : 0);
     for (int i = 0; i < d->count; i++) {
       if (d->own[i] != of || !(kind == SURFACE_GUARD || kind == IMPACT_GUARD || kind == EXIT_GUARD || kind == RELEASE_GUARD)) continue;
       int both = kind == RELEASE_GUARD || own->before[i] == UNDECIDED || is_idle(r, to->letter, of);
@@ -1013,15 +1013,15 @@ static void begin_decision(Decision *d) {
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
   if (r->s->continuous[surface]) return 0;
-  double *near = r->vector + n_of(r) + width_of(r); /* not where inputs are put together */
+  double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < n_of(r); i++) near[i] = r->size + fabs(r->x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
   for (int side = 1; side >= -1; side -= 2) {
     held_of(r, letter);
     r->held[surface] = side;
     error_scales(r, r->x, r->held, r->none);
-    if (r->s->scaled[surface] && r->slope[surface * width_of(r) + surface] != 0) return 0;
-    gradient_sums(r, &r->s->point, r->point, 2 * width_of(r) + r->s->slope.count, &r->s->layer_gradient, width_of(r), near,
+    if (r->s->scaled[surface] && r->slope[surface * r->width + surface] != 0) return 0;
+    gradient_sums(r, &r->s->point, r->point, 2 * r->width + r->s->slope.count, &r->s->layer_gradient, r->width, near,
                   1, r->small);
     double scale = r->small[surface];
     if (!(fabs(layer_of(r, surface)) <= (tolerance + TANGENT) * scale)) return 0; /* or zero everywhere */
@@ -1032,12 +1032,12 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
 /* One active surface whose rates of h on both sides decide, without series: crossing, entry, and exit where the
  * multiplier is known to pass its bound. The choice to r->chosen; 0 where it is not clear. */
 static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count) {
-  int own = r->active[0], w = width_of(r), exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
-  double rate[2], *near = r->vector + n_of(r) + w; /* not where inputs are put together */
-  if (own >= m_of(r) || !r->s->affine || r->s->scaled[own] || is_idle(r, letter, own)) return 0;
+  int own = r->active[0], w = r->width, exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
+  double rate[2], *near = r->vector + r->n + w; /* not where inputs are put together */
+  if (own >= r->m || !r->s->affine || r->s->scaled[own] || is_idle(r, letter, own)) return 0;
   if (known_count && !(exits && r->falls)) return 0;
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < n_of(r); i++) near[i] = r->size + fabs(r->x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
   for (int q = 0; q < 2; q++) {
     held_of(r, letter);
     r->held[own] = q ? 1 : -1;
@@ -1067,7 +1067,7 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
 static int no_motion(Run *r, int contacts) {
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
   else if (meets_sets(r)) finish(r, HAND_OVER, NO_REASON, 0); /* M is singular, or nearly */
-  else if (r->active_count == 2 && n_of(r) == 2) finish(r, HAND_OVER, NO_REASON, 0); /* orbits may spiral in */
+  else if (r->active_count == 2 && r->n == 2) finish(r, HAND_OVER, NO_REASON, 0); /* orbits may spiral in */
   else if (r->active_count > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
   else finish(r, HAND_OVER, NO_REASON, 0); /* a degenerate tangency: other programs tell zeros apart */
   return 0;
@@ -1082,7 +1082,7 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
   int k = r->active_count, contacts = 0, several = 0;
   if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
   if (k == 1 && decide_by_rates(r, letter, known, known_count)) return 1;
-  for (int i = 0; i < k; i++) contacts |= r->active[i] >= m_of(r);
+  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
   if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {
     finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);
     return 0;

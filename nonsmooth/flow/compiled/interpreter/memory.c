@@ -53,7 +53,7 @@ static size_t place_continuation(Continuation *c, char *base, size_t used, int w
 
 /* Lemke's method on a block of all takes most of it. */
 static size_t place_decision(Run *r, char *base, size_t used) {
-  size_t w = width_of(r), square = w * w, orders = (ORDERS + 1) * w;
+  size_t w = r->width, square = w * w, orders = (ORDERS + 1) * w;
   Decision *d = r->decision = place(base, &used, sizeof(Decision), 1);
   if (!base) d = r->decision = 0;
   Decision none = {0}, *to = d ? d : &none;
@@ -69,14 +69,14 @@ static size_t place_decision(Run *r, char *base, size_t used) {
   for (int i = 0; i < SEVERAL; i++) {
     Motion *own = to->motion + i;
     own->state = LETTERS(w); own->order = LETTERS(w); own->before = LETTERS(w);
-    own->nu = DOUBLES(w); own->series = DOUBLES(COMPARED * (size_t)n_of(r));
+    own->nu = DOUBLES(w); own->series = DOUBLES(COMPARED * (size_t)r->n);
   }
   return used;
 }
 
 static size_t place_run(Run *r, char *base) {
   const System *s = r->s;
-  int n = n_of(r), w = width_of(r), c = c_of(r), all = m_of(r) + 2 * c, g = r->guards, stride = stride_of(r);
+  int n = r->n, w = r->width, c = r->c, all = r->m + 2 * c, g = r->guards, stride = r->stride;
   size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
   used = place_layout(&r->now, base, used, w, g);
   used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets);
@@ -89,6 +89,7 @@ static size_t place_run(Run *r, char *base) {
   r->x = DOUBLES(n);
   r->at_x = DOUBLES(n);
   r->before = DOUBLES(n);
+  r->saved = DOUBLES(n);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
   r->drop = INTEGERS(g);

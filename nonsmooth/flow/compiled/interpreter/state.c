@@ -7,32 +7,6 @@
 #define HISTORY 48
 #define SEVERAL 16 /* modes that can continue, for the message */
 
-/* Sizes: constants in a program generated for one system. */
-#ifdef GENERATED
-#define n_of(r) STATES
-#define dimension_of(r) DIMENSION
-#define timed_of(r) TIMED
-#define m_of(r) SURFACES
-#define c_of(r) CONTACTS
-#define width_of(r) (SURFACES + CONTACTS)
-#define stops_of(r) STOPS
-#define resets_of(r) RESETS
-#define sets_of(r) SETS
-#define order_of(r) P
-#define stride_of(r) (P + 1)
-#else
-#define n_of(r) ((r)->n)
-#define dimension_of(r) ((r)->s->dimension)
-#define timed_of(r) ((r)->s->timed)
-#define m_of(r) ((r)->m)
-#define c_of(r) ((r)->c)
-#define width_of(r) ((r)->width)
-#define stops_of(r) ((r)->s->stops)
-#define resets_of(r) ((r)->s->resets)
-#define sets_of(r) ((r)->s->sets)
-#define order_of(r) ((r)->order)
-#define stride_of(r) ((r)->stride)
-#endif
 #define TINY 2.2250738585072014e-308
 
 /* Entries of a sparse matrix in the order of a program's outputs. */
@@ -111,22 +85,23 @@ typedef struct {
 /* The guard that is served. */
 typedef struct { int kind, index, side; } Met;
 
+/* An event that may be one of many that accumulate: the time since the one before, and what was served. */
+typedef struct { double interval; int64_t pattern; int32_t kind; Met met; } Happened;
+
 typedef struct {
   Options o;
   const System *s;
   Table *table;
   double *p;
   int32_t n, m, c, width, order, stride, guards;
-  double t, begun, last_event, limit, at_t, *x, *at_x, *unknowns;
+  double t, begun, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start; /* present ones, and those that a choice is made from */
   Layout now; /* of the present mode */
   Met met;
   int32_t mode, status, reason, where, due, due_impact, falls, *drop, *side, *fired;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode;
-  double interval[HISTORY];
-  int64_t pattern[HISTORY];
-  int32_t kind[HISTORY];
+  Happened past[HISTORY];
   double size, length, shortened;
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
@@ -135,7 +110,8 @@ typedef struct {
   int32_t facts; /* about the decisions of a run */
   Output out;
   int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
-  const double *times;
+  const double *times, *asked; /* times of samples in the row; times at which any run is read */
+  int64_t asked_count;
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
@@ -143,6 +119,7 @@ typedef struct {
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
+  double *saved; /* a state to return to */
   int8_t *moving;
   int32_t shown;
   const Expansion *expansion;

@@ -40,13 +40,15 @@ class Case:
         self.symbols = {n: ca.SX.sym(n) for names in self.names for n in names}
 
     def parse(self, text: str) -> list:
-        value = eval(f"[{text}]", {"__builtins__": {}}, {**FUNCTIONS, **self.symbols})  # our own text
+        value = eval(
+            f"[{text}]", {"__builtins__": {}}, {**FUNCTIONS, **self.symbols}
+        )  # our own text
         return [ca.SX(v) for v in value]
 
     @cached_property
     def system(self) -> ns.FilippovSystem:
         data = self.data
-        states, multipliers, reactions, time = ([self.symbols[n] for n in own] for own in self.names)
+        states, multipliers, _, time = ([self.symbols[n] for n in own] for own in self.names)
         impacts = [
             ns.Impact(
                 self.parse(own["gap"])[0],
@@ -100,7 +102,10 @@ def planar_body(data: dict) -> dict:
         n, s = (math.cos(angle), math.sin(angle)), (-math.sin(angle), math.cos(angle))
         rows = [(*d, px * d[1] - py * d[0]) for d in (n, s)]
         (gap, _), (_, slip) = (
-            ["+".join(f"({c!r})*{q}" for c, q in zip(row, names, strict=True)) for names in ("xyt", "uvw")]
+            [
+                "+".join(f"({c!r})*{q}" for c, q in zip(row, names, strict=True))
+                for names in ("xyt", "uvw")
+            ]
             for row in rows
         )
         gaps.append({"gap": gap, "restitution": 0, "reaction": f"r{i}"})

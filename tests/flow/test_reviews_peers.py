@@ -13,10 +13,6 @@ import nonsmooth as ns
 OPEN = {
     "test_a_flat_block_on_two_feet_slides_and_stays[1.0-each]": "dependent friction",
     "test_a_flat_block_on_two_feet_slides_and_stays[0.0-each]": "dependent friction",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-08]": "dependent contacts",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-10]": "dependent contacts",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-12]": "dependent contacts",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-13]": "dependent contacts",
     "test_fireflies_fire_one_another": "jumps fire nothing",
     "test_a_tank_empties[0]": "no roots",
     "test_a_tank_empties[1]": "no roots",

@@ -68,6 +68,13 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
         column = ca.vertcat(*entries)
         if ca.depends_on(column, lam) or not ca.depends_on(column, variables):
             continue  # products of multipliers, or hidden dynamics; a constant
+        if len(members) == 1:  # what vanishes with h has no part in sliding
+            h, others = system.definition.surfaces[members[0]], ca.vertcat(p, lam, reactions)
+            acts = [not vanish_on([e], h, x, others) for e in entries]
+            places = [own for own, is_there in zip(places, acts, strict=True) if is_there]
+            entries = [e for e, is_there in zip(entries, acts, strict=True) if is_there]
+        if not entries:
+            continue
         reduced, factor = cancel_common_factor(entries, variables, known)
         if ca.depends_on(factor, variables):
             field = ca.SX(field)

@@ -173,11 +173,12 @@ class Coupled:
         return [i for i, sign in enumerate(signs) if sign == 0 and not self._is_idle(i, signs)]
 
     def _is_idle(self, i: int, signs: Sequence[int]) -> bool:
-        """Whether a multiplier makes no difference: on its surface, or at an open contact."""
+        """Whether a multiplier makes no difference: on its surface, or at open contacts alone."""
         if i >= self._surfaces:
             return False
-        open_ones = [j for j in self.carriers[i] if signs[self._surfaces + j]]
-        return self.continuous[i] or bool(open_ones)
+        carried = self.carriers[i]
+        idle = bool(carried) and all(signs[self._surfaces + j] for j in carried)
+        return self.continuous[i] or idle
 
     def guards(self, mode: str) -> tuple[Guard, ...]:
         """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""

@@ -11,8 +11,6 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_a_flat_block_on_two_feet_slides_and_stays[1.0-each]": "dependent friction",
-    "test_a_flat_block_on_two_feet_slides_and_stays[0.0-each]": "dependent friction",
     "test_a_slider_crank_without_friction_is_never_inconsistent[1e-08]": "dependent contacts",
     "test_a_slider_crank_without_friction_is_never_inconsistent[1e-10]": "dependent contacts",
     "test_a_slider_crank_without_friction_is_never_inconsistent[1e-12]": "dependent contacts",

@@ -11,10 +11,6 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-08]": "dependent contacts",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-10]": "dependent contacts",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-12]": "dependent contacts",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-13]": "dependent contacts",
     "test_fireflies_fire_one_another": "jumps fire nothing",
     "test_a_tank_empties[0]": "no roots",
     "test_a_tank_empties[1]": "no roots",

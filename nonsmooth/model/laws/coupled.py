@@ -32,6 +32,7 @@ from ..expressions.linearity import linearity
 from ..expressions.simplification import simplified
 from ..expressions.taylor_rules import lower, touched
 from ..expressions.unused_terms import without_unused_terms
+from ..numbering import FALL, LIMIT_FALL
 from ..values import Array
 from .evaluators import Evaluator
 from .switches import Guard, event_guards
@@ -418,12 +419,6 @@ def coupled_of(system: FilippovSystem) -> Coupled:
 
 
 # multipliers of a mode as power series ---------------------------------------------------------
-
-#: A step ends where |h| has fallen to this part: towards h = 0 a series may go on as -|h|.
-FALL = 0.1
-
-#: The same for friction's limit on the set, whose square is compared with that of what is needed.
-LIMIT_FALL = 1e-3
 
 #: A rate of leaving below this part of its terms is zero by rounding.
 _STILL = 64 * np.finfo(float).eps

@@ -111,11 +111,17 @@ TENFOLD = 20.0
 #: they are larger than this.
 OVERFLOW = 1e280
 
+#: Motions that can continue from a point, at most so many are kept.
+SEVERAL = 16
+
 #: What a run notes about its decisions, as bits.
 DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 
 #: Kinds of events, by number in ensembles and in C.
-KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")
+KINDS = (
+    *("crossing", "entry", "exit", "stop", "reset"),
+    *("impact", "contact", "release", "stability", "end"),
+)
 
 #: The first and the last of these, as many, can happen without resets and impacts.
 SIMPLE_KINDS = 5
@@ -161,6 +167,7 @@ REASONS = (
     "no_reaction",
     "no_stable_motion",
     "possibly_several",
+    "stability_lost",
 )
 
 #: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.

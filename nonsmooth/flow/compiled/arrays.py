@@ -78,6 +78,10 @@ class Run:
         Surfaces and contacts at the last point that was decided.
     several : list of str
         Modes that could continue there, where more than one could.
+    rates : ndarray (k, n)
+        Rates of the states in them.
+    facts : int
+        What was noted about the decisions, as bits.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
     starts, coefficients, modes : ndarray (s,), (s, N, P+1), (s,)
@@ -98,6 +102,8 @@ class Run:
     guards: Callable[[str], Sequence[Guard]]
     active: list[int]
     several: list[str]
+    rates: Array
+    facts: int
     t: Array
     x: Array
     starts: Array
@@ -123,6 +129,7 @@ class Run:
         guards: Callable[[str], Sequence[Guard]],
         active: list[int],
         several: list[str],
+        rates: Array,
     ) -> Run:
         """Put together what a run wrote, and what the driver says of its end."""
         return cls(
@@ -136,6 +143,8 @@ class Run:
             guards=guards,
             active=active,
             several=several,
+            rates=rates,
+            facts=counts[12],
             t=whole["point_t"],
             x=whole["point_x"][:, :n],
             starts=whole["start"],

@@ -55,6 +55,7 @@ class Definition:
     hidden: bool
     sizes: tuple[int, ...] = ()
     renamed: tuple[tuple[str, str], ...] = ()
+    layer_widths: tuple[float, ...] = ()
 
     @property
     def extended_states(self) -> ca.SX:
@@ -81,7 +82,11 @@ class Definition:
         """Plain values from which ``from_state`` makes an equal definition."""
         inputs = [self.states, self.time, self.parameters, self.multipliers, self.reactions]
         outputs = [self.field, self.surfaces, self.guards, self.maps, self.gaps, self.restitutions]
-        some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed}
+        some: dict[str, Any] = {
+            "sizes": self.sizes,
+            "renamed": self.renamed,
+            "layer_widths": self.layer_widths,
+        }
         return {
             **{name: value for name, value in some.items() if value},
             "definition": ca.Function("definition", inputs, outputs).serialize(),
@@ -105,7 +110,8 @@ class Definition:
         rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
         parts = dict(zip((*inputs, *outputs), (*vectors, *expressions), strict=True))
         sizes, renamed = tuple(state.get("sizes", ())), tuple(state.get("renamed", ()))
-        return cls(**parts, **rest, sizes=sizes, renamed=renamed)
+        widths = tuple(state.get("layer_widths", ()))
+        return cls(**parts, **rest, sizes=sizes, renamed=renamed, layer_widths=widths)
 
 
 _DIRECTIONS = (-1, 0, 1)
@@ -126,6 +132,7 @@ def read_definition(
     resets: Any,
     impacts: Any,
     hidden: bool,
+    layer_widths: Any = None,
 ) -> Definition:
     """Read and check the arguments of FilippovSystem."""
     x = symbols(states, "states")
@@ -153,10 +160,8 @@ def read_definition(
         parameters=p,
         multipliers=lam,
         reactions=reactions,
-        gaps=ca.vertcat(*[column([i.gap], f"gap of {i.name!r}", 1) for i in impacts]),
-        restitutions=ca.vertcat(
-            *[column([i.restitution], f"restitution of {i.name!r}", 1) for i in impacts]
-        ),
+        gaps=_of_impacts(impacts, "gap"),
+        restitutions=_of_impacts(impacts, "restitution"),
         impacts=tuple(i.name for i in impacts),
         field=f,
         surfaces=h,
@@ -168,9 +173,28 @@ def read_definition(
         hidden=hidden,
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
+        layer_widths=_widths(layer_widths, h.numel()),
     )
     require_consistent(definition)
     return definition
+
+
+def _of_impacts(impacts: Sequence[Any], what: str) -> ca.SX:
+    """One expression of each impact."""
+    return ca.vertcat(*[column([getattr(i, what)], f"{what} of {i.name!r}", 1) for i in impacts])
+
+
+def _widths(values: Any, count: int) -> tuple[float, ...]:
+    """Widths of the layers of the surfaces; nothing where they are equal."""
+    if values is None:
+        return ()
+    widths = tuple(real(v, "layer_widths") for v in listed(values))
+    if len(widths) != count or not all(0 < v < float("inf") for v in widths):
+        raise DefinitionError(
+            f"layer_widths is {values!r}, but the system has {count} switching functions. Give a "
+            "positive number for each."
+        )
+    return widths if len(set(widths)) > 1 else ()
 
 
 def _one_multiplier_each(lam: ca.SX, h: ca.SX) -> None:

@@ -219,6 +219,21 @@ class Coupled:
             moves[i, j] = ca.depends_on(self.slope[i, j], self.moving)
         return moves
 
+    @cached_property
+    def slope_symmetric(self) -> NDArray[np.bool_]:
+        """Which pairs of those derivatives are equal, as those of mechanical systems are, by numbers (m, m)."""
+        if not self.count:
+            return np.zeros((0, 0), bool)
+        function, rng = ca.Function("slope", self._symbols, [self.slope]), np.random.default_rng(1)
+        equal = np.ones((self.count, self.count), bool)
+        for _ in range(3):
+            found = np.array(
+                function(*[rng.uniform(0.2, 0.9, s.numel()) for s in self._symbols]), float
+            )
+            size = abs(found).max(initial=0.0)
+            equal &= abs(found - found.T) <= 1e-12 * size
+        return equal
+
     def _changing(self, sliding: Sequence[int]) -> list[int]:
         """Unknowns that the stability of sliding is read from."""
         if len(sliding) == 2 and max(sliding) < self._surfaces:

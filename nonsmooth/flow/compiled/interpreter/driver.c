@@ -92,8 +92,10 @@ static void start_in(Run *r, const int8_t *asked) {
   if (!is_known(r, &r->now) || !improve(r, &r->now, r->x, r->unknowns, 1)) { finish(r, HAND_OVER, NO_REASON, 0); return; }
   Expansion *e = &r->e;
   expand(r, r->letter, r->x, r->unknowns, e);
+  r->turned_mode = r->mode;
   for (int row = 0; row < e->l.rows; row++) {
     int kind = e->l.kind[row], active = 0;
+    r->turned[row] = e->guards[(int64_t)row * r->stride] < 0 ? -1 : 1;
     if (kind != SURFACE_GUARD && kind != EXIT_GUARD) continue;
     for (int j = 0; j < r->active_count; j++) active |= r->active[j] == e->l.index[row];
     if (!active) continue;
@@ -269,6 +271,10 @@ static void serve(Run *r, int row) {
   else if (kind == IMPACT_GUARD) impact(r, row);
   else if (kind == RELEASE_GUARD) release(r, row);
   else if (kind == NEAR_GUARD) near_set(r, row, 1);
+  else if (kind == BRANCH_GUARD && side != OF_ONE) {
+    event(r, STABILITY, r->mode, row, r->x);
+    finish(r, INTERSECTION, STABILITY_LOST, index);
+  }
   else {
     Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, 2}};
     if (kind == SLIP_GUARD) {

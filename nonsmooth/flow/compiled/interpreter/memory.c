@@ -70,6 +70,8 @@ static size_t place_run(Run *r, char *base) {
   r->drop = INTEGERS(g);
   r->side = INTEGERS(s->stops + s->resets);
   r->fired = INTEGERS(s->resets);
+  r->root = DOUBLES(g);
+  r->met_at = DOUBLES(g);
   r->active = INTEGERS(w);
   r->involved = INTEGERS(3 * w + 1);
   r->p = DOUBLES(s->parameters);

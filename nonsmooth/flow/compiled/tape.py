@@ -221,6 +221,7 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
         getattr(made, name).argtypes = [_POINTER]
     made.table_read.argtypes = [_POINTER] * 4
     made.run_new.argtypes = [_POINTER] * 2
+    made.run_ask.argtypes = [_POINTER, _POINTER, _I64]
     made.run_begin.argtypes = [*[_POINTER] * 6, _D]
     made.run_continue.argtypes = [_POINTER, _I64]
     made.run_read.argtypes = [_POINTER] * 5
@@ -347,14 +348,15 @@ class TapeEngine:
 
     # one trajectory ----------------------------------------------------------------------------
 
-    def run(self, x: Array, p: Array, options: Options) -> Run:
-        """Run one trajectory from an extended start, dense output kept."""
+    def run(self, x: Array, p: Array, options: Options, asked: Array | None = None) -> Run:
+        """Run one trajectory from an extended start, dense output kept, to be read at ``asked`` times."""
         output = Output(self.system.extended_dimension, self.order, self._rooms)
         x, p = np.array(x, float), np.array([*p, 0.0], float)
         start = self._start_mode(options)
         with self._table() as table, self._state(table) as state:
             c_options = ctypes.byref(options_of(self.system, options, dense=True))
             given = (address(x), address(p), address(start))
+            library().run_ask(state, address(asked), 0 if asked is None else len(asked))
             library().run_begin(state, c_options, output.pointer, *given, options.t_start)
             while True:
                 # Python hears Ctrl-C between the calls.

@@ -29,7 +29,7 @@ _MOST_LINEAR = 22
 _FILES = (
     *("programs.h", "linear.h", "state.c", "modes.c", "jets.c", "sets.c", "stepper.c"),
     *("surfaces.c", "record.c", "switching.c", "contacts.c", "approach.c", "driver.c"),
-    *("memory.c", "entry.c"),
+    *("accumulation.c", "memory.c", "entry.c"),
 )
 
 

@@ -72,29 +72,31 @@ typedef struct {
 /* The guard that is served. */
 typedef struct { int kind, index, side; } Met;
 
+/* An event that may be one of many that accumulate: the time since the one before, and what was served. */
+typedef struct { double interval; int64_t pattern; int32_t kind; Met met; } Happened;
+
 typedef struct {
   Options o;
   const System *s;
   Table *table;
   double *p;
   int32_t n, m, c, width, order, stride, guards;
-  double t, begun, last_event, limit, at_t, *x, *at_x, *unknowns;
+  double t, begun, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start; /* present ones, and those that a choice is made from */
   Layout now; /* of the present mode */
   Met met;
   int32_t mode, status, reason, where, due, due_impact, falls, *drop, *side, *fired;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode;
-  double interval[HISTORY];
-  int64_t pattern[HISTORY];
-  int32_t kind[HISTORY];
+  Happened past[HISTORY];
   double size, length, shortened;
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
   Output out;
   int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
-  const double *times;
+  const double *times, *asked; /* times of samples in the row; times at which any run is read */
+  int64_t asked_count;
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
@@ -103,6 +105,7 @@ typedef struct {
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
+  double *saved; /* a state to return to */
   int8_t *moving;
   int32_t shown;
   const Expansion *expansion;

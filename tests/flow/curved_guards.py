@@ -42,7 +42,7 @@ class Counts:
 
 def _term(rng, m):
     """A random smooth function of x, v and t with values of order 1; ``m`` are the functions of a library."""
-    a, b, c = rng.uniform(0.3, 3.0, 3) * rng.choice([-1, 1], 3)
+    a, b = rng.uniform(0.3, 3.0, 2) * rng.choice([-1, 1], 2)
     return (
         lambda x, v, t: m.sin(a * t + b),
         lambda x, v, t: m.cos(a * x + 0.3 * b * v),
@@ -84,7 +84,7 @@ def run(seed: int, counts: Counts, tol: float = 1e-10) -> None:
     system = ns.FilippovSystem([_x, _v, _count], resets=[kick], **given)
     values = dense(*motion(GRID), GRID)
     for level in rng.uniform(values.min(), values.max(), LEVELS):
-        true = _passages(lambda t: dense(*motion(t), t) - level, direction)
+        true = _passages(lambda t, level=level: dense(*motion(t), t) - level, direction)
         if true is None:
             counts.left_out += 1
             continue

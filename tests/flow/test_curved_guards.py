@@ -3,9 +3,9 @@
 import casadi as ca
 import numpy as np
 import pytest
-from tests.flow import curved_guards
 
 import nonsmooth as ns
+from tests.flow import curved_guards
 
 x, v, kicks, t, h = (ca.SX.sym(name) for name in ("x", "v", "kicks", "t", "h"))
 

@@ -71,8 +71,6 @@ static size_t place_run(Run *r, char *base) {
   r->drop = INTEGERS(g);
   r->side = INTEGERS(s->stops + s->resets);
   r->fired = INTEGERS(s->resets);
-  r->root = DOUBLES(g);
-  r->met_at = DOUBLES(g);
   r->active = INTEGERS(w);
   r->involved = INTEGERS(3 * w + 1);
   r->p = DOUBLES(s->parameters);
@@ -101,5 +99,7 @@ static size_t place_run(Run *r, char *base) {
   r->heights_of = DOUBLES(w);
   r->aside = DOUBLES(2 * n);
   r->moving = LETTERS(w);
+  r->root = DOUBLES(g);
+  r->met_at = DOUBLES(g);
   return used;
 }

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LIMIT_FALL
+from ..model.numbering import FALL, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LIMIT_FALL"]  # and all below
+__all__ = ["FALL", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 
@@ -53,6 +53,10 @@ AT_END = 64 * EPSILON
 
 #: Lanes leave events closer than this, relative to the time, to the scalar driver.
 NEAR = 1e-13
+
+#: Newton's steps that improve a root on the guard itself; one is the last below this part of the time.
+POLISHED = 3
+CLOSE = 1e-8
 
 #: Rounding of a polynomial's value, relative to the sum of the magnitudes of its terms.
 ROUNDING = 4 * EPSILON
@@ -129,7 +133,7 @@ SIMPLE_KINDS = 5
 #: Kinds of guards, by number in C, and their priority among simultaneous ones (0 first).
 GUARDS = (
     *("surface", "exit", "stop", "reset", "impact", "release", "branch"),
-    *("near", "slip"),
+    *("near", "slip", "atom"),
 )
 PRIORITY = {
     "stop": 0,
@@ -141,6 +145,7 @@ PRIORITY = {
     "branch": 6,
     "near": 3,
     "slip": 4,
+    "atom": 1,
 }
 
 #: Why a run ended, besides its status, by number in C.
@@ -168,6 +173,7 @@ REASONS = (
     "no_stable_motion",
     "possibly_several",
     "stability_lost",
+    "discrete_value",
 )
 
 #: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.

@@ -124,7 +124,7 @@ DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 #: Kinds of events, by number in ensembles and in C.
 KINDS = (
     *("crossing", "entry", "exit", "stop", "reset"),
-    *("impact", "contact", "release", "stability", "end"),
+    *("impact", "contact", "release", "stability", "rest", "rest_below", "end"),
 )
 
 #: The first and the last of these, as many, can happen without resets and impacts.
@@ -173,6 +173,7 @@ REASONS = (
     "no_stable_motion",
     "possibly_several",
     "stability_lost",
+    "high_degree",
     "discrete_value",
 )
 

@@ -202,6 +202,7 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards")],
         *[(name, _I32) for name in ("affine", "sets")],
+        ("curved", _POINTER),
         *[(name, _POINTER) for name in ("set_first", "set_size", "set_of", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
     ]
@@ -239,10 +240,6 @@ def _place(system: FilippovSystem, i: int) -> int:
 
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
     """Return the interpreter with a system at the options' tolerance, or None where it has none."""
-    if any(system.nonlinear):
-        return None
-    if system.impacts and not coupled_of(system).affine:
-        return None
     order = tape_order(system, options)
     if order >= MOST_ORDER:
         return None
@@ -296,7 +293,7 @@ class TapeEngine:
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         self._c = self._structure(self.coupled, tape)
         self._steps, self._special, self._rooms = 0, None, rooms_of((0, 0, 0))
-        if supports_special(tape, order):
+        if self.coupled.affine and supports_special(tape, order):
             source = lambda: special_source(tape, self.coupled, order)
             self._special = Background(source, _declared)
 
@@ -351,6 +348,7 @@ class TapeEngine:
             "component": tape.component,
             "slope_output": tape.slope_output,
             "slope_moves": tape.slope_moves,
+            "curved": coupled.curved.ravel(),
             "bent": coupled.linearity.bent_rows,
             "bent_free": coupled.linearity.bent_free_rows,
             "bent_guards": coupled.linearity.bent_guards,
@@ -446,7 +444,7 @@ class TapeEngine:
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``interpreter/sets.c`` for those of sets."""
         m = self.system.surface_count
-        surfaces = ("-s+*bll"[sign + 1] for sign in signs[:m])
+        surfaces = ("-s+*blli"[sign + 1] for sign in signs[:m])
         return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
 
     # many trajectories -------------------------------------------------------------------------

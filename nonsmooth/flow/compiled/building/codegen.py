@@ -36,7 +36,7 @@ _MOST_LINEAR = 22
 #: The driver in C, in the order in which it is read: one text.
 _FILES = (
     *("programs.h", "linear.h", "state.c", "modes.c", "jets.c", "sets.c", "stepper.c"),
-    *("surfaces.c", "record.c", "switching.c", "contacts.c", "approach.c", "driver.c"),
+    *("surfaces.c", "record.c", "spiral.c", "switching.c", "layer.c", "contacts.c", "approach.c", "driver.c"),
     *("memory.c", "entry.c"),
 )
 

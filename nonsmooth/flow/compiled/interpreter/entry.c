@@ -45,6 +45,8 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->limit = r->at_t = NAN;
   for (int i = 0; i < n_of(r); i++) r->at_x[i] = NAN;
   r->status = RUNNING;
+  r->met = (Met){0};
+  r->repelling = 0;
   r->reason = NO_REASON;
   r->where = 0;
   r->segment_mode = r->due = r->due_impact = r->length_mode = -1;

@@ -199,9 +199,6 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
   e->finite = is_finite(r, e);
 }
 
-/* Whether the multipliers of a mode are the only ones: those that enter in products may have several values. */
-static int is_known(const Run *r, const Layout *l) { return r->s->affine || l->slides < 2; }
-
 /* Multipliers that keep the sliding surfaces of a mode: one step of Newton's method, since they enter
  * linearly, and one against rounding. 0 where there are none. */
 static int improve(Run *r, const Layout *l, const double *x, double *unknowns, int steps) {

@@ -135,21 +135,24 @@ static int is_stable(Run *r, const Layout *l) {
   return shown(a, k, r->work, r->pending) == 2 ? 1 : -1;
 }
 
-/* Whether the motion can continue in a mode: its guards that vanish here become positive. */
-static int continuation(Run *r, const int8_t *letter, const Known *known, int known_count, Continuation *result) {
+/* Coefficients that are no numbers decide nothing. */
+static void keep_finite(Run *r, Expansion *e) {
+  for (int i = 0; i < n_of(r) * stride_of(r); i++) if (!(fabs(e->states[i]) < INFINITY)) e->states[i] = 0;
+  for (int i = 0; i < e->l.rows * stride_of(r); i++) if (!(fabs(e->guards[i]) < INFINITY)) e->guards[i] = 0;
+}
+
+/* Whether the motion can continue in a mode with given unknowns: its guards that vanish here become positive. */
+static int continues(Run *r, const int8_t *letter, const Known *known, int known_count, Continuation *result) {
   Expansion *e = &r->trial;
   lay_out(r, letter, &e->l);
-  if (!meets_sets(r)) keep_carried(r, letter, result->unknowns); /* else they are given */
   if (e->l.slides) {
-    if (!is_known(r, &e->l)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
-    if (!improve(r, &e->l, r->x, result->unknowns, 1)) return 0;
     error_scales(r, r->x, held_of(r, letter), result->unknowns);
-    int stable = meets_sets(r) ? 1 : is_stable(r, &e->l); /* M of sets is definite where they are decided */
+    int stable = is_stable(r, &e->l);
     if (stable < 0) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
     if (!stable) return 0;
   }
   expand(r, letter, r->x, result->unknowns, e);
-  if (!e->finite) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+  if (!e->finite) keep_finite(r, e);
   memcpy(result->letter, letter, width_of(r));
   result->strict = 1;
   memset(result->drop, 0, sizeof(int32_t) * r->guards);
@@ -173,6 +176,14 @@ static int continuation(Run *r, const int8_t *letter, const Known *known, int kn
   return 1;
 }
 
+/* The same with the unknowns that keep what slides in the mode; those of sets are given. */
+static int continuation(Run *r, const int8_t *letter, const Known *known, int known_count, Continuation *result) {
+  lay_out(r, letter, &r->trial.l);
+  if (!meets_sets(r)) keep_carried(r, letter, result->unknowns);
+  if (r->trial.l.slides && !improve(r, &r->trial.l, r->x, result->unknowns, 1)) return 0;
+  return continues(r, letter, known, known_count, result);
+}
+
 static void copy_continuation(const Run *r, Continuation *to, const Continuation *from) {
   memcpy(to->letter, from->letter, width_of(r));
   memcpy(to->drop, from->drop, sizeof(int32_t) * r->guards);
@@ -185,13 +196,71 @@ static int rests(const Run *r, const int8_t *letter) {
   return 0;
 }
 
-/* What is to be said of a point without a motion. */
-static int no_motion(Run *r, int contacts) {
+/* Modes that can continue, so far. */
+typedef struct { int strict, found, resting; } Tally;
+
+/* Count r->found, of r->trial. */
+static void count_found(Run *r, Tally *t) {
+  if (r->found.strict && t->strict++ == 0) copy_continuation(r, &r->one, &r->found);
+  if (r->found.strict && r->several_count < SEVERAL) r->several[r->several_count++] = r->trial.l.mode;
+  if (t->found++ == 0) copy_continuation(r, &r->first, &r->found);
+  if (rests(r, r->found.letter) && t->resting++ == 0) copy_continuation(r, &r->rest, &r->found);
+}
+
+/* The one that continues to r->chosen; 0 where there is none, or more than one and the run ends. */
+static int choose_of(Run *r, const Tally *t) {
+  if (t->strict > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
+  if (!t->found || (!t->strict && t->found > 1 && !t->resting)) return 0;
+  copy_continuation(r, &r->chosen, t->strict ? &r->one : t->found == 1 ? &r->first : &r->rest);
+  return 1;
+}
+
+/* Letters of the active elements by the number of a choice of those that are possible. */
+static void spell_choice(const Run *r, const int8_t *letter, const int8_t *possible, int number, int8_t *trial) {
+  memcpy(trial, letter, width_of(r));
+  for (int i = r->active_count - 1; i >= 0; i--) {
+    int which = number % bits(possible[i]);
+    number /= bits(possible[i]);
+    for (int bit = 0; bit < 3; bit++)
+      if (possible[i] >> bit & 1 && which-- == 0) trial[r->active[i]] = bit == 0 ? 1 : bit == 1 ? -1 : 0;
+  }
+}
+
+static int decide(Run *r, const int8_t *letter, const Known *known, int known_count);
+
+/* Whether sliding on the one active surface would end here, to rounding: then it is left with known zeros. */
+static int leaves_at_end(Run *r, const int8_t *letter) {
+  int own = r->active[0];
+  int8_t *trial = r->tried_letter;
+  Expansion *e = &r->trial;
+  memcpy(trial, letter, width_of(r));
+  trial[own] = 0;
+  lay_out(r, trial, &e->l);
+  keep_carried(r, trial, r->found.unknowns);
+  if (!improve(r, &e->l, r->x, r->found.unknowns, 1)) return 0;
+  expand(r, trial, r->x, r->found.unknowns, e);
+  for (int row = 0; row < e->l.rows && e->finite; row++) {
+    double value;
+    int side = e->l.side[row];
+    if (e->l.kind[row] != EXIT_GUARD || e->l.index[row] != own || !leading(r, e, row, 0, &value)) continue;
+    Known known[] = {{EXIT_GUARD, own, side, 1}, {SURFACE_GUARD, own, side, 2}};
+    return decide(r, letter, known, 2);
+  }
+  return 0;
+}
+
+/* Where no mode continues: stay where all orbits spiral in, leave where sliding ends to rounding, or say why the run
+ * ends. */
+static int no_motion(Run *r, const int8_t *letter, int known_count) {
+  int contacts = 0, k = r->active_count;
+  for (int i = 0; i < k; i++) contacts |= r->active[i] >= m_of(r);
+  if (r->status != RUNNING) return 0;
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
-  else if (meets_sets(r)) finish(r, HAND_OVER, NO_REASON, 0); /* M is singular, or nearly */
-  else if (r->active_count == 2 && n_of(r) == 2) finish(r, HAND_OVER, NO_REASON, 0); /* orbits may spiral in */
-  else if (r->active_count > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
-  else finish(r, HAND_OVER, NO_REASON, 0); /* a degenerate tangency: other programs tell zeros apart */
+  else if (meets_sets(r)) finish(r, NON_UNIQUE, UNDETERMINED, 0);
+  else if (k == 2 && spirals_in(r, letter) && hold_there(r, letter)) return 1;
+  else if (k > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
+  else if (!known_count && leaves_at_end(r, letter)) return 1;
+  else finish(r, NON_UNIQUE, DEGENERATE, 0);
   return 0;
 }
 
@@ -230,13 +299,17 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
 }
 
 static int decide_sets(Run *r, const int8_t *letter, const Known *known, int known_count);
+static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count);
+static int is_curved(const Run *r, const int32_t *own, int count);
 
 /* Choose, as r->chosen, the motion that continues from a point of the active surfaces; 0 if the run ends.
  * ``letter`` has those of the other surfaces. */
 static int decide(Run *r, const int8_t *letter, const Known *known, int known_count) {
-  int k = r->active_count, contacts = 0, strict = 0, found = 0, resting = 0, total = 1;
+  int k = r->active_count, contacts = 0, total = 1;
   int8_t *possible = (int8_t *)r->lam + sizeof(double) * width_of(r), *trial = possible + width_of(r);
+  Tally tally = {0};
   if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
+  if (is_curved(r, r->active, k)) return decide_in_layer(r, letter, known, known_count);
   if (k == 1 && decide_by_rates(r, letter, known, known_count)) return 1;
   for (int i = 0; i < k; i++) contacts |= r->active[i] >= m_of(r);
   if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {
@@ -247,29 +320,14 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
   total = choices_of(possible, k);
   r->several_count = 0;
   for (int number = 0; number < total && r->status == RUNNING; number++) {
-    int rest = number;
-    memcpy(trial, letter, width_of(r));
-    for (int i = k - 1; i >= 0; i--) { /* the last one first, as the reference does */
-      int which = rest % bits(possible[i]);
-      rest /= bits(possible[i]);
-      for (int bit = 0; bit < 3; bit++)
-        if (possible[i] >> bit & 1 && which-- == 0) trial[r->active[i]] = bit == 0 ? 1 : bit == 1 ? -1 : 0;
-    }
-    if (!continuation(r, trial, known, known_count, &r->found)) continue;
-    if (r->found.strict && strict++ == 0) copy_continuation(r, &r->one, &r->found);
-    if (r->found.strict && r->several_count < SEVERAL) r->several[r->several_count++] = r->trial.l.mode;
-    if (found++ == 0) copy_continuation(r, &r->first, &r->found);
-    if (rests(r, trial) && resting++ == 0) copy_continuation(r, &r->rest, &r->found);
+    spell_choice(r, letter, possible, number, trial);
+    if (continuation(r, trial, known, known_count, &r->found)) count_found(r, &tally);
   }
   if (r->status != RUNNING) return 0;
-  if (strict > 1) { /* rounding may have hidden which: where multipliers are eliminated one sees more */
-    int handed = known_count || (m_of(r) == 1 && c_of(r) == 0);
-    finish(r, handed ? HAND_OVER : NON_UNIQUE, handed ? NO_REASON : AMBIGUOUS, 0);
+  if (tally.strict > 1 && (known_count || (m_of(r) == 1 && c_of(r) == 0))) {
+    /* rounding may have hidden which: where multipliers are eliminated one sees more */
+    finish(r, HAND_OVER, NO_REASON, 0);
     return 0;
   }
-  if (strict == 1) copy_continuation(r, &r->chosen, &r->one);
-  else if (found == 1) copy_continuation(r, &r->chosen, &r->first);
-  else if (resting) copy_continuation(r, &r->chosen, &r->rest);
-  else return no_motion(r, contacts);
-  return 1;
+  return choose_of(r, &tally) || no_motion(r, letter, known_count);
 }

@@ -4,7 +4,7 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
 static int change_kind(const Run *r, int before, int after);
 
 /* The mode in which a step is shown. */
-static int shown_mode(const Run *r) { return sets_of(r) ? r->shown : r->mode; }
+static int shown_mode(const Run *r) { return r->s->sets ? r->shown : r->mode; }
 
 /* A solution of a x = b, whose rows may depend on one another, in place of b. ``a`` is lost. */
 static int solve_consistent(double *a, double *b, int n) {
@@ -42,7 +42,7 @@ static int solve_consistent(double *a, double *b, int n) {
 /* h' = a - M lambda of the functions ``own``, with what else slides eliminated; 0 where that is impossible. */
 static int freeze(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
                   double *a, double *m) {
-  int w = width_of(r), count = 0;
+  int w = r->width, count = 0;
   int32_t *others = r->pending;
   aim(r, letter, x, unknowns);
   held_of(r, letter);
@@ -76,7 +76,7 @@ static int freeze(Run *r, const int8_t *letter, const double *x, const double *u
 /* The field with given multipliers of a set, and what slides elsewhere in balance. */
 static int field_with(Run *r, const int8_t *letter, const double *x, const double *unknowns, int first, int k,
                       const double *lam, double *field) {
-  int w = width_of(r), count = 0;
+  int w = r->width, count = 0;
   int32_t *others = r->pending;
   double *acting = r->later;
   aim(r, letter, x, unknowns);
@@ -98,7 +98,7 @@ static int field_with(Run *r, const int8_t *letter, const double *x, const doubl
   }
   set_inputs(r, x, r->held, acting);
   first_values(r, 0);
-  for (int i = 0; i < n_of(r); i++) field[i] = row_of(r, i)[0];
+  for (int i = 0; i < r->n; i++) field[i] = row_of(r, i)[0];
   return 1;
 }
 
@@ -149,7 +149,7 @@ static int leaving_direction(const double *a, const double *m, int stride, int k
 
 /* The step along a straight line that is too short for a series. */
 static void jump(Run *r, const double *rate, double dt) {
-  int n = n_of(r), stride = stride_of(r);
+  int n = r->n, stride = r->stride;
   Expansion *e = &r->trial;
   for (int i = 0; i < n; i++) {
     double *c = e->states + (int64_t)i * stride;
@@ -167,13 +167,13 @@ static void jump(Run *r, const double *rate, double dt) {
   r->t += dt;
   r->step_count++;
   r->segment_steps++;
-  if (timed_of(r)) r->x[n - 1] = r->t;
+  if (r->s->timed) r->x[n - 1] = r->t;
   memset(r->drop, 0, sizeof(int32_t) * r->guards);
   note(r);
 }
 
 /* Time to a set below which coefficients of series are too large for numbers. */
-static double shortest(const Run *r) { return pow(OVERFLOW, -1.0 / order_of(r)); }
+static double shortest(const Run *r) { return pow(OVERFLOW, -1.0 / r->order); }
 
 /* Whether the state is on a set, or as close as no series can begin; after surface_values. */
 static int is_met(Run *r, const int8_t *letter, int set, const double *h, const double *scales_of) {
@@ -190,7 +190,7 @@ static int is_met(Run *r, const int8_t *letter, int set, const double *h, const 
 /* |h| has fallen tenfold, or is small: the set is reached or passed now, or looked at again nearer. What has
  * fallen to rounding is zero, whatever its direction says. */
 static void near_set(Run *r, int row, int fell) {
-  int f = r->now.index[row], s = set_of(r, f), k = size_of(r, s), n = n_of(r), before = r->mode;
+  int f = r->now.index[row], s = set_of(r, f), k = size_of(r, s), n = r->n, before = r->mode;
   int32_t own[3];
   double h[3], a[3], m[9], u[3], b[3], mean[3], scale = 0, dt, c = 0;
   if (r->letter[f] == 0) return; /* friction's limit has fallen: the next step sees its digits */
@@ -244,7 +244,7 @@ static void near_set(Run *r, int row, int fell) {
       for (int i = 0; i < n; i++) turn[i] = fabs(field[i] - other[i]);
       field_with(r, r->letter, end, r->unknowns, f, k, mean, other);
       for (int i = 0; i < n; i++) {
-        double allowed = i < dimension_of(r) ? REACHED * SAFETY * (r->o.atol + r->o.rtol * fabs(r->x[i])) : 0;
+        double allowed = i < r->s->dimension ? REACHED * SAFETY * (r->o.atol + r->o.rtol * fabs(r->x[i])) : 0;
         allowed += EPSILON * (r->size + fabs(r->x[i]));
         if ((turn[i] + fabs(field[i] - other[i])) * dt > allowed) return;
       }
@@ -258,7 +258,7 @@ static void near_set(Run *r, int row, int fell) {
   for (int i = 0; i < r->active_count; i++) r->involved[kept++] = r->active[i];
   project(r, r->involved, kept);
   renote(r);
-  memcpy(r->start, r->letter, width_of(r));
+  memcpy(r->start, r->letter, r->width);
   if (choose(r, r->start, 0, 0) && r->mode != before) event(r, change_kind(r, before, r->mode), before, row, r->x);
 }
 
@@ -267,7 +267,7 @@ static void after_step(Run *r) {
   int changed = 0, carried = 0;
   double *level = r->later;
   const double *scales_of = 0;
-  for (int s = 0; s < sets_of(r); s++) {
+  for (int s = 0; s < r->s->sets; s++) {
     int f = first_of(r, s), k = size_of(r, s), letter = r->letter[f];
     if (letter != LEAVING && letter != LEFT_BEHIND) continue;
     if (!scales_of) { surface_values(r, r->x); scales_of = surface_scales(r, r->x); }
@@ -380,10 +380,10 @@ static int limit_directions(const double *given, const double *matrix, int k, do
 
 /* All unknowns of a mode in which sets are left; as solutions_of. */
 static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found) {
-  int n = 0, sets = 0, w = width_of(r), count = 1;
+  int n = 0, sets = 0, w = r->width, count = 1;
   int32_t *own = r->involved, *first = own + w;
   double *a = r->laws, *lam = a + w, *m = lam + w, u[6][3], *unknowns = r->tried;
-  for (int i = 0; i < m_of(r); i++) {
+  for (int i = 0; i < r->m; i++) {
     if (l->letter[i] != LEAVING) continue;
     if (i == first_of(r, set_of(r, i))) first[sets++] = n;
     own[n++] = i;
@@ -425,12 +425,12 @@ static int has_negative(const double *m, int k) {
 /* Letters that are possible where sets are met, as bits: of sets leaving (1) and holding (4). One where the law of
  * sets alone decides. 0 where the run ends. */
 static int sets_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count, int8_t *possible) {
-  int w = width_of(r), n = 0, sets = 0, *first = r->involved + w, bounded;
+  int w = r->width, n = 0, sets = 0, *first = r->involved + w, bounded;
   int32_t *own = r->involved;
   double *a = r->laws, *lam = a + w, *m = lam + w, block[9];
   for (int i = 0; i < r->active_count; i++) {
     int which = r->active[i], s = set_of(r, which);
-    possible[i] = s < 0 && which < m_of(r) ? 7 : 5;
+    possible[i] = s < 0 && which < r->m ? 7 : 5;
     if (s < 0) continue;
     if (which == first_of(r, s)) first[sets++] = n;
     own[n++] = which;
@@ -461,7 +461,7 @@ static int sets_by_rates(Run *r, const int8_t *letter, const Known *known, int k
 
 /* Choose, as r->chosen, the motion that continues from h = 0 of some sets, and of surfaces and contacts there. */
 static int decide_sets(Run *r, const int8_t *letter, const Known *known, int known_count) {
-  int8_t *trial = r->tried_letter, *possible = trial + width_of(r), *each = (int8_t *)r->lam + sizeof(double) * width_of(r);
+  int8_t *trial = r->tried_letter, *possible = trial + r->width, *each = (int8_t *)r->lam + sizeof(double) * r->width;
   Solutions all = {0};
   Tally tally = {0};
   if (!sets_by_rates(r, letter, known, known_count, possible)) return 0;
@@ -481,7 +481,7 @@ static int decide_sets(Run *r, const int8_t *letter, const Known *known, int kno
     lay_out(r, trial, &r->trial.l);
     solutions_of(r, &r->trial.l, &all);
     for (int q = 0; q < all.count && r->status == RUNNING; q++) {
-      memcpy(r->found.unknowns, all.each + q * width_of(r), sizeof(double) * width_of(r));
+      memcpy(r->found.unknowns, all.each + q * r->width, sizeof(double) * r->width);
       if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
     }
   }
@@ -513,15 +513,15 @@ static void find_zeros(const Values *t, const double *w, int8_t *zero) {
 /* Sets whose multiplier does not enter the field with these parameters: no friction. */
 static void find_idle(Run *r) {
   const Entries *column = &r->s->column;
-  if (!sets_of(r)) return;
-  memset(r->idle, 1, sets_of(r));
+  if (!r->s->sets) return;
+  memset(r->idle, 1, r->s->sets);
   find_zeros(&r->s->columns, r->columns, r->vanishes);
   for (int q = 0; q < column->count; q++) {
     int s = set_of(r, column->column[q]);
     if (s >= 0 && !r->vanishes[r->s->columns.output[q]]) r->idle[s] = 0;
   }
   find_zeros(&r->s->point, r->point, r->vanishes);
-  for (int s = 0; s < sets_of(r); s++) r->idle[s] |= r->vanishes[r->s->point.output[width_of(r) + first_of(r, s)]];
+  for (int s = 0; s < r->s->sets; s++) r->idle[s] |= r->vanishes[r->s->point.output[r->width + first_of(r, s)]];
 }
 
 /* After a step that ended with no guard: sets that are close may be reached to rounding. */

@@ -5,9 +5,9 @@
 static int impulses_fit(Run *r, const double *x, const int32_t *involved, int count, const int32_t *taking, int takes,
                         const int8_t *letter, const int32_t *carried, int carries, const double *target, int plastic,
                         double *after) {
-  int m = m_of(r), w = width_of(r), k = 0, n = n_of(r);
+  int m = r->m, w = r->width, k = 0, n = r->n;
   int32_t *unknown = r->pending + 4 * w;
-  double *every = r->lam, *a = r->matrix, *b = a + (int64_t)w * w, *limit = b + w, *h = limit + w, *scale = h + w + c_of(r);
+  double *every = r->lam, *a = r->matrix, *b = a + (int64_t)w * w, *limit = b + w, *h = limit + w, *scale = h + w + r->c;
   for (int i = 0; i < carries; i++) if (letter[carried[i]] == 0) unknown[k++] = carried[i];
   int stuck = k;
   for (int i = 0; i < takes; i++) unknown[k++] = m + taking[i];
@@ -15,9 +15,9 @@ static int impulses_fit(Run *r, const double *x, const int32_t *involved, int co
   for (int i = 0; i < k; i++)
     for (int j = 0; j < k; j++) a[i * k + j] = r->slope[unknown[i] * w + unknown[j]];
   surface_values(r, x);
-  memcpy(scale, surface_scales(r, x), sizeof(double) * (m + 2 * c_of(r)));
+  memcpy(scale, surface_scales(r, x), sizeof(double) * (m + 2 * r->c));
   memcpy(h, r->rates, sizeof(double) * m);
-  for (int j = 0; j < c_of(r); j++) h[m + j] = r->rates[m + c_of(r) + j];
+  for (int j = 0; j < r->c; j++) h[m + j] = r->rates[m + r->c + j];
   for (int i = 0; i < k; i++) b[i] = i < stuck ? -h[unknown[i]] : target[unknown[i] - m];
   if (!solve(a, b, k)) return 0;
   memset(every, 0, sizeof(double) * w);
@@ -25,7 +25,7 @@ static int impulses_fit(Run *r, const double *x, const int32_t *involved, int co
   /* What the impulses change, before r->slope is that of other multipliers. */
   for (int i = 0; i < w; i++)
     for (int j = 0; j < k; j++) if (b[j] != 0) h[i] += r->slope[i * w + unknown[j]] * b[j];
-  for (int j = 0; j < c_of(r); j++) r->held[m + j] = every[m + j]; /* impulses in place of reactions */
+  for (int j = 0; j < r->c; j++) r->held[m + j] = every[m + j]; /* impulses in place of reactions */
   error_scales(r, x, r->held, r->none);
   for (int i = 0; i < m; i++) limit[i] = fabs(factor_of(r, i));
   for (int i = 0; i < takes; i++) if (!plastic && every[m + taking[i]] < 0) return 0;
@@ -38,7 +38,7 @@ static int impulses_fit(Run *r, const double *x, const int32_t *involved, int co
   for (int i = 0; i < count; i++) {
     int j = involved[i], takes_part = 0;
     for (int q = 0; q < takes; q++) takes_part |= taking[q] == j;
-    if (!takes_part && h[m + j] < -ON_SURFACE * scale[m + c_of(r) + j]) return 0;
+    if (!takes_part && h[m + j] < -ON_SURFACE * scale[m + r->c + j]) return 0;
   }
   memcpy(after, x, sizeof(double) * n);
   set_inputs(r, x, held_of(r, letter), r->none);
@@ -64,9 +64,9 @@ static int improper(Run *r, const double *x, const int32_t *involved, int count)
 /* State after the impulses at some closed gaps; 0 if none are consistent. All possibilities are tried, with
  * most contacts and with the present letters first. */
 static int strike(Run *r, const int32_t *involved, int count, int plastic, double *after) {
-  int m = m_of(r), c = c_of(r), carries = 0, choices = 1;
-  int32_t *carried = r->pending, *taking = carried + width_of(r);
-  int8_t *letter = (int8_t *)(r->pending + 2 * width_of(r));
+  int m = r->m, c = r->c, carries = 0, choices = 1;
+  int32_t *carried = r->pending, *taking = carried + r->width;
+  int8_t *letter = (int8_t *)(r->pending + 2 * r->width);
   double *target = r->rates + 2 * (m + 2 * c), *x = r->x;
   const double *h = surface_values(r, x);
   if (!plastic) values_run(&r->s->restitution, x, r->p, r->restitution);
@@ -87,7 +87,7 @@ static int strike(Run *r, const int32_t *involved, int count, int plastic, doubl
       if (takes != size) continue;
       for (int number = 0; number < choices; number++) {
         int rest = number;
-        memcpy(letter, r->letter, width_of(r));
+        memcpy(letter, r->letter, r->width);
         for (int i = carries - 1; i >= 0; i--, rest /= 3) {
           static const int8_t order[3][3] = {{-1, 0, 1}, {0, 1, -1}, {1, 0, -1}}; /* present, then s + - */
           letter[carried[i]] = order[r->letter[carried[i]] + 1][rest % 3];

@@ -1,36 +1,36 @@
 /* Events: nonsmooth/flow/reference/driver.py ----------------------------------------------------------- */
 
 static int change_kind(const Run *r, int before, int after) {
-  const int8_t *one = r->table->letter + (int64_t)before * width_of(r);
-  const int8_t *two = r->table->letter + (int64_t)after * width_of(r);
+  const int8_t *one = r->table->letter + (int64_t)before * r->width;
+  const int8_t *two = r->table->letter + (int64_t)after * r->width;
   int closed = 0, slides = 0;
-  for (int i = 0; i < width_of(r); i++)
-    if (i < m_of(r)) slides += (two[i] == 0) - (one[i] == 0); else closed += (two[i] == 0) - (one[i] == 0);
+  for (int i = 0; i < r->width; i++)
+    if (i < r->m) slides += (two[i] == 0) - (one[i] == 0); else closed += (two[i] == 0) - (one[i] == 0);
   if (closed) return closed > 0 ? CONTACT : RELEASE;
   return slides > 0 ? ENTRY : slides < 0 ? EXIT : CROSSING;
 }
 
 /* Whether another mode is the present one for those who look at it: close to a set or far from it is the same. */
 static int is_alike(const Run *r, const int8_t *letter) {
-  if (!sets_of(r)) return 0;
-  for (int i = 0; i < width_of(r); i++)
+  if (!r->s->sets) return 0;
+  for (int i = 0; i < r->width; i++)
     if (letter[i] != (r->letter[i] == LEFT_BEHIND ? OFF : r->letter[i]) && letter[i] != r->letter[i]) return 0;
   return 1;
 }
 
 static void adopt(Run *r, const Continuation *c) {
   int alike = is_alike(r, c->letter);
-  memcpy(r->letter, c->letter, width_of(r));
+  memcpy(r->letter, c->letter, r->width);
   memcpy(r->drop, c->drop, sizeof(int32_t) * r->guards);
-  memcpy(r->unknowns, c->unknowns, sizeof(double) * width_of(r));
+  memcpy(r->unknowns, c->unknowns, sizeof(double) * r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
   r->repelling = 0;
   if (alike) return;
   int shown = r->mode;
-  if (sets_of(r) && shown == r->shown) { /* a set is passed again: another stretch, of the same letters */
+  if (r->s->sets && shown == r->shown) { /* a set is passed again: another stretch, of the same letters */
     int8_t *letter = (int8_t *)r->heights_of;
-    for (int i = 0; i < width_of(r); i++) letter[i] = r->letter[i] == LEAVING ? LEAVING_AGAIN : r->letter[i];
+    for (int i = 0; i < r->width; i++) letter[i] = r->letter[i] == LEAVING ? LEAVING_AGAIN : r->letter[i];
     shown = mode_number(r->table, letter);
   }
   r->shown = shown;
@@ -42,7 +42,7 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
   if (r->active_count) {
     if (!decide(r, letter, known, known_count)) return 0;
   } else {
-    memcpy(r->chosen.letter, letter, width_of(r));
+    memcpy(r->chosen.letter, letter, r->width);
     memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
     keep_carried(r, letter, r->chosen.unknowns);
   }
@@ -52,17 +52,17 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
 
 /* Sides of all surfaces; what is on one counts as below until it is decided. Contacts are open. */
 static int letters_of(Run *r, int8_t *letter) {
-  if (!width_of(r)) return 1;
+  if (!r->width) return 1;
   const double *h = surface_values(r, r->x);
-  int finite = finite_all(h, m_of(r) + 2 * c_of(r));
-  for (int i = 0; i < width_of(r); i++) letter[i] = set_of(r, i) >= 0 ? off_letter(r, i) : i >= m_of(r) || h[i] > 0 ? 1 : -1;
+  int finite = finite_all(h, r->m + 2 * r->c);
+  for (int i = 0; i < r->width; i++) letter[i] = set_of(r, i) >= 0 ? off_letter(r, i) : i >= r->m || h[i] > 0 ? 1 : -1;
   return finite;
 }
 
 /* A closed gap that is closing further is struck at once; one that opens has a known zero. */
 static void strike_due(Run *r) {
-  if (!c_of(r) || r->status != RUNNING) return;
-  const double *gap = gaps(r, r->x), *rate = gap + c_of(r);
+  if (!r->c || r->status != RUNNING) return;
+  const double *gap = gaps(r, r->x), *rate = gap + r->c;
   r->due_impact = -1;
   for (int row = 0; row < r->now.rows; row++) {
     if (r->now.kind[row] != IMPACT_GUARD || gap[r->now.index[row]] != 0) continue;
@@ -107,19 +107,19 @@ static int can_start(Run *r) {
 static void start_in(Run *r, const int8_t *asked) {
   Solutions all = {0};
   int8_t *letter = r->start;
-  for (int i = 0; i < width_of(r); i++) {
+  for (int i = 0; i < r->width; i++) {
     int active = 0;
     for (int j = 0; j < r->active_count; j++) active |= r->active[j] == i;
     letter[i] = asked[i];
     if (set_of(r, i) >= 0 && asked[i] == OFF) letter[i] = active ? LEAVING : r->letter[i] == IDLE ? IDLE : OFF;
     if (!active && letter[i] != r->letter[i]) { finish(r, NON_UNIQUE, WRONG_START, r->mode); return; }
   }
-  memcpy(r->letter, letter, width_of(r));
+  memcpy(r->letter, letter, r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
   solutions_of(r, &r->now, &all);
   if (all.count != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, all.count); return; }
-  memcpy(r->unknowns, all.each, sizeof(double) * width_of(r));
+  memcpy(r->unknowns, all.each, sizeof(double) * r->width);
   if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
 }
 
@@ -134,10 +134,10 @@ static void pass(Run *r, int row, int zeros, double value, int side) {
 
 /* The state after a reset; the time is kept. */
 static void reset_map(Run *r, int index, const double *x, double *after) {
-  int nd = dimension_of(r);
+  int nd = r->s->dimension;
   values_run(&r->s->maps, x, r->p, r->maps);
   for (int i = 0; i < nd; i++) after[i] = out_of(&r->s->maps, r->maps, index * nd + i);
-  if (timed_of(r)) after[nd] = x[nd];
+  if (r->s->timed) after[nd] = x[nd];
 }
 
 /* Whether a start on the zero of a reset is met at once. */
@@ -186,12 +186,12 @@ static void begin(Run *r, const int8_t *start_mode) {
   active_surfaces(r, -1, r->letter);
   if (r->status == RUNNING) {
     int surfaces = 0;
-    while (surfaces < r->active_count && r->active[surfaces] < m_of(r)) surfaces++;
+    while (surfaces < r->active_count && r->active[surfaces] < r->m) surfaces++;
     project(r, r->active, surfaces);
     renote(r);
     if (start_mode) start_in(r, start_mode);
     else if (r->active_count) {
-      memcpy(r->start, r->letter, width_of(r));
+      memcpy(r->start, r->letter, r->width);
       choose(r, r->start, 0, 0);
     }
   }
@@ -204,13 +204,13 @@ static void begin(Run *r, const int8_t *start_mode) {
 static void reset(Run *r, int row) {
   double *x = r->before;
   int before = r->mode, index = r->now.index[row];
-  memcpy(x, r->x, sizeof(double) * n_of(r));
+  memcpy(x, r->x, sizeof(double) * r->n);
   reset_map(r, index, x, r->x);
-  if (finite_all(r->x, dimension_of(r))) {
+  if (finite_all(r->x, r->s->dimension)) {
     note(r);
     settle_in(r);
   } else {
-    memcpy(r->x, x, sizeof(double) * n_of(r));
+    memcpy(r->x, x, sizeof(double) * r->n);
     finish(r, NOT_FINITE, RESET_MAP, index);
   }
   event(r, RESET, before, row, x);
@@ -224,7 +224,7 @@ static int with_touched(Run *r, int32_t *onto, int kept) {
   int all = kept;
   surface_values(r, r->x);
   const double *scale = surface_scales(r, r->x);
-  for (int i = m_of(r); i < m_of(r) + c_of(r); i++) {
+  for (int i = r->m; i < r->m + r->c; i++) {
     int known = 0;
     for (int k = 0; k < kept; k++) known |= onto[k] == i;
     if (!known && r->rates[i] < 0 && r->rates[i] >= -r->o.rtol * scale[i]) onto[all++] = i;
@@ -237,18 +237,18 @@ static void impact(Run *r, int row) {
   int before = r->mode, contact = r->now.index[row], count = 0;
   int32_t *involved = r->involved, *onto = involved, kept = kept_by(r, r->letter, onto);
   double *x = r->before;
-  onto[kept++] = m_of(r) + contact; /* what is closed stays so to rounding */
+  onto[kept++] = r->m + contact; /* what is closed stays so to rounding */
   project(r, onto, kept);
   int more = with_touched(r, onto, kept);
   if (more > kept) project(r, onto, more);
   renote(r);
-  memcpy(x, r->x, sizeof(double) * n_of(r));
-  const double *gap = gaps(r, x), *rate = gap + c_of(r);
-  for (int j = 0; j < c_of(r); j++) if ((gap[j] == 0 && rate[j] <= 0) || j == contact) involved[count++] = j;
+  memcpy(x, r->x, sizeof(double) * r->n);
+  const double *gap = gaps(r, x), *rate = gap + r->c;
+  for (int j = 0; j < r->c; j++) if ((gap[j] == 0 && rate[j] <= 0) || j == contact) involved[count++] = j;
   int wrong = improper(r, x, involved, count);
   if (wrong >= 0) { finish(r, INCONSISTENT, RESTITUTION, wrong); return; }
   if (!strike(r, involved, count, 0, r->at_work)) { finish(r, INCONSISTENT, NO_IMPULSE, contact); return; }
-  memcpy(r->x, r->at_work, sizeof(double) * n_of(r));
+  memcpy(r->x, r->at_work, sizeof(double) * r->n);
   note(r);
   settle_in(r);
   event(r, IMPACT, before, row, x);
@@ -258,9 +258,9 @@ static void impact(Run *r, int row) {
 static void release(Run *r, int row) {
   int before = r->mode, j = r->now.index[row];
   Known known[] = {{RELEASE_GUARD, j, 0, 1}, {IMPACT_GUARD, j, 1, 3}};
-  active_surfaces(r, m_of(r) + j, r->letter);
+  active_surfaces(r, r->m + j, r->letter);
   if (r->status != RUNNING) return;
-  memcpy(r->start, r->letter, width_of(r));
+  memcpy(r->start, r->letter, r->width);
   if (choose(r, r->start, known, 2) && r->mode != before) event(r, change_kind(r, before, r->mode), before, row, r->x);
 }
 
@@ -269,19 +269,19 @@ static int advance(Run *r, const Expansion *e, double dt);
 /* After impacts that accumulate the contact is closed; whether there is one. */
 static int come_to_rest(Run *r, double left) {
   int count = 0, kept = 0;
-  int32_t *involved = r->involved, *which = r->involved + c_of(r);
-  if (!c_of(r)) return 0;
+  int32_t *involved = r->involved, *which = r->involved + r->c;
+  if (!r->c) return 0;
   for (int k = 1; k <= 6 && k <= r->history; k++) if (r->kind[(r->history - k) % HISTORY] != IMPACT) return 0;
   const double *gap = gaps(r, r->x);
-  for (int j = 0; j < c_of(r); j++) if (gap[j] == 0) involved[count++] = j;
+  for (int j = 0; j < r->c; j++) if (gap[j] == 0) involved[count++] = j;
   if (!strike(r, involved, count, 1, r->at_work)) return 0;
   int before = r->mode;
-  memcpy(r->x, r->at_work, sizeof(double) * n_of(r));
-  for (int i = 0; i < count; i++) which[kept++] = m_of(r) + involved[i];
-  for (int i = 0; i < count; i++) which[kept++] = m_of(r) + c_of(r) + involved[i];
+  memcpy(r->x, r->at_work, sizeof(double) * r->n);
+  for (int i = 0; i < count; i++) which[kept++] = r->m + involved[i];
+  for (int i = 0; i < count; i++) which[kept++] = r->m + r->c + involved[i];
   project(r, which, kept);
   letters_of(r, r->start);
-  for (int i = 0; i < count; i++) which[i] = m_of(r) + involved[i];
+  for (int i = 0; i < count; i++) which[i] = r->m + involved[i];
   active_surfaces(r, -1, r->start);
   for (int i = 0; i < count; i++) { /* those that rest are so, whatever rounding says */
     int at = 0;
@@ -296,7 +296,7 @@ static int come_to_rest(Run *r, double left) {
   r->history = 0;
   expand(r, r->letter, r->x, r->unknowns, &r->e);
   int closed = 0;
-  for (int i = m_of(r); i < width_of(r); i++) closed |= r->letter[i] == 0;
+  for (int i = r->m; i < r->width; i++) closed |= r->letter[i] == 0;
   if (closed && r->e.finite && advance(r, &r->e, left)) {
     r->limit = r->t;
     event(r, change_kind(r, before, r->mode), before, -1, r->x);
@@ -306,7 +306,7 @@ static int come_to_rest(Run *r, double left) {
 
 static int only_sliding(const Run *r) {
   int found = -1;
-  for (int i = 0; i < m_of(r); i++) if (r->letter[i] == 0) { if (found >= 0) return -1; found = i; }
+  for (int i = 0; i < r->m; i++) if (r->letter[i] == 0) { if (found >= 0) return -1; found = i; }
   return found;
 }
 
@@ -341,7 +341,7 @@ static void serve(Run *r, int row) {
     else if (kind != SURFACE_GUARD) watch_two_fold(r);
     else if (!is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
     if (r->status != RUNNING) return;
-    memcpy(r->start, r->letter, width_of(r));
+    memcpy(r->start, r->letter, r->width);
     if (choose(r, r->start, known, kind == EXIT_GUARD || kind == SLIP_GUARD ? 2 : 0) && r->mode != before)
       event(r, change_kind(r, before, r->mode), before, row, r->x);
   }
@@ -349,10 +349,10 @@ static void serve(Run *r, int row) {
 
 /* 0 where the state after the step is not finite; the run then ends before it. */
 static int advance(Run *r, const Expansion *e, double dt) {
-  int n = n_of(r), stride = stride_of(r), kept = 0;
+  int n = r->n, stride = r->stride, kept = 0;
   double *x = r->at_work;
-  for (int i = 0; i < dimension_of(r); i++) x[i] = value_at(e->states + (int64_t)i * stride, order_of(r), dt);
-  if (!finite_all(x, dimension_of(r))) { finish(r, NOT_FINITE, STATE, 0); return 0; }
+  for (int i = 0; i < r->s->dimension; i++) x[i] = value_at(e->states + (int64_t)i * stride, r->order, dt);
+  if (!finite_all(x, r->s->dimension)) { finish(r, NOT_FINITE, STATE, 0); return 0; }
   if (r->o.dense) {
     int64_t k = r->out.steps++;
     r->out.start[k] = r->t;
@@ -360,20 +360,20 @@ static int advance(Run *r, const Expansion *e, double dt) {
     memcpy(r->out.coefficients + k * n * stride, e->states, sizeof(double) * n * stride);
   }
   if (r->times) sample_step(r, e, dt);
-  memcpy(r->x, x, sizeof(double) * dimension_of(r));
+  memcpy(r->x, x, sizeof(double) * r->s->dimension);
   r->t += dt;
   r->step_count++;
   r->segment_steps++;
-  if (timed_of(r)) r->x[n - 1] = r->t;
+  if (r->s->timed) r->x[n - 1] = r->t;
   kept = kept_by(r, r->letter, r->involved);
   project(r, r->involved, kept);
-  if (e->l.slides || sets_of(r)) {
+  if (e->l.slides || r->s->sets) {
     double *ahead = r->lam;
-    for (int i = 0; i < width_of(r); i++) ahead[i] = value_at(e->series + (int64_t)i * stride, order_of(r), dt);
-    memcpy(r->unknowns, ahead, sizeof(double) * width_of(r));
+    for (int i = 0; i < r->width; i++) ahead[i] = value_at(e->series + (int64_t)i * stride, r->order, dt);
+    memcpy(r->unknowns, ahead, sizeof(double) * r->width);
     improve(r, &r->now, r->x, r->unknowns, 2);
   }
-  if (sets_of(r)) after_step(r);
+  if (r->s->sets) after_step(r);
   memset(r->drop, 0, sizeof(int32_t) * r->guards);
   note(r);
   return 1;
@@ -382,12 +382,12 @@ static int advance(Run *r, const Expansion *e, double dt) {
 /* Leave a point where only low derivatives exist; guards are looked at after the step. */
 static void leave_singular(Run *r, Expansion *e, double left) {
   int huge = 0;
-  for (int i = 0; i < n_of(r); i++)
-    for (int k = 0; k < 2; k++) huge |= fabs(e->states[(int64_t)i * stride_of(r) + k]) > HUGE;
+  for (int i = 0; i < r->n; i++)
+    for (int k = 0; k < 2; k++) huge |= fabs(e->states[(int64_t)i * r->stride + k]) > HUGE;
   double h = singular_step(r, e, smaller(left, r->o.max_step));
   if (h == 0 || huge) { finish(r, NOT_FINITE, FIELD, 0); return; }
-  memset(r->side, 0, sizeof(int32_t) * (stops_of(r) + resets_of(r) + 1));
-  memset(r->fired, 0, sizeof(int32_t) * (resets_of(r) + 1));
+  memset(r->side, 0, sizeof(int32_t) * (r->s->stops + r->s->resets + 1));
+  memset(r->fired, 0, sizeof(int32_t) * (r->s->resets + 1));
   advance(r, e, h);
 }
 
@@ -427,19 +427,19 @@ static void step(Run *r) {
   if (dt < wanted) { row = -1; last = 0; }
   if (dt > 0) {
     note_sides(r, e, dt);
-    memset(r->fired, 0, sizeof(int32_t) * (resets_of(r) + 1));
+    memset(r->fired, 0, sizeof(int32_t) * (r->s->resets + 1));
   }
   r->falls = row >= 0 && is_steep(r, e, row, dt);
   last &= dt == h;
   if (!advance(r, e, dt)) return;
   if (last) {
     r->t = r->o.t_end;
-    if (timed_of(r)) r->x[n_of(r) - 1] = r->t;
+    if (r->s->timed) r->x[r->n - 1] = r->t;
     if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
   }
   if (row >= 0) serve(r, row);
   else if (!last) {
-    if (sets_of(r)) look_at_sets(r);
+    if (r->s->sets) look_at_sets(r);
     watch_two_fold(r);
   }
 }

@@ -25,15 +25,15 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->o = *o;
   r->size = o->atol / o->rtol;
   r->out = *out;
-  memcpy(r->x, x, sizeof(double) * n_of(r));
+  memcpy(r->x, x, sizeof(double) * r->n);
   memcpy(r->p, p, sizeof(double) * s->parameters);
-  series_prepare(&s->series, stride_of(r), r->p, r->series);
+  series_prepare(&s->series, r->stride, r->p, r->series);
   values_prepare(&s->point, r->p, r->point);
   values_prepare(&s->surfaces, r->p, r->heights);
   values_prepare(&s->maps, r->p, r->maps);
   values_prepare(&s->restitution, r->p, r->restitution);
   values_prepare(&s->columns, r->p, r->columns);
-  memset(r->unknowns, 0, sizeof(double) * width_of(r));
+  memset(r->unknowns, 0, sizeof(double) * r->width);
   memset(r->drop, 0, sizeof(int32_t) * r->guards);
   memset(r->side, 0, sizeof(int32_t) * (s->stops + s->resets + 1));
   memset(r->fired, 0, sizeof(int32_t) * (s->resets + 1));
@@ -43,15 +43,15 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->length = r->shortened = 0;
   r->t = r->begun = r->last_event = t;
   r->limit = r->at_t = NAN;
-  for (int i = 0; i < n_of(r); i++) r->at_x[i] = NAN;
+  for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
   r->met = (Met){0};
   r->repelling = 0;
   r->reason = NO_REASON;
   r->where = 0;
   r->segment_mode = r->due = r->due_impact = r->length_mode = -1;
-  if (finite_all(r->x, n_of(r))) { begin(r, start_mode); return; }
-  memset(r->letter, 1, width_of(r));
+  if (finite_all(r->x, r->n)) { begin(r, start_mode); return; }
+  memset(r->letter, 1, r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
   finish(r, NOT_FINITE, SURFACE, 0);
@@ -90,11 +90,11 @@ static void sample_into(Run *r, const Batch *b, int64_t i) {
   r->room = b->room;
   r->times = b->times ? b->times + i * b->times_stride : 0;
   r->sample_t = b->sample_t + i * b->room;
-  r->sample_x = b->sample_x + i * b->room * dimension_of(r);
+  r->sample_x = b->sample_x + i * b->room * r->s->dimension;
 }
 
 static void keep(Run *r, const Batch *b, int64_t i) {
-  int nd = dimension_of(r);
+  int nd = r->s->dimension;
   while (r->times && r->kept < r->room && r->times[r->kept] <= r->t && finite_all(r->x, nd))
     sample(r, r->times[r->kept], r->x);
   memcpy(b->x + i * nd, r->x, nd * sizeof(double));
@@ -117,7 +117,7 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
     int64_t k = *next / 2, i = b->which ? b->which[k] : k;
     if (*next % 2 == 0) {
       sample_into(r, b, i);
-      run_begin(r, o, &none, b->x0 + i * n_of(r), b->p + i * b->p_stride, start_mode, b->t0);
+      run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, start_mode, b->t0);
     }
     *next |= 1;
     if (go_on(r, &budget) == RUNNING) return 1;

@@ -1,19 +1,19 @@
 /* Series of a mode: nonsmooth/model/laws/coupled.py ---------------------------------------------------------- */
 
 static const double *row_of(const Run *r, int output) {
-  return r->series + (int64_t)r->s->series.output[output] * stride_of(r);
+  return r->series + (int64_t)r->s->series.output[output] * r->stride;
 }
 
 static const double *slope_row(const Run *r, int i, int j) {
   static const double zero[P + 1];
-  int output = r->s->slope_output[i * width_of(r) + j];
-  return output < 0 ? zero : row_of(r, n_of(r) + 3 * width_of(r) + stops_of(r) + resets_of(r) + output);
+  int output = r->s->slope_output[i * r->width + j];
+  return output < 0 ? zero : row_of(r, r->n + 3 * r->width + r->s->stops + r->s->resets + output);
 }
 
 /* The slope of one multiplier, determinant and trace of that of two, or its diagonal, turned to begin
  * positive. */
 static void branch_rows(const Run *r, const Layout *l, int count, double *g) {
-  int stride = stride_of(r), row = 0;
+  int stride = r->stride, row = 0;
   if (is_pair(r, l)) {
     int i = l->sliding[0], j = l->sliding[1];
     const double *a = slope_row(r, i, i), *b = slope_row(r, i, j), *c = slope_row(r, j, i), *d = slope_row(r, j, j);
@@ -24,7 +24,7 @@ static void branch_rows(const Run *r, const Layout *l, int count, double *g) {
     row = 2;
   } else {
     for (int i = 0; i < l->slides; i++)
-      if (r->s->slope_moves[l->sliding[i] * (width_of(r) + 1)])
+      if (r->s->slope_moves[l->sliding[i] * (r->width + 1)])
         memcpy(g + (int64_t)row++ * stride, slope_row(r, l->sliding[i], l->sliding[i]), sizeof(double) * count);
   }
   for (int j = 0; j < row; j++) {
@@ -37,15 +37,15 @@ static void branch_rows(const Run *r, const Layout *l, int count, double *g) {
 /* Guards from the series (or, with count 1, values) of what they are made of. */
 ALWAYS_INLINE void guard_rows(Run *r, const Layout *l, const double *series, int count, double *guards) {
   const System *s = r->s;
-  int w = width_of(r), n = n_of(r), stride = stride_of(r);
+  int w = r->width, n = r->n, stride = r->stride;
   for (int row = 0; row < l->rows; row++) {
     int kind = l->kind[row], i = l->index[row], side = l->side[row];
     double *g = guards + (int64_t)row * stride;
     if (kind == SURFACE_GUARD || kind == IMPACT_GUARD) {
-      const double *h = row_of(r, n + w + i + (kind == IMPACT_GUARD ? m_of(r) : 0));
+      const double *h = row_of(r, n + w + i + (kind == IMPACT_GUARD ? r->m : 0));
       UNROLLED for (int k = 0; k < count; k++) g[k] = side * h[k];
     } else if (kind == RELEASE_GUARD) {
-      memcpy(g, series + (int64_t)(m_of(r) + i) * stride, sizeof(double) * count);
+      memcpy(g, series + (int64_t)(r->m + i) * stride, sizeof(double) * count);
     } else if (kind == EXIT_GUARD && is_idle(r, l->letter, i)) {
       const double *layer = row_of(r, n + i);
       UNROLLED for (int k = 0; k < count; k++) g[k] = -side * layer[k];
@@ -60,7 +60,7 @@ ALWAYS_INLINE void guard_rows(Run *r, const Layout *l, const double *series, int
       branch_rows(r, l, count, g);
       break;
     } else {
-      const double *stop = row_of(r, n + 3 * w + i + (kind == RESET_GUARD ? stops_of(r) : 0));
+      const double *stop = row_of(r, n + 3 * w + i + (kind == RESET_GUARD ? r->s->stops : 0));
       memcpy(g, stop, sizeof(double) * count);
     }
   }
@@ -73,30 +73,30 @@ static void follow_layer(Run *r, Expansion *e, int k, const int32_t *start) {
     double sum = 0;
     for (int q = start[i]; q < start[i + 1]; q++) {
       int j = start[slides + 1 + q];
-      sum += e->inverse[i * slides + j] * row_of(r, n_of(r) + e->l.sliding[j])[k];
+      sum += e->inverse[i * slides + j] * row_of(r, r->n + e->l.sliding[j])[k];
     }
-    e->series[(int64_t)e->l.sliding[i] * stride_of(r) + k] = -sum;
+    e->series[(int64_t)e->l.sliding[i] * r->stride + k] = -sum;
   }
 }
 
 #ifndef GENERATED
 /* Coefficient k of states and multipliers as the inputs of the series. */
 static void inputs_of(Run *r, const Expansion *e, int k) {
-  double *x = r->vector, *lam = x + n_of(r);
-  for (int i = 0; i < n_of(r); i++) x[i] = e->states[(int64_t)i * stride_of(r) + k];
-  for (int i = 0; i < width_of(r); i++) lam[i] = e->series[(int64_t)i * stride_of(r) + k];
+  double *x = r->vector, *lam = x + r->n;
+  for (int i = 0; i < r->n; i++) x[i] = e->states[(int64_t)i * r->stride + k];
+  for (int i = 0; i < r->width; i++) lam[i] = e->series[(int64_t)i * r->stride + k];
   set_inputs(r, x, k ? r->none : r->held, lam);
 }
 
 static void next_states(Run *r, Expansion *e, int k) {
   double part = 1.0 / (k + 1);
-  for (int i = 0; i < n_of(r); i++) e->states[(int64_t)i * stride_of(r) + k + 1] = row_of(r, i)[k] * part;
+  for (int i = 0; i < r->n; i++) e->states[(int64_t)i * r->stride + k + 1] = row_of(r, i)[k] * part;
 }
 
 /* Coefficients of all that a mode needs in which something slides; ``start`` are places in the inverse. */
 static void sliding_series(Run *r, Expansion *e, const int32_t *start) {
   const Series *t = &r->s->series;
-  int order = order_of(r), stride = stride_of(r);
+  int order = r->order, stride = r->stride;
   for (int k = 0; k <= order; k++) {
     inputs_of(r, e, k);
     if (k == 0) series_rules(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
@@ -115,11 +115,11 @@ static void sliding_series(Run *r, Expansion *e, const int32_t *start) {
 /* The same where nothing slides. */
 static void free_series(Run *r, Expansion *e) {
   const Series *t = &r->s->free;
-  int n = n_of(r), order = order_of(r), stride = stride_of(r);
+  int n = r->n, order = r->order, stride = r->stride;
   inputs_of(r, e, 0);
   series_rules(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
   next_states(r, e, 0);
-  memset(r->input + n, 0, sizeof(double) * 2 * width_of(r));
+  memset(r->input + n, 0, sizeof(double) * 2 * r->width);
   for (int k = 1; k <= order; k++) {
     for (int i = 0; i < n; i++) r->input[i] = e->states[(int64_t)i * stride + k];
     series_rules(t, t->later, t->later_count, k, stride, r->input, r->series);
@@ -130,7 +130,7 @@ static void free_series(Run *r, Expansion *e) {
 /* First coefficients, values, from r->input. */
 static void first_values(Run *r, int is_free) {
   const Series *t = is_free ? &r->s->free : &r->s->series;
-  series_rules(t, t->moving, t->moving_count, 0, stride_of(r), r->input, r->series);
+  series_rules(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
 }
 #else
 static void sliding_series(Run *r, Expansion *e, const int32_t *start);
@@ -142,25 +142,25 @@ static void jets(Run *r, Expansion *e) {
   int slides = e->l.slides;
   int32_t *start = r->sparse, *column = start + slides + 1, count = 0;
   r->expansion = e;
-  if (e->l.is_free && !sets_of(r)) free_series(r, e);
+  if (e->l.is_free && !r->s->sets) free_series(r, e);
   else {
     for (int i = 0; i < slides; i++) {
       start[i] = count;
       for (int j = 0; j < slides; j++) if (e->inverse[i * slides + j] != 0) column[count++] = j;
     }
     start[slides] = count;
-    if (sets_of(r)) set_series(r, e, start); else sliding_series(r, e, start);
-    if (sets_of(r)) measure_limits(r, e);
+    if (r->s->sets) set_series(r, e, start); else sliding_series(r, e, start);
+    if (r->s->sets) measure_limits(r, e);
   }
-  guard_rows(r, &e->l, e->series, order_of(r) + 1, e->guards);
+  guard_rows(r, &e->l, e->series, r->order + 1, e->guards);
 }
 
 /* A coefficient that is not finite makes all later ones so, or is the first: the field, which is not used
  * again where a logarithm's argument is negative. */
 static int is_finite(const Run *r, const Expansion *e) {
-  int order = order_of(r), stride = stride_of(r);
+  int order = r->order, stride = r->stride;
   double one = 0, two = 0, three = 0;
-  for (int i = 0; i < dimension_of(r); i++) {
+  for (int i = 0; i < r->s->dimension; i++) {
     const double *c = e->states + (int64_t)i * stride;
     one += 0 * c[order]; two += 0 * c[order - 1]; three += 0 * c[1];
   }
@@ -173,7 +173,7 @@ static int is_finite(const Run *r, const Expansion *e) {
 
 /* Jets of a mode at x, with the multipliers of what slides; inverses of the layer's slope. */
 static void expand(Run *r, const int8_t *letter, const double *x, const double *unknowns, Expansion *e) {
-  int w = width_of(r), stride = stride_of(r);
+  int w = r->width, stride = r->stride;
   lay_out(r, letter, &e->l);
   aim(r, letter, x, unknowns);
   weigh_point(r, e, x, unknowns);
@@ -182,17 +182,17 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
     for (int j = 0; j < slides; j++)
       r->work[i * slides + j] = r->slope[e->l.sliding[i] * w + e->l.sliding[j]];
   if (slides) invert(r->work, slides, e->inverse);
-  if (!e->l.is_free || sets_of(r)) memset(e->series, 0, sizeof(double) * w * stride);
+  if (!e->l.is_free || r->s->sets) memset(e->series, 0, sizeof(double) * w * stride);
   else for (int i = 0; i < w; i++) e->series[(int64_t)i * stride] = 0;
-  for (int i = 0; i < n_of(r); i++) e->states[(int64_t)i * stride] = x[i];
+  for (int i = 0; i < r->n; i++) e->states[(int64_t)i * stride] = x[i];
   for (int i = 0; i < slides; i++) e->series[(int64_t)e->l.sliding[i] * stride] = unknowns[e->l.sliding[i]];
-  for (int i = 0; i < n_of(r); i++)
-    e->allowed[i] = i < dimension_of(r) ? SAFETY * (r->o.atol + r->o.rtol * fabs(x[i])) : 0;
-  if (sets_of(r)) begin_sets(r, e, unknowns);
+  for (int i = 0; i < r->n; i++)
+    e->allowed[i] = i < r->s->dimension ? SAFETY * (r->o.atol + r->o.rtol * fabs(x[i])) : 0;
+  if (r->s->sets) begin_sets(r, e, unknowns);
   else guard_sums(r, e, e->allowed, 0, e->of_guards);
   e->scaled = e->steepened = 0;
   jets(r, e);
-  if (sets_of(r)) { /* |h| is known now */
+  if (r->s->sets) { /* |h| is known now */
     weigh_again(r, e);
     guard_sums(r, e, e->allowed, 0, e->of_guards);
   }
@@ -202,7 +202,7 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
 /* Multipliers that keep the sliding surfaces of a mode: one step of Newton's method, since they enter
  * linearly, and one against rounding. 0 where there are none. */
 static int improve(Run *r, const Layout *l, const double *x, double *unknowns, int steps) {
-  int w = width_of(r), slides = l->slides;
+  int w = r->width, slides = l->slides;
   for (int iteration = 0; slides && iteration < steps; iteration++) {
     double largest = 0, most = 0;
     aim(r, l->letter, x, unknowns);

@@ -10,24 +10,24 @@ typedef struct { double *each; int32_t count, width; } Solutions;
 static int is_curved(const Run *r, const int32_t *own, int count) {
   if (r->s->affine) return 0;
   for (int i = 0; i < count; i++)
-    for (int j = 0; j < count; j++) if (r->s->curved[own[i] * width_of(r) + own[j]]) return 1;
+    for (int j = 0; j < count; j++) if (r->s->curved[own[i] * r->width + own[j]]) return 1;
   return 0;
 }
 
 /* Series of the rate of an element along its multiplier, x and the others at rest. */
 static void rate_along(Run *r, const Layout *l, const double *unknowns, int own, double *g) {
   const Series *t = &r->s->series;
-  double *x = r->vector, *lam = x + n_of(r);
+  double *x = r->vector, *lam = x + r->n;
   aim(r, l->letter, r->x, unknowns);
   held_of(r, l->letter);
-  for (int k = 0; k <= order_of(r); k++) {
-    memset(x, 0, sizeof(double) * (n_of(r) + width_of(r)));
-    if (k == 0) memcpy(x, r->x, sizeof(double) * n_of(r));
-    if (k == 0) memcpy(lam, unknowns, sizeof(double) * width_of(r));
+  for (int k = 0; k <= r->order; k++) {
+    memset(x, 0, sizeof(double) * (r->n + r->width));
+    if (k == 0) memcpy(x, r->x, sizeof(double) * r->n);
+    if (k == 0) memcpy(lam, unknowns, sizeof(double) * r->width);
     if (k == 1) lam[own] = 1;
     set_inputs(r, x, k ? r->none : r->held, lam);
-    series_rules(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, stride_of(r), r->input, r->series);
-    g[k] = row_of(r, n_of(r) + own)[k];
+    series_rules(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
+    g[k] = row_of(r, r->n + own)[k];
   }
 }
 
@@ -53,7 +53,7 @@ static int zeros_of(const double *g, int order, double h, int zeros) {
  * coefficients vanish at the first; -1 where it is no number. */
 static int roots_along(Run *r, const Layout *l, double *unknowns, int own, double from, double to, int zeros,
                        double *root) {
-  int order = order_of(r), count = 0;
+  int order = r->order, count = 0;
   double way = to > from ? 1 : -1, at = from, most = INFINITY, g[P + 1], next[P + 1];
   unknowns[own] = at;
   rate_along(r, l, unknowns, own, g);
@@ -85,7 +85,7 @@ static int roots_along(Run *r, const Layout *l, double *unknowns, int own, doubl
 
 /* Add a solution that Newton's method improves and that is new; unknowns of surfaces are within their bounds. */
 static void keep_solution(Run *r, const Layout *l, double *unknowns, int steps, Solutions *found) {
-  int w = width_of(r);
+  int w = r->width;
   if (found->count == SOLUTIONS || !improve(r, l, r->x, unknowns, steps)) return;
   error_scales(r, r->x, held_of(r, l->letter), unknowns);
   for (int i = 0; i < l->slides; i++) {
@@ -93,7 +93,7 @@ static void keep_solution(Run *r, const Layout *l, double *unknowns, int steps, 
     double slope = 0;
     for (int j = 0; j < l->slides; j++) slope += fabs(r->slope[own * w + l->sliding[j]]);
     if (!(fabs(layer_of(r, own)) <= LAYER_RESIDUAL * (1 + slope))) return;
-    if (own < m_of(r) && !(fabs(unknowns[own]) <= fabs(factor_of(r, own)) * (1 + LAYER_BEYOND))) return;
+    if (own < r->m && !(fabs(unknowns[own]) <= fabs(factor_of(r, own)) * (1 + LAYER_BEYOND))) return;
   }
   for (int k = 0; k < found->count; k++) {
     double apart = 0;
@@ -192,12 +192,12 @@ static void solve_products(Run *r, const Layout *l, double *unknowns, Solutions 
 /* The same for other laws, and with reactions: Newton's method from a grid. */
 static void solve_from_grid(Run *r, const Layout *l, double *unknowns, Solutions *found) {
   int surfaces = 0, points = 1;
-  for (int i = 0; i < l->slides; i++) surfaces += l->sliding[i] < m_of(r);
+  for (int i = 0; i < l->slides; i++) surfaces += l->sliding[i] < r->m;
   for (int i = 0; i < surfaces && points < LAYER_STARTS; i++) points *= LAYER_GRID;
   for (int number = 0; number < points; number++) {
-    memset(unknowns, 0, sizeof(double) * width_of(r));
+    memset(unknowns, 0, sizeof(double) * r->width);
     for (int i = 0, rest = number; i < l->slides; i++)
-      if (l->sliding[i] < m_of(r)) {
+      if (l->sliding[i] < r->m) {
         unknowns[l->sliding[i]] = (2.0 * (rest % LAYER_GRID) + 1) / LAYER_GRID - 1;
         rest /= LAYER_GRID;
       }
@@ -209,12 +209,12 @@ static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found);
 
 /* All unknowns with which a mode keeps what slides in it. */
 static void solutions_of(Run *r, const Layout *l, Solutions *found) {
-  int w = width_of(r), bent = 0, contacts = 0;
+  int w = r->width, bent = 0, contacts = 0;
   double *unknowns = r->tried, root[SOLUTIONS];
   found->each = r->solutions;
   found->count = 0;
   keep_carried(r, l->letter, unknowns);
-  for (int i = 0; sets_of(r) && i < m_of(r); i++)
+  for (int i = 0; r->s->sets && i < r->m; i++)
     if (l->letter[i] == LEAVING) { solutions_of_leaving(r, l, found); return; }
   if (!is_curved(r, l->sliding, l->slides)) {
     if (l->slides && !improve(r, l, r->x, unknowns, 2)) return;
@@ -224,7 +224,7 @@ static void solutions_of(Run *r, const Layout *l, Solutions *found) {
   }
   for (int i = 0; i < l->slides; i++) {
     bent |= r->s->curved[l->sliding[i] * (w + 1)];
-    contacts |= l->sliding[i] >= m_of(r);
+    contacts |= l->sliding[i] >= r->m;
   }
   if (l->slides == 1) {
     int own = l->sliding[0], count = roots_along(r, l, unknowns, own, -1 - LAYER_BEYOND, 1 + LAYER_BEYOND, 0, root);
@@ -242,7 +242,7 @@ static int way_in_layer(Run *r, const Layout *l, double *from) {
   if (kind == SURFACE_GUARD) return -r->met.side;
   if (kind == EXIT_GUARD) return r->met.side;
   if (kind != BRANCH_GUARD) return 0;
-  memcpy(r->tried, r->unknowns, sizeof(double) * width_of(r));
+  memcpy(r->tried, r->unknowns, sizeof(double) * r->width);
   rate_along(r, l, r->tried, own, g);
   *from = r->unknowns[own];
   return g[2] > 0 ? 1 : -1;
@@ -254,7 +254,7 @@ static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int
   double from, root[SOLUTIONS];
   Layout *l = &r->trial.l;
   int8_t *trial = r->tried_letter;
-  memcpy(trial, letter, width_of(r));
+  memcpy(trial, letter, r->width);
   trial[own] = 0;
   lay_out(r, trial, l);
   int way = way_in_layer(r, l, &from);
@@ -276,7 +276,7 @@ static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int
  * modes and all their solutions. */
 static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int k = r->active_count;
-  int8_t *trial = r->tried_letter, *possible = trial + width_of(r);
+  int8_t *trial = r->tried_letter, *possible = trial + r->width;
   Solutions all = {0};
   Tally tally = {0};
   if (k == 1 && is_two_fold(r, letter, r->active[0], 0)) {
@@ -284,7 +284,7 @@ static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int
     return 0;
   }
   if (k == 1 && follow_in_layer(r, letter, known, known_count)) return 1;
-  for (int i = 0; i < k; i++) possible[i] = r->active[i] < m_of(r) ? 7 : 5;
+  for (int i = 0; i < k; i++) possible[i] = r->active[i] < r->m ? 7 : 5;
   int total = choices_of(possible, k);
   if (total > TRIED) { many_may_hold(r); return 0; }
   r->several_count = 0;
@@ -293,7 +293,7 @@ static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int
     lay_out(r, trial, &r->trial.l);
     solutions_of(r, &r->trial.l, &all);
     for (int q = 0; q < all.count && r->status == RUNNING; q++) {
-      memcpy(r->found.unknowns, all.each + q * width_of(r), sizeof(double) * width_of(r));
+      memcpy(r->found.unknowns, all.each + q * r->width, sizeof(double) * r->width);
       if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
     }
   }
@@ -309,7 +309,7 @@ static int advance(Run *r, const Expansion *e, double dt);
 static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
   if (!is_curved(r, e->l.sliding, e->l.slides)) return 0;
   for (int row = 0; row < e->l.rows; row++) {
-    const double *g = e->guards + (int64_t)row * stride_of(r);
+    const double *g = e->guards + (int64_t)row * r->stride;
     if (e->l.kind[row] == BRANCH_GUARD && g[0] < -FOLD_AHEAD * h * g[1]) return 1;
   }
   return 0;
@@ -318,17 +318,17 @@ static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
 /* Rules of order k of all that a mode needs, with the multipliers' own coefficients. */
 static void rules_of(Run *r, const Expansion *f, int k) {
   const Series *t = &r->s->series;
-  double *x = r->vector, *lam = x + n_of(r);
-  for (int i = 0; i < n_of(r); i++) x[i] = f->states[(int64_t)i * stride_of(r) + k];
-  for (int i = 0; i < width_of(r); i++) lam[i] = f->series[(int64_t)i * stride_of(r) + k];
+  double *x = r->vector, *lam = x + r->n;
+  for (int i = 0; i < r->n; i++) x[i] = f->states[(int64_t)i * r->stride + k];
+  for (int i = 0; i < r->width; i++) lam[i] = f->series[(int64_t)i * r->stride + k];
   set_inputs(r, x, k ? r->none : r->held, lam);
-  series_rules(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, stride_of(r), r->input, r->series);
+  series_rules(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
 }
 
 /* Series in the multiplier of sliding[lead], which moves in a direction, of states, of the others and of the rate
  * of the time; 0 where there is none. */
 static int series_in_multiplier(Run *r, Expansion *f, int lead, double way, double *rate) {
-  int slides = f->l.slides, w = width_of(r), n = n_of(r), order = order_of(r), stride = stride_of(r);
+  int slides = f->l.slides, w = r->width, n = r->n, order = r->order, stride = r->stride;
   double *drift = r->lam, *a = r->work, *b = a + slides * slides;
   held_of(r, f->l.letter);
   rules_of(r, f, 0);
@@ -367,8 +367,8 @@ static double integral(const double *c, int order, double s) {
 
 /* States of a step as cubic polynomials of the time, from those in a multiplier; 0 where that is not accurate. */
 static int in_time(Run *r, Expansion *f, const double *rate, double s, double dt, const double *field) {
-  int order = order_of(r), stride = stride_of(r);
-  for (int i = 0; i < n_of(r); i++) {
+  int order = r->order, stride = r->stride;
+  for (int i = 0; i < r->n; i++) {
     double *x = f->states + (int64_t)i * stride, end = value_at(x, order, s), slope, cubic[4];
     double start = rate[0] != 0 ? x[1] / rate[0] : field[i], mean = (end - x[0]) / dt;
     cubic[0] = x[0];
@@ -378,7 +378,7 @@ static int in_time(Run *r, Expansion *f, const double *rate, double s, double dt
     for (int q = 1; q < 4; q++) {
       double part = 0.25 * q * s, at = integral(rate, order, part);
       double off = fabs(horner(cubic, 3, at, &slope) - value_at(x, order, part));
-      if (off > f->allowed[i] + VANISHES * (r->size + fabs(x[0])) + (i < dimension_of(r) ? 0 : TIE * fabs(x[0]))) return 0;
+      if (off > f->allowed[i] + VANISHES * (r->size + fabs(x[0])) + (i < r->s->dimension ? 0 : TIE * fabs(x[0]))) return 0;
     }
     memset(x, 0, sizeof(double) * stride);
     memcpy(x, cubic, sizeof cubic);
@@ -388,23 +388,23 @@ static int in_time(Run *r, Expansion *f, const double *rate, double s, double dt
 
 /* Go to the fold of what slides, if it is met next; its row, or -1. */
 static int reach_fold(Run *r, const Expansion *e, double left) {
-  int slides = e->l.slides, lead = 0, order = order_of(r), stride = stride_of(r), row, last = -1;
+  int slides = e->l.slides, lead = 0, order = r->order, stride = r->stride, row, last = -1;
   double rate[P + 1], h = INFINITY, ds, *end = r->lam, *field = r->at_work;
   Expansion *f = &r->trial;
   for (int i = 1; i < slides; i++)
     if (fabs(e->series[(int64_t)e->l.sliding[i] * stride + 1]) > fabs(e->series[(int64_t)e->l.sliding[lead] * stride + 1])) lead = i;
   lay_out(r, e->l.letter, &f->l);
-  memset(f->series, 0, sizeof(double) * width_of(r) * stride);
-  memset(f->states, 0, sizeof(double) * n_of(r) * stride);
-  for (int i = 0; i < n_of(r); i++) f->states[(int64_t)i * stride] = r->x[i];
+  memset(f->series, 0, sizeof(double) * r->width * stride);
+  memset(f->states, 0, sizeof(double) * r->n * stride);
+  for (int i = 0; i < r->n; i++) f->states[(int64_t)i * stride] = r->x[i];
   for (int i = 0; i < slides; i++) f->series[(int64_t)e->l.sliding[i] * stride] = r->unknowns[e->l.sliding[i]];
   memcpy(f->inverse, e->inverse, sizeof(double) * slides * slides);
-  memcpy(f->allowed, e->allowed, sizeof(double) * n_of(r));
+  memcpy(f->allowed, e->allowed, sizeof(double) * r->n);
   f->scaled = f->steepened = 0;
   weigh_point(r, f, r->x, r->unknowns);
   if (!series_in_multiplier(r, f, lead, ns_sign(e->series[(int64_t)e->l.sliding[lead] * stride + 1]), rate)) return -1;
   h = exact_length(rate, order - 1, 2 * (1 + fabs(r->unknowns[e->l.sliding[lead]])));
-  for (int i = 0; i < n_of(r); i++) h = exact_length(f->states + (int64_t)i * stride, order, h);
+  for (int i = 0; i < r->n; i++) h = exact_length(f->states + (int64_t)i * stride, order, h);
   for (int i = 0; i < slides; i++) h = exact_length(f->series + (int64_t)e->l.sliding[i] * stride, order, h);
   double s = rate[0] > 0 ? first_root(rate, order - 1, h) : -1, dt = s > 0 ? integral(rate, order - 1, s) : -1;
   if (!(dt > 0 && dt <= smaller(left, r->o.max_step))) return -1;
@@ -414,17 +414,17 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   for (int k = 0; k < f->l.rows; k++) if (f->l.kind[k] == BRANCH_GUARD && (last < 0 || k == row)) last = k;
   if (last < 0 || (row >= 0 && row != last && ds < s)) return -1;
   note_sides(r, f, s);
-  for (int i = 0; i < width_of(r); i++) end[i] = value_at(f->series + (int64_t)i * stride, order, s);
-  for (int i = 0; i < n_of(r); i++) r->before[i] = value_at(f->states + (int64_t)i * stride, order, s);
+  for (int i = 0; i < r->width; i++) end[i] = value_at(f->series + (int64_t)i * stride, order, s);
+  for (int i = 0; i < r->n; i++) r->before[i] = value_at(f->states + (int64_t)i * stride, order, s);
   set_inputs(r, r->before, held_of(r, f->l.letter), end);
   first_values(r, 0);
-  for (int i = 0; i < n_of(r); i++) field[i] = row_of(r, i)[0];
+  for (int i = 0; i < r->n; i++) field[i] = row_of(r, i)[0];
   if (!in_time(r, f, rate, s, dt, field)) return -1;
-  memcpy(r->tried, end, sizeof(double) * width_of(r));
-  memset(f->series, 0, sizeof(double) * width_of(r) * stride);
+  memcpy(r->tried, end, sizeof(double) * r->width);
+  memset(f->series, 0, sizeof(double) * r->width * stride);
   for (int i = 0; i < slides; i++) f->series[(int64_t)e->l.sliding[i] * stride] = end[e->l.sliding[i]];
-  memset(r->fired, 0, sizeof(int32_t) * (resets_of(r) + 1));
+  memset(r->fired, 0, sizeof(int32_t) * (r->s->resets + 1));
   if (!advance(r, f, dt)) return -1;
-  memcpy(r->unknowns, r->tried, sizeof(double) * width_of(r));
+  memcpy(r->unknowns, r->tried, sizeof(double) * r->width);
   return last;
 }

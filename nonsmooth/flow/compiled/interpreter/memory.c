@@ -53,7 +53,7 @@ static size_t place_continuation(Continuation *c, char *base, size_t used, int w
 
 static size_t place_run(Run *r, char *base) {
   const System *s = r->s;
-  int n = n_of(r), w = width_of(r), c = c_of(r), all = m_of(r) + 2 * c, g = r->guards, stride = stride_of(r);
+  int n = r->n, w = r->width, c = r->c, all = r->m + 2 * c, g = r->guards, stride = r->stride;
   size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
   used = place_layout(&r->now, base, used, w, g);
   used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets);

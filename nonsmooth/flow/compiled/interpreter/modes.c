@@ -3,9 +3,9 @@
 /* Whether a multiplier makes no difference: on its surface, or at an open contact. */
 static int is_idle(const Run *r, const int8_t *letter, int i) {
   const System *s = r->s;
-  if (i >= m_of(r)) return 0;
+  if (i >= r->m) return 0;
   if (s->continuous[i]) return 1;
-  for (int j = 0; j < c_of(r); j++) if (s->carries[i * c_of(r) + j] && letter[m_of(r) + j]) return 1;
+  for (int j = 0; j < r->c; j++) if (s->carries[i * r->c + j] && letter[r->m + j]) return 1;
   return 0;
 }
 
@@ -15,37 +15,37 @@ static int add_row(Layout *l, int kind, int index, int side) {
   return k;
 }
 
-static int is_pair(const Run *r, const Layout *l) { return l->slides == 2 && l->sliding[1] < m_of(r); }
+static int is_pair(const Run *r, const Layout *l) { return l->slides == 2 && l->sliding[1] < r->m; }
 
 /* Whether a guard is more than an affine function of the states, whose polynomial needs no check. */
 static int is_bent(const Run *r, int kind, int index) {
   const int32_t *bent = r->s->bent_guards;
   if (kind == SURFACE_GUARD) return bent[index];
-  if (kind == IMPACT_GUARD) return bent[m_of(r) + index];
-  if (kind == STOP_GUARD) return bent[width_of(r) + index];
-  if (kind == RESET_GUARD) return bent[width_of(r) + stops_of(r) + index];
+  if (kind == IMPACT_GUARD) return bent[r->m + index];
+  if (kind == STOP_GUARD) return bent[r->width + index];
+  if (kind == RESET_GUARD) return bent[r->width + r->s->stops + index];
   return kind != BRANCH_GUARD;
 }
 
 static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
   const System *s = r->s;
-  if (l->mode >= 0 && !memcmp(l->letter, letter, width_of(r))) return;
-  memmove(l->letter, letter, width_of(r));
+  if (l->mode >= 0 && !memcmp(l->letter, letter, r->width)) return;
+  memmove(l->letter, letter, r->width);
   l->rows = l->slides = l->branches = 0;
   l->is_free = 1;
   l->mode = mode_number(r->table, letter);
-  for (int i = 0; i < width_of(r); i++) {
+  for (int i = 0; i < r->width; i++) {
     l->is_free &= letter[i] != 0 && letter[i] != LEAVING;
     if (letter[i] == 0 && !is_idle(r, letter, i)) l->sliding[l->slides++] = i;
-    if (i >= m_of(r)) add_row(l, letter[i] ? IMPACT_GUARD : RELEASE_GUARD, i - m_of(r), letter[i]);
+    if (i >= r->m) add_row(l, letter[i] ? IMPACT_GUARD : RELEASE_GUARD, i - r->m, letter[i]);
     else if (set_of(r, i) >= 0) lay_out_set(r, l, i);
     else if (letter[i]) add_row(l, SURFACE_GUARD, i, letter[i]);
     else { add_row(l, EXIT_GUARD, i, 1); add_row(l, EXIT_GUARD, i, -1); }
   }
-  for (int j = 0; j < stops_of(r); j++) add_row(l, STOP_GUARD, j, s->stop_direction[j]);
-  for (int j = 0; j < resets_of(r); j++) add_row(l, RESET_GUARD, j, s->reset_direction[j]);
-  int first = 0, w = width_of(r), moves = 0;
-  for (int i = l->slides - 1; i >= 0; i--) if (l->sliding[i] < m_of(r)) first = l->sliding[i];
+  for (int j = 0; j < r->s->stops; j++) add_row(l, STOP_GUARD, j, s->stop_direction[j]);
+  for (int j = 0; j < r->s->resets; j++) add_row(l, RESET_GUARD, j, s->reset_direction[j]);
+  int first = 0, w = r->width, moves = 0;
+  for (int i = l->slides - 1; i >= 0; i--) if (l->sliding[i] < r->m) first = l->sliding[i];
   if (is_pair(r, l)) {
     int one = l->sliding[0], two = l->sliding[1];
     moves |= s->slope_moves[one * w + one] | s->slope_moves[one * w + two];
@@ -61,22 +61,22 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
 
 /* Letters as the multipliers that are known: +1 and -1, 0 for what slides, open and closed contacts. */
 static const double *held_of(Run *r, const int8_t *letter) {
-  for (int i = 0; i < width_of(r); i++) r->held[i] = i >= m_of(r) ? 0 : letter[i] > 1 ? r->direction[i] : letter[i];
+  for (int i = 0; i < r->width; i++) r->held[i] = i >= r->m ? 0 : letter[i] > 1 ? r->direction[i] : letter[i];
   return r->held;
 }
 
 /* Whether a switching function is of a set off which the mode is. */
-static int is_moving(const Run *r, int i) { return sets_of(r) && r->moving[i]; }
+static int is_moving(const Run *r, int i) { return r->s->sets && r->moving[i]; }
 
 /* The moving inputs: states, lambda and reactions, then nu. */
 static void set_inputs(Run *r, const double *x, const double *held, const double *unknowns) {
   double *in = r->input;
-  memcpy(in, x, sizeof(double) * n_of(r));
-  in += n_of(r);
-  for (int i = 0; i < width_of(r); i++)
-    in[i] = held[i] + (i < m_of(r) && (r->s->scaled[i] || is_moving(r, i)) ? 0 : unknowns[i]);
-  in += width_of(r);
-  for (int i = 0; i < m_of(r); i++) if (r->s->scaled[i]) *in++ = is_moving(r, i) ? 0 : unknowns[i];
+  memcpy(in, x, sizeof(double) * r->n);
+  in += r->n;
+  for (int i = 0; i < r->width; i++)
+    in[i] = held[i] + (i < r->m && (r->s->scaled[i] || is_moving(r, i)) ? 0 : unknowns[i]);
+  in += r->width;
+  for (int i = 0; i < r->m; i++) if (r->s->scaled[i]) *in++ = is_moving(r, i) ? 0 : unknowns[i];
 }
 
 static double out_of(const Values *t, const double *w, int k) { return w[t->output[k]]; }
@@ -92,12 +92,12 @@ static void error_scales(Run *r, const double *x, const double *held, const doub
   const Entries *slope = &r->s->slope;
   set_inputs(r, x, held, unknowns);
   r->stamp++;
-  run_point(&r->s->point, r->input, r->p, r->point);
+  values_run(&r->s->point, r->input, r->p, r->point);
   for (int k = 0; k < slope->count; k++)
-    r->slope[slope->row[k] * width_of(r) + slope->column[k]] = out_of(&r->s->point, r->point, 2 * width_of(r) + k);
+    r->slope[slope->row[k] * r->width + slope->column[k]] = out_of(&r->s->point, r->point, 2 * r->width + k);
 }
 static double layer_of(const Run *r, int i) { return out_of(&r->s->point, r->point, i); }
-static double factor_of(const Run *r, int i) { return out_of(&r->s->point, r->point, width_of(r) + i); }
+static double factor_of(const Run *r, int i) { return out_of(&r->s->point, r->point, r->width + i); }
 
 /* Sums over the states of |gradient| times a vector, for each row; infinite slopes, those of a square root
  * at zero, say nothing about rounding and are left out where asked for. */
@@ -118,7 +118,7 @@ typedef struct { double *layer, *height, *stop, *factor; } Sums;
 static void point_sums(const Run *r, int is_free, const double *vector, int finite_only, const Sums *to) {
   const System *s = r->s;
   const Values *t = &s->point;
-  int w = width_of(r), first = 2 * w + s->slope.count, stops = stops_of(r) + resets_of(r);
+  int w = r->width, first = 2 * w + s->slope.count, stops = r->s->stops + r->s->resets;
   if (!is_free) gradient_sums(r, t, r->point, first, &s->layer_gradient, w, vector, finite_only, to->layer);
   first += s->layer_gradient.count;
   gradient_sums(r, t, r->point, first, &s->height_gradient, w, vector, finite_only, to->height);
@@ -137,7 +137,7 @@ static void point_sums(const Run *r, int is_free, const double *vector, int fini
 /* Error scales of the guards from those of surfaces, of sliding multipliers and of stops. */
 static void guard_sums(Run *r, const Expansion *e, const double *vector, int finite_only, double *result) {
   const Layout *l = &e->l;
-  int w = width_of(r), slides = l->slides, stops = stops_of(r) + resets_of(r);
+  int w = r->width, slides = l->slides, stops = r->s->stops + r->s->resets;
   double *layer = r->small, *height = layer + w, *stop = height + w, *through = stop + stops, *factor = through + w;
   double worst = 0;
   point_sums(r, l->is_free, vector, finite_only, &(Sums){layer, height, stop, factor});
@@ -150,17 +150,17 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
       }
     }
     for (int i = 0; i < slides; i++) layer[l->sliding[i]] = through[i];
-    for (int i = 0; i < m_of(r); i++) layer[i] += factor[i];
+    for (int i = 0; i < r->m; i++) layer[i] += factor[i];
     for (int i = 0; i < w; i++) worst = larger(layer[i], worst);
   }
   for (int row = 0; row < l->rows; row++) {
     int kind = l->kind[row], index = l->index[row];
     if (kind == SURFACE_GUARD) result[row] = height[index];
-    else if (kind == IMPACT_GUARD) result[row] = height[m_of(r) + index];
+    else if (kind == IMPACT_GUARD) result[row] = height[r->m + index];
     else if (kind == EXIT_GUARD) result[row] = layer[index];
-    else if (kind == RELEASE_GUARD) result[row] = layer[m_of(r) + index];
+    else if (kind == RELEASE_GUARD) result[row] = layer[r->m + index];
     else if (kind == STOP_GUARD) result[row] = stop[index];
-    else if (kind == RESET_GUARD) result[row] = stop[stops_of(r) + index];
+    else if (kind == RESET_GUARD) result[row] = stop[r->s->stops + index];
     else if (kind == NEAR_GUARD || kind == SLIP_GUARD) result[row] = set_sum(r, e, row, height, layer, factor);
     else result[row] = worst;
   }
@@ -173,7 +173,7 @@ static void weigh_point(Run *r, Expansion *e, const double *x, const double *unk
     r->stamp++;
     if (r->s->point.free_count) {
       set_inputs(r, x, held, unknowns);
-      run_free_point(&r->s->point, r->input, r->p, r->point);
+      values_free(&r->s->point, r->input, r->p, r->point);
     }
   } else error_scales(r, x, held_of(r, e->l.letter), unknowns);
   e->stamp = r->stamp;
@@ -181,10 +181,10 @@ static void weigh_point(Run *r, Expansion *e, const double *x, const double *unk
 
 /* The state and the unknowns of an expansion, if other values have been computed since. */
 static void weigh_again(Run *r, Expansion *e) {
-  double *x = r->vector, *unknowns = x + n_of(r);
+  double *x = r->vector, *unknowns = x + r->n;
   if (e->stamp == r->stamp) return;
-  for (int i = 0; i < n_of(r); i++) x[i] = e->states[(int64_t)i * stride_of(r)];
-  for (int i = 0; i < width_of(r); i++) unknowns[i] = e->series[(int64_t)i * stride_of(r)];
+  for (int i = 0; i < r->n; i++) x[i] = e->states[(int64_t)i * r->stride];
+  for (int i = 0; i < r->width; i++) unknowns[i] = e->series[(int64_t)i * r->stride];
   aim_again(r, e);
   weigh_point(r, e, x, unknowns);
 }
@@ -193,7 +193,7 @@ static void weigh_again(Run *r, Expansion *e) {
 static const double *scales(Run *r, Expansion *e) {
   if (e->scaled) return e->scale;
   weigh_again(r, e);
-  for (int i = 0; i < n_of(r); i++) r->vector[i] = r->size + fabs(e->states[(int64_t)i * stride_of(r)]);
+  for (int i = 0; i < r->n; i++) r->vector[i] = r->size + fabs(e->states[(int64_t)i * r->stride]);
   guard_sums(r, e, r->vector, 1, e->scale);
   e->scaled = 1;
   return e->scale;
@@ -203,7 +203,7 @@ static const double *scales(Run *r, Expansion *e) {
 static const double *steepness(Run *r, Expansion *e) {
   if (e->steepened) return e->steep;
   weigh_again(r, e);
-  for (int i = 0; i < n_of(r); i++) r->vector[i] = 1;
+  for (int i = 0; i < r->n; i++) r->vector[i] = 1;
   guard_sums(r, e, r->vector, 0, e->steep);
   e->steepened = 1;
   return e->steep;

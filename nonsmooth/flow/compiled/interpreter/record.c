@@ -4,12 +4,12 @@ static void note(Run *r) {
   if (!r->o.dense) return;
   int64_t k = r->out.points++;
   r->out.point_t[k] = r->t;
-  memcpy(r->out.point_x + k * n_of(r), r->x, sizeof(double) * n_of(r));
+  memcpy(r->out.point_x + k * r->n, r->x, sizeof(double) * r->n);
 }
 
 static void renote(Run *r) {
   if (r->o.dense && r->out.points)
-    memcpy(r->out.point_x + (r->out.points - 1) * n_of(r), r->x, sizeof(double) * n_of(r));
+    memcpy(r->out.point_x + (r->out.points - 1) * r->n, r->x, sizeof(double) * r->n);
 }
 
 static void enter_segment(Run *r, int mode) {
@@ -26,7 +26,7 @@ static void enter_segment(Run *r, int mode) {
 static void sample(Run *r, double t, const double *x) {
   if (r->kept >= r->room) return;
   r->sample_t[r->kept] = t;
-  memcpy(r->sample_x + r->kept++ * dimension_of(r), x, dimension_of(r) * sizeof(double));
+  memcpy(r->sample_x + r->kept++ * r->s->dimension, x, r->s->dimension * sizeof(double));
 }
 
 /* Samples at the times from the present one to less than that plus dt. */
@@ -34,7 +34,7 @@ static void sample_step(Run *r, const Expansion *e, double dt) {
   double *x = r->vector, ignored;
   while (r->kept < r->room && r->times[r->kept] < r->t + dt) {
     double s = r->times[r->kept] - r->t;
-    for (int i = 0; i < dimension_of(r); i++) x[i] = horner(e->states + (int64_t)i * stride_of(r), order_of(r), s, &ignored);
+    for (int i = 0; i < r->s->dimension; i++) x[i] = horner(e->states + (int64_t)i * r->stride, r->order, s, &ignored);
     sample(r, r->times[r->kept], x);
   }
 }
@@ -59,14 +59,14 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
   r->event_count++;
   if (kind == r->o.at_kind && r->kinds[kind] == r->o.at_count) {
     r->at_t = r->t;
-    memcpy(r->at_x, x, sizeof(double) * n_of(r));
+    memcpy(r->at_x, x, sizeof(double) * r->n);
   }
   if (r->o.dense) {
     int64_t k = r->out.events++;
     r->out.event_kind[k] = kind;
     r->out.event_t[k] = r->t;
-    memcpy(r->out.event_x + k * n_of(r), x, sizeof(double) * n_of(r));
-    memcpy(r->out.event_after_x + k * n_of(r), r->x, sizeof(double) * n_of(r));
+    memcpy(r->out.event_x + k * r->n, x, sizeof(double) * r->n);
+    memcpy(r->out.event_after_x + k * r->n, r->x, sizeof(double) * r->n);
     r->out.event_before[k] = before;
     r->out.event_after[k] = r->mode;
     r->out.event_guard[k] = guard;

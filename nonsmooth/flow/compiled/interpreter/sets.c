@@ -19,22 +19,22 @@ static double unit_of(const double *h, int k, double *u) {
 static int first_of(const Run *r, int set) { return r->s->set_first[set]; }
 static int size_of(const Run *r, int set) { return r->s->set_size[set]; }
 static int off_letter(const Run *r, int i) { return r->idle[r->s->set_of[i]] ? IDLE : OFF; }
-static int set_of(const Run *r, int i) { return sets_of(r) && i < m_of(r) ? r->s->set_of[i] : -1; }
+static int set_of(const Run *r, int i) { return r->s->sets && i < r->m ? r->s->set_of[i] : -1; }
 
 /* Multipliers of the sets at a state; ``unknowns`` are h of those left behind, and directions of those that are
  * being left. */
 static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns) {
   const double *h = 0;
-  for (int s = 0; s < sets_of(r); s++) {
+  for (int s = 0; s < r->s->sets; s++) {
     int f = first_of(r, s), k = size_of(r, s);
     double *u = r->direction + f;
     for (int i = f; i < f + k; i++) r->moving[i] = letter[f] > 1 && letter[f] != IDLE;
     if (letter[f] < OFF || letter[f] == IDLE) { for (int i = 0; i < k; i++) u[i] = 0; continue; }
     if (letter[f] != OFF) { unit_of(unknowns + f, k, u); continue; }
     if (!h) {
-      run_surfaces(&r->s->surfaces, x, r->p, r->heights);
+      values_run(&r->s->surfaces, x, r->p, r->heights);
       h = r->heights_of;
-      for (int i = 0; i < m_of(r); i++) r->heights_of[i] = out_of(&r->s->surfaces, r->heights, i);
+      for (int i = 0; i < r->m; i++) r->heights_of[i] = out_of(&r->s->surfaces, r->heights, i);
     }
     unit_of(h + f, k, u);
   }
@@ -42,9 +42,9 @@ static void aim(Run *r, const int8_t *letter, const double *x, const double *unk
 
 /* As the expansion began. */
 static void aim_again(Run *r, const Expansion *e) {
-  for (int i = 0; sets_of(r) && i < m_of(r); i++) {
+  for (int i = 0; r->s->sets && i < r->m; i++) {
     r->moving[i] = e->l.letter[i] > 1 && e->l.letter[i] != IDLE;
-    r->direction[i] = set_of(r, i) < 0 ? 0 : e->lambda[(int64_t)i * stride_of(r)];
+    r->direction[i] = set_of(r, i) < 0 ? 0 : e->lambda[(int64_t)i * r->stride];
   }
 }
 
@@ -52,7 +52,7 @@ static void aim_again(Run *r, const Expansion *e) {
 
 /* Coefficient k of h/|h| from that of h, both in units of |h| at the start. */
 static void push_direction(Run *r, Expansion *e, int set, int k, const double *h, int apart) {
-  int f = first_of(r, set), size = size_of(r, set), stride = stride_of(r);
+  int f = first_of(r, set), size = size_of(r, set), stride = r->stride;
   double *root = e->root + (int64_t)set * stride, square = 0, curved = 0;
   if (k == 0) {
     double first[3];
@@ -76,13 +76,13 @@ static void push_direction(Run *r, Expansion *e, int set, int k, const double *h
 
 /* Coefficients k of the sets off which the mode is. */
 static void follow_sets(Run *r, Expansion *e, int k) {
-  int stride = stride_of(r);
-  for (int s = 0; s < sets_of(r); s++) {
+  int stride = r->stride;
+  for (int s = 0; s < r->s->sets; s++) {
     int f = first_of(r, s), size = size_of(r, s), letter = e->l.letter[f];
     if (letter == LEFT_BEHIND) push_direction(r, e, s, k, e->series + (int64_t)f * stride + k, stride);
     else if (letter == OFF) {
       double h[3];
-      for (int i = 0; i < size; i++) h[i] = row_of(r, n_of(r) + width_of(r) + f + i)[k];
+      for (int i = 0; i < size; i++) h[i] = row_of(r, r->n + r->width + f + i)[k];
       push_direction(r, e, s, k, h, 1);
     }
   }
@@ -90,17 +90,17 @@ static void follow_sets(Run *r, Expansion *e, int k) {
 
 /* Coefficients k of directions in which sets are left and k + 1 of the distances, with those of what slides. */
 static void leave_sets(Run *r, Expansion *e, int k) {
-  int slides = e->l.slides, n = 0, sets = 0, stride = stride_of(r), w = width_of(r);
+  int slides = e->l.slides, n = 0, sets = 0, stride = r->stride, w = r->width;
   int32_t *which = r->pending;
   for (int i = 0; i < slides; i++) which[n++] = e->l.sliding[i];
-  for (int s = 0; s < sets_of(r); s++) {
+  for (int s = 0; s < r->s->sets; s++) {
     int f = first_of(r, s), size = size_of(r, s);
     if (e->l.letter[f] != LEAVING) continue;
     double *radius = e->rates + (int64_t)s * (stride + 1);
     if (k == 0) {
       double rate = 0, terms = 0;
       for (int i = 0; i < size; i++) {
-        double u = e->lambda[(int64_t)(f + i) * stride], g = row_of(r, n_of(r) + f + i)[0], sum = fabs(g);
+        double u = e->lambda[(int64_t)(f + i) * stride], g = row_of(r, r->n + f + i)[0], sum = fabs(g);
         for (int j = f; j < f + size; j++) sum += fabs(e->slopes[(f + i) * w + j]);
         rate += u * g;
         terms += fabs(u) * sum;
@@ -118,10 +118,10 @@ static void leave_sets(Run *r, Expansion *e, int k) {
   double *a = r->work, *b = a + (int64_t)all * all;
   memset(a, 0, sizeof(double) * all * all);
   for (int i = 0; i < n; i++) {
-    b[i] = -row_of(r, n_of(r) + which[i])[k];
+    b[i] = -row_of(r, r->n + which[i])[k];
     for (int j = 0; j < n; j++) a[i * all + j] = e->slopes[which[i] * w + which[j]];
   }
-  for (int s = 0; s < sets_of(r); s++) {
+  for (int s = 0; s < r->s->sets; s++) {
     int f = first_of(r, s), size = size_of(r, s);
     if (e->l.letter[f] != LEAVING) continue;
     const double *radius = e->rates + (int64_t)s * (stride + 1);
@@ -142,19 +142,19 @@ static void leave_sets(Run *r, Expansion *e, int k) {
   if (!solve(a, b, all)) for (int i = 0; i < all; i++) b[i] = NAN;
   for (int i = 0; i < slides; i++) e->series[(int64_t)which[i] * stride + k] = b[i];
   for (int i = slides; i < n; i++) e->lambda[(int64_t)which[i] * stride + k] = b[i];
-  for (int s = 0, j = n; s < sets_of(r); s++)
+  for (int s = 0, j = n; s < r->s->sets; s++)
     if (e->l.letter[first_of(r, s)] == LEAVING) e->rates[(int64_t)s * (stride + 1) + k + 1] = b[j++];
 }
 
 /* Coefficients k + 1 of h that is carried along. */
 static void close_sets(Run *r, Expansion *e, int k) {
-  int stride = stride_of(r);
-  for (int s = 0; k < order_of(r) && s < sets_of(r); s++) {
+  int stride = r->stride;
+  for (int s = 0; k < r->order && s < r->s->sets; s++) {
     int f = first_of(r, s), letter = e->l.letter[f];
     if (letter != LEFT_BEHIND && letter != LEAVING) continue;
     for (int i = f; i < f + size_of(r, s); i++) {
       double *h = e->series + (int64_t)i * stride;
-      if (letter == LEFT_BEHIND) { h[k + 1] = row_of(r, n_of(r) + i)[k] / (k + 1); continue; }
+      if (letter == LEFT_BEHIND) { h[k + 1] = row_of(r, r->n + i)[k] / (k + 1); continue; }
       const double *radius = e->rates + (int64_t)s * (stride + 1), *u = e->lambda + (int64_t)i * stride;
       double sum = 0;
       for (int j = 0; j <= k; j++) sum += u[j] * radius[k + 1 - j];
@@ -165,13 +165,13 @@ static void close_sets(Run *r, Expansion *e, int k) {
 
 /* Coefficients k of states and multipliers as the inputs of the series. */
 static void inputs_of_sets(Run *r, const Expansion *e, int k) {
-  double *x = r->vector, *lam = x + n_of(r);
-  for (int i = 0; i < n_of(r); i++) x[i] = e->states[(int64_t)i * stride_of(r) + k];
-  for (int i = 0; i < width_of(r); i++) lam[i] = e->series[(int64_t)i * stride_of(r) + k];
+  double *x = r->vector, *lam = x + r->n;
+  for (int i = 0; i < r->n; i++) x[i] = e->states[(int64_t)i * r->stride + k];
+  for (int i = 0; i < r->width; i++) lam[i] = e->series[(int64_t)i * r->stride + k];
   const double *held = r->held;
   if (k) {
-    for (int i = 0; i < width_of(r); i++) r->later[i] = 0;
-    for (int i = 0; i < m_of(r); i++) if (r->moving[i]) r->later[i] = e->lambda[(int64_t)i * stride_of(r) + k];
+    for (int i = 0; i < r->width; i++) r->later[i] = 0;
+    for (int i = 0; i < r->m; i++) if (r->moving[i]) r->later[i] = e->lambda[(int64_t)i * r->stride + k];
     held = r->later;
   }
   set_inputs(r, x, held, lam);
@@ -182,10 +182,10 @@ static void set_series(Run *r, Expansion *e, const int32_t *start) {
   const Series *t = e->l.is_free ? &r->s->free : &r->s->series;
   const int32_t *early = e->l.is_free ? r->s->early_free : r->s->early;
   int early_count = e->l.is_free ? r->s->early_free_count : r->s->early_count;
-  int order = order_of(r), stride = stride_of(r), leaving = 0;
-  for (int s = 0; s < sets_of(r); s++) leaving |= e->l.letter[first_of(r, s)] == LEAVING;
-  memset(e->lambda, 0, sizeof(double) * width_of(r) * stride); /* the first guess of each order is zero */
-  for (int i = 0; i < m_of(r); i++) e->lambda[(int64_t)i * stride] = r->direction[i];
+  int order = r->order, stride = r->stride, leaving = 0;
+  for (int s = 0; s < r->s->sets; s++) leaving |= e->l.letter[first_of(r, s)] == LEAVING;
+  memset(e->lambda, 0, sizeof(double) * r->width * stride); /* the first guess of each order is zero */
+  for (int i = 0; i < r->m; i++) e->lambda[(int64_t)i * stride] = r->direction[i];
   for (int k = 0; k <= order; k++) {
     inputs_of_sets(r, e, k);
     if (k == 0) series_rules(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
@@ -203,28 +203,28 @@ static void set_series(Run *r, Expansion *e, const int32_t *start) {
     }
     close_sets(r, e, k);
     if (k < order)
-      for (int i = 0; i < n_of(r); i++) e->states[(int64_t)i * stride + k + 1] = row_of(r, i)[k] * (1.0 / (k + 1));
+      for (int i = 0; i < r->n; i++) e->states[(int64_t)i * stride + k + 1] = row_of(r, i)[k] * (1.0 / (k + 1));
   }
 }
 
 /* What the expansion of a mode begins with, besides the states: h that is carried, derivatives of the rates by
  * the multipliers. */
 static void begin_sets(Run *r, Expansion *e, const double *unknowns) {
-  int w = width_of(r), leaving = 0;
-  for (int i = 0; i < m_of(r); i++) {
-    if (e->l.letter[i] == LEFT_BEHIND) e->series[(int64_t)i * stride_of(r)] = unknowns[i];
+  int w = r->width, leaving = 0;
+  for (int i = 0; i < r->m; i++) {
+    if (e->l.letter[i] == LEFT_BEHIND) e->series[(int64_t)i * r->stride] = unknowns[i];
     leaving |= e->l.letter[i] == LEAVING;
   }
   if (!leaving) return;
   for (int i = 0; i < w; i++)
     for (int j = 0; j < w; j++)
-      e->slopes[i * w + j] = r->slope[i * w + j] * (j < m_of(r) && e->l.letter[j] == LEAVING ? factor_of(r, j) : 1);
+      e->slopes[i * w + j] = r->slope[i * w + j] * (j < r->m && e->l.letter[j] == LEAVING ? factor_of(r, j) : 1);
 }
 
 /* Guards: NEAR, how far |h| (or on a set friction's limit) has fallen; SLIP, how far friction can rise. */
 static void set_row(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
-  int i = l->index[row], s = set_of(r, i), size = size_of(r, s), stride = stride_of(r), letter = l->letter[i];
-  const double *factor = row_of(r, n_of(r) + 2 * width_of(r) + i), *radius = r->expansion->radius;
+  int i = l->index[row], s = set_of(r, i), size = size_of(r, s), stride = r->stride, letter = l->letter[i];
+  const double *factor = row_of(r, r->n + 2 * r->width + i), *radius = r->expansion->radius;
   if (letter == LEAVING) {
     if (count > 1) memcpy(g, r->expansion->rates + (int64_t)s * (stride + 1), sizeof(double) * count);
     else {
@@ -248,7 +248,7 @@ static void set_row(Run *r, const Layout *l, int row, const double *series, int 
       if (k == 0) sum = per > 0 ? sum - LIMIT_FALL * LIMIT_FALL : 1;
     } else {
       for (int j = i; j < i + size; j++) {
-        const double *h = letter == OFF ? row_of(r, n_of(r) + width_of(r) + j) : series + (int64_t)j * stride;
+        const double *h = letter == OFF ? row_of(r, r->n + r->width + j) : series + (int64_t)j * stride;
         if (k == 0) sum += (h[0] * per) * (h[0] * per);
         else sum += convolve(h, h, k, 0, k) * per * per;
       }
@@ -269,7 +269,7 @@ static double set_sum(Run *r, const Expansion *e, int row, const double *height,
   double n = fabs(factor_of(r, i));
   if (e->l.kind[row] == NEAR_GUARD) return n > 0 ? 2 * factor[i] / n : INFINITY;
   sum = 0;
-  for (int j = i; j < i + size; j++) sum += (fabs(e->series[(int64_t)j * stride_of(r)]) + n) * layer[j];
+  for (int j = i; j < i + size; j++) sum += (fabs(e->series[(int64_t)j * r->stride]) + n) * layer[j];
   return 2 * sum;
 }
 
@@ -285,9 +285,9 @@ static void lay_out_set(const Run *r, Layout *l, int i) {
 
 /* Largest coefficients, in units of the tolerance, of what has to be known to a relative tolerance. */
 static void direction_bounds(const Run *r, const Expansion *e, double *last, double *before) {
-  int order = order_of(r), stride = stride_of(r);
+  int order = r->order, stride = r->stride;
   double per = 1 / (SAFETY * r->o.rtol);
-  for (int i = 0; i < m_of(r); i++) {
+  for (int i = 0; i < r->m; i++) {
     int letter = e->l.letter[i];
     if (letter != LEFT_BEHIND && letter != LEAVING) continue;
     const double *u = e->lambda + (int64_t)i * stride, *h = e->apart + (int64_t)i * stride;
@@ -301,11 +301,11 @@ static void direction_bounds(const Run *r, const Expansion *e, double *last, dou
 
 /* Time at which |nu| = |n|, from that at which their squares are equal to rounding. */
 static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h) {
-  int i = e->l.index[row], size = size_of(r, set_of(r, i)), order = order_of(r);
+  int i = e->l.index[row], size = size_of(r, set_of(r, i)), order = r->order;
   double root = dt;
   for (int again = 0; again < 3; again++) {
-    double nu[3], rate[3], of_n, n = horner(row_of(r, n_of(r) + 2 * width_of(r) + i), order, root, &of_n), along = 0;
-    for (int j = 0; j < size; j++) nu[j] = horner(e->series + (int64_t)(i + j) * stride_of(r), order, root, &rate[j]);
+    double nu[3], rate[3], of_n, n = horner(row_of(r, r->n + 2 * r->width + i), order, root, &of_n), along = 0;
+    for (int j = 0; j < size; j++) nu[j] = horner(e->series + (int64_t)(i + j) * r->stride, order, root, &rate[j]);
     double length = length_of(nu, size);
     if (!(length > 0) || n == 0) return dt;
     for (int j = 0; j < size; j++) along += nu[j] * rate[j];
@@ -318,13 +318,13 @@ static double slip_root(const Run *r, const Expansion *e, int row, double dt, do
 
 /* Friction's limit at the start of a step on a set. */
 static void measure_limits(Run *r, Expansion *e) {
-  for (int s = 0; s < sets_of(r); s++) {
+  for (int s = 0; s < r->s->sets; s++) {
     int f = first_of(r, s);
-    if (e->l.letter[f] == 0) e->radius[s] = fabs(row_of(r, n_of(r) + 2 * width_of(r) + f)[0]);
+    if (e->l.letter[f] == 0) e->radius[s] = fabs(row_of(r, r->n + 2 * r->width + f)[0]);
   }
 }
 
 /* Unknowns of a mode that are known: h of sets left behind. */
 static void keep_carried(const Run *r, const int8_t *letter, double *unknowns) {
-  for (int i = 0; i < width_of(r); i++) unknowns[i] = i < m_of(r) && letter[i] == LEFT_BEHIND ? r->unknowns[i] : 0;
+  for (int i = 0; i < r->width; i++) unknowns[i] = i < r->m && letter[i] == LEFT_BEHIND ? r->unknowns[i] : 0;
 }

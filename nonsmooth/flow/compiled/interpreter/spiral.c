@@ -4,7 +4,7 @@
 /* Rates of two surfaces in a quadrant, and their derivatives by the surfaces; 0 where these are dependent. */
 static int in_quadrant(Run *r, const int8_t *letter, const int *sign, double *rate, double *slope) {
   const Entries *of_layer = &r->s->layer_gradient, *of_height = &r->s->height_gradient;
-  int w = width_of(r), first = 2 * w + r->s->slope.count;
+  int w = r->width, first = 2 * w + r->s->slope.count;
   double g[4] = {0}, h[4] = {0};
   held_of(r, letter);
   for (int i = 0; i < 2; i++) r->held[r->active[i]] = sign[i];
@@ -29,7 +29,7 @@ static int in_quadrant(Run *r, const int8_t *letter, const int *sign, double *ra
 static int spirals_in(Run *r, const int8_t *letter) {
   static const int turns[2][4][2] = {{{1, 1}, {-1, 1}, {-1, -1}, {1, -1}}, {{1, 1}, {1, -1}, {-1, -1}, {-1, 1}}};
   double ratio = 1, bend = 0, size = 0, f[2], d[4];
-  if (n_of(r) != 2 || r->active_count != 2 || r->active[1] >= m_of(r)) return 0;
+  if (r->n != 2 || r->active_count != 2 || r->active[1] >= r->m) return 0;
   if (!in_quadrant(r, letter, turns[0][0], f, d)) return 0;
   int clockwise = !(f[0] < 0);
   for (int q = 0; q < 4; q++) { /* from the half axis where ``near`` is on its own side to that where it is zero */
@@ -54,7 +54,7 @@ static int spirals_in(Run *r, const int8_t *letter) {
 /* Stay where two surfaces meet though no layer attracts: all orbits spiral in, so none leaves. */
 static int hold_there(Run *r, const int8_t *letter) {
   Continuation *c = &r->chosen;
-  memcpy(c->letter, letter, width_of(r));
+  memcpy(c->letter, letter, r->width);
   for (int i = 0; i < 2; i++) c->letter[r->active[i]] = 0;
   keep_carried(r, c->letter, c->unknowns);
   lay_out(r, c->letter, &r->trial.l);

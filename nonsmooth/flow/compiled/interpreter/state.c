@@ -11,29 +11,29 @@
 
 /* Sizes: constants in a program generated for one system. */
 #ifdef GENERATED
-#define n_of(r) STATES
-#define dimension_of(r) DIMENSION
-#define timed_of(r) TIMED
-#define m_of(r) SURFACES
-#define c_of(r) CONTACTS
-#define width_of(r) (SURFACES + CONTACTS)
-#define stops_of(r) STOPS
-#define resets_of(r) RESETS
-#define sets_of(r) SETS
-#define order_of(r) P
-#define stride_of(r) (P + 1)
+#define r->n STATES
+#define r->s->dimension DIMENSION
+#define r->s->timed TIMED
+#define r->m SURFACES
+#define r->c CONTACTS
+#define r->width (SURFACES + CONTACTS)
+#define r->s->stops STOPS
+#define r->s->resets RESETS
+#define r->s->sets SETS
+#define r->order P
+#define r->stride (P + 1)
 #else
-#define n_of(r) ((r)->n)
-#define dimension_of(r) ((r)->s->dimension)
-#define timed_of(r) ((r)->s->timed)
-#define m_of(r) ((r)->m)
-#define c_of(r) ((r)->c)
-#define width_of(r) ((r)->width)
-#define stops_of(r) ((r)->s->stops)
-#define resets_of(r) ((r)->s->resets)
-#define sets_of(r) ((r)->s->sets)
-#define order_of(r) ((r)->order)
-#define stride_of(r) ((r)->stride)
+#define r->n ((r)->n)
+#define r->s->dimension ((r)->s->dimension)
+#define r->s->timed ((r)->s->timed)
+#define r->m ((r)->m)
+#define r->c ((r)->c)
+#define r->width ((r)->width)
+#define r->s->stops ((r)->s->stops)
+#define r->s->resets ((r)->s->resets)
+#define r->s->sets ((r)->s->sets)
+#define r->order ((r)->order)
+#define r->stride ((r)->stride)
 #endif
 #define TINY 2.2250738585072014e-308
 

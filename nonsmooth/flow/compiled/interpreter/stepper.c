@@ -39,9 +39,9 @@ static double resolve(const double *g, int order, double h) {
 }
 
 static double step_size(const Run *r, const Expansion *e) {
-  int order = order_of(r), stride = stride_of(r);
+  int order = r->order, stride = r->stride;
   double last = 0, before = 0;
-  for (int i = 0; i < dimension_of(r); i++) {
+  for (int i = 0; i < r->s->dimension; i++) {
     const double *c = e->states + (int64_t)i * stride;
     last = larger(fabs(c[order]) / e->allowed[i], last);
     before = larger(fabs(c[order - 1]) / e->allowed[i], before);
@@ -53,7 +53,7 @@ static double step_size(const Run *r, const Expansion *e) {
     last = larger(fabs(g[order]) / a, last);
     before = larger(fabs(g[order - 1]) / a, before);
   }
-  if (sets_of(r)) direction_bounds(r, e, &last, &before);
+  if (r->s->sets) direction_bounds(r, e, &last, &before);
   double h = bound(last, before, order);
   for (int j = 0; j < e->l.rows; j++) {
     const double *g = e->guards + (int64_t)j * stride;
@@ -71,8 +71,8 @@ static double safe_length(const Run *r, const Expansion *e, double h) {
   if (is_linear(r, e)) return INFINITY;
   if (e->l.mode == r->length_mode) return h > GROWTH * r->length ? r->length : INFINITY;
   double natural = INFINITY;
-  for (int i = 0; i < n_of(r); i++) {
-    const double *c = e->states + (int64_t)i * stride_of(r);
+  for (int i = 0; i < r->n; i++) {
+    const double *c = e->states + (int64_t)i * r->stride;
     natural = smaller((fabs(c[0]) + r->size) / fabs(c[1]), natural);
   }
   return h > FAR * natural ? FIRST * natural : INFINITY;
@@ -80,7 +80,7 @@ static double safe_length(const Run *r, const Expansion *e, double h) {
 
 /* Field (n), errors of the multipliers that slide, and guards at a state and multipliers. */
 static void sampled(Run *r, const Expansion *e, const double *x, const double *lam, double *found) {
-  int n = n_of(r), w = width_of(r), stride = stride_of(r), slides = e->l.slides;
+  int n = r->n, w = r->width, stride = r->stride, slides = e->l.slides;
   aim(r, e->l.letter, x, lam);
   r->expansion = e;
   set_inputs(r, x, held_of(r, e->l.letter), lam);
@@ -102,13 +102,13 @@ static void sampled(Run *r, const Expansion *e, const double *x, const double *l
 
 /* Whether field and guards at a time of the step are those of the polynomials. */
 static int agrees(Run *r, const Expansion *e, double time, double dt) {
-  int n = n_of(r), w = width_of(r), order = order_of(r), stride = stride_of(r), slides = e->l.slides;
+  int n = r->n, w = r->width, order = r->order, stride = r->stride, slides = e->l.slides;
   int guards = e->l.bent_count, all = n + slides + guards;
   double *x = r->vector, *lam = x + n, ignored;
   double *found = r->sample, *noise = found + all, *moved = noise + all;
   const int32_t *bent = e->l.is_free ? r->s->bent_free : r->s->bent;
   for (int i = 0; i < n; i++) x[i] = value_at(e->states + (int64_t)i * stride, order, time);
-  for (int i = 0; i < w; i++) lam[i] = e->l.is_free && !sets_of(r) ? 0 : value_at(e->series + (int64_t)i * stride, order, time);
+  for (int i = 0; i < w; i++) lam[i] = e->l.is_free && !r->s->sets ? 0 : value_at(e->series + (int64_t)i * stride, order, time);
   sampled(r, e, x, lam, found);
   for (int again = 0; again < 2; again++) {
     int near = 1;
@@ -163,26 +163,26 @@ static double verified(Run *r, Expansion *e, double dt, double end, double safe)
 
 /* First coefficient of a guard that is not zero to rounding; order + 1 if there is none. */
 static int leading(Run *r, Expansion *e, int row, int zeros, double *value) {
-  const double *g = e->guards + (int64_t)row * stride_of(r);
-  for (int k = zeros; k <= order_of(r); k++) {
+  const double *g = e->guards + (int64_t)row * r->stride;
+  for (int k = zeros; k <= r->order; k++) {
     double noise;
     if (k == 0) noise = scales(r, e)[row];
     else {
       double speed = 0;
-      for (int i = 0; i < n_of(r); i++) speed = larger(fabs(e->states[(int64_t)i * stride_of(r) + k]), speed);
+      for (int i = 0; i < r->n; i++) speed = larger(fabs(e->states[(int64_t)i * r->stride + k]), speed);
       noise = steepness(r, e)[row] * speed * (k + 1);
     }
     if (fabs(g[k]) > VANISHES * noise) { *value = g[k]; return k; }
   }
   *value = 0;
-  return order_of(r) + 1;
+  return r->order + 1;
 }
 
 static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
-  const double *g = e->guards + (int64_t)row * stride_of(r), *c = g + drop;
+  const double *g = e->guards + (int64_t)row * r->stride, *c = g + drop;
   int kind = e->l.kind[row];
-  if (drop > order_of(r)) return -1;
-  if (kind == STOP_GUARD || kind == RESET_GUARD) return first_crossing(c, order_of(r) - drop, h, e->l.side[row]);
+  if (drop > r->order) return -1;
+  if (kind == STOP_GUARD || kind == RESET_GUARD) return first_crossing(c, r->order - drop, h, e->l.side[row]);
   if (c[0] <= 0) {
     double value;
     drop = leading(r, e, row, drop, &value);
@@ -190,8 +190,8 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
     c = g + drop;
   }
   /* Most guards have no root, and all their terms: that is seen here, with the length known. */
-  if (!drop && c[0] > rest_of(c, order_of(r), h)) return -1;
-  double dt = first_root(c, order_of(r) - drop, h);
+  if (!drop && c[0] > rest_of(c, r->order, h)) return -1;
+  double dt = first_root(c, r->order - drop, h);
   return kind == SLIP_GUARD && dt > 0 ? slip_root(r, e, row, dt, h) : dt; /* squares lose digits */
 }
 
@@ -205,18 +205,18 @@ static double blur(const double *c, int order, double dt) {
 
 /* Whether a guard passes its root with a slope that is no rounding. */
 static int is_steep(const Run *r, const Expansion *e, int row, double dt) {
-  return blur(e->guards + (int64_t)row * stride_of(r), order_of(r), dt) > 0;
+  return blur(e->guards + (int64_t)row * r->stride, r->order, dt) > 0;
 }
 
 static int32_t *side_of(const Run *r, const Layout *l, int row) {
-  return r->side + l->index[row] + (l->kind[row] == RESET_GUARD ? stops_of(r) : 0);
+  return r->side + l->index[row] + (l->kind[row] == RESET_GUARD ? r->s->stops : 0);
 }
 
 static void note_sides(Run *r, Expansion *e, double dt) {
   for (int j = 0; j < e->l.rows; j++) {
     if (e->l.kind[j] != STOP_GUARD && e->l.kind[j] != RESET_GUARD) continue;
-    const double *g = e->guards + (int64_t)j * stride_of(r);
-    *side_of(r, &e->l, j) = side_before(g, order_of(r), dt, ON_SURFACE * scales(r, e)[j]);
+    const double *g = e->guards + (int64_t)j * r->stride;
+    *side_of(r, &e->l, j) = side_before(g, r->order, dt, ON_SURFACE * scales(r, e)[j]);
   }
 }
 
@@ -225,22 +225,22 @@ static void note_sides(Run *r, Expansion *e, double dt) {
  * at its end is below the tolerance. Guards are not located within it: none may fall in it, and what leaves zero at
  * a rate must do so at that rate. */
 static double singular_step(Run *r, Expansion *e, double most) {
-  int n = n_of(r), order = order_of(r), stride = stride_of(r), rests = 0;
+  int n = r->n, order = r->order, stride = r->stride, rests = 0;
   Expansion *there = &r->trial;
   double *end = r->before, *unknowns = r->lam, *defect = r->at_work, *through = r->of_defect;
   const double *noise = scales(r, e);
-  for (int i = 0; i < n + width_of(r); i++) {
+  for (int i = 0; i < n + r->width; i++) {
     double *c = i < n ? e->states + (int64_t)i * stride : e->series + (int64_t)(i - n) * stride;
     int k = 0;
     while (k <= order && fabs(c[k]) < INFINITY) k++;
     if (k < 2 && i < n) return 0;
     for (; k <= order; k++) c[k] = 0;
   }
-  for (int i = 0; i < width_of(r); i++) rests |= e->l.letter[i] == 0;
-  if (sets_of(r) || (rests && e->l.slides > 1)) return 0;
+  for (int i = 0; i < r->width; i++) rests |= e->l.letter[i] == 0;
+  if (r->s->sets || (rests && e->l.slides > 1)) return 0;
   for (double h = smaller(most, SINGULAR_LONGEST); h > SINGULAR_SHORTEST; h *= SINGULAR_SHORTER) {
     for (int i = 0; i < n; i++) end[i] = value_at(e->states + (int64_t)i * stride, order, h);
-    memcpy(unknowns, r->unknowns, sizeof(double) * width_of(r));
+    memcpy(unknowns, r->unknowns, sizeof(double) * r->width);
     if (!improve(r, &e->l, end, unknowns, 2)) continue;
     expand(r, e->l.letter, end, unknowns, there);
     int fits = 1;
@@ -265,8 +265,8 @@ static double singular_step(Run *r, Expansion *e, double most) {
 /* Sliding from which both sides lead away, as a run may start, ends where its exits rise through zero. */
 static void turn_exits(const Run *r, Expansion *e) {
   for (int j = 0; j < e->l.rows; j++)
-    for (int k = 0; k <= order_of(r) && e->l.kind[j] == EXIT_GUARD; k++) {
-      double *c = e->guards + (int64_t)j * stride_of(r) + k;
+    for (int k = 0; k <= r->order && e->l.kind[j] == EXIT_GUARD; k++) {
+      double *c = e->guards + (int64_t)j * r->stride + k;
       *c = -*c;
     }
 }
@@ -278,10 +278,10 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   if (r->repelling) turn_exits(r, e);
   for (int j = 0; j < rows; j++) {
     int kind = e->l.kind[j], at_once = 0;
-    const double *g = e->guards + (int64_t)j * stride_of(r);
+    const double *g = e->guards + (int64_t)j * r->stride;
     if ((kind == STOP_GUARD || kind == RESET_GUARD) && !r->drop[j]) {
       int side = *side_of(r, &e->l, j);
-      at_once = side && passed(g, order_of(r), side, e->l.side[j]);
+      at_once = side && passed(g, r->order, side, e->l.side[j]);
     }
     time[j] = at_once ? 0 : guard_root(r, e, j, r->drop[j], h);
     if (time[j] < 0) continue;
@@ -291,9 +291,9 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   int best = first;
   if (found > 1) {
     double near = time[first] + TIE * larger(fabs(r->t), 1)
-                  + blur(e->guards + (int64_t)first * stride_of(r), order_of(r), time[first]);
+                  + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
     for (int j = 0; j < rows; j++) {
-      if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * stride_of(r), order_of(r), time[j])) continue;
+      if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;
       int rank = PRIORITY[e->l.kind[j]], best_rank = PRIORITY[e->l.kind[best]];
       if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
     }

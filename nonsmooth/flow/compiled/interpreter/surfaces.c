@@ -3,16 +3,16 @@
 /* Surfaces, gaps and their rates at x; gradients stay among the program's values. */
 static const double *surface_values(Run *r, const double *x) {
   const Values *t = &r->s->surfaces;
-  run_surfaces(t, x, r->p, r->heights);
-  for (int i = 0; i < m_of(r) + 2 * c_of(r); i++) r->rates[i] = out_of(t, r->heights, i);
+  values_run(t, x, r->p, r->heights);
+  for (int i = 0; i < r->m + 2 * r->c; i++) r->rates[i] = out_of(t, r->heights, i);
   return r->rates;
 }
 
 /* Rounding in each of them, times epsilon, after surface_values. */
 static const double *surface_scales(Run *r, const double *x) {
-  double *near = r->vector, *scale = r->rates + m_of(r) + 2 * c_of(r);
-  for (int i = 0; i < n_of(r); i++) near[i] = r->size + fabs(x[i]);
-  gradient_sums(r, &r->s->surfaces, r->heights, m_of(r) + 2 * c_of(r), &r->s->surface_gradient, m_of(r) + 2 * c_of(r), near, 1,
+  double *near = r->vector, *scale = r->rates + r->m + 2 * r->c;
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(x[i]);
+  gradient_sums(r, &r->s->surfaces, r->heights, r->m + 2 * r->c, &r->s->surface_gradient, r->m + 2 * r->c, near, 1,
                 scale);
   return scale;
 }
@@ -21,8 +21,8 @@ static const double *surface_scales(Run *r, const double *x) {
  * made orthogonal one after the other, those that can overlap (a dependent row drops out). */
 static void project_to(Run *r, const int32_t *which, int count, const double *level) {
   const Entries *g = &r->s->surface_gradient;
-  int all = m_of(r) + 2 * c_of(r), nd = dimension_of(r);
-  double *rows = r->gradient_row, *size = rows + (int64_t)all * n_of(r), *residual = size + all;
+  int all = r->m + 2 * r->c, nd = r->s->dimension;
+  double *rows = r->gradient_row, *size = rows + (int64_t)all * r->n, *residual = size + all;
   for (int iteration = 0; count && iteration < 3; iteration++) {
     int any = 0, k = 0;
     const double *h = surface_values(r, r->x);
@@ -30,18 +30,18 @@ static void project_to(Run *r, const int32_t *which, int count, const double *le
     for (int i = 0; i < all; i++) place[i] = -1;
     for (int i = 0; i < count; i++) { place[which[i]] = i; any |= h[which[i]] != (level ? level[i] : 0); }
     if (!any) break;
-    memset(rows, 0, sizeof(double) * count * n_of(r));
+    memset(rows, 0, sizeof(double) * count * r->n);
     for (int q = 0; q < g->count; q++)
       if (place[g->row[q]] >= 0 && g->column[q] < nd)
-        rows[(int64_t)place[g->row[q]] * n_of(r) + g->column[q]] = out_of(&r->s->surfaces, r->heights, all + q);
+        rows[(int64_t)place[g->row[q]] * r->n + g->column[q]] = out_of(&r->s->surfaces, r->heights, all + q);
     for (int i = 0; i < count; i++) {
-      double *row = rows + (int64_t)i * n_of(r), full = 0;
+      double *row = rows + (int64_t)i * r->n, full = 0;
       for (int l = 0; l < nd; l++) full += row[l] * row[l];
       residual[i] = h[which[i]] - (level ? level[i] : 0);
       for (int j = 0; j < k; j++) {
         int other = kept[j];
         if (r->s->component[which[other]] != r->s->component[which[i]]) continue;
-        const double *base = rows + (int64_t)other * n_of(r);
+        const double *base = rows + (int64_t)other * r->n;
         double s = 0;
         for (int l = 0; l < nd; l++) s += row[l] * base[l];
         s /= size[other];
@@ -53,7 +53,7 @@ static void project_to(Run *r, const int32_t *which, int count, const double *le
       if (size[i] > 1e-24 * full) kept[k++] = i;
     }
     for (int j = 0; j < k; j++) {
-      const double *row = rows + (int64_t)kept[j] * n_of(r);
+      const double *row = rows + (int64_t)kept[j] * r->n;
       double f = residual[kept[j]] / size[kept[j]];
       if (f != 0) for (int l = 0; l < nd; l++) r->x[l] -= f * row[l];
     }
@@ -65,8 +65,8 @@ static void project(Run *r, const int32_t *which, int count) { project_to(r, whi
 /* Functions that a mode keeps at zero: surfaces, gaps and their rates. */
 static int kept_by(const Run *r, const int8_t *letter, int32_t *which) {
   int count = 0;
-  for (int i = 0; i < width_of(r); i++) if (letter[i] == 0) which[count++] = i;
-  for (int i = m_of(r); i < width_of(r); i++) if (letter[i] == 0) which[count++] = i + c_of(r);
+  for (int i = 0; i < r->width; i++) if (letter[i] == 0) which[count++] = i;
+  for (int i = r->m; i < r->width; i++) if (letter[i] == 0) which[count++] = i + r->c;
   return count;
 }
 
@@ -80,8 +80,8 @@ static int is_on(Run *r, int surface) {
 static const double *gaps(Run *r, const double *x) {
   surface_values(r, x);
   const double *scale = surface_scales(r, x);
-  for (int i = m_of(r); i < m_of(r) + 2 * c_of(r); i++) if (fabs(r->rates[i]) <= ON_SURFACE * scale[i]) r->rates[i] = 0;
-  return r->rates + m_of(r);
+  for (int i = r->m; i < r->m + 2 * r->c; i++) if (fabs(r->rates[i]) <= ON_SURFACE * scale[i]) r->rates[i] = 0;
+  return r->rates + r->m;
 }
 
 /* Surfaces through the present state, to rounding, and contacts at rest; those that slide in a mode and the
@@ -90,17 +90,17 @@ static int is_met(Run *r, const int8_t *letter, int set, const double *h, const 
 
 static void active_surfaces(Run *r, int certain, const int8_t *letter) {
   r->active_count = 0;
-  if (!width_of(r)) return;
+  if (!r->width) return;
   surface_values(r, r->x);
   const double *scale = surface_scales(r, r->x), *h = r->rates;
-  for (int j = 0; j < c_of(r); j++) {
-    double gap = h[m_of(r) + j];
-    if (gap < 0 && !(fabs(gap) <= ON_SURFACE * scale[m_of(r) + j])) finish(r, INCONSISTENT, BEHIND, j);
+  for (int j = 0; j < r->c; j++) {
+    double gap = h[r->m + j];
+    if (gap < 0 && !(fabs(gap) <= ON_SURFACE * scale[r->m + j])) finish(r, INCONSISTENT, BEHIND, j);
   }
   int met = 0;
-  for (int i = 0; i < width_of(r); i++) {
+  for (int i = 0; i < r->width; i++) {
     int rests = fabs(h[i]) <= ON_SURFACE * scale[i];
-    if (i >= m_of(r)) rests &= fabs(h[i + c_of(r)]) <= ON_SURFACE * scale[i + c_of(r)];
+    if (i >= r->m) rests &= fabs(h[i + r->c]) <= ON_SURFACE * scale[i + r->c];
     int s = set_of(r, i), sure = i == certain;
     if (s >= 0) {
       int f = r->s->set_first[s];

@@ -3,15 +3,15 @@
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
   if (r->s->continuous[surface]) return 0;
-  double *near = r->vector + n_of(r) + width_of(r); /* not where inputs are put together */
+  double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < n_of(r); i++) near[i] = r->size + fabs(r->x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
   for (int side = 1; side >= -1; side -= 2) {
     held_of(r, letter);
     r->held[surface] = side;
     error_scales(r, r->x, r->held, r->none);
-    if (r->s->scaled[surface] && r->slope[surface * width_of(r) + surface] != 0) return 0;
-    gradient_sums(r, &r->s->point, r->point, 2 * width_of(r) + r->s->slope.count, &r->s->layer_gradient, width_of(r), near,
+    if (r->s->scaled[surface] && r->slope[surface * r->width + surface] != 0) return 0;
+    gradient_sums(r, &r->s->point, r->point, 2 * r->width + r->s->slope.count, &r->s->layer_gradient, r->width, near,
                   1, r->small);
     double scale = r->small[surface];
     if (!(fabs(layer_of(r, surface)) <= (tolerance + TANGENT) * scale)) return 0; /* or zero everywhere */
@@ -22,25 +22,25 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
 /* Rates of the active surfaces as a + M lambda (reactions open contacts), and their rounding; 0 where they
  * do not decide. a, M, scales one after the other in r->matrix. */
 static int rates(Run *r, const int8_t *letter) {
-  int k = r->active_count, w = width_of(r);
-  double *a = r->matrix, *m = a + k, *scale = m + (int64_t)k * k, *near = r->vector + n_of(r) + w;
+  int k = r->active_count, w = r->width;
+  double *a = r->matrix, *m = a + k, *scale = m + (int64_t)k * k, *near = r->vector + r->n + w;
   if (!r->s->affine) return 0;
   aim(r, letter, r->x, r->unknowns);
   held_of(r, letter);
   for (int i = 0; i < k; i++) {
     int own = r->active[i];
     r->held[own] = 0;
-    if (own >= m_of(r)) continue;
+    if (own >= r->m) continue;
     if (r->s->continuous[own]) return 0;
     for (int j = 0; j < k; j++)
-      if (r->active[j] >= m_of(r) && r->s->carries[own * c_of(r) + r->active[j] - m_of(r)]) return 0;
+      if (r->active[j] >= r->m && r->s->carries[own * r->c + r->active[j] - r->m]) return 0;
   }
   error_scales(r, r->x, r->held, r->none);
-  for (int i = 0; i < n_of(r); i++) near[i] = r->size + fabs(r->x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
   gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
   for (int i = 0; i < w; i++) if (!(fabs(layer_of(r, i)) < INFINITY)) return 0;
   for (int i = 0; i < k; i++) {
-    double turn = r->active[i] < m_of(r) ? 1 : -1;
+    double turn = r->active[i] < r->m ? 1 : -1;
     if (factor_of(r, r->active[i]) == 0) return 0;
     a[i] = turn * layer_of(r, r->active[i]);
     scale[i] = r->small[r->active[i]];
@@ -56,7 +56,7 @@ typedef struct { int kind, index, side, zeros; } Known;
 /* What is being left has a multiplier at its bound, to the tolerance of the run: its rates decide nothing. */
 static int is_left(const Run *r, int which, const Known *known, int count) {
   for (int i = 0; i < count; i++)
-    if (known[i].index + (known[i].kind == IMPACT_GUARD || known[i].kind == RELEASE_GUARD ? m_of(r) : 0) == which) return 1;
+    if (known[i].index + (known[i].kind == IMPACT_GUARD || known[i].kind == RELEASE_GUARD ? r->m : 0) == which) return 1;
   return 0;
 }
 
@@ -76,8 +76,8 @@ static int choices_of(const int8_t *possible, int count) {
 static int by_rates(Run *r, const int8_t *letter, const Known *known, int known_count, int8_t *possible) {
   int k = r->active_count, contacts = 0;
   for (int i = 0; i < k; i++) {
-    contacts |= r->active[i] >= m_of(r);
-    possible[i] = r->active[i] < m_of(r) ? 7 : 5;
+    contacts |= r->active[i] >= r->m;
+    possible[i] = r->active[i] < r->m ? 7 : 5;
   }
   if (k < 2) return 1;
   int choices = choices_of(possible, k);
@@ -92,7 +92,7 @@ static int by_rates(Run *r, const int8_t *letter, const Known *known, int known_
   }
   int8_t *contact = (int8_t *)(scale + k), *guess = contact + k;
   for (int i = 0; i < k; i++) {
-    contact[i] = r->active[i] >= m_of(r);
+    contact[i] = r->active[i] >= r->m;
     guess[i] = contact[i] ? -letter[r->active[i]] : letter[r->active[i]];
   }
   if (!complementarity(a, m, k, contact, guess, r->lam, r->work, r->pending)) {
@@ -115,17 +115,17 @@ static int by_rates(Run *r, const int8_t *letter, const Known *known, int known_
 
 /* Whether sliding is stable across its layer: 1, 0, or -1 where no simple test shows it. */
 static int is_stable(Run *r, const Layout *l) {
-  int k = 0, w = width_of(r);
-  for (int i = 0; i < l->slides; i++) k += l->sliding[i] < m_of(r);
+  int k = 0, w = r->width;
+  for (int i = 0; i < l->slides; i++) k += l->sliding[i] < r->m;
   if (k == 0) return 1;
   double *a = r->matrix;
   int row = 0;
   for (int i = 0; i < l->slides; i++) {
     int column = 0;
-    if (l->sliding[i] >= m_of(r)) continue;
+    if (l->sliding[i] >= r->m) continue;
     double turn = ns_sign(factor_of(r, l->sliding[i]));
     for (int j = 0; j < l->slides; j++) {
-      if (l->sliding[j] >= m_of(r)) continue;
+      if (l->sliding[j] >= r->m) continue;
       a[row * k + column++] = turn * r->slope[l->sliding[i] * w + l->sliding[j]];
     }
     row++;
@@ -137,8 +137,8 @@ static int is_stable(Run *r, const Layout *l) {
 
 /* Coefficients that are no numbers decide nothing. */
 static void keep_finite(Run *r, Expansion *e) {
-  for (int i = 0; i < n_of(r) * stride_of(r); i++) if (!(fabs(e->states[i]) < INFINITY)) e->states[i] = 0;
-  for (int i = 0; i < e->l.rows * stride_of(r); i++) if (!(fabs(e->guards[i]) < INFINITY)) e->guards[i] = 0;
+  for (int i = 0; i < r->n * r->stride; i++) if (!(fabs(e->states[i]) < INFINITY)) e->states[i] = 0;
+  for (int i = 0; i < e->l.rows * r->stride; i++) if (!(fabs(e->guards[i]) < INFINITY)) e->guards[i] = 0;
 }
 
 /* Whether the motion can continue in a mode with given unknowns: its guards that vanish here become positive. */
@@ -153,14 +153,14 @@ static int continues(Run *r, const int8_t *letter, const Known *known, int known
   }
   expand(r, letter, r->x, result->unknowns, e);
   if (!e->finite) keep_finite(r, e);
-  memcpy(result->letter, letter, width_of(r));
+  memcpy(result->letter, letter, r->width);
   result->strict = 1;
   memset(result->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < e->l.rows; row++) {
     int kind = e->l.kind[row], index = e->l.index[row], of = index, active = 0, zeros = 0;
     if (kind == STOP_GUARD || kind == RESET_GUARD) continue;
     if (kind == NEAR_GUARD && letter[index] == 0) continue; /* ends steps only */
-    if (kind == IMPACT_GUARD || kind == RELEASE_GUARD) of += m_of(r);
+    if (kind == IMPACT_GUARD || kind == RELEASE_GUARD) of += r->m;
     for (int i = 0; i < r->active_count; i++) active |= r->active[i] == of;
     if (!active) continue;
     for (int i = 0; i < known_count; i++)
@@ -171,7 +171,7 @@ static int continues(Run *r, const int8_t *letter, const Known *known, int known
     int k = leading(r, e, row, zeros, &value);
     if (value < 0) return 0;
     if (value == 0) result->strict = 0;
-    result->drop[row] = value != 0 ? (k < order_of(r) ? k : order_of(r)) : order_of(r) + 1;
+    result->drop[row] = value != 0 ? (k < r->order ? k : r->order) : r->order + 1;
   }
   return 1;
 }
@@ -185,14 +185,14 @@ static int continuation(Run *r, const int8_t *letter, const Known *known, int kn
 }
 
 static void copy_continuation(const Run *r, Continuation *to, const Continuation *from) {
-  memcpy(to->letter, from->letter, width_of(r));
+  memcpy(to->letter, from->letter, r->width);
   memcpy(to->drop, from->drop, sizeof(int32_t) * r->guards);
-  memcpy(to->unknowns, from->unknowns, sizeof(double) * width_of(r));
+  memcpy(to->unknowns, from->unknowns, sizeof(double) * r->width);
   to->strict = from->strict;
 }
 
 static int rests(const Run *r, const int8_t *letter) {
-  for (int i = 0; i < width_of(r); i++) if (letter[i] == 0) return 1;
+  for (int i = 0; i < r->width; i++) if (letter[i] == 0) return 1;
   return 0;
 }
 
@@ -217,7 +217,7 @@ static int choose_of(Run *r, const Tally *t) {
 
 /* Letters of the active elements by the number of a choice of those that are possible. */
 static void spell_choice(const Run *r, const int8_t *letter, const int8_t *possible, int number, int8_t *trial) {
-  memcpy(trial, letter, width_of(r));
+  memcpy(trial, letter, r->width);
   for (int i = r->active_count - 1; i >= 0; i--) {
     int which = number % bits(possible[i]);
     number /= bits(possible[i]);
@@ -233,7 +233,7 @@ static int leaves_at_end(Run *r, const int8_t *letter) {
   int own = r->active[0];
   int8_t *trial = r->tried_letter;
   Expansion *e = &r->trial;
-  memcpy(trial, letter, width_of(r));
+  memcpy(trial, letter, r->width);
   trial[own] = 0;
   lay_out(r, trial, &e->l);
   keep_carried(r, trial, r->found.unknowns);
@@ -253,7 +253,7 @@ static int leaves_at_end(Run *r, const int8_t *letter) {
  * ends. */
 static int no_motion(Run *r, const int8_t *letter, int known_count) {
   int contacts = 0, k = r->active_count;
-  for (int i = 0; i < k; i++) contacts |= r->active[i] >= m_of(r);
+  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
   if (r->status != RUNNING) return 0;
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
   else if (meets_sets(r)) finish(r, NON_UNIQUE, UNDETERMINED, 0);
@@ -267,12 +267,12 @@ static int no_motion(Run *r, const int8_t *letter, int known_count) {
 /* One active surface whose rates of h on both sides decide, without series: crossing, entry, and exit where the
  * multiplier is known to pass its bound. The choice to r->chosen; 0 where it is not clear. */
 static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count) {
-  int own = r->active[0], w = width_of(r), exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
-  double rate[2], *near = r->vector + n_of(r) + w; /* not where inputs are put together */
-  if (own >= m_of(r) || !r->s->affine || r->s->scaled[own] || is_idle(r, letter, own)) return 0;
+  int own = r->active[0], w = r->width, exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
+  double rate[2], *near = r->vector + r->n + w; /* not where inputs are put together */
+  if (own >= r->m || !r->s->affine || r->s->scaled[own] || is_idle(r, letter, own)) return 0;
   if (known_count && !(exits && r->falls)) return 0;
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < n_of(r); i++) near[i] = r->size + fabs(r->x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
   for (int q = 0; q < 2; q++) {
     held_of(r, letter);
     r->held[own] = q ? 1 : -1;
@@ -306,12 +306,12 @@ static int is_curved(const Run *r, const int32_t *own, int count);
  * ``letter`` has those of the other surfaces. */
 static int decide(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int k = r->active_count, contacts = 0, total = 1;
-  int8_t *possible = (int8_t *)r->lam + sizeof(double) * width_of(r), *trial = possible + width_of(r);
+  int8_t *possible = (int8_t *)r->lam + sizeof(double) * r->width, *trial = possible + r->width;
   Tally tally = {0};
   if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
   if (is_curved(r, r->active, k)) return decide_in_layer(r, letter, known, known_count);
   if (k == 1 && decide_by_rates(r, letter, known, known_count)) return 1;
-  for (int i = 0; i < k; i++) contacts |= r->active[i] >= m_of(r);
+  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
   if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {
     finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);
     return 0;
@@ -324,7 +324,7 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
     if (continuation(r, trial, known, known_count, &r->found)) count_found(r, &tally);
   }
   if (r->status != RUNNING) return 0;
-  if (tally.strict > 1 && (known_count || (m_of(r) == 1 && c_of(r) == 0))) {
+  if (tally.strict > 1 && (known_count || (r->m == 1 && r->c == 0))) {
     /* rounding may have hidden which: where multipliers are eliminated one sees more */
     finish(r, HAND_OVER, NO_REASON, 0);
     return 0;

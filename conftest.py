@@ -1,9 +1,8 @@
 """What tests and the examples of docstrings have in common: no display, and little to compile.
 
-The fast tests compile the driver in C, once, and lanes and kernels without optimisation. A program
-of one system has the same bits as that driver and takes seconds to compile: only the fast tests of
-``test_special.py`` and the slow tests use it. Optimised lanes run in the tests named in ``SHIPPED``, in the
-slow tests, and in all of ``tests/flow/compiled`` where hypothesis draws all its examples.
+The fast tests compile the driver in C, once, and lanes and kernels without optimisation. Optimised lanes run
+in the tests named in ``SHIPPED``, in the slow tests, and in all of ``tests/flow/compiled`` where hypothesis
+draws all its examples.
 """
 
 import contextlib
@@ -76,11 +75,8 @@ def pytest_collection_finish() -> None:
 def few_compilations(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[None]:
-    """Replace programs of one system by the driver in C, and compile lanes without optimisation."""
+    """Compile lanes without optimisation."""
     slow = request.node.get_closest_marker("slow") is not None
-    if not slow and request.path.name != "test_special.py":
-        monkeypatch.setattr(tape.TapeEngine, "compile", lambda engine: tape.library())
-        monkeypatch.setattr(tape, "_LONG", 500_000)
     names = {"/".join(request.path.parts[-2:]), request.node.name}
     shipped = bool(names & SHIPPED) or (WHOLE and COMPILED in request.path.parents)
     if not (slow or shipped):

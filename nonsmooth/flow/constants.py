@@ -76,9 +76,9 @@ SHORTEST = 4 * EPSILON
 DEPTH = 52
 
 # Accumulation of events: lengths of patterns (an impact 1, a crossing pair 2, a relay pair 4), blocks of
-# each, largest spread and value of their ratio, and largest time left, relative to that of the run.
+# each, largest spread and value of their ratio.
 LAGS = (1, 2, 3, 4, 6)
-BLOCKS = 6
+BLOCKS = 4
 SPREAD = 0.02
 SHRINKS = 0.9999
 REMAINING = 1e-6

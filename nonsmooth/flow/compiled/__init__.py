@@ -1,4 +1,4 @@
-"""The compiled engines: the interpreter of any system, programs generated for one, and lanes."""
+"""The compiled engines: the interpreter of any system, and lanes."""
 
 from .arrays import Run
 from .building.build import CompilerError, find_compiler

@@ -56,15 +56,6 @@ int64_t batch_size(void) { return sizeof(Batch); }
 /* Functions that compilers do not look into. */
 #define OUTSIDE __attribute__((noinline, noclone, const))
 
-/* Loops of a length that is known where a program is generated. */
-#ifdef GENERATED
-#define UNROLLED _Pragma("GCC unroll 64")
-#define ALWAYS_INLINE static inline __attribute__((always_inline))
-#else
-#define UNROLLED
-#define ALWAYS_INLINE static
-#endif
-
 /* As fmax and fmin where b is a number, without the calls. */
 static inline double larger(double a, double b) { return a > b ? a : b; }
 static inline double smaller(double a, double b) { return a < b ? a : b; }
@@ -92,7 +83,7 @@ static double ns_erfinv(double y) {
 
 static double horner(const double *c, int n, double x, double *slope) {
   double f = c[n], d = 0;
-  UNROLLED for (int k = n - 1; k >= 0; k--) { d = MULADD(d, x, f); f = MULADD(f, x, c[k]); }
+  for (int k = n - 1; k >= 0; k--) { d = MULADD(d, x, f); f = MULADD(f, x, c[k]); }
   *slope = d;
   return f;
 }
@@ -101,8 +92,8 @@ static double horner(const double *c, int n, double x, double *slope) {
 static inline double value_at(const double *c, int n, double x) {
   double z = x * x, even = c[n - n % 2], odd = c[n - 1 + n % 2], slope;
   if (!(z < INFINITY)) return horner(c, n, x, &slope);
-  UNROLLED for (int k = n - n % 2 - 2; k >= 0; k -= 2) even = MULADD(even, z, c[k]);
-  UNROLLED for (int k = n - 3 + n % 2; k >= 1; k -= 2) odd = MULADD(odd, z, c[k]);
+  for (int k = n - n % 2 - 2; k >= 0; k -= 2) even = MULADD(even, z, c[k]);
+  for (int k = n - 3 + n % 2; k >= 1; k -= 2) odd = MULADD(odd, z, c[k]);
   return MULADD(x, odd, even);
 }
 
@@ -176,7 +167,7 @@ static inline double rest_of(const double *c, int n, double h) {
   double even = 0, odd = 0, z = h * h;
   int k = n;
   if (k % 2) { odd = fabs(c[k]); k--; }
-  UNROLLED for (; k >= 2; k -= 2) { even = MULADD(even, z, fabs(c[k])); odd = MULADD(odd, z, fabs(c[k - 1])); }
+  for (; k >= 2; k -= 2) { even = MULADD(even, z, fabs(c[k])); odd = MULADD(odd, z, fabs(c[k - 1])); }
   return MULADD(odd, h, even * z);
 }
 
@@ -195,15 +186,15 @@ static inline int stays_positive(const double *c, int n, double h) {
   double b[FIRST_TERMS + 1], power = 1, binomial = 1, rest = 0;
   if (n < FIRST_TERMS) return 0;
   for (int k = n; k > FIRST_TERMS; k--) rest = MULADD(rest, h, fabs(c[k]));
-  UNROLLED for (int k = 0; k <= FIRST_TERMS; k++) {
+  for (int k = 0; k <= FIRST_TERMS; k++) {
     b[k] = c[k] * power * (1 / binomial);
     power *= h;
     binomial = binomial * (FIRST_TERMS - k) / (k + 1);
   }
-  UNROLLED for (int level = 1; level <= FIRST_TERMS; level++)
-    UNROLLED for (int i = FIRST_TERMS; i >= level; i--) b[i] += b[i - 1];
+  for (int level = 1; level <= FIRST_TERMS; level++)
+    for (int i = FIRST_TERMS; i >= level; i--) b[i] += b[i - 1];
   double low = b[0];
-  UNROLLED for (int i = 1; i <= FIRST_TERMS; i++) low = smaller(b[i], low);
+  for (int i = 1; i <= FIRST_TERMS; i++) low = smaller(b[i], low);
   return low > rest * power;
 }
 

@@ -28,13 +28,10 @@ from .arrays import (
     require_size,
     words_of,
 )
-from .building.background import Background
 from .building.build import build
 from .building.codegen import (
     MOST_ORDER,
     interpreter_source,
-    special_source,
-    supports_special,
     tape_order,
 )
 
@@ -225,6 +222,7 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
         getattr(made, name).argtypes = [_POINTER]
     made.table_read.argtypes = [_POINTER] * 4
     made.run_new.argtypes = [_POINTER] * 2
+    made.run_ask.argtypes = [_POINTER, _POINTER, _I64]
     made.run_begin.argtypes = [*[_POINTER] * 6, _D]
     made.run_continue.argtypes = [_POINTER, _I64]
     made.run_read.argtypes = [_POINTER] * 5
@@ -275,15 +273,8 @@ class _Held:
         self.free(self.pointer)
 
 
-#: Steps of a system, in all its runs, after which a program is generated for it.
-_LONG = 20_000
-
-
 class TapeEngine:
     """The driver in C with one system at one order."""
-
-    # The interpreter runs it at once. Long runs go on, from a step to the next, in a program generated for
-    # the system, which a compiler makes meanwhile: the same operations, so the same bits.
 
     def __init__(self, system: FilippovSystem, order: int):
         self.system, self.order = system, order
@@ -292,26 +283,7 @@ class TapeEngine:
         self.guards = lru_cache(maxsize=4096)(self.coupled.guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         self._c = self._structure(self.coupled, tape)
-        self._steps, self._special, self._rooms = 0, None, rooms_of((0, 0, 0))
-        if self.coupled.affine and supports_special(tape, order):
-            source = lambda: special_source(tape, self.coupled, order)
-            self._special = Background(source, _declared)
-
-    def compile(self) -> None:
-        """Wait for the program generated for the system; very large ones have none."""
-        if self._special is not None:
-            self._special.start()  # beside the interpreter, where that is not there yet
-        library()
-        if self._special is not None:
-            self._special.wait()
-
-    def _driver(self, steps: int) -> ctypes.CDLL:
-        """The library to go on with, after some more steps."""
-        self._steps += steps
-        if self._special is None or self._steps < _LONG:
-            return (self._special and self._special.library()) or library()
-        self._special.start()
-        return self._special.library() or library()
+        self._rooms = rooms_of((0, 0, 0))
 
     def _structure(self, coupled: Coupled, tape: Tape) -> _System:
         system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
@@ -373,26 +345,25 @@ class TapeEngine:
 
     # one trajectory ----------------------------------------------------------------------------
 
-    def run(self, x: Array, p: Array, options: Options) -> Run:
-        """Run one trajectory from an extended start, dense output kept."""
+    def run(self, x: Array, p: Array, options: Options, asked: Array | None = None) -> Run:
+        """Run one trajectory from an extended start, dense output kept, to be read at ``asked`` times."""
         output = Output(self.system.extended_dimension, self.order, self._rooms)
         x, p = np.array(x, float), np.array([*p, 0.0], float)
         start = self._start_mode(options)
         with self._table() as table, self._state(table) as state:
             c_options = ctypes.byref(options_of(self.system, options, dense=True))
             given = (address(x), address(p), address(start))
+            library().run_ask(state, address(asked), 0 if asked is None else len(asked))
             library().run_begin(state, c_options, output.pointer, *given, options.t_start)
-            driver, bursts = self._driver(0), 0
             while True:
                 # Python hears Ctrl-C between the calls.
-                while (status := driver.run_continue(state, BURST)) == RUNNING:
-                    driver, bursts = self._driver(BURST), bursts + BURST
+                while (status := library().run_continue(state, BURST)) == RUNNING:
+                    pass
                 numbers, counts, active, several = self._read(state)
                 if status != FULL:
                     break
                 output.grow(counts[7:10])
                 library().run_resume(state, output.pointer)
-            self._steps += counts[5] - bursts
             self._rooms = rooms_of(counts[7:10])  # of the next run, which is often a similar one
             modes, words = self._words(table, [counts[4]])
         return Run.of(
@@ -470,12 +441,9 @@ class TapeEngine:
         c_options = options_of(self.system, options, dense=False, at=at)
         with self._table() as table, self._state(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
-            driver, bursts = self._driver(0), 0
-            while driver.run_many(*call, address(start), BURST):
-                driver, bursts = self._driver(BURST), bursts + BURST
+            while library().run_many(*call, address(start), BURST):
                 if stop():
                     raise Stopped
-            self._steps += int(chunk.totals[0]) - bursts
             used = np.flatnonzero(np.bincount(chunk.itinerary)).tolist()
             chunk.rename(self._words(table, used)[1])
         return chunk

@@ -1,8 +1,7 @@
 """The C sources of the engines: what Python and C share, then fixed texts, then what is generated.
 
-``interpreter_source`` knows no system; ``special_source`` is the same driver with the programs of one
-system written out; ``lanes_source`` serves systems of one surface without resets, several trajectories in
-step.
+``interpreter_source`` knows no system; ``lanes_source`` serves systems of one surface without resets,
+several trajectories in step.
 """
 
 from __future__ import annotations
@@ -15,14 +14,7 @@ from importlib import resources
 from ....model import Coupled, FilippovSystem, coupled_of, motion
 from ....model.printing.programs import is_flat, lanes_program
 from ....model.printing.set_program import set_program
-from ....model.printing.special import (
-    MOST_PRODUCTS,
-    products,
-    special_series,
-    special_sizes,
-    special_values,
-)
-from ....model.printing.tape import OPERATIONS, TAPE_RULES, Tape
+from ....model.printing.tape import OPERATIONS, TAPE_RULES
 from ... import constants
 from ...options import Options
 from ...status import Status
@@ -36,8 +28,8 @@ _MOST_LINEAR = 22
 #: The driver in C, in the order in which it is read: one text.
 _FILES = (
     *("programs.h", "linear.h", "state.c", "modes.c", "jets.c", "sets.c", "stepper.c"),
-    *("surfaces.c", "record.c", "spiral.c", "switching.c", "layer.c", "contacts.c", "approach.c", "driver.c"),
-    *("memory.c", "entry.c"),
+    *("surfaces.c", "record.c", "spiral.c", "switching.c", "layer.c", "contacts.c", "approach.c"),
+    *("driver.c", "accumulation.c", "memory.c", "entry.c"),
 )
 
 
@@ -74,22 +66,18 @@ def tape_order(system: FilippovSystem, options: Options) -> int:
     return max(order, min((4 * order + 2) // 3, _MOST_LINEAR))
 
 
-def supports_special(tape: Tape, order: int) -> bool:
-    """Whether a compiler can be expected to make a program of a system."""
-    return products(tape, order) <= MOST_PRODUCTS
-
-
 def interpreter_source() -> str:
     """C of the interpreter, which knows no system."""
-    driver = _driver(f"#define P {MOST_ORDER}\n", "", "")
+    enumerations = [("OP", OPERATIONS), ("RULE", TAPE_RULES)]
+    head = "".join(
+        f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
+        for prefix, names in enumerations
+    )
+    sizes = f"#define P {MOST_ORDER}\n#define MODES 1000000\n"
+    driver = [driver_text(f"interpreter/{name}") for name in _FILES]
     flows = [driver_text("interpreter/flow.c"), _extended("programs.h", "flow.c")]
-    return "".join([driver, *flows, driver_text("interpreter/fixed.c")])
-
-
-def special_source(tape: Tape, coupled: Coupled, order: int) -> str:
-    """C of the same driver with the programs of one system written out."""
-    sizes = special_sizes(coupled.system, order)
-    return _driver(sizes, special_values(tape), special_series(tape, coupled, order))
+    fixed = driver_text("interpreter/fixed.c")
+    return "".join([facts_header(), sizes, head, driver_text("common.h"), *driver, *flows, fixed])
 
 
 def _extended(*files: str) -> str:
@@ -105,19 +93,6 @@ def _extended(*files: str) -> str:
     undone = "".join(f"#undef {name}\n" for name in sorted(names))
     plain = "#undef MULADD\n#define MULADD(a, b, c) ((a) * (b) + (c))\n"
     return f"#include <tgmath.h>\n{plain}{defined}{text}{undone}"
-
-
-def _driver(sizes: str, values: str, series: str) -> str:
-    enumerations = [("OP", OPERATIONS), ("RULE", TAPE_RULES)]
-    head = "".join(
-        f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
-        for prefix, names in enumerations
-    )
-    parts = [facts_header(), sizes, "#define MODES 1000000\n", head, driver_text("common.h")]
-    for name in _FILES:
-        parts.append(driver_text(f"interpreter/{name}"))
-        parts += [values] if name == "programs.h" else [series] if name == "jets.c" else []
-    return "".join(parts)
 
 
 def lanes_source(system: FilippovSystem, order: int, width: int) -> str:

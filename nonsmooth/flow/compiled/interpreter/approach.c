@@ -165,6 +165,7 @@ static void jump(Run *r, const double *rate, double dt) {
   if (r->times) sample_step(r, e, dt);
   for (int i = 0; i < n; i++) r->x[i] += dt * rate[i];
   r->t += dt;
+  r->since += dt;
   r->step_count++;
   r->segment_steps++;
   if (r->s->timed) r->x[n - 1] = r->t;

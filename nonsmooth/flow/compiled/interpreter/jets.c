@@ -35,7 +35,7 @@ static void branch_rows(const Run *r, const Layout *l, int count, double *g) {
 }
 
 /* Guards from the series (or, with count 1, values) of what they are made of. */
-ALWAYS_INLINE void guard_rows(Run *r, const Layout *l, const double *series, int count, double *guards) {
+static void guard_rows(Run *r, const Layout *l, const double *series, int count, double *guards) {
   const System *s = r->s;
   int w = r->width, n = r->n, stride = r->stride;
   for (int row = 0; row < l->rows; row++) {
@@ -43,17 +43,17 @@ ALWAYS_INLINE void guard_rows(Run *r, const Layout *l, const double *series, int
     double *g = guards + (int64_t)row * stride;
     if (kind == SURFACE_GUARD || kind == IMPACT_GUARD) {
       const double *h = row_of(r, n + w + i + (kind == IMPACT_GUARD ? r->m : 0));
-      UNROLLED for (int k = 0; k < count; k++) g[k] = side * h[k];
+      for (int k = 0; k < count; k++) g[k] = side * h[k];
     } else if (kind == RELEASE_GUARD) {
       memcpy(g, series + (int64_t)(r->m + i) * stride, sizeof(double) * count);
     } else if (kind == EXIT_GUARD && is_idle(r, l->letter, i)) {
       const double *layer = row_of(r, n + i);
-      UNROLLED for (int k = 0; k < count; k++) g[k] = -side * layer[k];
+      for (int k = 0; k < count; k++) g[k] = -side * layer[k];
     } else if (kind == EXIT_GUARD) {
       const double *factor = row_of(r, n + 2 * w + i), *lam = series + (int64_t)i * stride;
       double turn = 1;
       for (int k = 0; k < count; k++) if (factor[k] != 0) { turn = ns_sign(factor[k]); break; }
-      UNROLLED for (int k = 0; k < count; k++) g[k] = turn * (factor[k] - side * lam[k]);
+      for (int k = 0; k < count; k++) g[k] = turn * (factor[k] - side * lam[k]);
     } else if (kind == NEAR_GUARD || kind == SLIP_GUARD) {
       set_row(r, l, row, series, count, g);
     } else if (kind == BRANCH_GUARD) {
@@ -79,7 +79,6 @@ static void follow_layer(Run *r, Expansion *e, int k, const int32_t *start) {
   }
 }
 
-#ifndef GENERATED
 /* Coefficient k of states and multipliers as the inputs of the series. */
 static void inputs_of(Run *r, const Expansion *e, int k) {
   double *x = r->vector, *lam = x + r->n;
@@ -132,11 +131,6 @@ static void first_values(Run *r, int is_free) {
   const Series *t = is_free ? &r->s->free : &r->s->series;
   series_rules(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
 }
-#else
-static void sliding_series(Run *r, Expansion *e, const int32_t *start);
-static void free_series(Run *r, Expansion *e);
-static void first_values(Run *r, int is_free);
-#endif
 
 static void jets(Run *r, Expansion *e) {
   int slides = e->l.slides;

@@ -65,6 +65,7 @@ static size_t place_run(Run *r, char *base) {
   r->x = DOUBLES(n);
   r->at_x = DOUBLES(n);
   r->before = DOUBLES(n);
+  r->saved = DOUBLES(n);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
   r->tried = DOUBLES(w);

@@ -81,12 +81,6 @@ static void set_inputs(Run *r, const double *x, const double *held, const double
 
 static double out_of(const Values *t, const double *w, int k) { return w[t->output[k]]; }
 
-#ifndef GENERATED
-#define run_point values_run
-#define run_free_point values_free
-#define run_surfaces values_run
-#endif
-
 /* Layer, factors, slope and gradients at a point; r->slope is dense. */
 static void error_scales(Run *r, const double *x, const double *held, const double *unknowns) {
   const Entries *slope = &r->s->slope;
@@ -114,7 +108,6 @@ static void gradient_sums(const Run *r, const Values *t, const double *w, int fi
  * surfaces, gaps, stops and resets only where nothing slides. */
 typedef struct { double *layer, *height, *stop, *factor; } Sums;
 
-#ifndef GENERATED
 static void point_sums(const Run *r, int is_free, const double *vector, int finite_only, const Sums *to) {
   const System *s = r->s;
   const Values *t = &s->point;
@@ -127,12 +120,6 @@ static void point_sums(const Run *r, int is_free, const double *vector, int fini
   first += s->stop_gradient.count;
   if (!is_free) gradient_sums(r, t, r->point, first, &s->factor_gradient, w, vector, finite_only, to->factor);
 }
-#else
-static inline double weighed(double slope, double x, int finite_only) {
-  return !finite_only || fabs(slope) < INFINITY ? fabs(slope) * x : 0;
-}
-static void point_sums(const Run *r, int is_free, const double *vector, int finite_only, const Sums *to);
-#endif
 
 /* Error scales of the guards from those of surfaces, of sliding multipliers and of stops. */
 static void guard_sums(Run *r, const Expansion *e, const double *vector, int finite_only, double *result) {

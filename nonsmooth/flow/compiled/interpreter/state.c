@@ -9,32 +9,6 @@
 #define FEW 3 /* surfaces of which all modes are tried where no matrix is known to have one solution */
 #define SEVERAL 16 /* modes that can continue, for the message */
 
-/* Sizes: constants in a program generated for one system. */
-#ifdef GENERATED
-#define r->n STATES
-#define r->s->dimension DIMENSION
-#define r->s->timed TIMED
-#define r->m SURFACES
-#define r->c CONTACTS
-#define r->width (SURFACES + CONTACTS)
-#define r->s->stops STOPS
-#define r->s->resets RESETS
-#define r->s->sets SETS
-#define r->order P
-#define r->stride (P + 1)
-#else
-#define r->n ((r)->n)
-#define r->s->dimension ((r)->s->dimension)
-#define r->s->timed ((r)->s->timed)
-#define r->m ((r)->m)
-#define r->c ((r)->c)
-#define r->width ((r)->width)
-#define r->s->stops ((r)->s->stops)
-#define r->s->resets ((r)->s->resets)
-#define r->s->sets ((r)->s->sets)
-#define r->order ((r)->order)
-#define r->stride ((r)->stride)
-#endif
 #define TINY 2.2250738585072014e-308
 
 /* Entries of a sparse matrix in the order of a program's outputs. */
@@ -98,13 +72,16 @@ typedef struct {
 /* The guard that is served. */
 typedef struct { int kind, index, side; } Met;
 
+/* An event that may be one of many that accumulate: the time since the one before, and what was served. */
+typedef struct { double interval; int64_t pattern; int32_t kind; Met met; } Happened;
+
 typedef struct {
   Options o;
   const System *s;
   Table *table;
   double *p;
   int32_t n, m, c, width, order, stride, guards;
-  double t, begun, last_event, limit, at_t, *x, *at_x, *unknowns;
+  double t, begun, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
   double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
   Layout now; /* of the present mode */
@@ -112,16 +89,15 @@ typedef struct {
   int32_t mode, status, reason, where, due, due_impact, falls, repelling, *drop, *side, *fired;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode;
-  double interval[HISTORY];
-  int64_t pattern[HISTORY];
-  int32_t kind[HISTORY];
+  Happened past[HISTORY];
   double size, length, shortened;
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
   Output out;
   int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
-  const double *times;
+  const double *times, *asked; /* times of samples in the row; times at which any run is read */
+  int64_t asked_count;
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
@@ -129,6 +105,7 @@ typedef struct {
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
+  double *saved; /* a state to return to */
   int8_t *moving, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
   int32_t shown;
   const Expansion *expansion;

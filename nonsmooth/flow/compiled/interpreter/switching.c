@@ -324,10 +324,5 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
     if (continuation(r, trial, known, known_count, &r->found)) count_found(r, &tally);
   }
   if (r->status != RUNNING) return 0;
-  if (tally.strict > 1 && (known_count || (r->m == 1 && r->c == 0))) {
-    /* rounding may have hidden which: where multipliers are eliminated one sees more */
-    finish(r, HAND_OVER, NO_REASON, 0);
-    return 0;
-  }
   return choose_of(r, &tally) || no_motion(r, letter, known_count);
 }

@@ -66,6 +66,21 @@ ON_SURFACE = 16 * EPSILON
 #: A coefficient of a guard below this part of its terms is zero by rounding.
 VANISHES = 64 * EPSILON
 
+#: The same where a law is solved: rates and distances from a bound below this part of their terms are zero.
+TIED = 1e-10
+
+#: In an element whose guard ended a mode they are zero to this many relative tolerances: its root has that error.
+KNOWN_TO = 100.0
+
+#: Solutions and motions that differ by this part are one; pivots below this part are zero.
+MERGED, SINGULAR = 1e-8, 1e-12
+
+#: Orders of the law that are solved; terms of the series by which motions are compared.
+ORDERS, COMPARED = 9, 4
+
+#: Elements of a block of which all solutions are tried, and those of which all minors are.
+MOST_ENUMERATED, MOST_MINORS = 8, 10
+
 #: Both fields are tangent where they are at this angle to the surface.
 TANGENT = 2e-14
 
@@ -124,6 +139,9 @@ HUGE = 1e300
 
 #: A fold of sliding is looked for where the slope would vanish within this many steps.
 FOLD_AHEAD = 10.0
+
+#: What a run notes about its decisions, as bits.
+DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 
 #: Kinds of events, by number in ensembles and in C.
 KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")

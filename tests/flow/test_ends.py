@@ -47,9 +47,9 @@ ENDS = {
         repelling(5),
         [0.0] * 5,
         "NON_UNIQUE",
-        "On h0 and h1 and h2 and h3 and h4 = 0 more than one set of multipliers may hold",
+        "the motion can continue in each of the modes '+++++', '++++-'",
     ),
-    "seven": (repelling(7), [0.0] * 7, "NON_UNIQUE", "more than one set of multipliers may hold"),
+    "seven": (repelling(7), [0.0] * 7, "NON_UNIQUE", "in each of the modes '+++++++', '++++++-'"),
     "Painleve": (
         PAINLEVE,
         [0.0, 0.0, 1.0, 0.0],

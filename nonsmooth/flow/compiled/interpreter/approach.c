@@ -112,7 +112,7 @@ static double largest_of(const double *m, int count) {
 static int definite(Run *r, const double *m, int k) {
   double *a = r->work, most = largest_of(m, k * k);
   for (int i = 0; i < k; i++) for (int j = 0; j < k; j++) a[i * k + j] = 0.5 * (m[i * k + j] + m[j * k + i]) / most;
-  return most > 0 && is_definite(a, k);
+  return most > 0 && is_definite(a, k, VANISHES * k);
 }
 
 static int symmetric(const double *m, int k, double part) {
@@ -379,7 +379,7 @@ static int limit_directions(const double *given, const double *matrix, int k, do
   return count;
 }
 
-/* All unknowns of a mode in which sets are left; as solutions_of. */
+/* All unknowns of a mode in which sets are left; as mode_solutions. */
 static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found) {
   int n = 0, sets = 0, w = r->width, count = 1;
   int32_t *own = r->involved, *first = own + w;
@@ -480,7 +480,7 @@ static int decide_sets(Run *r, const int8_t *letter, const Known *known, int kno
       if (s >= 0) trial[r->active[i]] = trial[first_of(r, s)] ? LEAVING : 0;
     }
     lay_out(r, trial, &r->trial.l);
-    solutions_of(r, &r->trial.l, &all);
+    mode_solutions(r, &r->trial.l, &all);
     for (int q = 0; q < all.count && r->status == RUNNING; q++) {
       memcpy(r->found.unknowns, all.each + q * r->width, sizeof(double) * r->width);
       if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
@@ -490,7 +490,7 @@ static int decide_sets(Run *r, const int8_t *letter, const Known *known, int kno
     same = r->several[i] == r->several[0];
     if (same && i == r->several_count - 1) finish(r, NON_UNIQUE, SEVERAL_DIRECTIONS, tally.strict);
   }
-  return r->status == RUNNING && (choose_of(r, &tally) || no_motion(r, letter, known_count));
+  return r->status == RUNNING && (choose_of(r, &tally) || no_motion(r, letter));
 }
 
 /* Nodes of a program that are zero whatever moves, from the values of those that do not. */

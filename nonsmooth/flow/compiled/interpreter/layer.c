@@ -208,7 +208,7 @@ static void solve_from_grid(Run *r, const Layout *l, double *unknowns, Solutions
 static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found);
 
 /* All unknowns with which a mode keeps what slides in it. */
-static void solutions_of(Run *r, const Layout *l, Solutions *found) {
+static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
   int w = r->width, bent = 0, contacts = 0;
   double *unknowns = r->tried, root[SOLUTIONS];
   found->each = r->solutions;
@@ -272,18 +272,12 @@ static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int
   return 0;
 }
 
-/* Choose, as r->chosen, the motion that continues where unknowns of the active elements enter nonlinearly: of all
- * modes and all their solutions. */
-static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count) {
+/* Choose, as r->chosen, the motion that continues, of all modes and all their solutions. */
+static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int k = r->active_count;
   int8_t *trial = r->tried_letter, *possible = trial + r->width;
   Solutions all = {0};
   Tally tally = {0};
-  if (k == 1 && is_two_fold(r, letter, r->active[0], 0)) {
-    finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);
-    return 0;
-  }
-  if (k == 1 && follow_in_layer(r, letter, known, known_count)) return 1;
   for (int i = 0; i < k; i++) possible[i] = r->active[i] < r->m ? 7 : 5;
   int total = choices_of(possible, k);
   if (total > TRIED) { many_may_hold(r); return 0; }
@@ -291,13 +285,20 @@ static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int
   for (int number = 0; number < total && r->status == RUNNING; number++) {
     spell_choice(r, letter, possible, number, trial);
     lay_out(r, trial, &r->trial.l);
-    solutions_of(r, &r->trial.l, &all);
+    mode_solutions(r, &r->trial.l, &all);
     for (int q = 0; q < all.count && r->status == RUNNING; q++) {
       memcpy(r->found.unknowns, all.each + q * r->width, sizeof(double) * r->width);
       if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
     }
   }
-  return r->status == RUNNING && (choose_of(r, &tally) || no_motion(r, letter, known_count));
+  return r->status == RUNNING && (choose_of(r, &tally) || no_motion(r, letter));
+}
+
+/* The same where unknowns of the active elements enter nonlinearly. */
+static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  int alone = r->active_count == 1;
+  if (alone && is_two_fold(r, letter, r->active[0], 0)) { finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]); return 0; }
+  return (alone && follow_in_layer(r, letter, known, known_count)) || (r->status == RUNNING && try_modes(r, letter, known, known_count));
 }
 
 /* Folds of sliding: where the slope of what slides vanishes the multipliers go with a root of the time. With one of

@@ -5,8 +5,6 @@
  * repelling sliding, stability that no simple test shows) is handed over to them.
  */
 #define HISTORY 48
-#define TRIED 256 /* modes that are tried one by one, where the rates do not decide */
-#define FEW 3 /* surfaces of which all modes are tried where no matrix is known to have one solution */
 #define SEVERAL 16 /* modes that can continue, for the message */
 
 #define TINY 2.2250738585072014e-308
@@ -59,6 +57,22 @@ enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5, IDLE = 6 };
 /* A mode that can continue, and the zeros of its guards. */
 typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Continuation;
 
+/* A motion that can continue from a point: states of the active elements, the orders at which they were decided, the
+ * states before, the unknowns; first terms of the states' series. */
+typedef struct { int8_t *state, *order, *before; int32_t terms; double *nu, *series; } Motion;
+
+/* The law of the active elements at a point; see decide.c. Matrices are (count, count), what has orders is
+ * (orders, count). */
+typedef struct {
+  int32_t count, blocks, motions, branches, unstable;
+  const int8_t *letter;
+  int32_t *own, *order, *first, *mark, *pivot, *proved;
+  int8_t *is_contact, *is_idle, *is_touched, *is_known, *state, *block_state, *large_class;
+  double *matrix, *share, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
+  double most, field, rate;
+  Motion motion[SEVERAL];
+} Decision;
+
 /* Modes met, by number: their letters. */
 typedef struct { Tree tree; int32_t width, count, room; int8_t *letter; int32_t *bucket, buckets; } Table;
 
@@ -94,6 +108,8 @@ typedef struct {
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
+  Decision *decision;
+  int32_t facts; /* about the decisions of a run */
   Output out;
   int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
   const double *times, *asked; /* times of samples in the row; times at which any run is read */

@@ -134,7 +134,7 @@ TURN_ROUNDING = 1e-12
 SINGULAR_LONGEST = 1e-3
 SINGULAR_SHORTEST = 1e-15
 SINGULAR_SHORTER = 0.25
-SINGULAR_RATE = 1e-2
+SINGULAR_RATE = 0.1
 HUGE = 1e300
 
 #: A fold of sliding is looked for where the slope would vanish within this many steps.

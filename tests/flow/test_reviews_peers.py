@@ -24,8 +24,6 @@ OPEN = {
     "test_second_order_sliding_rests_from_its_limit[twisting]": "no rest",
     "test_second_order_sliding_rests_from_its_limit[super_twisting]": "no rest",
     "test_a_load_that_slip_feeds_starts_from_rest[free]": "load that vanishes",
-    "test_a_hump_of_friction_releases_at_the_same_force_each_time[0.6495]": "fold of a hidden law",
-    "test_a_hump_of_friction_releases_at_the_same_force_each_time[1.5]": "fold of a hidden law",
 }
 
 x, y, u, v, w, p, q, t = (ca.SX.sym(name) for name in "xyuvwpqt")

@@ -1,13 +1,13 @@
 """Constants of the event logic in every driver: tolerances, kinds, priorities, reasons.
 
-``compiled/building/codegen.py`` writes them into the sources in C.
+``compiled/building/core_source.py`` writes them into the sources in C.
 """
 
 from __future__ import annotations
 
 import sys
 
-from ..model.laws.coupled import FALL, LIMIT_FALL
+from ..model.numbering import FALL, LIMIT_FALL
 
 __all__ = ["FALL", "LIMIT_FALL"]  # and all below
 

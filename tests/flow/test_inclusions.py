@@ -21,12 +21,7 @@ OPEN = {
     "test_a_case_is_as_known[layer-ring-three]": "the law of elements is being built",
     "test_a_case_is_as_known[layer-units-1.9]": "the law of elements is being built",
     "test_a_case_is_as_known[layer-units-2.1]": "the law of elements is being built",
-    "test_a_case_is_as_known[feet-two-slides]": "the law of elements is being built",
-    "test_a_case_is_as_known[feet-four-stick-slip]": "the law of elements is being built",
-    "test_a_case_is_as_known[bridge-cold-start]": "the law of elements is being built",
-    "test_a_case_is_as_known[fed-load]": "the law of elements is being built",
     "test_a_case_is_as_known[parallel-1e-10]": "the law of elements is being built",
-    "test_a_case_is_as_known[slider-crank-opens]": "the law of elements is being built",
     "test_a_case_is_as_known[body-two-contacts-several-1]": "the law of elements is being built",
 }
 

@@ -45,9 +45,11 @@ int64_t options_size(void) { return sizeof(Options); }
 int64_t batch_size(void) { return sizeof(Batch); }
 #endif
 
-/* a * b + c rounded once where the processor does that at once. Drivers are compiled without contraction: what
- * is fused is written so, and the same text gives the same bits whatever surrounds it. */
-#if defined(__FMA__) || defined(__ARM_FEATURE_FMA) || defined(__FP_FAST_FMA)
+/* a * b + c, in lanes rounded once where the processor does that at once. The driver is compiled without
+ * contraction and UNFUSED, so that it gives the same bits on every processor. */
+#if defined(UNFUSED)
+#define MULADD(a, b, c) ((a) * (b) + (c))
+#elif defined(__FMA__) || defined(__ARM_FEATURE_FMA) || defined(__FP_FAST_FMA)
 #define MULADD(a, b, c) __builtin_fma(a, b, c)
 #else
 #define MULADD(a, b, c) ((a) * (b) + (c))

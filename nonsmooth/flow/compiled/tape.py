@@ -28,12 +28,9 @@ from .arrays import (
     require_size,
     words_of,
 )
-from .building.build import build
-from .building.codegen import (
-    MOST_ORDER,
-    interpreter_source,
-    tape_order,
-)
+from .building.codegen import tape_order
+from .building.core_source import MOST_ORDER
+from .library import core_library
 
 # Where a dense run is written: arrays of steps, points and events, which grow.
 
@@ -207,8 +204,8 @@ class _System(ctypes.Structure):
 
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL:
-    """Return the interpreter, compiled when it is first asked for on a machine."""
-    return _declared(build(interpreter_source()))
+    """Return the driver."""
+    return _declared(core_library())
 
 
 def _declared(made: ctypes.CDLL) -> ctypes.CDLL:

@@ -30,86 +30,6 @@ typedef struct { int kind, index, side, zeros; } Known;
 
 static int degree_of(const Run *r, int i) { return i < r->m ? 1 : 2; }
 
-/* Linear equations that may be singular ------------------------------------------------------------ */
-
-/* Gauss and Jordan with full pivoting on (rows, columns) with ``more`` right sides behind, after scaling of rows and
- * columns; the rank is returned, the column of each pivot's row in ``pivot``, columns' scales in ``unit``. */
-static int eliminate(double *a, int rows, int columns, int more, int32_t *pivot, double *unit) {
-  int width = columns + more, rank = 0;
-  for (int i = 0; i < rows; i++) {
-    double *row = a + (int64_t)i * width, most = 0;
-    for (int j = 0; j < columns; j++) most = larger(fabs(row[j]), most);
-    if (most > 0) for (int j = 0; j < width; j++) row[j] /= most;
-  }
-  for (int j = 0; j < columns; j++) {
-    unit[j] = 0;
-    for (int i = 0; i < rows; i++) unit[j] = larger(fabs(a[(int64_t)i * width + j]), unit[j]);
-    if (unit[j] > 0) for (int i = 0; i < rows; i++) a[(int64_t)i * width + j] /= unit[j];
-    else unit[j] = 1;
-  }
-  while (rank < rows && rank < columns) {
-    int row = rank, column = -1;
-    double best = SINGULAR;
-    for (int i = rank; i < rows; i++)
-      for (int j = 0; j < columns; j++) {
-        double size = fabs(a[(int64_t)i * width + j]);
-        if (size > best) { best = size; row = i; column = j; }
-      }
-    if (column < 0) break;
-    double *one = a + (int64_t)rank * width, *other = a + (int64_t)row * width;
-    for (int j = 0; j < width && row != rank; j++) { double t = one[j]; one[j] = other[j]; other[j] = t; }
-    double head = one[column];
-    for (int j = 0; j < width; j++) one[j] /= head;
-    for (int i = 0; i < rows; i++) {
-      double *to = a + (int64_t)i * width, f = to[column];
-      if (i == rank || f == 0) continue;
-      for (int j = 0; j < width; j++) if (one[j] != 0) to[j] -= f * one[j];
-      to[column] = 0;
-    }
-    pivot[rank++] = column;
-  }
-  return rank;
-}
-
-/* Solve a x = b, in place of b, unknowns that are not determined being zero; 0 where there is no solution. */
-static int solve_any(double *a, double *b, int n, double *work, int32_t *pivot) {
-  double *unit = work, *all = work + n, most = 0, rest = 0;
-  if (n == 1) {
-    if (a[0] != 0) { b[0] /= a[0]; return isfinite(b[0]); }
-    return b[0] == 0;
-  }
-  for (int i = 0; i < n; i++) {
-    double *row = all + (int64_t)i * (n + 1);
-    memcpy(row, a + (int64_t)i * n, sizeof(double) * n);
-    row[n] = b[i];
-  }
-  int rank = eliminate(all, n, n, 1, pivot, unit);
-  for (int i = 0; i < n; i++) {
-    double value = fabs(all[(int64_t)i * (n + 1) + n]);
-    if (i < rank) most = larger(value, most); else rest = larger(value, rest);
-  }
-  for (int i = 0; i < n; i++) b[i] = 0;
-  for (int i = 0; i < rank; i++) b[pivot[i]] = all[(int64_t)i * (n + 1) + n] / unit[pivot[i]];
-  return rest <= TIED * most && finite_all(b, n);
-}
-
-/* Vectors z with E z = 0 for E (rows, columns), one after the other; their number. */
-static int null_space(const double *e, int rows, int columns, double *z, double *work, int32_t *pivot) {
-  double *unit = work, *a = work + columns;
-  memcpy(a, e, sizeof(double) * rows * columns);
-  int rank = eliminate(a, rows, columns, 0, pivot, unit), count = 0;
-  for (int j = 0; j < columns; j++) {
-    int is_free = 1;
-    for (int i = 0; i < rank; i++) is_free &= pivot[i] != j;
-    if (!is_free) continue;
-    double *own = z + (int64_t)count++ * columns;
-    memset(own, 0, sizeof(double) * columns);
-    own[j] = 1 / unit[j];
-    for (int i = 0; i < rank; i++) own[pivot[i]] = -a[(int64_t)i * columns + j] / unit[pivot[i]];
-  }
-  return count;
-}
-
 /* Lemke's method ------------------------------------------------------------------------------------ */
 
 /* Whether row i leaves before row j: the least ratio, ties by the rows of the inverse. */
@@ -777,8 +697,12 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
       for (int j = 0; j < n; j++) miss += b.matrix[i * n + j] * (nu[j] - d->old[b.own[j]]);
       agrees = fabs(miss) <= larger(KNOWN_TO * r->o.rtol * terms, zero_of(&b, i, terms));
     }
-    for (int i = 0; i < n; i++)
-      class[q * n + i] = (int8_t)class_of(&b, i, nu, agrees && d->is_known[b.own[i]] ? KNOWN_TO * r->o.rtol : 0);
+    int is_dependent = 0; /* then what ends is the set of all solutions */
+    for (int i = 0; i < n && n > 1; i++) is_dependent |= d->is_known[b.own[i]] && d->proved[which] < UNIQUE;
+    for (int i = 0; i < n; i++) {
+      int is_loose = agrees && (is_dependent || d->is_known[b.own[i]]);
+      class[q * n + i] = (int8_t)class_of(&b, i, nu, is_loose ? KNOWN_TO * r->o.rtol : 0);
+    }
   }
   return count;
 }
@@ -976,6 +900,7 @@ static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   for (int i = 0; i < d->count; i++)
     if (to->letter[d->own[i]] == 0 && !is_idle(r, to->letter, d->own[i])) to->unknowns[d->own[i]] = own->nu[i];
   lay_out(r, to->letter, l);
+  if (l->slides) improve(r, l, r->x, to->unknowns, 1); /* bounds that were reached to a tolerance are exact now */
   memset(to->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < l->rows; row++) {
     int kind = l->kind[row], of = l->index[row] + (kind == IMPACT_GUARD || kind == RELEASE_GUARD ? r->m : 0);

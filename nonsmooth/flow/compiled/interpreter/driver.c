@@ -340,13 +340,16 @@ static int advance(Run *r, const Expansion *e, double dt) {
   return 1;
 }
 
+static int ends_at_singular(Run *r);
+
 /* Leave a point where only low derivatives exist; guards are looked at after the step. */
 static void leave_singular(Run *r, Expansion *e, double left) {
   int huge = 0;
   for (int i = 0; i < r->n; i++)
     for (int k = 0; k < 2; k++) huge |= fabs(e->states[(int64_t)i * r->stride + k]) > HUGE;
   double h = singular_step(r, e, smaller(left, r->o.max_step));
-  if (h == 0 || huge) { finish(r, NOT_FINITE, FIELD, 0); return; }
+  if ((h == 0 || huge) && !ends_at_singular(r)) finish(r, NOT_FINITE, FIELD, 0);
+  if (r->status != RUNNING) return;
   memset(r->side, 0, sizeof(int32_t) * (r->s->stops + r->s->resets + 1));
   memset(r->fired, 0, sizeof(int32_t) * (r->s->resets + 1));
   advance(r, e, h);

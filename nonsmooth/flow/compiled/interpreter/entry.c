@@ -53,6 +53,8 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->repelling = 0;
   r->reason = NO_REASON;
   r->where = 0;
+  r->facts = 0;
+  r->dependent = -1;
   r->segment_mode = r->due = r->due_impact = r->length_mode = -1;
   if (finite_all(r->x, r->n)) { begin(r, start_mode); return; }
   memset(r->letter, 1, r->width);

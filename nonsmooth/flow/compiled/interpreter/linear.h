@@ -57,6 +57,129 @@ static int solve(double *a, double *b, int n) {
   return finite_all(b, n);
 }
 
+/* Linear equations that may be singular ------------------------------------------------------------ */
+
+/* Gauss and Jordan with full pivoting on (rows, columns) with ``more`` right sides behind, after scaling of rows and
+ * columns; the rank is returned, the column of each pivot's row in ``pivot``, columns' scales in ``unit``. */
+static int eliminate(double *a, int rows, int columns, int more, int32_t *pivot, double *unit) {
+  int width = columns + more, rank = 0;
+  for (int i = 0; i < rows; i++) {
+    double *row = a + (int64_t)i * width, most = 0;
+    for (int j = 0; j < columns; j++) most = larger(fabs(row[j]), most);
+    if (most > 0) for (int j = 0; j < width; j++) row[j] /= most;
+  }
+  for (int j = 0; j < columns; j++) {
+    unit[j] = 0;
+    for (int i = 0; i < rows; i++) unit[j] = larger(fabs(a[(int64_t)i * width + j]), unit[j]);
+    if (unit[j] > 0) for (int i = 0; i < rows; i++) a[(int64_t)i * width + j] /= unit[j];
+    else unit[j] = 1;
+  }
+  while (rank < rows && rank < columns) {
+    int row = rank, column = -1;
+    double best = SINGULAR;
+    for (int i = rank; i < rows; i++)
+      for (int j = 0; j < columns; j++) {
+        double size = fabs(a[(int64_t)i * width + j]);
+        if (size > best) { best = size; row = i; column = j; }
+      }
+    if (column < 0) break;
+    double *one = a + (int64_t)rank * width, *other = a + (int64_t)row * width;
+    for (int j = 0; j < width && row != rank; j++) { double t = one[j]; one[j] = other[j]; other[j] = t; }
+    double head = one[column];
+    for (int j = 0; j < width; j++) one[j] /= head;
+    for (int i = 0; i < rows; i++) {
+      double *to = a + (int64_t)i * width, f = to[column];
+      if (i == rank || f == 0) continue;
+      for (int j = 0; j < width; j++) if (one[j] != 0) to[j] -= f * one[j];
+      to[column] = 0;
+    }
+    pivot[rank++] = column;
+  }
+  return rank;
+}
+
+/* Solve a x = b, in place of b, unknowns that are not determined being zero; 0 where there is no solution. */
+static int solve_any(double *a, double *b, int n, double *work, int32_t *pivot) {
+  double *unit = work, *all = work + n, most = 0, rest = 0;
+  if (n == 1) {
+    if (a[0] != 0) { b[0] /= a[0]; return isfinite(b[0]); }
+    return b[0] == 0;
+  }
+  for (int i = 0; i < n; i++) {
+    double *row = all + (int64_t)i * (n + 1);
+    memcpy(row, a + (int64_t)i * n, sizeof(double) * n);
+    row[n] = b[i];
+  }
+  int rank = eliminate(all, n, n, 1, pivot, unit);
+  for (int i = 0; i < n; i++) {
+    double value = fabs(all[(int64_t)i * (n + 1) + n]);
+    if (i < rank) most = larger(value, most); else rest = larger(value, rest);
+  }
+  for (int i = 0; i < n; i++) b[i] = 0;
+  for (int i = 0; i < rank; i++) b[pivot[i]] = all[(int64_t)i * (n + 1) + n] / unit[pivot[i]];
+  return rest <= TIED * most && finite_all(b, n);
+}
+
+/* Vectors z with E z = 0 for E (rows, columns), one after the other; their number. */
+static int null_space(const double *e, int rows, int columns, double *z, double *work, int32_t *pivot) {
+  double *unit = work, *a = work + columns;
+  memcpy(a, e, sizeof(double) * rows * columns);
+  int rank = eliminate(a, rows, columns, 0, pivot, unit), count = 0;
+  for (int j = 0; j < columns; j++) {
+    int is_free = 1;
+    for (int i = 0; i < rank; i++) is_free &= pivot[i] != j;
+    if (!is_free) continue;
+    double *own = z + (int64_t)count++ * columns;
+    memset(own, 0, sizeof(double) * columns);
+    own[j] = 1 / unit[j];
+    for (int i = 0; i < rank; i++) own[pivot[i]] = -a[(int64_t)i * columns + j] / unit[pivot[i]];
+  }
+  return count;
+}
+
+/* A matrix G with M G M = M: the unknowns M G b solve what can be solved of M x = b, with the least sum of the squares
+ * of x over ``size``. ``work`` has room for 3 n^2 + n. */
+static int invert_any(const double *m, int n, const double *size, double *inverse, double *work, int32_t *pivot) {
+  double *unit = work, *a = unit + n, *z = a + 2 * (int64_t)n * n;
+  for (int i = 0; i < n; i++) {
+    double *row = a + 2 * (int64_t)i * n;
+    memcpy(row, m + (int64_t)i * n, sizeof(double) * n);
+    for (int j = 0; j < n; j++) row[n + j] = i == j;
+  }
+  int rank = eliminate(a, n, n, n, pivot, unit), count = 0;
+  memset(inverse, 0, sizeof(double) * n * n);
+  for (int i = 0; i < rank; i++)
+    for (int j = 0; j < n; j++) inverse[pivot[i] * n + j] = a[2 * (int64_t)i * n + n + j] / unit[pivot[i]];
+  for (int j = 0; j < n; j++) { /* directions that make no difference, orthogonal one after the other */
+    int is_free = 1;
+    double *own = z + (int64_t)count * n, length = 0;
+    for (int i = 0; i < rank; i++) is_free &= pivot[i] != j;
+    if (!is_free) continue;
+    memset(own, 0, sizeof(double) * n);
+    own[j] = 1 / (unit[j] * size[j]);
+    for (int i = 0; i < rank; i++) own[pivot[i]] = -a[2 * (int64_t)i * n + j] / (unit[pivot[i]] * size[pivot[i]]);
+    for (int again = 0; again < 2; again++)
+      for (int l = 0; l < count; l++) {
+        double part = 0;
+        for (int i = 0; i < n; i++) part += own[i] * z[(int64_t)l * n + i];
+        for (int i = 0; i < n; i++) own[i] -= part * z[(int64_t)l * n + i];
+      }
+    for (int i = 0; i < n; i++) length += own[i] * own[i];
+    if (!(length > 0)) continue;
+    for (int i = 0; i < n; i++) own[i] /= sqrt(length);
+    count++;
+  }
+  for (int l = 0; l < count; l++) {
+    const double *own = z + (int64_t)l * n;
+    for (int j = 0; j < n; j++) {
+      double part = 0;
+      for (int i = 0; i < n; i++) part += own[i] * inverse[i * n + j] / size[i];
+      if (part != 0) for (int i = 0; i < n; i++) inverse[i * n + j] -= part * own[i] * size[i];
+    }
+  }
+  return finite_all(inverse, n * n);
+}
+
 /* Whether a symmetric matrix is positive definite by a margin, or nearly semidefinite (a negative one): Cholesky.
  * ``a`` is lost. */
 static int is_definite(double *a, int n, double margin) {

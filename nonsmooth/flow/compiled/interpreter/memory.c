@@ -113,7 +113,7 @@ static size_t place_run(Run *r, char *base) {
   r->slope = DOUBLES(square);
   r->vector = DOUBLES(3 * n + 2 * w);
   r->sample = DOUBLES(3 * ((size_t)n + w + g));
-  r->work = DOUBLES(2 * square + 4 * w + rows + g);
+  r->work = DOUBLES(6 * square + 8 * w + rows + g);
   r->gradient_row = DOUBLES((size_t)all * n + 2 * all);
   r->rates = DOUBLES(2 * all + c);
   r->lam = DOUBLES(2 * w);

@@ -109,7 +109,7 @@ typedef struct {
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
   Decision *decision;
-  int32_t facts; /* about the decisions of a run */
+  int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
   Output out;
   int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
   const double *times, *asked; /* times of samples in the row; times at which any run is read */

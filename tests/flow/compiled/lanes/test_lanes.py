@@ -8,7 +8,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import nonsmooth.flow.compiled.building.build as build_module
 import nonsmooth.flow.compiled.lanes.engine as lanes_module
 import nonsmooth.textbook as textbook
 from nonsmooth.flow.compiled import find_compiler, lanes_for, tape_for
@@ -247,7 +246,7 @@ def test_lanes_of_any_width_and_instruction_set(width, flags, monkeypatch):
     starts = np.random.default_rng(1).normal(size=(50, 2))
     p = system.parameter_vector()
     with monkeypatch.context() as patch:
-        patch.setattr(build_module, "FLAGS", [*build_module.FLAGS, *flags.split()])
+        patch.setattr(lanes_module, "FLAGS", (*lanes_module.FLAGS, *flags.split()))
         patch.setattr(lanes_module, "lane_width", lambda: width)
         chunk = lanes_module.Lanes(system, 10).run_many(starts, p, options, None)
     expected = tape_for(system, options).run_many(starts, p, options, None)

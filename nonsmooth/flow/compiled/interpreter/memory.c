@@ -130,5 +130,7 @@ static size_t place_run(Run *r, char *base) {
   r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
   r->of_defect = DOUBLES(g);
   r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
+  r->root = DOUBLES(g);
+  r->met_at = DOUBLES(g);
   return used;
 }

@@ -220,13 +220,13 @@ class Coupled:
         return moves
 
     @cached_property
-    def curved(self) -> NDArray[np.bool_]:
+    def mixed(self) -> NDArray[np.bool_]:
         """Pairs of unknowns that do not enter the field linearly together (m, m)."""
-        curved = np.zeros((self.count, self.count), bool)
+        mixed = np.zeros((self.count, self.count), bool)
         for j in range(0 if self.affine else self.count):
             bent = ca.jacobian(self.columns_of_field[:, j], self._every)
-            curved[j, bent.sparsity().get_col()] = True
-        return curved
+            mixed[j, bent.sparsity().get_col()] = True
+        return mixed
 
     def _changing(self, sliding: Sequence[int]) -> list[int]:
         """Unknowns that the stability of sliding is read from."""

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LIMIT_FALL
+from ..model.numbering import FALL, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LIMIT_FALL"]  # and all below
+__all__ = ["FALL", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 
@@ -156,7 +156,7 @@ SIMPLE_KINDS = 5
 #: Kinds of guards, by number in C, and their priority among simultaneous ones (0 first).
 GUARDS = (
     *("surface", "exit", "stop", "reset", "impact", "release", "branch"),
-    *("near", "slip"),
+    *("near", "slip", "atom"),
 )
 PRIORITY = {
     "stop": 0,
@@ -168,6 +168,7 @@ PRIORITY = {
     "branch": 6,
     "near": 3,
     "slip": 4,
+    "atom": 1,
 }
 
 #: Why a run ended, besides its status, by number in C.
@@ -199,6 +200,7 @@ REASONS = (
     "several_directions",
     "indefinite",
     "undetermined",
+    "discrete_value",
 )
 
 #: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.

@@ -114,6 +114,19 @@ def reset_not_finite(name: str, t: float) -> str:
     return f"The map of reset {name!r} at t = {t:.10g}."
 
 
+def discrete_value(name: str, t: float) -> str:
+    """A map gives a discrete state another value."""
+    return (
+        f"The map of reset {name!r} at t = {t:.10g} gives a discrete state a value that is not among those "
+        "of discrete=."
+    )
+
+
+def endless_jumps(names: Sequence[str], t: float) -> str:
+    """Jumps at one instant that do not end."""
+    return f"At t = {t:.10g} jumps of {' and '.join(map(repr, names))} repeat without end."
+
+
 def reached_end(t_end: float) -> str:
     """Nothing stopped the run."""
     return f"t_end = {t_end:g} reached."

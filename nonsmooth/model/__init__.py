@@ -9,7 +9,7 @@ from .definition.lift import LiftedSwitch
 from .definition.parse_definition import read_function
 from .definition.regularise import regularise
 from .definition.system import FilippovSystem, multiplier_enters, require_system
-from .derivatives.forcing import is_function, periods, read_period
+from .derivatives.forcing import clock_periods, is_function, periods, read_period
 from .derivatives.start_maps import StartMap
 from .errors import (
     ConvergenceError,
@@ -62,6 +62,7 @@ __all__ = [
     "Stop",
     "Surfaces",
     "call",
+    "clock_periods",
     "complementarity",
     "coupled_of",
     "evaluator",

@@ -8,10 +8,6 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_a_jump_over_another_reset_fires_it": "jumps fire nothing",
-    "test_a_jump_over_a_stop_stops": "jumps fire nothing",
-    "test_neurons_that_excite_one_another[5-0.05]": "jumps fire nothing",
-    "test_neurons_that_excite_one_another[20-0.02]": "jumps fire nothing",
     "test_a_damped_relay_stays_at_rest": "no rest",
     "test_twisting_rests_from_its_limit_on": "no rest",
     "test_super_twisting_rests_from_its_limit_on": "no rest",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from ...model import Array, FilippovSystem
 from .. import messages
@@ -19,9 +20,15 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
     status, modes = Status(run.status), run.letters
     limit = None if math.isnan(run.limit) else run.limit
     events = _events(system, run)
+    motion = run.motion if len(run.motion) else None
     if status is not Status.STOPPED:
         letters = system.spelled(modes[run.mode])
-        events.append(Event("end", float(run.t[-1]), run.x[-1], letters, letters, str(status)))
+        last = run.x[-1]
+        events.append(
+            Event("end", float(run.t[-1]), last, letters, letters, str(status), motion=motion)
+        )
+    elif motion is not None:
+        events[-1] = replace(events[-1], motion=motion)
     return Trajectory(
         system=system,
         parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),
@@ -45,10 +52,13 @@ def _events(system: FilippovSystem, run: Run) -> list[Event]:
         key = (modes[one], modes[two], row)
         if key not in known:
             known[key] = _named(system, run, *key)
-        before, after, name, *of = known[key]
+        before, after, name, element, side = known[key]
         t, kind = float(run.event_t[k]), KINDS[run.event_kinds[k]]
         states = run.event_x[k].copy(), run.event_after_x[k].copy()
-        found.append(Event(kind, t, states[0], before, after, name, states[1], *of))
+        motion = run.event_motions[k].copy() if len(run.motion) else None
+        found.append(
+            Event(kind, t, states[0], before, after, name, states[1], element, side, motion)
+        )
     return found
 
 
@@ -69,13 +79,16 @@ def _named(
 def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
     """Stretches of steps in one mode; a run without a step has its one mode."""
     t_last, shown = float(run.t[-1]), [system.spelled(letters) for letters in run.letters]
+    discrete = len(system.definition.discrete)
+    labels = run.labels or [()] * len(shown)
     if not len(run.modes):
-        return [Segment(shown[run.mode], t_last, t_last, 0, 0)]
+        own = tuple(run.x[-1][system.dimension - discrete :].tolist())
+        return [Segment(shown[run.mode], t_last, t_last, 0, 0, own)]
     changes = (run.modes[1:] != run.modes[:-1]).nonzero()[0] + 1
     bounds = [0, *changes.tolist(), len(run.modes)]
     ends = [*(float(run.starts[k]) for k in changes), t_last]
     return [
-        Segment(shown[run.modes[a]], float(run.starts[a]), end, a, b)
+        Segment(shown[run.modes[a]], float(run.starts[a]), end, a, b, labels[run.modes[a]])
         for a, b, end in zip(bounds[:-1], bounds[1:], ends, strict=True)
     ]
 
@@ -88,6 +101,9 @@ def _message(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.sampled(run.where, t)
     if status is Status.STOPPED:
         return messages.stopped(system.stops[run.where][0], t)
+    if status is Status.ENDLESS_JUMPS:
+        at_once = [e for e in _events(system, run) if e.t == t][-options.max_jumps // 2 :]
+        return messages.endless_jumps(sorted({e.name for e in at_once}), t)
     if status is Status.ACCUMULATION and REASONS[run.reason] == "pressed":
         return messages.pressed(system.resets[run.where][0], t)
     if status is Status.ACCUMULATION:
@@ -147,6 +163,8 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.no_stable_motion(entries)
     if reason == "possibly_several":
         return messages.possibly_several(entries)
+    if reason == "discrete_value":
+        return messages.discrete_value(system.resets[run.where][0], t)
     if reason == "reset_map":
         return messages.reset_not_finite(system.resets[run.where][0], t)
     return messages.surface_not_finite() if reason == "surface" else messages.degenerate()

@@ -10,7 +10,7 @@ static const Happened *back(const Run *r, int64_t k) { return &r->past[(r->histo
  * repeated, or 0; the time left to the limit, and how much the last block has changed the estimate. */
 static int block_of(const Run *r, double *left, double *error) {
   int at_once = r->history > AT_ONCE;
-  for (int k = 1; at_once && k <= AT_ONCE; k++) at_once = back(r, k)->interval == 0;
+  for (int k = 1; at_once && k <= AT_ONCE; k++) at_once = back(r, k)->interval == 0 && back(r, k)->kind != RESET;
   *left = *error = 0;
   if (at_once) return AT_ONCE;
   for (int l = 0; l < LAG_COUNT; l++) {
@@ -62,6 +62,7 @@ static int is_quiet(Run *r, Expansion *e, const int32_t *drop, const double *nea
   guard_sums(r, e, near, 1, noise);
   for (int row = 0; row < e->l.rows; row++) {
     const double *c = e->guards + (int64_t)row * r->stride + drop[row];
+    if (is_atom(e->l.kind[row]) && (!r->instant.side[row - e->l.atoms] || e->l.side[row] == UNWATCHED)) continue;
     if (drop[row] > order || is_repeated(r, block, e->l.kind[row], e->l.index[row])) continue;
     if (!(fabs(c[0]) - (drop[row] ? 0 : noise[row]) > rest_of(c, order - drop[row], time))) return 0;
   }
@@ -153,12 +154,16 @@ static void end_at_limit(Run *r, int block, double left, double error) {
   finish(r, ACCUMULATION, NO_REASON, 0);
 }
 
-/* Keep an event in mind, and see whether the last ones accumulate. */
-static void watch_accumulation(Run *r, int kind, int before, int guard) {
-  double left, error;
+/* Keep an event in mind. */
+static void remember(Run *r, int kind, int before, int guard) {
   int64_t pattern = (((int64_t)kind * 4096 + guard + 1) << 40) + ((int64_t)before << 20) + r->mode;
   r->past[r->history++ % HISTORY] = (Happened){r->since, pattern, kind, r->met};
   r->since = 0;
+}
+
+/* See whether the last events accumulate. */
+static void see_limit(Run *r) {
+  double left, error;
   int block = block_of(r, &left, &error), only_impacts = r->c > 0;
   if (!block || r->status != RUNNING) return;
   for (int k = 1; k <= block; k++) only_impacts &= back(r, k)->kind == IMPACT;

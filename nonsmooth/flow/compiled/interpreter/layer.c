@@ -412,6 +412,7 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   r->expansion = f;
   guard_rows(r, &f->l, f->series, order + 1, f->guards);
   row = first_hit(r, f, s, &ds);
+  memset(r->instant.passing, 0, r->s->rules.atoms);
   for (int k = 0; k < f->l.rows; k++) if (f->l.kind[k] == BRANCH_GUARD && (last < 0 || k == row)) last = k;
   if (last < 0 || (row >= 0 && row != last && ds < s)) return -1;
   note_sides(r, f, s);
@@ -424,7 +425,6 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   memcpy(r->tried, end, sizeof(double) * r->width);
   memset(f->series, 0, sizeof(double) * r->width * stride);
   for (int i = 0; i < slides; i++) f->series[(int64_t)e->l.sliding[i] * stride] = end[e->l.sliding[i]];
-  memset(r->fired, 0, sizeof(int32_t) * (r->s->resets + 1));
   if (!advance(r, f, dt)) return -1;
   memcpy(r->unknowns, r->tried, sizeof(double) * r->width);
   return last;

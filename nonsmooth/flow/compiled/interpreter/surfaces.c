@@ -70,8 +70,16 @@ static int kept_by(const Run *r, const int8_t *letter, int32_t *which) {
   return count;
 }
 
+/* Whether a surface is one of the time alone, onto which no step of the states leads. */
+static int is_of_time(const Run *r, int surface) {
+  const Entries *g = &r->s->surface_gradient;
+  for (int k = 0; k < g->count; k++) if (g->row[k] == surface && g->column[k] < r->s->dimension) return 0;
+  return 1;
+}
+
 /* Whether Newton's steps have led onto a surface: not where its zero is a multiple one. */
 static int is_on(Run *r, int surface) {
+  if (is_of_time(r, surface)) return 1;
   double h = surface_values(r, r->x)[surface];
   return fabs(h) <= VANISHES * surface_scales(r, r->x)[surface];
 }

@@ -148,7 +148,19 @@ FOLD_AHEAD = 10.0
 DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 
 #: Kinds of events, by number in ensembles and in C.
-KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")
+KINDS = (
+    "crossing",
+    "entry",
+    "exit",
+    "stop",
+    "reset",
+    "impact",
+    "contact",
+    "release",
+    "rest",
+    "rest_below",
+    "end",
+)
 
 #: The first and the last of these, as many, can happen without resets and impacts.
 SIMPLE_KINDS = 5
@@ -200,6 +212,7 @@ REASONS = (
     "several_directions",
     "indefinite",
     "undetermined",
+    "high_degree",
     "discrete_value",
 )
 

@@ -13,8 +13,6 @@ import nonsmooth as ns
 OPEN = {
     "test_a_tank_empties[0]": "no roots",
     "test_a_tank_empties[1]": "no roots",
-    "test_twisting_comes_to_rest_and_stays": "no rest",
-    "test_second_order_sliding_rests_from_its_limit[twisting]": "no rest",
     "test_second_order_sliding_rests_from_its_limit[super_twisting]": "no rest",
 }
 

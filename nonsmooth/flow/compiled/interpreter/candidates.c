@@ -62,7 +62,8 @@ static int continues(Run *r, const int8_t *letter, const Known *known, int known
     if (!active) continue;
     for (int i = 0; i < known_count; i++)
       if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row]) zeros = known[i].zeros;
-    if ((kind == SURFACE_GUARD || kind == NEAR_GUARD) && zeros < 1) zeros = 1;
+    if (kind == SURFACE_GUARD && zeros < r->s->degree[index]) zeros = r->s->degree[index];
+    if (kind == NEAR_GUARD && zeros < 1) zeros = 1;
     if (kind == IMPACT_GUARD && zeros < 2) zeros = 2;
     double value;
     int k = leading(r, e, row, zeros, &value);

@@ -43,6 +43,8 @@ typedef struct {
   int32_t sets; /* of codimension two and more */
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   const int32_t *set_first, *set_size, *set_of; /* by set; the set of each switching function or -1 */
+  /* Of each surface the derivative of h that its multiplier enters; where those between are among what is kept. */
+  const int32_t *degree, *lower_first;
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
   int32_t early_count, early_free_count;
   Rules rules;
@@ -116,7 +118,7 @@ typedef struct {
   const System *s;
   Table *table;
   double *p;
-  int32_t n, m, c, width, order, stride, guards;
+  int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
   double t, begun, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
   double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */

@@ -29,7 +29,7 @@ _MOST_LINEAR = 22
 _FILES = (
     *("programs.h", "linear.h", "state.c", "modes.c", "jets.c", "sets.c", "stepper.c"),
     *("surfaces.c", "record.c", "switching.c", "contacts.c", "approach.c", "driver.c"),
-    *("memory.c", "entry.c"),
+    *("memory.c", "entry.c", "motion.c"),
 )
 
 
@@ -73,7 +73,7 @@ def interpreter_source() -> str:
         f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
         for prefix, names in enumerations
     )
-    sizes = f"#define P {MOST_ORDER}\n#define MODES 1000000\n"
+    sizes = f"#define P {MOST_ORDER}\n"
     driver = [driver_text(f"interpreter/{name}") for name in _FILES]
     flows = [driver_text("interpreter/flow.c"), _extended("programs.h", "flow.c")]
     fixed = driver_text("interpreter/fixed.c")
@@ -98,7 +98,7 @@ def _extended(*files: str) -> str:
 def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
     """C source of the engine for ``width`` trajectories in step."""
     head, program = _lanes_head(system, order)
-    texts = map(driver_text, ("common.h", "lanes/vector.h", "lanes/polynomials.h"))
+    texts = map(driver_text, ("common.h", "lanes/vector.h", "lanes/sines.h", "lanes/polynomials.h"))
     return "".join(
         [
             f"#define W {width}\n",
@@ -115,7 +115,7 @@ def device_source(system: FilippovSystem, order: int, threads: int, resident: in
     compiler."""
     head, program = _lanes_head(system, order)
     sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n"
-    texts = map(driver_text, ("common.h", "device/lane.h", "lanes/polynomials.h"))
+    texts = map(driver_text, ("common.h", "device/lane.h", "lanes/sines.h", "lanes/polynomials.h"))
     parts = [driver_text("device/head.h"), sizes, head, *texts, program]
     return "".join([*parts, driver_text("lanes/lanes.c"), driver_text("device/kernel.c")])
 
@@ -160,7 +160,7 @@ def set_lanes_source(coupled: Coupled, order: int, width: int) -> str:
         f"__attribute__((unused)) static const int OWN[] = {{{_list(program.states) or 0}}};\n"
     )
     drivers = ("lanes/polynomials.h", "lanes/records.h", "lanes/set_lanes.c", "lanes/set_steps.c")
-    texts = [driver_text("common.h"), driver_text("lanes/vector.h"), program.text]
+    texts = [*map(driver_text, ("common.h", "lanes/vector.h", "lanes/sines.h")), program.text]
     return "".join(
         [facts_header(), _sizes(system, order), defines, *texts, *map(driver_text, drivers)]
     )
@@ -200,7 +200,6 @@ def _sizes(system: FilippovSystem, order: int) -> str:
         "ND": system.dimension,
         "P": order,
         "M": system.surface_count,
-        "MODES": len(system.modes),
         "TIMED": int(system.time_dependent),
     }
     return "".join(f"#define {name} {value}\n" for name, value in sizes.items())

@@ -19,13 +19,8 @@ Run *run_new(const System *s, Table *table) {
 }
 void run_free(Run *r) { free(r->arena); free(r); }
 
-void run_begin(Run *r, const Options *o, const Output *out, const double *x, const double *p,
-               const int8_t *start_mode, double t) {
+static void set_parameters(Run *r, const double *p) {
   const System *s = r->s;
-  r->o = *o;
-  r->size = o->atol / o->rtol;
-  r->out = *out;
-  memcpy(r->x, x, sizeof(double) * r->n);
   memcpy(r->p, p, sizeof(double) * s->parameters);
   series_prepare(&s->series, r->stride, r->p, r->series);
   values_prepare(&s->point, r->p, r->point);
@@ -33,6 +28,13 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   values_prepare(&s->maps, r->p, r->maps);
   values_prepare(&s->restitution, r->p, r->restitution);
   values_prepare(&s->columns, r->p, r->columns);
+}
+
+/* A run that has not begun. */
+static void clear(Run *r, const Options *o, double t) {
+  const System *s = r->s;
+  r->o = *o;
+  r->size = o->atol / o->rtol;
   memset(r->unknowns, 0, sizeof(double) * r->width);
   memset(r->drop, 0, sizeof(int32_t) * r->guards);
   memset(r->side, 0, sizeof(int32_t) * (s->stops + s->resets + 1));
@@ -48,6 +50,14 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->reason = NO_REASON;
   r->where = 0;
   r->segment_mode = r->due = r->due_impact = r->length_mode = -1;
+}
+
+void run_begin(Run *r, const Options *o, const Output *out, const double *x, const double *p,
+               const int8_t *start_mode, double t) {
+  clear(r, o, t);
+  r->out = *out;
+  memcpy(r->x, x, sizeof(double) * r->n);
+  set_parameters(r, p);
   if (finite_all(r->x, r->n)) { begin(r, start_mode); return; }
   memset(r->letter, 1, r->width);
   lay_out(r, r->letter, &r->now);

@@ -4,7 +4,6 @@
  * driver}.py; read those first. What is rare and slow anyway (points where the jet is not finite, starts in
  * repelling sliding, stability that no simple test shows) is handed over to them.
  */
-#define HISTORY 48
 #define TRIED 256 /* modes that are tried one by one, where the rates do not decide */
 #define FEW 3 /* surfaces of which all modes are tried where no matrix is known to have one solution */
 #define SEVERAL 16 /* modes that can continue, for the message */
@@ -83,7 +82,7 @@ typedef struct {
   Met met;
   int32_t mode, status, reason, where, due, due_impact, falls, *drop, *side, *fired;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
-  int32_t itinerary, segment_mode;
+  int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   double interval[HISTORY];
   int64_t pattern[HISTORY];
   int32_t kind[HISTORY];
@@ -171,7 +170,10 @@ Table *table_new(int32_t width) {
 int32_t table_modes(const Table *t) { return t->count; }
 int32_t table_size(const Table *t) { return t->tree.size; }
 void table_read(const Table *t, int32_t *parent, int32_t *mode, int8_t *letter) {
-  tree_read(&t->tree, parent, mode);
+  for (int32_t k = 0; k < t->tree.size; k++) {
+    parent[k] = t->tree.node[k].parent;
+    mode[k] = t->tree.node[k].mode;
+  }
   memcpy(letter, t->letter, (size_t)t->count * t->width);
 }
 void table_free(Table *t) { free(t->tree.node); free(t->letter); free(t->bucket); free(t); }

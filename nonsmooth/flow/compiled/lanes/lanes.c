@@ -3,9 +3,8 @@
  * Each lane holds one trajectory and is refilled when it ends. Whatever is common is done for all
  * lanes at once: expansion, step size, roots, projection, the decision at a surface where both
  * fields are clearly transversal. Whatever is rare (tangency, repelling sliding, ties, accumulating
- * events, limits, points that are not finite) is handed over: the trajectory gets the status
- * HAND_OVER and runs again from its start in the interpreter. No lane's result depends on its
- * neighbours.
+ * events, limits, points that are not finite) is not clear: the lane gives its trajectory to the driver for that
+ * step and takes it back (on a GPU it runs again from its start there). No lane's result depends on its neighbours.
  *
  * The generated text defines, besides what common.h asks for: N states with time, ND without, M surfaces,
  * TIMED whether time is a state, W, SLOTS guards (surface or exit to +, exit to -, stops), STOPS, DIRECTION[STOPS],
@@ -18,16 +17,28 @@
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 60)
 
+#if RARE_CASES_HERE
+/* Of a trajectory, what only the driver needs: the last events; halved steps, and up to which step that is so. */
+typedef struct { Recent event[HISTORY]; int64_t count, steps; double shortened; } Past;
+#endif
+
 typedef struct {
   T x[N];
   OWN(T, q, NQ); /* prepared from the parameters */
-  T t, lambda, last_event, shortest, length; /* of the step before in the same mode, or 0 */
-  I slides, above, drop, live, steps, events, kinds[LAST_KIND], shrinking;
+  T t, lambda, last_event, length; /* of the step before in the same mode, or 0 */
+  I slides, above, drop, live, steps, events, kinds[LAST_KIND];
+  I entered; /* number of steps when the mode began */
   I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
   I above_stop[STOPS > 0 ? STOPS : 1]; /* where the guard of a stop was at the start of the step before */
   double size; /* of states at which both tolerances are as large */
   int64_t index[W];
   int32_t base[W];
+#if RARE_CASES_HERE
+  Past past[W];
+#else
+  T shortest;
+  I shrinking;
+#endif
 } Lanes;
 
 /* What feeds the lanes and takes their results: batch.c, or device.c on a GPU. */
@@ -35,11 +46,16 @@ typedef struct Work Work;
 INLINE const Options *limits(const Work *w);
 static void store(Lanes *s, Work *w, int l, int status);
 static void shorten_codes(Lanes *s, Work *w);
+static void begin_elsewhere(Lanes *s, Work *w, I which);
+INLINE I by_chance(const Lanes *s, const Work *w);
 INLINE void keep_event(const Lanes *s, Work *w, int kind, I which);
 
+/* Number of the mode: 0 above, 1 below, 2 sliding. */
+INLINE I mode_of(const Lanes *s) { return (s->slides & 2) | (~s->slides & ~s->above & (M > 0)); }
+
 static void note_modes(Lanes *s, Work *w, I which) {
-  I digit = 1 + ((s->slides & 2) | (~s->slides & ~s->above & (M > 0)));
-  s->code = (s->code & ~which) | (((s->code << 2) + digit) & which);
+  s->code = (s->code & ~which) | (((s->code << 2) + mode_of(s) + 1) & which);
+  s->entered = (s->entered & ~which) | (s->steps & which);
   if (any(s->code >= LONG_CODE)) shorten_codes(s, w);
 }
 
@@ -54,8 +70,6 @@ INLINE void finish_lanes(Lanes *s, Work *w, I which, int status) {
   s->live &= ~which;
   store_lanes(s, w, which, status);
 }
-
-INLINE void hand_over(Lanes *s, Work *w, I which) { finish_lanes(s, w, which, HAND_OVER); }
 
 /* The surface -------------------------------------------------------------------------------- */
 
@@ -140,7 +154,7 @@ static void begin(Lanes *s, Work *w, I fresh) {
 #endif
   set_lambda(s);
   note_modes(s, w, fresh & ~unclear);
-  hand_over(s, w, unclear);
+  begin_elsewhere(s, w, fresh & unclear);
 }
 
 /* Step size ------------------------------------------------------------------------------------ */
@@ -428,8 +442,53 @@ INLINE void first_hits(int n, const Lanes *s, Step *e) {
 
 /* Events --------------------------------------------------------------------------------------- */
 
-/* Zeno: ever shorter intervals are left to the interpreter, which knows their limit. */
-INLINE I watch_intervals(Lanes *s, I which) {
+#if RARE_CASES_HERE
+/* Sum of the last intervals but ``back``. */
+static double block(const Past *p, int64_t back, int lag) {
+  double sum = 0;
+  for (int k = 0; k < lag; k++) sum += p->event[(p->count - 1 - back - k) % HISTORY].interval;
+  return sum;
+}
+
+/* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
+static int may_accumulate(const Past *p) {
+  for (int l = 0; l < LAG_COUNT; l++) {
+    int lag = LAGS[l];
+    if (p->count < (BLOCKS + 1) * lag) return 0;
+    double later = block(p, 0, lag), low = INFINITY, high = 0, last = 0;
+    if (!(later > 0)) return 1;
+    for (int b = 1; b < BLOCKS; b++) {
+      double earlier = block(p, b * lag, lag), ratio = later / earlier;
+      low = smaller(ratio, low);
+      high = larger(ratio, high);
+      if (b == 1) last = ratio;
+      if (!(high < SHRINKS && high - low <= SPREAD * (1 - last))) break;
+      if (b == BLOCKS - 1) return 1;
+      later = earlier;
+    }
+  }
+  return 0;
+}
+
+/* Remember events of the lanes ``which``, by kind; those that may accumulate are returned, and not clear. */
+SELDOM I remember(Lanes *s, I which, I kind, I row, I before) {
+  I unclear = NONE;
+  T interval = s->t - s->last_event;
+  I pattern = (((kind << 12) + row + 1) << 40) + (before << 20) + mode_of(s);
+  for EACH(l, which) {
+    Past *p = &s->past[l];
+    p->event[p->count++ % HISTORY] = (Recent){LANE(interval, l), LANE_I(pattern, l)};
+    if (p->count > BLOCKS && may_accumulate(p)) {
+      LANE_I(unclear, l) = -1;
+      p->count--;
+    }
+  }
+  s->last_event = SELECT(which & ~unclear, s->t, s->last_event);
+  return unclear;
+}
+#else
+/* Ever shorter intervals are left to the driver, which knows their limit. */
+INLINE I remember(Lanes *s, I which, I, I, I) {
   T interval = s->t - s->last_event;
   I shorter = which & (interval < SHRINKS * s->shortest);
   s->last_event = SELECT(which, s->t, s->last_event);
@@ -437,6 +496,7 @@ INLINE I watch_intervals(Lanes *s, I which) {
   s->shrinking -= shorter;
   return which & (s->shrinking >= 3);
 }
+#endif
 
 INLINE void count(Lanes *s, Work *w, int kind, I which) {
   s->kinds[kind] -= which;
@@ -446,7 +506,7 @@ INLINE void count(Lanes *s, Work *w, int kind, I which) {
 
 #if M > 0
 /* Lanes that met the surface or an end of sliding change their mode; ``slope`` is that of the guard
- * over the step. The lanes that need the interpreter are returned. */
+ * over the step. Those that are not clear are returned, and have no event. */
 INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   T value[2], scale[2];
   lie(s, value, scale);
@@ -460,18 +520,16 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   s->slides &= ~ends;
   s->above = (s->above & ~ends) | up;
   s->drop = (s->drop & ~ends) | (ends & 2);
-  I all = (met | ends) & ~unclear;
-  I entered = all & s->slides & ~was, changed = all & (s->slides ^ was | s->above ^ was_above);
-  unclear |= all & ~changed;
-  count(s, w, ENTRY, entered);
+  unclear |= s->events + 1 >= limits(w)->max_events;
+  I all = (met | ends) & ~unclear & (s->slides ^ was | s->above ^ was_above);
+  I entered = all & s->slides & ~was, kind = (entered & ENTRY) | (ends & EXIT) | (~entered & ~ends & CROSSING);
+  all &= ~remember(s, all, kind, down & 1, (was & 2) | (~was & ~was_above & 1));
+  count(s, w, ENTRY, entered & all);
   count(s, w, EXIT, all & ends);
-  count(s, w, CROSSING, changed & ~ends & ~entered);
-  unclear |= watch_intervals(s, all);
-  s->length = SELECT(all, BC(0), s->length);
-  unclear |= s->events >= limits(w)->max_events;
+  count(s, w, CROSSING, all & ~ends & ~entered);
   set_lambda(s);
-  note_modes(s, w, all & ~unclear);
-  return unclear;
+  note_modes(s, w, all);
+  return (met | ends) & ~all;
 }
 
 /* Lanes that slide towards a two-fold where the sliding field is 0/0. */
@@ -523,9 +581,9 @@ INLINE I disagrees(const Lanes *s, T c[N][P + 1], T g[S1][P + 1], const T *x, co
 }
 #endif
 
-/* Lanes whose step is left to the interpreter: it would be held back, or its defect is too large. */
-INLINE I unchecked(Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], const T *allowed,
-                   const T *of_guards, T by_series, T h, T dt, const T *end) {
+/* Lanes whose step is not clear: it would be held back, or its defect is too large. */
+INLINE I unchecked(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], const T *allowed,
+                   const T *of_guards, T by_series, T dt, const T *end) {
   I wrong = {0};
 #if ROWS + GUARDS > 0
   I same = s->length > 0;
@@ -538,7 +596,6 @@ INLINE I unchecked(Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], co
     wrong |= disagrees(s, c, g, x, allowed, of_guards, at, dt, INNER);
   }
   wrong |= disagrees(s, c, g, end, allowed, of_guards, dt, dt, P);
-  s->length = h;
   wrong &= ~((s->slides & -AFFINE_MODES[2]) | (~s->slides & s->above & -AFFINE_MODES[0])
              | (~s->slides & ~s->above & -AFFINE_MODES[1]));
 #endif
@@ -546,14 +603,13 @@ INLINE I unchecked(Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], co
 }
 
 /* Lanes where a stop was passed between two steps: rounding hid it from the first. */
-INLINE I passed_between(Lanes *s, T g[S1][P + 1]) {
+INLINE I passed_between(const Lanes *s, T g[S1][P + 1]) {
   I passed = {0};
   UNROLL for (int j = 0; j < STOPS; j++) {
     T value = g[FIRST_STOP + j][0];
     I above = value > 0, was = s->above_stop[j];
     if (DIRECTION[j] <= 0) passed |= was & ~above;
     if (DIRECTION[j] >= 0) passed |= ~was & (I)(value >= 0);
-    s->above_stop[j] = above;
   }
   return passed;
 }
@@ -587,35 +643,57 @@ INLINE void sort_step(Lanes *s, Step *e) {
   if (any(hard)) e->unclear |= resolve(&e->v);
 }
 
-INLINE void take_step(Lanes *s, Work *w, Step *e) {
+/* What a step may have changed in the lanes ``which`` is again as at its start. */
+INLINE void undo_step(Lanes *s, const Step *e, T t, I drop, I slides, I above, I which) {
+  UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(which, e->c[i][0], s->x[i]);
+  s->t = SELECT(which, t, s->t);
+  s->steps += which;
+  s->drop = (s->drop & ~which) | (drop & which);
+  s->slides = (s->slides & ~which) | (slides & which);
+  s->above = (s->above & ~which) | (above & which);
+  set_lambda(s);
+}
+
+/* Take the step where it is clear; the lanes are returned where it is not. */
+INLINE I take_step(Lanes *s, Work *w, Step *e) {
   const Options *o = limits(w);
-  T left = e->left, dt = e->dt;
-  I last = e->last & (e->h >= left), unclear = e->unclear, slot = e->slot;
+  T left = e->left, dt = e->dt, t = s->t;
+  I last = e->last & (e->h >= left), unclear = e->unclear | by_chance(s, w), slot = e->slot;
   dt = MIN(dt, SELECT(last, left, dt));
   unclear |= last & (dt == left) & (slot != 0) & (slot <= FIRST_STOP); /* a mode without a step */
   T h = MIN(e->h, left), end[N];
   state_at(end, e->c, dt, P);
-  unclear |= unchecked(s, o, e->c, e->g, e->allowed, e->of_guards, e->by_series, h, dt, end);
-  I was_sliding = s->slides;
+  unclear |= unchecked(s, o, e->c, e->g, e->allowed, e->of_guards, e->by_series, dt, end);
+  I drop = s->drop, slides = s->slides, above = s->above;
   advance(s, end, dt);
   I live = s->live & ~unclear, met = {0}, up = {0}, down = {0}, stopped = {0};
+  T length = ROWS + GUARDS > 0 ? SELECT(live, h, s->length) : s->length;
+  unclear |= ~finite_lanes(s);
 #if M > 0
-  met = live & ~was_sliding & (slot == 1);
-  up = live & was_sliding & (slot == 1);
+  met = live & ~slides & (slot == 1);
+  up = live & slides & (slot == 1);
   down = live & (slot == 2);
-  if (any(met | (live & was_sliding))) unclear |= project(s, met | was_sliding);
-  I on = live & was_sliding & (slot == 0) & ~last;
+  if (any(met | (live & slides))) unclear |= project(s, met | slides);
+  I on = live & slides & (slot == 0) & ~last;
   if (!CANCELLED && any(on)) unclear |= on & near_two_fold(s, o->rtol);
+  met &= ~unclear;
+  up &= ~unclear;
+  down &= ~unclear;
   if (any(met | up | down)) unclear |= change_modes(s, w, met, up, down, e->slope);
+  length = SELECT((met | up | down) & ~unclear, BC(0), length);
 #endif
+  unclear &= s->live;
+  if (any(unclear)) undo_step(s, e, t, drop, slides, above, unclear);
+  live &= ~unclear;
+  s->length = SELECT(live, length, s->length);
 #if STOPS > 0
+  for (int j = 0; j < STOPS; j++)
+    s->above_stop[j] = (s->above_stop[j] & ~live) | ((I)(e->g[FIRST_STOP + j][0] > 0) & live);
   stopped = live & (slot > FIRST_STOP);
   if (any(stopped)) count(s, w, STOP, stopped);
 #endif
   s->t = SELECT(live & last & (I)(dt == left), BC(o->t_end), s->t);
-  last &= live & (slot == 0);
-  unclear |= ~finite_lanes(s);
-  hand_over(s, w, unclear);
-  finish_lanes(s, w, stopped & ~unclear, STOPPED);
-  finish_lanes(s, w, last & ~unclear, REACHED_END);
+  finish_lanes(s, w, stopped, STOPPED);
+  finish_lanes(s, w, last & live & (slot == 0), REACHED_END);
+  return unclear;
 }

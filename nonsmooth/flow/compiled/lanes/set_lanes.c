@@ -47,6 +47,7 @@ typedef struct { int64_t word[WORDS]; } Traveller;
 typedef struct {
   const Batch *b;
   const Options *o;
+  const Core *core;
   Words words;
   int64_t next;
   double size; /* of states at which both tolerances are as large */

@@ -47,9 +47,6 @@ def solvers() -> list[Solver]:
     fixed = lambda make, **options: lambda name, tol: make(name, tol, **options)
     return [
         Solver("nonsmooth", library.make, taylor, 100_000, 200_000),
-        Solver(
-            "nonsmooth, reference driver", library.reference_driver, ladder(-6, -12, 1), 200, 100
-        ),
         Solver("heyoka, one integrator per mode", hy.make, taylor, 100_000, 10_000, hy.available),
         Solver(
             "heyoka, one integrator and callbacks",

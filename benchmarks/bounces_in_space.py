@@ -62,8 +62,8 @@ def starts(count: int) -> Array:
 def errors(name: str, count: int = 200) -> float:
     """Largest error of some ends, by a tolerance a thousand times smaller."""
     one, fine = (
-        ns.ensemble(system(name), starts(count), T_MAX, tol=tol, engine=engine)
-        for tol, engine in ((TOLERANCE, "compiled"), (TOLERANCE / 1000, "auto"))
+        ns.ensemble(system(name), starts(count), T_MAX, tol=tol)
+        for tol in (TOLERANCE, TOLERANCE / 1000)
     )
     if not np.array_equal(one.itinerary, fine.itinerary):
         raise AssertionError("itineraries in 3-D differ from those at a tolerance a thousandth")
@@ -79,7 +79,7 @@ def run(quick: bool) -> dict[str, Any]:
     flat = landings(rng.uniform(-1, 1, many), rng.uniform(-1, 1, many))
     systems = {name: system(name) for name in ("linear", "nonlinear")}
     solve = library.make("nonlinear", TOLERANCE)
-    options: dict[str, Any] = dict(tol=TOLERANCE, engine="compiled", work=work)
+    options: dict[str, Any] = dict(tol=TOLERANCE, work=work)
     timings = alternate(
         {
             "linear, in 3-D": lambda: ns.ensemble(systems["linear"], x, T_MAX, **options),

@@ -5,7 +5,7 @@
 Friction falls with the speed of slip by b, so that blocks keep sticking and slipping. Errors are against
 our run at a tolerance a thousand times smaller; that of Siconos falls with its step h as O(h).
 
-``python -m benchmarks.burridge_knopoff [--blocks 100] [--t-end 100] [--engine auto]`` prints the table alone.
+``python -m benchmarks.burridge_knopoff [--blocks 100] [--t-end 100]`` prints the table alone.
 """
 
 from __future__ import annotations
@@ -60,12 +60,12 @@ def chain(count: int) -> ns.FilippovSystem:
     )
 
 
-def ours(count: int, t_end: float, tol: float, engine: str) -> tuple[ns.Trajectory, float]:
+def ours(count: int, t_end: float, tol: float) -> tuple[ns.Trajectory, float]:
     """A run and its processor seconds, the system built before."""
     system = chain(count)
-    ns.simulate(system, start(count), 1e-3, tol=tol, engine=engine)
+    ns.simulate(system, start(count), 1e-3, tol=tol)
     begin = time.process_time()
-    found = ns.simulate(system, start(count), t_end, tol=tol, engine=engine)
+    found = ns.simulate(system, start(count), t_end, tol=tol)
     return found, time.process_time() - begin
 
 
@@ -89,14 +89,13 @@ def run(
     quick: bool,
     count: int = BLOCKS,
     t_end: float = 100.0,
-    engine: str = "auto",
     steps: Sequence[float] = STEPS,
 ) -> dict[str, Any]:
     """Errors at t_end and processor seconds of both, for the steps of Siconos and our tolerance."""
     if quick:
         count, t_end = min(count, 5), min(t_end, 20.0)
-    solution, _ = ours(count, t_end, 1e-3 * TOLERANCE, engine)
-    found, seconds = ours(count, t_end, TOLERANCE, engine)
+    solution, _ = ours(count, t_end, 1e-3 * TOLERANCE)
+    found, seconds = ours(count, t_end, TOLERANCE)
     error = float(np.abs(found.x[-1] - solution.x[-1]).max())
     row = {"tolerance": TOLERANCE, "error": error, "seconds": seconds, "events": len(found.events)}
     result: dict[str, Any] = {"blocks": count, "t_end": t_end, "nonsmooth": {"rows": [row]}}
@@ -120,10 +119,9 @@ def main() -> None:
     )
     parser.add_argument("--blocks", type=int, default=100)
     parser.add_argument("--t-end", type=float, default=100.0)
-    parser.add_argument("--engine", default="auto", choices=["auto", "compiled", "reference"])
     parser.add_argument("--steps", nargs="+", type=float, default=STEPS, help="of Siconos")
     o = parser.parse_args()
-    print(report.chain(run(False, o.blocks, o.t_end, o.engine, o.steps)))
+    print(report.chain(run(False, o.blocks, o.t_end, o.steps)))
 
 
 if __name__ == "__main__":

@@ -1,9 +1,8 @@
-"""Itineraries of random landings in 3-D by several engines.
+"""Itineraries of random landings in 3-D, computed in several ways.
 
-``python -m benchmarks.landings`` runs what is missing and prints the counts; it can be interrupted. The
-compiled engine integrates every landing at its default tolerance and at 1e-14, with the spin as a
-state, and as a bounce, with the slip as a state; the reference driver at 1e-14 those with different
-results first, then all. Landings with different results are listed.
+``python -m benchmarks.landings`` runs what is missing and prints the counts; it can be interrupted. Every
+landing is integrated at the default tolerance and at 1e-14, with the spin as a state, and as a bounce, with the
+slip as a state. Landings with different results are listed.
 """
 
 from __future__ import annotations
@@ -35,8 +34,7 @@ PARAMETERS = ("mu", "d1", "d2", "eta", "G", "k")
 PIECE, TOTAL = 500, 100_000
 DEFAULT, TIGHT = 1e-10, 1e-14
 T_END = 100.0
-#: From the quickest to the slowest, the reference driver.
-ENGINES = ("default", "tight", "bounce", "reference")
+WAYS = ("default", "tight", "bounce")
 
 
 @lru_cache
@@ -81,19 +79,17 @@ def drawn(piece: int, count: int) -> dict[str, Array]:
     return dict(**p, v=v, w=w)
 
 
-def answers(piece: int, count: int, engine: str, which: Sequence[int] | None = None) -> list[str]:
+def answers(piece: int, count: int, way: str) -> list[str]:
     """Itineraries of landings of a piece; a run without lift-off has its status instead."""
     found = np.empty(count, dtype=object)
     cases, work = drawn(piece, count), ns.Work(progress=False, threads=1)
     for i, load in enumerate(LOADS):
         rows = np.arange(count) // 4 % 2 == i
-        if which is not None:
-            rows &= np.isin(np.arange(count), which)
         if not rows.any():
             continue
         own = {name: values[rows] for name, values in cases.items()}
         v, w = own.pop("v"), own.pop("w")
-        if engine == "bounce":
+        if way == "bounce":
             turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4, load=load)
             own["inertia"] = own.pop("k")
             shots = bounce.lift_off(
@@ -108,59 +104,38 @@ def answers(piece: int, count: int, engine: str, which: Sequence[int] | None = N
             starts,
             T_END,
             parameters=own,
-            tol=DEFAULT if engine == "default" else TIGHT,
-            engine="reference" if engine == "reference" else "auto",
+            tol=DEFAULT if way == "default" else TIGHT,
             work=work,
         )
         ended = many.status == ns.Status.STOPPED
         statuses = [str(ns.Status(s)) for s in many.status]
         found[rows] = np.where(ended, many.itinerary, statuses)
-    return [str(one) for one in (found if which is None else found[list(which)])]
+    return [str(one) for one in found]
 
 
-def _compute(piece: int, engine: str, count: int, folder: Path) -> None:
-    path = folder / f"{engine}-{piece:04d}.json"
+def _compute(piece: int, way: str, count: int, folder: Path) -> None:
+    path = folder / f"{way}-{piece:04d}.json"
     if not path.exists():
         partial = path.with_suffix(f".{os.getpid()}")
-        partial.write_text(json.dumps(answers(piece, count, engine)))
+        partial.write_text(json.dumps(answers(piece, count, way)))
         partial.replace(path)
 
 
-def _compute_doubtful(count: int, folder: Path) -> None:
-    """Run the reference driver for the landings on which the quick engines differ."""
-    path = folder / "doubtful.json"
-    known: dict[str, str] = json.loads(path.read_text()) if path.exists() else {}
-    rows: dict[int, list[int]] = {}
-    for one in summary(folder, count)["differ"]:
-        if f"{one['piece']}:{one['row']}" not in known and "reference" not in one:
-            rows.setdefault(one["piece"], []).append(one["row"])
-    for piece, which in rows.items():
-        found = answers(piece, count, "reference", which)
-        known |= {f"{piece}:{row}": itinerary for row, itinerary in zip(which, found, strict=True)}
-        path.write_text(json.dumps(known))
-
-
 def summary(folder: Path = FOLDER, count: int = PIECE) -> dict[str, Any]:
-    """Number of landings of each engine, and those on which two engines differ."""
-    known = {
-        engine: {int(f.stem[-4:]): f for f in folder.glob(f"{engine}-*.json")} for engine in ENGINES
-    }
-    path = folder / "doubtful.json"
-    doubtful: dict[str, str] = json.loads(path.read_text()) if path.exists() else {}
+    """Number of landings of each way, and those on which two ways differ."""
+    known = {way: {int(f.stem[-4:]): f for f in folder.glob(f"{way}-*.json")} for way in WAYS}
     differ: list[dict[str, Any]] = []
     counts: dict[str, int] = {}
     for piece in sorted(known["default"]):
         found = {
-            engine: json.loads(files[piece].read_text())
-            for engine, files in known.items()
+            way: json.loads(files[piece].read_text())
+            for way, files in known.items()
             if piece in files
         }
         for i, row in enumerate(zip(*found.values(), strict=True)):
             counts[row[0]] = counts.get(row[0], 0) + 1
             if len(set(row)) > 1:
                 differ.append(dict(piece=piece, row=i, **dict(zip(found, row, strict=True))))
-                own = doubtful.get(f"{piece}:{i}")
-                differ[-1] |= {"reference": own} if own else {}
                 differ[-1]["phases"] = len({phases(itinerary) for itinerary in row}) > 1
     landings = {name: count * len(files) for name, files in known.items()}
     return dict(landings=landings, itineraries=counts, differ=differ)
@@ -183,15 +158,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.folder.mkdir(parents=True, exist_ok=True)
     if not options.report:
         with ProcessPoolExecutor(options.workers) as pool:
-            *quick, last = (
-                [(piece, engine) for piece in range(options.count // options.piece)]
-                for engine in ENGINES
-            )
-            own = (options.piece, options.folder)
-            for future in [pool.submit(_compute, *r, *own) for part in quick for r in part]:
-                future.result()
-            pool.submit(_compute_doubtful, *own).result()
-            for future in [pool.submit(_compute, *r, *own) for r in last]:
+            own, pieces = (options.piece, options.folder), range(options.count // options.piece)
+            for future in [pool.submit(_compute, k, way, *own) for way in WAYS for k in pieces]:
                 future.result()
     found = summary(options.folder, options.piece)
     print(f"landings: {found['landings']}")
@@ -199,7 +167,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"  {number:7d}  {itinerary}")
     differ = found["differ"]
     other = sum(row["phases"] for row in differ)
-    print(f"two engines differ on {len(differ)}; in what slips and rolls when, on {other}")
+    print(f"two ways differ on {len(differ)}; in what slips and rolls when, on {other}")
     for row in differ:
         print(f"  {row}")
 

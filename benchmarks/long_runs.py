@@ -88,9 +88,7 @@ def _hash(itinerary: str) -> int:
 
 def _trajectory(belt: float, tolerance: float, t_end: float) -> ns.Trajectory:
     system = stick_slip_system(belt)
-    return ns.simulate(
-        system, STICK_START, t_end, tol=tolerance, max_events=10**6, engine="compiled"
-    )
+    return ns.simulate(system, STICK_START, t_end, tol=tolerance, max_events=10**6)
 
 
 def _ours(belt: float, tolerance: float, t_end: float, dense: bool) -> Run:
@@ -106,7 +104,6 @@ def _ours(belt: float, tolerance: float, t_end: float, dense: bool) -> Run:
             t_end,
             tol=tolerance,
             max_events=10**6,
-            engine="compiled",
             work=ns.Work(threads=1, progress=False),
         )
         return many.x[0], _hash(many.itinerary[0])

@@ -54,9 +54,7 @@ def _ours(solution: np.ndarray) -> list[dict[str, Any]]:
         seconds = []
         for _ in range(5):
             begin = time.process_time()
-            end = ns.simulate(
-                stick_slip_system(BELT), STICK_START, T_END, tol=tolerance, engine="compiled"
-            )
+            end = ns.simulate(stick_slip_system(BELT), STICK_START, T_END, tol=tolerance)
             seconds.append(time.process_time() - begin)
         error = float(np.abs(end.x[-1] - solution).max())
         rows.append({"tolerance": tolerance, "error": error, "seconds": float(np.median(seconds))})

@@ -103,12 +103,7 @@ def _itineraries(results: dict[str, Any]) -> dict[str, float]:
     sections = results.get("correctness", {}).values()
     if not sections:
         return {}
-    random = sum(
-        s["wrong at the default tolerance"]
-        + s["wrong against the reference driver"]
-        + s["wrong against mpmath"]
-        for s in sections
-    )
+    random = sum(s["wrong at the default tolerance"] + s["wrong against mpmath"] for s in sections)
     near = sum(b["wrong"] for s in sections for b in s["boundaries"].values())
     return {
         "wrong itineraries, random starts": random,
@@ -271,15 +266,10 @@ def _correct(section: dict[str, Any]) -> str:
     for name, s in section.items():
         rows += [
             [name, "random, against tolerance 1e-14", f"{s['random starts']:,}"],
-            [
-                name,
-                "random, against the reference driver",
-                f"{s['against the reference driver']:,}",
-            ],
             [name, "random, against mpmath", f"{s['against mpmath']:,}"],
         ]
-        keys = ("default tolerance", "reference driver", "mpmath")
-        for row, key in zip(rows[-3:], keys, strict=True):
+        keys = ("default tolerance", "mpmath")
+        for row, key in zip(rows[-2:], keys, strict=True):
             row.append(str(next(v for k, v in s.items() if k.startswith("wrong") and key in k)))
         for pair, b in s["boundaries"].items():
             shown = f"within 1e-9, against mpmath: `{pair.replace(' | ', '` and `')}`"
@@ -370,7 +360,6 @@ def pictures(results: dict[str, Any], folder: Path) -> list[Path]:
 #: Name, colour and mark of each solver in the picture.
 _MARKS = {
     "nonsmooth": ("nonsmooth", style.BLUE, "o"),
-    "nonsmooth, reference driver": ("reference driver", style.BLUE, "x"),
     MODES: ("heyoka, each mode", style.VERMILLION, "s"),
     "heyoka, one integrator and callbacks": ("heyoka, callbacks", style.VERMILLION, "^"),
     "heyoka, 8 lanes per mode": ("heyoka, 8 lanes", style.VERMILLION, "v"),

@@ -20,7 +20,6 @@ _ENSEMBLE = (
     + "note = str(ns.ensemble(system, random_starts(10000), T_MAX, work=ns.Work(threads=1)).t[0])"
 )
 _SIMULATE = _OURS + "note = str(ns.simulate(system, random_starts(1)[0], T_MAX).t[-1])"
-_COMPILED = _SIMULATE.replace("T_MAX)", 'T_MAX, engine="compiled")')
 _PEER = """
 from benchmarks.problems import random_starts
 from benchmarks.peers.{module} import make
@@ -35,8 +34,6 @@ def run(quick: bool) -> dict[str, Any]:
         "import nonsmooth": ("import nonsmooth", False),
         "nonsmooth.simulate, one bounce, the driver compiled": (_SIMULATE, True),
         "nonsmooth.simulate, one bounce": (_SIMULATE, False),
-        "nonsmooth.simulate, compiled, cold": (_COMPILED, True),
-        "nonsmooth.simulate, compiled, cached": (_COMPILED, False),
         "nonsmooth.ensemble, 10,000 bounces, cold": (_ENSEMBLE, True),
         "nonsmooth.ensemble, 10,000 bounces, cached": (_ENSEMBLE, False),
         "scipy, one bounce": (_peer("scipy_dop853", 1e-10, 1), False),

@@ -32,9 +32,9 @@ NET = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.0, eta=0.5, G=0.01, load="net")
 
 WORKS = {
     "a search for multipliers": lambda: ns.local.sliding_branches(HIDDEN, [0.0, 0.0]),
-    "hidden sliding": lambda: ns.simulate(HIDDEN, [0.01, 0.0], 0.03, engine="reference"),
-    "an intersection": lambda: ns.simulate(BILINEAR, [0.01, 0.01], 0.05, engine="reference"),
-    "resets": lambda: ns.simulate(PENDULUM, [0.1, 0.0], 2.0, engine="reference"),
+    "hidden sliding": lambda: ns.simulate(HIDDEN, [0.01, 0.0], 0.03),
+    "an intersection": lambda: ns.simulate(BILINEAR, [0.01, 0.01], 0.05),
+    "resets": lambda: ns.simulate(PENDULUM, [0.1, 0.0], 2.0),
     "a two-fold": lambda: ns.find_two_fold(FOLD, [0.01, 0.02, 0.03]),
     "a point": lambda: ns.classify(FOLD, [0.0, 0.1, 0.2]),
     "a sliding field": lambda: ns.sliding_field(FOLD, [0.0, 0.1, 0.2]),

@@ -131,7 +131,7 @@ def test_nothing_is_drawn_by_matplotlib():
     code = (
         "import sys, casadi as ca, nonsmooth as ns\n"
         "x = ca.SX.sym('x')\n"
-        "run = ns.simulate(ns.FilippovSystem([x], field=[-x]), [1.0], 1.0, engine='reference')\n"
+        "run = ns.simulate(ns.FilippovSystem([x], field=[-x]), [1.0], 1.0)\n"
         "run._repr_html_()\n"
         "print('matplotlib' in sys.modules)"
     )

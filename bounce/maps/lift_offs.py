@@ -67,7 +67,6 @@ def lift_off(
     tol: float = 1e-10,
     t_max: float = 100.0,
     work: ns.Work | None = None,
-    engine: str = "auto",
     device: str | None = None,
 ) -> LiftOffs:
     """Bounce many balls: inputs and model parameters broadcast against each other.
@@ -85,8 +84,6 @@ def lift_off(
         As in :func:`simulate`.
     work : nonsmooth.Work, optional
         Threads, executor, chunk, bar and store of :func:`nonsmooth.ensemble`; by default no bar.
-    engine : {"auto", "reference", "compiled"}
-        Which driver: ``"auto"`` takes the compiled one where there is a compiler.
     device : {None, "cuda"}, optional
         ``"cuda"`` runs landings in the plane on an NVIDIA card, as :func:`nonsmooth.ensemble` does.
 
@@ -104,7 +101,7 @@ def lift_off(
     ModelError
         No contact model.
     nonsmooth.OptionError
-        A tolerance, a time, work or an engine out of its range; a ``device`` for landings in 3-D.
+        A tolerance, a time or work out of its range; a ``device`` for landings in 3-D.
 
     Warns
     -----
@@ -131,7 +128,7 @@ def lift_off(
     given = dict(xdot=xdot, ydot=ydot, omega=omega, x=x, y=y)
     bounces = _Bounces(model, given, parameters)
     work = ns.Work(progress=False) if work is None else work
-    options = dict(tol=tol, engine=engine, device=device)
+    options = dict(tol=tol, device=device)
     bounces.check()
     bounces.touch_down(t_max, work, options)
     itineraries, code = bounces.contact(t_max, work, options)

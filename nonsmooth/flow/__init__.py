@@ -1,6 +1,6 @@
 """Motion in time: events and resets, drivers, trajectories, ensembles.
 
-The contract of events, the same in every engine (``tests/flow/test_contract.py`` checks each sentence):
+The contract of events (``tests/flow/test_contract.py`` checks each sentence):
 
 1. A stop or reset fires where its function passes through zero in its direction: falling (-1), rising (1),
    either way (0). A touch without a passage does not fire it.

@@ -1,13 +1,13 @@
 """Constants of the event logic in every driver: tolerances, kinds, priorities, reasons.
 
-``compiled/building/codegen.py`` writes them into the sources in C.
+``compiled/building/core_source.py`` writes them into the sources in C.
 """
 
 from __future__ import annotations
 
 import sys
 
-from ..model.laws.coupled import FALL, LIMIT_FALL
+from ..model.numbering import FALL, LIMIT_FALL
 
 __all__ = ["FALL", "LIMIT_FALL"]  # and all below
 
@@ -54,6 +54,10 @@ AT_END = 64 * EPSILON
 #: Lanes leave events closer than this, relative to the time, to the scalar driver.
 NEAR = 1e-13
 
+#: Newton's steps that improve a root on the guard itself; one is the last below this part of the time.
+POLISHED = 3
+CLOSE = 1e-8
+
 #: Rounding of a polynomial's value, relative to the sum of the magnitudes of its terms.
 ROUNDING = 4 * EPSILON
 
@@ -66,6 +70,21 @@ ON_SURFACE = 16 * EPSILON
 #: A coefficient of a guard below this part of its terms is zero by rounding.
 VANISHES = 64 * EPSILON
 
+#: The same where a law is solved: rates and distances from a bound below this part of their terms are zero.
+TIED = 1e-10
+
+#: In an element whose guard ended a mode they are zero to this many relative tolerances: its root has that error.
+KNOWN_TO = 100.0
+
+#: Solutions and motions that differ by this part are one; pivots below this part are zero.
+MERGED, SINGULAR = 1e-8, 1e-12
+
+#: Orders of the law that are solved; terms of the series by which motions are compared.
+ORDERS, COMPARED = 9, 4
+
+#: Elements of a block of which all solutions are tried, and those of which all minors are.
+MOST_ENUMERATED, MOST_MINORS = 8, 10
+
 #: Both fields are tangent where they are at this angle to the surface.
 TANGENT = 2e-14
 
@@ -76,9 +95,9 @@ SHORTEST = 4 * EPSILON
 DEPTH = 52
 
 # Accumulation of events: lengths of patterns (an impact 1, a crossing pair 2, a relay pair 4), blocks of
-# each, largest spread and value of their ratio, and largest time left, relative to that of the run.
+# each, largest spread and value of their ratio.
 LAGS = (1, 2, 3, 4, 6)
-BLOCKS = 6
+BLOCKS = 4
 SPREAD = 0.02
 SHRINKS = 0.9999
 REMAINING = 1e-6
@@ -95,6 +114,9 @@ TENFOLD = 20.0
 #: Coefficients of a series grow as the inverse time to a set to their order: the set is reached before
 #: they are larger than this.
 OVERFLOW = 1e280
+
+#: What a run notes about its decisions, as bits.
+DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 
 #: Kinds of events, by number in ensembles and in C.
 KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")

@@ -1,4 +1,4 @@
-"""Messages of the ends of runs, the same for every engine."""
+"""Messages of the ends of runs."""
 
 from __future__ import annotations
 

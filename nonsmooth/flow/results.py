@@ -164,6 +164,9 @@ class Ensemble(
         States and times of the samples by ``t_eval`` or ``at``; NaN where there are none.
     state_names : tuple of str
         Names of the states, in their order on the last axis.
+    engine : str
+        What ran: ``"lanes"``, several trajectories in step, ``"core"``, one at a time, or ``"cuda"``.
+        Both promise the same itineraries, and numbers within the tolerance.
     """
 
     x: Array
@@ -177,6 +180,7 @@ class Ensemble(
     sample_x: Array | None = None
     sample_t: Array | None = None
     state_names: tuple[str, ...] = ()
+    engine: str = "core"
 
     @property
     def itinerary(self) -> NDArray[np.object_]:
@@ -265,7 +269,7 @@ class Collected:
         numbers = [self._words.setdefault(w, len(self._words)) for w in chunk.words]
         self._parts.append((first, first + len(chunk.t), np.array(numbers, np.int32)))
 
-    def ensemble(self, codes: NDArray[np.int32] | None = None) -> Ensemble:
+    def ensemble(self, engine: str, codes: NDArray[np.int32] | None = None) -> Ensemble:
         """Return the results, with the itineraries sorted and their numbers in ``codes``."""
         words, every = sorted(self._words), self.all
         position = np.empty(len(words), np.int32)
@@ -290,6 +294,7 @@ class Collected:
             sample_x=shaped(every.sample_x),
             sample_t=shaped(every.sample_t),
             state_names=self.system.state_names,
+            engine=engine,
         )
 
     def _events(self) -> dict[str, NDArray[np.int32]]:

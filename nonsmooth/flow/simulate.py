@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, Parameters, require_system
-from .compiled.arrays import Run
 from .compiled.convert import trajectory
-from .compiled.tape import library, tape_for
+from .compiled.tape import tape_for
 from .constants import HAND_OVER
 from .ensembles.starts import require_start_mode
 from .options import Options, tolerances
 from .reference.driver import Driver
 from .section import Section, Times, read_sampling, sampled, sectioned
-from .select import compiled_or_none, use_compiled
 from .trajectory import Trajectory
 
 
@@ -38,7 +36,6 @@ def simulate(
     max_events: int = 100_000,
     t_eval: ArrayLike | None = None,
     at: Any = None,
-    engine: str = "auto",
 ) -> Trajectory:
     """Integrate a Filippov system through crossings, sliding, stops and resets.
 
@@ -71,11 +68,6 @@ def simulate(
     at : Section, str, number or expression, optional
         Keep the states at a section: at a surface, stop, reset or impact of that name, at a kind of
         event, or after each period. See :class:`Section`.
-    engine : {"auto", "reference", "compiled"}
-        The driver. ``"auto"`` is the driver in C, which is compiled once on a machine and
-        runs every system without delay; long runs continue, with the same bits, in a program that is
-        compiled for the system meanwhile. ``"compiled"`` waits for that program. Without a compiler
-        ``"auto"`` warns once and uses the reference driver in Python.
 
     Returns
     -------
@@ -91,8 +83,10 @@ def simulate(
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     OptionError
-        A tolerance, a limit, a time, a section or an engine out of its range; a ``start_mode`` that
+        A tolerance, a limit, a time or a section out of its range; a ``start_mode`` that
         contradicts the side on which the run starts.
+    CompilerError
+        The driver in C is not there yet, and no C compiler builds it.
 
     Notes
     -----
@@ -133,7 +127,7 @@ def simulate(
         options = replace(options, hits=sampling.hits)
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
-    return _with_samples(_run(system, x, p, options, engine), options, times, p)
+    return _with_samples(_run(system, x, p, options, times), options, times, p)
 
 
 def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Array) -> Trajectory:
@@ -149,20 +143,11 @@ def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Arr
     return replace(run, sample_t=t, sample_x=x)
 
 
-def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: str) -> Trajectory:
-    """Choose the engine, by the problem alone, so that the same call gives the same bits."""
-    tape = tape_for(system, options)
-    if not use_compiled(engine, tape is not None) or tape is None:
-        return Driver(system, x, p, options).run()
-
-    run = compiled_or_none(engine, library, lambda: tape.run(x, p, options))
-    return _converted(system, x, p, options, run)
-
-
-def _converted(
-    system: FilippovSystem, x: Array, p: Array, options: Options, run: Run | None
+def _run(
+    system: FilippovSystem, x: Array, p: Array, options: Options, times: Times | None
 ) -> Trajectory:
-    """Return the trajectory of a compiled run; rare cases fall back to the reference driver."""
+    tape, asked = tape_for(system, options), None if times is None else times.of(p)
+    run = None if tape is None else tape.run(x, p, options, asked)
     if run is None or run.status == HAND_OVER:
         return Driver(system, x, p, options).run()
     return trajectory(system, p, options, run)

@@ -11,7 +11,7 @@ _HERE = str(Path(__file__).parents[1])
 
 
 class CompilerWarning(UserWarning):
-    """The compiled engine, or the cache of compiled engines, is not used."""
+    """A compiler failed, or the cache of compiled libraries is not used."""
 
 
 @lru_cache(maxsize=64)

@@ -24,7 +24,7 @@ class PointError(NonsmoothError, ValueError):
 
 
 class OptionError(NonsmoothError, ValueError):
-    """An option of a run (tolerance, end time, engine) is out of its range."""
+    """An option of a run (tolerance, end time, section) is out of its range."""
 
 
 class ConvergenceError(NonsmoothError, RuntimeError):

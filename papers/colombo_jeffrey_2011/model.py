@@ -56,7 +56,7 @@ def normal_form(numbers: Numbers) -> ns.FilippovSystem:
 def arrivals(numbers: Numbers) -> int:
     """How many of the ring of attracting sliding orbits end at the two-fold, by simulation."""
     system = normal_form(numbers)
-    runs = [ns.simulate(system, [0.0, *p], 20.0, tol=1e-9, engine="reference") for p in ring()]
+    runs = [ns.simulate(system, [0.0, *p], 20.0, tol=1e-9) for p in ring()]
     return sum(r.status is ns.Status.NON_UNIQUE for r in runs)
 
 
@@ -115,7 +115,7 @@ def excursions(count: int = 40, seed: int = 1) -> tuple[Excursion, ...]:
         angle, radius = chance.uniform(0, math.pi / 2), 0.3 * chance.uniform(0.05, 1)
         start = fold.point_at([-radius * math.cos(angle), -radius * math.sin(angle)])
         mode = "+-"[int(chance.integers(2))]
-        run = ns.simulate(system, start, 400.0, start_mode=mode, engine="reference")
+        run = ns.simulate(system, start, 400.0, start_mode=mode)
         found.append(Excursion(start, mode, run))
     return tuple(found)
 
@@ -136,4 +136,4 @@ def _close() -> ca.SX:
 def calm_run(t_end: float = 400.0) -> ns.Trajectory:
     """Simulate an orbit on the other side of the bifurcation, where nothing reaches the two-fold."""
     values = {"nu1": CALM, "nu2": CALM}
-    return ns.simulate(recurrent(), [0.0, 0.05, 0.08], t_end, parameters=values, engine="reference")
+    return ns.simulate(recurrent(), [0.0, 0.05, 0.08], t_end, parameters=values)

@@ -221,7 +221,6 @@ def robust() -> Claim:
                     400.0,
                     parameters=values,
                     start_mode=mode,
-                    engine="reference",
                 )
                 counts.append(run.status is ns.Status.NON_UNIQUE)
     return Claim(
@@ -240,10 +239,7 @@ def eliminated() -> Claim:
     run = calm_run()
     values = {"nu1": CALM, "nu2": CALM}
     starts = np.column_stack([np.zeros(30), 0.2 * ring()[2::4]])
-    ends = [
-        ns.simulate(recurrent(), s, 50.0, parameters=values, tol=1e-8, engine="reference").status
-        for s in starts
-    ]
+    ends = [ns.simulate(recurrent(), s, 50.0, parameters=values, tol=1e-8).status for s in starts]
     reached = sum(status is ns.Status.NON_UNIQUE for status in ends)
     fold = ns.find_two_fold(recurrent(), [0.0, 0.01, 0.01], parameters=values)
     return Claim(

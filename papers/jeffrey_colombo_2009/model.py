@@ -37,9 +37,7 @@ def system() -> ns.FilippovSystem:
 def run(v: V, start: tuple[float, float], t_end: float, *, tol: float = 1e-12) -> ns.Trajectory:
     """Simulate from (0, y, z)."""
     values = {"nu1": v[0], "nu2": v[1]}
-    return ns.simulate(
-        system(), [0.0, *start], t_end, parameters=values, tol=tol, engine="reference"
-    )
+    return ns.simulate(system(), [0.0, *start], t_end, parameters=values, tol=tol)
 
 
 def landings(trajectory: ns.Trajectory) -> Array:

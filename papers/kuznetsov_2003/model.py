@@ -64,7 +64,6 @@ def run_from_fold(alpha: float, t_end: float) -> ns.Trajectory:
         parameters=at(alpha),
         start_mode="-",
         max_events=12,
-        engine="reference",
     )
 
 

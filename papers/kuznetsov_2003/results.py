@@ -243,7 +243,7 @@ def sliding_cycles() -> Claim:
     periods = [period(a) for a in levels]
     entries = []
     for start in ([0.3, 1.2], [0.5, 0.3], [0.1, 1.0]):
-        run = ns.simulate(SYSTEM, start, 400.0, parameters=at(1.2), engine="reference")
+        run = ns.simulate(SYSTEM, start, 400.0, parameters=at(1.2))
         entries.append([e.x[0] for e in run.events if e.kind == "entry"][-1])
     spread = float(np.ptp(entries))
     return Claim(

@@ -87,7 +87,6 @@ def simulate(
         start_mode=mode,
         tol=tol,
         max_events=max_events,
-        engine="reference",
     )
 
 

@@ -109,7 +109,7 @@ def test_a_chain_is_the_same_for_siconos_and_us(monkeypatch):
         theirs = np.array(p["matrix"]) @ x + p["offset"] + push
         np.testing.assert_allclose(ours, theirs, atol=1e-14)
     monkeypatch.delenv(burridge_knopoff.VARIABLE, raising=False)
-    found = burridge_knopoff.run(True, 2, 5.0, "reference")
+    found = burridge_knopoff.run(True, 2, 5.0)
     assert found["same itinerary"] and found["nonsmooth"]["rows"][0]["error"] < 1e-9
 
 

@@ -1,4 +1,4 @@
-"""The contract of events and resets (``nonsmooth.flow``), sentence by sentence, in every engine."""
+"""The contract of events and resets (``nonsmooth.flow``), sentence by sentence: one run, and many at once."""
 
 import casadi as ca
 import numpy as np
@@ -10,18 +10,18 @@ from nonsmooth.flow.constants import KINDS
 x, y, v, w, t, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "w", "t", "lam"))
 G = 9.81
 
-engines = pytest.mark.parametrize("engine", ["reference", "auto", "compiled", "ensemble"])
+one_and_many = pytest.mark.parametrize("many", [False, True], ids=["one", "many"])
 
 
-def ends(system, start, t_end, engine, **options):
+def ends(system, start, t_end, many, **options):
     """Last state, status, itinerary and number of events of each kind."""
-    if engine == "ensemble":
+    if many:
         starts = np.tile(np.array(start, float), (70, 1))
-        many = ns.ensemble(system, starts, t_end, work=ns.Work(progress=False), **options)
-        assert np.array_equal(many.x, np.tile(many.x[0], (70, 1)), equal_nan=True)
-        counts = {kind: int(n[0]) for kind, n in many.events.items()}
-        return many.x[0], ns.Status(int(many.status[0])), many.itinerary[0], counts
-    run = ns.simulate(system, start, t_end, engine=engine, **options)
+        found = ns.ensemble(system, starts, t_end, work=ns.Work(progress=False), **options)
+        assert np.array_equal(found.x, np.tile(found.x[0], (70, 1)), equal_nan=True)
+        counts = {kind: int(n[0]) for kind, n in found.events.items()}
+        return found.x[0], ns.Status(int(found.status[0])), found.itinerary[0], counts
+    run = ns.simulate(system, start, t_end, **options)
     counts = {kind: sum(e.kind == kind for e in run.events) for kind in KINDS}
     return run.x[-1], run.status, run.itinerary, counts
 
@@ -35,63 +35,63 @@ def floor(direction, restitution=0.8):
 # 1 A stop or reset is met where its function passes zero in its direction; a touch is not.
 
 
-@engines
+@one_and_many
 @pytest.mark.parametrize(("direction", "expected"), [(-1, 0.5), (1, 1.5), (0, 0.5)])
-def test_a_stop_is_met_where_its_function_passes_zero_in_its_direction(direction, expected, engine):
+def test_a_stop_is_met_where_its_function_passes_zero_in_its_direction(direction, expected, many):
     system = ns.FilippovSystem([x, y], field=[y, -x], stops=[ns.Stop(x, direction)])
-    state, status, _, _ = ends(system, [1.0, 0.0], 10.0, engine)
+    state, status, _, _ = ends(system, [1.0, 0.0], 10.0, many)
     assert status is ns.Status.STOPPED
     assert abs(np.arctan2(-state[1], state[0]) % (2 * np.pi) - expected * np.pi) < 1e-10
 
 
-@engines
-def test_a_touch_is_not_met(engine):
+@one_and_many
+def test_a_touch_is_not_met(many):
     """y = (t - 1)^2 touches zero from above."""
     system = ns.FilippovSystem([y, v], field=[v, 2], stops=[ns.Stop(y)])
-    state, status, _, _ = ends(system, [1.0, -2.0], 3.0, engine)
+    state, status, _, _ = ends(system, [1.0, -2.0], 3.0, many)
     assert status is ns.Status.REACHED_END and abs(state[0] - 4.0) < 1e-12
 
 
 # 2 What happens exactly at t_end, to rounding, happens.
 
 
-@engines
+@one_and_many
 @pytest.mark.parametrize("t_end", [3.0, 0.3, 1e6])
-def test_a_stop_exactly_at_the_end_stops(t_end, engine):
+def test_a_stop_exactly_at_the_end_stops(t_end, many):
     system = ns.FilippovSystem([x], field=[1], stops=[ns.Stop(x - t_end)])
-    state, status, _, counts = ends(system, [0.0], t_end, engine)
+    state, status, _, counts = ends(system, [0.0], t_end, many)
     assert status is ns.Status.STOPPED and state[0] == t_end and counts["stop"] == 1
 
 
-@engines
-def test_a_reset_exactly_at_the_end_jumps(engine):
+@one_and_many
+def test_a_reset_exactly_at_the_end_jumps(many):
     system = ns.FilippovSystem([x], field=[1], resets=[ns.Reset(x - 2.0, [x - 5.0])])
-    state, status, _, counts = ends(system, [0.0], 2.0, engine)
+    state, status, _, counts = ends(system, [0.0], 2.0, many)
     assert status is ns.Status.REACHED_END and counts["reset"] == 1
     assert abs(state[0] + 3.0) < 1e-14
 
 
 @pytest.mark.slow_cases("ensemble")
-@engines
-def test_a_surface_exactly_at_the_end_is_entered(engine):
+@one_and_many
+def test_a_surface_exactly_at_the_end_is_entered(many):
     system = ns.FilippovSystem([x], surface=x, above=[-1], below=[3])
-    state, status, itinerary, counts = ends(system, [2.0], 2.0, engine)
+    state, status, itinerary, counts = ends(system, [2.0], 2.0, many)
     assert counts["entry"] == 1 and abs(state[0]) < 1e-15
     assert status is ns.Status.REACHED_END and itinerary == "+"  # no time was spent sliding
 
 
-@engines
-def test_what_happens_after_the_end_does_not(engine):
+@one_and_many
+def test_what_happens_after_the_end_does_not(many):
     system = ns.FilippovSystem([x], field=[1], stops=[ns.Stop(x - 2.0)])
-    state, status, _, _ = ends(system, [0.0], 2.0 - 1e-9, engine)
+    state, status, _, _ = ends(system, [0.0], 2.0 - 1e-9, many)
     assert status is ns.Status.REACHED_END and state[0] < 2.0
 
 
 # 3 At one instant a stop is served first, then resets in their order, then surfaces.
 
 
-@engines
-def test_a_stop_is_served_before_a_reset_and_a_surface(engine):
+@one_and_many
+def test_a_stop_is_served_before_a_reset_and_a_surface(many):
     system = ns.FilippovSystem(
         [x],
         surface=x - 1,
@@ -100,41 +100,41 @@ def test_a_stop_is_served_before_a_reset_and_a_surface(engine):
         stops=[ns.Stop(x - 1)],
         resets=[ns.Reset(x - 1, [x - 7])],
     )
-    state, status, itinerary, counts = ends(system, [0.0], 2.0, engine)
+    state, status, itinerary, counts = ends(system, [0.0], 2.0, many)
     assert status is ns.Status.STOPPED and abs(state[0] - 1.0) < 1e-15
     assert itinerary == "-" and counts["reset"] == counts["crossing"] == 0
 
 
-@engines
-def test_resets_at_one_instant_are_served_in_their_order(engine):
+@one_and_many
+def test_resets_at_one_instant_are_served_in_their_order(many):
     """x reaches 1: the first adds 1 to y and leaves x, the second doubles y."""
     system = ns.FilippovSystem(
         [x, y],
         field=[1, 0],
         resets=[ns.Reset(x - 1, [x, y + 1], 1, "add"), ns.Reset(x - 1, [x, 2 * y], 1, "double")],
     )
-    state, _, _, counts = ends(system, [0.0, 3.0], 2.0, engine)
+    state, _, _, counts = ends(system, [0.0, 3.0], 2.0, many)
     assert counts["reset"] == 2 and abs(state[1] - 8.0) < 1e-15
 
 
-@engines
-def test_what_a_jump_carries_across_is_not_met(engine):
+@one_and_many
+def test_what_a_jump_carries_across_is_not_met(many):
     """From x = 1 to x = 3, over the stop at 2."""
     system = ns.FilippovSystem(
         [x], field=[1], stops=[ns.Stop(x - 2)], resets=[ns.Reset(x - 1, [x + 2], 1)]
     )
-    state, status, _, _ = ends(system, [0.0], 2.0, engine)
+    state, status, _, _ = ends(system, [0.0], 2.0, many)
     assert status is ns.Status.REACHED_END and abs(state[0] - 4.0) < 1e-14
 
 
 # 4 A start on the zero of a stop is no event: the stop is armed once the motion has left it.
 
 
-@engines
+@one_and_many
 @pytest.mark.parametrize("direction", [-1, 0, 1])
-def test_a_start_on_a_stop_is_no_event(direction, engine):
+def test_a_start_on_a_stop_is_no_event(direction, many):
     system = ns.FilippovSystem([x, y], field=[y, -x], stops=[ns.Stop(x, direction)])
-    state, status, _, _ = ends(system, [0.0, 1.0], 10.0, engine)
+    state, status, _, _ = ends(system, [0.0, 1.0], 10.0, many)
     assert status is ns.Status.STOPPED
     assert np.allclose(state, [0.0, -1.0 if direction < 1 else 1.0], atol=1e-9)
 
@@ -142,12 +142,12 @@ def test_a_start_on_a_stop_is_no_event(direction, engine):
 # 5 A start on the zero of a reset with a direction: it is met at once if the motion leaves that way.
 
 
-@engines
+@one_and_many
 @pytest.mark.parametrize("speed", [-1.0, 1.0])
-def test_a_start_on_the_floor(speed, engine):
+def test_a_start_on_the_floor(speed, many):
     """A ball that starts on the floor bounces at once if it moves into it."""
     up = 1.0 if speed > 0 else 0.8
-    state, status, _, counts = ends(floor(-1), [0.0, speed], up / G, engine)
+    state, status, _, counts = ends(floor(-1), [0.0, speed], up / G, many)
     assert counts["reset"] == (speed < 0) and status is ns.Status.REACHED_END
     assert abs(state[0] - up**2 / (2 * G)) < 1e-12
 
@@ -155,60 +155,60 @@ def test_a_start_on_the_floor(speed, engine):
 # 6 One without a direction is not met at a start, and ambiguous if it would turn the motion round.
 
 
-@engines
-def test_a_start_on_a_kick_without_a_direction(engine):
+@one_and_many
+def test_a_start_on_a_kick_without_a_direction(many):
     """The kick comes back twice in a period of the oscillator."""
     kick = ns.Reset(x, [x, 0.9 * v], name="kick")
     system = ns.FilippovSystem([x, v], field=[v, -x], resets=[kick])
-    state, _, _, counts = ends(system, [0.0, 1.0], 2 * np.pi + 0.1, engine)
+    state, _, _, counts = ends(system, [0.0, 1.0], 2 * np.pi + 0.1, many)
     assert counts["reset"] == 2 and abs(np.hypot(*state) - 0.81) < 1e-9
 
 
-@engines
+@one_and_many
 @pytest.mark.parametrize("speed", [-1.0, 0.0, 1.0])
-def test_a_start_on_a_wall_of_two_sides_is_ambiguous(speed, engine):
+def test_a_start_on_a_wall_of_two_sides_is_ambiguous(speed, many):
     """It could be the floor of the ball or its ceiling: nothing falls through in silence."""
-    _, status, _, _ = ends(floor(0), [0.0, speed], 1.0, engine)
+    _, status, _, _ = ends(floor(0), [0.0, speed], 1.0, many)
     assert status is ns.Status.NON_UNIQUE
     run = ns.simulate(floor(0), [0.0, speed], 1.0)
     assert "direction" in run.message and "impact" in run.message
 
 
-@engines
-def test_a_wall_of_two_sides_is_met_from_either(engine):
+@one_and_many
+def test_a_wall_of_two_sides_is_met_from_either(many):
     for start in ([1.0, 0.0], [-1.0, 2 * G]):
-        _, _, _, counts = ends(floor(0), start, 0.6, engine)
+        _, _, _, counts = ends(floor(0), start, 0.6, many)
         assert counts["reset"] == 1
 
 
 # 7 A reset is not met again before the motion has left its zero.
 
 
-@engines
+@one_and_many
 @pytest.mark.parametrize("direction", [1, -1, 0])
-def test_a_kick_that_stays_on_its_zero_comes_once(direction, engine):
+def test_a_kick_that_stays_on_its_zero_comes_once(direction, many):
     """The oscillator is slowed to .9 at each passage in the direction."""
     kick = ns.Reset(x, [x, 0.9 * v], direction, "kick")
     system = ns.FilippovSystem([x, v], field=[v, -x], resets=[kick])
-    state, status, _, counts = ends(system, [-1.0, 0.0], 6 * np.pi - 0.1, engine)
+    state, status, _, counts = ends(system, [-1.0, 0.0], 6 * np.pi - 0.1, many)
     passages = 3 if direction else 6
     assert status is ns.Status.REACHED_END and counts["reset"] == passages
     assert abs(np.hypot(*state) - 0.9**passages) < 1e-9
 
 
-@engines
+@one_and_many
 @pytest.mark.parametrize("direction", [1, 0])
-def test_a_clock_written_as_a_sine_strikes_once_a_period(direction, engine):
+def test_a_clock_written_as_a_sine_strikes_once_a_period(direction, many):
     strike = ns.Reset(ca.sin(2 * np.pi * t), [x + 1], direction, "clock")
     system = ns.FilippovSystem([x], field=[0], resets=[strike], time=t)
-    state, status, _, _ = ends(system, [0.0], 4.9, engine, t_start=0.25)
+    state, status, _, _ = ends(system, [0.0], 4.9, many, t_start=0.25)
     assert status is ns.Status.REACHED_END and state[0] == (4 if direction else 9)
 
 
-@engines
-def test_a_body_that_a_reset_leaves_pressed_against_its_zero_rests(engine):
+@one_and_many
+def test_a_body_that_a_reset_leaves_pressed_against_its_zero_rests(many):
     """Without restitution nothing turns it back: it is not let through the floor."""
-    state, status, _, counts = ends(floor(-1, 0.0), [1.0, 0.0], 5.0, engine)
+    state, status, _, counts = ends(floor(-1, 0.0), [1.0, 0.0], 5.0, many)
     assert status is ns.Status.ACCUMULATION and counts["reset"] == 1
     assert abs(state[0]) < 1e-12 and abs(state[1]) < 1e-12
     assert "Impact" in ns.simulate(floor(-1, 0.0), [1.0, 0.0], 5.0).message
@@ -228,16 +228,15 @@ def ramp():
     )
 
 
-@engines
-def test_a_reset_that_changes_side_is_one_event(engine):
-    state, _, itinerary, counts = ends(ramp(), [0.0, 0.0], 3.25, engine)
+@one_and_many
+def test_a_reset_that_changes_side_is_one_event(many):
+    state, _, itinerary, counts = ends(ramp(), [0.0, 0.0], 3.25, many)
     assert counts["reset"] == 3 and counts["crossing"] == 3 and counts["end"] == 1
     assert itinerary == "- + - + - + -" and abs(state[1] - 3.0) < 1e-12
 
 
-@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
-def test_events_know_what_they_led_to(engine):
-    run = ns.simulate(ramp(), [0.0, 0.0], 1.25, engine=engine)
+def test_events_know_what_they_led_to():
+    run = ns.simulate(ramp(), [0.0, 0.0], 1.25)
     assert [(e.kind, e.name, e.mode_before, e.mode_after) for e in run.events] == [
         ("crossing", "h0", "-", "+"),
         ("reset", "clock", "+", "-"),
@@ -252,23 +251,23 @@ def test_events_know_what_they_led_to(engine):
 # to the other side.
 
 
-@engines
-def test_a_reset_onto_the_zero_of_another_one(engine):
+@one_and_many
+def test_a_reset_onto_the_zero_of_another_one(many):
     """From x = 1 to x = 2, where the stop is, and on."""
     system = ns.FilippovSystem(
         [x], field=[1], stops=[ns.Stop(x - 2)], resets=[ns.Reset(x - 1, [x + 1], 1)]
     )
-    state, status, _, _ = ends(system, [0.0], 2.0, engine)
+    state, status, _, _ = ends(system, [0.0], 2.0, many)
     assert status is ns.Status.STOPPED and abs(state[0] - 2.0) < 1e-14
 
 
-@engines
-def test_a_reset_onto_the_zero_of_another_one_from_which_the_motion_goes_back(engine):
+@one_and_many
+def test_a_reset_onto_the_zero_of_another_one_from_which_the_motion_goes_back(many):
     """x jumps to the stop at 2 and turns round there: v becomes -1."""
     system = ns.FilippovSystem(
         [x, v], field=[v, 0], stops=[ns.Stop(x - 2)], resets=[ns.Reset(x - 1, [x + 1, -v], 1)]
     )
-    state, status, _, _ = ends(system, [0.0, 1.0], 1.5, engine)
+    state, status, _, _ = ends(system, [0.0, 1.0], 1.5, many)
     assert status is ns.Status.REACHED_END and abs(state[0] - 1.5) < 1e-14
 
 
@@ -276,10 +275,10 @@ def test_a_reset_onto_the_zero_of_another_one_from_which_the_motion_goes_back(en
 
 
 @pytest.mark.slow_cases("ensemble")
-@engines
-def test_a_multiple_zero_that_nobody_could_see_is_refused_when_it_is_met(engine):
+@one_and_many
+def test_a_multiple_zero_that_nobody_could_see_is_refused_when_it_is_met(many):
     surface = (ca.exp(x) - np.e) ** 3
     system = ns.FilippovSystem([x, y], surface=surface, above=[1, 2], below=[1, 1])
-    _, status, _, _ = ends(system, [0.0, 0.0], 2.0, engine)
+    _, status, _, _ = ends(system, [0.0, 0.0], 2.0, many)
     assert status is ns.Status.NON_UNIQUE
     assert "multiple zero" in ns.simulate(system, [0.0, 0.0], 2.0).message

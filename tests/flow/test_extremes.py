@@ -154,11 +154,10 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
 @pytest.mark.parametrize("name", CASES)
-def test_closed_form(name, engine):
+def test_closed_form(name):
     make, start, t_end, expected, itinerary, options = CASES[name]
-    run = ns.simulate(make(), start, t_end, engine=engine, **options)
+    run = ns.simulate(make(), start, t_end, **options)
     assert run.status is ns.Status.REACHED_END
     assert itinerary is None or run.itinerary == itinerary
     size = max(np.abs(expected).max(), np.abs(start).max() * 1e-3) or 1.0

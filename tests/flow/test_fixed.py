@@ -1,4 +1,4 @@
-"""The flow of a fixed duration is exact to rounding, in C and in Python, of either sign."""
+"""The flow of a fixed duration is exact to rounding, of either sign."""
 
 import casadi as ca
 import numpy as np
@@ -7,20 +7,11 @@ from scipy.linalg import expm
 
 import nonsmooth as ns
 from nonsmooth.flow import fixed
-from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.model.derivatives.variational import variational_field
 
 x, y, k = (ca.SX.sym(name) for name in ("x", "y", "k"))
 LINEAR = ns.FilippovSystem([x, y], field=[y, -k * x - 0.3 * y], parameters={k: 4.0})
 PENDULUM = ns.FilippovSystem([x, y], field=[y, -k * ca.sin(x)], parameters={k: 1.0})
-
-
-@pytest.fixture(params=["C", "Python"])
-def engine(request, monkeypatch):
-    if request.param == "Python":
-        monkeypatch.setattr(fixed, "has_interpreter", lambda: False)
-    elif find_compiler() is None:
-        pytest.skip("no C compiler")
 
 
 def flown(system, start, duration):
@@ -31,14 +22,14 @@ def flown(system, start, duration):
 
 
 @pytest.mark.parametrize("duration", [0.0, 1e-9, 0.7, -0.7, 25.0])
-def test_a_linear_field_has_the_exponential(engine, duration):
+def test_a_linear_field_has_the_exponential(duration):
     a = np.array([[0.0, 1.0], [-4.0, -0.3]])
     whole = flown(LINEAR, [1.0, -0.5], duration)
     np.testing.assert_allclose(whole[:, 1:3], expm(a * duration), rtol=0, atol=1e-13)
     np.testing.assert_allclose(whole[:, 0], expm(a * duration) @ [1.0, -0.5], rtol=0, atol=1e-13)
 
 
-def test_back_and_forth_and_the_area(engine):
+def test_back_and_forth_and_the_area():
     there = flown(PENDULUM, [0.5, 1.0], 3.0)
     back = flown(PENDULUM, there[:, 0], -3.0)
     np.testing.assert_allclose(back[:, 0], [0.5, 1.0], rtol=0, atol=1e-14)
@@ -46,14 +37,14 @@ def test_back_and_forth_and_the_area(engine):
     np.testing.assert_allclose(back[:, 1:3] @ there[:, 1:3], np.eye(2), rtol=0, atol=1e-13)
 
 
-def test_derivatives_by_a_parameter_are_those_of_rescaled_time(engine):
+def test_derivatives_by_a_parameter_are_those_of_rescaled_time():
     """x(t; k) = x(t sqrt(k); 1) with x' scaled: P follows from the field at the end."""
     whole = flown(PENDULUM, [0.5, 0.0], 2.0)
     angle, rate = whole[:, 0]
     np.testing.assert_allclose(whole[:, 3], [rate, 0.5 * rate - np.sin(angle)], rtol=0, atol=1e-13)
 
 
-def test_what_is_not_finite_is_refused(engine):
+def test_what_is_not_finite_is_refused():
     system = ns.FilippovSystem([x, y], field=[1, x**2 + y**2 + k], parameters={k: 0.0})
     with pytest.raises(ns.ConvergenceError, match="duration"):
         flown(system, [0.0, 1.0], 5.0)

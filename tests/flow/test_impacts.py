@@ -10,18 +10,15 @@ import nonsmooth as ns
 x, y, u, v, t, lam, r, q = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t", "lam", "r", "q"))
 G = 9.81
 
-engines = pytest.mark.parametrize("engine", ["reference", "compiled"])
-
 
 def kinds(run):
     return [e.kind for e in run.events]
 
 
-@engines
 @pytest.mark.parametrize("e", [0.3, 0.9])
-def test_a_ball_comes_to_rest_at_the_closed_form(e, engine):
+def test_a_ball_comes_to_rest_at_the_closed_form(e):
     ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=e))
-    run = ns.simulate(ball, [1.0, 0.0], 30.0, engine=engine)
+    run = ns.simulate(ball, [1.0, 0.0], 30.0)
     first = (2 / G) ** 0.5
     contact = next(event for event in run.events if event.kind == "contact")
     assert run.itinerary == "o c" and run.status is ns.Status.REACHED_END
@@ -31,16 +28,15 @@ def test_a_ball_comes_to_rest_at_the_closed_form(e, engine):
     assert abs(after + e * before) < 1e-14
 
 
-@engines
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_a_table_throws_the_ball_off_when_its_reaction_ends(restitution, engine):
+def test_a_table_throws_the_ball_off_when_its_reaction_ends(restitution):
     """g = A omega^2 sin(omega t)."""
     a, omega = 0.2, 8.0
     gap = y - a * ca.sin(omega * t)
     ball = ns.FilippovSystem(
         [y, v], field=[v, -G], impacts=ns.Impact(gap, restitution=restitution), time=t
     )
-    run = ns.simulate(ball, [1.0, 0.0], 5.0, engine=engine)
+    run = ns.simulate(ball, [1.0, 0.0], 5.0)
     released = [event.t for event in run.events if event.kind == "release"]
     phase = np.arcsin(G / (a * omega**2))
     turns = np.round((omega * np.array(released) - phase) / (2 * np.pi))
@@ -50,12 +46,11 @@ def test_a_table_throws_the_ball_off_when_its_reaction_ends(restitution, engine)
     assert np.min(heights - a * np.sin(omega * np.linspace(0.0, 5.0, 2001))) > -1e-9
 
 
-@engines
 @pytest.mark.parametrize("e", [-0.5, 1.5])
-def test_a_restitution_that_only_the_run_knows_ends_it_where_it_is_improper(e, engine):
+def test_a_restitution_that_only_the_run_knows_ends_it_where_it_is_improper(e):
     """Below zero the ball would be pushed through the floor, above one energy would come from nowhere."""
     ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=e + y))
-    run = ns.simulate(ball, [1.0, 0.0], 5.0, engine=engine)
+    run = ns.simulate(ball, [1.0, 0.0], 5.0)
     assert run.status is ns.Status.INCONSISTENT and "restitution of 'impact'" in run.message
     assert abs(run.t[-1] - (2 / G) ** 0.5) < 1e-12
 
@@ -76,35 +71,31 @@ def test_a_gap_without_states_is_refused():
         ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(q), parameters={q: 1.0})
 
 
-@engines
-def test_a_start_at_rest_needs_no_accumulation(engine):
+def test_a_start_at_rest_needs_no_accumulation():
     ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=0.9))
-    run = ns.simulate(ball, [0.0, 0.0], 1.0, engine=engine)
+    run = ns.simulate(ball, [0.0, 0.0], 1.0)
     assert run.itinerary == "c" and kinds(run) == ["end"] and np.all(run.x == 0.0)
 
 
-@engines
-def test_a_start_that_presses_into_the_gap_is_an_impact_at_once(engine):
+def test_a_start_that_presses_into_the_gap_is_an_impact_at_once():
     ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=0.5))
-    run = ns.simulate(ball, [0.0, -2.0], 0.05, engine=engine)
+    run = ns.simulate(ball, [0.0, -2.0], 0.05)
     assert run.events[0].kind == "impact" and run.events[0].t == 0.0
     assert abs(run.x[-1, 1] - (1.0 - 0.05 * G)) < 1e-13
 
 
-@engines
-def test_a_pulled_body_leaves(engine):
+def test_a_pulled_body_leaves():
     """The load turns round at t = 1: reaction 1 - t."""
     body = ns.FilippovSystem([y, v], field=[v, t - 1], impacts=ns.Impact(y), time=t)
-    run = ns.simulate(body, [0.0, 0.0], 3.0, engine=engine)
+    run = ns.simulate(body, [0.0, 0.0], 3.0)
     assert run.itinerary == "c o" and kinds(run) == ["release", "end"]
     assert abs(run.events[0].t - 1.0) < 1e-12
     assert abs(run.x[-1, 0] - 2.0**3 / 6) < 1e-10
 
 
-@engines
-def test_a_start_behind_the_constraint_is_refused(engine):
+def test_a_start_behind_the_constraint_is_refused():
     ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, name="floor"))
-    run = ns.simulate(ball, [-0.1, 0.0], 1.0, engine=engine)
+    run = ns.simulate(ball, [-0.1, 0.0], 1.0)
     assert run.status is ns.Status.INCONSISTENT and "'floor' is negative" in run.message
 
 
@@ -119,37 +110,33 @@ def block(mu, e=0.0):
     )
 
 
-@engines
-def test_friction_lives_on_the_contact(engine):
+def test_friction_lives_on_the_contact():
     """It slides to rest after u^2/(2 mu g), and sticks."""
-    run = ns.simulate(block(0.3), [0.0, 0.0, 2.0, 0.0], 3.0, engine=engine)
+    run = ns.simulate(block(0.3), [0.0, 0.0, 2.0, 0.0], 3.0)
     assert run.itinerary == "+c sc"
     assert abs(run.events[0].t - 2.0 / (0.3 * G)) < 1e-12
     np.testing.assert_allclose(run.x[-1], [2.0**2 / (2 * 0.3 * G), 0.0, 0.0, 0.0], atol=1e-12)
 
 
-@engines
 @pytest.mark.parametrize(("speed", "slips"), [(5.0, True), (0.5, False), (-5.0, True)])
-def test_an_oblique_impact_takes_friction_with_it(speed, slips, engine):
+def test_an_oblique_impact_takes_friction_with_it(speed, slips):
     """Slip is reduced by mu (1 + e) |v|, or stopped within the impact."""
     mu, e, fall = 0.3, 0.5, -2.0
-    run = ns.simulate(block(mu, e), [0.0, 0.0, speed, fall], 0.01, engine=engine)
+    run = ns.simulate(block(mu, e), [0.0, 0.0, speed, fall], 0.01)
     after = run.events[0].x_after
     stop = mu * (1 + e) * abs(fall)
     expected = speed - np.sign(speed) * stop if slips else 0.0
     np.testing.assert_allclose(after, [0.0, 0.0, expected, -e * fall], atol=1e-13)
 
 
-@engines
-def test_in_the_air_friction_does_nothing(engine):
-    run = ns.simulate(block(0.3, 0.5), [0.0, 1.0, 1.0, 0.0], 0.4, engine=engine)
+def test_in_the_air_friction_does_nothing():
+    run = ns.simulate(block(0.3, 0.5), [0.0, 1.0, 1.0, 0.0], 0.4)
     assert run.itinerary == "+o" and run.x[-1, 2] == 1.0
 
 
-@engines
-def test_a_body_without_slip_falls_and_stays(engine):
+def test_a_body_without_slip_falls_and_stays():
     """u = 0 all the time: the surface is never left, in the air nor on the ground."""
-    run = ns.simulate(block(0.3, 0.5), [0.0, 1.0, 0.0, 0.0], 5.0, engine=engine)
+    run = ns.simulate(block(0.3, 0.5), [0.0, 1.0, 0.0, 0.0], 5.0)
     assert run.status is ns.Status.REACHED_END
     np.testing.assert_allclose(run.x[-1], 0.0, atol=1e-12)
     assert run.itinerary.split()[-1][1] == "c"
@@ -166,12 +153,11 @@ def bar(inertia, e=0.0):
     return ns.FilippovSystem([x, y, u, v], field=[u, v, turn, lift], impacts=impacts)
 
 
-@engines
 @pytest.mark.parametrize("inertia", [0.5, 2.0])
-def test_one_end_rests_while_the_other_strikes(inertia, engine):
+def test_one_end_rests_while_the_other_strikes(inertia):
     """The end at rest is struck too if it would be pressed down (I < m l^2), else it lifts off."""
     start = [0.3, 0.3, 0.0, 0.0]  # left end down, right end up
-    run = ns.simulate(bar(inertia), start, 2.0, engine=engine)
+    run = ns.simulate(bar(inertia), start, 2.0)
     strike = next(event for event in run.events if event.kind == "impact")
     rate = strike.x[3] + strike.x[2]  # of the right end, before
     after = strike.x_after[3] - strike.x_after[2]  # of the left end
@@ -183,14 +169,12 @@ def test_one_end_rests_while_the_other_strikes(inertia, engine):
     )
 
 
-@engines
-def test_both_ends_strike_at_once(engine):
-    run = ns.simulate(bar(1.5), [0.0, 1.0, 0.0, 0.0], 2.0, engine=engine)
+def test_both_ends_strike_at_once():
+    run = ns.simulate(bar(1.5), [0.0, 1.0, 0.0, 0.0], 2.0)
     assert run.itinerary == "oo cc" and np.all(np.abs(run.x[-1]) < 1e-12)
 
 
-@engines
-def test_an_oscillator_chatters_to_rest_at_its_wall_and_leaves_when_the_force_ends(engine):
+def test_an_oscillator_chatters_to_rest_at_its_wall_and_leaves_when_the_force_ends():
     """x'' = -x + A cos(omega t) before the wall x = s: it leaves where A cos(omega t) = s."""
     force, omega, wall = 3.0, 0.3, 0.5
     system = ns.FilippovSystem(
@@ -199,7 +183,7 @@ def test_an_oscillator_chatters_to_rest_at_its_wall_and_leaves_when_the_force_en
         impacts=ns.Impact(wall - x, restitution=0.6),
         time=t,
     )
-    run = ns.simulate(system, [0.0, 0.0], 45.0, engine=engine)
+    run = ns.simulate(system, [0.0, 0.0], 45.0)
     left = [event.t for event in run.events if event.kind == "release"]
     assert len(left) == 2
     expected = (np.arccos(wall / force) + 2 * np.pi * np.arange(2)) / omega
@@ -207,8 +191,7 @@ def test_an_oscillator_chatters_to_rest_at_its_wall_and_leaves_when_the_force_en
     assert run(np.linspace(0, 45, 3000))[:, 0].max() < wall + 1e-9
 
 
-@engines
-def test_painleve_paradox_is_named(engine):
+def test_painleve_paradox_is_named():
     """Friction turns the reaction round: with slip +, r (1 - 2) pulls the contact into the ground."""
     system = ns.FilippovSystem(
         [x, y, u, v],
@@ -217,7 +200,7 @@ def test_painleve_paradox_is_named(engine):
         multipliers=lam,
         impacts=ns.Impact(y, reaction=r),
     )
-    run = ns.simulate(system, [0.0, 0.0, 1.0, 0.0], 1.0, engine=engine)
+    run = ns.simulate(system, [0.0, 0.0, 1.0, 0.0], 1.0)
     assert run.status is ns.Status.INCONSISTENT
 
 
@@ -232,17 +215,16 @@ def test_wrong_impacts_are_refused():
         ns.FilippovSystem([y, v], field=[v, -G], impacts=[ns.Stop(y)])
 
 
-@engines
-def test_a_curved_wall_pushes_along_its_normal(engine):
+def test_a_curved_wall_pushes_along_its_normal():
     """Without reaction=: a bead that rests in a parabola, and one that oscillates at the inside of a circle
     as a pendulum does, energy kept."""
     bowl = ns.FilippovSystem([x, y, u, v], field=[u, v, 0, -G], impacts=ns.Impact(y - x**2))
-    run = ns.simulate(bowl, [0.1, 0.01, 0.0, 0.0], 3.0, engine=engine)
+    run = ns.simulate(bowl, [0.1, 0.01, 0.0, 0.0], 3.0)
     assert run.itinerary == "c" and abs(run.x[-1, 1] - run.x[-1, 0] ** 2) < 1e-12
     energy = (run.x[:, 2] ** 2 + run.x[:, 3] ** 2) / 2 + G * run.x[:, 1]
     np.testing.assert_allclose(energy, energy[0], atol=1e-9)
     ring = ns.FilippovSystem([x, y, u, v], field=[u, v, 0, -G], impacts=ns.Impact(1 - x**2 - y**2))
-    swing = ns.simulate(ring, [0.1, -((1 - 0.01) ** 0.5), 0.0, 0.0], 4.0, engine=engine)
+    swing = ns.simulate(ring, [0.1, -((1 - 0.01) ** 0.5), 0.0, 0.0], 4.0)
     pendulum = ns.simulate(
         ns.FilippovSystem([q, v], field=[v, -G * ca.sin(q)]), [np.arcsin(0.1), 0.0], 4.0
     )
@@ -277,25 +259,22 @@ def pile(count, e, mu=0.4):
     )
 
 
-@pytest.mark.slow_cases("0.0-reference", "0.4-reference")
-@pytest.mark.parametrize("engine", ["reference", "auto"])
 @pytest.mark.parametrize("e", [0.0, 0.4])
-def test_a_pile_of_three_falls_and_comes_to_rest(engine, e):
+def test_a_pile_of_three_falls_and_comes_to_rest(e):
     """The momentum of the slips goes into the floor; at rest, one on the other, all stick."""
     system = pile(3, e)
     start = [0.2, 0.9, 1.7, 0.0, 0.0, 0.0, 0.3, -0.2, 0.1]
-    run = ns.simulate(system, start, 4.0, engine=engine)
+    run = ns.simulate(system, start, 4.0)
     assert run.status is ns.Status.REACHED_END, run.message
     assert run.itinerary.endswith("sssccc")
     np.testing.assert_allclose(run.x[-1, :3], [0.0, 0.5, 1.0], rtol=0, atol=1e-12)
     np.testing.assert_allclose(run.x[-1, 3:], 0.0, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("engine", [pytest.param("reference", marks=pytest.mark.slow), "auto"])
-def test_a_neighbour_is_not_behind_by_the_error_of_a_root(engine):
+def test_a_neighbour_is_not_behind_by_the_error_of_a_root():
     """While one gap chatters the others are met within the tolerance, from all sides."""
     system = pile(2, 0.5)
     for k in range(6):
         start = [0.1 + 0.07 * k, 0.75 + 0.05 * k, 0.1 * k, -0.3 * k, 0.3 * k, -0.2]
-        run = ns.simulate(system, start, 3.0, tol=1e-8, engine=engine)
+        run = ns.simulate(system, start, 3.0, tol=1e-8)
         assert run.status is ns.Status.REACHED_END, run.message

@@ -1,4 +1,4 @@
-"""Names, elements and sides of events (``nonsmooth.flow.names``), the same in every engine."""
+"""Names, elements and sides of events (``nonsmooth.flow.names``)."""
 
 import casadi as ca
 import numpy as np
@@ -7,7 +7,6 @@ import pytest
 import nonsmooth as ns
 
 x, v, y, w, t = (ca.SX.sym(name) for name in "xvywt")
-engines = pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
 
 
 def stick_slip(**further):
@@ -15,8 +14,8 @@ def stick_slip(**further):
     return ns.FilippovSystem([x, v], surface=v - 1, above=[v, -x - 1], below=[v, 1 - x], **further)
 
 
-def events(system, start, t_end, engine="auto", **options):
-    run = ns.simulate(system, start, t_end, engine=engine, **options)
+def events(system, start, t_end, **options):
+    run = ns.simulate(system, start, t_end, **options)
     return [(e.kind, e.name, e.element, e.side) for e in run.events]
 
 
@@ -28,14 +27,12 @@ STICK_SLIP = [
 ]
 
 
-@engines
-def test_one_surface(engine):
-    assert events(stick_slip(), [0.0, 0.0], 12.0, engine)[:4] == STICK_SLIP
+def test_one_surface():
+    assert events(stick_slip(), [0.0, 0.0], 12.0)[:4] == STICK_SLIP
 
 
-@engines
 @pytest.mark.parametrize("first", [True, False])
-def test_two_surfaces_name_the_same_thing_alike(engine, first):
+def test_two_surfaces_name_the_same_thing_alike(first):
     """A second surface that is never reached, before or after the first one."""
     lam, mu = ca.SX.sym("lam"), ca.SX.sym("mu")
     both = [(lam, v - 1), (mu, x - 50)] if first else [(mu, x - 50), (lam, v - 1)]
@@ -47,19 +44,17 @@ def test_two_surfaces_name_the_same_thing_alike(engine, first):
     )
     k = 0 if first else 1
     expected = [(kind, name.replace("0", str(k)), k, side) for kind, name, _, side in STICK_SLIP]
-    assert events(system, [0.0, 0.0], 12.0, engine)[:4] == expected
+    assert events(system, [0.0, 0.0], 12.0)[:4] == expected
 
 
-@engines
-def test_crossings_have_the_side_from_which_the_motion_comes(engine):
+def test_crossings_have_the_side_from_which_the_motion_comes():
     system = ns.FilippovSystem([x, v], surface=x, above=[v, -x], below=[v, -4 * x])
-    found = events(system, [0.0, 1.0], 9.0, engine)
+    found = events(system, [0.0, 1.0], 9.0)
     assert found[:3] == [("crossing", "h0", 0, s) for s in (1, -1, 1)]
     assert found[-1] == ("end", "REACHED_END", -1, 0)
 
 
-@engines
-def test_stops_resets_and_clocks_have_their_number_and_direction(engine):
+def test_stops_resets_and_clocks_have_their_number_and_direction():
     system = ns.FilippovSystem(
         [x, v],
         field=[1, 0],
@@ -68,7 +63,7 @@ def test_stops_resets_and_clocks_have_their_number_and_direction(engine):
         clocks=[ns.Clock(3.0)],
     )
     start = [0.0, 0.0, 0.0]
-    assert events(system, start, 20.0, engine) == [
+    assert events(system, start, 20.0) == [
         ("reset", "kick", 1, 1),
         ("reset", "clock", 2, 1),
         ("reset", "clock", 2, 1),
@@ -76,8 +71,7 @@ def test_stops_resets_and_clocks_have_their_number_and_direction(engine):
     ]
 
 
-@engines
-def test_contacts_follow_the_surfaces(engine):
+def test_contacts_follow_the_surfaces():
     far = ns.FilippovSystem(
         [x, v],
         surface=x - 100,
@@ -85,21 +79,19 @@ def test_contacts_follow_the_surfaces(engine):
         below=[v, -1],
         impacts=[ns.Impact(50 - x, name="roof"), ns.Impact(x, restitution=0.5, name="floor")],
     )
-    found = events(far, [1.0, 0.0], 8.0, engine)
+    found = events(far, [1.0, 0.0], 8.0)
     assert found[:2] == [("impact", "floor", 2, 1)] * 2
     assert found[-2] == ("contact", "floor", 2, 0)
 
 
-@engines
-def test_release(engine):
+def test_release():
     system = ns.FilippovSystem(
         [x, v], field=[v, t - 1], time=t, impacts=[ns.Impact(x, name="floor")]
     )
-    assert events(system, [0.0, 0.0], 2.0, engine)[:1] == [("release", "floor", 0, 0)]
+    assert events(system, [0.0, 0.0], 2.0)[:1] == [("release", "floor", 0, 0)]
 
 
-@engines
-def test_sets(engine):
+def test_sets():
     """Friction in the plane that holds until the spring pulls hard enough."""
     u = ca.SX.sym("u", 2)
     system = ns.FilippovSystem(
@@ -109,15 +101,14 @@ def test_sets(engine):
         multipliers=[u],
         surfaces=[ca.vertcat(v, w)],
     )
-    found = events(system, [0.0, 0.0, -0.5, 0.3], 4.0, engine)
+    found = events(system, [0.0, 0.0, -0.5, 0.3], 4.0)
     assert found[:2] == [("entry", "h0", 0, 0), ("exit", "|lambda0| = 1", 0, 0)]
 
 
-@engines
 @pytest.mark.parametrize("name", ["lambda1", "lambda", "lambda_", "h7", "L_F1 h", "h", "f0", "s"])
-def test_odd_names_of_events_do_not_confuse(engine, name):
+def test_odd_names_of_events_do_not_confuse(name):
     wall = ns.Reset(x + 0.3, [x, -v / 2], -1, name)
-    run = ns.simulate(stick_slip(resets=[wall]), [0.0, -1.0], 4.0, engine=engine)
+    run = ns.simulate(stick_slip(resets=[wall]), [0.0, -1.0], 4.0)
     assert ("reset", name, 0, -1) in [(e.kind, e.name, e.element, e.side) for e in run.events]
     derivative = ns.sensitivity(run).dx_dx0
     step = 1e-6
@@ -150,8 +141,7 @@ def test_saved_runs_keep_elements_and_sides(tmp_path):
     assert list(run.to_pandas("events")["element"]) == [e.element for e in run.events]
 
 
-@engines
-def test_states_and_parameters_may_be_called_like_multipliers(engine):
+def test_states_and_parameters_may_be_called_like_multipliers():
     """The same run and derivative, whatever the symbols are called."""
     found = []
     for names in (("x", "v", "f", "u"), ("lambda0", "h0", "lambda1", "L_F1 h")):
@@ -163,7 +153,7 @@ def test_states_and_parameters_may_be_called_like_multipliers(engine):
             field=[b, -a - f * u],
             parameters={f: 1.0},
         )
-        run = ns.simulate(system, [0.0, -0.5], 6.0, engine=engine)
+        run = ns.simulate(system, [0.0, -0.5], 6.0)
         derivative = ns.sensitivity(run)
         kinds = [(e.kind, e.name, e.element, e.side) for e in run.events]
         found.append((run.x.tobytes(), derivative.dx_dp.tobytes(), kinds))

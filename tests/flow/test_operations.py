@@ -1,4 +1,4 @@
-"""Every operation of CasADi's SX has the value of mpmath in every engine, or is refused by name."""
+"""Every operation of CasADi's SX has the value of mpmath, alone and in lanes, or is refused by name."""
 
 from functools import cache
 from itertools import chain
@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.model.expressions.float_arithmetic import BINARY, UNARY
 from nonsmooth.model.expressions.graph import NOT_SMOOTH, operation
 from tests.proofs.random_graphs import Exact
@@ -29,7 +28,6 @@ def nodes_of(code):
 SX = {n[3:].lower(): getattr(ca, n) for n in dir(ca) if n.startswith("OP_")}
 SX = {name: code for name, code in SX.items() if nodes_of(code)}
 SMOOTH = [op for op in (*UNARY, *BINARY) if op not in NOT_SMOOTH and op != "assign"]
-ENGINES = ["reference", "auto", *(["compiled"] if find_compiler() else [])]
 PROVEN = {"fabs", "fmin", "fmax"}  # of constants: the other kinks jump somewhere
 
 
@@ -65,28 +63,26 @@ def moving():
     return system, [*chain(*starts), *[0.0] * len(SMOOTH)]
 
 
-@pytest.mark.parametrize("engine", [*ENGINES, "lanes"])
-def test_operations_of_states(engine):
+@pytest.mark.parametrize("lanes", [False, True])
+def test_operations_of_states(lanes):
     system, start = moving()
-    if engine == "lanes":
+    if lanes:
         found = ns.ensemble(system, np.tile(start, (70, 1)), T_END, tol=1e-12).x[[0, 69]]
     else:
-        found = [ns.simulate(system, start, T_END, engine=engine, tol=1e-12).x[-1]]
+        found = [ns.simulate(system, start, T_END, tol=1e-12).x[-1]]
     for row in found:
         values = dict(zip(SMOOTH, row[4:].tolist(), strict=True))
         assert values == pytest.approx({op: integral(op) for op in SMOOTH}, rel=1e-10)
 
 
-@pytest.mark.parametrize("engine", [*ENGINES, "lanes"])
+@pytest.mark.parametrize("lanes", [False, True])
 @pytest.mark.parametrize(
     "values", [(0.3, 0.4), (-0.6, 0.25), (1.0, 0.0), (-0.5, -0.5), (0.5, -3.0)]
 )
-def test_operations_of_parameters(engine, values):
+def test_operations_of_parameters(lanes, values):
     """Those that have a finite value there."""
     given, known = dict(zip((p, q), values, strict=True)), {}
-    # CasADi's erfinv, which the reference driver takes for constants, is off by up to 2e-6 below zero.
-    chosen = [op for op in (*UNARY, *BINARY) if (op, engine) != ("erfinv", "reference")]
-    for op in chosen:
+    for op in (*UNARY, *BINARY):
         value = float(ca.evalf(of(op, *map(ca.SX, values))))
         if np.isfinite(value):
             known[op] = float(mpmath.erfinv(values[0])) if op == "erfinv" else value
@@ -94,10 +90,10 @@ def test_operations_of_parameters(engine, values):
     system = ns.FilippovSystem(states, field=[of(op, p, q) for op in known], parameters=[p, q])
     expected = np.array(list(known.values()))
     start, options = np.zeros(len(known)), {"parameters": given}
-    if engine == "lanes":
+    if lanes:
         found = ns.ensemble(system, np.tile(start, (70, 1)), 1.0, **options).x[69]
     else:
-        found = ns.simulate(system, start, 1.0, engine=engine, **options).x[-1]
+        found = ns.simulate(system, start, 1.0, **options).x[-1]
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-15)
 
 

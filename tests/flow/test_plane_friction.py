@@ -11,15 +11,12 @@ import nonsmooth as ns
 
 from . import plane_friction as plane
 
-ENGINES = ["reference", "auto"]
-
 
 @pytest.mark.slow_cases("three-rolls-reference")
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", plane.CASES)
-def test_reference_cases_to_rounding(name, engine):
+def test_reference_cases_to_rounding(name):
     case = plane.CASES[name]
-    run, begun = plane.run_of(case, 1e-13, engine=engine)
+    run, begun = plane.run_of(case, 1e-13)
     assert run.status.complete
     assert run.itinerary.replace(" ", "") == case["itinerary"]
     of_state, of_times = plane.errors(case, run, begun)
@@ -173,14 +170,13 @@ def test_friction_that_pushes_has_no_unique_future():
     assert moving.x[-1, 2:] == pytest.approx([3.6, 4.8], abs=1e-12)
 
 
-@pytest.mark.parametrize("engine", ["compiled", "reference"])
 @pytest.mark.parametrize(("k", "pull"), [(2, 0.0), (2, 0.3), (3, 0.0)])
-def test_friction_that_misses_a_direction_leaves_its_multiplier_open(k, pull, engine):
+def test_friction_that_misses_a_direction_leaves_its_multiplier_open(k, pull):
     h, lam = ca.SX.sym("h", k), ca.SX.sym("lam", k)
     system = ns.FilippovSystem(
         h, field=pull - ca.vertcat(lam[0], ca.SX(k - 1, 1)), surfaces=[h], multipliers=[lam]
     )
-    run = ns.simulate(system, np.eye(1, k)[0], 5.0, engine=engine)
+    run = ns.simulate(system, np.eye(1, k)[0], 5.0)
     if pull:
         assert run.itinerary == "*"
         return
@@ -210,8 +206,7 @@ def test_a_mode_to_start_in():
                 run(_puck(), [0, 0, 0, 0], 2.0, start_mode=mode)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_start_off_a_set_goes_on_from_a_surface_that_repels(engine):
+def test_a_start_off_a_set_goes_on_from_a_surface_that_repels():
     # A puck of known stopping time beside z' = sign z, which may go either way from z = 0.
     x, z = plane.columns("v1", "v2"), ca.SX.sym("z")
     lam, one = ca.vertcat(*plane.columns("l1", "l2")), ca.SX.sym("one")
@@ -221,7 +216,7 @@ def test_a_start_off_a_set_goes_on_from_a_surface_that_repels(engine):
         surfaces=[ca.vertcat(*x), z],
         multipliers=[lam, one],
     )
-    run = lambda start, mode: ns.simulate(system, start, 3.0, start_mode=mode, engine=engine)
+    run = lambda start, mode: ns.simulate(system, start, 3.0, start_mode=mode)
     start = [0.6, -0.8, 0.0]
     stopped = run(start, None)
     assert stopped.status == ns.Status.NON_UNIQUE
@@ -339,37 +334,34 @@ def test_a_slip_next_to_rounding_is_none(v, w, itinerary):
     assert run.status == ns.Status.STOPPED and run.itinerary == itinerary
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_slip_that_falls_to_rounding_slowly_ends(engine):
+def test_a_slip_that_falls_to_rounding_slowly_ends():
     # Its last steps each end far from a tenth of it.
     p = {"mu": 1.4457164102791997, "d1": 0.30549677017535637, "d2": 0.03326735320558579}
     p |= {"eta": 1.0900828299229095, "G": 0.016207736400060048, "k": 0.6}
     v, w = (2.69033200272562, -1.4892391709366652), (2.7720083301603515, 3.5211825978719737)
     start = [0.0, 0.0, *v, *w, 0.0, -1.0]
-    run = ns.simulate(plane.ball(), start, 20.0, parameters=p, tol=1e-14, engine=engine)
-    fine = ns.simulate(plane.ball(), start, 20.0, parameters=p, tol=1e-12, engine=engine)
+    run = ns.simulate(plane.ball(), start, 20.0, parameters=p, tol=1e-14)
+    fine = ns.simulate(plane.ball(), start, 20.0, parameters=p, tol=1e-12)
     assert run.status == ns.Status.STOPPED and run.itinerary == "* s *"
     assert np.abs(run.x[-1] - fine.x[-1]).max() < 1e-12
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_line_crosses_again_within_the_step_that_left(engine):
+def test_a_line_crosses_again_within_the_step_that_left():
     # Along a line the series of leaving reaches far: to the next zero of slip, where it ends in rounding.
     p = {"mu": 0.05185574893987187, "d1": 0.3057990207800733, "d2": 0.2166692797028548}
     p |= {"eta": 1.4489698921967489, "G": 1.0660467368662658e-06, "k": 2 / 3}
     v, w = (-0.7954321571225536, 1.444639697247086), (-0.3073360719784702, 0.5581744288314956)
     start = [0.0, 0.0, *v, *w, 0.0, -1.0]
-    run = ns.simulate(plane.ball(), start, 20.0, parameters=p, tol=1e-13, engine=engine)
+    run = ns.simulate(plane.ball(), start, 20.0, parameters=p, tol=1e-13)
     along = np.array([0.0, 0.0, np.hypot(*v), 0.0, np.hypot(*w), 0.0, 0.0, -1.0])
-    axis = ns.simulate(plane.ball(), along, 20.0, parameters=p, tol=1e-13, engine=engine)
+    axis = ns.simulate(plane.ball(), along, 20.0, parameters=p, tol=1e-13)
     assert run.itinerary == axis.itinerary == "* * *" and run.status == ns.Status.STOPPED
     assert np.hypot(*run.x[-1, 2:4]) == pytest.approx(abs(axis.x[-1, 2]), abs=1e-13)
 
 
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
 @pytest.mark.parametrize("skew", [0.0, 2.0])
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3, 1e6])
-def test_a_set_is_reached_whatever_the_unit_of_time(size, skew, engine):
+def test_a_set_is_reached_whatever_the_unit_of_time(size, skew):
     """h' = -c (1 + i skew) h/|h| in the complex plane: h winds into zero, and the place is its integral.
 
     Late in a long run the last part of the way is shorter than the rounding of the time.
@@ -383,7 +375,7 @@ def test_a_set_is_reached_whatever_the_unit_of_time(size, skew, engine):
         surfaces=[ca.vertcat(u, v)],
         multipliers=[lam],
     )
-    options = dict(atol=1e-12 * size, rtol=1e-12, engine=engine)
+    options = dict(atol=1e-12 * size, rtol=1e-12)
     run = ns.simulate(block, [0.0, 0.0, size, size], 5 * size, **options)
     place = 2 * size**2 / c * np.exp(0.25j * np.pi) / (2 + 1j * skew)
     assert run.itinerary == "* s" and run.status is ns.Status.REACHED_END
@@ -391,10 +383,9 @@ def test_a_set_is_reached_whatever_the_unit_of_time(size, skew, engine):
     assert abs(complex(*run.x[-1][:2]) - place) < 1e-11 * abs(place)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("k", [2, 3])
 @pytest.mark.parametrize("seed", range(2))
-def test_a_set_is_left_however_much_friction_depends_on_direction(seed, k, engine):
+def test_a_set_is_left_however_much_friction_depends_on_direction(seed, k):
     """A load t a grows until |M^-1 a| t = 1, with friction up to a hundred times stronger in one direction."""
     rng = np.random.default_rng(seed)
     axes = np.linalg.qr(rng.normal(size=(k, k)))[0]
@@ -405,7 +396,7 @@ def test_a_set_is_left_however_much_friction_depends_on_direction(seed, k, engin
     system = ns.FilippovSystem(
         ca.vertsplit(h), field=t * a - m @ force, surfaces=[h], multipliers=[force], time=t
     )
-    run = ns.simulate(system, np.zeros(k), 1.5, engine=engine, tol=1e-12)
+    run = ns.simulate(system, np.zeros(k), 1.5, tol=1e-12)
     assert run.itinerary == "s *" and run.status is ns.Status.REACHED_END
     assert run.events[0].t == pytest.approx(1.0, abs=1e-12)
 

@@ -11,19 +11,12 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_a_flat_block_on_two_feet_slides_and_stays[1.0-each]": "dependent friction",
-    "test_a_flat_block_on_two_feet_slides_and_stays[0.0-each]": "dependent friction",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-08]": "dependent contacts",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-10]": "dependent contacts",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-12]": "dependent contacts",
-    "test_a_slider_crank_without_friction_is_never_inconsistent[1e-13]": "dependent contacts",
     "test_fireflies_fire_one_another": "jumps fire nothing",
     "test_a_tank_empties[0]": "no roots",
     "test_a_tank_empties[1]": "no roots",
     "test_twisting_comes_to_rest_and_stays": "no rest",
     "test_second_order_sliding_rests_from_its_limit[twisting]": "no rest",
     "test_second_order_sliding_rests_from_its_limit[super_twisting]": "no rest",
-    "test_a_load_that_slip_feeds_starts_from_rest[free]": "load that vanishes",
     "test_a_hump_of_friction_releases_at_the_same_force_each_time[0.6495]": "fold of a hidden law",
     "test_a_hump_of_friction_releases_at_the_same_force_each_time[1.5]": "fold of a hidden law",
 }

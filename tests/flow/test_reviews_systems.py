@@ -13,7 +13,6 @@ OPEN = {
     "test_neurons_that_excite_one_another[5-0.05]": "jumps fire nothing",
     "test_neurons_that_excite_one_another[20-0.02]": "jumps fire nothing",
     "test_a_damped_relay_stays_at_rest": "no rest",
-    "test_a_cold_rectifier_starts": "load that vanishes",
     "test_twisting_rests_from_its_limit_on": "no rest",
     "test_super_twisting_rests_from_its_limit_on": "no rest",
     "test_a_rocking_block_comes_to_rest": "no rest",

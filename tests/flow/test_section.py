@@ -1,4 +1,4 @@
-"""Samples at sections, periods and given times are those of closed forms, in every engine."""
+"""Samples at sections, periods and given times are those of closed forms."""
 
 import math
 
@@ -14,7 +14,6 @@ FALL = ns.FilippovSystem(
     [x, v], field=[v, -2], resets=ns.Reset(x, [x, -v], direction=-1, name="floor")
 )
 FORCED = ns.FilippovSystem([x], field=[ca.cos(w * t)], parameters={w: 2.0}, time=t)
-ENGINES = ["reference", "auto", "compiled"]
 
 
 @pytest.fixture(params=["simulate", "ensemble"])
@@ -33,41 +32,36 @@ def sample(request):
     return run
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_crossings_of_a_surface_in_one_direction(sample, engine):
+def test_crossings_of_a_surface_in_one_direction(sample):
     # half a period of each spring: pi above, pi/2 below; speed is kept
     at = ns.Section("h0", direction=1, count=3)
-    times, states, _ = sample(TWO_SPRINGS, [0.0, 1.0], 100.0, at=at, engine=engine)
+    times, states, _ = sample(TWO_SPRINGS, [0.0, 1.0], 100.0, at=at)
     assert np.allclose(times, 1.5 * math.pi * np.arange(1, 4), rtol=0, atol=1e-8)
     assert np.allclose(states, [[0, 1]] * 3, rtol=0, atol=1e-8)
     falling = ns.Section("h0", direction=-1, count=2)
-    times, states, _ = sample(TWO_SPRINGS, [0.0, 1.0], 100.0, at=falling, engine=engine)
+    times, states, _ = sample(TWO_SPRINGS, [0.0, 1.0], 100.0, at=falling)
     assert np.allclose(times, math.pi * np.array([1, 2.5]), rtol=0, atol=1e-8)
     assert np.allclose(states[:, 1], -1, rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_an_expression_in_states_is_a_section_and_its_start_is_no_hit(sample, engine):
+def test_an_expression_in_states_is_a_section_and_its_start_is_no_hit(sample):
     # on the circle x**2 + v**2 = 1 above, the ellipse 4 x**2 + v**2 = 1 below: v = 0 at x = -1/2
     at = ns.Section(v, direction=1, count=3)
-    times, states, _ = sample(TWO_SPRINGS, [-0.5, 0.0], 100.0, at=at, engine=engine)
+    times, states, _ = sample(TWO_SPRINGS, [-0.5, 0.0], 100.0, at=at)
     assert np.allclose(times, 1.5 * math.pi * np.arange(1, 4), rtol=0, atol=1e-8)
     assert np.allclose(states, [[-0.5, 0.0]] * 3, rtol=0, atol=1e-8)
     with pytest.raises(ns.DefinitionError, match="section"):
         sample(TWO_SPRINGS, [-0.5, 0.0], 1.0, at=ns.Section(v - w, count=1))
 
 
-@pytest.mark.parametrize("engine", ["reference", "auto"])
-def test_impacts_and_contacts_are_sections(sample, engine):
+def test_impacts_and_contacts_are_sections(sample):
     # speed halves at each impact: the flights last 2, 1, 1/2, ... after a fall of 1
     ball = ns.FilippovSystem([x, v], field=[v, -2], impacts=ns.Impact(x, restitution=0.5))
     at = ns.Section("impact", count=3, after=True)
-    times, states, _ = sample(ball, [1.0, 0.0], 10.0, at=at, engine=engine)
+    times, states, _ = sample(ball, [1.0, 0.0], 10.0, at=at)
     assert np.allclose(times, [1.0, 2.0, 2.5], rtol=0, atol=1e-9)
     assert np.allclose(states, [[0, 1], [0, 0.5], [0, 0.25]], rtol=0, atol=1e-9)
-    times, states, _ = sample(
-        ball, [1.0, 0.0], 10.0, at=ns.Section("contact", count=1), engine=engine
-    )
+    times, states, _ = sample(ball, [1.0, 0.0], 10.0, at=ns.Section("contact", count=1))
     assert np.allclose(times, [3.0], rtol=0, atol=1e-6) and np.allclose(states, 0.0, atol=1e-6)
 
 
@@ -82,45 +76,39 @@ def test_a_section_written_as_a_surface_is_that_surface_where_motion_may_slide()
     assert away.sample_t.tolist() == [e.t for e in plain.events if e.mode_before == "+"]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_every_third_hit_after_two_that_are_passed_over(sample, engine):
+def test_every_third_hit_after_two_that_are_passed_over(sample):
     # from rest at the height 1 the ball lands at 1, 3, 5, ... with the speed 2
     at = ns.Section("floor", every=3, skip=2, count=2, after=True)
-    times, states, run = sample(FALL, [1.0, 0.0], 100.0, at=at, engine=engine)
+    times, states, run = sample(FALL, [1.0, 0.0], 100.0, at=at)
     assert np.allclose(times, [9, 15], rtol=0, atol=1e-8)
     assert np.allclose(states, [[0, 2], [0, 2]], rtol=0, atol=1e-8)
     status = run.status if np.ndim(run.status) == 0 else run.status[1]
     assert status == ns.Status.STOPPED
     before = ns.Section("reset", count=1)
-    assert np.allclose(sample(FALL, [1.0, 0.0], 9.0, at=before, engine=engine)[1], [[0, -2]])
+    assert np.allclose(sample(FALL, [1.0, 0.0], 9.0, at=before)[1], [[0, -2]])
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_states_at_given_times_also_at_both_ends_and_after_a_jump(sample, engine):
+def test_states_at_given_times_also_at_both_ends_and_after_a_jump(sample):
     given = [0.0, 0.5, 1.5, 2.0, 3.5]
-    times, states, _ = sample(FALL, [1.0, 0.0], 3.5, t_eval=given, engine=engine)
+    times, states, _ = sample(FALL, [1.0, 0.0], 3.5, t_eval=given)
     heights = [1.0, 0.75, 0.75, 1.0, 0.75]
     assert np.array_equal(times, given)
     assert np.allclose(states[:, 0], heights, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_times_after_the_end_of_a_run_are_nan(engine):
+def test_times_after_the_end_of_a_run_are_nan():
     ends = ns.FilippovSystem([x], field=[1], stops=ns.Stop(x - 1))
-    run = ns.simulate(ends, [0.0], 3.0, t_eval=[0.5, 1.0, 1.5], engine=engine)
+    run = ns.simulate(ends, [0.0], 3.0, t_eval=[0.5, 1.0, 1.5])
     assert np.allclose(run.sample_x[:2, 0], [0.5, 1.0]) and np.isnan(run.sample_x[2, 0])
-    many = ns.ensemble(ends, [[0.0], [0.7]], 3.0, t_eval=[0.5, 1.0, 1.5], engine=engine)
+    many = ns.ensemble(ends, [[0.0], [0.7]], 3.0, t_eval=[0.5, 1.0, 1.5])
     assert np.array_equal(many.sample_x[0], run.sample_x, equal_nan=True)
     assert np.isnan(many.sample_t[1]).tolist() == [True, True, True]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_period_may_depend_on_parameters(engine):
+def test_a_period_may_depend_on_parameters():
     # x = sin(w t)/w is back at zero after each period, half way up a quarter later
     values = np.array([2.0, 3.0, np.nan])
-    many = ns.ensemble(
-        FORCED, [[0.0]], 10.0, parameters={"w": values}, at=2 * ca.pi / w, engine=engine
-    )
+    many = ns.ensemble(FORCED, [[0.0]], 10.0, parameters={"w": values}, at=2 * ca.pi / w)
     assert many.sample_t.shape == (1, 3, 4) or many.sample_t.shape == (3, 4)
     times = many.sample_t.reshape(3, 4)
     assert np.allclose(times[0, :3], math.pi * np.array([1, 2, 3])) and np.isnan(times[0, 3])
@@ -132,7 +120,7 @@ def test_a_period_may_depend_on_parameters(engine):
 
 
 @pytest.mark.slow
-def test_engines_and_chunks_agree_on_hits_of_random_runs():
+def test_chunks_agree_on_hits_of_random_runs():
     dry = ns.FilippovSystem(
         [x, v],
         surface=v - 0.3,
@@ -143,14 +131,9 @@ def test_engines_and_chunks_agree_on_hits_of_random_runs():
     )
     starts = np.random.default_rng(0).normal(size=(70, 2))
     for at in (ns.Section("entry", count=4), ns.Section("h0", direction=-1, count=3)):
-        every = [ns.ensemble(dry, starts, 20.0, at=at, engine=engine) for engine in ENGINES]
-        for one in every[1:]:
-            assert np.array_equal(one.status, every[0].status)
-            assert one.itineraries == every[0].itineraries
-            assert np.allclose(one.sample_t, every[0].sample_t, atol=1e-8, equal_nan=True)
-            assert np.allclose(one.sample_x, every[0].sample_x, atol=1e-8, equal_nan=True)
+        every = ns.ensemble(dry, starts, 20.0, at=at)
         small = ns.ensemble(dry, starts, 20.0, at=at, work=ns.Work(threads=2, chunk=7))
-        assert np.array_equal(small.sample_x, every[1].sample_x, equal_nan=True)
+        assert np.array_equal(small.sample_x, every.sample_x, equal_nan=True)
 
 
 @pytest.mark.parametrize(
@@ -201,9 +184,8 @@ def test_events_that_share_a_name_are_hits_of_it() -> None:
     walls = [ns.Impact(1 - x, restitution=0.5), ns.Impact(x + 1, restitution=0.9)]
     system = ns.FilippovSystem([x, v], field=[v, 0 * v], impacts=walls)
     times = [0.9 / 1.3, 0.9 / 1.3 + 2 / 0.65]
-    for engine in ("auto", "reference"):
-        run = ns.simulate(system, [0.1, 1.3], 6.0, at="impact", engine=engine)
-        assert run.sample_t == pytest.approx(times, abs=1e-12)
+    run = ns.simulate(system, [0.1, 1.3], 6.0, at="impact")
+    assert run.sample_t == pytest.approx(times, abs=1e-12)
     second = ns.simulate(system, [0.1, 1.3], 6.0, at="impact 2")
     assert second.sample_t == pytest.approx(times[1:], abs=1e-12)
     named = ns.FilippovSystem(
@@ -234,14 +216,11 @@ def test_sections_beside_a_set_of_codimension_two() -> None:
         multipliers=[lam, one],
     )
     quarters = np.pi * np.array([0.5, 1.5, 2.5])
-    for engine in ("auto", "reference"):
-        run = lambda at, engine=engine: ns.simulate(
-            system, [1.0, 0.0, 1.0, 0.0], 9.5, at=at, engine=engine, tol=1e-12
-        )
-        for at in (z, -z, "h1", v1):
-            assert run(at).sample_t == pytest.approx(quarters, abs=1e-9)
-        for at in (ns.Section(z, 1), ns.Section(-z, -1), ns.Section("h1", 1), ns.Section(v1, 1)):
-            assert run(at).sample_t == pytest.approx(quarters[1:2], abs=1e-9)
+    run = lambda at: ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at=at, tol=1e-12)
+    for at in (z, -z, "h1", v1):
+        assert run(at).sample_t == pytest.approx(quarters, abs=1e-9)
+    for at in (ns.Section(z, 1), ns.Section(-z, -1), ns.Section("h1", 1), ns.Section(v1, 1)):
+        assert run(at).sample_t == pytest.approx(quarters[1:2], abs=1e-9)
     many = ns.ensemble(system, [[1.0, 0.0, 1.0, 0.0]], 9.5, at=ns.Section(z, 1, count=1))
     assert many.sample_t[0] == pytest.approx(quarters[1:2], abs=1e-9)
     with pytest.raises(ns.OptionError, match=r"^at .*\['h0', 'h1'\]"):
@@ -250,11 +229,10 @@ def test_sections_beside_a_set_of_codimension_two() -> None:
         ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at=ns.Section("h0", direction=1))
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_more_hits_than_any_run_has_are_not_met(engine) -> None:
+def test_more_hits_than_any_run_has_are_not_met() -> None:
     """Numbers beyond those of C, where they became others, and zero."""
     relay = ns.FilippovSystem([x, v], surface=v, above=[v, -x - 0.1], below=[v, -x + 0.1])
-    run = lambda at: ns.simulate(relay, [1.05, 0.0], 10.0, at=at, engine=engine)
+    run = lambda at: ns.simulate(relay, [1.05, 0.0], 10.0, at=at)
     hits = run("crossing").sample_t
     assert len(hits) > 2
     sections = {"every": 2**64, "skip": 2**64}, {"every": 2**64 + 1}, {"skip": 2**63}
@@ -268,7 +246,5 @@ def test_more_hits_than_any_run_has_are_not_met(engine) -> None:
             == hits[options.get("every", 1) - 1 :: options.get("every", 1)].tolist()
         )
     for count in 2**63, 2**64 + 1:
-        many = ns.ensemble(
-            relay, [[1.05, 0.0]] * 2, 10.0, at_event=("crossing", count), engine=engine
-        )
+        many = ns.ensemble(relay, [[1.05, 0.0]] * 2, 10.0, at_event=("crossing", count))
         assert np.isnan(many.event_t).all()

@@ -47,7 +47,7 @@ typedef struct { double interval; int64_t pattern; } Recent;
 
 /* What a run is between two steps: lanes give it to the driver for a step that is not clear, and take it back. */
 typedef struct {
-  double t, last_event, length, shortened; /* length of the step before in this mode, or 0 */
+  double t, since, length, shortened; /* since: the last event; length of the step before in this mode, or 0 */
   int64_t steps, events, segment_steps, history;
   int64_t *kinds;
   double *x;
@@ -55,13 +55,13 @@ typedef struct {
   int32_t *side; /* of stops */
   Recent *past;
   int32_t drop, itinerary, status; /* drop: first coefficients of the first guard that vanish */
-} Motion;
+} Suspended;
 
 /* The driver as lanes call it: a run, and what begins one or makes a step of it. */
 typedef struct {
   void *run;
-  void (*begin)(void *run, const Batch *b, const Options *o, int64_t i, Motion *m);
-  void (*step)(void *run, const Batch *b, const Options *o, int64_t i, Motion *m);
+  void (*begin)(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m);
+  void (*step)(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m);
   int64_t random; /* not 0: every other step is given to the driver, at random, which changes no result */
 } Core;
 
@@ -71,9 +71,11 @@ int64_t options_size(void) { return sizeof(Options); }
 int64_t batch_size(void) { return sizeof(Batch); }
 #endif
 
-/* a * b + c rounded once where the processor does that at once. Drivers are compiled without contraction: what
- * is fused is written so, and the same text gives the same bits whatever surrounds it. */
-#if defined(__FMA__) || defined(__ARM_FEATURE_FMA) || defined(__FP_FAST_FMA)
+/* a * b + c, in lanes rounded once where the processor does that at once. The driver is compiled without
+ * contraction and UNFUSED, so that it gives the same bits on every processor. */
+#if defined(UNFUSED)
+#define MULADD(a, b, c) ((a) * (b) + (c))
+#elif defined(__FMA__) || defined(__ARM_FEATURE_FMA) || defined(__FP_FAST_FMA)
 #define MULADD(a, b, c) __builtin_fma(a, b, c)
 #else
 #define MULADD(a, b, c) ((a) * (b) + (c))

@@ -28,12 +28,9 @@ from .arrays import (
     require_size,
     words_of,
 )
-from .building.build import build
-from .building.codegen import (
-    MOST_ORDER,
-    interpreter_source,
-    tape_order,
-)
+from .building.codegen import tape_order
+from .building.core_source import MOST_ORDER
+from .library import core_library
 
 # Where a dense run is written: arrays of steps, points and events, which grow.
 
@@ -197,7 +194,7 @@ class _System(ctypes.Structure):
         *[(name, _Entries) for name in _ENTRIES],
         *[(name, _POINTER) for name in (*_TABLES, "slope_output", "slope_moves")],
         *[(name, _I32) for name in ("linear", "linear_free")],
-        *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards")],
+        *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets")],
         *[(name, _POINTER) for name in ("set_first", "set_size", "set_of", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
@@ -206,8 +203,8 @@ class _System(ctypes.Structure):
 
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL:
-    """Return the interpreter, compiled when it is first asked for on a machine."""
-    return _declared(build(interpreter_source()))
+    """Return the driver."""
+    return _declared(core_library())
 
 
 def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
@@ -221,6 +218,7 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
         getattr(made, name).argtypes = [_POINTER]
     made.table_read.argtypes = [_POINTER] * 4
     made.run_new.argtypes = [_POINTER] * 2
+    made.run_ask.argtypes = [_POINTER, _POINTER, _I64]
     made.run_begin.argtypes = [*[_POINTER] * 6, _D]
     made.run_continue.argtypes = [_POINTER, _I64]
     made.run_read.argtypes = [_POINTER] * 5
@@ -325,6 +323,7 @@ class TapeEngine:
             "bent": coupled.linearity.bent_rows,
             "bent_free": coupled.linearity.bent_free_rows,
             "bent_guards": coupled.linearity.bent_guards,
+            "curved": coupled.linearity.curved_guards,
             "set_first": [members[0] for members in system.sets],
             "set_size": [len(members) for members in system.sets],
             "set_of": [_place(system, i) for i in range(m)],
@@ -346,14 +345,15 @@ class TapeEngine:
 
     # one trajectory ----------------------------------------------------------------------------
 
-    def run(self, x: Array, p: Array, options: Options) -> Run:
-        """Run one trajectory from an extended start, dense output kept."""
+    def run(self, x: Array, p: Array, options: Options, asked: Array | None = None) -> Run:
+        """Run one trajectory from an extended start, dense output kept, to be read at ``asked`` times."""
         output = Output(self.system.extended_dimension, self.order, self._rooms)
         x, p = np.array(x, float), np.array([*p, 0.0], float)
         start = self._start_mode(options)
         with self.held_table() as table, self.held_run(table) as state:
             c_options = ctypes.byref(options_of(self.system, options, dense=True))
             given = (address(x), address(p), address(start))
+            library().run_ask(state, address(asked), 0 if asked is None else len(asked))
             library().run_begin(state, c_options, output.pointer, *given, options.t_start)
             while True:
                 # Python hears Ctrl-C between the calls.

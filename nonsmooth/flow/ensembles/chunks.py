@@ -34,7 +34,7 @@ class Job:
     at: tuple[int, int] | None
     times: Times | None
     room: int | None
-    engine: str  # reference, tape or lanes
+    engine: str  # lanes or core
 
 
 def shipped(job: Job) -> Job:
@@ -61,11 +61,10 @@ def run_chunk(
     start = np.where(bad[:, None], np.nan, x) if bad.any() else x
     times = None if job.times is None else job.times.of(p)
     chunk = out or Chunk.empty(len(x), system, job.at is not None, job.room)
-    if job.engine == "reference":
+    if tape_for(system, job.options) is None:
         _refuse(chunk, system, start, job.options)
     else:
         _run_compiled(job, system, start, p, chunk, stop, times)
-    handed = bool(np.any(chunk.status == HAND_OVER))
     rest = np.flatnonzero(chunk.status == HAND_OVER)
     words = dict(enumerate(chunk.words))
     for i in rest.tolist():
@@ -73,7 +72,7 @@ def run_chunk(
             raise Stopped
         words[len(words)] = _run_reference(chunk, system, i, start[i], p, len(words), job, times)
     chunk.x[bad] = x[bad, : system.dimension]
-    if job.engine == "reference" or handed:
+    if rest.size:
         used = np.bincount(chunk.itinerary).nonzero()[0].tolist()
         chunk.rename({code: words[code] for code in used})
     return chunk

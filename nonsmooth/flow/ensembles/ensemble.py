@@ -11,13 +11,14 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ...model import FilippovSystem, OptionError, require_system
+from ..compiled.building.compilers import ADVICE, CompilerError, find_compiler
 from ..compiled.lanes.engine import lanes_for
-from ..compiled.tape import library, tape_for
+from ..compiled.tape import library
 from ..constants import KINDS
 from ..options import Options, tolerances
 from ..results import Chunk, Collected, Ensemble
 from ..section import KINDS_OF_SECTIONS, read_sampling, sectioned
-from ..select import compiled_or_none, use_compiled
+from ..warn import warn_once
 from .chunks import Job
 from .lazy_starts import LazyStarts
 from .on_device import CHUNK, require_device, run_on_device
@@ -26,7 +27,7 @@ from .store import Store
 from .work import Work, checked_work, run_all, size_of_chunk
 
 #: Below so many trajectories the engine that runs several in step is not compiled; the second number is for
-#: systems with a set, which take longer to compile, with engine="auto".
+#: systems with a set, which take longer to compile.
 _FEW, _FEW_WITH_SETS = 64, 4000
 
 
@@ -48,7 +49,6 @@ def ensemble(
     t_eval: ArrayLike | None = None,
     at: Any = None,
     work: Work | None = None,
-    engine: str = "auto",
     device: str | None = None,
 ) -> Ensemble:
     """Integrate many trajectories and keep their ends.
@@ -76,11 +76,9 @@ def ensemble(
         Keep the states at a section; one at events needs a ``count``. See :class:`Section`.
     work : Work, optional
         Threads or an executor, size of a chunk, progress bar, store; see :class:`Work`.
-    engine : {"auto", "reference", "compiled"}
-        The driver: ``"auto"`` is the compiled one where there is a compiler.
     device : {None, "cuda"}, optional
-        ``"cuda"`` runs on an NVIDIA card; rare cases fall back to ``engine``. It needs the packages
-        of ``nonsmooth-dynamics[cuda]``, and a system of at most one surface without resets and contacts.
+        ``"cuda"`` runs on an NVIDIA card; rare cases fall back to the processor. It needs the
+        packages of ``nonsmooth-dynamics[cuda]``, and a system of at most one surface without resets and contacts.
 
     Returns
     -------
@@ -94,11 +92,11 @@ def ensemble(
     ParameterError
         An unknown parameter, or one without a value.
     OptionError
-        A tolerance, a limit, a time, a section or an engine out of its range.
+        A tolerance, a limit, a time or a section out of its range.
     DefinitionError
         ``system`` is none; a ``start_mode`` that it does not have.
     CompilerError
-        ``engine="compiled"`` where nothing compiles.
+        The driver in C is not there yet, and no C compiler builds it.
     DeviceError
         ``device="cuda"`` without a card, its driver or the packages.
 
@@ -139,7 +137,7 @@ def ensemble(
             "at=nonsmooth.Section(..., count=100) to keep up to 100 states of each run."
         )
     step = sampling.room is None and t_end > t_start and device is None
-    chosen = engine_for(system, options, engine, starts.count, step)
+    chosen = engine_for(system, options, starts.count, step)
     job = Job(system, options, number, sampling.times, sampling.room, chosen)
     if device is not None:
         require_device(job, device, work.executor is not None)
@@ -162,28 +160,27 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     if work.store is None:
         results = collected(None)
         run_all(job, starts, results, work, size(), None, away)
-        return results.ensemble()
+        return results.ensemble(job.engine if away is None else str(device))
     store = Store(work.store, _problem(system, starts, job, device))
     with store.opened(size):
         results, codes = collected(store.arrays(none, count)), store.codes(count)
         run_all(job, starts, results, work, store.chunk, store, away)
-        return results.ensemble(codes)
+        return results.ensemble(job.engine if away is None else str(device), codes)
 
 
-def engine_for(
-    system: FilippovSystem, options: Options, engine: str, count: int, step: bool
-) -> str:
-    """Return the driver of all chunks: reference, tape or lanes."""
-    # It is compiled here, so that all chunks use the same one.
-    lanes, tape = lanes_for(system, options) if step else None, tape_for(system, options)
-    if not use_compiled(engine, tape is not None) or tape is None:
-        return "reference"
-    few = _FEW_WITH_SETS if system.sets and engine == "auto" else _FEW
-    if lanes is not None and count >= few:
-        found = compiled_or_none(engine, lanes, lambda: lanes.library)
-        return "reference" if found is None else "lanes"
-    done = compiled_or_none(engine, library, library)
-    return "reference" if done is None else "tape"
+def engine_for(system: FilippovSystem, options: Options, count: int, step: bool) -> str:
+    """Return what runs all chunks, compiled here so that all use the same: lanes or core."""
+    lanes = lanes_for(system, options) if step else None
+    if lanes is not None and count >= (_FEW_WITH_SETS if system.sets else _FEW):
+        try:
+            if find_compiler() is not None and lanes.library:
+                return "lanes"
+        except CompilerError as error:
+            warn_once(
+                f"{error.brief or error} Several trajectories in step need a compiler. {ADVICE}"
+            )
+    library()
+    return "core"
 
 
 def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:

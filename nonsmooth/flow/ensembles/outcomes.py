@@ -121,7 +121,6 @@ def outcomes(
     ranges: Mapping[str, tuple[float, float]] | None = None,
     bins: int = 100,
     work: Work | None = None,
-    engine: str = "auto",
     device: str | None = None,
 ) -> Outcomes:
     """Integrate many trajectories and count their ends: by status and itinerary, means and histograms.
@@ -147,8 +146,6 @@ def outcomes(
         Number of bins.
     work : Work, optional
         Threads, executor, size of a chunk, progress bar.
-    engine : {"auto", "reference", "compiled"}
-        Which driver, as for :func:`ensemble`.
     device : {None, "cuda"}, optional
         ``"cuda"`` runs and reduces on an NVIDIA card.
 
@@ -183,9 +180,7 @@ def outcomes(
     made = _Sums(system, _bins(system, ranges or {}, bins))
     starts = Starts(system, x0, parameters, t_start)
     step = t_end > t_start and device is None
-    job = Job(
-        system, options, None, None, None, engine_for(system, options, engine, starts.count, step)
-    )
+    job = Job(system, options, None, None, None, engine_for(system, options, starts.count, step))
     if device is None:
         most = work.largest(Chunk.empty(0, system, at=False).row_size)
         size = work.chunk or size_of_chunk(job, starts, work.workers, most)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
-from ..expressions.jets import taylor
 from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
 from ..laws.explicit import explicit, solved
@@ -71,13 +70,6 @@ class PlainField:
         moving = np.arange(self.entries)
         system = self.motion.system
         return (np.delete(moving, system.dimension) if system.time_dependent else moving,)
-
-    @cached_property
-    def jets(self) -> Evaluator:
-        """(y, p) -> Taylor coefficients (entries, ORDER + 1) of the flow."""
-        jet, _ = taylor(self.field, ca.SX(0, 1), self.states, self.parameters, ORDER)
-        inputs = [self.states, self.parameters]
-        return Evaluator(ca.Function("jets", inputs, [ca.densify(jet)], {"cse": True}))
 
     @cached_property
     def series(self) -> Series:
@@ -252,11 +244,6 @@ class GuardedField(PlainField):
     def series(self) -> Series:
         """The Taylor rules of the field and of the guards."""
         return series_of([self.states, self.parameters], [self.field, self.motion.functions])
-
-    @cached_property
-    def jets(self) -> Evaluator:
-        """(y, p) -> coefficients of the states (N + k, ORDER + 1) and of the guards."""
-        return Evaluator(self.motion.jet_function(ORDER))
 
     @cached_property
     def starts(self) -> Evaluator:

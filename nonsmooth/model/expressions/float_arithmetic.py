@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-import casadi as ca
-
 
 def _erfinv(y: float) -> float:
     """CasADi's erfinv, off by up to 2e-6 below zero, and two Newton steps."""
+    import casadi as ca  # here: a build of the package has no CasADi
+
     w = float(ca.erfinv(y))
     for _ in range(2 if math.isfinite(w) else 0):
         w -= (math.erf(w) - y) * 0.5 * math.sqrt(math.pi) * math.exp(w * w)
@@ -94,5 +94,7 @@ class Numbers:
                 return UNARY[op](values[0])
             return BINARY[op](values[0], values[1])
         except (OverflowError, ZeroDivisionError, ValueError):  # infinite or undefined
+            import casadi as ca
+
             code, given = getattr(ca, "OP_" + op.upper()), map(ca.DM, values)
             return float((ca.DM.unary if len(values) == 1 else ca.DM.binary)(code, *given))

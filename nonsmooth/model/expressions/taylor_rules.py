@@ -15,27 +15,6 @@ from typing import cast
 from ..errors import NotSmoothError
 from .graph import Node
 
-#: Rules by number, as in the C enumeration.
-RULES = (
-    "constant",
-    "input",
-    "apply",
-    "add",
-    "sub",
-    "neg",
-    "twice",
-    "mul",
-    "sq",
-    "div",
-    "sqrt",
-    "power",
-    "affine",
-    "integral",
-    "quotient",
-    "atan2",
-    "chosen",
-)
-
 
 @dataclass(frozen=True)
 class Rule:

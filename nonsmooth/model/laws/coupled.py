@@ -32,6 +32,7 @@ from ..expressions.linearity import linearity
 from ..expressions.simplification import simplified
 from ..expressions.taylor_rules import lower, touched
 from ..expressions.unused_terms import without_unused_terms
+from ..numbering import FALL, LIMIT_FALL
 from ..values import Array
 from .evaluators import Evaluator
 from .switches import Guard, event_guards
@@ -68,6 +69,13 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
         column = ca.vertcat(*entries)
         if ca.depends_on(column, lam) or not ca.depends_on(column, variables):
             continue  # products of multipliers, or hidden dynamics; a constant
+        if len(members) == 1:  # what vanishes with h has no part in sliding
+            h, others = system.definition.surfaces[members[0]], ca.vertcat(p, lam, reactions)
+            acts = [not vanish_on([e], h, x, others) for e in entries]
+            places = [own for own, is_there in zip(places, acts, strict=True) if is_there]
+            entries = [e for e, is_there in zip(entries, acts, strict=True) if is_there]
+        if not entries:
+            continue
         reduced, factor = cancel_common_factor(entries, variables, known)
         if ca.depends_on(factor, variables):
             field = ca.SX(field)
@@ -166,11 +174,12 @@ class Coupled:
         return [i for i, sign in enumerate(signs) if sign == 0 and not self._is_idle(i, signs)]
 
     def _is_idle(self, i: int, signs: Sequence[int]) -> bool:
-        """Whether a multiplier makes no difference: on its surface, or at an open contact."""
+        """Whether a multiplier makes no difference: on its surface, or at open contacts alone."""
         if i >= self._surfaces:
             return False
-        open_ones = [j for j in self.carriers[i] if signs[self._surfaces + j]]
-        return self.continuous[i] or bool(open_ones)
+        carried = self.carriers[i]
+        idle = bool(carried) and all(signs[self._surfaces + j] for j in carried)
+        return self.continuous[i] or idle
 
     def guards(self, mode: str) -> tuple[Guard, ...]:
         """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""
@@ -410,12 +419,6 @@ def coupled_of(system: FilippovSystem) -> Coupled:
 
 
 # multipliers of a mode as power series ---------------------------------------------------------
-
-#: A step ends where |h| has fallen to this part: towards h = 0 a series may go on as -|h|.
-FALL = 0.1
-
-#: The same for friction's limit on the set, whose square is compared with that of what is needed.
-LIMIT_FALL = 1e-3
 
 #: A rate of leaving below this part of its terms is zero by rounding.
 _STILL = 64 * np.finfo(float).eps

@@ -14,21 +14,14 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expressions.float_arithmetic import BINARY, UNARY
 from ..expressions.graph import depends_on, instructions
 from ..expressions.simplification import simplified
-from ..expressions.taylor_rules import RULES, Rule, entered, lower
+from ..expressions.taylor_rules import Rule, entered, lower
 from ..laws.coupled import Coupled
+from ..numbering import OPERATIONS, TAPE_RULES
 from ..values import Array
 
 Integers = NDArray[np.int32]
-
-#: Operations and rules by number, as in the C enumerations. Where one argument does not move, sums are
-#: ``shift``, differences ``lower`` and ``below`` it, products ``scale``, quotients ``over`` and ``under`` it;
-#: an ``integral`` over what is affine in the time, as in cos(omega t), is a ``turn``, and what is ``chosen`` by a
-#: factor that does not move is ``gated``.
-OPERATIONS = ("const", "input", *UNARY, *BINARY)
-TAPE_RULES = (*RULES, "shift", "lower", "below", "scale", "over", "under", "turn", "gated")
 
 
 @dataclass(frozen=True)

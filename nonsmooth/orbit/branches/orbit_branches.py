@@ -640,7 +640,7 @@ def _beginnings(
     before = at.events[i - 1]
     rate = at.by_leg[i - 1].rate[: before.gradient.size]
     return {
-        "cusp with the other sliding bifurcation": float(field.jets(y, p)[1][k, order]),
+        "cusp with the other sliding bifurcation": float(field.starts(y, p)[1][k, order]),
         "two-fold": float(before.gradient @ rate),
     }
 

@@ -63,7 +63,6 @@ class PlaneOrbits:
                 start_mode=mode,
                 max_events=_EVENTS,
                 max_steps=_CHUNK,
-                engine="reference",
             )
             entry = next((e for e in part.events if landing and e.kind == "entry"), None)
             until = None if entry is None else (entry.t, entry.x)

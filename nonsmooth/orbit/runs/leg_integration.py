@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...flow.compiled.smooth import LegsProgram
-from ...flow.fixed import MOST_STEPS, TOLERANCE, has_interpreter, legs_program, stuck
+from ...flow.fixed import MOST_STEPS, TOLERANCE, legs_program, stuck
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent
 from ...model.derivatives.variational import plain_field
@@ -136,7 +136,7 @@ class LegIntegrator:
             States rounded, and in extended precision what that leaves. None where legs fail or
             where not each is a flow of the states to one event.
         """
-        program = self._plain_program if has_interpreter() else None
+        program = self._plain_program
         if program is None:
             return None
         n = starts.shape[1]
@@ -174,7 +174,7 @@ class LegIntegrator:
         self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE
     ) -> LegFlows:
         """Integrate all legs."""
-        if len(set(self.sizes)) > 1 or not has_interpreter():
+        if len(set(self.sizes)) > 1:
             return self._one_by_one(starts, durations, p)
         n, most = starts.shape[1], self._most
         template, fixed, ours, theirs = self._template

@@ -56,7 +56,7 @@ def test_large_maps_are_all_run_in_lanes(count, monkeypatch):
     """So that a million bounces take seconds (`make bench`)."""
 
     def refuse(*_):
-        raise AssertionError("a bounce was handed to the reference driver")
+        raise AssertionError("a bounce fell back")
 
     monkeypatch.setattr("nonsmooth.flow.ensembles.chunks._run_reference", refuse)
     over = dict(xdot=np.linspace(-2, 2, count), omega=np.linspace(-4, 4, count))

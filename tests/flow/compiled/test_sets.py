@@ -1,14 +1,10 @@
-"""Friction in the plane in the driver in C: the reference driver's itineraries and states, the generated program's
-bits, and what is left to the reference driver."""
+"""Friction in the plane: ensembles and runs alone, dense output."""
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled.tape import tape_for
-from nonsmooth.flow.constants import HAND_OVER
-from nonsmooth.flow.options import Options
 from tests.flow import plane_friction as plane
 
 
@@ -36,42 +32,6 @@ def landings(count, seed):
         yield p, np.array([0.0, 0.0, *v, *w, 0.0, -1.0]), ("contact", "net")[k // 4 % 2]
 
 
-def compare(count, seed, tol):
-    """Largest difference of last states; itineraries are the same, and nothing was handed over."""
-    worst = 0.0
-    for p, x, load in landings(count, seed):
-        system = plane.ball(load)
-        options = Options(t_end=20.0, rtol=tol, atol=tol)
-        tape = tape_for(system, options)
-        assert tape.run(x, system.parameter_vector(p), options).status != HAND_OVER
-        fast = ns.simulate(system, x, 20.0, parameters=p, tol=tol)
-        slow = ns.simulate(system, x, 20.0, parameters=p, tol=tol, engine="reference")
-        assert fast.itinerary == slow.itinerary and fast.status == slow.status
-        times = np.array([[e.t for e in run.events] for run in (fast, slow)])
-        worst = max(
-            worst, np.abs(fast.x[-1] - slow.x[-1]).max(), 0.01 * np.abs(times[0] - times[1]).max()
-        )
-    return worst
-
-
-@pytest.mark.slow
-def test_random_landings_agree_with_the_reference():
-    assert compare(16, 3, 1e-12) < 1e-12
-
-
-@pytest.mark.slow
-def test_many_random_landings_agree_with_the_reference():
-    assert compare(160, 4, 1e-14) < 5e-14
-
-
-def test_the_generated_program_gives_the_same_bits():
-    case = plane.CASES["three-rolls"]
-    one, _ = plane.run_of(case, 1e-10)
-    two, _ = plane.run_of(case, 1e-10, engine="compiled")
-    assert one.itinerary == two.itinerary == "* s * s * s *"
-    assert np.array_equal(one.t, two.t) and np.array_equal(one.x, two.x)
-
-
 def test_ensembles_are_runs():
     cases = list(landings(40, 5))
     starts = np.array([x for _, x, _ in cases])
@@ -92,29 +52,25 @@ def test_ensembles_are_runs():
 def test_dense_output_and_samples_through_a_stop_of_slip():
     case = plane.CASES["oblique-slow-net"]
     fast, _ = plane.run_of(case, 1e-11)
-    slow, _ = plane.run_of(case, 1e-11, engine="reference")
+    fine, _ = plane.run_of(case, 1e-14)
     t = np.sort(
         np.concatenate([np.linspace(0, 2.9, 200), fast.events[0].t + np.logspace(-16, -2, 20)])
     )
-    assert np.abs(fast(t) - slow(t)).max() < 1e-9
+    assert np.abs(fast(t) - fine(t)).max() < 1e-9
     p = {name: float(value) for name, value in case["parameters"].items()}
     start = fast.x[0]
     kept = ns.simulate(plane.ball("net"), start, 20.0, parameters=p, tol=1e-11, t_eval=t)
     assert np.array_equal(kept.sample_x, fast(t))
-    assert [s.mode for s in fast.segments] == [s.mode for s in slow.segments] == ["*", "s", "*"]
+    assert [s.mode for s in fast.segments] == [s.mode for s in fine.segments] == ["*", "s", "*"]
 
 
 def test_crossings_on_a_line_are_stretches_of_their_own():
     p = {"mu": 0.2037, "d1": 0.2835, "d2": 0.0897, "eta": 5.617, "G": 5.6e-4, "k": 0.4}
     line = np.array([0.6, 0.8])
     start = [0.0, 0.0, *(-1.533 * line), *(-0.0878 * line), 0.0, -1.0]
-    runs = [
-        ns.simulate(plane.ball(), start, 20.0, parameters=p, engine=e)
-        for e in ("auto", "reference")
-    ]
-    assert runs[0].itinerary == runs[1].itinerary == "* * * * s *"
-    assert [e.kind for e in runs[0].events] == [e.kind for e in runs[1].events]
-    assert [s.mode for s in runs[0].segments] == list("****s*")
+    run = ns.simulate(plane.ball(), start, 20.0, parameters=p)
+    assert run.itinerary == "* * * * s *"
+    assert [s.mode for s in run.segments] == list("****s*")
 
 
 def test_what_is_rare_is_left_to_the_reference():

@@ -69,7 +69,7 @@ def same(a, b):
 def test_each_start_as_by_simulate(system, starts):
     many = ensemble(system, starts, 12.0, at_event=("entry", 2))
     for k in range(0, 300, 15):
-        run = simulate(system, starts[k], 12.0, engine="reference")
+        run = simulate(system, starts[k], 12.0)
         assert many.itinerary[k] == run.itinerary
         assert many.status[k] == run.status
         np.testing.assert_allclose(many.x[k], run.x[-1], atol=1e-11)
@@ -122,16 +122,6 @@ def test_not_finite_is_reported_and_the_rest_goes_on(system, starts):
     assert "NOT_FINITE 1" in repr(many)
 
 
-@needs_compiler
-def test_reference_and_compiled_engines_agree(system, starts):
-    few = starts[:6]
-    for options in ({"engine": "compiled"}, {"engine": "auto"}):
-        one = ensemble(system, few, 4.0, **options)
-        two = ensemble(system, few, 4.0, engine="reference", at_event=("crossing", 1))
-        assert one.itinerary.tolist() == two.itinerary.tolist()
-        np.testing.assert_allclose(one.x, two.x, atol=1e-12)
-
-
 @pytest.mark.slow
 @needs_compiler
 def test_process_pool_gives_the_same_bits(system, starts):
@@ -181,7 +171,6 @@ NONE = np.zeros((4, 2))
         ({"at_event": ("exit", 0)}, OptionError, "^at_event"),
         ({"at_event": ("end", 1)}, OptionError, "^at_event"),
         ({"at_event": 3}, OptionError, "^at_event"),
-        ({"engine": "warp"}, OptionError, "^engine"),
         ({"tol": 2.0}, OptionError, "^tol"),
         ({"work": 3}, OptionError, "^work"),
         ({"system": None}, DefinitionError, "^system"),
@@ -277,20 +266,16 @@ def test_runs_that_fall_back_share_the_itineraries_of_lanes():
     assert many.itinerary[::40].tolist() == single
 
 
-@pytest.mark.parametrize(
-    ("engine", "count"),
-    [("reference", 3), ("auto", 3), pytest.param("auto", 100, marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize(("engine", "count"), [("core", 3), ("lanes", 100)])
 def test_events_that_cannot_happen_are_none(engine, count):
     """A relay enters sliding once; a saw is set back by 1 whenever it reaches 5."""
     x, starts = ca.SX.sym("x"), np.linspace(-1.0, 4.0, count)[:, None]
     relay = FilippovSystem([x], surface=x, above=[-1], below=[2], stops=Stop(x - 5, 1))
-    many = ensemble(relay, starts, 10.0, engine=engine)
+    many = ensemble(relay, starts, 10.0)
+    assert many.engine == engine
     assert list(many.events) == list(KINDS)
     for kind, number in pickle.loads(pickle.dumps(many)).events.items():
         assert number.shape == (count,) and np.all(number == (kind in ("entry", "end"))), kind
-    saw = ensemble(
-        FilippovSystem([x], field=[1], resets=Reset(x - 5, [x - 1], 1)), starts, 9.7, engine=engine
-    )
+    saw = ensemble(FilippovSystem([x], field=[1], resets=Reset(x - 5, [x - 1], 1)), starts, 9.7)
     assert np.array_equal(saw.events["reset"], np.floor(5.7 + starts[:, 0]))
     assert np.all(saw.events["end"] == 1) and not saw.events["stop"].any()

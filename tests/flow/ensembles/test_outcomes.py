@@ -84,6 +84,6 @@ def test_what_keeps_nothing_has_no_store(system, tmp_path):
 
 
 def test_no_runs_have_no_means(system):
-    found = ns.outcomes(system, np.empty((0, 2)), 1.0, engine="reference")
+    found = ns.outcomes(system, np.empty((0, 2)), 1.0)
     assert (found.count, found.status, found.itineraries) == (0, {}, {})
     assert np.isnan(found.mean["x"])

@@ -81,10 +81,9 @@ def test_repelling_sliding_that_was_chosen_goes_on_until_it_ends():
     """
     system = ns.FilippovSystem([x, z], surface=z, above=[1, 1], below=[1, x - 1])
     assert ns.simulate(system, [0.0, 0.0], 3.0).status is ns.Status.NON_UNIQUE
-    for engine in ("auto", "reference", "compiled"):
-        run = ns.simulate(system, [0.0, 0.0], 3.0, start_mode="s", engine=engine, tol=1e-12)
-        assert run.itinerary == "s +" and run.events[0].t == pytest.approx(1.0, abs=1e-12)
-        np.testing.assert_allclose(run.x[-1], [3.0, 2.0], atol=1e-11)
+    run = ns.simulate(system, [0.0, 0.0], 3.0, start_mode="s", tol=1e-12)
+    assert run.itinerary == "s +" and run.events[0].t == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(run.x[-1], [3.0, 2.0], atol=1e-11)
 
 
 @pytest.mark.parametrize(("mode", "start"), [("+", 0.0), ("-", 0.0), ("s", 3.0)])
@@ -118,13 +117,12 @@ def test_finite_time_to_a_teixeira_singularity():
     np.testing.assert_allclose(run.x[-1], 0.0, atol=1e-10)
 
 
-@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
-def test_sliding_into_a_mixed_two_fold_is_not_taken_for_an_exit(engine):
+def test_sliding_into_a_mixed_two_fold_is_not_taken_for_an_exit():
     """mix-C, sigma = (+, +), nu = (-3, -1/2): a whole sector reaches s, none of it leaves there."""
     system = ns.FilippovSystem([x, y, z], surface=x, above=[-y, -1, -3], below=[z, -0.5, 1])
     for angle in np.linspace(0.05, np.arctan(2.0) - 0.05, 12):  # below the strong canard, slope 2
         start = [0.0, np.cos(angle), np.sin(angle)]
-        run = ns.simulate(system, start, 10.0, engine=engine)
+        run = ns.simulate(system, start, 10.0)
         assert run.status is ns.Status.NON_UNIQUE and run.itinerary == "s"
         np.testing.assert_allclose(run.x[-1], 0.0, atol=1e-8)
 
@@ -263,12 +261,9 @@ def test_a_stop_inside_the_singular_step_is_not_skipped():
     assert run.status is ns.Status.STOPPED and run.t[-1] == pytest.approx(1e-6, rel=1e-9)
 
 
-ENGINES = ["reference", "auto", "compiled"]
-
-
-def rows(start, engine):
-    """Starts that are all the same: enough for lanes, or a few for the driver that is slow."""
-    return np.tile(start, (100 if engine == "compiled" else 3, 1))
+def rows(start):
+    """Starts that are all the same, enough for lanes."""
+    return np.tile(start, (100, 1))
 
 
 def and_slowly(fast, *slow):
@@ -276,47 +271,41 @@ def and_slowly(fast, *slow):
     return [*fast, *(pytest.param(case, marks=pytest.mark.slow) for case in slow)]
 
 
-@pytest.mark.slow_cases("3e-14-compiled", "-3e-14-compiled")
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("gap", [3e-14, -3e-14])
-def test_events_keep_their_order_until_rounding(engine, gap):
+def test_events_keep_their_order_until_rounding(gap):
     """x' = 1 from -1 meets x = 0 at t = 1, and a stop a few dozen roundings before or after."""
     system = ns.FilippovSystem(
         [x, y], field=[1, -lam], multipliers=lam, surface=x, stops=[ns.Stop(x - gap, 1, "wall")]
     )
-    run = ns.simulate(system, [-1.0, 0.0], 2.0, engine=engine)
+    run = ns.simulate(system, [-1.0, 0.0], 2.0)
     assert run.itinerary == ("- +" if gap > 0 else "-")
     assert run.t[-1] == pytest.approx(1.0 + gap, abs=5e-16)
-    many = ns.ensemble(system, rows([-1.0, 0.0], engine), 2.0, engine=engine)
+    many = ns.ensemble(system, rows([-1.0, 0.0]), 2.0)
     assert set(many.itinerary) == {run.itinerary}
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("offset", [5e-14, -5e-14])
-def test_a_start_is_on_a_surface_only_to_rounding(engine, offset):
+def test_a_start_is_on_a_surface_only_to_rounding(offset):
     """Sliding along x = y + 1.5 begins where the surface is met, unless the start is on it."""
     system = ns.FilippovSystem([x, y], field=[-lam, 0], multipliers=lam, surface=x - y)
     for start, word in (([1.5 + offset, 1.5], ("+ s", "- s")[offset < 0]), ([1.5, 1.5], "s")):
-        assert ns.simulate(system, start, 1.0, engine=engine).itinerary == word
-        many = ns.ensemble(system, rows(start, engine), 1.0, engine=engine)
+        assert ns.simulate(system, start, 1.0).itinerary == word
+        many = ns.ensemble(system, rows(start), 1.0)
         assert set(many.itinerary) == {word}
 
 
-@pytest.mark.slow_cases("1e-13-compiled")
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     "tol", and_slowly([1e-4, 1e-8, 1e-13], 1e-5, 1e-6, 1e-7, 1e-9, 1e-10, 1e-11, 1e-12)
 )
-def test_a_guard_far_below_the_tolerance_keeps_its_sign(engine, tol):
+def test_a_guard_far_below_the_tolerance_keeps_its_sign(tol):
     """y^(3/2) grows from 3e-20; beyond its circle of convergence the series falls through zero."""
     system = ns.FilippovSystem([y], field=[1], stops=[ns.Stop(y**1.5, -1, "no load")])
-    run = ns.simulate(system, [1e-13], 1.0, tol=tol, engine=engine)
+    run = ns.simulate(system, [1e-13], 1.0, tol=tol)
     assert run.status is ns.Status.REACHED_END
-    many = ns.ensemble(system, rows([1e-13], engine), 1.0, tol=tol, engine=engine)
+    many = ns.ensemble(system, rows([1e-13]), 1.0, tol=tol)
     assert set(many.status) == {ns.Status.REACHED_END}
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     ("m", "tol"),
     [
@@ -325,19 +314,19 @@ def test_a_guard_far_below_the_tolerance_keeps_its_sign(engine, tol):
         *[pytest.param(3, tol, marks=pytest.mark.slow) for tol in (1e-4, 1e-7, 1e-10)],
     ],
 )
-def test_a_polynomial_does_not_pass_a_branch_point(m, tol, engine):
+def test_a_polynomial_does_not_pass_a_branch_point(m, tol):
     """x' = -x^(1 - 1/m) from 1 is (1 - t/m)^m, a polynomial, to t = m; beyond, x stays 0."""
     power = ca.sqrt(x) if m == 2 else x ** (1 - 1 / m)
     system = ns.FilippovSystem([x, y], field=[-power, 1], surface=y - 4, multipliers=lam)
-    run = ns.simulate(system, [1.0, 0.0], 5.0, tol=tol, engine=engine)
+    run = ns.simulate(system, [1.0, 0.0], 5.0, tol=tol)
     exact = np.maximum(0.0, 1 - run.t / m) ** m
     assert run.status is ns.Status.STEP_TOO_SMALL and "root" in run.message
     assert np.max(np.abs(run.x[:, 0] - exact)) < 10 * tol
     assert run.t[-1] > m * (1 - 2 * tol ** (1 / m))
-    many = ns.ensemble(system, rows([1.0, 0.0], engine), 5.0, tol=tol, engine=engine)
+    many = ns.ensemble(system, rows([1.0, 0.0]), 5.0, tol=tol)
     assert set(many.status) == {ns.Status.STEP_TOO_SMALL}
     assert np.max(np.abs(many.x - run.x[-1])) < 10 * tol
-    before = ns.simulate(system, [1.0, 0.0], 1.5, tol=tol, engine=engine)
+    before = ns.simulate(system, [1.0, 0.0], 1.5, tol=tol)
     assert before.x[-1, 0] == pytest.approx((1 - 1.5 / m) ** m, abs=tol)
 
 
@@ -403,7 +392,6 @@ def test_zero_duration():
         ({"t_end": np.inf}, "^t_end"),
         ({"max_step": 0.0}, "^max_step"),
         ({"max_events": -1}, "^max_events"),
-        ({"engine": "fast"}, "^engine"),
     ],
 )
 def test_wrong_options_are_refused(options, message):
@@ -460,56 +448,49 @@ def test_accumulation_does_not_depend_on_the_unit_of_time(unit):
     assert run.accumulation_time == pytest.approx(4.0 * unit, rel=1e-9)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("offset", [0.0, 1e6, 1e8])
 @pytest.mark.parametrize(("direction", "speed"), [(-1, -1.0), (0, -1.0), (0, 1.0), (1, 1.0)])
-def test_a_stop_at_the_end_of_a_step_is_met(engine, offset, direction, speed):
+def test_a_stop_at_the_end_of_a_step_is_met(offset, direction, speed):
     """Steps of max_step end where the stop is, on either side of it by rounding, or on it."""
     y = ca.SX.sym("y")
     system = ns.FilippovSystem([y], field=[speed], stops=[ns.Stop(y - offset, direction)])
     for step in (0.1, 0.7, 0.3, 0.25):
-        every = 1 if engine == "compiled" else 5
-        starts = offset - speed * step * np.arange(2, 40, every)[:, None]
+        starts = offset - speed * step * np.arange(2, 40)[:, None]
         expected = (offset - starts[:, 0]) / speed
-        many = ns.ensemble(
-            system, starts, 50 * step, max_step=step, engine=engine, work=ns.Work(progress=False)
-        )
+        many = ns.ensemble(system, starts, 50 * step, max_step=step, work=ns.Work(progress=False))
         assert np.all(many.status == ns.Status.STOPPED)
         np.testing.assert_allclose(many.t, expected, rtol=0, atol=1e-14 * (1 + offset))
-        run = ns.simulate(system, starts[7], 50 * step, max_step=step, engine=engine)
+        run = ns.simulate(system, starts[7], 50 * step, max_step=step)
         assert run.status is ns.Status.STOPPED
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("step", [0.25, 0.1, 0.01])
-def test_a_ball_does_not_fall_through_the_floor_at_the_end_of_a_step(engine, step):
+def test_a_ball_does_not_fall_through_the_floor_at_the_end_of_a_step(step):
     y, v = ca.SX.sym("y"), ca.SX.sym("v")
     system = ns.FilippovSystem([y, v], field=[v, -1], resets=[ns.Reset(y, [y, -0.8 * v], -1)])
     for n in range(2, 21):
         fall = n * step
-        run = ns.simulate(system, [fall**2 / 2, 0.0], 2 * fall, max_step=step, engine=engine)
+        run = ns.simulate(system, [fall**2 / 2, 0.0], 2 * fall, max_step=step)
         assert [e.kind for e in run.events] == ["reset", "end"]
         assert run.events[0].t == pytest.approx(fall, abs=1e-14)
         assert run.x[:, 0].min() > -1e-15
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_touch_at_the_end_of_a_step_is_no_event(engine):
+def test_a_touch_at_the_end_of_a_step_is_no_event():
     """A parabola with its vertex on the stop, where steps of max_step end."""
     y, v = ca.SX.sym("y"), ca.SX.sym("v")
     system = ns.FilippovSystem([y, v], field=[v, 1], stops=[ns.Stop(y, -1)])
-    run = ns.simulate(system, [0.5, -1.0], 2.0, max_step=0.25, engine=engine)
+    run = ns.simulate(system, [0.5, -1.0], 2.0, max_step=0.25)
     assert run.status is ns.Status.REACHED_END
 
 
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
-def test_a_state_that_does_not_move_from_its_surface_has_no_unique_future(engine):
+def test_a_state_that_does_not_move_from_its_surface_has_no_unique_future():
     """Any of the fields between the two keeps it there."""
     for above, below in (([1, 0], [-1, 0]), ([-x, 0 * v], [x, 0 * v])):
         system = ns.FilippovSystem([x, v], surface=v, above=above, below=below)
-        run = ns.simulate(system, [1.0, 0.0], 1.0, engine=engine)
+        run = ns.simulate(system, [1.0, 0.0], 1.0)
         assert run.status is ns.Status.NON_UNIQUE and "tangent" in run.message
-        beside = ns.simulate(system, [1.0, 1e-3], 1.0, engine=engine)
+        beside = ns.simulate(system, [1.0, 1e-3], 1.0)
         assert beside.itinerary == "+" and beside.status is ns.Status.REACHED_END
 
 

@@ -11,14 +11,13 @@ import nonsmooth as ns
 x, v, q, T = (ca.SX.sym(s) for s in ("x", "v", "q", "T"))
 
 
-@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
-def test_a_ramp_compared_with_the_state_switches_as_pulse_width_modulation_does(engine):
+def test_a_ramp_compared_with_the_state_switches_as_pulse_width_modulation_does():
     # x' = u - x, u = 1 while x < 1 - phase; within a period the switch is at an algebraic root
     clock = ns.Clock(1.0)
     pwm = ns.FilippovSystem(
         [x], surface=x + clock.phase - 1, above=[-x], below=[1 - x], clocks=clock
     )
-    run = ns.simulate(pwm, [0.2, 0.0], t_end=200.0, at="clock", engine=engine)
+    run = ns.simulate(pwm, [0.2, 0.0], t_end=200.0, at="clock")
     assert np.allclose(run.sample_t, np.arange(1, 201), rtol=0, atol=1e-11)
     value = 0.2
     for k, found in enumerate(run.sample_x[:, 0]):

@@ -72,13 +72,12 @@ def test_fields_that_are_nearly_equal_near_the_origin():
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-30, 1e-200, 1e30])
-@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
-def test_small_fields_slide_as_large_ones(size, engine):
+def test_small_fields_slide_as_large_ones(size):
     system = ns.FilippovSystem(
         [x, y], surface=y, above=[size, -size], below=[2 * size, size], parameters={}
     )
     assert not motion(system, "s").regular
-    run = ns.simulate(system, [0.0, 0.0], 1 / size, engine=engine)
+    run = ns.simulate(system, [0.0, 0.0], 1 / size)
     assert run.itinerary == "s" and abs(run.x[-1, 0] - 1.5) < 1e-12
 
 
@@ -88,8 +87,7 @@ def test_coefficients_that_differ_by_rounding_are_the_same():
 
 
 @pytest.mark.parametrize("unit", [1e-13, 1e-9, 1e-3, 1e9])
-@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
-def test_the_unit_of_the_states_does_not_matter(unit, engine):
+def test_the_unit_of_the_states_does_not_matter(unit):
     """Stick-slip with a tolerance in the same unit: the same itinerary and times."""
     v = y
     system = ns.FilippovSystem(
@@ -98,7 +96,7 @@ def test_the_unit_of_the_states_does_not_matter(unit, engine):
         above=[v, -x - 0.2 * v - 0.5 * unit],
         below=[v, -x - 0.2 * v + 0.7 * unit],
     )
-    run = ns.simulate(system, [0.0, 0.0], 30.0, atol=1e-10 * unit, rtol=1e-10, engine=engine)
+    run = ns.simulate(system, [0.0, 0.0], 30.0, atol=1e-10 * unit, rtol=1e-10)
     assert run.itinerary == "- s -"
     exit = next(e for e in run.events if e.kind == "exit")
     assert abs(exit.x[0] / unit - (0.7 - 0.2 * 0.3)) < 1e-8

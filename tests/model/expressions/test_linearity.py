@@ -53,11 +53,8 @@ def test_each_expression_has_its_own_answer_and_without_time_sines_are_bent() ->
     assert bent(both, STATES) == [True, True, True]
 
 
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
 @pytest.mark.parametrize("omega", [0.05, 1.0, 37.0])
-def test_forced_linear_runs_keep_the_tolerance_though_no_step_is_checked(
-    engine: str, omega: float
-) -> None:
+def test_forced_linear_runs_keep_the_tolerance_though_no_step_is_checked(omega: float) -> None:
     """x'' + x = cos(omega t) and a stop that is met between, against the closed form."""
     x = ca.SX.sym("x", 2)
     t = ca.SX.sym("t")
@@ -66,7 +63,7 @@ def test_forced_linear_runs_keep_the_tolerance_though_no_step_is_checked(
         x, field=ca.vertcat(x[1], -x[0] + ca.cos(omega * t)), time=t, stops=[ns.Stop(x[0] - end)]
     )
     tol = 1e-9
-    run = ns.simulate(system, [0.0, 1.0], 3.0, tol=tol, engine=engine)
+    run = ns.simulate(system, [0.0, 1.0], 3.0, tol=tol)
     solution = lambda s: (
         np.sin(s)
         + (s * np.sin(s) / 2 if omega == 1 else (np.cos(omega * s) - np.cos(s)) / (1 - omega**2))

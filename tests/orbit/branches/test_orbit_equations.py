@@ -12,7 +12,6 @@ from nonsmooth.flow import fixed
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.model.derivatives.variational import guarded_field
 from nonsmooth.orbit.branches import conditions
-from nonsmooth.orbit.branches.conditions import conditions_of
 from nonsmooth.orbit.branches.orbit_branches import OrbitCurve
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
@@ -140,18 +139,6 @@ def test_directions_and_determinants_are_those_of_linear_algebra(orbit_and_names
     assert np.sign(determinant) == sign
     if u.size <= 24:
         assert determinant == pytest.approx(sign * np.exp(size) * length, rel=1e-9)
-
-
-def test_tests_of_an_orbit_are_the_same_without_the_interpreter(monkeypatch, orbit_and_names):
-    orbit, _ = orbit_and_names
-    p, known = orbit.parameter_vector, {}
-    found = conditions_of(orbit.problem, orbit.evaluation, p, known)
-    monkeypatch.setattr(fixed, "has_interpreter", lambda: False)
-    again = conditions_of(orbit.problem, orbit.evaluation, p, {})
-    assert list(found) == list(again) and set(known) <= set(found)
-    size = max(1.0, *map(abs, again.values()))
-    for name, value in found.items():
-        assert value == pytest.approx(again[name], rel=1e-9, abs=1e-11 * size), name
 
 
 def test_tests_by_multipliers_are_products_of_them(orbit_and_names):

@@ -65,13 +65,12 @@ def test_a_cycle_through_events_is_drawn_once_or_twice():
     assert curve[:, 0].max() == pytest.approx(2.00862, abs=1e-4)
 
 
-def test_orbits_need_no_compiler_and_few_steps(monkeypatch):
+def test_orbits_need_few_steps(monkeypatch):
     """Spirals to t = 10000: the orbits are cut where they meet, a few steps at a time."""
     runs = []
 
     def spy(*arguments, **options):
         runs.append(ns.simulate(*arguments, **options))
-        assert options["engine"] == "reference"
         return runs[-1]
 
     monkeypatch.setattr("nonsmooth.orbit.manifolds.plane_orbits.simulate", spy)

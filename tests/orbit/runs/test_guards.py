@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow import fixed
 from nonsmooth.flow.names import described
 from nonsmooth.model import Guard
 from nonsmooth.orbit.runs.guards import change_fault, faults_along, watch
@@ -39,7 +38,7 @@ def test_a_guard_is_told_as_the_condition_that_holds(guard, words):
     assert described(system, guard) == words
 
 
-def test_legs_are_judged_together_as_one_by_one(monkeypatch):
+def test_legs_are_judged_together_as_one_by_one():
     """A swing above and below y = 0, of which some legs pass it, begin beyond it, or have no duration."""
     x, y, v = (ca.SX.sym(name) for name in ("x", "y", "v"))
     system = ns.FilippovSystem(
@@ -78,17 +77,12 @@ def test_legs_are_judged_together_as_one_by_one(monkeypatch):
     assert sum("is violated" in fault for fault in together) >= 1
     assert sum("begins after it" in fault for fault in together) >= 1
     assert sum("'out' is met" in fault for fault in together) == 2  # from 7 to 8, and from 0 to 9
-    monkeypatch.setattr(fixed, "has_interpreter", lambda: False)
-    assert faults_along(system, legs, starts, durations, speeds, p, True) == together
 
 
-@pytest.mark.parametrize("interpreted", [True, False])
 @pytest.mark.parametrize("kind", ["stop", "reset"])
 @pytest.mark.parametrize("duration", [1.0, 3.0, 40.0])
-def test_what_is_passed_inside_a_step_is_seen(monkeypatch, interpreted, kind, duration):
+def test_what_is_passed_inside_a_step_is_seen(kind, duration):
     """x - 0.9 rises all along a leg of one step, x = t or of many: it has no extremum and one zero."""
-    if not interpreted:
-        monkeypatch.setattr(fixed, "has_interpreter", lambda: False)
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     given = (
         {"stops": ns.Stop(x - 0.9, 1, "out")}

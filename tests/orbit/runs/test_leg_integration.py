@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow import fixed
 from nonsmooth.flow.compiled import find_compiler
-from nonsmooth.model.derivatives.variational import guarded_field
 from nonsmooth.orbit.runs import leg_integration
 from nonsmooth.orbit.runs.guards import watch
 from nonsmooth.orbit.runs.leg_integration import LegIntegrator
@@ -43,12 +41,10 @@ MIXED = [
 ]
 
 
-def together_and_apart(monkeypatch, system, legs, starts, durations, chosen):
-    p = system.parameter_vector()
+def together_and_apart(system, legs, starts, durations, chosen):
     integrator = LegIntegrator(system, legs, chosen)
-    together = integrator(np.array(starts), np.array(durations), p)
-    monkeypatch.setattr(leg_integration, "has_interpreter", lambda: False)
-    return together, integrator(np.array(starts), np.array(durations), p)
+    given = np.array(starts), np.array(durations), system.parameter_vector()
+    return integrator(*given), integrator._one_by_one(*given)
 
 
 @pytest.mark.parametrize(
@@ -64,8 +60,8 @@ def together_and_apart(monkeypatch, system, legs, starts, durations, chosen):
         (HIDDEN, [Leg("s"), Leg("+", "entry", 0, 1)], [[0.1, 0.0], [0.2, 0.1]], [0.3, 0.2]),
     ],
 )
-def test_legs_together_equal_legs_one_by_one(monkeypatch, system, legs, starts, durations):
-    both = together_and_apart(monkeypatch, system, legs, starts, durations, (0,))
+def test_legs_together_equal_legs_one_by_one(system, legs, starts, durations):
+    both = together_and_apart(system, legs, starts, durations, (0,))
     for name in leg_integration.LegFlows.__dataclass_fields__:
         one, two = (np.asarray(getattr(found, name)) for found in both)
         np.testing.assert_allclose(one, two, rtol=1e-12, atol=1e-13, err_msg=name)
@@ -100,23 +96,6 @@ def test_residuals_have_more_digits_than_doubles():
     assert max(errors) < 2e-18 and value[0] == float(end[0])
 
 
-def test_guards_are_watched_alike_in_c_and_in_python(monkeypatch):
-    field, p = guarded_field(BELT, "-"), BELT.parameter_vector()
-    start = np.array([0.2, -0.4, 0.1])
-    found = fixed.watched(field, start, p, 6.0, 1e-6)
-    passed = fixed.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9)
-    monkeypatch.setattr(fixed, "has_interpreter", lambda: False)
-    again = fixed.watched(field, start, p, 6.0, 1e-6)
-    extrema = [rows[rows[:, 3] != 0.0] for rows in (found, again)]
-    assert len(extrema[0]) >= 3
-    np.testing.assert_allclose(
-        *(rows[np.lexsort(rows.T[:2])] for rows in extrema), rtol=1e-10, atol=1e-11
-    )
-    assert passed == pytest.approx(
-        fixed.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9), rel=1e-13
-    )
-
-
 def test_extrema_of_a_guard_are_those_of_its_closed_form():
     """h = sin(3 t) + 1.1 along x = t: minima at t = pi/2, 7 pi/6, ... with h = 0.1."""
     system = ns.FilippovSystem([x, y], surface=ca.sin(3 * x) + 1.1, above=[1, 0], below=[1, 0])
@@ -124,4 +103,4 @@ def test_extrema_of_a_guard_are_those_of_its_closed_form():
     times = [near.t for near in seen.approaches]
     np.testing.assert_allclose(times, np.pi / 2 + 2 * np.pi / 3 * np.arange(2), rtol=1e-13)
     np.testing.assert_allclose([near.value for near in seen.approaches], 0.1, rtol=1e-13)
-    assert not seen.faults and fixed.has_interpreter()
+    assert not seen.faults

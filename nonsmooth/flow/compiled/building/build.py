@@ -34,6 +34,7 @@ from .compilers import (
     processor,
     version,
 )
+from .core_source import keyed
 from .store import cache_directory, is_intact, remove_leftovers, sealed, usable_folder
 
 __all__ = [
@@ -115,7 +116,7 @@ def build(source: str, flags: Sequence[str] = (), run: Compilation | None = None
     """Load the library of a C source, compiled unless the cache has it."""
     commands = compilers()
     if not commands:
-        raise CompilerError(f"compiler: expected a C compiler, found none. {ADVICE}")
+        raise CompilerError(f"No C compiler was found. {ADVICE}")
     failures: list[CompilerError] = []
     for command in commands:
         try:
@@ -157,13 +158,19 @@ def _library(
 def _loaded(library: Path, key: str) -> ctypes.CDLL:
     """Load a library; OSError if that fails or if it is not the one of this key."""
     loaded = ctypes.CDLL(str(library))
-    try:
-        found = (ctypes.c_char * (len(key) + 1)).in_dll(loaded, "nonsmooth_key").value
-    except ValueError:
-        found = b""
-    if found != key.encode():
+    if not has_key(loaded, key):
         raise OSError("it is not the library of this source")
     return loaded
+
+
+def has_key(loaded: ctypes.CDLL, key: str) -> bool:
+    """Whether a library was compiled with a key."""
+    try:
+        return (ctypes.c_char * (len(key) + 1)).in_dll(
+            loaded, "nonsmooth_key"
+        ).value == key.encode()
+    except ValueError:
+        return False
 
 
 def compile_library(
@@ -191,8 +198,7 @@ def _compile(
     work = Path(tempfile.mkdtemp(dir=library.parent, prefix=_WORK))
     try:
         text, output = work / "engine.c", work / "engine.so"
-        key = f'const char nonsmooth_key[] = "{library.stem}";\n'
-        text.write_text(f"{source}\n{key}", encoding="utf-8")
+        text.write_text(keyed(source, library.stem), encoding="utf-8")
         call = [*command, *FLAGS, *flags, str(text), "-o", str(output), "-lm"]
         failure = _no_end() if command in _HANGING else run.call(call)
         if run.hangs:

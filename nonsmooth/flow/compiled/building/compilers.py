@@ -11,12 +11,12 @@ import sys
 from functools import lru_cache
 from pathlib import Path
 
-from ....model import NonsmoothError, explain
+from ....model.errors import NonsmoothError, explain
 
-#: No -ffast-math: reassociation and assumed finiteness give wrong itineraries.
+#: No -ffast-math: reassociation and assumed finiteness give wrong itineraries. The code is for any processor of
+#: the machine's kind, with the same bits on all.
 FLAGS = (
-    "-O2 -march=native -std=gnu11 -fPIC -shared -fno-math-errno -fno-trapping-math "
-    "-ffp-contract=off -w"
+    "-O2 -std=gnu11 -fPIC -shared -fno-math-errno -fno-trapping-math -ffp-contract=off -w"
 ).split()
 
 ADVICE = (
@@ -37,6 +37,11 @@ class CompilerError(NonsmoothError, RuntimeError):
 def compilers() -> tuple[Command, ...]:
     """Commands of the C compilers in the order of preference: $CC, cc, gcc, clang, ziglang's."""
     return _located(os.environ.get("CC", ""), os.environ.get("PATH", ""))
+
+
+def baseline(command: Command) -> tuple[str, ...]:
+    """Flags with which a compiler makes code for any processor of the machine's kind."""
+    return ("-mcpu=baseline",) if command[1:3] == ("-m", "ziglang") else ()
 
 
 def find_compiler() -> Command | None:

@@ -95,7 +95,8 @@ static inline int load(Lanes *s, Work *w) {
   }
   if (TIMED) s->x[N - 1] = BC(g->t0);
   s->q = (const T *)(g->q + i * g->q_stride);
-  s->t = s->last_event = BC(g->t0);
+  s->t = BC(g->t0);
+  s->since = BC(0);
   s->shortest = BC(1e-3);
   s->length = BC(0);
   s->code = s->steps = s->entered = s->events = s->shrinking = s->drop = s->slides = s->above = I(0);

@@ -79,7 +79,7 @@ static double largest_of(const double *m, int count) {
 static int definite(Run *r, const double *m, int k) {
   double *a = r->work, most = largest_of(m, k * k);
   for (int i = 0; i < k; i++) for (int j = 0; j < k; j++) a[i * k + j] = 0.5 * (m[i * k + j] + m[j * k + i]) / most;
-  return most > 0 && is_definite(a, k);
+  return most > 0 && is_definite(a, k, VANISHES * k);
 }
 
 static int symmetric(const double *m, int k, double part) {
@@ -132,6 +132,7 @@ static void jump(Run *r, const double *rate, double dt) {
   if (r->times) sample_step(r, e, dt);
   for (int i = 0; i < n; i++) r->x[i] += dt * rate[i];
   r->t += dt;
+  r->since += dt;
   r->step_count++;
   r->segment_steps++;
   if (r->s->timed) r->x[n - 1] = r->t;
@@ -280,6 +281,52 @@ static int bounded_multipliers(Run *r, const double *a, const double *m, int n, 
 /* Whether sets are met: those are decided here. */
 static int meets_sets(const Run *r) {
   for (int i = 0; i < r->active_count; i++) if (set_of(r, r->active[i]) >= 0) return 1;
+  return 0;
+}
+
+/* Whether the motion can continue in a mode: its guards that vanish here become positive. */
+static int continuation(Run *r, const int8_t *letter, const Known *known, int known_count, Continuation *result) {
+  Expansion *e = &r->trial;
+  lay_out(r, letter, &e->l);
+  if (e->l.slides) {
+    if (!is_known(r, &e->l)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+    if (!improve(r, &e->l, r->x, result->unknowns, 1)) return 0;
+    error_scales(r, r->x, held_of(r, letter), result->unknowns);
+  }
+  expand(r, letter, r->x, result->unknowns, e);
+  if (!e->finite) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+  memcpy(result->letter, letter, r->width);
+  result->strict = 1;
+  memset(result->drop, 0, sizeof(int32_t) * r->guards);
+  for (int row = 0; row < e->l.rows; row++) {
+    int kind = e->l.kind[row], index = e->l.index[row], of = index, active = 0, zeros = 0;
+    if (kind == STOP_GUARD || kind == RESET_GUARD) continue;
+    if (kind == NEAR_GUARD && letter[index] == 0) continue; /* ends steps only */
+    if (kind == IMPACT_GUARD || kind == RELEASE_GUARD) of += r->m;
+    for (int i = 0; i < r->active_count; i++) active |= r->active[i] == of;
+    if (!active) continue;
+    for (int i = 0; i < known_count; i++)
+      if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row]) zeros = known[i].zeros;
+    if ((kind == SURFACE_GUARD || kind == NEAR_GUARD) && zeros < 1) zeros = 1;
+    if (kind == IMPACT_GUARD && zeros < 2) zeros = 2;
+    double value;
+    int k = leading(r, e, row, zeros, &value);
+    if (value < 0) return 0;
+    if (value == 0) result->strict = 0;
+    result->drop[row] = value != 0 ? (k < r->order ? k : r->order) : r->order + 1;
+  }
+  return 1;
+}
+
+static void copy_continuation(const Run *r, Continuation *to, const Continuation *from) {
+  memcpy(to->letter, from->letter, r->width);
+  memcpy(to->drop, from->drop, sizeof(int32_t) * r->guards);
+  memcpy(to->unknowns, from->unknowns, sizeof(double) * r->width);
+  to->strict = from->strict;
+}
+
+static int rests(const Run *r, const int8_t *letter) {
+  for (int i = 0; i < r->width; i++) if (letter[i] == 0) return 1;
   return 0;
 }
 

@@ -248,46 +248,6 @@ static void release(Run *r, int row) {
   if (choose(r, r->start, known, 2) && r->mode != before) event(r, change_kind(r, before, r->mode), before, row, r->x);
 }
 
-static int advance(Run *r, const Expansion *e, double dt);
-
-/* After impacts that accumulate the contact is closed; whether there is one. */
-static int come_to_rest(Run *r, double left) {
-  int count = 0, kept = 0;
-  int32_t *involved = r->involved, *which = r->involved + r->c;
-  if (!r->c) return 0;
-  for (int k = 1; k <= 6 && k <= r->history; k++) if (r->kind[(r->history - k) % HISTORY] != IMPACT) return 0;
-  const double *gap = gaps(r, r->x);
-  for (int j = 0; j < r->c; j++) if (gap[j] == 0) involved[count++] = j;
-  if (!strike(r, involved, count, 1, r->at_work)) return 0;
-  int before = r->mode;
-  memcpy(r->x, r->at_work, sizeof(double) * r->n);
-  for (int i = 0; i < count; i++) which[kept++] = r->m + involved[i];
-  for (int i = 0; i < count; i++) which[kept++] = r->m + r->c + involved[i];
-  project(r, which, kept);
-  letters_of(r, r->start);
-  for (int i = 0; i < count; i++) which[i] = r->m + involved[i];
-  active_surfaces(r, -1, r->start);
-  for (int i = 0; i < count; i++) { /* those that rest are so, whatever rounding says */
-    int at = 0;
-    while (at < r->active_count && r->active[at] < which[i]) at++;
-    if (at < r->active_count && r->active[at] == which[i]) continue;
-    memmove(r->active + at + 1, r->active + at, sizeof(int32_t) * (r->active_count - at));
-    r->active[at] = which[i];
-    r->active_count++;
-  }
-  if (r->status != RUNNING || !choose(r, r->start, 0, 0)) return 1;
-  note(r);
-  r->history = 0;
-  expand(r, r->letter, r->x, r->unknowns, &r->e);
-  int closed = 0;
-  for (int i = r->m; i < r->width; i++) closed |= r->letter[i] == 0;
-  if (closed && r->e.finite && advance(r, &r->e, left)) {
-    r->limit = r->t;
-    event(r, change_kind(r, before, r->mode), before, -1, r->x);
-  }
-  return 1;
-}
-
 static int only_sliding(const Run *r) {
   int found = -1;
   for (int i = 0; i < r->m; i++) if (r->letter[i] == 0) { if (found >= 0) return -1; found = i; }
@@ -346,6 +306,7 @@ static int advance(Run *r, const Expansion *e, double dt) {
   if (r->times) sample_step(r, e, dt);
   memcpy(r->x, x, sizeof(double) * r->s->dimension);
   r->t += dt;
+  r->since += dt;
   r->step_count++;
   r->segment_steps++;
   if (r->s->timed) r->x[n - 1] = r->t;

@@ -19,6 +19,9 @@ Run *run_new(const System *s, Table *table) {
 }
 void run_free(Run *r) { free(r->arena); free(r); }
 
+/* Times at which the run is read: no approximation of the motion may span one of them. */
+void run_ask(Run *r, const double *times, int64_t count) { r->asked = times; r->asked_count = count; }
+
 static void set_parameters(Run *r, const double *p) {
   const System *s = r->s;
   memcpy(r->p, p, sizeof(double) * s->parameters);
@@ -43,12 +46,15 @@ static void clear(Run *r, const Options *o, double t) {
   r->step_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
-  r->t = r->begun = r->last_event = t;
+  r->t = r->begun = t;
+  r->since = 0;
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
   r->reason = NO_REASON;
   r->where = 0;
+  r->facts = 0;
+  r->dependent = -1;
   r->segment_mode = r->due = r->due_impact = r->length_mode = -1;
 }
 
@@ -97,6 +103,7 @@ void run_resume(Run *r, const Output *out) { r->out = *out; }
 static void sample_into(Run *r, const Batch *b, int64_t i) {
   r->room = b->room;
   r->times = b->times ? b->times + i * b->times_stride : 0;
+  run_ask(r, r->times, r->times ? b->room : 0);
   r->sample_t = b->sample_t + i * b->room;
   r->sample_x = b->sample_x + i * b->room * r->s->dimension;
 }

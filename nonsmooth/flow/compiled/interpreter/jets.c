@@ -165,6 +165,26 @@ static int is_finite(const Run *r, const Expansion *e) {
   return one + two + three == 0;
 }
 
+/* Inverse of the layer's slope in a mode. Where it has none, as for two contacts whose slips are one function, one
+ * with which the unknowns change as little as can be, in units of their bounds; the motion does not depend on it. */
+static int invert_layer(Run *r, const Layout *l, const double *unknowns, double *inverse) {
+  int n = l->slides, w = r->width, is_regular = 1;
+  double *a = r->work, *m = a + n * n, *size = m + n * n, most = 0;
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) a[i * n + j] = m[i * n + j] = r->slope[l->sliding[i] * w + l->sliding[j]];
+  is_regular = invert(a, n, inverse);
+  for (int i = 0; n > 1 && i < n; i++) /* the same in all units of rows and columns */
+    for (int j = 0; j < n; j++) is_regular &= fabs(m[i * n + j] * inverse[j * n + i]) < 1 / SINGULAR;
+  if (is_regular || n < 2) return 1;
+  for (int i = 0; i < n; i++) {
+    int own = l->sliding[i];
+    size[i] = own < r->m ? fabs(factor_of(r, own)) : fabs(unknowns[own]);
+    most = larger(size[i], most);
+  }
+  for (int i = 0; i < n; i++) size[i] = larger(size[i], MERGED * (most > 0 ? most : 1));
+  return invert_any(m, n, size, inverse, size + n, r->pending) && 0;
+}
+
 /* Jets of a mode at x, with the multipliers of what slides; inverses of the layer's slope. */
 static void expand(Run *r, const int8_t *letter, const double *x, const double *unknowns, Expansion *e) {
   int w = r->width, stride = r->stride;
@@ -172,10 +192,7 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
   aim(r, letter, x, unknowns);
   weigh_point(r, e, x, unknowns);
   int slides = e->l.slides;
-  for (int i = 0; i < slides; i++)
-    for (int j = 0; j < slides; j++)
-      r->work[i * slides + j] = r->slope[e->l.sliding[i] * w + e->l.sliding[j]];
-  if (slides) invert(r->work, slides, e->inverse);
+  if (slides && !invert_layer(r, &e->l, unknowns, e->inverse)) r->dependent = e->l.mode;
   if (!e->l.is_free || r->s->sets) memset(e->series, 0, sizeof(double) * w * stride);
   else for (int i = 0; i < w; i++) e->series[(int64_t)i * stride] = 0;
   for (int i = 0; i < r->n; i++) e->states[(int64_t)i * stride] = x[i];
@@ -196,6 +213,29 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
 /* Whether the multipliers of a mode are the only ones: those that enter in products may have several values. */
 static int is_known(const Run *r, const Layout *l) { return r->s->affine || l->slides < 2; }
 
+/* The step of Newton's method where the layer's slope has no inverse; 0 where there is none. */
+static int step_dependent(Run *r, const Layout *l, const double *unknowns, double *b) {
+  int n = l->slides, w = r->width;
+  double *rates = r->small + w;
+  if (n < 2) return 0;
+  invert_layer(r, l, unknowns, r->matrix);
+  for (int i = 0; i < n; i++) rates[i] = layer_of(r, l->sliding[i]);
+  for (int i = 0; i < n; i++) {
+    b[i] = 0;
+    for (int j = 0; j < n; j++) b[i] += r->matrix[i * n + j] * rates[j];
+  }
+  for (int i = 0; i < n; i++) {
+    double rest = rates[i], terms = fabs(rest);
+    for (int j = 0; j < n; j++) {
+      double term = r->slope[l->sliding[i] * w + l->sliding[j]] * b[j];
+      rest -= term;
+      terms += fabs(term);
+    }
+    if (!(fabs(rest) <= MERGED * terms)) return 0;
+  }
+  return 1;
+}
+
 /* Multipliers that keep the sliding surfaces of a mode: one step of Newton's method, since they enter
  * linearly, and one against rounding. 0 where there are none. */
 static int improve(Run *r, const Layout *l, const double *x, double *unknowns, int steps) {
@@ -209,7 +249,7 @@ static int improve(Run *r, const Layout *l, const double *x, double *unknowns, i
       for (int j = 0; j < slides; j++) a[i * slides + j] = r->slope[l->sliding[i] * w + l->sliding[j]];
       b[i] = layer_of(r, l->sliding[i]);
     }
-    if (!solve(a, b, slides)) return 0;
+    if (r->dependent == l->mode || !solve(a, b, slides)) if (!step_dependent(r, l, unknowns, b)) return 0;
     for (int i = 0; i < slides; i++) {
       unknowns[l->sliding[i]] -= b[i];
       largest = larger(fabs(b[i]), largest);

@@ -57,9 +57,133 @@ static int solve(double *a, double *b, int n) {
   return finite_all(b, n);
 }
 
-/* Whether a symmetric matrix is positive definite by a margin: Cholesky. ``a`` is lost. */
-static int is_definite(double *a, int n) {
-  for (int k = 0; k < n; k++) a[k * n + k] -= VANISHES * n;
+/* Linear equations that may be singular ------------------------------------------------------------ */
+
+/* Gauss and Jordan with full pivoting on (rows, columns) with ``more`` right sides behind, after scaling of rows and
+ * columns; the rank is returned, the column of each pivot's row in ``pivot``, columns' scales in ``unit``. */
+static int eliminate(double *a, int rows, int columns, int more, int32_t *pivot, double *unit) {
+  int width = columns + more, rank = 0;
+  for (int i = 0; i < rows; i++) {
+    double *row = a + (int64_t)i * width, most = 0;
+    for (int j = 0; j < columns; j++) most = larger(fabs(row[j]), most);
+    if (most > 0) for (int j = 0; j < width; j++) row[j] /= most;
+  }
+  for (int j = 0; j < columns; j++) {
+    unit[j] = 0;
+    for (int i = 0; i < rows; i++) unit[j] = larger(fabs(a[(int64_t)i * width + j]), unit[j]);
+    if (unit[j] > 0) for (int i = 0; i < rows; i++) a[(int64_t)i * width + j] /= unit[j];
+    else unit[j] = 1;
+  }
+  while (rank < rows && rank < columns) {
+    int row = rank, column = -1;
+    double best = SINGULAR;
+    for (int i = rank; i < rows; i++)
+      for (int j = 0; j < columns; j++) {
+        double size = fabs(a[(int64_t)i * width + j]);
+        if (size > best) { best = size; row = i; column = j; }
+      }
+    if (column < 0) break;
+    double *one = a + (int64_t)rank * width, *other = a + (int64_t)row * width;
+    for (int j = 0; j < width && row != rank; j++) { double t = one[j]; one[j] = other[j]; other[j] = t; }
+    double head = one[column];
+    for (int j = 0; j < width; j++) one[j] /= head;
+    for (int i = 0; i < rows; i++) {
+      double *to = a + (int64_t)i * width, f = to[column];
+      if (i == rank || f == 0) continue;
+      for (int j = 0; j < width; j++) if (one[j] != 0) to[j] -= f * one[j];
+      to[column] = 0;
+    }
+    pivot[rank++] = column;
+  }
+  return rank;
+}
+
+/* Solve a x = b, in place of b, unknowns that are not determined being zero; 0 where there is no solution. */
+static int solve_any(double *a, double *b, int n, double *work, int32_t *pivot) {
+  double *unit = work, *all = work + n, most = 0, rest = 0;
+  if (n == 1) {
+    if (a[0] != 0) { b[0] /= a[0]; return isfinite(b[0]); }
+    return b[0] == 0;
+  }
+  for (int i = 0; i < n; i++) {
+    double *row = all + (int64_t)i * (n + 1);
+    memcpy(row, a + (int64_t)i * n, sizeof(double) * n);
+    row[n] = b[i];
+  }
+  int rank = eliminate(all, n, n, 1, pivot, unit);
+  for (int i = 0; i < n; i++) {
+    double value = fabs(all[(int64_t)i * (n + 1) + n]);
+    if (i < rank) most = larger(value, most); else rest = larger(value, rest);
+  }
+  for (int i = 0; i < n; i++) b[i] = 0;
+  for (int i = 0; i < rank; i++) b[pivot[i]] = all[(int64_t)i * (n + 1) + n] / unit[pivot[i]];
+  return rest <= TIED * most && finite_all(b, n);
+}
+
+/* Vectors z with E z = 0 for E (rows, columns), one after the other; their number. */
+static int null_space(const double *e, int rows, int columns, double *z, double *work, int32_t *pivot) {
+  double *unit = work, *a = work + columns;
+  memcpy(a, e, sizeof(double) * rows * columns);
+  int rank = eliminate(a, rows, columns, 0, pivot, unit), count = 0;
+  for (int j = 0; j < columns; j++) {
+    int is_free = 1;
+    for (int i = 0; i < rank; i++) is_free &= pivot[i] != j;
+    if (!is_free) continue;
+    double *own = z + (int64_t)count++ * columns;
+    memset(own, 0, sizeof(double) * columns);
+    own[j] = 1 / unit[j];
+    for (int i = 0; i < rank; i++) own[pivot[i]] = -a[(int64_t)i * columns + j] / unit[pivot[i]];
+  }
+  return count;
+}
+
+/* A matrix G with M G M = M: the unknowns M G b solve what can be solved of M x = b, with the least sum of the squares
+ * of x over ``size``. ``work`` has room for 3 n^2 + n. */
+static int invert_any(const double *m, int n, const double *size, double *inverse, double *work, int32_t *pivot) {
+  double *unit = work, *a = unit + n, *z = a + 2 * (int64_t)n * n;
+  for (int i = 0; i < n; i++) {
+    double *row = a + 2 * (int64_t)i * n;
+    memcpy(row, m + (int64_t)i * n, sizeof(double) * n);
+    for (int j = 0; j < n; j++) row[n + j] = i == j;
+  }
+  int rank = eliminate(a, n, n, n, pivot, unit), count = 0;
+  memset(inverse, 0, sizeof(double) * n * n);
+  for (int i = 0; i < rank; i++)
+    for (int j = 0; j < n; j++) inverse[pivot[i] * n + j] = a[2 * (int64_t)i * n + n + j] / unit[pivot[i]];
+  for (int j = 0; j < n; j++) { /* directions that make no difference, orthogonal one after the other */
+    int is_free = 1;
+    double *own = z + (int64_t)count * n, length = 0;
+    for (int i = 0; i < rank; i++) is_free &= pivot[i] != j;
+    if (!is_free) continue;
+    memset(own, 0, sizeof(double) * n);
+    own[j] = 1 / (unit[j] * size[j]);
+    for (int i = 0; i < rank; i++) own[pivot[i]] = -a[2 * (int64_t)i * n + j] / (unit[pivot[i]] * size[pivot[i]]);
+    for (int again = 0; again < 2; again++)
+      for (int l = 0; l < count; l++) {
+        double part = 0;
+        for (int i = 0; i < n; i++) part += own[i] * z[(int64_t)l * n + i];
+        for (int i = 0; i < n; i++) own[i] -= part * z[(int64_t)l * n + i];
+      }
+    for (int i = 0; i < n; i++) length += own[i] * own[i];
+    if (!(length > 0)) continue;
+    for (int i = 0; i < n; i++) own[i] /= sqrt(length);
+    count++;
+  }
+  for (int l = 0; l < count; l++) {
+    const double *own = z + (int64_t)l * n;
+    for (int j = 0; j < n; j++) {
+      double part = 0;
+      for (int i = 0; i < n; i++) part += own[i] * inverse[i * n + j] / size[i];
+      if (part != 0) for (int i = 0; i < n; i++) inverse[i * n + j] -= part * own[i] * size[i];
+    }
+  }
+  return finite_all(inverse, n * n);
+}
+
+/* Whether a symmetric matrix is positive definite by a margin, or nearly semidefinite (a negative one): Cholesky.
+ * ``a`` is lost. */
+static int is_definite(double *a, int n, double margin) {
+  for (int k = 0; k < n; k++) a[k * n + k] -= margin;
   for (int k = 0; k < n; k++) {
     if (!(a[k * n + k] > 0)) return 0;
     for (int i = k + 1; i < n; i++) {
@@ -72,7 +196,7 @@ static int is_definite(double *a, int n) {
 }
 
 static double determinant(const double *a, int n, const int *rows, int k) {
-  double b[64], sign = 1, product = 1; /* k is 8 at most */
+  double b[MOST_MINORS * MOST_MINORS], sign = 1, product = 1;
   for (int i = 0; i < k; i++) for (int j = 0; j < k; j++) b[i * k + j] = a[rows[i] * n + rows[j]];
   for (int c = 0; c < k; c++) {
     int best = c;
@@ -123,83 +247,47 @@ static int symmetrised(const double *a, int n, double *d, double *result, int *p
   return 1;
 }
 
-/* What is shown of -m: 2 definite after scaling or diagonally dominant (stable and a P-matrix), 1 a
- * P-matrix by its minors, 0 nothing. ``work`` has room for 2 n^2 + n, ``pending`` for n. */
-static int shown(const double *m, int n, double *work, int *pending) {
-  double *a = work, *b = work + n * n, *d = b + n * n;
-  int dominant = 1;
-  for (int i = 0; i < n; i++) if (!(m[i * n + i] < 0)) return 0;
-  if (!finite_all(m, n * n)) return 0;
-  for (int i = 0; i < n; i++) {
-    double off = 0;
-    for (int j = 0; j < n; j++) {
-      a[i * n + j] = -m[i * n + j] / (sqrt(-m[i * n + i]) * sqrt(-m[j * n + j]));
-      if (i != j) off += fabs(a[i * n + j]);
-    }
-    dominant &= off < 1 - VANISHES;
-  }
-  if (dominant) return 2;
-  if (symmetrised(a, n, d, b, pending) && is_definite(b, n)) return 2;
-  for (int i = 0; i < n; i++)
-    for (int j = 0; j < n; j++) b[i * n + j] = (a[i * n + j] + a[j * n + i]) / 2;
-  if (is_definite(b, n)) return 2;
-  if (n > 8) return 0;
+/* What is proved of a matrix: nothing, that w of a linear complementarity problem is unique, that its solution is,
+ * and that it is stable after multiplication of its rows by any positive numbers. */
+enum { NOTHING, SEMIDEFINITE, UNIQUE, UNIQUE_AND_STABLE };
+
+/* Whether the comparison matrix, of unit diagonal, is an M-matrix. ``work`` has room for n^2 + n. */
+static int is_dominant(const double *a, int n, double *work) {
+  double *b = work + n * n;
+  for (int i = 0; i < n * n; i++) work[i] = -fabs(a[i]);
+  for (int i = 0; i < n; i++) { work[i * n + i] = 1; b[i] = 1; }
+  if (!solve(work, b, n)) return 0;
+  for (int i = 0; i < n; i++) if (!(b[i] > 0 && b[i] < 1 / TIED)) return 0;
+  return 1;
+}
+
+static int has_positive_minors(const double *a, int n) {
   for (unsigned set = 1; set < 1u << n; set++) {
-    int rows[8], k = 0;
+    int rows[MOST_MINORS], k = 0;
     for (int i = 0; i < n; i++) if (set >> i & 1) rows[k++] = i;
-    if (k > 1 && !(determinant(a, n, rows, k) > VANISHES)) return 0;
+    if (k > 1 && !(determinant(a, n, rows, k) > SINGULAR)) return 0;
   }
   return 1;
 }
 
-/* Lambda of letters that are held: those that slide keep their rates at zero. */
-static int held_lambda(const double *a, const double *m, int n, const int8_t *letter, const double *low, double *lam,
-                       double *work, int *slides) {
-  int k = 0;
+/* ``work`` has room for 3 n^2 + 3 n, ``pending`` for n. */
+static int certificate(const double *m, int n, double *work, int32_t *pending) {
+  double *a = work, *b = work + n * n, *d = b + n * n, *scale = d + n, *rest = scale + n;
+  int is_positive = 1, is_symmetric;
+  if (!finite_all(m, n * n)) return NOTHING;
   for (int i = 0; i < n; i++) {
-    if (letter[i] == 0) slides[k++] = i;
-    lam[i] = letter[i] > 0 ? 1 : letter[i] < 0 ? low[i] : 0;
+    is_positive &= m[i * n + i] > 0;
+    if (m[i * n + i] < 0) return NOTHING;
   }
-  double *b = work + k * k;
-  for (int i = 0; i < k; i++) {
-    b[i] = -a[slides[i]];
-    for (int j = 0; j < n; j++) if (lam[j] != 0) b[i] -= m[slides[i] * n + j] * lam[j];
-    for (int j = 0; j < k; j++) work[i * k + j] = m[slides[i] * n + slides[j]];
-  }
-  if (!solve(work, b, k)) return 0;
-  for (int i = 0; i < k; i++) lam[slides[i]] = b[i];
-  return 1;
-}
-
-/* Find lambda, with ``letter`` to begin with and changed; 0 where it is not found. */
-static int complementarity(const double *a, const double *m, int n, const int8_t *contact, int8_t *letter,
-                           double *lam, double *work, int *slides) {
-  double *low = work + n * n + n;
-  int best = n + 1, patience = 10;
-  for (int i = 0; i < n; i++) low[i] = contact[i] ? 0 : -1;
-  for (int iteration = 0; iteration < 10000; iteration++) {
-    if (!held_lambda(a, m, n, letter, low, lam, work, slides)) return 0;
-    int wrong = 0, first = -1;
-    int8_t *wanted = (int8_t *)(low + n);
-    for (int i = 0; i < n; i++) {
-      double high = contact[i] ? INFINITY : 1, rate = a[i];
-      wanted[i] = letter[i];
-      if (letter[i] == 0) {
-        if (lam[i] > high) wanted[i] = 1; else if (lam[i] < low[i]) wanted[i] = -1;
-      } else {
-        for (int j = 0; j < n; j++) if (m[i * n + j] != 0) rate += m[i * n + j] * lam[j];
-        if (rate * letter[i] < 0) wanted[i] = 0;
-      }
-      if (wanted[i] != letter[i] && wrong++ == 0) first = i;
-    }
-    if (!wrong) {
-      for (int i = 0; i < n; i++)
-        lam[i] = larger(low[i], contact[i] ? lam[i] : smaller(lam[i], 1));
-      return 1;
-    }
-    if (wrong < best) { best = wrong; patience = 10; }
-    if (--patience > 0) memcpy(letter, wanted, n);
-    else letter[first] = wanted[first];
-  }
-  return 0;
+  for (int i = 0; i < n; i++) scale[i] = m[i * n + i] > 0 ? sqrt(m[i * n + i]) : 1;
+  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) a[i * n + j] = m[i * n + j] / (scale[i] * scale[j]);
+  if (is_positive && is_dominant(a, n, rest)) return UNIQUE_AND_STABLE;
+  is_symmetric = symmetrised(a, n, d, b, pending);
+  if (is_symmetric && is_definite(b, n, VANISHES * n)) return UNIQUE_AND_STABLE;
+  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) b[i * n + j] = (a[i * n + j] + a[j * n + i]) / 2;
+  if (is_definite(b, n, VANISHES * n)) return UNIQUE_AND_STABLE;
+  if (is_positive && n <= MOST_MINORS && has_positive_minors(a, n)) return UNIQUE;
+  if (is_symmetric) symmetrised(a, n, d, b, pending);
+  else for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) b[i * n + j] = (a[i * n + j] + a[j * n + i]) / 2;
+  return is_definite(b, n, -SINGULAR * n) ? SEMIDEFINITE : NOTHING;
 }

@@ -51,6 +51,29 @@ static size_t place_continuation(Continuation *c, char *base, size_t used, int w
   return used;
 }
 
+/* Lemke's method on a block of all takes most of it. */
+static size_t place_decision(Run *r, char *base, size_t used) {
+  size_t w = r->width, square = w * w, orders = (ORDERS + 1) * w;
+  Decision *d = r->decision = place(base, &used, sizeof(Decision), 1);
+  if (!base) d = r->decision = 0;
+  Decision none = {0}, *to = d ? d : &none;
+  to->own = INTEGERS(w); to->order = INTEGERS(w); to->first = INTEGERS(w + 1); to->mark = INTEGERS(4 * w);
+  to->pivot = INTEGERS(8 * w + 8); to->proved = INTEGERS(w);
+  to->is_contact = LETTERS(w); to->is_idle = LETTERS(w); to->is_touched = LETTERS(w); to->is_known = LETTERS(w);
+  to->state = LETTERS(orders + w); to->block_state = LETTERS(3 * w); to->large_class = LETTERS(w);
+  to->matrix = DOUBLES(square); to->share = DOUBLES(square);
+  to->a = DOUBLES(orders); to->b = DOUBLES(orders); to->nu = DOUBLES(orders); to->floor = DOUBLES(orders);
+  to->turn = DOUBLES(w); to->sign = DOUBLES(w); to->old = DOUBLES(w); to->yard = DOUBLES(w); to->room = DOUBLES(w);
+  to->steep = DOUBLES(w); to->block = DOUBLES(6 * square + 8 * w); to->large = DOUBLES(w);
+  to->work = DOUBLES(90 * square + 90 * w + 64);
+  for (int i = 0; i < SEVERAL; i++) {
+    Motion *own = to->motion + i;
+    own->state = LETTERS(w); own->order = LETTERS(w); own->before = LETTERS(w);
+    own->nu = DOUBLES(w); own->series = DOUBLES(COMPARED * (size_t)r->n);
+  }
+  return used;
+}
+
 static size_t place_run(Run *r, char *base) {
   const System *s = r->s;
   int n = r->n, w = r->width, c = r->c, all = r->m + 2 * c, g = r->guards, stride = r->stride;
@@ -60,11 +83,13 @@ static size_t place_run(Run *r, char *base) {
   used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets);
   Continuation *each[] = {&r->chosen, &r->one, &r->first, &r->rest, &r->found};
   for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, w, g);
+  used = place_decision(r, base, used);
   r->letter = LETTERS(w);
   r->start = LETTERS(w);
   r->x = DOUBLES(n);
   r->at_x = DOUBLES(n);
   r->before = DOUBLES(n);
+  r->saved = DOUBLES(n);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
   r->drop = INTEGERS(g);
@@ -85,7 +110,7 @@ static size_t place_run(Run *r, char *base) {
   r->slope = DOUBLES(square);
   r->vector = DOUBLES(3 * n + 2 * w);
   r->sample = DOUBLES(3 * ((size_t)n + w + g));
-  r->work = DOUBLES(2 * square + 4 * w + rows + g);
+  r->work = DOUBLES(6 * square + 8 * w + rows + g);
   r->gradient_row = DOUBLES((size_t)all * n + 2 * all);
   r->rates = DOUBLES(2 * all + c);
   r->lam = DOUBLES(2 * w);
@@ -98,5 +123,7 @@ static size_t place_run(Run *r, char *base) {
   r->heights_of = DOUBLES(w);
   r->aside = DOUBLES(2 * n);
   r->moving = LETTERS(w);
+  r->root = DOUBLES(g);
+  r->met_at = DOUBLES(g);
   return used;
 }

@@ -1,12 +1,17 @@
 /* Modes: nonsmooth/model/laws/coupled.py, nonsmooth/flow/reference/modes.py --------------------------------- */
 
-/* Whether a multiplier makes no difference: on its surface, or at an open contact. */
+/* Whether a multiplier makes no difference: on its surface, or where all contacts are open that carry it. */
 static int is_idle(const Run *r, const int8_t *letter, int i) {
   const System *s = r->s;
+  int carried = 0;
   if (i >= r->m) return 0;
   if (s->continuous[i]) return 1;
-  for (int j = 0; j < r->c; j++) if (s->carries[i * r->c + j] && letter[r->m + j]) return 1;
-  return 0;
+  for (int j = 0; j < r->c; j++) {
+    if (!s->carries[i * r->c + j]) continue;
+    if (!letter[r->m + j]) return 0;
+    carried = 1;
+  }
+  return carried;
 }
 
 static int add_row(Layout *l, int kind, int index, int side) {

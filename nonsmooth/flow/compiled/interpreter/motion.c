@@ -9,7 +9,7 @@ static int is_plain(const Run *r) {
 }
 
 /* The number of a mode's letters in the driver's table is that of lanes. */
-static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Motion *m) {
+static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Suspended *m) {
   static const Output none;
   clear(r, o, b->t0);
   r->out = none;
@@ -24,7 +24,7 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Moti
   memcpy(r->side, m->side, sizeof(int32_t) * r->s->stops);
   memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
   r->t = m->t;
-  r->last_event = m->last_event;
+  r->since = m->since;
   r->length = m->length;
   r->shortened = m->shortened;
   if (m->length > 0) r->length_mode = r->mode;
@@ -34,14 +34,17 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Moti
   r->itinerary = m->itinerary;
   r->history = m->history;
   for (int k = 0; k < HISTORY && k < m->history; k++) {
-    r->interval[k] = m->past[k].interval;
-    r->pattern[k] = m->past[k].pattern;
-    r->kind[k] = (int32_t)(m->past[k].pattern >> 52);
+    int64_t pattern = m->past[k].pattern;
+    int row = (int)(pattern >> 40 & 4095) - 1;
+    Layout *before = &r->trial.l;
+    lay_out(r, r->table->letter + (pattern >> 20 & 0xfffff) * r->width, before);
+    Met met = {before->kind[row], before->index[row], before->side[row]};
+    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(pattern >> 52), met};
   }
 }
 
 /* Give a run back, or store it where it ended. */
-static void give(Run *r, const Batch *b, int64_t i, Motion *m) {
+static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
   int64_t first = m->history > r->history - HISTORY ? m->history : r->history - HISTORY;
   m->status = r->status;
   if (r->status != RUNNING) { keep(r, b, i); return; }
@@ -55,7 +58,7 @@ static void give(Run *r, const Batch *b, int64_t i, Motion *m) {
   memcpy(m->side, r->side, sizeof(int32_t) * r->s->stops);
   memcpy(m->kinds, r->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
   m->t = r->t;
-  m->last_event = r->last_event;
+  m->since = r->since;
   m->length = r->length_mode == r->mode ? r->length : 0;
   m->shortened = r->shortened;
   m->steps = r->step_count;
@@ -63,17 +66,17 @@ static void give(Run *r, const Batch *b, int64_t i, Motion *m) {
   m->segment_steps = r->segment_steps;
   m->itinerary = r->itinerary;
   for (int64_t k = first; k < r->history; k++)
-    m->past[k % HISTORY] = (Recent){r->interval[k % HISTORY], r->pattern[k % HISTORY]};
+    m->past[k % HISTORY] = (Recent){r->past[k % HISTORY].interval, r->past[k % HISTORY].pattern};
   m->history = r->history;
 }
 
-static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Motion *m) {
+static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Suspended *m) {
   while (r->status == RUNNING && !is_plain(r)) step(r);
   give(r, b, i, m);
 }
 
 /* Begin a run whose start is not clear to lanes. */
-void core_begin(void *run, const Batch *b, const Options *o, int64_t i, Motion *m) {
+void core_begin(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m) {
   static const Output none;
   Run *r = run;
   m->history = 0;
@@ -82,7 +85,7 @@ void core_begin(void *run, const Batch *b, const Options *o, int64_t i, Motion *
 }
 
 /* Make the step that is not clear to lanes. */
-void core_step(void *run, const Batch *b, const Options *o, int64_t i, Motion *m) {
+void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m) {
   Run *r = run;
   take(r, b, o, i, m);
   if (b->at_x) {

@@ -50,7 +50,7 @@ static void count_hit(Run *r, int kind, int guard, int index, int side, const do
     finish(r, STOPPED, SAMPLED, (int)o->hit_count);
 }
 
-static void limit_of_events(Run *r);
+static void watch_accumulation(Run *r, int kind, int before, int guard);
 
 /* ``x`` is the state at the event, the present one unless the event changed it; ``guard`` a row of the mode
  * before, or -1. */
@@ -74,55 +74,6 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, r->met.index, r->met.side, x);
   if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, 0, 0, x); /* impacts that accumulated */
   if (kind == END || kind == STOP) return;
-  int at = r->history++ % HISTORY;
-  r->interval[at] = r->t - r->last_event;
-  r->kind[at] = kind;
-  r->pattern[at] = (((int64_t)kind * 4096 + guard + 1) << 40) + ((int64_t)before << 20) + r->mode;
-  r->last_event = r->t;
-  limit_of_events(r);
+  watch_accumulation(r, kind, before, guard);
   if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
-}
-
-/* nonsmooth/flow/reference/driver.py */
-static double interval_back(const Run *r, int back) { return r->interval[(r->history - back) % HISTORY]; }
-static int64_t pattern_back(const Run *r, int back) { return r->pattern[(r->history - back) % HISTORY]; }
-
-/* Time left until events accumulate; -1 if they do not (yet). */
-static double remaining_time(const Run *r) {
-  if (r->history > AT_ONCE) {
-    int all_zero = 1;
-    for (int k = 1; k <= AT_ONCE; k++) all_zero &= interval_back(r, k) == 0;
-    if (all_zero) return 0;
-  }
-  for (int l = 0; l < LAG_COUNT; l++) {
-    int lag = LAGS[l], need = BLOCKS * lag, same = 1;
-    if (r->history < need + lag) return -1;
-    for (int k = 1; k <= need && same; k++) same = pattern_back(r, k) == pattern_back(r, k + lag);
-    if (!same) continue;
-    double block[BLOCKS], least = INFINITY, low = INFINITY, high = 0, ratio = 0;
-    for (int b = 0; b < BLOCKS; b++) {
-      block[b] = 0;
-      for (int k = 0; k < lag; k++) block[b] += interval_back(r, need - b * lag - k);
-      least = fmin(least, block[b]);
-    }
-    if (!(least > 0)) continue;
-    for (int b = 1; b < BLOCKS; b++) {
-      ratio = block[b] / block[b - 1];
-      low = fmin(low, ratio);
-      high = fmax(high, ratio);
-    }
-    if (!(high < SHRINKS && high - low <= SPREAD * (1 - ratio))) continue;
-    double left = block[BLOCKS - 1] * ratio / (1 - ratio);
-    if (left < REMAINING * (r->t - r->begun)) return left;
-  }
-  return -1;
-}
-
-static int come_to_rest(Run *r, double left);
-
-static void limit_of_events(Run *r) {
-  double left = remaining_time(r);
-  if (left < 0 || (r->status == RUNNING && come_to_rest(r, left))) return;
-  r->limit = r->t + left;
-  finish(r, ACCUMULATION, NO_REASON, 0);
 }

@@ -4,8 +4,6 @@
  * driver}.py; read those first. What is rare and slow anyway (points where the jet is not finite, starts in
  * repelling sliding, stability that no simple test shows) is handed over to them.
  */
-#define TRIED 256 /* modes that are tried one by one, where the rates do not decide */
-#define FEW 3 /* surfaces of which all modes are tried where no matrix is known to have one solution */
 #define SEVERAL 16 /* modes that can continue, for the message */
 
 #define TINY 2.2250738585072014e-308
@@ -26,8 +24,9 @@ typedef struct {
   const int32_t *stop_direction, *reset_direction, *continuous, *scaled, *carries, *component;
   const int32_t *slope_output, *slope_moves; /* (m + c, m + c): output of the series or -1; whether it moves */
   int32_t linear, linear_free; /* whether field and guards are affine: in any mode, where nothing slides */
-  const int32_t *bent, *bent_free, *bent_guards; /* field's rows in any mode, where nothing slides; surfaces and
-                                                  * gaps, stops and resets: 0 if affine, nothing to be checked */
+  /* Field's rows in any mode, where nothing slides; surfaces and gaps, stops and resets: 0 if affine, with sines of
+   * the time, nothing to be checked; the latter: 0 if affine in states and time, polynomials are exact. */
+  const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
   int32_t sets; /* of codimension two and more */
   const int32_t *set_first, *set_size, *set_of; /* by set; the set of each switching function or -1 */
@@ -57,6 +56,22 @@ enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5 };
 /* A mode that can continue, and the zeros of its guards. */
 typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Continuation;
 
+/* A motion that can continue from a point: states of the active elements, the orders at which they were decided, the
+ * states before, the unknowns; first terms of the states' series. */
+typedef struct { int8_t *state, *order, *before; int32_t terms; double *nu, *series; } Motion;
+
+/* The law of the active elements at a point; see decide.c. Matrices are (count, count), what has orders is
+ * (orders, count). */
+typedef struct {
+  int32_t count, blocks, motions, branches, unstable;
+  const int8_t *letter;
+  int32_t *own, *order, *first, *mark, *pivot, *proved;
+  int8_t *is_contact, *is_idle, *is_touched, *is_known, *state, *block_state, *large_class;
+  double *matrix, *share, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
+  double most, field, rate;
+  Motion motion[SEVERAL];
+} Decision;
+
 /* Modes met, by number: their letters. */
 typedef struct { Tree tree; int32_t width, count, room; int8_t *letter; int32_t *bucket, buckets; } Table;
 
@@ -70,36 +85,42 @@ typedef struct {
 /* The guard that is served. */
 typedef struct { int kind, index, side; } Met;
 
+/* An event that may be one of many that accumulate: the time since the one before, and what was served. */
+typedef struct { double interval; int64_t pattern; int32_t kind; Met met; } Happened;
+
 typedef struct {
   Options o;
   const System *s;
   Table *table;
   double *p;
   int32_t n, m, c, width, order, stride, guards;
-  double t, begun, last_event, limit, at_t, *x, *at_x, *unknowns;
+  double t, begun, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start; /* present ones, and those that a choice is made from */
   Layout now; /* of the present mode */
   Met met;
   int32_t mode, status, reason, where, due, due_impact, falls, *drop, *side, *fired;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
-  double interval[HISTORY];
-  int64_t pattern[HISTORY];
-  int32_t kind[HISTORY];
+  Happened past[HISTORY];
   double size, length, shortened;
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
+  Decision *decision;
+  int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
   Output out;
   int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
-  const double *times;
+  const double *times, *asked; /* times of samples in the row; times at which any run is read */
+  int64_t asked_count;
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
+  double *root, *met_at; /* of each guard in the step: of its polynomial, and of itself; -1 if there is none */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
+  double *saved; /* a state to return to */
   int8_t *moving;
   int32_t shown;
   const Expansion *expansion;

@@ -75,7 +75,7 @@ static I refill(Lanes *s, Work *w) {
   }
   fresh &= ~refused;
   s->t = SELECT(fresh, BC(w->b->t0), s->t);
-  s->last_event = SELECT(fresh, s->t, s->last_event);
+  s->since = SELECT(fresh, BC(0), s->since);
   s->length = SELECT(fresh, BC(0), s->length);
   s->live |= fresh;
   s->code &= ~fresh;
@@ -101,7 +101,7 @@ INLINE void keep_event(const Lanes *s, Work *w, int kind, I which) {
 
 /* A lane as the driver takes and gives it back. */
 typedef struct {
-  Motion m;
+  Suspended m;
   double x[N];
   int64_t kinds[KINDS];
   int8_t letter[1];
@@ -117,14 +117,14 @@ static void point_to(Packed *a, Past *past) {
 }
 
 static void pack(const Lanes *s, Work *w, int l, Packed *a) {
-  Motion *m = &a->m;
+  Suspended *m = &a->m;
   const Past *past = &s->past[l];
   UNROLL for (int i = 0; i < N; i++) a->x[i] = LANE(s->x[i], l);
   for (int k = 0; k < LAST_KIND; k++) a->kinds[k] = LANE_I(s->kinds[k], l);
   for (int j = 0; j < STOPS; j++) a->side[j] = LANE_I(s->above_stop[j], l) ? 1 : -1;
   a->letter[0] = LANE_I(s->slides, l) ? 0 : LANE_I(s->above, l) ? 1 : -1;
   m->t = LANE(s->t, l);
-  m->last_event = LANE(s->last_event, l);
+  m->since = LANE(s->since, l);
   m->length = LANE(s->length, l);
   m->steps = LANE_I(s->steps, l);
   m->shortened = larger(0, past->shortened - 0.2 * (double)(m->steps - past->steps));
@@ -136,7 +136,7 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
 }
 
 static void unpack(Lanes *s, int l, const Packed *a) {
-  const Motion *m = &a->m;
+  const Suspended *m = &a->m;
   Past *past = &s->past[l];
   UNROLL for (int i = 0; i < N; i++) LANE(s->x[i], l) = a->x[i];
   for (int k = 0; k < LAST_KIND; k++) LANE_I(s->kinds[k], l) = a->kinds[k];
@@ -145,7 +145,7 @@ static void unpack(Lanes *s, int l, const Packed *a) {
   LANE_I(s->above, l) = -(int64_t)(a->letter[0] > 0);
   LANE(s->lambda, l) = a->letter[0] > 0 ? 1 : -1;
   LANE(s->t, l) = m->t;
-  LANE(s->last_event, l) = m->last_event;
+  LANE(s->since, l) = m->since;
   LANE(s->length, l) = m->length;
   LANE_I(s->steps, l) = past->steps = m->steps;
   past->shortened = m->shortened;

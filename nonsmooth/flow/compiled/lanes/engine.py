@@ -29,8 +29,8 @@ from ..tape import tape_for
 
 _I64, _POINTER = ctypes.c_int64, ctypes.c_void_p
 
-#: Lanes have a text of their own, and no bits in common with another: sums of products may be fused.
-FLAGS = ("-ffp-contract=fast",)
+#: Lanes are compiled for this processor, and have no bits in common with the driver: sums of products may be fused.
+FLAGS = ("-march=native", "-ffp-contract=fast")
 
 
 class _Core(ctypes.Structure):

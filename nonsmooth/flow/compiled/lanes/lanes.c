@@ -25,7 +25,7 @@ typedef struct { Recent event[HISTORY]; int64_t count, steps; double shortened; 
 typedef struct {
   T x[N];
   OWN(T, q, NQ); /* prepared from the parameters */
-  T t, lambda, last_event, length; /* of the step before in the same mode, or 0 */
+  T t, lambda, since, length; /* time since the last event; of the step before in the same mode, or 0 */
   I slides, above, drop, live, steps, events, kinds[LAST_KIND];
   I entered; /* number of steps when the mode began */
   I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
@@ -162,7 +162,7 @@ static void begin(Lanes *s, Work *w, I fresh) {
 /* Ratios of the last two terms of the guards that are not affine to their allowances (an affine
  * guard is bounded by the states). */
 INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T *of_guards, T g[S1][P + 1],
-                         T *last, T *before, T *sum) {
+                         T *last, T *before, T *sum, I *vanish) {
   T gradient[S1][N], value[S1];
 #if M > 0
   if (!AFFINE[0] || !AFFINE[1]) {
@@ -189,12 +189,15 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T *
     *sum += SELECT(counts, p + b, BC(0));
     *last = MAX(*last, SELECT(counts, p, BC(0)));
     *before = MAX(*before, SELECT(counts, b, BC(0)));
+    I zero = (g[j][P] == 0) | (g[j][P - 1] == 0), ahead = (g[j][P - 2] != 0) | (g[j][P - 3] != 0);
+    *vanish |= counts & zero & ahead;
   }
 }
 
-/* ``allowed`` and ``of_guards`` are the tolerances of states and of guards that are not affine. */
+/* ``allowed`` and ``of_guards`` are the tolerances of states and of guards that are not affine; the last terms of
+ * some guards ``vanish``, and earlier ones bound the step. */
 INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], T *allowed, T *of_guards,
-                   I *finite) {
+                   I *finite, I *vanish) {
   T last = BC(1e-300), before = BC(1e-300), sum = BC(0);
   UNROLL for (int i = 0; i < N; i++) {
     allowed[i] = i < ND ? SAFETY * (o->atol + o->rtol * ABS(s->x[i])) : BC(0);
@@ -204,7 +207,8 @@ INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 
     last = MAX(last, p);
     before = MAX(before, b);
   }
-  guard_ratios(s, o, allowed, of_guards, g, &last, &before, &sum);
+  *vanish = NONE;
+  guard_ratios(s, o, allowed, of_guards, g, &last, &before, &sum, vanish);
   *finite = ABS(sum) < INFINITY;
   T h1 = LOG2(MIN(last, BC(1e300))) * (-1.0 / P), h2 = LOG2(MIN(before, BC(1e300))) * (-1.0 / (P - 1));
   return EXP2(MIN(h1, h2));
@@ -473,26 +477,24 @@ static int may_accumulate(const Past *p) {
 /* Remember events of the lanes ``which``, by kind; those that may accumulate are returned, and not clear. */
 SELDOM I remember(Lanes *s, I which, I kind, I row, I before) {
   I unclear = NONE;
-  T interval = s->t - s->last_event;
   I pattern = (((kind << 12) + row + 1) << 40) + (before << 20) + mode_of(s);
   for EACH(l, which) {
     Past *p = &s->past[l];
-    p->event[p->count++ % HISTORY] = (Recent){LANE(interval, l), LANE_I(pattern, l)};
+    p->event[p->count++ % HISTORY] = (Recent){LANE(s->since, l), LANE_I(pattern, l)};
     if (p->count > BLOCKS && may_accumulate(p)) {
       LANE_I(unclear, l) = -1;
       p->count--;
     }
   }
-  s->last_event = SELECT(which & ~unclear, s->t, s->last_event);
+  s->since = SELECT(which & ~unclear, BC(0), s->since);
   return unclear;
 }
 #else
 /* Ever shorter intervals are left to the driver, which knows their limit. */
 INLINE I remember(Lanes *s, I which, I, I, I) {
-  T interval = s->t - s->last_event;
-  I shorter = which & (interval < SHRINKS * s->shortest);
-  s->last_event = SELECT(which, s->t, s->last_event);
-  s->shortest = SELECT(shorter, interval, s->shortest);
+  I shorter = which & (s->since < SHRINKS * s->shortest);
+  s->shortest = SELECT(shorter, s->since, s->shortest);
+  s->since = SELECT(which, BC(0), s->since);
   s->shrinking -= shorter;
   return which & (s->shrinking >= 3);
 }
@@ -552,6 +554,7 @@ INLINE void state_at(T *x, T c[N][P + 1], T dt, int degree) {
 INLINE void advance(Lanes *s, const T *x, T dt) {
   UNROLL for (int i = 0; i < N; i++) s->x[i] = x[i];
   s->t += dt;
+  s->since += dt;
   if (TIMED) s->x[N - 1] = s->t;
   s->steps += 1;
   s->drop = NONE;
@@ -623,12 +626,12 @@ INLINE I finite_lanes(const Lanes *s) {
 /* The series of a step, its length, and which guards have a root in it. */
 INLINE void expand_step(Lanes *s, Work *w, Step *e) {
   const Options *o = limits(w);
-  I finite;
+  I finite, vanish;
   jet(s->x, s->q, s->slides, s->above, s->lambda, &e->c[0][0], &e->g[0][0]);
-  e->by_series = step_size(s, o, e->c, e->g, e->allowed, e->of_guards, &finite);
+  e->by_series = step_size(s, o, e->c, e->g, e->allowed, e->of_guards, &finite, &vanish);
   T h = MIN(e->by_series, BC(o->max_step)), left = o->t_end - s->t;
   e->last = h >= left;
-  e->unclear = ~finite;
+  e->unclear = ~finite | vanish;
   e->unclear |= ~e->last & (h <= SHORTEST * MAX(BC(1), ABS(s->t)));
   e->unclear |= (s->steps >= o->max_steps) | passed_between(s, e->g);
   /* What happens at the end, to rounding, happens. */
@@ -643,10 +646,45 @@ INLINE void sort_step(Lanes *s, Step *e) {
   if (any(hard)) e->unclear |= resolve(&e->v);
 }
 
+/* Roots on a surface and on stops that are not affine are improved on these functions, as in the driver; the lanes
+ * are returned where one of Newton's steps is not enough. */
+INLINE I polish_times(const Lanes *s, Step *e, I slot, T *dt, T *end) {
+  I curved = NONE;
+  T value = BC(0), slope = BC(0);
+#if M > 0
+  if (CURVED && any(curved = s->live & (slot == 1) & ~s->slides)) {
+    T h, gradient[N];
+    surface_values(end, s->q, s->slides, s->above, s->lambda, &h, gradient);
+    value = SELECT(curved, s->lambda * h, value);
+  }
+#endif
+#if STOPS > 0
+  I here = NONE;
+  for (int j = 0; j < STOPS; j++) if (!AFFINE[FIRST_STOP + j]) here |= s->live & (slot == FIRST_STOP + j + 1);
+  if (any(here)) {
+    T stop[STOPS], gradient[STOPS][N];
+    stop_values(end, s->q, s->slides, s->above, s->lambda, stop, &gradient[0][0]);
+    for (int j = 0; j < STOPS; j++) value = SELECT(here & (slot == FIRST_STOP + j + 1), stop[j], value);
+    curved |= here;
+  }
+#endif
+  if (!any(curved)) return NONE;
+  UNROLL for (int j = 0; j < SLOTS; j++) {
+    T d = BC(0);
+    UNROLL for (int k = P; k >= 1; k--) d = d * *dt + (double)k * e->g[j][k];
+    slope = SELECT(slot == j + 1, d, slope);
+  }
+  T change = value / slope;
+  *dt = SELECT(curved, *dt - change, *dt);
+  state_at(end, e->c, *dt, P);
+  return curved & ~(I)(ABS(change) <= CLOSE * *dt);
+}
+
 /* What a step may have changed in the lanes ``which`` is again as at its start. */
-INLINE void undo_step(Lanes *s, const Step *e, T t, I drop, I slides, I above, I which) {
+INLINE void undo_step(Lanes *s, const Step *e, T t, T since, I drop, I slides, I above, I which) {
   UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(which, e->c[i][0], s->x[i]);
   s->t = SELECT(which, t, s->t);
+  s->since = SELECT(which, since, s->since);
   s->steps += which;
   s->drop = (s->drop & ~which) | (drop & which);
   s->slides = (s->slides & ~which) | (slides & which);
@@ -657,12 +695,13 @@ INLINE void undo_step(Lanes *s, const Step *e, T t, I drop, I slides, I above, I
 /* Take the step where it is clear; the lanes are returned where it is not. */
 INLINE I take_step(Lanes *s, Work *w, Step *e) {
   const Options *o = limits(w);
-  T left = e->left, dt = e->dt, t = s->t;
+  T left = e->left, dt = e->dt, t = s->t, since = s->since;
   I last = e->last & (e->h >= left), unclear = e->unclear | by_chance(s, w), slot = e->slot;
   dt = MIN(dt, SELECT(last, left, dt));
   unclear |= last & (dt == left) & (slot != 0) & (slot <= FIRST_STOP); /* a mode without a step */
   T h = MIN(e->h, left), end[N];
   state_at(end, e->c, dt, P);
+  unclear |= polish_times(s, e, slot, &dt, end) | (I)(dt > left);
   unclear |= unchecked(s, o, e->c, e->g, e->allowed, e->of_guards, e->by_series, dt, end);
   I drop = s->drop, slides = s->slides, above = s->above;
   advance(s, end, dt);
@@ -683,7 +722,7 @@ INLINE I take_step(Lanes *s, Work *w, Step *e) {
   length = SELECT((met | up | down) & ~unclear, BC(0), length);
 #endif
   unclear &= s->live;
-  if (any(unclear)) undo_step(s, e, t, drop, slides, above, unclear);
+  if (any(unclear)) undo_step(s, e, t, since, drop, slides, above, unclear);
   live &= ~unclear;
   s->length = SELECT(live, length, s->length);
 #if STOPS > 0

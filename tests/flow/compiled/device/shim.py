@@ -14,7 +14,7 @@ extern "C" void stand(int block, int thread, int blocks, int threads) {
   blockIdx.x = block; threadIdx.x = thread; gridDim.x = blocks; blockDim.x = threads;
 }
 """
-FLAGS = ("-x", "c++", "-std=gnu++17", "-fno-exceptions", "-fno-rtti")
+FLAGS = ("-march=native", "-x", "c++", "-std=gnu++17", "-fno-exceptions", "-fno-rtti")
 
 
 class Shim:

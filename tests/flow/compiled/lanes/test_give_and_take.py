@@ -111,7 +111,7 @@ def test_parameters_of_each_start(monkeypatch):
 
 
 def test_events_that_accumulate(monkeypatch):
-    """The surface is crossed at 1 - 2**(-k/2 - 1/4): the driver sees it from what the lane remembers."""
+    """The surface is crossed at 1 - 2**(-k/2 - 1/4): from the seventh event on the driver sees them all."""
     turns = ca.cos(2 * ca.pi * ca.log(1 - y) / np.log(2.0))
     system = ns.FilippovSystem([x, y], surface=turns, above=[1, 1], below=[-1, 1])
     options, p = Options(t_end=2.0, rtol=1e-10, atol=1e-10), system.parameter_vector()
@@ -119,7 +119,7 @@ def test_events_that_accumulate(monkeypatch):
     scalar = tape_for(system, options).run_many(start, p, options, None)
     lanes = lanes_of(system, options.order, 4, monkeypatch)
     found = lanes.run_many(start, p, options, None)
-    assert set(scalar.status.tolist()) == {int(ns.Status.ACCUMULATION)}
+    assert found.totals[1] > 12 * 60 and found.totals[2] > 0.5 * found.totals[1]
     same(found, scalar, 1e-8)
 
 

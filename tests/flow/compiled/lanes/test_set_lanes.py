@@ -11,6 +11,7 @@ import nonsmooth as ns
 from benchmarks import bounces_in_space
 from nonsmooth.flow.compiled.lanes.engine import lanes_for
 from nonsmooth.flow.compiled.tape import tape_for
+from nonsmooth.flow.ensembles import ensemble
 from nonsmooth.flow.options import Options
 from tests.flow import plane_friction as plane
 from tests.flow.compiled.test_sets import landings
@@ -89,11 +90,12 @@ def test_mirror_images_are_mirrored_to_the_bit_and_turned_starts_turn(kind):
     assert np.abs(other[1] - t).max() < 1e-14 and np.array_equal(other[2], words)
 
 
-def test_an_ensemble_depends_on_no_neighbour():
+def test_an_ensemble_depends_on_no_neighbour(monkeypatch):
+    monkeypatch.setattr(ensemble, "_FEW_WITH_SETS", 64)
     system, (x, p) = plane.ball("contact", True), drawn(400)
     given = {name: p[:, i] for i, name in enumerate(system.parameter_names)}
     run = lambda **work: ns.ensemble(
-        system, x, 20.0, parameters=given, tol=TOL, engine="compiled", at_event=("entry", 1),
+        system, x, 20.0, parameters=given, tol=TOL, at_event=("entry", 1),
         work=ns.Work(progress=False, **work),
     )  # fmt: skip
     whole, parts = run(threads=1), run(threads=2, chunk=37)
@@ -168,26 +170,26 @@ def test_sets_of_three_and_friction_with_a_grain(kind):
         case = plane.CASES["elliptical-friction"]
     system = plane.sliding_body(case)
     x = rng.normal(size=(64, system.dimension))
-    run = lambda engine: ns.ensemble(system, x, 3.0, engine=engine)
-    fast, slow = run("compiled"), run("reference")
-    assert np.array_equal(fast.itinerary, slow.itinerary) and {"*", "* s"} == set(fast.itineraries)
-    assert np.abs(fast.x - slow.x).max() < 1e-8 and not fast.status.any()
+    fast, slow = both(system, x, system.parameter_vector(), 1e-10, 3.0)
+    agree(fast, slow, 1e-8)
+    assert {"*", "* s"} == set(fast.words) and not fast.status.any()
 
 
 @pytest.mark.parametrize("kind", ["entry", "exit"])
 @pytest.mark.parametrize("tol", [1e-6, 1e-9, 1e-12])
-def test_where_sets_are_reached_and_left_is_known_to_the_tolerance(tol, kind):
+def test_where_sets_are_reached_and_left_is_known_to_the_tolerance(monkeypatch, tol, kind):
     # The last way is taken in one step from where |h| is about the cube root of the tolerance: were its second
     # order wrong or missing, places and times of hits would be off by some 10 tol^(2/3).
     system, (x, p) = plane.ball("contact", True), drawn(400)
     rows = np.arange(400) % 8 < 5
     given = {name: p[rows, i] for i, name in enumerate(system.parameter_names)}
-    fast, fine = (
-        ns.ensemble(
-            system, x[rows], 20.0, parameters=given, tol=t, engine=engine, at_event=(kind, 1)
-        )
-        for t, engine in ((tol, "compiled"), (1e-14, "auto"))
+    run = lambda tol: ns.ensemble(
+        system, x[rows], 20.0, parameters=given, tol=tol, at_event=(kind, 1)
     )
+    fine = run(1e-14)
+    monkeypatch.setattr(ensemble, "_FEW_WITH_SETS", 64)
+    fast = run(tol)
+    assert (fine.engine, fast.engine) == ("core", "lanes")
     assert np.array_equal(fast.itinerary, fine.itinerary)
     met = np.isfinite(fine.event_t)
     size = 1 + np.abs(fine.event_x[met]).max(axis=1)

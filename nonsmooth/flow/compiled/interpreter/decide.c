@@ -1,0 +1,1037 @@
+/* Which motion continues from a point where several elements act: lexicographic complementarity.
+ *
+ * Element i is a surface or a contact. w_i is its row of the layer, the first derivative of its function that holds
+ * an unknown (negative for contacts), nu_i its unknown, n_i times lambda_i or the reaction: w = a - A nu, and
+ * w_i lies in the normal cone of [-n_i, n_i], or of [0, inf), at nu_i. The coefficients of this law are solved in
+ * turn, until each element moves inside its set (it slides) or along its bound (it leaves to a side).
+ *
+ * Source: Cottle, Pang & Stone 1992, The Linear Complementarity Problem; Acary & Brogliato 2008, chapter 4.
+ */
+
+/* What is known of an element after some orders: nothing; nu at a bound and w = 0 so far; decided. A contact that
+ * is open is BELOW. */
+enum { UNDECIDED, AT_TOP, AT_BOTTOM, INSIDE, ABOVE, BELOW };
+
+/* Where nu is in a trial: inside its set with w = 0, or at a bound. */
+enum { HELD, TOP, BOTTOM };
+
+enum { MOST_SOLUTIONS = 16, MOST_FOUND = 64 };
+
+/* One block of elements that act on one another, with copies of its part of the law at one order. */
+typedef struct {
+  int size, first, is_coupled;
+  const int32_t *own;
+  double *a, *b, *matrix, *share, *floor; /* share: bounds by the reactions in the block; floor: rounding of w */
+  int8_t *state, *is_contact;
+} Block;
+
+/* Of a guard that ended the mode before so many coefficients vanish. */
+typedef struct { int kind, index, side, zeros; } Known;
+
+static int degree_of(const Run *r, int i) { return i < r->m ? 1 : 2; }
+
+/* Lemke's method ------------------------------------------------------------------------------------ */
+
+/* Whether row i leaves before row j: the least ratio, ties by the rows of the inverse. */
+static int leaves_first(const double *t, int width, int n, int i, int j, int column) {
+  const double *one = t + (int64_t)i * width, *two = t + (int64_t)j * width;
+  double x = one[width - 1] / one[column], y = two[width - 1] / two[column];
+  for (int k = 0; k <= n; k++) {
+    if (fabs(x - y) > SINGULAR * (fabs(x) + fabs(y))) return x < y;
+    if (k < n) { x = one[k] / one[column]; y = two[k] / two[column]; }
+  }
+  return i < j;
+}
+
+/* z >= 0 with w = M z + q >= 0 and z w = 0; 0 where the method ends on a ray. The tableau is of n (2 n + 2), m is
+ * (n, n). */
+static int lemke(const double *m, const double *q, int n, double *z, double *t, int32_t *basis) {
+  int width = 2 * n + 2, row = -1, column = 2 * n;
+  uint32_t seed = 1;
+  for (int i = 0; i < n; i++) {
+    double *own = t + (int64_t)i * width;
+    memset(own, 0, sizeof(double) * width);
+    own[i] = 1;
+    for (int j = 0; j < n; j++) own[n + j] = -m[(int64_t)i * n + j];
+    seed = seed * 1664525u + 1013904223u;
+    own[2 * n] = -1 - (seed >> 8) / 16777216.0;
+    own[width - 1] = q[i];
+    basis[i] = i;
+    if (q[i] < 0 && (row < 0 || q[i] * t[(int64_t)row * width + 2 * n] > q[row] * own[2 * n])) row = i;
+  }
+  memset(z, 0, sizeof(double) * n);
+  if (row < 0) return 1;
+  for (int count = 0; count < 100 * (n + 10); count++) {
+    double *own = t + (int64_t)row * width, head = own[column];
+    for (int j = 0; j < width; j++) own[j] /= head;
+    for (int i = 0; i < n; i++) {
+      double *to = t + (int64_t)i * width, f = to[column];
+      if (i == row || f == 0) continue;
+      for (int j = 0; j < width; j++) if (own[j] != 0) to[j] -= f * own[j];
+      to[column] = 0;
+    }
+    int left = basis[row];
+    basis[row] = column;
+    if (left == 2 * n) {
+      for (int i = 0; i < n; i++) if (basis[i] >= n) z[basis[i] - n] = larger(t[(int64_t)i * width + width - 1], 0);
+      return finite_all(z, n);
+    }
+    column = left < n ? left + n : left - n;
+    row = -1;
+    for (int i = 0; i < n; i++)
+      if (t[(int64_t)i * width + column] > SINGULAR && (row < 0 || leaves_first(t, width, n, i, row, column))) row = i;
+    for (int i = 0; i < n; i++) /* the covering variable leaves as soon as it may */
+      if (row >= 0 && basis[i] == 2 * n && i != row && t[(int64_t)i * width + column] > SINGULAR) {
+        const double *one = t + (int64_t)i * width, *two = t + (int64_t)row * width;
+        if (one[width - 1] / one[column] <= two[width - 1] / two[column]) row = i;
+      }
+    if (row < 0) return 0;
+  }
+  return 0;
+}
+
+/* The same with rows and columns of one size; m and q are lost. */
+static int lemke_scaled(double *m, double *q, int n, double *z, double *work, int32_t *basis) {
+  double *unit = work, largest = 0;
+  for (int i = 0; i < n; i++) {
+    double most = 0;
+    for (int j = 0; j < n; j++) most = larger(fabs(m[(int64_t)i * n + j]), most);
+    if (!(most > 0)) continue;
+    for (int j = 0; j < n; j++) m[(int64_t)i * n + j] /= most;
+    q[i] /= most;
+  }
+  for (int j = 0; j < n; j++) {
+    unit[j] = 0;
+    for (int i = 0; i < n; i++) unit[j] = larger(fabs(m[(int64_t)i * n + j]), unit[j]);
+    if (!(unit[j] > 0)) unit[j] = 1;
+    for (int i = 0; i < n; i++) m[(int64_t)i * n + j] /= unit[j];
+  }
+  for (int i = 0; i < n; i++) largest = larger(fabs(q[i]), largest);
+  if (largest > 0) for (int i = 0; i < n; i++) q[i] /= largest;
+  if (!lemke(m, q, n, z, work + n, basis)) return 0;
+  for (int j = 0; j < n; j++) z[j] *= largest / unit[j];
+  return 1;
+}
+
+/* One block at one order --------------------------------------------------------------------------- */
+
+/* Bound of nu_i by the reactions of its block. */
+static double bound_of(const Block *k, int i, const double *nu) {
+  double b = k->b[i];
+  if (k->is_coupled)
+    for (int j = 0; j < k->size; j++) if (k->share[i * k->size + j] != 0) b += k->share[i * k->size + j] * nu[j];
+  return b;
+}
+
+/* w_i, and the sum of its terms. */
+static double rate_of(const Block *k, int i, const double *nu, double *terms) {
+  double w = k->a[i];
+  *terms = fabs(w);
+  for (int j = 0; j < k->size; j++) {
+    double term = k->matrix[i * k->size + j] * nu[j];
+    if (term != 0) { w -= term; *terms += fabs(term); }
+  }
+  return w;
+}
+
+/* What w_i and nu_i are zero to. */
+static double zero_of(const Block *k, int i, double terms) { return larger(k->floor[i], TIED * terms); }
+static double room_zero(const Block *k, int i, double zero, double bound) {
+  double own = fabs(k->matrix[i * (k->size + 1)]), most = TIED * fabs(bound);
+  return own > 0 ? larger(zero / own, most) : most;
+}
+
+/* Whether a state allows a position; the position of those that are decided. */
+static int allows(const Block *k, int i, int position) {
+  switch (k->state[i]) {
+    case UNDECIDED: return !k->is_contact[i] || position != TOP;
+    case AT_TOP: return position != BOTTOM;
+    case AT_BOTTOM: return position != TOP;
+    case INSIDE: return position == HELD;
+    case ABOVE: return position == TOP;
+    default: return position == BOTTOM;
+  }
+}
+
+/* nu of positions; 0 where there is none. ``work`` has room for 3 n^2 + 4 n. */
+static int place_unknowns(const Block *k, const int8_t *position, double *nu, double *work, int32_t *pivot) {
+  int n = k->size;
+  double *m = work;
+  for (int i = 0; i < n; i++) {
+    double *row = m + (int64_t)i * n;
+    if (position[i] == HELD) { memcpy(row, k->matrix + (int64_t)i * n, sizeof(double) * n); nu[i] = k->a[i]; continue; }
+    double side = position[i] == TOP ? 1 : -1;
+    for (int j = 0; j < n; j++) row[j] = i == j;
+    nu[i] = k->is_contact[i] ? 0 : side * k->b[i];
+    if (k->is_coupled && !k->is_contact[i]) for (int j = 0; j < n; j++) row[j] -= side * k->share[i * n + j];
+  }
+  return solve_any(m, nu, n, work + (int64_t)n * n, pivot);
+}
+
+/* The position that an element wants next, its own where it fits. */
+static int wanted(const Block *k, int i, int position, const double *nu) {
+  double terms, w = rate_of(k, i, nu, &terms), zero = zero_of(k, i, terms), bound = bound_of(k, i, nu);
+  double low = k->is_contact[i] ? 0 : -bound, room = room_zero(k, i, zero, bound);
+  if (position == HELD) {
+    if (allows(k, i, TOP) && nu[i] > bound + room) return TOP;
+    if (allows(k, i, BOTTOM) && nu[i] < low - room) return BOTTOM;
+    return HELD;
+  }
+  if (!allows(k, i, HELD)) return position;
+  if (position == TOP ? w >= -zero : w <= zero) return position;
+  int is_empty = !k->is_contact[i] && k->state[i] == UNDECIDED && bound <= room; /* {0}: any w */
+  return is_empty ? position == TOP ? BOTTOM : TOP : HELD;
+}
+
+/* Principal pivoting: all that do not fit change, one at a time where that does not help. */
+static int pivot_block(const Block *k, int8_t *position, double *nu, int most, double *work, int32_t *pivot) {
+  int best = k->size + 1, patience = 10;
+  for (int count = 0; count < most; count++) {
+    if (!place_unknowns(k, position, nu, work, pivot)) return 0;
+    int wrong = 0, first = -1, next = 0;
+    for (int i = 0; i < k->size; i++) {
+      int want = wanted(k, i, position[i], nu);
+      if (want != position[i] && wrong++ == 0) { first = i; next = want; }
+    }
+    if (!wrong) return 1;
+    if (wrong < best) { best = wrong; patience = 10; }
+    if (--patience > 0) {
+      for (int i = 0; i < k->size; i++) pivot[i] = wanted(k, i, position[i], nu);
+      for (int i = 0; i < k->size; i++) position[i] = (int8_t)pivot[i];
+    } else position[first] = (int8_t)next;
+  }
+  return 0;
+}
+
+/* nu, and what has to be positive beside z, of variables z that are: distances to a bound, for two bounds that from
+ * the lower one and how far w is positive; two parts of nu where w = 0. The number of variables. */
+static int standard_form(const Block *k, const double *z, double *nu, double *beside) {
+  int at = 0, n = k->size;
+  for (int contacts = 1; contacts >= 0; contacts--) /* bounds depend on contacts */
+    for (int i = 0, v = 0; i < n; i++) {
+      int state = k->state[i], two = state == INSIDE || (state == UNDECIDED && !k->is_contact[i]);
+      int count = state == ABOVE || state == BELOW ? 0 : two ? 2 : 1, from = v;
+      v += count;
+      at = v;
+      if (k->is_contact[i] != contacts) continue;
+      double bound = k->is_contact[i] ? 0 : bound_of(k, i, nu);
+      nu[i] = state == ABOVE ? bound : state == BELOW ? -bound : state == INSIDE ? z[from] - z[from + 1]
+              : state == AT_TOP ? bound - z[from] : z[from] - bound;
+    }
+  for (int i = 0, v = 0; i < n; i++) {
+    int state = k->state[i];
+    double terms, w = rate_of(k, i, nu, &terms);
+    if (state == ABOVE || state == BELOW) continue;
+    if (state == INSIDE) { beside[v++] = -w; beside[v++] = w; }
+    else if (state == AT_TOP) beside[v++] = w;
+    else if (state == AT_BOTTOM || k->is_contact[i]) beside[v++] = -w;
+    else { beside[v] = z[v + 1] - w; beside[v + 1] = bound_of(k, i, nu) - nu[i]; v += 2; }
+  }
+  return at;
+}
+
+/* A solution by Lemke's method. ``work`` has room for 14 n^2 + 20 n with n twice the size. */
+static int lemke_block(const Block *k, double *nu, double *work, int32_t *pivot) {
+  int most = 2 * k->size, n;
+  double *z = work, *q = z + most, *other = q + most, *m = other + most, *rest = m + (int64_t)most * most;
+  memset(z, 0, sizeof(double) * most);
+  n = standard_form(k, z, nu, q);
+  for (int j = 0; j < n; j++) {
+    z[j] = 1;
+    standard_form(k, z, nu, other);
+    for (int i = 0; i < n; i++) m[(int64_t)i * n + j] = other[i] - q[i];
+    z[j] = 0;
+  }
+  if (!lemke_scaled(m, q, n, z, rest, pivot)) return 0;
+  standard_form(k, z, nu, other);
+  return finite_all(nu, k->size);
+}
+
+/* What a solution says of an element; ``part`` of its terms is zero, if that is more than rounding. */
+static int class_of(const Block *k, int i, const double *nu, double part) {
+  double terms, w = rate_of(k, i, nu, &terms), bound = bound_of(k, i, nu), zero = larger(zero_of(k, i, terms), part * terms);
+  double room = larger(room_zero(k, i, zero, bound), part * fabs(bound));
+  int state = k->state[i];
+  if (state >= INSIDE) return state;
+  if (k->is_contact[i]) return w < -zero ? BELOW : nu[i] > room ? INSIDE : AT_BOTTOM;
+  if (w > zero) return ABOVE;
+  if (w < -zero) return BELOW;
+  if (state == UNDECIDED && bound <= room) return UNDECIDED;
+  if (state != AT_BOTTOM && bound - nu[i] <= room) return AT_TOP;
+  if (state != AT_TOP && nu[i] + bound <= room) return AT_BOTTOM;
+  return INSIDE;
+}
+
+/* A point inside ------------------------------------------------------------------------------------ */
+
+/* The largest c y with c y <= cap and G y + s >= 0, y (d) free: 0 where it is not found. */
+static int maximise(const double *g, const double *s, const double *c, double cap, int rows, int d, double *y,
+                    double *work, int32_t *basis) {
+  int n = 2 * d + rows + 1;
+  double *m = work, *q = m + (int64_t)n * n, *z = q + n, *rest = z + n;
+  memset(m, 0, sizeof(double) * n * n);
+  for (int j = 0; j < d; j++) { q[j] = -c[j]; q[d + j] = c[j]; }
+  for (int i = 0; i <= rows; i++) {
+    q[2 * d + i] = i < rows ? s[i] : cap;
+    for (int j = 0; j < d; j++) {
+      double of = i < rows ? g[(int64_t)i * d + j] : -c[j];
+      m[(int64_t)(2 * d + i) * n + j] = of;
+      m[(int64_t)(2 * d + i) * n + d + j] = -of;
+      m[(int64_t)j * n + 2 * d + i] = -of;
+      m[(int64_t)(d + j) * n + 2 * d + i] = of;
+    }
+  }
+  if (!lemke_scaled(m, q, n, z, rest, basis)) return 0;
+  for (int j = 0; j < d; j++) y[j] = z[j] - z[d + j];
+  return 1;
+}
+
+/* Distances of nu from the bounds that are open to it (rows), where w is zero. */
+static int distances(const Block *k, const double *nu, const int8_t *is_moving, double *s) {
+  int rows = 0;
+  for (int i = 0; i < k->size; i++) {
+    double bound = k->is_contact[i] ? 0 : bound_of(k, i, nu);
+    if (!is_moving[i] || k->state[i] == INSIDE) continue;
+    if (!k->is_contact[i] && k->state[i] != AT_BOTTOM) s[rows++] = bound - nu[i];
+    if (k->state[i] != AT_TOP) s[rows++] = nu[i] + bound;
+  }
+  return rows;
+}
+
+/* Move a solution, whose w is the only one, inside all solutions: the mean of those that are farthest from a bound.
+ * Room as lemke_block's and 40 n^2 + 40 n. The dimension of the solutions is returned. */
+static int move_inside(const Block *k, double *nu, double *work, int32_t *pivot) {
+  int n = k->size, rows = 0, found = 1;
+  int8_t *is_moving = (int8_t *)work;
+  double *e = work + n, *z = e + 2 * (int64_t)n * n, *g = z + (int64_t)n * n, *s = g + 2 * (int64_t)n * n, *mean = s + 2 * n;
+  double *y = mean + n, *trial = y + n, *shifted = trial + n, *rest = shifted + 2 * n;
+  for (int i = 0; i < n; i++) {
+    int class = class_of(k, i, nu, 0);
+    is_moving[i] = class != ABOVE && class != BELOW;
+  }
+  memset(e, 0, sizeof(double) * 2 * n * n);
+  for (int i = 0; i < n; i++) {
+    double side = class_of(k, i, nu, 0) == ABOVE ? 1 : -1;
+    memcpy(e + (int64_t)rows++ * n, k->matrix + (int64_t)i * n, sizeof(double) * n);
+    if (is_moving[i]) continue;
+    for (int j = 0; j < n && !k->is_contact[i]; j++) e[(int64_t)rows * n + j] = -side * k->share[i * n + j];
+    e[(int64_t)rows++ * n + i] += 1;
+  }
+  int d = null_space(e, rows, n, z, rest, pivot);
+  if (!d) return 0;
+  memcpy(mean, nu, sizeof(double) * n);
+  rows = distances(k, nu, is_moving, s);
+  for (int l = 0; l < d; l++) { /* distances are affine */
+    for (int i = 0; i < n; i++) trial[i] = nu[i] + z[(int64_t)l * n + i];
+    distances(k, trial, is_moving, shifted);
+    for (int q = 0; q < rows; q++) g[(int64_t)q * d + l] = shifted[q] - s[q];
+  }
+  for (int q = 0; q < rows; q++) s[q] = larger(s[q], 0);
+  double cap = 0;
+  for (int i = 0; i < n; i++) cap = larger(cap, fabs(nu[i]) + (k->is_contact[i] ? 0 : fabs(bound_of(k, i, nu))));
+  for (int q = 0; q < rows; q++) {
+    distances(k, mean, is_moving, shifted);
+    if (shifted[q] > TIED * cap || !(cap > 0)) continue;
+    if (!maximise(g, s, g + (int64_t)q * d, cap, rows, d, y, rest, pivot)) continue;
+    found++;
+    for (int i = 0; i < n; i++) {
+      trial[i] = nu[i];
+      for (int l = 0; l < d; l++) trial[i] += z[(int64_t)l * n + i] * y[l];
+      mean[i] += (trial[i] - mean[i]) / found;
+    }
+  }
+  memcpy(nu, mean, sizeof(double) * n);
+  return d;
+}
+
+/* All solutions of a block ---------------------------------------------------------------------------- */
+
+/* Whether two solutions are one, or have the same w. */
+static int is_same(const Block *k, const double *one, const double *two, int only_rates) {
+  for (int i = 0; i < k->size; i++) {
+    double terms, more, w = rate_of(k, i, one, &terms), v = rate_of(k, i, two, &more);
+    double zero = larger(zero_of(k, i, larger(terms, more)), MERGED * larger(terms, more));
+    if (fabs(w - v) > zero) return 0;
+    if (only_rates) continue;
+    double bound = larger(fabs(one[i]), fabs(two[i]));
+    if (fabs(one[i] - two[i]) > larger(room_zero(k, i, zero, bound), MERGED * bound)) return 0;
+  }
+  return 1;
+}
+
+/* All positions are tried; of solutions with the same w the mean. They are written to ``found`` (MOST_SOLUTIONS,
+ * n); their number is returned. */
+static int enumerate(const Block *k, double *found, double *work, int32_t *pivot) {
+  int n = k->size, count = 0, groups = 0, in_group[MOST_SOLUTIONS];
+  int8_t position[MOST_ENUMERATED];
+  double all[MOST_FOUND * MOST_ENUMERATED], nu[MOST_ENUMERATED];
+  int64_t total = 1;
+  for (int i = 0; i < n; i++) total *= 3;
+  for (int64_t number = 0; number < total && count < MOST_FOUND; number++) {
+    int64_t rest = number;
+    int fits = 1;
+    for (int i = 0; i < n && fits; i++, rest /= 3) fits = allows(k, i, position[i] = (int8_t)(rest % 3));
+    if (!fits || !place_unknowns(k, position, nu, work, pivot)) continue;
+    for (int i = 0; i < n && fits; i++) {
+      fits = wanted(k, i, position[i], nu) == position[i];
+      fits = fits && (k->is_contact[i] || bound_of(k, i, nu) >= -room_zero(k, i, k->floor[i], bound_of(k, i, nu)));
+    }
+    for (int q = 0; q < count && fits; q++) fits = !is_same(k, all + q * n, nu, 0);
+    if (fits) memcpy(all + n * count++, nu, sizeof(double) * n);
+  }
+  for (int q = 0; q < count; q++) {
+    int g = 0;
+    while (g < groups && !is_same(k, found + g * n, all + q * n, 1)) g++;
+    if (g == MOST_SOLUTIONS) continue;
+    if (g == groups) { in_group[groups++] = 0; memset(found + g * n, 0, sizeof(double) * n); }
+    in_group[g]++;
+    for (int i = 0; i < n; i++) found[g * n + i] += (all[q * n + i] - found[g * n + i]) / in_group[g];
+  }
+  return groups;
+}
+
+/* Solutions of a block that is not of one element: one where a certificate or the size says so. */
+static int solve_block_of_many(const Block *k, int certificate, int8_t *position, double *found, double *work,
+                               int32_t *pivot) {
+  if (certificate == NOTHING && k->size <= MOST_ENUMERATED) return enumerate(k, found, work, pivot);
+  int most = certificate >= UNIQUE ? 10000 : 20 + 4 * k->size;
+  int solved = pivot_block(k, position, found, most, work, pivot) || lemke_block(k, found, work, pivot);
+  if (solved && certificate < UNIQUE) move_inside(k, found, work, pivot);
+  return solved;
+}
+
+/* Of one element without a matrix the bound is left open: higher orders decide between both. */
+static int solve_single(const Block *k, double *found) {
+  double a = k->a[0], m = k->matrix[0], b = k->b[0], low = k->is_contact[0] ? 0 : -b, zero = k->floor[0];
+  int state = k->state[0], count = 0;
+  if (state == ABOVE || state == BELOW) { found[0] = state == ABOVE ? b : low; return 1; }
+  if (state == INSIDE) { found[0] = a / m; return isfinite(found[0]); }
+  if (m > 0) {
+    double nu = a / m;
+    if (state != AT_BOTTOM && !k->is_contact[0]) nu = smaller(nu, b);
+    if (state != AT_TOP) nu = larger(nu, low);
+    found[0] = nu;
+    return 1;
+  }
+  if (allows(k, 0, HELD) && m < 0) {
+    double nu = a / m;
+    if ((state == AT_BOTTOM || k->is_contact[0] || nu <= b) && (state == AT_TOP || nu >= low)) found[count++] = nu;
+  }
+  if (allows(k, 0, TOP) && a - m * b >= -zero) found[count++] = b;
+  if (allows(k, 0, BOTTOM) && a - m * low <= zero && !(count && found[count - 1] == low)) found[count++] = low;
+  if (count == 2 && found[0] == found[1]) count = 1;
+  return count;
+}
+
+/* The law at a point --------------------------------------------------------------------------------- */
+
+static int element_of(const Run *r, const Known *known) {
+  return known->index + (known->kind == IMPACT_GUARD || known->kind == RELEASE_GUARD ? r->m : 0);
+}
+
+/* Bounds that are negative turn the law around: the unknown changes its sign. */
+static void turn_bound(Decision *d, int i, double *b) {
+  int k = d->count;
+  double all = *b;
+  for (int j = 0; j < k; j++) if (all == 0) all = d->share[i * k + j];
+  if (!(all < 0)) return;
+  *b = -*b;
+  d->sign[i] = -d->sign[i];
+  for (int j = 0; j < k; j++) { d->share[i * k + j] *= -1; d->matrix[j * k + i] *= -1; }
+}
+
+/* Edges of the graph: row i of the law holds the unknown j. */
+static int holds(const Decision *d, int i, int j) {
+  return i != j && (d->matrix[i * d->count + j] != 0 || d->share[i * d->count + j] != 0);
+}
+
+/* Depth-first search of the strongly connected components (Tarjan 1972), those that others depend on first. */
+static void visit(Decision *d, int i, int *time, int *top) {
+  int32_t *index = d->mark, *low = index + d->count, *stack = low + d->count, *on = stack + d->count;
+  index[i] = low[i] = ++*time;
+  stack[(*top)++] = i;
+  on[i] = 1;
+  for (int j = 0; j < d->count; j++) {
+    if (!holds(d, i, j)) continue;
+    if (!index[j]) { visit(d, j, time, top); if (low[j] < low[i]) low[i] = low[j]; }
+    else if (on[j] && index[j] < low[i]) low[i] = index[j];
+  }
+  if (low[i] != index[i]) return;
+  int at = d->first[d->blocks], j;
+  do { j = stack[--*top]; on[j] = 0; d->order[at++] = j; } while (j != i);
+  for (int a = d->first[d->blocks] + 1; a < at; a++) /* in the order of the elements */
+    for (int b = a; b > d->first[d->blocks] && d->order[b] < d->order[b - 1]; b--) {
+      int t = d->order[b]; d->order[b] = d->order[b - 1]; d->order[b - 1] = t;
+    }
+  d->first[++d->blocks] = at;
+}
+
+static void find_blocks(Decision *d) {
+  int time = 0, top = 0;
+  d->blocks = d->first[0] = 0;
+  memset(d->mark, 0, sizeof(int32_t) * 4 * d->count);
+  for (int i = 0; i < d->count; i++) if (!d->mark[i]) visit(d, i, &time, &top);
+}
+
+/* Rows, matrix and bounds at the present point with all active unknowns zero; 0 where they are no numbers. */
+static int read_law(Run *r, Decision *d, const int8_t *letter) {
+  int k = d->count, w = r->width, carried = 0;
+  double *near = r->vector + r->n + w; /* not where inputs are put together */
+  aim(r, letter, r->x, r->unknowns);
+  held_of(r, letter);
+  for (int i = 0; i < k; i++) r->held[r->active[i]] = 0;
+  error_scales(r, r->x, r->held, r->none);
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
+  gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
+  memset(d->share, 0, sizeof(double) * k * k);
+  for (int i = 0; i < k; i++) {
+    int own = d->own[i] = r->active[i];
+    d->is_contact[i] = own >= r->m;
+    d->turn[i] = d->is_contact[i] ? -1 : 1;
+    d->a[i] = d->turn[i] * layer_of(r, own);
+    d->floor[i] = VANISHES * r->small[own];
+    d->is_idle[i] = own < r->m && r->s->continuous[own];
+    d->b[i] = d->is_contact[i] || d->is_idle[i] ? 0 : factor_of(r, own);
+    for (int j = 0; j < r->c && own < r->m; j++) carried |= r->s->carries[own * r->c + j];
+    if (!isfinite(d->a[i]) || !isfinite(d->b[i])) return 0;
+  }
+  for (int i = 0; i < k; i++)
+    for (int j = 0; j < k; j++)
+      d->matrix[i * k + j] = d->is_idle[j] ? 0 : -d->turn[i] * r->slope[d->own[i] * w + d->own[j]];
+  for (int j = 0; carried && j < k; j++) { /* bounds are affine in the reactions */
+    if (!d->is_contact[j]) continue;
+    r->held[d->own[j]] = 1;
+    error_scales(r, r->x, r->held, r->none);
+    r->held[d->own[j]] = 0;
+    for (int i = 0; i < k; i++)
+      if (!d->is_contact[i] && !d->is_idle[i]) d->share[i * k + j] = factor_of(r, d->own[i]) - d->b[i];
+  }
+  for (int i = 0; i < k; i++) { d->sign[i] = 1; turn_bound(d, i, d->b + i); }
+  return finite_all(d->matrix, k * k);
+}
+
+/* The unknowns of the mode before, those whose guard ended it at their bounds. */
+static void read_old(const Run *r, Decision *d, const int8_t *letter, const Known *known, int known_count) {
+  int k = d->count;
+  for (int i = 0; i < k; i++) {
+    d->is_known[i] = 0;
+    for (int q = 0; q < known_count; q++) if (element_of(r, known + q) == d->own[i]) d->is_known[i] = 1;
+  }
+  for (int contacts = 1; contacts >= 0; contacts--)
+    for (int i = 0; i < k; i++) {
+      int own = d->own[i], side = letter[own];
+      double bound = d->b[i];
+      if (d->is_contact[i] != contacts) continue;
+      for (int j = 0; j < k; j++) bound += d->share[i * k + j] * d->old[j];
+      for (int q = 0; q < known_count; q++) if (element_of(r, known + q) == own && known[q].kind == EXIT_GUARD) side = known[q].side;
+      d->old[i] = side == 0 && !d->is_known[i] ? d->sign[i] * r->unknowns[own] : d->is_contact[i] ? 0 : side * bound;
+    }
+}
+
+/* Whether the old unknown of an element is at its bound, to rounding. */
+static int is_at_bound(const Decision *d, int i) {
+  double bound = d->b[i];
+  if (d->is_contact[i]) return d->old[i] <= TIED * d->room[i];
+  for (int j = 0; j < d->count; j++) bound += d->share[i * d->count + j] * d->old[j];
+  return bound - fabs(d->old[i]) <= TIED * d->room[i];
+}
+
+/* Elements of components in which nothing is new go on as they are. */
+static void find_touched(Decision *d, const int8_t *letter) {
+  int k = d->count, any = 0, changed = 1;
+  for (int i = 0; i < k; i++) {
+    d->is_touched[i] = d->is_known[i] || letter[d->own[i]] != 0 || is_at_bound(d, i);
+    any |= d->is_touched[i];
+  }
+  if (!any) for (int i = 0; i < k; i++) d->is_touched[i] = 1;
+  while (any && changed) {
+    changed = 0;
+    for (int i = 0; i < k; i++)
+      for (int j = 0; j < k; j++)
+        if (d->is_touched[i] != d->is_touched[j] && (holds(d, i, j) || holds(d, j, i)))
+          changed = d->is_touched[i] = d->is_touched[j] = 1;
+  }
+}
+
+/* Orders ------------------------------------------------------------------------------------------------- */
+
+/* Coefficients ``order`` of all that is known without the unknowns of that order. */
+static void open_order(Run *r, Expansion *e, int order) {
+  const Series *t = &r->s->series;
+  for (int i = 0; i < r->active_count; i++) e->series[(int64_t)r->active[i] * r->stride + order] = 0;
+  if (!r->s->sets) {
+    inputs_of(r, e, order);
+    series_rules(t, order ? t->later : t->moving, order ? t->later_count : t->moving_count, order, r->stride, r->input, r->series);
+    return;
+  }
+  inputs_of_sets(r, e, order);
+  if (!order) series_rules(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
+  else series_rules(t, r->s->early, r->s->early_count, order, r->stride, r->input, r->series);
+  follow_sets(r, e, order);
+  inputs_of_sets(r, e, order);
+  if (order) series_rules(t, t->late, t->late_count, order, r->stride, r->input, r->series);
+}
+
+/* The same with them, and the states of the next order. */
+static void close_order(Run *r, Expansion *e, int order) {
+  const Series *t = &r->s->series;
+  if (r->s->sets) inputs_of_sets(r, e, order); else inputs_of(r, e, order);
+  series_rules(t, order ? t->late : t->moving, order ? t->late_count : t->moving_count, order, r->stride, r->input, r->series);
+  if (r->s->sets) close_sets(r, e, order);
+  next_states(r, e, order);
+}
+
+static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
+  Expansion *e = &r->trial;
+  int w = r->width, stride = r->stride;
+  memset(e->series, 0, sizeof(double) * w * stride);
+  for (int i = 0; i < r->n; i++) e->states[(int64_t)i * stride] = r->x[i];
+  aim(r, letter, r->x, r->unknowns);
+  held_of(r, letter);
+  for (int i = 0; i < d->count; i++) r->held[d->own[i]] = 0;
+  if (!r->s->sets) return;
+  memset(e->lambda, 0, sizeof(double) * w * stride);
+  for (int i = 0; i < r->m; i++) {
+    e->lambda[(int64_t)i * stride] = r->direction[i];
+    if (letter[i] == LEFT_BEHIND) e->series[(int64_t)i * stride] = r->unknowns[i];
+  }
+  memcpy(e->l.letter, letter, w);
+  e->l.mode = -1;
+}
+
+/* Rounding of the states' coefficients, and of the rows of each order: what is zero at rest is not compared with
+ * itself. */
+static void read_noise(Run *r, Decision *d) {
+  int k = d->count, w = r->width, m = r->m, c = r->c, all = m + 2 * c, first = 2 * w + r->s->slope.count;
+  double *ones = r->vector + r->n + w, *steep = r->small, *height = r->rates + all;
+  d->field = d->rate = 0;
+  for (int i = 0; i < r->n; i++) ones[i] = 1;
+  error_scales(r, r->x, r->held, r->none);
+  gradient_sums(r, &r->s->point, r->point, first, &r->s->layer_gradient, w, ones, 1, steep);
+  surface_values(r, r->x);
+  gradient_sums(r, &r->s->surfaces, r->heights, all, &r->s->surface_gradient, all, ones, 1, height);
+  for (int i = 0; i < k; i++) {
+    int own = d->own[i];
+    double of = height[own < m ? own : own + c];
+    d->steep[i] = steep[own];
+    if (!(of > 0)) continue;
+    d->field = larger(d->field, d->yard[i] / of);
+    d->rate = larger(d->rate, d->steep[i] / of);
+  }
+}
+
+/* Rows and bounds of an order after the first. */
+static void read_order(Run *r, Decision *d, int order) {
+  Expansion *e = &r->trial;
+  int k = d->count, w = r->width;
+  double speed = 0, drift = VANISHES * d->field;
+  for (int i = 2; i <= order; i++) drift *= d->rate / i;
+  for (int i = 0; i < r->n; i++) speed = larger(fabs(e->states[(int64_t)i * r->stride + order]), speed);
+  for (int i = 0; i < k; i++) {
+    int at = order * k + i;
+    d->a[at] = d->turn[i] * row_of(r, r->n + d->own[i])[order];
+    d->b[at] = d->is_contact[i] || d->is_idle[i] ? 0 : d->sign[i] * row_of(r, r->n + 2 * w + d->own[i])[order];
+    d->floor[at] = d->steep[i] * (VANISHES * (order + 1) * speed + drift);
+    if (d->state[at] == UNDECIDED && !d->is_contact[i]) turn_bound(d, i, d->b + at);
+  }
+}
+
+/* Motions ------------------------------------------------------------------------------------------------ */
+
+/* A block's part of the law at an order, with what blocks before it add. */
+static Block part_of_law(Decision *d, int order, int which) {
+  int k = d->count, first = d->first[which], n = d->first[which + 1] - first, at = order * k;
+  Block b = {.size = n, .own = d->order + first, .a = d->block, .state = d->block_state, .is_contact = d->block_state + k};
+  b.b = b.a + n; b.floor = b.b + n; b.matrix = b.floor + n; b.share = b.matrix + n * n;
+  const double *nu = d->nu + at;
+  for (int i = 0; i < n; i++) {
+    int own = b.own[i];
+    b.a[i] = d->a[at + own];
+    b.b[i] = d->b[at + own];
+    b.floor[i] = d->floor[at + own];
+    b.state[i] = d->state[at + own];
+    b.is_contact[i] = d->is_contact[own];
+    for (int q = 0; q < first; q++) {
+      int j = d->order[q];
+      b.a[i] -= d->matrix[own * k + j] * nu[j];
+      b.b[i] += d->share[own * k + j] * nu[j];
+    }
+    for (int j = 0; j < n; j++) {
+      b.matrix[i * n + j] = d->matrix[own * k + b.own[j]];
+      b.share[i * n + j] = d->share[own * k + b.own[j]];
+      b.is_coupled |= b.share[i * n + j] != 0;
+    }
+  }
+  return b;
+}
+
+/* What is proved of each block, once. */
+static int certificate_of(Decision *d, const Block *b, int which) {
+  if (d->proved[which] < 0)
+    d->proved[which] = b->is_coupled ? NOTHING : certificate(b->matrix, b->size, d->work, d->pivot);
+  return d->proved[which];
+}
+
+/* Solutions of a block at an order; where the old unknowns are one, what its guard says of an element is known. */
+static int solutions_of(Run *r, Decision *d, int order, int which, double *found, int8_t *class) {
+  Block b = part_of_law(d, order, which);
+  int n = b.size, count;
+  int8_t *position = b.is_contact + d->count;
+  for (int i = 0; i < n; i++) {
+    int letter = d->letter[d->own[b.own[i]]], is_open = b.is_contact[i] && letter;
+    position[i] = letter == 0 && !d->is_known[b.own[i]] ? HELD : letter > 0 && !is_open ? TOP : BOTTOM;
+    if (!allows(&b, i, position[i])) position[i] = allows(&b, i, HELD) ? HELD : allows(&b, i, TOP) ? TOP : BOTTOM;
+  }
+  if (order == 0 && !d->is_touched[b.own[0]]) {
+    for (int i = 0; i < n; i++) { found[i] = d->old[b.own[i]]; class[i] = INSIDE; }
+    return 1;
+  }
+  count = n == 1 ? solve_single(&b, found)
+                 : solve_block_of_many(&b, certificate_of(d, &b, which), position, found, d->work, d->pivot);
+  for (int q = 0; q < count; q++) {
+    double *nu = found + q * n, terms;
+    int agrees = order == 0;
+    for (int i = 0; i < n && agrees; i++) {
+      double miss = 0;
+      rate_of(&b, i, nu, &terms);
+      for (int j = 0; j < n; j++) miss += b.matrix[i * n + j] * (nu[j] - d->old[b.own[j]]);
+      agrees = fabs(miss) <= larger(KNOWN_TO * r->o.rtol * terms, zero_of(&b, i, terms));
+    }
+    int is_dependent = 0; /* then what ends is the set of all solutions */
+    for (int i = 0; i < n && n > 1; i++) is_dependent |= d->is_known[b.own[i]] && d->proved[which] < UNIQUE;
+    for (int i = 0; i < n; i++) {
+      int is_loose = agrees && (is_dependent || d->is_known[b.own[i]]);
+      class[q * n + i] = (int8_t)class_of(&b, i, nu, is_loose ? KNOWN_TO * r->o.rtol : 0);
+    }
+  }
+  return count;
+}
+
+/* Stability ---------------------------------------------------------------------------------------------- */
+
+/* Whether all eigenvalues have positive real parts: powers of (A + c)^-1 (A - c) vanish. A is lost. */
+static int is_positive_stable(double *a, int n, double *work) {
+  double c = 0, *inverse = work, *power = inverse + (int64_t)n * n, *next = power + (int64_t)n * n;
+  if (n == 1) return a[0] > 0;
+  for (int i = 0; i < n * n; i++) c += a[i] * a[i];
+  c = sqrt(c / n);
+  for (int i = 0; i < n * n; i++) next[i] = a[i];
+  for (int i = 0; i < n; i++) { a[i * n + i] += c; next[i * n + i] -= c; }
+  if (!(c > 0) || !invert(a, n, inverse)) return 0;
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) {
+      power[i * n + j] = 0;
+      for (int l = 0; l < n; l++) power[i * n + j] += inverse[i * n + l] * next[l * n + j];
+    }
+  for (int again = 0; again < DEPTH; again++) {
+    double size = 0;
+    for (int i = 0; i < n * n; i++) size = larger(fabs(power[i]), size);
+    if (size < TIED) return 1;
+    if (!(size < INFINITY)) return 0;
+    for (int i = 0; i < n; i++)
+      for (int j = 0; j < n; j++) {
+        next[i * n + j] = 0;
+        for (int l = 0; l < n; l++) next[i * n + j] += power[i * n + l] * power[l * n + j];
+      }
+    double *t = power; power = next; next = t;
+  }
+  return 0;
+}
+
+/* The state of an element after so many orders. One that is still undecided moves with nu at its bound and w = 0:
+ * letters that leave and that slide are the same motion, except where nu makes no difference. */
+static int final_state(const Decision *d, int i, int orders) {
+  int state = d->state[orders * d->count + i];
+  if (state >= INSIDE) return state;
+  if (d->is_contact[i] || d->is_idle[i] || d->matrix[i * (d->count + 1)] != 0) return INSIDE;
+  return state == AT_TOP ? ABOVE : state == AT_BOTTOM ? BELOW : INSIDE;
+}
+
+/* The matrix of the surfaces that slide in a block, with the closed contacts in balance, and its rows times the
+ * bounds over the widths of the layers; its size, -1 where it cannot be had. */
+static int layer_matrix(const Decision *d, int which, int orders, double *a, double *weight) {
+  int k = d->count, rows = 0, all = 0, n;
+  int32_t *own = d->pivot;
+  double *m = d->work;
+  for (int contacts = 0; contacts < 2; contacts++) {
+    for (int q = d->first[which]; q < d->first[which + 1]; q++) {
+      int i = d->order[q];
+      if (final_state(d, i, orders) == INSIDE && d->is_contact[i] == contacts && !d->is_idle[i]) own[all++] = i;
+    }
+    if (!contacts) rows = all;
+  }
+  n = all;
+  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) m[i * n + j] = d->matrix[own[i] * k + own[j]];
+  for (int l = n - 1; l >= rows; l--) { /* eliminate the contacts */
+    double head = m[l * n + l];
+    if (!(fabs(head) > SINGULAR * d->most)) continue;
+    for (int i = 0; i < l; i++) {
+      double f = m[i * n + l] / head;
+      if (f != 0) for (int j = 0; j < l; j++) m[i * n + j] -= f * m[l * n + j];
+    }
+  }
+  for (int i = 0; i < rows; i++) {
+    double bound = d->b[own[i]];
+    for (int j = 0; j < k; j++) bound += d->share[own[i] * k + j] * d->nu[j];
+    weight[i] = bound > 0 ? bound : 1;
+    for (int j = 0; j < rows; j++) a[i * rows + j] = m[i * n + j];
+  }
+  return rows;
+}
+
+/* Whether the sliding of a block is stable across its layers; what depends on their widths is noted. */
+static int is_stable_block(Run *r, Decision *d, int which, int orders) {
+  int size = d->first[which + 1] - d->first[which];
+  if (!d->is_touched[d->order[d->first[which]]] || d->proved[which] == UNIQUE_AND_STABLE || d->proved[which] == SEMIDEFINITE) return 1;
+  double *a = d->block, *weight = a + (int64_t)size * size, *scaled = weight + size, *rest = scaled + (int64_t)size * size;
+  int n = layer_matrix(d, which, orders, a, weight), stable, falling = 0;
+  if (n == 0) return 1;
+  if (n == 1) return a[0] > 0;
+  int proved = certificate(a, n, d->work, d->pivot);
+  if (proved == UNIQUE_AND_STABLE || proved == SEMIDEFINITE) return 1;
+  for (int i = 0; i < n; i++) {
+    falling += !(a[i * n + i] > 0);
+    for (int j = 0; j < n; j++) scaled[i * n + j] = weight[i] * a[i * n + j];
+  }
+  double determinant = n == 2 ? a[0] * a[3] - a[1] * a[2] : 1;
+  stable = is_positive_stable(scaled, n, rest);
+  int for_all = n == 2 ? determinant <= 0 || (a[0] >= 0 && a[3] >= 0 && a[0] + a[3] > 0) || falling == 2 : !stable && falling == n;
+  if (!for_all) r->facts |= DEPENDS_ON_WIDTHS;
+  return stable;
+}
+
+/* Add a motion, whose letters are decided, unless its sliding is unstable. */
+static void add_motion(Run *r, Decision *d, int orders) {
+  int k = d->count;
+  for (int q = 0; q < d->blocks; q++) if (!is_stable_block(r, d, q, orders)) { d->unstable++; return; }
+  if (d->motions == SEVERAL) return;
+  Motion *own = d->motion + d->motions++;
+  for (int i = 0; i < k; i++) {
+    int order = 0;
+    while (order < orders && d->state[(order + 1) * k + i] < INSIDE) order++;
+    own->order[i] = (int8_t)(order < orders ? order : r->order + 1);
+    own->before[i] = order ? d->state[(order < orders ? order : orders) * k + i] : UNDECIDED;
+    own->state[i] = (int8_t)final_state(d, i, orders);
+    own->nu[i] = d->sign[i] * d->nu[i];
+  }
+  own->terms = orders < COMPARED ? orders : COMPARED;
+  for (int i = 0; i < r->n; i++)
+    for (int j = 1; j <= own->terms; j++)
+      own->series[i * COMPARED + j - 1] = r->trial.states[(int64_t)i * r->stride + j];
+}
+
+/* Close an order with the unknowns that were found. */
+static void close_with(Run *r, Decision *d, int order) {
+  Expansion *e = &r->trial;
+  if (order == 0) { begin_orders(r, d, d->letter); open_order(r, e, 0); }
+  for (int i = 0; i < d->count; i++)
+    e->series[(int64_t)d->own[i] * r->stride + order] = d->sign[i] * d->nu[order * d->count + i];
+  close_order(r, e, order);
+}
+
+/* Follow all solutions from a block of an order on. */
+static void explore(Run *r, Decision *d, int order, int which) {
+  int k = d->count;
+  Expansion *e = &r->trial;
+  double found[MOST_SOLUTIONS * MOST_ENUMERATED];
+  int8_t class[MOST_SOLUTIONS * MOST_ENUMERATED];
+  while (d->motions < SEVERAL) {
+    if (which == d->blocks) {
+      int open = 0, more = order < (d->branches ? COMPARED : 0) - 1;
+      for (int i = 0; i < k; i++) open |= d->state[(order + 1) * k + i] < INSIDE;
+      if ((!open && !more) || order + 1 == ORDERS || order + 1 >= r->order) { /* the series is closed if it is compared */
+        if (d->branches) close_with(r, d, order);
+        add_motion(r, d, order + 1);
+        return;
+      }
+      close_with(r, d, order);
+      if (++order == 1) read_noise(r, d);
+      open_order(r, e, order);
+      read_order(r, d, order);
+      which = 0;
+      continue;
+    }
+    int n = d->first[which + 1] - d->first[which], is_large = n > MOST_ENUMERATED;
+    double *nu = is_large ? d->large : found;
+    int8_t *to = is_large ? d->large_class : class;
+    int count = solutions_of(r, d, order, which, nu, to);
+    if (count > 1) d->branches++;
+    for (int q = 0; q < count; q++) {
+      for (int i = 0; i < n; i++) {
+        int own = d->order[d->first[which] + i];
+        d->nu[order * k + own] = nu[q * n + i];
+        d->state[(order + 1) * k + own] = to[q * n + i];
+      }
+      if (count > 1) explore(r, d, order, which + 1);
+    }
+    if (count != 1) return;
+    which++;
+  }
+}
+
+/* Whether two motions are one: their series are equal. */
+static int is_same_motion(const Run *r, const Motion *one, const Motion *two) {
+  int terms = one->terms < two->terms ? one->terms : two->terms;
+  for (int j = 0; j < terms; j++) {
+    double most = 0;
+    for (int i = 0; i < r->n; i++)
+      most = larger(most, larger(fabs(one->series[i * COMPARED + j]), fabs(two->series[i * COMPARED + j])));
+    for (int i = 0; i < r->n; i++)
+      if (fabs(one->series[i * COMPARED + j] - two->series[i * COMPARED + j]) > MERGED * most) return 0;
+  }
+  return 1;
+}
+
+/* Letters of a motion. */
+static void letters_of_motion(const Run *r, const Decision *d, const Motion *own, int8_t *letter) {
+  memcpy(letter, d->letter, r->width);
+  for (int i = 0; i < d->count; i++) {
+    int side = own->state[i] == INSIDE ? 0 : own->state[i] == ABOVE ? 1 : -1;
+    letter[d->own[i]] = (int8_t)(d->is_contact[i] ? side != 0 : side);
+  }
+}
+
+/* The mode of a motion to r->chosen, with the zeros of its guards. */
+static void choose_motion(Run *r, const Decision *d, const Motion *own) {
+  Continuation *to = &r->chosen;
+  Layout *l = &r->trial.l;
+  letters_of_motion(r, d, own, to->letter);
+  keep_carried(r, to->letter, to->unknowns);
+  for (int i = 0; i < d->count; i++)
+    if (to->letter[d->own[i]] == 0 && !is_idle(r, to->letter, d->own[i])) to->unknowns[d->own[i]] = own->nu[i];
+  lay_out(r, to->letter, l);
+  if (l->slides) improve(r, l, r->x, to->unknowns, 1); /* bounds that were reached to a tolerance are exact now */
+  memset(to->drop, 0, sizeof(int32_t) * r->guards);
+  for (int row = 0; row < l->rows; row++) {
+    int kind = l->kind[row], of = l->index[row] + (kind == IMPACT_GUARD || kind == RELEASE_GUARD ? r->m : 0);
+    for (int i = 0; i < d->count; i++) {
+      if (d->own[i] != of || !(kind == SURFACE_GUARD || kind == IMPACT_GUARD || kind == EXIT_GUARD || kind == RELEASE_GUARD)) continue;
+      int both = kind == RELEASE_GUARD || own->before[i] == UNDECIDED || is_idle(r, to->letter, of);
+      int near = both || own->before[i] == (l->side[row] > 0 ? AT_TOP : AT_BOTTOM);
+      to->drop[row] = kind == SURFACE_GUARD || kind == IMPACT_GUARD ? own->order[i] + degree_of(r, of) : near ? own->order[i] : 0;
+    }
+  }
+}
+
+/* Scales of the law at the point. */
+static void begin_decision(Decision *d) {
+  int k = d->count;
+  d->most = 0;
+  for (int i = 0; i < k; i++) { /* what reactions can be, then rows */
+    double own = fabs(d->matrix[i * (k + 1)]);
+    d->room[i] = d->is_contact[i] ? own > 0 ? fabs(d->a[i]) / own : 0 : fabs(d->b[i]);
+    for (int j = 0; j < k; j++) d->most = larger(fabs(d->matrix[i * k + j]), d->most);
+  }
+  for (int i = 0; i < k; i++)
+    for (int j = 0; j < k && !d->is_contact[i]; j++) d->room[i] += fabs(d->share[i * k + j]) * d->room[j];
+  for (int i = 0; i < k; i++) {
+    d->yard[i] = fabs(d->a[i]);
+    for (int j = 0; j < k; j++) d->yard[i] += fabs(d->matrix[i * k + j]) * d->room[j];
+    d->floor[i] = larger(d->floor[i], TIED * d->yard[i]);
+    d->state[i] = UNDECIDED;
+  }
+  for (int q = 0; q < d->blocks; q++) d->proved[q] = -1;
+}
+
+/* One surface ------------------------------------------------------------------------------------------- */
+
+/* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
+static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
+  if (r->s->continuous[surface]) return 0;
+  double *near = r->vector + r->n + r->width; /* not where inputs are put together */
+  aim(r, letter, r->x, r->unknowns);
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
+  for (int side = 1; side >= -1; side -= 2) {
+    held_of(r, letter);
+    r->held[surface] = side;
+    error_scales(r, r->x, r->held, r->none);
+    if (r->s->scaled[surface] && r->slope[surface * r->width + surface] != 0) return 0;
+    gradient_sums(r, &r->s->point, r->point, 2 * r->width + r->s->slope.count, &r->s->layer_gradient, r->width, near,
+                  1, r->small);
+    double scale = r->small[surface];
+    if (!(fabs(layer_of(r, surface)) <= (tolerance + TANGENT) * scale)) return 0; /* or zero everywhere */
+  }
+  return 1;
+}
+
+/* One active surface whose rates of h on both sides decide, without series: crossing, entry, and exit where the
+ * multiplier is known to pass its bound. The choice to r->chosen; 0 where it is not clear. */
+static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  int own = r->active[0], w = r->width, exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
+  double rate[2], *near = r->vector + r->n + w; /* not where inputs are put together */
+  if (own >= r->m || !r->s->affine || r->s->scaled[own] || is_idle(r, letter, own)) return 0;
+  if (known_count && !(exits && r->falls)) return 0;
+  aim(r, letter, r->x, r->unknowns);
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
+  for (int q = 0; q < 2; q++) {
+    held_of(r, letter);
+    r->held[own] = q ? 1 : -1;
+    error_scales(r, r->x, r->held, r->none);
+    gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
+    rate[q] = layer_of(r, own);
+    if (!(fabs(rate[q]) > (VANISHES + TANGENT) * r->small[own] && fabs(rate[q]) < INFINITY)) rate[q] = 0;
+  }
+  if (exits) { /* the other side still leads onto the surface; the rate of this one is zero */
+    chosen = known[0].side;
+    if (!(rate[chosen < 0] * chosen > 0)) return 0;
+  } else if (rate[0] * rate[1] > 0) chosen = rate[0] > 0 ? 1 : -1;
+  else if (!(rate[0] > 0 && rate[1] < 0)) return 0;
+  Layout *l = &r->trial.l;
+  memcpy(r->chosen.letter, letter, w);
+  r->chosen.letter[own] = (int8_t)chosen;
+  keep_carried(r, r->chosen.letter, r->chosen.unknowns);
+  lay_out(r, r->chosen.letter, l);
+  if (l->slides && !improve(r, l, r->x, r->chosen.unknowns, 1)) return 0;
+  memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
+  for (int row = 0; row < l->rows; row++)
+    if (l->kind[row] == SURFACE_GUARD && l->index[row] == own) r->chosen.drop[row] = exits ? 2 : 1;
+  return 1;
+}
+
+/* What is to be said of a point without a motion. */
+static int no_motion(Run *r, int contacts) {
+  if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
+  else if (meets_sets(r)) finish(r, HAND_OVER, NO_REASON, 0); /* M is singular, or nearly */
+  else if (r->active_count == 2 && r->n == 2) finish(r, HAND_OVER, NO_REASON, 0); /* orbits may spiral in */
+  else if (r->active_count > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
+  else finish(r, HAND_OVER, NO_REASON, 0); /* a degenerate tangency: other programs tell zeros apart */
+  return 0;
+}
+
+static int decide_sets(Run *r, const int8_t *letter, const Known *known, int known_count);
+
+/* Choose, as r->chosen, the motion that continues from a point of the active elements; 0 if the run ends.
+ * ``letter`` has those of the other elements. */
+static int decide(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  Decision *d = r->decision;
+  int k = r->active_count, contacts = 0, several = 0;
+  if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
+  if (k == 1 && decide_by_rates(r, letter, known, known_count)) return 1;
+  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
+  if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {
+    finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);
+    return 0;
+  }
+  if (!r->s->affine && k > 1) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+  d->count = k;
+  d->letter = letter;
+  d->motions = d->branches = d->unstable = r->several_count = 0;
+  if (!read_law(r, d, letter)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+  find_blocks(d);
+  begin_decision(d);
+  read_old(r, d, letter, known, known_count);
+  find_touched(d, letter);
+  explore(r, d, 0, 0);
+  if (!d->motions) return no_motion(r, contacts);
+  for (int i = 0; i < d->motions; i++) {
+    int is_new = 1;
+    for (int j = 0; j < i; j++) is_new &= !is_same_motion(r, d->motion + i, d->motion + j);
+    if (!is_new) continue;
+    several++;
+    letters_of_motion(r, d, d->motion + i, r->found.letter);
+    r->several[r->several_count++] = mode_number(r->table, r->found.letter);
+  }
+  if (several > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
+  choose_motion(r, d, d->motion);
+  return 1;
+}

@@ -1,0 +1,25 @@
+"""Numbers of operations and Taylor rules, and constants, that the model and the sources in C share.
+
+A build of the package imports this module without CasADi.
+"""
+
+from __future__ import annotations
+
+from .expressions.float_arithmetic import BINARY, UNARY
+
+#: Operations by number, as in the C enumeration.
+OPERATIONS = ("const", "input", *UNARY, *BINARY)
+
+#: Rules by number. Where one argument does not move, sums are ``shift``, differences ``lower`` and ``below`` it,
+#: products ``scale``, quotients ``over`` and ``under`` it; an ``integral`` over what is affine in the time, as in
+#: cos(omega t), is a ``turn``, and what is ``chosen`` by a factor that does not move is ``gated``.
+TAPE_RULES = tuple(
+    "constant input apply add sub neg twice mul sq div sqrt power affine integral quotient atan2 chosen "
+    "shift lower below scale over under turn gated".split()
+)
+
+#: A step ends where |h| has fallen to this part: towards h = 0 a series may go on as -|h|.
+FALL = 0.1
+
+#: The same for friction's limit on the set, whose square is compared with that of what is needed.
+LIMIT_FALL = 1e-3

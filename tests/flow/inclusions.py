@@ -1,0 +1,160 @@
+"""Cases of set-valued elements as data: a system in strings, a start, and what is true of its motion."""
+
+import json
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+
+import nonsmooth as ns
+
+CASES = Path(__file__).parents[1] / "cases" / "inclusions.json"
+
+#: Constructs that the library does not have.
+MISSING = ("complementarity", "constraints", "vector_multipliers")
+
+#: Functions that the strings use.
+FUNCTIONS = {n: getattr(ca, n) for n in ("sin", "cos", "sqrt", "exp", "log", "fabs")}
+
+
+def cases(path: Path = CASES) -> list[dict]:
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+@dataclass
+class Case:
+    """One case; ``system`` is built when it is first needed."""
+
+    data: dict
+
+    def __post_init__(self):
+        if "points" in self.data:
+            self.data = planar_body(self.data)
+        elif self.data["id"].startswith("slider-crank"):
+            self.data = {**self.data, "field": slider_crank(), "start_mode": "oocc"}
+        names = [self.data.get(key, "") for key in ("states", "multipliers", "reactions", "time")]
+        self.names = [name.split() for name in names]
+        self.symbols = {n: ca.SX.sym(n) for names in self.names for n in names}
+
+    def parse(self, text: str) -> list:
+        value = eval(
+            f"[{text}]", {"__builtins__": {}}, {**FUNCTIONS, **self.symbols}
+        )  # our own text
+        return [ca.SX(v) for v in value]
+
+    @cached_property
+    def system(self) -> ns.FilippovSystem:
+        data = self.data
+        states, multipliers, _, time = ([self.symbols[n] for n in own] for own in self.names)
+        impacts = [
+            ns.Impact(
+                self.parse(own["gap"])[0],
+                restitution=own["restitution"],
+                reaction=self.symbols[own["reaction"]] if "reaction" in own else None,
+                name=f"gap{i}",
+            )
+            for i, own in enumerate(data.get("impacts", []))
+        ]
+        return ns.FilippovSystem(
+            states,
+            field=self.parse(data["field"]) if "field" in data else None,
+            above=self.parse(data["above"]) if "above" in data else None,
+            below=self.parse(data["below"]) if "below" in data else None,
+            surface=self.parse(data["surface"])[0] if "surface" in data else None,
+            surfaces=self.parse(data.get("surfaces", "")) or None,
+            multipliers=multipliers or None,
+            impacts=impacts or None,
+            time=time[0] if time else None,
+        )
+
+    def run(self, **options) -> ns.Trajectory:
+        start = [float(v) for v in self.data["start"]]
+        options = {"start_mode": self.data.get("start_mode"), **options}
+        if options["start_mode"] is not None:
+            start = projected(self.system, start)
+        return ns.simulate(self.system, start, self.data["t_end"], **options)
+
+    def errors(self, run: ns.Trajectory) -> dict[str, float]:
+        """Relative errors of what is true of the states at the end, and of those in ``x_at_1``."""
+        found, states = {}, self.names[0]
+        for name, text in self.data["truth"].items():
+            which, _, at = name.partition("_at_")
+            own = [which] if which in states else [n for n in states if which == f"each_{n[0]}"]
+            value = run.x[-1] if not at else run(float(at))
+            for n in own:
+                true = float(text)
+                error = abs(value[states.index(n)] - true) / max(1.0, abs(true))
+                found[name] = max(error, found.get(name, 0.0))
+        return found
+
+
+def projected(system: ns.FilippovSystem, start: list[float]) -> list[float]:
+    return start
+
+
+def planar_body(data: dict) -> dict:
+    """A planar body that touches at points: gaps and slips are linear, so that its accelerations are those at rest."""
+    gaps, slips, force = [], [], ["0", "0", "0"]
+    for i, ((px, py), angle) in enumerate(zip(data["points"], data["normal_angles"], strict=True)):
+        n, s = (math.cos(angle), math.sin(angle)), (-math.sin(angle), math.cos(angle))
+        rows = [(*d, px * d[1] - py * d[0]) for d in (n, s)]
+        (gap, _), (_, slip) = (
+            [
+                "+".join(f"({c!r})*{q}" for c, q in zip(row, names, strict=True))
+                for names in ("xyt", "uvw")
+            ]
+            for row in rows
+        )
+        gaps.append({"gap": gap, "restitution": 0, "reaction": f"r{i}"})
+        slips.append(slip)
+        for j in range(3):
+            force[j] += f"+({rows[0][j]!r})*r{i}-({data['mu'] * rows[1][j]!r})*l{i}*r{i}"
+    loads = [f"({own}+({load!r}))" for own, load in zip(force, data["load"], strict=True)]
+    loads[2] = f"{loads[2]}/{data['inertia']!r}"
+    count = len(gaps)
+    return {
+        **data,
+        "states": "x y t u v w",
+        "multipliers": " ".join(f"l{i}" for i in range(count)),
+        "reactions": " ".join(f"r{i}" for i in range(count)),
+        "surfaces": ", ".join(slips),
+        "impacts": gaps,
+        "field": ", ".join(["u", "v", "w", *loads]),
+        "start": [0] * 6,
+        "t_end": 1e-3,
+    }
+
+
+def accelerations(run: ns.Trajectory) -> np.ndarray:
+    """Those of all motions that continue from the start, sorted."""
+    if run.continuations:
+        found = np.array([rates[3:] for _, rates in run.continuations])
+    else:
+        found = run.steps.coefficients[:1, 3:6, 1]
+    return found[np.lexsort(found.T[::-1].round(7))]
+
+
+def slider_crank() -> str:
+    """The field of a slider-crank mechanism with clearance (see the case's text)."""
+    mass = {"m00": "(7.4e-5+.1235*.153**2)", "m11": "(5.9e-4+.0855*.306**2)"}
+    mass["m01"] = "(.095*.153*.306*cos(q1-q0))"
+    gaps = [(side, end) for side in (1, -1) for end in (-1, 1)]
+    forces = [
+        "-.095*.153*.306*sin(q0-q1)*v1**2-.133*9.81*.153*cos(q0)",
+        ".095*.153*.306*sin(q0-q1)*v0**2-.095*9.81*.306*cos(q1)",
+        "0",
+    ]
+    for k, (side, end) in enumerate(gaps):
+        forces[0] += f"-({side})*.153*cos(q0)*r{k}"
+        forces[1] += f"-({side})*.306*cos(q1)*r{k}"
+        forces[2] += f"-({side})*(({end})*.05*cos(q2)-({side})*.025*sin(q2))*r{k}"
+    det = "({m00}*{m11}-{m01}**2)".format(**mass)
+    solved = [
+        f"({mass['m11']}*({forces[0]})-{mass['m01']}*({forces[1]}))/{det}",
+        f"({mass['m00']}*({forces[1]})-{mass['m01']}*({forces[0]}))/{det}",
+        f"({forces[2]})/2.7e-6",
+    ]
+    return ", ".join(["v0", "v1", "v2", *solved])

@@ -1,0 +1,132 @@
+"""Events that accumulate end at their limit, and nothing before it is passed over."""
+
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+y, v, s, w, lam, force, t = (ca.SX.sym(n) for n in ("y", "v", "s", "w", "lam", "force", "t"))
+
+_G, _E = 9.81, 0.8
+#: A ball dropped from height 1 is at rest after this time, by the geometric series of its flights.
+_LIMIT = math.sqrt(2 / _G) * (1 + 2 * _E / (1 - _E))
+
+
+def _ball(restitution=_E, **more):
+    """Build a ball with a state that is the time."""
+    impact = ns.Impact(y, restitution=restitution)
+    return ns.FilippovSystem([y, v, s], field=[v, -_G, 1], impacts=impact, **more)
+
+
+def _end(system, start, t_end):
+    """End of a run, by both drivers."""
+    run = ns.simulate(system, start, t_end)
+    many = ns.ensemble(system, [start] * 3, t_end)
+    assert (many.status == run.status).all()
+    np.testing.assert_allclose(many.t, run.t[-1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(many.x, np.tile(run.x[-1], (3, 1)), rtol=1e-9, atol=1e-9)
+    return run
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.8, 0.9, 0.99])
+def test_contact_closes_at_the_limit(restitution):
+    limit = math.sqrt(2 / _G) * (1 + 2 * restitution / (1 - restitution))
+    run = ns.simulate(_ball(restitution), [1, 0, 0], limit + 1)
+    contact = [event for event in run.events if event.kind == "contact"]
+    assert [event.t for event in contact] == pytest.approx([limit], abs=1e-12)
+    assert run.status is ns.Status.REACHED_END and run.x[-1][:2].tolist() == [0, 0]
+
+
+def test_run_that_ends_before_the_limit_does_not_reach_it():
+    for early in (1e-2, 3e-6, 1e-9):
+        run = _end(_ball(), [1, 0, 0], _LIMIT - early)
+        assert run.t[-1] == _LIMIT - early and run.itinerary == "o"
+
+
+@pytest.mark.parametrize("early", [1e-6, 1e-9])
+def test_stop_and_kick_before_the_limit_happen(early):
+    stop = ns.Stop(s - (_LIMIT - early))
+    run = _end(_ball(stops=stop), [1, 0, 0], _LIMIT + 1)
+    assert run.status is ns.Status.STOPPED
+    assert run.t[-1] == pytest.approx(_LIMIT - early, abs=1e-14)
+    kick = ns.Reset(s - (_LIMIT - early), [y, v + 5, s], direction=1)
+    run = _end(_ball(resets=kick), [1, 0, 0], _LIMIT + 0.5)
+    after = 0.5 + early
+    assert run.x[-1][0] == pytest.approx(5 * after - _G / 2 * after**2, abs=2e-6)
+
+
+def test_surface_before_the_limit_is_crossed_in_time():
+    system = ns.FilippovSystem(
+        [y, v, s], field=[v, -_G, 1 + 0 * s + (lam + 1) / 2], surfaces=[s - (_LIMIT - 3e-6)],
+        multipliers=[lam], impacts=ns.Impact(y, restitution=_E),
+    )  # fmt: skip
+    run = _end(system, [1, 0, 0], _LIMIT + 1)
+    assert run.x[-1][2] == pytest.approx(_LIMIT - 3e-6 + 2 * (1 + 3e-6), abs=1e-12)
+    crossing = next(event for event in run.events if event.kind == "crossing")
+    assert crossing.t == pytest.approx(_LIMIT - 3e-6, abs=1e-14)
+
+
+def test_speeds_at_requested_times_are_those_of_the_impacts():
+    times = _LIMIT - np.array([1e-5, 1e-6, 1e-9])
+    run = ns.simulate(_ball(), [1, 0, 0], _LIMIT + 1, t_eval=times)
+    many = ns.ensemble(_ball(), [[1, 0, 0]], _LIMIT + 1, t_eval=times)
+    for time, *found in zip(times, run.sample_x, many.sample_x[0], strict=True):
+        begin, speed = math.sqrt(2 / _G), math.sqrt(2 * _G) * _E
+        while begin + 2 * speed / _G <= time:
+            begin, speed = begin + 2 * speed / _G, speed * _E
+        for x in found:
+            assert x[1] == pytest.approx(speed - _G * (time - begin), abs=1e-9)
+
+
+def test_age_of_a_run_does_not_lengthen_what_is_replaced():
+    clock = ns.Clock(20.0, map=[y, v + 5.0])
+    impact = ns.Impact(y, restitution=_E)
+    system = ns.FilippovSystem([y, v], field=[v, -_G], impacts=impact, clocks=clock)
+    run = ns.simulate(system, [0, 0, 0], 20.0 * 300 + 19, max_events=10**6)
+    impacts = np.array([event.t for event in run.events if event.kind == "impact"])
+    contacts = np.array([event.t for event in run.events if event.kind == "contact"])
+    last = impacts[np.searchsorted(impacts, contacts) - 1]
+    assert len(contacts) == 300 and (contacts - last).max() < 2e-5
+    since = contacts - 20.0 * np.arange(1, 301)
+    np.testing.assert_allclose(since, 10 / _G / (1 - _E), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("gravities", "restitution"), [(1.05, 0.8), (1.1, 0.7)])
+def test_shaken_table_after_waiting(gravities, restitution):
+    def at_end(wait):
+        drive = gravities * _G * ca.sin(s)
+        system = ns.FilippovSystem(
+            [y, v, s, w], field=[v * w, (-_G + drive) * w + force, w, 0],
+            impacts=ns.Impact(y, restitution=restitution, reaction=force), resets=ns.Reset(t - wait, [y, v, s, 1], direction=1), time=t,
+        )  # fmt: skip
+        return ns.simulate(system, [0.1, 0, 0, 0], wait + 40, max_events=10**6).x[-1]
+
+    np.testing.assert_allclose(at_end(1e4), at_end(1.0), rtol=0, atol=1e-8)
+
+
+def test_ball_on_a_sprung_plate_after_waiting():
+    plate, speed = ca.SX.sym("plate"), ca.SX.sym("speed")
+
+    def at_end(wait):
+        field = [v, -1 + force, speed, -plate - 0.2 * speed - 0.5 * force]
+        system = ns.FilippovSystem(
+            [y, v, plate, speed, w], field=[*[w * f for f in field], 0],
+            impacts=ns.Impact(y - plate, restitution=0.8, reaction=force),
+            resets=ns.Reset(t - wait, [y, v, plate, speed, 1], direction=1), time=t,
+        )  # fmt: skip
+        return ns.simulate(system, [1.0, 0, -0.3, 0, 0], wait + 15, max_events=10**6).x[-1]
+
+    np.testing.assert_allclose(at_end(1e5), at_end(1.0), rtol=0, atol=1e-8)
+
+
+def test_resets_end_at_their_limit():
+    floor = ns.Reset(y, [y, -0.75 * v], direction=-1)
+    system = ns.FilippovSystem([y, v], field=[v, -8], resets=floor)
+    run = ns.simulate(system, [1, 0], 4)
+    assert run.status is ns.Status.ACCUMULATION
+    assert run.accumulation_time == pytest.approx(3.5, abs=1e-12)
+    run = ns.simulate(system, [1, 0], 3.5 - 2**-18)
+    assert run.status is ns.Status.REACHED_END

@@ -13,7 +13,7 @@
 
 typedef struct {
   double t_end, rtol, atol, max_step;
-  int64_t max_steps, max_events;
+  int64_t max_steps, max_events, max_jumps;
   int32_t start_mode, at_kind;
   int64_t at_count;
   int32_t dense, hit_after;
@@ -42,7 +42,7 @@ typedef struct {
 /* Events that are remembered. */
 #define HISTORY 48
 
-/* An event: the time since the one before; kinds, guard and modes as a number. */
+/* An event: the time since the one before; kinds of event and guard, and its index, as a number. */
 typedef struct { double interval; int64_t pattern; } Recent;
 
 /* What a run is between two steps: lanes give it to the driver for a step that is not clear, and take it back. */
@@ -51,8 +51,7 @@ typedef struct {
   int64_t steps, events, segment_steps, history;
   int64_t *kinds;
   double *x;
-  int8_t *letter;
-  int32_t *side; /* of stops */
+  int8_t *letter, *side; /* side: of stops */
   Recent *past;
   int32_t drop, itinerary, status; /* drop: first coefficients of the first guard that vanish */
 } Suspended;

@@ -14,17 +14,22 @@ _MOST_LINEAR = 22
 
 def supports_lanes(system: FilippovSystem) -> bool:
     """Whether the lanes engine can be generated for a system."""
-    return system.surface_count <= 1 and not (
-        system.resets or system.impacts or any(system.nonlinear)
-    )
+    return system.surface_count <= 1 and _has_only_plain_stops(system)
 
 
 def supports_set_lanes(coupled: Coupled) -> bool:
     """Whether lanes can be generated for a system with a set: one, alone, of constant slopes."""
     system = coupled.system
     alone = len(system.sets) == 1 and system.surface_count == len(system.sets[0])
+    moves = not coupled.affine or coupled.slope_moves.any()
+    return alone and not moves and _has_only_plain_stops(system)
+
+
+def _has_only_plain_stops(system: FilippovSystem) -> bool:
+    """Whether all events are stops at a guard, without conditions, and multipliers enter linearly."""
+    definition = system.definition
     others = system.resets or system.impacts or any(system.nonlinear)
-    return alone and not others and coupled.affine and not coupled.slope_moves.any()
+    return not others and definition.plain and definition.whens.is_constant()
 
 
 def tape_order(system: FilippovSystem, options: Options) -> int:

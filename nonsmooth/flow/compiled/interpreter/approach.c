@@ -4,7 +4,7 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
 static int change_kind(const Run *r, int before, int after);
 
 /* The mode in which a step is shown. */
-static int shown_mode(const Run *r) { return r->s->sets ? r->shown : r->mode; }
+static int shown_mode(const Run *r) { return r->s->sets || r->s->rules.discrete ? r->shown : r->mode; }
 
 /* h' = a - M lambda of the functions ``own``, with what else slides eliminated; 0 where that is impossible. */
 static int freeze(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,

@@ -2,9 +2,9 @@
 
 /* Whether lanes can go on from here: nothing is to be served, and only the first guard has known zeros. */
 static int is_plain(const Run *r) {
-  if (r->due >= 0 || r->due_impact >= 0) return 0;
-  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row ? 0 : 2)) return 0;
-  for (int j = 0; j < r->s->stops; j++) if (!r->side[j]) return 0;
+  if (r->instant.running || r->due_impact >= 0) return 0;
+  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m ? 0 : 2)) return 0;
+  for (int j = 0; j < r->s->stops; j++) if (!r->instant.side[j]) return 0;
   return 1;
 }
 
@@ -21,7 +21,10 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   improve(r, &r->now, r->x, r->unknowns, 2);
   r->mode = r->shown = r->segment_mode = r->now.mode;
   r->drop[0] = m->drop;
-  memcpy(r->side, m->side, sizeof(int32_t) * r->s->stops);
+  memcpy(r->instant.side, m->side, r->s->stops);
+  memcpy(r->instant.view, m->side, r->s->stops);
+  memset(r->instant.residual, 0, sizeof(double) * r->s->stops);
+  memset(r->instant.pending, 0, r->s->rules.triggers);
   memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
   r->t = m->t;
   r->since = m->since;
@@ -35,11 +38,8 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   r->history = m->history;
   for (int k = 0; k < HISTORY && k < m->history; k++) {
     int64_t pattern = m->past[k].pattern;
-    int row = (int)(pattern >> 40 & 4095) - 1;
-    Layout *before = &r->trial.l;
-    lay_out(r, r->table->letter + (pattern >> 20 & 0xfffff) * r->width, before);
-    Met met = {before->kind[row], before->index[row], before->side[row]};
-    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(pattern >> 52), met};
+    Met met = {(int)(pattern >> 32 & 255), (int)(int32_t)pattern, 0};
+    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(pattern >> 40), met};
   }
 }
 
@@ -55,7 +55,7 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
   memcpy(m->x, r->x, sizeof(double) * r->n);
   memcpy(m->letter, r->letter, r->width);
   m->drop = r->drop[0];
-  memcpy(m->side, r->side, sizeof(int32_t) * r->s->stops);
+  memcpy(m->side, r->instant.side, r->s->stops);
   memcpy(m->kinds, r->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
   m->t = r->t;
   m->since = r->since;
@@ -80,7 +80,7 @@ void core_begin(void *run, const Batch *b, const Options *o, int64_t i, Suspende
   static const Output none;
   Run *r = run;
   m->history = 0;
-  run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, 0, b->t0);
+  run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, 0, b->t0, 0);
   go_on_until_plain(r, b, i, m);
 }
 

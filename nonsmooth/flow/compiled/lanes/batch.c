@@ -104,8 +104,7 @@ typedef struct {
   Suspended m;
   double x[N];
   int64_t kinds[KINDS];
-  int8_t letter[1];
-  int32_t side[STOPS + 1];
+  int8_t letter[1], side[STOPS + 1];
 } Packed;
 
 static void point_to(Packed *a, Past *past) {

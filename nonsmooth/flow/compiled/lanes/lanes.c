@@ -474,10 +474,11 @@ static int may_accumulate(const Past *p) {
   return 0;
 }
 
-/* Remember events of the lanes ``which``, by kind; those that may accumulate are returned, and not clear. */
-SELDOM I remember(Lanes *s, I which, I kind, I row, I before) {
+/* Remember events of the lanes ``which`` by their kinds and those of their guards; those that may accumulate are
+ * returned, and not clear. */
+SELDOM I remember(Lanes *s, I which, I kind, I guard) {
   I unclear = NONE;
-  I pattern = (((kind << 12) + row + 1) << 40) + (before << 20) + mode_of(s);
+  I pattern = (kind << 40) + (guard << 32);
   for EACH(l, which) {
     Past *p = &s->past[l];
     p->event[p->count++ % HISTORY] = (Recent){LANE(s->since, l), LANE_I(pattern, l)};
@@ -491,7 +492,7 @@ SELDOM I remember(Lanes *s, I which, I kind, I row, I before) {
 }
 #else
 /* Ever shorter intervals are left to the driver, which knows their limit. */
-INLINE I remember(Lanes *s, I which, I, I, I) {
+INLINE I remember(Lanes *s, I which, I, I) {
   I shorter = which & (s->since < SHRINKS * s->shortest);
   s->shortest = SELECT(shorter, s->since, s->shortest);
   s->since = SELECT(which, BC(0), s->since);
@@ -525,7 +526,7 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   unclear |= s->events + 1 >= limits(w)->max_events;
   I all = (met | ends) & ~unclear & (s->slides ^ was | s->above ^ was_above);
   I entered = all & s->slides & ~was, kind = (entered & ENTRY) | (ends & EXIT) | (~entered & ~ends & CROSSING);
-  all &= ~remember(s, all, kind, down & 1, (was & 2) | (~was & ~was_above & 1));
+  all &= ~remember(s, all, kind, ends & EXIT_GUARD);
   count(s, w, ENTRY, entered & all);
   count(s, w, EXIT, all & ends);
   count(s, w, CROSSING, all & ~ends & ~entered);

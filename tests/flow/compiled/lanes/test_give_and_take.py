@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled import find_compiler, tape_for
+from nonsmooth.flow.compiled import find_compiler, lanes_for, tape_for
 from nonsmooth.flow.compiled.lanes import engine
 from nonsmooth.flow.options import Options
 
@@ -108,6 +108,13 @@ def test_parameters_of_each_start(monkeypatch):
     lanes.random = 3
     scalar = tape_for(system, options).run_many(start, p, options, (1, 1))
     same(lanes.run_many(start, p, options, (1, 1)), scalar, 1e-7)
+
+
+def test_stops_with_conditions_are_not_for_lanes():
+    half = {"when": y > 0}, {"level": True}, {"initially": True}
+    for more in ({}, *half):
+        system = ns.FilippovSystem([x, y], field=[y, -x], stops=[ns.Stop(x - 1, 1, **more)])
+        assert (lanes_for(system, Options(t_end=1.0)) is None) == bool(more)
 
 
 def test_events_that_accumulate(monkeypatch):

@@ -52,9 +52,12 @@ static void clear(Run *r, const Options *o, double t) {
   r->length = r->shortened = 0;
   r->t = r->begun = t;
   r->since = 0;
+  for (int i = 0; i < r->m; i++) r->speed[i] = INFINITY;
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
+  r->met = (Met){0};
+  r->repelling = 0;
   r->reason = NO_REASON;
   r->where = 0;
   r->facts = 0;

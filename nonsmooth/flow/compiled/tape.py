@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, Coupled, FilippovSystem, coupled_of, raised_of
+from ...model import Array, Coupled, FilippovSystem, raised_of
 from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
 from ..constants import FULL, RUNNING
 from ..names import shown_mode

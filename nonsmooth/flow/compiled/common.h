@@ -12,7 +12,7 @@
 #endif
 
 typedef struct {
-  double t_end, rtol, atol, max_step;
+  double t_end, rtol, atol, max_step, rest_below; /* the last: 0 for none */
   int64_t max_steps, max_events, max_jumps;
   int32_t start_mode, at_kind;
   int64_t at_count;

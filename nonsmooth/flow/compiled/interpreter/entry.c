@@ -50,6 +50,7 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->length = r->shortened = 0;
   r->t = r->begun = t;
   r->since = 0;
+  for (int i = 0; i < r->m; i++) r->speed[i] = INFINITY;
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;

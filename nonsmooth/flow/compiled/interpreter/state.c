@@ -148,7 +148,7 @@ typedef struct {
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
-  double *saved; /* a state to return to */
+  double *saved, *speed; /* a state to return to; of each surface at its last zero */
   int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
   int32_t shown;
   const Expansion *expansion;

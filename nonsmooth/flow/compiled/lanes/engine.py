@@ -140,7 +140,7 @@ def _words(
 def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
     """Return what runs a system's trajectories in step at the options' tolerance, or None where they
     cannot be: several surfaces, resets, a start's mode that is asked for."""
-    if options.start_mode is not None:
+    if options.start_mode is not None or options.rest_below is not None:
         return None
     if not (supports_set_lanes(coupled_of(system)) if system.sets else supports_lanes(system)):
         return None

@@ -233,9 +233,11 @@ static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
   else solve_from_grid(r, l, unknowns, found);
 }
 
-/* Of several solutions of a mode keep those that attract in the layer. */
+/* Of several solutions of a mode with a hidden law keep those that attract in the layer. */
 static void keep_stable(Run *r, const Layout *l, Solutions *found) {
-  int kept = 0, w = r->width;
+  int kept = 0, w = r->width, bent = 0;
+  for (int i = 0; i < l->slides; i++) bent |= r->s->mixed[l->sliding[i] * (w + 1)];
+  if (!bent) return;
   for (int k = 0; k < found->count; k++) {
     const double *own = found->each + k * w;
     error_scales(r, r->x, held_of(r, l->letter), own);

@@ -130,6 +130,7 @@ static void start_in(Run *r, const int8_t *asked) {
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
   mode_solutions(r, &r->now, &all);
+  if (all.count > 1) keep_stable(r, &r->now, &all);
   if (all.count != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, all.count); return; }
   memcpy(r->unknowns, all.each, sizeof(double) * r->width);
   if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);

@@ -37,6 +37,7 @@ class Options:
     max_events: int = 100_000
     start_mode: str | None = None
     hits: Hits | None = None
+    passed: tuple[bool, ...] = ()  # stops that do not end the run, which has no section
 
     def __post_init__(self) -> None:
         for name in ("t_end", "t_start"):

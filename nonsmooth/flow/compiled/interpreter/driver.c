@@ -264,7 +264,11 @@ static void serve(Run *r, int row) {
   r->met = (Met){kind, index, side};
   if (kind == STOP_GUARD) {
     event(r, STOP, r->mode, row, r->x);
-    finish(r, STOPPED, NO_REASON, index);
+    if (r->o.passed && r->o.passed[index]) {
+      *side_of(r, &r->now, row) = 0; /* as at a start on it */
+      arm(r, -1);
+      if (!r->drop[row]) { r->drop[row] = 1; *side_of(r, &r->now, row) = 0; } /* a zero, whatever rounding says */
+    } else finish(r, STOPPED, NO_REASON, index);
   } else if (kind == RESET_GUARD) reset(r, row);
   else if (kind == IMPACT_GUARD) impact(r, row);
   else if (kind == RELEASE_GUARD) release(r, row);

@@ -54,6 +54,10 @@ AT_END = 64 * EPSILON
 #: Lanes leave events closer than this, relative to the time, to the scalar driver.
 NEAR = 1e-13
 
+#: Newton's steps that improve a root on the guard itself; one is the last below this part of the time.
+POLISHED = 3
+CLOSE = 1e-8
+
 #: Rounding of a polynomial's value, relative to the sum of the magnitudes of its terms.
 ROUNDING = 4 * EPSILON
 

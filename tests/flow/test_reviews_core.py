@@ -11,11 +11,6 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_a_passage_of_a_curved_guard_is_one_reset[0.999]": "a passage counts twice",
-    "test_a_passage_of_a_curved_guard_is_one_reset[0.99999]": "a passage counts twice",
-    "test_returns_to_a_curved_section_are_counted_once[1e-06]": "a passage counts twice",
-    "test_returns_to_a_curved_section_are_counted_once[1e-08]": "a passage counts twice",
-    "test_returns_to_a_curved_section_are_counted_once[1e-10]": "a passage counts twice",
     "test_sliding_on_two_surfaces_ends_where_the_layer_loses_stability": "loss of stability is no guard",
     "test_sliding_on_three_surfaces_ends_where_the_layer_loses_stability": "loss of stability is no guard",
     "test_nearly_parallel_surfaces_are_crossed_one_by_one[1e-08-2e-07]": "thrown onto the intersection",
@@ -60,7 +55,7 @@ def test_returns_to_a_curved_section_are_counted_once(tol):
     """The 40th return by scipy's DOP853 with steps of at most 0.1 is at 151.5334."""
     pendulum = ns.FilippovSystem([x, v], field=[v, -1.3 * ca.sin(x) + 0.1 * (1 - x * x) * v])
     section = ca.sin(1.1 * x + 0.7 * v) - 0.9
-    points = ns.poincare(pendulum, section, [1.0, 0.5], count=40, tol=tol)
+    points = ns.orbit.poincare(pendulum, section, [1.0, 0.5], count=40, tol=tol)
     assert np.diff(points.t).min() > 1e-3
     assert abs(points.t[-1] - 151.5334) < 1e-3
 

@@ -13,21 +13,6 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_a_sine_guard_is_located_where_the_arcsine_says[1e-08-time]": "radius of the guard",
-    "test_a_sine_guard_is_located_where_the_arcsine_says[1e-08-state]": "radius of the guard",
-    "test_a_sine_guard_is_located_where_the_arcsine_says[1e-10-time]": "radius of the guard",
-    "test_a_sine_guard_is_located_where_the_arcsine_says[1e-12-time]": "radius of the guard",
-    "test_a_reset_fires_once_a_passage[1e-06-sin t]": "a passage counts twice",
-    "test_a_reset_fires_once_a_passage[1e-06-sin 3t]": "a passage counts twice",
-    "test_a_reset_fires_once_a_passage[1e-06-x + sin 3.1t]": "a passage counts twice",
-    "test_a_reset_fires_once_a_passage[1e-06-x^3]": "a passage counts twice",
-    "test_a_reset_fires_once_a_passage[1e-06-xv]": "a passage counts twice",
-    "test_a_reset_fires_once_a_passage[1e-10-sin 3t]": "a passage counts twice",
-    "test_a_reset_fires_once_a_passage[1e-10-x + sin 3.1t]": "a passage counts twice",
-    "test_a_reset_fires_once_a_passage[1e-10-x^3]": "a passage counts twice",
-    "test_a_section_is_met_once_a_passage": "a passage counts twice",
-    "test_close_events_of_hipparchus[fast-0]": "a passage counts twice",
-    "test_close_events_of_hipparchus[fast-1]": "a passage counts twice",
     "test_a_chain_of_two_resets": "jumps fire nothing",
     "test_a_map_with_a_condition_and_a_guard_that_is_a_minimum": "maps refuse conditions",
     "test_values_of_the_trigger": "no values= and priority=",

@@ -27,6 +27,9 @@ class Linearity:
     bent_rows: list[bool]
     bent_free_rows: list[bool]
     bent_guards: list[bool]
+    curved_guards: list[
+        bool
+    ]  #: Not affine in states and time: their series end later than the states'.
 
 
 def linearity(
@@ -50,6 +53,7 @@ def linearity(
         bent_rows=bent_rows if smooth else [True] * field.numel(),
         bent_free_rows=bent_free_rows if smooth else [True] * field.numel(),
         bent_guards=bent_guards,
+        curved_guards=bent(guards, x),
     )
 
 

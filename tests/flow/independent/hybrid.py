@@ -602,8 +602,8 @@ def follow(problem: Problem) -> Outcome:
         return Outcome([], np.array(problem.start), 0.0, "", str(error))
 
 
-def package_system(problem: Problem) -> Any:
-    """The same system for the package."""
+def package_system(problem: Problem, sets: bool = False) -> Any:
+    """The same system for the package; with ``sets`` each surface is a set of one."""
     import casadi as ca
 
     import nonsmooth as ns
@@ -620,6 +620,8 @@ def package_system(problem: Problem) -> Any:
     if m:
         options["surfaces"] = [read(h) for h in problem.surfaces]
         options["multipliers"] = [space[f"l{i}"] for i in range(m)]
+        if sets:
+            options = {name: [[entry] for entry in entries] for name, entries in options.items()}
     if c:
         options["impacts"] = [
             ns.Impact(read(one.gap), restitution=one.restitution, reaction=space[f"r{k}"], name=f"impact {k}")

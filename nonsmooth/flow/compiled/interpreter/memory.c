@@ -123,5 +123,7 @@ static size_t place_run(Run *r, char *base) {
   r->heights_of = DOUBLES(w);
   r->aside = DOUBLES(2 * n);
   r->moving = LETTERS(w);
+  r->root = DOUBLES(g);
+  r->met_at = DOUBLES(g);
   return used;
 }

@@ -76,6 +76,9 @@ OUTSIDE double operate(int op, double x, double y) {
   return NAN;
 }
 
+/* Aligned: where its jumps lie makes a tenth of a run's time. */
+static void values_nodes(const Values *t, const int32_t *which, int32_t count, const double *x, const double *p,
+                         double *w) __attribute__((aligned(64)));
 static void values_nodes(const Values *t, const int32_t *which, int32_t count, const double *x, const double *p,
                          double *w) {
   for (int32_t k = 0; k < count; k++) {

@@ -25,8 +25,9 @@ typedef struct {
   const int32_t *stop_direction, *reset_direction, *continuous, *scaled, *carries, *component;
   const int32_t *slope_output, *slope_moves; /* (m + c, m + c): output of the series or -1; whether it moves */
   int32_t linear, linear_free; /* whether field and guards are affine: in any mode, where nothing slides */
-  const int32_t *bent, *bent_free, *bent_guards; /* field's rows in any mode, where nothing slides; surfaces and
-                                                  * gaps, stops and resets: 0 if affine, nothing to be checked */
+  /* Field's rows in any mode, where nothing slides; surfaces and gaps, stops and resets: 0 if affine, with sines of
+   * the time, nothing to be checked; the latter: 0 if affine in states and time, polynomials are exact. */
+  const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
   int32_t sets; /* of codimension two and more */
   const int32_t *set_first, *set_size, *set_of; /* by set; the set of each switching function or -1 */
@@ -115,6 +116,7 @@ typedef struct {
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
+  double *root, *met_at; /* of each guard in the step: of its polynomial, and of itself; -1 if there is none */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */

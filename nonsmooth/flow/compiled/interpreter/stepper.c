@@ -18,11 +18,9 @@ static inline double rough_exp2(double a) {
   return u.d * MULADD(z, high, 1 + f);
 }
 
-static double bound(double last, double before, int order) {
-  double log_h = INFINITY;
-  if (last > 1e-300) log_h = rough_log2(smaller(last, 1e300)) * (-1.0 / order);
-  if (before > 1e-300) log_h = smaller(rough_log2(smaller(before, 1e300)) * (-1.0 / (order - 1)), log_h);
-  return log_h < INFINITY ? rough_exp2(log_h) : INFINITY;
+/* The longest step for a term of an order, given as part of what is allowed at length 1. */
+static double bound_at(double part, int order) {
+  return part > 1e-300 ? rough_exp2(rough_log2(smaller(part, 1e300)) * (-1.0 / order)) : INFINITY;
 }
 
 /* Shorten a step until a guard's series converges within it. */
@@ -38,6 +36,47 @@ static double resolve(const double *g, int order, double h) {
   return h;
 }
 
+/* Whether a guard is a function of states and time, and one that its polynomial only comes near. */
+static int has_height(int kind) {
+  return kind == SURFACE_GUARD || kind == IMPACT_GUARD || kind == STOP_GUARD || kind == RESET_GUARD;
+}
+static int is_curved(const Run *r, const Layout *l, int row) {
+  int kind = l->kind[row], first = kind == SURFACE_GUARD ? 0 : kind == IMPACT_GUARD ? r->m : r->width;
+  return has_height(kind) && r->s->curved[first + l->index[row] + (kind == RESET_GUARD ? r->s->stops : 0)];
+}
+
+/* The longest step in which term k of a guard is below ``allowed``, or below the tolerance's part of one of its
+ * first terms: a guard of time alone that begins at zero has nothing else. */
+static double reach(const double *g, int k, double allowed, double rtol, int by_terms) {
+  double h = allowed > 0 ? bound_at(fabs(g[k]) / allowed, k) : 0;
+  for (int j = 1, found = 0; by_terms && j < k && found < 2; j++) {
+    if (g[j] == 0) continue;
+    found++;
+    h = larger(bound_at(fabs(g[k] / g[j]) / rtol, k - j), h);
+  }
+  return h > 0 ? h : INFINITY;
+}
+
+/* Shorten a step until the last two terms of each guard that are not zero, of the last four, are small. */
+static double reach_of_guards(const Run *r, const Expansion *e, double h) {
+  int order = r->order, stride = r->stride;
+  double power = 1;
+  for (int k = 1; k < order; k++) power *= h;
+  for (int row = 0; row < e->l.rows; row++) {
+    const double *g = e->guards + (int64_t)row * stride;
+    double allowed = e->of_guards[row] + r->o.rtol * fabs(g[0]);
+    int by_terms = has_height(e->l.kind[row]);
+    if (fabs(g[order - 1]) * power <= allowed && fabs(g[order] * h) * power <= allowed) continue;
+    for (int k = order, found = 0; k > order - 4 && found < 2; k--) {
+      if (g[k] == 0) continue;
+      found++;
+      double longest = reach(g, k, allowed, r->o.rtol, by_terms);
+      if (longest < h) { h = longest; power = pow(h, order - 1); }
+    }
+  }
+  return h;
+}
+
 static double step_size(const Run *r, const Expansion *e) {
   int order = r->order, stride = r->stride;
   double last = 0, before = 0;
@@ -46,15 +85,8 @@ static double step_size(const Run *r, const Expansion *e) {
     last = larger(fabs(c[order]) / e->allowed[i], last);
     before = larger(fabs(c[order - 1]) / e->allowed[i], before);
   }
-  for (int j = 0; j < e->l.rows; j++) {
-    const double *g = e->guards + (int64_t)j * stride;
-    double a = e->of_guards[j] + r->o.rtol * fabs(g[0]);
-    if (!(a > 0)) continue;
-    last = larger(fabs(g[order]) / a, last);
-    before = larger(fabs(g[order - 1]) / a, before);
-  }
   if (r->s->sets) direction_bounds(r, e, &last, &before);
-  double h = bound(last, before, order);
+  double h = reach_of_guards(r, e, smaller(bound_at(last, order), bound_at(before, order - 1)));
   for (int j = 0; j < e->l.rows; j++) {
     const double *g = e->guards + (int64_t)j * stride;
     double a = e->of_guards[j] + r->o.rtol * fabs(g[0]);
@@ -78,13 +110,34 @@ static double safe_length(const Run *r, const Expansion *e, double h) {
   return h > FAR * natural ? FIRST * natural : INFINITY;
 }
 
-/* Field (n), errors of the multipliers that slide, and guards at a state and multipliers. */
-static void sampled(Run *r, const Expansion *e, const double *x, const double *lam, double *found) {
-  int n = r->n, w = r->width, stride = r->stride, slides = e->l.slides;
+/* The state and the multipliers at a time of a step. */
+static void at_time(const Run *r, const Expansion *e, double time, double *x, double *lam) {
+  int moves = !e->l.is_free || r->s->sets;
+  for (int i = 0; i < r->n; i++) x[i] = value_at(e->states + (int64_t)i * r->stride, r->order, time);
+  for (int i = 0; i < r->width; i++)
+    lam[i] = moves ? value_at(e->series + (int64_t)i * r->stride, r->order, time) : 0;
+}
+
+/* What a mode's series are made of, at a state and multipliers. */
+static void evaluate(Run *r, const Expansion *e, const double *x, const double *lam) {
   aim(r, e->l.letter, x, lam);
   r->expansion = e;
   set_inputs(r, x, held_of(r, e->l.letter), lam);
   first_values(r, e->l.is_free);
+}
+
+/* Guards there, each as the first of ``stride`` numbers. */
+static const double *guards_at(Run *r, const Expansion *e, const double *lam) {
+  double *g = r->work, *now = g + (int64_t)e->l.rows * r->stride;
+  for (int i = 0; i < r->width; i++) now[(int64_t)i * r->stride] = lam[i];
+  guard_rows(r, &e->l, now, 1, g);
+  return g;
+}
+
+/* Field (n), errors of the multipliers that slide, and guards at a state and multipliers. */
+static void sampled(Run *r, const Expansion *e, const double *x, const double *lam, double *found) {
+  int n = r->n, slides = e->l.slides;
+  evaluate(r, e, x, lam);
   for (int i = 0; i < n; i++) *found++ = row_of(r, i)[0];
   for (int i = 0; i < slides; i++, found++) {
     *found = 0;
@@ -94,21 +147,18 @@ static void sampled(Run *r, const Expansion *e, const double *x, const double *l
     }
   }
   if (!e->l.bent_count) return;
-  double *g = r->work, *now = g + (int64_t)e->l.rows * stride;
-  for (int i = 0; i < w; i++) now[(int64_t)i * stride] = lam[i];
-  guard_rows(r, &e->l, now, 1, g);
-  for (int q = 0; q < e->l.bent_count; q++) *found++ = g[(int64_t)e->l.bent[q] * stride];
+  const double *g = guards_at(r, e, lam);
+  for (int q = 0; q < e->l.bent_count; q++) *found++ = g[(int64_t)e->l.bent[q] * r->stride];
 }
 
 /* Whether field and guards at a time of the step are those of the polynomials. */
 static int agrees(Run *r, const Expansion *e, double time, double dt) {
-  int n = r->n, w = r->width, order = r->order, stride = r->stride, slides = e->l.slides;
+  int n = r->n, order = r->order, stride = r->stride, slides = e->l.slides;
   int guards = e->l.bent_count, all = n + slides + guards;
   double *x = r->vector, *lam = x + n, ignored;
   double *found = r->sample, *noise = found + all, *moved = noise + all;
   const int32_t *bent = e->l.is_free ? r->s->bent_free : r->s->bent;
-  for (int i = 0; i < n; i++) x[i] = value_at(e->states + (int64_t)i * stride, order, time);
-  for (int i = 0; i < w; i++) lam[i] = e->l.is_free && !r->s->sets ? 0 : value_at(e->series + (int64_t)i * stride, order, time);
+  at_time(r, e, time, x, lam);
   sampled(r, e, x, lam, found);
   for (int again = 0; again < 2; again++) {
     int near = 1;
@@ -212,17 +262,37 @@ static int32_t *side_of(const Run *r, const Layout *l, int row) {
   return r->side + l->index[row] + (l->kind[row] == RESET_GUARD ? r->s->stops : 0);
 }
 
+/* The root of a guard's polynomial improved on the guard itself along the motion; as it is where its slope is
+ * rounding, or where the guard is not seen to pass zero near it. */
+static double polished(Run *r, const Expansion *e, int row, double root) {
+  const double *c = e->guards + (int64_t)row * r->stride;
+  double *x = r->vector, *lam = x + r->n, slope, time = root;
+  for (int again = 0; again < POLISHED; again++) {
+    if (!(blur(c, r->order, time) > 0)) return root;
+    horner(c, r->order, time, &slope);
+    at_time(r, e, time, x, lam);
+    evaluate(r, e, x, lam);
+    double change = guards_at(r, e, lam)[(int64_t)row * r->stride] / slope;
+    if (!(fabs(change) < 0.5 * time)) return root;
+    time -= change;
+    if (fabs(change) <= CLOSE * time) return time;
+  }
+  return root;
+}
+
+/* The side of each stop and reset just before a time of a step; of those that pass there, before their roots. */
 static void note_sides(Run *r, Expansion *e, double dt) {
   for (int j = 0; j < e->l.rows; j++) {
     if (e->l.kind[j] != STOP_GUARD && e->l.kind[j] != RESET_GUARD) continue;
     const double *g = e->guards + (int64_t)j * r->stride;
-    *side_of(r, &e->l, j) = side_before(g, r->order, dt, ON_SURFACE * scales(r, e)[j]);
+    double before = r->root[j] > 0 && r->met_at[j] <= dt ? r->root[j] : dt;
+    *side_of(r, &e->l, j) = side_before(g, r->order, before, ON_SURFACE * scales(r, e)[j]);
   }
 }
 
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
-  double *time = r->work;
+  double *time = r->met_at;
   int first = -1, found = 0, rows = e->l.rows;
   for (int j = 0; j < rows; j++) {
     int kind = e->l.kind[j], at_once = 0;
@@ -231,11 +301,15 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
       int side = *side_of(r, &e->l, j);
       at_once = side && passed(g, r->order, side, e->l.side[j]);
     }
-    time[j] = at_once ? 0 : guard_root(r, e, j, r->drop[j], h);
+    time[j] = r->root[j] = at_once ? 0 : guard_root(r, e, j, r->drop[j], h);
     if (time[j] < 0) continue;
     found++;
     if (first < 0 || time[j] < time[first]) first = j;
   }
+  double latest = first < 0 ? 0 : time[first] + RESOLVED * h;
+  for (int j = 0; j < rows && first >= 0; j++)
+    if (time[j] > 0 && time[j] <= latest && is_curved(r, &e->l, j)) time[j] = polished(r, e, j, time[j]);
+  for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
   int best = first;
   if (found > 1) {
     double near = time[first] + TIE * larger(fabs(r->t), 1)

@@ -138,7 +138,6 @@ def follow(
     if made.unknowns:
         start = np.concatenate([start, unknowns[0][list(made.unknowns)]])
     tape = tape_for(made.system, options)
-    assert tape is not None
     run = tape.run(made.system.extended_point(start, options.t_start), p, options)
     return _trajectory(system, mode, p, made, names, backward, options, run)
 

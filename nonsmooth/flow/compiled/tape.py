@@ -195,6 +195,7 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets")],
+        ("curved", _POINTER),
         *[(name, _POINTER) for name in ("set_first", "set_size", "set_of", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
     ]
@@ -316,6 +317,7 @@ class TapeEngine:
             "component": tape.component,
             "slope_output": tape.slope_output,
             "slope_moves": tape.slope_moves,
+            "curved": coupled.curved.ravel(),
             "bent": coupled.linearity.bent_rows,
             "bent_free": coupled.linearity.bent_free_rows,
             "bent_guards": coupled.linearity.bent_guards,
@@ -411,7 +413,7 @@ class TapeEngine:
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``interpreter/sets.c`` for those of sets."""
         m = self.system.surface_count
-        surfaces = ("-s+*bll"[sign + 1] for sign in signs[:m])
+        surfaces = ("-s+*blli"[sign + 1] for sign in signs[:m])
         return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
 
     # many trajectories -------------------------------------------------------------------------

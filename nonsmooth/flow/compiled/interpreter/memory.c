@@ -92,6 +92,9 @@ static size_t place_run(Run *r, char *base) {
   r->saved = DOUBLES(n);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
+  r->tried = DOUBLES(w);
+  r->solutions = DOUBLES(SOLUTIONS * w);
+  r->tried_letter = LETTERS(2 * w);
   r->drop = INTEGERS(g);
   r->side = INTEGERS(s->stops + s->resets);
   r->fired = INTEGERS(s->resets);
@@ -123,6 +126,10 @@ static size_t place_run(Run *r, char *base) {
   r->heights_of = DOUBLES(w);
   r->aside = DOUBLES(2 * n);
   r->moving = LETTERS(w);
+  r->idle = LETTERS(s->sets);
+  r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
+  r->of_defect = DOUBLES(g);
+  r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
   r->root = DOUBLES(g);
   r->met_at = DOUBLES(g);
   return used;

@@ -195,7 +195,7 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets")],
-        ("curved", _POINTER),
+        ("nonlinear", _POINTER),
         *[(name, _POINTER) for name in ("set_first", "set_size", "set_of", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
     ]
@@ -317,7 +317,7 @@ class TapeEngine:
             "component": tape.component,
             "slope_output": tape.slope_output,
             "slope_moves": tape.slope_moves,
-            "curved": coupled.curved.ravel(),
+            "nonlinear": coupled.nonlinear.ravel(),
             "bent": coupled.linearity.bent_rows,
             "bent_free": coupled.linearity.bent_free_rows,
             "bent_guards": coupled.linearity.bent_guards,

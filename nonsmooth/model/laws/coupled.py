@@ -220,7 +220,7 @@ class Coupled:
         return moves
 
     @cached_property
-    def curved(self) -> NDArray[np.bool_]:
+    def nonlinear(self) -> NDArray[np.bool_]:
         """Pairs of unknowns that do not enter the field linearly together (m, m)."""
         curved = np.zeros((self.count, self.count), bool)
         for j in range(0 if self.affine else self.count):

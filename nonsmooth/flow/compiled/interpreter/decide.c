@@ -1001,7 +1001,7 @@ static int no_motion(Run *r, const int8_t *letter) {
   return 0;
 }
 
-static int is_curved(const Run *r, const int32_t *own, int count);
+static int is_nonlinear(const Run *r, const int32_t *own, int count);
 static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int decide_sets(Run *r, const int8_t *letter, const Known *known, int known_count);
@@ -1012,7 +1012,7 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
   Decision *d = r->decision;
   int k = r->active_count, contacts = 0, several = 0;
   if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
-  if (is_curved(r, r->active, k)) return decide_in_layer(r, letter, known, known_count);
+  if (is_nonlinear(r, r->active, k)) return decide_in_layer(r, letter, known, known_count);
   if (k == 1 && decide_by_rates(r, letter, known, known_count)) return 1;
   for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
   if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {

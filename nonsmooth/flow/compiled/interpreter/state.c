@@ -30,7 +30,7 @@ typedef struct {
   const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
   int32_t sets; /* of codimension two and more */
-  const int32_t *curved; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
+  const int32_t *nonlinear; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   const int32_t *set_first, *set_size, *set_of; /* by set; the set of each switching function or -1 */
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
   int32_t early_count, early_free_count;

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LIMIT_FALL
+from ..model.numbering import FALL, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LIMIT_FALL"]  # and all below
+__all__ = ["FALL", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 
@@ -148,7 +148,19 @@ FOLD_AHEAD = 10.0
 DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 
 #: Kinds of events, by number in ensembles and in C.
-KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")
+KINDS = (
+    "crossing",
+    "entry",
+    "exit",
+    "stop",
+    "reset",
+    "impact",
+    "contact",
+    "release",
+    "rest",
+    "rest_below",
+    "end",
+)
 
 #: The first and the last of these, as many, can happen without resets and impacts.
 SIMPLE_KINDS = 5
@@ -156,7 +168,7 @@ SIMPLE_KINDS = 5
 #: Kinds of guards, by number in C, and their priority among simultaneous ones (0 first).
 GUARDS = (
     *("surface", "exit", "stop", "reset", "impact", "release", "branch"),
-    *("near", "slip"),
+    *("near", "slip", "atom"),
 )
 PRIORITY = {
     "stop": 0,
@@ -168,6 +180,7 @@ PRIORITY = {
     "branch": 6,
     "near": 3,
     "slip": 4,
+    "atom": 1,
 }
 
 #: Why a run ended, besides its status, by number in C.
@@ -199,6 +212,8 @@ REASONS = (
     "several_directions",
     "indefinite",
     "undetermined",
+    "high_degree",
+    "discrete_value",
 )
 
 #: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.

@@ -22,7 +22,7 @@ MOST_ORDER = 48
 _FILES = (
     *("programs.h", "linear.h", "state.c", "modes.c", "jets.c", "sets.c", "stepper.c"),
     *("surfaces.c", "record.c", "spiral.c", "decide.c", "candidates.c", "layer.c", "contacts.c"),
-    *("approach.c", "driver.c", "accumulation.c", "memory.c", "entry.c"),
+    *("approach.c", "events.c", "driver.c", "accumulation.c", "memory.c", "entry.c"),
 )
 
 

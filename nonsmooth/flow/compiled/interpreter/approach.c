@@ -4,7 +4,7 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
 static int change_kind(const Run *r, int before, int after);
 
 /* The mode in which a step is shown. */
-static int shown_mode(const Run *r) { return r->s->sets ? r->shown : r->mode; }
+static int shown_mode(const Run *r) { return r->s->sets || r->s->rules.discrete ? r->shown : r->mode; }
 
 /* A solution of a x = b, whose rows may depend on one another, in place of b. ``a`` is lost. */
 static int solve_consistent(double *a, double *b, int n) {

@@ -7,10 +7,10 @@ enum { SOLUTIONS = 16, FACTORS = 4, CORNERS = 1 << FACTORS };
 /* Solutions of one mode, each the unknowns of all elements. */
 typedef struct { double *each; int32_t count, width; } Solutions;
 
-static int is_nonlinear(const Run *r, const int32_t *own, int count) {
+static int is_mixed(const Run *r, const int32_t *own, int count) {
   if (r->s->affine) return 0;
   for (int i = 0; i < count; i++)
-    for (int j = 0; j < count; j++) if (r->s->nonlinear[own[i] * r->width + own[j]]) return 1;
+    for (int j = 0; j < count; j++) if (r->s->mixed[own[i] * r->width + own[j]]) return 1;
   return 0;
 }
 
@@ -216,14 +216,14 @@ static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
   keep_carried(r, l->letter, unknowns);
   for (int i = 0; r->s->sets && i < r->m; i++)
     if (l->letter[i] == LEAVING) { solutions_of_leaving(r, l, found); return; }
-  if (!is_nonlinear(r, l->sliding, l->slides)) {
+  if (!is_mixed(r, l->sliding, l->slides)) {
     if (l->slides && !improve(r, l, r->x, unknowns, 2)) return;
     memcpy(found->each, unknowns, sizeof(double) * w);
     found->count = 1;
     return;
   }
   for (int i = 0; i < l->slides; i++) {
-    bent |= r->s->nonlinear[l->sliding[i] * (w + 1)];
+    bent |= r->s->mixed[l->sliding[i] * (w + 1)];
     contacts |= l->sliding[i] >= r->m;
   }
   if (l->slides == 1) {
@@ -308,7 +308,7 @@ static int advance(Run *r, const Expansion *e, double dt);
 
 /* Whether sliding may end in a fold within some steps of length h. */
 static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
-  if (!is_nonlinear(r, e->l.sliding, e->l.slides)) return 0;
+  if (!is_mixed(r, e->l.sliding, e->l.slides)) return 0;
   for (int row = 0; row < e->l.rows; row++) {
     const double *g = e->guards + (int64_t)row * r->stride;
     if (e->l.kind[row] == BRANCH_GUARD && g[0] < -FOLD_AHEAD * h * g[1]) return 1;
@@ -412,6 +412,7 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   r->expansion = f;
   guard_rows(r, &f->l, f->series, order + 1, f->guards);
   row = first_hit(r, f, s, &ds);
+  memset(r->instant.passing, 0, r->s->rules.atoms);
   for (int k = 0; k < f->l.rows; k++) if (f->l.kind[k] == BRANCH_GUARD && (last < 0 || k == row)) last = k;
   if (last < 0 || (row >= 0 && row != last && ds < s)) return -1;
   note_sides(r, f, s);
@@ -424,7 +425,6 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   memcpy(r->tried, end, sizeof(double) * r->width);
   memset(f->series, 0, sizeof(double) * r->width * stride);
   for (int i = 0; i < slides; i++) f->series[(int64_t)e->l.sliding[i] * stride] = end[e->l.sliding[i]];
-  memset(r->fired, 0, sizeof(int32_t) * (r->s->resets + 1));
   if (!advance(r, f, dt)) return -1;
   memcpy(r->unknowns, r->tried, sizeof(double) * r->width);
   return last;

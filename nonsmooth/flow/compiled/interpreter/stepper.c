@@ -38,11 +38,11 @@ static double resolve(const double *g, int order, double h) {
 
 /* Whether a guard is a function of states and time, and one that its polynomial only comes near. */
 static int has_height(int kind) {
-  return kind == SURFACE_GUARD || kind == IMPACT_GUARD || kind == STOP_GUARD || kind == RESET_GUARD;
+  return kind == SURFACE_GUARD || kind == IMPACT_GUARD || is_atom(kind);
 }
 static int is_curved(const Run *r, const Layout *l, int row) {
-  int kind = l->kind[row], first = kind == SURFACE_GUARD ? 0 : kind == IMPACT_GUARD ? r->m : r->width;
-  return has_height(kind) && r->s->curved[first + l->index[row] + (kind == RESET_GUARD ? r->s->stops : 0)];
+  int kind = l->kind[row], index = kind == IMPACT_GUARD ? r->m + l->index[row] : l->index[row];
+  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : index];
 }
 
 /* The longest step in which term k of a guard is below ``allowed``, or below the tolerance's part of one of its
@@ -232,7 +232,7 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   const double *g = e->guards + (int64_t)row * r->stride, *c = g + drop;
   int kind = e->l.kind[row];
   if (drop > r->order) return -1;
-  if (kind == STOP_GUARD || kind == RESET_GUARD) return first_crossing(c, r->order - drop, h, e->l.side[row]);
+  if (is_atom(kind)) return first_crossing(c, r->order - drop, h, e->l.side[row]);
   if (c[0] <= 0) {
     double value;
     drop = leading(r, e, row, drop, &value);
@@ -258,8 +258,9 @@ static int is_steep(const Run *r, const Expansion *e, int row, double dt) {
   return blur(e->guards + (int64_t)row * r->stride, r->order, dt) > 0;
 }
 
-static int32_t *side_of(const Run *r, const Layout *l, int row) {
-  return r->side + l->index[row] + (l->kind[row] == RESET_GUARD ? r->s->stops : 0);
+static double tick_of(const Run *r, int c) {
+  double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
+  return r->instant.tick[c] + r->instant.count[c] * period;
 }
 
 /* The root of a guard's polynomial improved on the guard itself along the motion; as it is where its slope is
@@ -280,13 +281,20 @@ static double polished(Run *r, const Expansion *e, int row, double root) {
   return root;
 }
 
-/* The side of each stop and reset just before a time of a step; of those that pass there, before their roots. */
+/* The clock whose tick is the event of an atom, or -1. */
+static int clock_of(const Run *r, int atom) {
+  for (int c = 0; c < r->s->rules.clocks; c++) if (r->s->stops + r->s->rules.clock_reset[c] == atom) return c;
+  return -1;
+}
+
+/* Sides at the end of a step of the atoms that are located in one direction only. */
 static void note_sides(Run *r, Expansion *e, double dt) {
-  for (int j = 0; j < e->l.rows; j++) {
-    if (e->l.kind[j] != STOP_GUARD && e->l.kind[j] != RESET_GUARD) continue;
-    const double *g = e->guards + (int64_t)j * r->stride;
-    double before = r->root[j] > 0 && r->met_at[j] <= dt ? r->root[j] : dt;
-    *side_of(r, &e->l, j) = side_before(g, r->order, before, ON_SURFACE * scales(r, e)[j]);
+  Instant *i = &r->instant;
+  for (int a = 0; a < r->s->rules.atoms; a++) {
+    const double *g = e->guards + (int64_t)(e->l.atoms + a) * r->stride;
+    if (i->passing[a] || !i->side[a] || r->s->rules.way[a] == UNWATCHED || !r->s->rules.way[a]) continue;
+    int side = side_before(g, r->order, dt, ON_SURFACE * scales(r, e)[e->l.atoms + a]);
+    if (side) i->side[a] = (int8_t)side;
   }
 }
 
@@ -341,38 +349,54 @@ static void turn_exits(const Run *r, Expansion *e) {
     }
 }
 
+/* Time to the zero of an atom, at which its side changes in the direction in which it is located; -1 if there is none
+ * within h. */
+static double atom_root(Run *r, Expansion *e, int atom, double h) {
+  int row = e->l.atoms + atom, side = r->instant.side[atom], clock = clock_of(r, atom);
+  const double *g = e->guards + (int64_t)row * r->stride;
+  if (clock >= 0) {
+    double left = larger(tick_of(r, clock) - r->t, 0);
+    return left <= h ? left : -1;
+  }
+  if (!side || r->s->rules.way[atom] == UNWATCHED) return -1;
+  if (!r->drop[row] && passed(g, r->order, side, e->l.side[row])) return 0;
+  return guard_root(r, e, row, r->drop[row], h);
+}
+
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->met_at;
   int first = -1, found = 0, rows = e->l.rows;
   if (r->repelling) turn_exits(r, e);
   for (int j = 0; j < rows; j++) {
-    int kind = e->l.kind[j], at_once = 0;
-    const double *g = e->guards + (int64_t)j * r->stride;
-    if ((kind == STOP_GUARD || kind == RESET_GUARD) && !r->drop[j]) {
-      int side = *side_of(r, &e->l, j);
-      at_once = side && passed(g, r->order, side, e->l.side[j]);
-    }
-    time[j] = r->root[j] = at_once ? 0 : guard_root(r, e, j, r->drop[j], h);
+    time[j] = r->root[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);
     if (time[j] < 0) continue;
     found++;
     if (first < 0 || time[j] < time[first]) first = j;
   }
-  double latest = first < 0 ? 0 : time[first] + RESOLVED * h;
-  for (int j = 0; j < rows && first >= 0; j++)
+  if (first < 0) { if (r->repelling) turn_exits(r, e); return -1; }
+  double latest = time[first] + RESOLVED * h;
+  for (int j = 0; j < rows; j++)
     if (time[j] > 0 && time[j] <= latest && is_curved(r, &e->l, j)) time[j] = polished(r, e, j, time[j]);
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
-  int best = first;
-  if (found > 1) {
-    double near = time[first] + TIE * larger(fabs(r->t), 1)
-                  + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
-    for (int j = 0; j < rows; j++) {
-      if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;
-      int rank = PRIORITY[e->l.kind[j]], best_rank = PRIORITY[e->l.kind[best]];
-      if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
+  /* Guards whose times cannot be told apart: atoms are passed together, at the first time; others one by one. */
+  int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;
+  double near = time[first] + TIE * larger(fabs(r->t), 1)
+                + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
+  for (int j = 0; j < rows && (found > 1 || passed_atoms); j++) {
+    if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;
+    if (is_atom(e->l.kind[j])) {
+      r->instant.passing[j - e->l.atoms] = 1;
+      if (atom < 0 || time[j] < time[atom]) atom = j;
+      continue;
     }
+    int rank = PRIORITY[e->l.kind[j]], best_rank = best < 0 ? rank + 1 : PRIORITY[e->l.kind[best]];
+    if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
   }
   if (r->repelling) turn_exits(r, e);
-  if (best >= 0) *dt = time[best];
+  r->instant.tied = atom < 0 ? -1 : best;
+  if (atom >= 0) best = atom;
+  if (best < 0) best = first;
+  *dt = time[best];
   return best;
 }

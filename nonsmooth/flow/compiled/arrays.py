@@ -28,7 +28,7 @@ class OptionsStructure(ctypes.Structure):
     """``Options`` of common.h."""
 
     _fields_ = [
-        *[(name, _D) for name in ("t_end", "rtol", "atol", "max_step")],
+        *[(name, _D) for name in ("t_end", "rtol", "atol", "max_step", "rest_below")],
         *[(name, _I64) for name in ("max_steps", "max_events", "max_jumps")],
         *[(name, _I32) for name in ("start_mode", "at_kind")],
         ("at_count", _I64),
@@ -199,6 +199,7 @@ def options_of(
         o.rtol,
         o.atol,
         o.max_step,
+        o.rest_below or 0.0,
         int(min(o.max_steps, limit)),
         int(min(o.max_events, limit)),
         int(min(o.max_jumps, limit)),

@@ -227,12 +227,12 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     require_size(made.batch_size, BatchStructure)
     require_size(made.system_size, _System)
     require_size(made.output_size, Output.Structure)
-    made.table_new.restype = made.run_new.restype = _POINTER
+    made.table_new.restype = made.run_new.restype = made.lanes_tree.restype = _POINTER
     made.table_new.argtypes = [_I32]
     made.polynomial_root.restype = made.polynomial_crossing.restype = _D
     made.polynomial_root.argtypes = [_POINTER, _I32, _D]
     made.polynomial_crossing.argtypes = [*made.polynomial_root.argtypes, _I32]
-    for name in ("table_modes", "table_size", "table_free", "run_free"):
+    for name in ("table_modes", "table_size", "table_free", "run_free", "lanes_tree"):
         getattr(made, name).argtypes = [_POINTER]
     made.table_read.argtypes = [_POINTER] * 4
     made.run_new.argtypes = [_POINTER] * 2
@@ -419,7 +419,7 @@ class TapeEngine:
         output = Output(self.system.extended_dimension, self.order, self._rooms, width)
         x, p = np.array(x, float), np.array([*p, 0.0], float)
         start = self._start_mode(options)
-        with self._table() as table, self._state(table) as state:
+        with self.held_table() as table, self.held_run(table) as state:
             c_options = ctypes.byref(options_of(self.system, options, dense=True))
             given = (address(x), address(p), address(start))
             library().run_ask(state, address(asked), 0 if asked is None else len(asked))
@@ -436,7 +436,7 @@ class TapeEngine:
                 output.grow(counts[7:10])
                 library().run_resume(state, output.pointer)
             self._rooms = rooms_of(counts[7:10])  # of the next run, which is often a similar one
-            modes, words = self._words(table, [counts[4]])
+            modes, words = self.words(table, [counts[4]])
             labels = self._labels(table)
             final = np.zeros(width)
             library().run_motion(state, address(final))
@@ -465,11 +465,11 @@ class TapeEngine:
         system = self.system
         return system.surface_count + len(system.impacts) + 8 * len(system.definition.discrete)
 
-    def _table(self) -> _Held:
+    def held_table(self) -> _Held:
         made = library()
         return _Held(made.table_new(self._width), made.table_free)
 
-    def _state(self, table: int) -> _Held:
+    def held_run(self, table: int) -> _Held:
         made = library()
         state = made.run_new(ctypes.byref(self._c), table)
         if not state:
@@ -483,7 +483,7 @@ class TapeEngine:
         library().run_read(state, numbers, counts, active, several)
         return numbers[:], counts[:], active[: counts[10]], several[: counts[11]]
 
-    def _words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
+    def words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
         """Modes that were met, and itineraries of some nodes of their tree."""
         parent, mode, letters = self._tree(table)
         width = self.system.surface_count + len(self.system.impacts)
@@ -541,11 +541,11 @@ class TapeEngine:
         batch = batch_of(x, p, options.t_start, chunk, times, None)
         start, done = self._start_mode(options), np.zeros(1, np.int64)
         c_options = options_of(self.system, options, dense=False, at=at)
-        with self._table() as table, self._state(table) as state:
+        with self.held_table() as table, self.held_run(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
             while library().run_many(*call, address(start), BURST):
                 if stop():
                     raise Stopped
             used = np.flatnonzero(np.bincount(chunk.itinerary)).tolist()
-            chunk.rename(self._words(table, used)[1])
+            chunk.rename(self.words(table, used)[1])
         return chunk

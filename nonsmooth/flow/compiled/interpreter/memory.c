@@ -106,6 +106,7 @@ static size_t place_run(Run *r, char *base) {
   r->at_x = DOUBLES(n);
   r->before = DOUBLES(n);
   r->saved = DOUBLES(n);
+  r->speed = DOUBLES(w);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
   r->tried = DOUBLES(w);

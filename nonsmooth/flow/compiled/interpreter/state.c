@@ -4,7 +4,6 @@
  * driver}.py; read those first. What is rare and slow anyway (points where the jet is not finite, starts in
  * repelling sliding, stability that no simple test shows) is handed over to them.
  */
-#define HISTORY 48
 #define SEVERAL 16 /* modes that can continue, for the message */
 
 #define TINY 2.2250738585072014e-308
@@ -127,7 +126,7 @@ typedef struct {
   Instant instant;
   int32_t mode, status, reason, where, due_impact, falls, repelling, *drop;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
-  int32_t itinerary, segment_mode;
+  int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
   double size, length, shortened;
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
@@ -148,7 +147,7 @@ typedef struct {
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
-  double *saved; /* a state to return to */
+  double *saved, *speed; /* a state to return to; of each surface at its last zero */
   int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
   int32_t shown;
   const Expansion *expansion;
@@ -219,7 +218,10 @@ Table *table_new(int32_t width) {
 int32_t table_modes(const Table *t) { return t->count; }
 int32_t table_size(const Table *t) { return t->tree.size; }
 void table_read(const Table *t, int32_t *parent, int32_t *mode, int8_t *letter) {
-  tree_read(&t->tree, parent, mode);
+  for (int32_t k = 0; k < t->tree.size; k++) {
+    parent[k] = t->tree.node[k].parent;
+    mode[k] = t->tree.node[k].mode;
+  }
   memcpy(letter, t->letter, (size_t)t->count * t->width);
 }
 void table_free(Table *t) { free(t->tree.node); free(t->letter); free(t->bucket); free(t); }

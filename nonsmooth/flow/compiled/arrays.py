@@ -79,6 +79,10 @@ class Run:
         Surfaces and contacts at the last point that was decided.
     several : list of str
         Modes that could continue there, where more than one could.
+    rates : ndarray (k, n)
+        Rates of the states in them.
+    facts : int
+        What was noted about the decisions, as bits.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
     starts, coefficients, modes : ndarray (s,), (s, N, P+1), (s,)
@@ -103,6 +107,8 @@ class Run:
     guards: Callable[[str], Sequence[Guard]]
     active: list[int]
     several: list[str]
+    rates: Array
+    facts: int
     t: Array
     x: Array
     starts: Array
@@ -131,6 +137,7 @@ class Run:
         guards: Callable[[str], Sequence[Guard]],
         active: list[int],
         several: list[str],
+        rates: Array,
         motion: Array,
         labels: Sequence[tuple[float, ...]],
     ) -> Run:
@@ -146,6 +153,8 @@ class Run:
             guards=guards,
             active=active,
             several=several,
+            rates=rates,
+            facts=counts[12],
             t=whole["point_t"],
             x=whole["point_x"][:, :n],
             starts=whole["start"],

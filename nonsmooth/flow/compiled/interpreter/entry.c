@@ -66,7 +66,7 @@ static void clear(Run *r, const Options *o, double t) {
   r->reason = NO_REASON;
   r->where = 0;
   r->facts = 0;
-  r->dependent = -1;
+  r->dependent = r->turned_mode = -1;
   r->segment_mode = r->due_impact = r->length_mode = -1;
 }
 
@@ -98,15 +98,17 @@ static int go_on(Run *r, int64_t *budget) {
 
 int run_continue(Run *r, int64_t budget) { return go_on(r, &budget); }
 
-void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, int32_t *several) {
+void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, int32_t *several,
+              double *rates) {
   numbers[0] = r->t;
   numbers[1] = r->limit;
   numbers[2] = r->at_t;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
-                    r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count};
+                    r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts};
   memcpy(counts, head, sizeof head);
   memcpy(active, r->active, sizeof(int32_t) * r->active_count);
   memcpy(several, r->several, sizeof(int32_t) * r->several_count);
+  memcpy(rates, r->rates_of_several, sizeof(double) * r->several_count * r->n);
 }
 
 /* What a restart needs, besides the state. */

@@ -119,7 +119,19 @@ OVERFLOW = 1e280
 DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 
 #: Kinds of events, by number in ensembles and in C.
-KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")
+KINDS = (
+    "crossing",
+    "entry",
+    "exit",
+    "stop",
+    "reset",
+    "impact",
+    "contact",
+    "release",
+    "rest",
+    "rest_below",
+    "end",
+)
 
 #: The first and the last of these, as many, can happen without resets and impacts.
 SIMPLE_KINDS = 5
@@ -166,6 +178,7 @@ REASONS = (
     "no_reaction",
     "no_stable_motion",
     "possibly_several",
+    "high_degree",
     "discrete_value",
 )
 

@@ -79,6 +79,15 @@ def possibly_several(surfaces: Sequence[int]) -> str:
     )
 
 
+def high_degree(surface: int) -> str:
+    """Rest on a surface of relative degree three or more."""
+    return (
+        f"Rest on h{surface} = 0 is one of many motions: the multiplier enters the third derivative of "
+        f"h{surface} or a later one, and motions leave such a point by infinitely many switchings. "
+        "start_mode='s' chooses rest."
+    )
+
+
 def wrong_start(asked: str, actual: str) -> str:
     """The start mode is not admissible."""
     return f"start_mode {asked!r} is not admissible at the start, where the mode is {actual!r}."

@@ -68,10 +68,13 @@ def _named(
     """Modes, name, element and side of an event."""
     if row >= 0:
         own = [run.guards(before)[row]]
-    else:  # the contacts that close together where impacts accumulate
-        opened = [g for g in run.guards(before) if g.kind == "release"]
-        own = [g for g in run.guards(after) if g.kind == "release" and g not in opened]
-    name = " and ".join([guard_name(system, guard) for guard in own])
+        name = guard_name(system, own[0])
+    else:  # what comes to rest together where events accumulate
+        held = run.guards(before)
+        own = [g for g in run.guards(after) if g not in held]
+        own = [g for g in own if g.kind == "release" or (g.kind == "exit" and g.side > 0)]
+        own = [replace(g, kind="surface", side=0) if g.kind == "exit" else g for g in own]
+        name = " and ".join([guard_name(system, guard) for guard in own])
     of = (own[0].element, own[0].side) if own else (-1, 0)
     return system.spelled(before), system.spelled(after), name, *of
 
@@ -150,6 +153,8 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.no_reaction(contacts)
     if reason == "no_stable_motion":
         return messages.no_stable_motion(entries)
+    if reason == "high_degree":
+        return messages.high_degree(system.entry_of(run.where))
     if reason == "possibly_several":
         return messages.possibly_several(entries)
     if reason == "discrete_value":

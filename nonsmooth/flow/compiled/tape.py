@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, Coupled, FilippovSystem, coupled_of
+from ...model import Array, Coupled, FilippovSystem, coupled_of, raised_of
 from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
 from ..constants import FULL, RUNNING
 from ..names import shown_mode
@@ -210,7 +210,11 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets")],
-        *[(name, _POINTER) for name in ("set_first", "set_size", "set_of", "early", "early_free")],
+        *[
+            (name, _POINTER)
+            for name in ("set_first", "set_size", "set_of", "degree", "lower_first")
+        ],
+        *[(name, _POINTER) for name in ("early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
     ]
@@ -299,7 +303,7 @@ class TapeEngine:
 
     def __init__(self, system: FilippovSystem, order: int):
         self.system, self.order = system, order
-        self.coupled = coupled_of(system)
+        self.coupled = raised_of(system)
         tape = system.cached("tape", lambda: tape_of(self.coupled))
         self.guards = lru_cache(maxsize=4096)(self.coupled.guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
@@ -346,6 +350,8 @@ class TapeEngine:
             "set_first": [members[0] for members in system.sets],
             "set_size": [len(members) for members in system.sets],
             "set_of": [_place(system, i) for i in range(m)],
+            "degree": [len(own) + 1 for own in coupled.lower],
+            "lower_first": m + 2 * c + np.cumsum([0, *map(len, coupled.lower)]),
             "early": tape.series.early,
             "early_free": tape.free.early,
         }

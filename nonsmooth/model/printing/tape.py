@@ -126,7 +126,7 @@ def tape_of(coupled: Coupled) -> Tape:
     x, p = system.extended_states, system.parameter_symbols
     slope, gradients = _sparse(coupled.slope), [_sparse(g) for g in coupled.gradients]
     matrices = [slope, *gradients]
-    kept = ca.vertcat(d.surfaces, d.gaps, d.gap_rates)
+    kept = coupled.kept
     surface_gradient = _sparse(ca.jacobian(kept, x)) if kept.numel() else _sparse(ca.SX(0, 1))
     column = _sparse(coupled.columns_of_field)
     atoms = d.guards if d.guards.numel() else ca.SX(0, 1)

@@ -28,7 +28,7 @@ typedef struct {
 /* Of a guard that ended the mode before so many coefficients vanish. */
 typedef struct { int kind, index, side, zeros; } Known;
 
-static int degree_of(const Run *r, int i) { return i < r->m ? 1 : 2; }
+static int degree_of(const Run *r, int i) { return i < r->m ? r->s->degree[i] : 2; }
 
 /* Lemke's method ------------------------------------------------------------------------------------ */
 
@@ -602,7 +602,7 @@ static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
 /* Rounding of the states' coefficients, and of the rows of each order: what is zero at rest is not compared with
  * itself. */
 static void read_noise(Run *r, Decision *d) {
-  int k = d->count, w = r->width, m = r->m, c = r->c, all = m + 2 * c, first = 2 * w + r->s->slope.count;
+  int k = d->count, w = r->width, all = r->kept_rows, first = 2 * w + r->s->slope.count;
   double *ones = r->vector + r->n + w, *steep = r->small, *height = r->rates + all;
   d->field = d->rate = 0;
   for (int i = 0; i < r->n; i++) ones[i] = 1;
@@ -612,7 +612,7 @@ static void read_noise(Run *r, Decision *d) {
   gradient_sums(r, &r->s->surfaces, r->heights, all, &r->s->surface_gradient, all, ones, 1, height);
   for (int i = 0; i < k; i++) {
     int own = d->own[i];
-    double of = height[own < m ? own : own + c];
+    double of = height[own >= r->m ? own + r->c : degree_of(r, own) > 1 ? r->s->lower_first[own + 1] - 1 : own];
     d->steep[i] = steep[own];
     if (!(of > 0)) continue;
     d->field = larger(d->field, d->yard[i] / of);
@@ -937,7 +937,7 @@ static void begin_decision(Decision *d) {
 
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
-  if (r->s->continuous[surface]) return 0;
+  if (r->s->continuous[surface] || r->s->degree[surface] > 1) return 0;
   double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
   for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
@@ -984,7 +984,7 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
   if (l->slides && !improve(r, l, r->x, r->chosen.unknowns, 1)) return 0;
   memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < l->rows; row++)
-    if (l->kind[row] == SURFACE_GUARD && l->index[row] == own) r->chosen.drop[row] = exits ? 2 : 1;
+    if (l->kind[row] == SURFACE_GUARD && l->index[row] == own) r->chosen.drop[row] = degree_of(r, own) + exits;
   return 1;
 }
 

@@ -36,10 +36,19 @@ static void adopt(Run *r, const Continuation *c) {
   enter_segment(r, shown);
 }
 
+/* A surface that would come to rest though its multiplier enters only its third derivative or a later one: motions
+ * leave such a point by infinitely many switchings. -1 if there is none. */
+static int rests_unstably(const Run *r, const int8_t *letter) {
+  for (int i = 0; i < r->m; i++) if (r->s->degree[i] > 2 && letter[i] == 0 && r->letter[i] != 0) return i;
+  return -1;
+}
+
 /* Adopt the mode that continues; 0 where there is none or more than one. */
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count) {
   if (r->active_count) {
     if (!decide(r, letter, known, known_count)) return 0;
+    int unstable = rests_unstably(r, r->chosen.letter);
+    if (unstable >= 0) { finish(r, NON_UNIQUE, HIGH_DEGREE, unstable); return 0; }
   } else {
     memcpy(r->chosen.letter, letter, r->width);
     memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
@@ -55,6 +64,7 @@ static int letters_of(Run *r, int8_t *letter) {
   const double *h = surface_values(r, r->x);
   int finite = finite_all(h, r->m + 2 * r->c);
   for (int i = 0; i < r->width; i++) letter[i] = set_of(r, i) >= 0 ? OFF : i >= r->m || h[i] > 0 ? 1 : -1;
+  take_sides(r, letter, -1);
   return finite;
 }
 
@@ -116,9 +126,7 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   if (r->s->sets && (start_mode || without_friction(r))) { finish(r, HAND_OVER, NO_REASON, 0); return; }
   active_surfaces(r, -1, r->letter);
   if (r->status == RUNNING) {
-    int surfaces = 0;
-    while (surfaces < r->active_count && r->active[surfaces] < r->m) surfaces++;
-    project(r, r->active, surfaces);
+    project(r, r->involved, gather(r, -1, r->m, r->involved));
     renote(r);
     if (start_mode) start_in(r, start_mode);
     else if (r->active_count) {
@@ -188,6 +196,8 @@ static void watch_two_fold(Run *r) {
   if (s >= 0 && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
 }
 
+static int rest_at_limit(Run *r, int before);
+
 static void serve(Run *r, int row) {
   int kind = r->now.kind[row], index = r->now.index[row], side = r->now.side[row], before = r->mode;
   r->met = (Met){kind, index, side};
@@ -195,23 +205,23 @@ static void serve(Run *r, int row) {
   else if (kind == RELEASE_GUARD) release(r, row);
   else if (kind == NEAR_GUARD) near_set(r, row, 1);
   else {
-    Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, 2}};
+    Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, kind == EXIT_GUARD ? r->s->degree[index] + 1 : 2}};
     if (kind == SLIP_GUARD) {
       known[0] = (Known){SLIP_GUARD, index, 0, 1};
       known[1] = (Known){NEAR_GUARD, index, 0, 2};
     }
     active_surfaces(r, index, r->letter);
     if (r->status != RUNNING) return;
-    int kept = 0; /* contacts among them keep their gaps */
-    for (int i = 0; i < r->active_count; i++) r->involved[kept++] = r->active[i];
-    project(r, r->involved, kept);
+    project(r, r->involved, gather(r, index, r->width, r->involved));
     renote(r);
     if (kind == SLIP_GUARD) {}
     else if (kind != SURFACE_GUARD) watch_two_fold(r);
     else if (!is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
     if (r->status != RUNNING) return;
     memcpy(r->start, r->letter, r->width);
-    if (choose(r, r->start, known, kind == EXIT_GUARD || kind == SLIP_GUARD ? 2 : 0) && r->mode != before)
+    take_sides(r, r->start, index);
+    if (choose(r, r->start, known, kind == EXIT_GUARD || kind == SLIP_GUARD ? 2 : 0) && r->mode != before
+        && !rest_at_limit(r, before))
       event(r, change_kind(r, before, r->mode), before, row, r->x);
   }
 }

@@ -10,6 +10,7 @@ Run *run_new(const System *s, Table *table) {
   r->table = table;
   r->n = s->n; r->m = s->m; r->c = s->c; r->width = s->m + s->c;
   r->order = s->order; r->stride = s->order + 1;
+  r->kept_rows = s->lower_first[s->m];
   r->guards = 3 * s->m + 2 * s->c + s->rules.atoms + 2;
   r->arena = calloc(1, place_run(r, 0));
   if (!r->arena) { free(r); return 0; }

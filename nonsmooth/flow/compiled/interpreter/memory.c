@@ -92,7 +92,7 @@ static size_t place_decision(Run *r, char *base, size_t used) {
 
 static size_t place_run(Run *r, char *base) {
   const System *s = r->s;
-  int n = r->n, w = r->width, c = r->c, all = r->m + 2 * c, g = r->guards, stride = r->stride;
+  int n = r->n, w = r->width, c = r->c, all = r->kept_rows, g = r->guards, stride = r->stride;
   size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
   used = place_layout(&r->now, base, used, w, g);
   used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets);
@@ -110,7 +110,7 @@ static size_t place_run(Run *r, char *base) {
   r->unknowns = DOUBLES(w);
   r->drop = INTEGERS(g);
   r->active = INTEGERS(w);
-  r->involved = INTEGERS(3 * w + 1);
+  r->involved = INTEGERS(3 * w + 2 * all + 1);
   r->p = DOUBLES(s->parameters);
   r->series = DOUBLES((size_t)s->series.size * stride);
   r->point = DOUBLES(s->point.size);

@@ -42,6 +42,8 @@ typedef struct {
   int32_t affine; /* whether all unknowns enter linearly together */
   int32_t sets; /* of codimension two and more */
   const int32_t *set_first, *set_size, *set_of; /* by set; the set of each switching function or -1 */
+  /* Of each surface the derivative of h that its multiplier enters; where those between are among what is kept. */
+  const int32_t *degree, *lower_first;
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
   int32_t early_count, early_free_count;
   Rules rules;
@@ -115,7 +117,7 @@ typedef struct {
   const System *s;
   Table *table;
   double *p;
-  int32_t n, m, c, width, order, stride, guards;
+  int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
   double t, begun, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start; /* present ones, and those that a choice is made from */
   Layout now; /* of the present mode */

@@ -5,16 +5,6 @@ import pytest
 
 from .random_systems import compare, draw
 
-#: Seeds that fail, and why; a repair deletes its seed.
-OPEN = {
-    f"test_random_system[{seed}]": why
-    for why, seeds in {
-        "conditions beside hidden laws or products": [8, 57, 88, 146, 147],
-        "a contact beside a product": [16, 79, 107, 115, 196, 212],
-    }.items()
-    for seed in seeds
-}
-
 
 @pytest.mark.parametrize(
     "seed", [pytest.param(s, marks=[pytest.mark.slow] * (s >= 40)) for s in range(215)]

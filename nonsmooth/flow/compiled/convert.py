@@ -134,6 +134,17 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.ambiguous([system.spelled(mode) for mode in run.several])
     if reason == "wrong_start":
         return messages.wrong_start(str(options.start_mode), modes[run.where])
+    if reason == "start_solutions":
+        return messages.start_solutions(str(options.start_mode), run.where)
+    if reason == "impossible_start":
+        return messages.impossible_start(str(options.start_mode))
+    if reason == "several_directions":
+        return messages.several_directions(run.where)
+    if reason == "indefinite":
+        return messages.indefinite(system.surface_names[run.where])
+    if reason == "undetermined":
+        firsts = [i for i in run.active if i in system.set_of and i == system.set_of[i][0]]
+        return messages.undetermined([system.surface_names[i] for i in firsts])
     if reason == "field":
         return messages.field_not_finite(modes[run.mode], run.x[-1].tolist())
     if reason == "state":

@@ -210,11 +210,8 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets")],
-        *[
-            (name, _POINTER)
-            for name in ("set_first", "set_size", "set_of", "degree", "lower_first")
-        ],
-        *[(name, _POINTER) for name in ("early", "early_free")],
+        *[(name, _POINTER) for name in ("mixed", "set_first", "set_size", "set_of")],
+        *[(name, _POINTER) for name in ("degree", "lower_first", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
     ]
@@ -254,10 +251,6 @@ def _place(system: FilippovSystem, i: int) -> int:
 
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
     """Return the interpreter with a system at the options' tolerance, or None where it has none."""
-    if any(system.nonlinear):
-        return None
-    if system.impacts and not coupled_of(system).affine:
-        return None
     order = tape_order(system, options)
     if order >= MOST_ORDER:
         return None
@@ -343,6 +336,7 @@ class TapeEngine:
             "component": tape.component,
             "slope_output": tape.slope_output,
             "slope_moves": tape.slope_moves,
+            "mixed": coupled.mixed.ravel(),
             "bent": coupled.linearity.bent_rows,
             "bent_free": coupled.linearity.bent_free_rows,
             "bent_guards": coupled.linearity.bent_guards,
@@ -523,7 +517,7 @@ class TapeEngine:
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``interpreter/sets.c`` for those of sets."""
         m = self.system.surface_count
-        surfaces = ("-s+*bll"[sign + 1] for sign in signs[:m])
+        surfaces = ("-s+*blli"[sign + 1] for sign in signs[:m])
         return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
 
     # many trajectories -------------------------------------------------------------------------

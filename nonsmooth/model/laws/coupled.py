@@ -125,7 +125,7 @@ class Coupled:
         factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
         self.outputs = [field, self.layer, heights, factor, stops]
         every = ca.vertcat(*unknowns, d.reactions)
-        self.slope = ca.jacobian(self.layer, every)
+        self.slope, self._every = ca.jacobian(self.layer, every), every
         #: Whether the unknown multipliers of a mode enter linearly together.
         self.affine = bool(ca.is_linear(field, every))
         guards, rest = ca.vertcat(heights, stops), (x, every, not system.sets, d.time)
@@ -246,6 +246,15 @@ class Coupled:
         for i, j in zip(sparsity.row(), sparsity.get_col(), strict=True):
             moves[i, j] = ca.depends_on(self.slope[i, j], self.moving)
         return moves
+
+    @cached_property
+    def mixed(self) -> NDArray[np.bool_]:
+        """Pairs of unknowns that do not enter the field linearly together (m, m)."""
+        mixed = np.zeros((self.count, self.count), bool)
+        for j in range(0 if self.affine else self.count):
+            bent = ca.jacobian(self.columns_of_field[:, j], self._every)
+            mixed[j, bent.sparsity().get_col()] = True
+        return mixed
 
     def _changing(self, sliding: Sequence[int]) -> list[int]:
         """Unknowns that the stability of sliding is read from."""

@@ -243,3 +243,12 @@ static void see_limit(Run *r) {
   for (int k = 1; k <= block; k++) only_impacts &= back(r, k)->kind == IMPACT;
   if (only_impacts) close_contacts(r, block, left, error); else end_at_limit(r, block, left, error);
 }
+
+/* Whether events accumulate at a point where no series exists: the run ends there. */
+static int ends_at_singular(Run *r) {
+  double left, error;
+  if (!block_of(r, &left, &error)) return 0;
+  r->limit = r->t + left;
+  finish(r, ACCUMULATION, NO_REASON, 0);
+  return 1;
+}

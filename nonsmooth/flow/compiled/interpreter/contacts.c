@@ -79,7 +79,7 @@ static int strike(Run *r, const int32_t *involved, int count, int plastic, doubl
     for (int q = 0; q < count; q++) borne |= r->s->carries[i * c + involved[q]];
     if (borne) { carried[carries++] = i; choices = choices < 100000 ? 3 * choices : choices; }
   }
-  if (count > 12 || choices > 100000) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+  if (count > 12 || choices > 100000) { many_may_hold(r); return 0; }
   for (int size = count; size > 0; size--)
     for (int set = (1 << count) - 1; set > 0; set--) {
       int takes = 0;

@@ -25,6 +25,7 @@ static void adopt(Run *r, const Continuation *c) {
   memcpy(r->unknowns, c->unknowns, sizeof(double) * r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
+  r->repelling = 0;
   if (alike) return;
   int shown = shown_number(r, r->letter);
   if (r->s->sets && shown == r->shown) { /* a set is passed again: another stretch, of the same letters */
@@ -63,7 +64,7 @@ static int letters_of(Run *r, int8_t *letter) {
   if (!r->width) return 1;
   const double *h = surface_values(r, r->x);
   int finite = finite_all(h, r->m + 2 * r->c);
-  for (int i = 0; i < r->width; i++) letter[i] = set_of(r, i) >= 0 ? OFF : i >= r->m || h[i] > 0 ? 1 : -1;
+  for (int i = 0; i < r->width; i++) letter[i] = set_of(r, i) >= 0 ? off_letter(r, i) : i >= r->m || h[i] > 0 ? 1 : -1;
   take_sides(r, letter, -1);
   return finite;
 }
@@ -89,41 +90,56 @@ static void settle_in(Run *r) {
   strike_due(r);
 }
 
+/* Guards of the active elements in the mode that a run starts in: whether it can. Sliding from which both sides lead
+ * away is kept. */
+static int can_start(Run *r) {
+  Expansion *e = &r->e;
+  int exits = 0, holds = 1;
+  double most = -INFINITY, least = INFINITY;
+  expand(r, r->letter, r->x, r->unknowns, e);
+  for (int row = 0; row < e->l.rows; row++) {
+    int kind = e->l.kind[row], index = e->l.index[row], active = 0;
+    if (kind != SURFACE_GUARD && kind != EXIT_GUARD && kind != SLIP_GUARD && kind != NEAR_GUARD) continue;
+    if (kind == NEAR_GUARD && r->letter[index] == 0) continue; /* ends steps only */
+    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == index;
+    if (!active) continue;
+    double value;
+    r->drop[row] = leading(r, e, row, kind == SURFACE_GUARD || kind == NEAR_GUARD, &value);
+    if (kind != EXIT_GUARD) { holds &= value >= 0; continue; }
+    exits = 1;
+    most = larger(value, most);
+    least = smaller(value, least);
+  }
+  r->repelling = exits && most <= 0 && least < 0;
+  return holds && (!exits || r->repelling || least >= 0);
+}
+
 static void start_in(Run *r, const int8_t *asked) {
+  Solutions all = {0};
+  int8_t *letter = r->start;
   for (int i = 0; i < r->width; i++) {
     int active = 0;
     for (int j = 0; j < r->active_count; j++) active |= r->active[j] == i;
-    if (!active && asked[i] != r->letter[i]) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+    letter[i] = asked[i];
+    if (set_of(r, i) >= 0 && asked[i] == OFF) letter[i] = active ? LEAVING : r->letter[i] == IDLE ? IDLE : OFF;
+    if (!active && letter[i] != r->letter[i]) { finish(r, NON_UNIQUE, WRONG_START, r->mode); return; }
   }
-  memset(r->unknowns, 0, sizeof(double) * r->width);
-  memcpy(r->letter, asked, r->width);
+  memcpy(r->letter, letter, r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
-  if (!is_known(r, &r->now) || !improve(r, &r->now, r->x, r->unknowns, 1)) { finish(r, HAND_OVER, NO_REASON, 0); return; }
-  Expansion *e = &r->e;
-  expand(r, r->letter, r->x, r->unknowns, e);
-  for (int row = 0; row < e->l.rows; row++) {
-    int kind = e->l.kind[row], active = 0;
-    if (kind != SURFACE_GUARD && kind != EXIT_GUARD) continue;
-    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == e->l.index[row];
-    if (!active) continue;
-    double value;
-    int k = leading(r, e, row, kind == SURFACE_GUARD, &value);
-    r->drop[row] = k;
-    if (value < 0) { /* repelling sliding, or a mode that cannot hold: the reference knows which */
-      finish(r, HAND_OVER, NO_REASON, 0);
-      return;
-    }
-  }
+  mode_solutions(r, &r->now, &all);
+  if (all.count != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, all.count); return; }
+  memcpy(r->unknowns, all.each, sizeof(double) * r->width);
+  if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
 }
 
 static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   note(r);
+  find_idle(r);
   int finite = letters_of(r, r->letter);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
   if (!finite) { finish(r, NOT_FINITE, SURFACE, 0); return; }
-  if (r->s->sets && (start_mode || without_friction(r))) { finish(r, HAND_OVER, NO_REASON, 0); return; }
   active_surfaces(r, -1, r->letter);
   if (r->status == RUNNING) {
     project(r, r->involved, gather(r, -1, r->m, r->involved));
@@ -259,6 +275,22 @@ static int advance(Run *r, const Expansion *e, double dt) {
   return 1;
 }
 
+static int ends_at_singular(Run *r);
+
+/* Leave a point where only low derivatives exist; guards are looked at after the step. */
+static void leave_singular(Run *r, Expansion *e, double left) {
+  int huge = 0;
+  for (int i = 0; i < r->n; i++)
+    for (int k = 0; k < 2; k++) huge |= fabs(e->states[(int64_t)i * r->stride + k]) > HUGE;
+  double h = singular_step(r, e, smaller(left, r->o.max_step));
+  if ((h == 0 || huge) && !ends_at_singular(r)) finish(r, NOT_FINITE, FIELD, 0);
+  if (r->status != RUNNING) return;
+  if (!advance(r, e, h) || !r->s->rules.atoms) return;
+  expand(r, r->letter, r->x, r->unknowns, e);
+  for (int a = 0; a < r->s->rules.atoms; a++) /* sides that the start did not have */
+    if (!r->instant.side[a]) r->instant.side[a] = (int8_t)ns_sign(e->guards[(int64_t)(e->l.atoms + a) * r->stride]);
+}
+
 static void step(Run *r) {
   if (r->instant.running) { instant_next(r); return; }
   if (r->due_impact >= 0) { serve_between(r, r->due_impact); return; }
@@ -267,11 +299,16 @@ static void step(Run *r) {
   if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
   Expansion *e = &r->e;
   expand(r, r->letter, r->x, r->unknowns, e);
-  if (!e->finite) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+  if (!e->finite) { leave_singular(r, e, left); return; }
   double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
   if (h <= SHORTEST * larger(fabs(r->t), fabs(r->t - r->begun)) && h < left) {
     finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
     return;
+  }
+  if (is_fold_ahead(r, e, by_series)) {
+    int fold = reach_fold(r, e, left);
+    if (fold >= 0) serve_between(r, fold);
+    if (fold >= 0 || r->status != RUNNING) return;
   }
   int last = h >= left;
   if (last) h = left;

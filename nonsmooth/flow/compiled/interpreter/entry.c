@@ -53,6 +53,8 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
+  r->met = (Met){0};
+  r->repelling = 0;
   r->reason = NO_REASON;
   r->where = 0;
   r->facts = 0;

@@ -209,9 +209,6 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
   e->finite = is_finite(r, e);
 }
 
-/* Whether the multipliers of a mode are the only ones: those that enter in products may have several values. */
-static int is_known(const Run *r, const Layout *l) { return r->s->affine || l->slides < 2; }
-
 /* The step of Newton's method where the layer's slope has no inverse; 0 where there is none. */
 static int step_dependent(Run *r, const Layout *l, const double *unknowns, double *b) {
   int n = l->slides, w = r->width;

@@ -108,6 +108,9 @@ static size_t place_run(Run *r, char *base) {
   r->saved = DOUBLES(n);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
+  r->tried = DOUBLES(w);
+  r->solutions = DOUBLES(SOLUTIONS * w);
+  r->tried_letter = LETTERS(2 * w);
   r->drop = INTEGERS(g);
   r->active = INTEGERS(w);
   r->involved = INTEGERS(3 * w + 2 * all + 1);
@@ -140,6 +143,10 @@ static size_t place_run(Run *r, char *base) {
   r->heights_of = DOUBLES(w);
   r->aside = DOUBLES(2 * n);
   r->moving = LETTERS(w);
+  r->idle = LETTERS(s->sets);
+  r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
+  r->of_defect = DOUBLES(g);
+  r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
   r->key = LETTERS(w + 8 * s->rules.discrete);
   r->root = DOUBLES(g);
   r->met_at = DOUBLES(g);

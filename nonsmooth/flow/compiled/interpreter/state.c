@@ -41,6 +41,7 @@ typedef struct {
   const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
   int32_t sets; /* of codimension two and more */
+  const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   const int32_t *set_first, *set_size, *set_of; /* by set; the set of each switching function or -1 */
   /* Of each surface the derivative of h that its multiplier enters; where those between are among what is kept. */
   const int32_t *degree, *lower_first;
@@ -74,8 +75,8 @@ typedef struct {
   double *lambda, *apart, *root, *rates, *slopes, *radius, *per_radius;
 } Expansion;
 
-/* Letters of a set: off it, its first step away from it, h carried along after that. */
-enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5 };
+/* Letters of a set: off it, h carried along after that, its first step away from it, and one without friction. */
+enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5, IDLE = 6 };
 
 /* A mode that can continue, and the zeros of its guards. */
 typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Continuation;
@@ -119,11 +120,12 @@ typedef struct {
   double *p;
   int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
   double t, begun, since, limit, at_t, *x, *at_x, *unknowns;
-  int8_t *letter, *start; /* present ones, and those that a choice is made from */
+  int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
+  double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
   Layout now; /* of the present mode */
   Met met;
   Instant instant;
-  int32_t mode, status, reason, where, due_impact, falls, *drop;
+  int32_t mode, status, reason, where, due_impact, falls, repelling, *drop;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode;
   Happened past[HISTORY];
@@ -147,7 +149,7 @@ typedef struct {
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
   double *saved; /* a state to return to */
-  int8_t *moving, *key;
+  int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
   int32_t shown;
   const Expansion *expansion;
   void *arena;

@@ -141,7 +141,7 @@ def _after(system: FilippovSystem, mode: str, guard: Guard, letters: str) -> ca.
 
 
 def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -> ca.SX:
-    """The state after the impulses at a gap that closes (``flow/reference/contacts.py``)."""
+    """The state after the impulses at a gap that closes (``contacts.c``)."""
     # Contacts that are closed take part with the rate zero; friction on them acts with the impulse
     # in the same proportion as with the reaction, and ``letters`` say to which side.
     coupled, m, d = coupled_of(system), system.surface_count, system.definition

@@ -1,4 +1,4 @@
-/* Impacts: nonsmooth/flow/reference/contacts.py ------------------------------------------------------- */
+/* Impacts ------------------------------------------------------------------------------------------------- */
 
 /* One possibility: the contacts ``taking`` an impulse, letters of the surfaces that they carry. The state
  * after it to ``after``; 0 where it contradicts itself. */

@@ -15,7 +15,7 @@ _MOST_LINEAR = 22
 def supports_lanes(system: FilippovSystem) -> bool:
     """Whether the lanes engine can be generated for a system."""
     return system.surface_count <= 1 and not (
-        system.resets or system.impacts or any(system.nonlinear)
+        system.resets or system.impacts or any(system.nonlinear) or not system.definition.plain
     )
 
 
@@ -23,7 +23,7 @@ def supports_set_lanes(coupled: Coupled) -> bool:
     """Whether lanes can be generated for a system with a set: one, alone, of constant slopes."""
     system = coupled.system
     alone = len(system.sets) == 1 and system.surface_count == len(system.sets[0])
-    others = system.resets or system.impacts or any(system.nonlinear)
+    others = system.resets or system.impacts or any(system.nonlinear) or not system.definition.plain
     return alone and not others and coupled.affine and not coupled.slope_moves.any()
 
 

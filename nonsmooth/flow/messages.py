@@ -32,6 +32,14 @@ def ambiguous(modes: Sequence[str]) -> str:
     )
 
 
+def stability_lost(name: str, t: float) -> str:
+    """Loss of the stability of sliding on several surfaces."""
+    return (
+        f"At t = {t:.8g} sliding on {name} and other surfaces loses its stability across their layers: an "
+        "eigenvalue of dh/dx df/dlambda, or a pair, reaches the imaginary axis."
+    )
+
+
 def multiple_zero(surface: int) -> str:
     """The gradient of a switching function vanishes with it."""
     return (
@@ -76,6 +84,15 @@ def possibly_several(surfaces: Sequence[int]) -> str:
     return (
         f"On {' and '.join(f'h{i}' for i in surfaces)} = 0 more than one set of multipliers may hold: "
         "the matrix dh/dx df/dlambda is not known to be a P-matrix, for which there is one."
+    )
+
+
+def high_degree(surface: int) -> str:
+    """Rest on a surface of relative degree three or more."""
+    return (
+        f"Rest on h{surface} = 0 is one of many motions: the multiplier enters the third derivative of "
+        f"h{surface} or a later one, and motions leave such a point by infinitely many switchings. "
+        "start_mode='s' chooses rest."
     )
 
 

@@ -23,7 +23,7 @@ from .errors import (
     explain,
 )
 from .laws import complementarity
-from .laws.coupled import Coupled, ErrorScales, coupled_of
+from .laws.coupled import Coupled, ErrorScales, coupled_of, raised_of
 from .laws.evaluators import Evaluator, Resets, Surfaces, evaluator
 from .laws.layer import Layer, LayerNumbers, Loop, layer_of, loop_at
 from .laws.motion import Motion, followed, mode_field, motion, watched_functions
@@ -77,6 +77,7 @@ __all__ = [
     "motion",
     "multiplier_enters",
     "periods",
+    "raised_of",
     "read_function",
     "read_period",
     "real",

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from ...model import Array, FilippovSystem
+from ...model import Array, FilippovSystem, Guard
 from .. import messages
-from ..constants import KINDS, REASONS
+from ..constants import DEPENDS_ON_WIDTHS, KINDS, REASONS, UNPROVED
 from ..names import guard_name
 from ..options import Options
 from ..status import ADVICE, Status
-from ..trajectory import Event, Segment, Steps, Trajectory
+from ..trajectory import Continuation, Event, Facts, Segment, Steps, Trajectory
+from ..warn import warn_of_facts
 from .arrays import Run
 
 
@@ -19,6 +20,8 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
     """Convert a dense run."""
     status, modes = Status(run.status), run.letters
     limit = None if math.isnan(run.limit) else run.limit
+    facts = Facts(bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED))
+    warn_of_facts(facts.depends_on_widths, facts.unproved)
     events = _events(system, run)
     motion = run.motion if len(run.motion) else None
     if status is not Status.STOPPED:
@@ -40,6 +43,12 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         message=f"{_message(system, options, run)} {ADVICE[status]}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
         steps=Steps(run.starts, run.coefficients),
+        continuations=[
+            Continuation(system.spelled(mode), rates)
+            for mode, rates in zip(run.several, run.rates, strict=True)
+            if status is Status.NON_UNIQUE
+        ],
+        facts=facts,
     )
 
 
@@ -66,12 +75,19 @@ def _named(
     system: FilippovSystem, run: Run, before: str, after: str, row: int
 ) -> tuple[str, str, str, int, int]:
     """Modes, name, element and side of an event."""
-    if row >= 0:
+    if row >= len(run.guards(before)):  # of stability, of which the driver has more
+        k = system.entry_of(before.index("s"))
+        own = [Guard("branch", k, 0, k)]
+        name = guard_name(system, own[0])
+    elif row >= 0:
         own = [run.guards(before)[row]]
-    else:  # the contacts that close together where impacts accumulate
-        opened = [g for g in run.guards(before) if g.kind == "release"]
-        own = [g for g in run.guards(after) if g.kind == "release" and g not in opened]
-    name = " and ".join([guard_name(system, guard) for guard in own])
+        name = guard_name(system, own[0])
+    else:  # what comes to rest together where events accumulate
+        held = run.guards(before)
+        own = [g for g in run.guards(after) if g not in held]
+        own = [g for g in own if g.kind == "release" or (g.kind == "exit" and g.side > 0)]
+        own = [replace(g, kind="surface", side=0) if g.kind == "exit" else g for g in own]
+        name = " and ".join([guard_name(system, guard) for guard in own])
     of = (own[0].element, own[0].side) if own else (-1, 0)
     return system.spelled(before), system.spelled(after), name, *of
 
@@ -131,6 +147,17 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.ambiguous([system.spelled(mode) for mode in run.several])
     if reason == "wrong_start":
         return messages.wrong_start(str(options.start_mode), modes[run.where])
+    if reason == "start_solutions":
+        return messages.start_solutions(str(options.start_mode), run.where)
+    if reason == "impossible_start":
+        return messages.impossible_start(str(options.start_mode))
+    if reason == "several_directions":
+        return messages.several_directions(run.where)
+    if reason == "indefinite":
+        return messages.indefinite(system.surface_names[run.where])
+    if reason == "undetermined":
+        firsts = [i for i in run.active if i in system.set_of and i == system.set_of[i][0]]
+        return messages.undetermined([system.surface_names[i] for i in firsts])
     if reason == "field":
         return messages.field_not_finite(modes[run.mode], run.x[-1].tolist())
     if reason == "state":
@@ -150,6 +177,10 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.no_reaction(contacts)
     if reason == "no_stable_motion":
         return messages.no_stable_motion(entries)
+    if reason == "stability_lost":
+        return messages.stability_lost(system.surface_names[run.where], t)
+    if reason == "high_degree":
+        return messages.high_degree(system.entry_of(run.where))
     if reason == "possibly_several":
         return messages.possibly_several(entries)
     if reason == "discrete_value":

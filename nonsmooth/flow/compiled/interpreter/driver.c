@@ -25,6 +25,7 @@ static void adopt(Run *r, const Continuation *c) {
   memcpy(r->unknowns, c->unknowns, sizeof(double) * r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
+  r->repelling = 0;
   if (alike) return;
   int shown = shown_number(r, r->letter);
   if (r->s->sets && shown == r->shown) { /* a set is passed again: another stretch, of the same letters */
@@ -36,10 +37,19 @@ static void adopt(Run *r, const Continuation *c) {
   enter_segment(r, shown);
 }
 
+/* A surface that would come to rest though its multiplier enters only its third derivative or a later one: motions
+ * leave such a point by infinitely many switchings. -1 if there is none. */
+static int rests_unstably(const Run *r, const int8_t *letter) {
+  for (int i = 0; i < r->m; i++) if (r->s->degree[i] > 2 && letter[i] == 0 && r->letter[i] != 0) return i;
+  return -1;
+}
+
 /* Adopt the mode that continues; 0 where there is none or more than one. */
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count) {
   if (r->active_count) {
     if (!decide(r, letter, known, known_count)) return 0;
+    int unstable = rests_unstably(r, r->chosen.letter);
+    if (unstable >= 0) { finish(r, NON_UNIQUE, HIGH_DEGREE, unstable); return 0; }
   } else {
     memcpy(r->chosen.letter, letter, r->width);
     memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
@@ -54,7 +64,8 @@ static int letters_of(Run *r, int8_t *letter) {
   if (!r->width) return 1;
   const double *h = surface_values(r, r->x);
   int finite = finite_all(h, r->m + 2 * r->c);
-  for (int i = 0; i < r->width; i++) letter[i] = set_of(r, i) >= 0 ? OFF : i >= r->m || h[i] > 0 ? 1 : -1;
+  for (int i = 0; i < r->width; i++) letter[i] = set_of(r, i) >= 0 ? off_letter(r, i) : i >= r->m || h[i] > 0 ? 1 : -1;
+  take_sides(r, letter, -1);
   return finite;
 }
 
@@ -79,46 +90,62 @@ static void settle_in(Run *r) {
   strike_due(r);
 }
 
+/* Guards of the active elements in the mode that a run starts in: whether it can. Sliding from which both sides lead
+ * away is kept. */
+static int can_start(Run *r) {
+  Expansion *e = &r->e;
+  int exits = 0, holds = 1;
+  double most = -INFINITY, least = INFINITY;
+  expand(r, r->letter, r->x, r->unknowns, e);
+  r->turned_mode = r->mode;
+  for (int row = 0; row < e->l.rows; row++) {
+    int kind = e->l.kind[row], index = e->l.index[row], active = 0;
+    r->turned[row] = e->guards[(int64_t)row * r->stride] < 0 ? -1 : 1;
+    if (kind != SURFACE_GUARD && kind != EXIT_GUARD && kind != SLIP_GUARD && kind != NEAR_GUARD) continue;
+    if (kind == NEAR_GUARD && r->letter[index] == 0) continue; /* ends steps only */
+    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == index;
+    if (!active) continue;
+    double value;
+    r->drop[row] = leading(r, e, row, kind == SURFACE_GUARD || kind == NEAR_GUARD, &value);
+    if (kind != EXIT_GUARD) { holds &= value >= 0; continue; }
+    exits = 1;
+    most = larger(value, most);
+    least = smaller(value, least);
+  }
+  r->repelling = exits && most <= 0 && least < 0;
+  return holds && (!exits || r->repelling || least >= 0);
+}
+
 static void start_in(Run *r, const int8_t *asked) {
+  Solutions all = {0};
+  int8_t *letter = r->start;
   for (int i = 0; i < r->width; i++) {
     int active = 0;
     for (int j = 0; j < r->active_count; j++) active |= r->active[j] == i;
-    if (!active && asked[i] != r->letter[i]) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+    letter[i] = asked[i];
+    if (set_of(r, i) >= 0 && asked[i] == OFF) letter[i] = active ? LEAVING : r->letter[i] == IDLE ? IDLE : OFF;
+    if (!active && letter[i] != r->letter[i]) { finish(r, NON_UNIQUE, WRONG_START, r->mode); return; }
   }
-  memset(r->unknowns, 0, sizeof(double) * r->width);
-  memcpy(r->letter, asked, r->width);
+  memcpy(r->letter, letter, r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
-  if (!is_known(r, &r->now) || !improve(r, &r->now, r->x, r->unknowns, 1)) { finish(r, HAND_OVER, NO_REASON, 0); return; }
-  Expansion *e = &r->e;
-  expand(r, r->letter, r->x, r->unknowns, e);
-  for (int row = 0; row < e->l.rows; row++) {
-    int kind = e->l.kind[row], active = 0;
-    if (kind != SURFACE_GUARD && kind != EXIT_GUARD) continue;
-    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == e->l.index[row];
-    if (!active) continue;
-    double value;
-    int k = leading(r, e, row, kind == SURFACE_GUARD, &value);
-    r->drop[row] = k;
-    if (value < 0) { /* repelling sliding, or a mode that cannot hold: the reference knows which */
-      finish(r, HAND_OVER, NO_REASON, 0);
-      return;
-    }
-  }
+  mode_solutions(r, &r->now, &all);
+  if (all.count > 1) keep_stable(r, &r->now, &all);
+  if (all.count != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, all.count); return; }
+  memcpy(r->unknowns, all.each, sizeof(double) * r->width);
+  if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
 }
 
 static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   note(r);
+  find_idle(r);
   int finite = letters_of(r, r->letter);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
   if (!finite) { finish(r, NOT_FINITE, SURFACE, 0); return; }
-  if (r->s->sets && (start_mode || without_friction(r))) { finish(r, HAND_OVER, NO_REASON, 0); return; }
   active_surfaces(r, -1, r->letter);
   if (r->status == RUNNING) {
-    int surfaces = 0;
-    while (surfaces < r->active_count && r->active[surfaces] < r->m) surfaces++;
-    project(r, r->active, surfaces);
+    project(r, r->involved, gather(r, -1, r->m, r->involved));
     renote(r);
     if (start_mode) start_in(r, start_mode);
     else if (r->active_count) {
@@ -188,30 +215,36 @@ static void watch_two_fold(Run *r) {
   if (s >= 0 && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
 }
 
+static int rest_at_limit(Run *r, int before);
+
 static void serve(Run *r, int row) {
   int kind = r->now.kind[row], index = r->now.index[row], side = r->now.side[row], before = r->mode;
   r->met = (Met){kind, index, side};
   if (kind == IMPACT_GUARD) impact(r, row);
   else if (kind == RELEASE_GUARD) release(r, row);
   else if (kind == NEAR_GUARD) near_set(r, row, 1);
+  else if (kind == BRANCH_GUARD && side != OF_ONE) {
+    event(r, STABILITY, r->mode, row, r->x);
+    finish(r, INTERSECTION, STABILITY_LOST, index);
+  }
   else {
-    Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, 2}};
+    Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, kind == EXIT_GUARD ? r->s->degree[index] + 1 : 2}};
     if (kind == SLIP_GUARD) {
       known[0] = (Known){SLIP_GUARD, index, 0, 1};
       known[1] = (Known){NEAR_GUARD, index, 0, 2};
     }
     active_surfaces(r, index, r->letter);
     if (r->status != RUNNING) return;
-    int kept = 0; /* contacts among them keep their gaps */
-    for (int i = 0; i < r->active_count; i++) r->involved[kept++] = r->active[i];
-    project(r, r->involved, kept);
+    project(r, r->involved, gather(r, index, r->width, r->involved));
     renote(r);
     if (kind == SLIP_GUARD) {}
     else if (kind != SURFACE_GUARD) watch_two_fold(r);
     else if (!is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
     if (r->status != RUNNING) return;
     memcpy(r->start, r->letter, r->width);
-    if (choose(r, r->start, known, kind == EXIT_GUARD || kind == SLIP_GUARD ? 2 : 0) && r->mode != before)
+    take_sides(r, r->start, index);
+    if (choose(r, r->start, known, kind == EXIT_GUARD || kind == SLIP_GUARD ? 2 : 0) && r->mode != before
+        && !rest_at_limit(r, before))
       event(r, change_kind(r, before, r->mode), before, row, r->x);
   }
 }
@@ -249,6 +282,22 @@ static int advance(Run *r, const Expansion *e, double dt) {
   return 1;
 }
 
+static int ends_at_singular(Run *r);
+
+/* Leave a point where only low derivatives exist; guards are looked at after the step. */
+static void leave_singular(Run *r, Expansion *e, double left) {
+  int huge = 0;
+  for (int i = 0; i < r->n; i++)
+    for (int k = 0; k < 2; k++) huge |= fabs(e->states[(int64_t)i * r->stride + k]) > HUGE;
+  double h = singular_step(r, e, smaller(left, r->o.max_step));
+  if ((h == 0 || huge) && !ends_at_singular(r)) finish(r, NOT_FINITE, FIELD, 0);
+  if (r->status != RUNNING) return;
+  if (!advance(r, e, h) || !r->s->rules.atoms) return;
+  expand(r, r->letter, r->x, r->unknowns, e);
+  for (int a = 0; a < r->s->rules.atoms; a++) /* sides that the start did not have */
+    if (!r->instant.side[a]) r->instant.side[a] = (int8_t)ns_sign(e->guards[(int64_t)(e->l.atoms + a) * r->stride]);
+}
+
 static void step(Run *r) {
   if (r->instant.running) { instant_next(r); return; }
   if (r->due_impact >= 0) { serve_between(r, r->due_impact); return; }
@@ -257,11 +306,16 @@ static void step(Run *r) {
   if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
   Expansion *e = &r->e;
   expand(r, r->letter, r->x, r->unknowns, e);
-  if (!e->finite) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+  if (!e->finite) { leave_singular(r, e, left); return; }
   double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
   if (h <= SHORTEST * larger(fabs(r->t), fabs(r->t - r->begun)) && h < left) {
     finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
     return;
+  }
+  if (is_fold_ahead(r, e, by_series)) {
+    int fold = reach_fold(r, e, left);
+    if (fold >= 0) serve_between(r, fold);
+    if (fold >= 0 || r->status != RUNNING) return;
   }
   int last = h >= left;
   if (last) h = left;

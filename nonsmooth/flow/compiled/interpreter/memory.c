@@ -14,6 +14,7 @@ static void *place(char *base, size_t *used, size_t size, size_t count) {
 static size_t place_layout(Layout *l, char *base, size_t used, int width, int guards) {
   l->letter = LETTERS(width);
   l->sliding = INTEGERS(width);
+  l->group = INTEGERS(width);
   l->kind = INTEGERS(guards);
   l->index = INTEGERS(guards);
   l->side = INTEGERS(guards);
@@ -92,7 +93,7 @@ static size_t place_decision(Run *r, char *base, size_t used) {
 
 static size_t place_run(Run *r, char *base) {
   const System *s = r->s;
-  int n = r->n, w = r->width, c = r->c, all = r->m + 2 * c, g = r->guards, stride = r->stride;
+  int n = r->n, w = r->width, c = r->c, all = r->kept_rows, g = r->guards, stride = r->stride;
   size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
   used = place_layout(&r->now, base, used, w, g);
   used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets);
@@ -106,11 +107,15 @@ static size_t place_run(Run *r, char *base) {
   r->at_x = DOUBLES(n);
   r->before = DOUBLES(n);
   r->saved = DOUBLES(n);
+  r->speed = DOUBLES(w);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
+  r->tried = DOUBLES(w);
+  r->solutions = DOUBLES(SOLUTIONS * w);
+  r->tried_letter = LETTERS(2 * w);
   r->drop = INTEGERS(g);
   r->active = INTEGERS(w);
-  r->involved = INTEGERS(3 * w + 1);
+  r->involved = INTEGERS(3 * w + 2 * all + 1);
   r->p = DOUBLES(s->parameters);
   r->series = DOUBLES((size_t)s->series.size * stride);
   r->point = DOUBLES(s->point.size);
@@ -140,6 +145,14 @@ static size_t place_run(Run *r, char *base) {
   r->heights_of = DOUBLES(w);
   r->aside = DOUBLES(2 * n);
   r->moving = LETTERS(w);
+  r->turned = LETTERS(g);
+  r->rates_of_several = DOUBLES(SEVERAL * n);
+  size_t q = r->m < MOST_ENUMERATED ? r->m : MOST_ENUMERATED, sums = q * (q - (q > 0)) / 2;
+  r->layer_series = DOUBLES(s->slope_outputs ? (q * q + sums * sums) * stride : 0);
+  r->idle = LETTERS(s->sets);
+  r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
+  r->of_defect = DOUBLES(g);
+  r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
   r->key = LETTERS(w + 8 * s->rules.discrete);
   r->root = DOUBLES(g);
   r->met_at = DOUBLES(g);

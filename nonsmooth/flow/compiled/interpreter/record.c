@@ -53,7 +53,7 @@ static void count_hit(Run *r, int kind, int guard, int index, int side, const do
   else if (is_last) finish(r, STOPPED, SAMPLED, (int)o->hit_count);
 }
 
-static void remember(Run *r, int kind, int before, int guard);
+static void remember(Run *r, int kind, int guard);
 static void see_limit(Run *r);
 static void write_motion(const Run *r, double *to);
 
@@ -80,7 +80,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, r->met.index, r->met.side, x);
   if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, 0, 0, x); /* impacts that accumulated */
   if (kind == END || kind == STOP) return;
-  remember(r, kind, before, guard);
+  remember(r, kind, guard);
   if (r->instant.running) return; /* at the end of the instant */
   see_limit(r);
   if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);

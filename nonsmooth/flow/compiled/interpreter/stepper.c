@@ -298,6 +298,57 @@ static void note_sides(Run *r, Expansion *e, double dt) {
   }
 }
 
+/* Length of a short step from a point where high derivatives do not exist (a power law at zero), or 0. Each series
+ * keeps the coefficients before its first that is no number; the step is shortened until the defect of the equation
+ * at its end is below the tolerance. Guards are not located within it: none may fall in it, and what leaves zero at
+ * a rate must do so at that rate. */
+static double singular_step(Run *r, Expansion *e, double most) {
+  int n = r->n, order = r->order, stride = r->stride, rests = 0;
+  Expansion *there = &r->trial;
+  double *end = r->before, *unknowns = r->lam, *defect = r->at_work, *through = r->of_defect;
+  const double *noise = scales(r, e);
+  for (int i = 0; i < n + r->width; i++) {
+    double *c = i < n ? e->states + (int64_t)i * stride : e->series + (int64_t)(i - n) * stride;
+    int k = 0;
+    while (k <= order && fabs(c[k]) < INFINITY) k++;
+    if (k < 2 && i < n) return 0;
+    for (; k <= order; k++) c[k] = 0;
+  }
+  for (int i = 0; i < r->width; i++) rests |= e->l.letter[i] == 0;
+  if (r->s->sets || (rests && e->l.slides > 1)) return 0;
+  for (double h = smaller(most, SINGULAR_LONGEST); h > SINGULAR_SHORTEST; h *= SINGULAR_SHORTER) {
+    for (int i = 0; i < n; i++) end[i] = value_at(e->states + (int64_t)i * stride, order, h);
+    memcpy(unknowns, r->unknowns, sizeof(double) * r->width);
+    if (!improve(r, &e->l, end, unknowns, 2)) continue;
+    expand(r, e->l.letter, end, unknowns, there);
+    int fits = 1;
+    for (int i = 0; i < n; i++) {
+      double slope;
+      horner(e->states + (int64_t)i * stride, order, h, &slope);
+      defect[i] = fabs(there->states[(int64_t)i * stride + 1] - slope);
+      fits &= defect[i] * h <= e->allowed[i] / SAFETY;
+    }
+    if (!fits) continue;
+    guard_sums(r, there, defect, 1, through);
+    for (int row = 0; row < e->l.rows; row++) {
+      const double *g = e->guards + (int64_t)row * stride, after = there->guards[(int64_t)row * stride];
+      int leaves = fabs(g[0]) <= VANISHES * noise[row] && fabs(g[1]) < INFINITY && g[1] != 0;
+      fits &= !(ns_sign(after) * ns_sign(g[0]) < 0) && !(leaves && through[row] > SINGULAR_RATE * fabs(g[1]));
+    }
+    if (fits) return h;
+  }
+  return 0;
+}
+
+/* Sliding from which both sides lead away, as a run may start, ends where its exits rise through zero. */
+static void turn_exits(const Run *r, Expansion *e) {
+  for (int j = 0; j < e->l.rows; j++)
+    for (int k = 0; k <= r->order && e->l.kind[j] == EXIT_GUARD; k++) {
+      double *c = e->guards + (int64_t)j * r->stride + k;
+      *c = -*c;
+    }
+}
+
 /* Time to the zero of an atom, at which its side changes in the direction in which it is located; -1 if there is none
  * within h. */
 static double atom_root(Run *r, Expansion *e, int atom, double h) {
@@ -316,13 +367,14 @@ static double atom_root(Run *r, Expansion *e, int atom, double h) {
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->met_at;
   int first = -1, found = 0, rows = e->l.rows;
+  if (r->repelling) turn_exits(r, e);
   for (int j = 0; j < rows; j++) {
     time[j] = r->root[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);
     if (time[j] < 0) continue;
     found++;
     if (first < 0 || time[j] < time[first]) first = j;
   }
-  if (first < 0) return -1;
+  if (first < 0) { if (r->repelling) turn_exits(r, e); return -1; }
   double latest = time[first] + RESOLVED * h;
   for (int j = 0; j < rows; j++)
     if (time[j] > 0 && time[j] <= latest && is_curved(r, &e->l, j)) time[j] = polished(r, e, j, time[j]);
@@ -341,6 +393,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
     int rank = PRIORITY[e->l.kind[j]], best_rank = best < 0 ? rank + 1 : PRIORITY[e->l.kind[best]];
     if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
   }
+  if (r->repelling) turn_exits(r, e);
   r->instant.tied = atom < 0 ? -1 : best;
   if (atom >= 0) best = atom;
   if (best < 0) best = first;

@@ -8,7 +8,7 @@ from .definition.events import Clock, Impact, Reset, Stop
 from .definition.lift import LiftedSwitch
 from .definition.parse_definition import read_function
 from .definition.regularise import regularise
-from .definition.system import FilippovSystem, multiplier_enters, require_system
+from .definition.system import FilippovSystem, multiplier_enters, require_plain, require_system
 from .derivatives.forcing import clock_periods, is_function, periods, read_period
 from .derivatives.start_maps import StartMap
 from .errors import (
@@ -25,8 +25,9 @@ from .errors import (
 from .laws import complementarity
 from .laws.coupled import Coupled, ErrorScales, coupled_of, raised_of
 from .laws.evaluators import Evaluator, Resets, Surfaces, evaluator
+from .laws.followed import Followed, followed
 from .laws.layer import Layer, LayerNumbers, Loop, layer_of, loop_at
-from .laws.motion import Motion, followed, mode_field, motion, watched_functions
+from .laws.motion import Motion, mode_field, motion, watched_functions
 from .laws.multipliers import sliding_multipliers
 from .laws.switches import Guard
 from .reading import Parameters
@@ -43,6 +44,7 @@ __all__ = [
     "ErrorScales",
     "Evaluator",
     "FilippovSystem",
+    "Followed",
     "Guard",
     "Impact",
     "Layer",
@@ -83,6 +85,7 @@ __all__ = [
     "real",
     "real_array",
     "regularise",
+    "require_plain",
     "require_system",
     "reversed_system",
     "sliding_multipliers",

@@ -11,11 +11,7 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_nearly_parallel_surfaces_are_crossed_one_by_one[1e-08-2e-07]": "thrown onto the intersection",
-    "test_nearly_parallel_surfaces_are_crossed_one_by_one[1e-10-2e-05]": "thrown onto the intersection",
     "test_an_autonomous_run_does_not_depend_on_when_it_starts[1700000000.0]": "time is one double",
-    "test_a_clock_does_not_drift": "ticks are summed",
-    "test_osculating_surfaces": "thrown onto the intersection",
 }
 
 x, y, u, v, w, z, t = (ca.SX.sym(name) for name in "xyuvwzt")

@@ -106,7 +106,7 @@ static int choose_closed(Run *r, const int32_t *contact, int count) {
 
 /* Whether a time is below the rounding of the run's times. */
 static int is_instant(const Run *r, double time) {
-  return time <= SHORTEST * larger(fabs(r->t), fabs(r->t - r->begun));
+  return time <= SHORTEST * time_scale(r);
 }
 
 /* Close the contacts of impacts that accumulate, unless further impacts are to be served. */
@@ -130,7 +130,7 @@ static void close_contacts(Run *r, int block, double left, double error) {
   r->history = 0;
   int closed = 0;
   for (int i = r->m; i < r->width; i++) closed |= r->letter[i] == 0;
-  left = smaller(left, r->o.t_end - r->t);
+  left = smaller(left, r->o.t_end - r->t - r->t_low);
   if (closed && r->e.finite && advance(r, &r->e, left)) {
     r->limit = r->t;
     event(r, change_kind(r, before, r->mode), before, -1, r->x);

@@ -45,6 +45,7 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
   r->t = r->begun = t;
+  r->t_low = 0;
   r->since = 0;
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;

@@ -95,7 +95,8 @@ typedef struct {
   Table *table;
   double *p;
   int32_t n, m, c, width, order, stride, guards;
-  double t, begun, since, limit, at_t, *x, *at_x, *unknowns;
+  /* The time is t + t_low: that of an event is no number of its own where times are large. */
+  double t, t_low, begun, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start; /* present ones, and those that a choice is made from */
   Layout now; /* of the present mode */
   Met met;

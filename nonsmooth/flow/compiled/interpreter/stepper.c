@@ -23,6 +23,25 @@ static double bound_at(double part, int order) {
   return part > 1e-300 ? rough_exp2(rough_log2(smaller(part, 1e300)) * (-1.0 / order)) : INFINITY;
 }
 
+/* Move the time on, in two numbers; it is kept to the rounding of the steps, not of their sum. */
+static void pass_time(Run *r, double dt) {
+  double sum = r->t + dt, moved = sum - r->t, lost = (r->t - (sum - moved)) + (dt - moved) + r->t_low;
+  r->t = sum + lost;
+  r->t_low = lost - (r->t - sum);
+  if (r->s->timed) r->x[r->n - 1] = r->t;
+}
+
+/* A step's length changed so little that the time after it is one number. */
+static double to_number(const Run *r, double dt) {
+  double to = (r->t + dt) - r->t - r->t_low;
+  return fabs(to - dt) <= RESOLVED * dt ? to : dt;
+}
+
+/* Rounding of times is relative to this: where they enter no formula, to how long the run is. */
+static double time_scale(const Run *r) {
+  return r->s->timed ? larger(fabs(r->t), fabs(r->t - r->begun)) : fabs(r->t - r->begun);
+}
+
 /* Shorten a step until a guard's series converges within it. */
 static double resolve(const double *g, int order, double h) {
   while (h < INFINITY) {
@@ -312,7 +331,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
   int best = first;
   if (found > 1) {
-    double near = time[first] + TIE * larger(fabs(r->t), 1)
+    double near = time[first] + TIE * larger(time_scale(r), 1)
                   + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
     for (int j = 0; j < rows; j++) {
       if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;

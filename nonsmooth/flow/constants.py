@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LIMIT_FALL
+from ..model.numbering import FALL, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LIMIT_FALL"]  # and all below
+__all__ = ["FALL", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 
@@ -115,11 +115,52 @@ TENFOLD = 20.0
 #: they are larger than this.
 OVERFLOW = 1e280
 
+# Unknowns that enter nonlinearly. Roots of a rate along a multiplier: coefficients below this part of all terms
+# vanish, the pieces of the way are counted, and its ends are a little beyond the bounds. Solutions of several
+# multipliers: how far two are apart, halvings of each side before Newton's method, its steps, and a grid of
+# starts where functions are not linear in each multiplier.
+LAYER_ROUNDING = 1e-13
+LAYER_PIECES = 4000
+LAYER_BEYOND = 1e-9
+LAYER_APART = 1e-7
+LAYER_RESIDUAL = 1e-10
+LAYER_HALVINGS = 10
+LAYER_NEWTON = 30
+LAYER_GRID = 9
+LAYER_STARTS = 729
+
+#: Orbits round an intersection are closed to first (second) order where their ratio (bend) is this close to 1 (0).
+TURN_ROUNDING = 1e-12
+
+# A step from a point where high derivatives do not exist: its longest and shortest length, the part by which it is
+# shortened, and how exact the rates of guards that leave zero have to be. Derivatives of a field that is larger
+# than HUGE may be no numbers.
+SINGULAR_LONGEST = 1e-3
+SINGULAR_SHORTEST = 1e-15
+SINGULAR_SHORTER = 0.25
+SINGULAR_RATE = 0.1
+HUGE = 1e300
+
+#: A fold of sliding is looked for where the slope would vanish within this many steps.
+FOLD_AHEAD = 10.0
+
 #: What a run notes about its decisions, as bits.
 DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 
 #: Kinds of events, by number in ensembles and in C.
-KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")
+KINDS = (
+    "crossing",
+    "entry",
+    "exit",
+    "stop",
+    "reset",
+    "impact",
+    "contact",
+    "release",
+    "rest",
+    "rest_below",
+    "end",
+)
 
 #: The first and the last of these, as many, can happen without resets and impacts.
 SIMPLE_KINDS = 5
@@ -127,7 +168,7 @@ SIMPLE_KINDS = 5
 #: Kinds of guards, by number in C, and their priority among simultaneous ones (0 first).
 GUARDS = (
     *("surface", "exit", "stop", "reset", "impact", "release", "branch"),
-    *("near", "slip"),
+    *("near", "slip", "atom"),
 )
 PRIORITY = {
     "stop": 0,
@@ -139,6 +180,7 @@ PRIORITY = {
     "branch": 6,
     "near": 3,
     "slip": 4,
+    "atom": 1,
 }
 
 #: Why a run ended, besides its status, by number in C.
@@ -165,6 +207,13 @@ REASONS = (
     "no_reaction",
     "no_stable_motion",
     "possibly_several",
+    "start_solutions",
+    "impossible_start",
+    "several_directions",
+    "indefinite",
+    "undetermined",
+    "high_degree",
+    "discrete_value",
 )
 
 #: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.

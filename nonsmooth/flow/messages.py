@@ -79,6 +79,15 @@ def possibly_several(surfaces: Sequence[int]) -> str:
     )
 
 
+def high_degree(surface: int) -> str:
+    """Rest on a surface of relative degree three or more."""
+    return (
+        f"Rest on h{surface} = 0 is one of many motions: the multiplier enters the third derivative of "
+        f"h{surface} or a later one, and motions leave such a point by infinitely many switchings. "
+        "start_mode='s' chooses rest."
+    )
+
+
 def wrong_start(asked: str, actual: str) -> str:
     """The start mode is not admissible."""
     return f"start_mode {asked!r} is not admissible at the start, where the mode is {actual!r}."
@@ -112,6 +121,19 @@ def surface_not_finite() -> str:
 def reset_not_finite(name: str, t: float) -> str:
     """The map of a reset is not finite."""
     return f"The map of reset {name!r} at t = {t:.10g}."
+
+
+def discrete_value(name: str, t: float) -> str:
+    """A map gives a discrete state another value."""
+    return (
+        f"The map of reset {name!r} at t = {t:.10g} gives a discrete state a value that is not among those "
+        "of discrete=."
+    )
+
+
+def endless_jumps(names: Sequence[str], t: float) -> str:
+    """Jumps at one instant that do not end."""
+    return f"At t = {t:.10g} jumps of {' and '.join(map(repr, names))} repeat without end."
 
 
 def reached_end(t_end: float) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..model import FilippovSystem, Guard
 
 
@@ -10,7 +12,7 @@ def guard_name(system: FilippovSystem, guard: Guard) -> str:
     k, kind = guard.element, guard.kind
     if kind in ("stop", "reset"):
         return (system.stops if kind == "stop" else system.resets)[k][0]
-    if kind == "zero":
+    if kind in ("zero", "atom"):
         return f"f{k}"
     if k >= len(system.entries):
         return system.impacts[k - len(system.entries)]
@@ -30,6 +32,13 @@ def described(system: FilippovSystem, guard: Guard) -> str:
         return f"lambda{k} {'<= 1' if guard.side > 0 else '>= -1'}"
     of = {"impact": "gap", "release": "reaction"}.get(guard.kind)
     return f"the {of} of {name!r} >= 0" if of else name
+
+
+def shown_mode(system: FilippovSystem, mode: str, values: Sequence[float]) -> str:
+    """A mode with the values of the discrete states, as itineraries show it."""
+    names = system.state_names[system.dimension - len(values) :]
+    labels = [f"{name}={value:g}" for name, value in zip(names, values, strict=True)]
+    return ",".join([mode, *labels] if mode else labels)
 
 
 def event_name(system: FilippovSystem, mode: str, kind: str, element: int, side: int = 0) -> str:

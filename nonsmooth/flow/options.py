@@ -35,6 +35,7 @@ class Options:
     max_step: float = math.inf
     max_steps: int = 1_000_000
     max_events: int = 100_000
+    max_jumps: int = 1_000
     start_mode: str | None = None
     hits: Hits | None = None
 
@@ -67,7 +68,7 @@ class Options:
             low = math.nextafter(0.0, 1.0)
             step = real(self.max_step, "max_step", expected="a positive number", low=low)
             self._set("max_step", step)
-        for name in ("max_steps", "max_events"):
+        for name in ("max_steps", "max_events", "max_jumps"):
             self._set(name, whole(getattr(self, name), name))
 
     @property

@@ -9,22 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, Parameters, require_system
+from ..model import Array, FilippovSystem, OptionError, Parameters, require_system
 from .compiled.convert import trajectory
 from .compiled.tape import tape_for
 from .constants import HAND_OVER
-from .ensembles.starts import require_start_mode
+from .ensembles.starts import require_start, require_start_mode
 from .options import Options, tolerances
 from .reference.driver import Driver
 from .section import Section, Times, read_sampling, sampled, sectioned
-from .trajectory import Trajectory
+from .trajectory import Event, Trajectory
 
 
 def simulate(
     system: FilippovSystem,
-    x0: ArrayLike,
-    t_end: float,
+    x0: ArrayLike | None = None,
+    t_end: float | None = None,
     *,
+    start: Trajectory | Event | None = None,
     t_start: float = 0.0,
     parameters: Parameters | None = None,
     tol: float = 1e-10,
@@ -34,6 +35,7 @@ def simulate(
     max_step: float = math.inf,
     max_steps: int = 1_000_000,
     max_events: int = 100_000,
+    max_jumps: int = 1_000,
     t_eval: ArrayLike | None = None,
     at: Any = None,
 ) -> Trajectory:
@@ -47,6 +49,9 @@ def simulate(
         Start; on a surface the mode follows from Filippov's convention.
     t_end : float
         Time at which the run ends, not before ``t_start``.
+    start : Trajectory or Event, optional
+        Continue this run, or what follows an event, in place of ``x0`` and ``t_start``: as the unbroken run,
+        also amid an instant that ``max_events`` cut. The parameters are those of the run.
     t_start : float, optional
         Time of the start.
     parameters : mapping, optional
@@ -61,8 +66,8 @@ def simulate(
         Longest step. A step is accepted only where field and guards agree with its polynomials at its
         end and inside; a pulse that is thinner than the spacing of these points, a hundredth of the
         time that a step may bridge, can still be missed. A ``max_step`` of its width excludes that.
-    max_steps, max_events : optional
-        Limits.
+    max_steps, max_events, max_jumps : optional
+        Limits of the run; of the jumps at one instant, beyond which it ends with ``ENDLESS_JUMPS``.
     t_eval : array_like (K,), optional
         Keep the states at these times, sorted, in ``sample_t`` and ``sample_x`` of the result.
     at : Section, str, number or expression, optional
@@ -106,6 +111,12 @@ def simulate(
     ('- + - + s', True)
     """
     require_system(system, sets=True)
+    if start is not None:
+        x0, t_start, parameters = _continued(start, x0, t_start, parameters)
+    elif x0 is None:
+        raise OptionError("x0 is missing. Give a start, or start= with a run or event to continue.")
+    if t_end is None:
+        raise OptionError("t_end is missing. Give the time at which the run ends.")
     rtol, atol = tolerances(tol, rtol, atol)
     options = Options(
         t_end=t_end,
@@ -115,11 +126,17 @@ def simulate(
         max_step=max_step,
         max_steps=max_steps,
         max_events=max_events,
+        max_jumps=max_jumps,
         start_mode=start_mode,
     )
     system, at = sectioned(system, at)
     x = system.extended_point(x0, options.t_start)
     p = system.parameter_vector(parameters)
+    motion = None
+    if start is None:
+        require_start(system, x, p)
+    else:
+        motion = (start.events[-1] if isinstance(start, Trajectory) else start).motion
     require_start_mode(system, x, p, options)
     sampling = read_sampling(system, t_eval, at, options.t_start, options.t_end, p)
     times = sampling.times
@@ -127,7 +144,22 @@ def simulate(
         options = replace(options, hits=sampling.hits)
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
-    return _with_samples(_run(system, x, p, options, times), options, times, p)
+    return _with_samples(_run(system, x, p, options, times, motion), options, times, p)
+
+
+def _continued(
+    start: Trajectory | Event, x0: Any, t_start: float, parameters: Any
+) -> tuple[Array, float, Any]:
+    """State, time and parameters at which a run or event is continued."""
+    if not isinstance(start, (Trajectory, Event)):
+        raise OptionError(
+            f"start is {start!r}. Give a run of nonsmooth.simulate or one of its events."
+        )
+    if x0 is not None or t_start != 0.0:
+        raise OptionError("start= has a state and a time. Leave out x0 and t_start.")
+    if isinstance(start, Event):
+        return start.x_after, start.t, parameters
+    return start.x[-1], float(start.t[-1]), start.parameters if parameters is None else parameters
 
 
 def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Array) -> Trajectory:
@@ -144,10 +176,15 @@ def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Arr
 
 
 def _run(
-    system: FilippovSystem, x: Array, p: Array, options: Options, times: Times | None
+    system: FilippovSystem,
+    x: Array,
+    p: Array,
+    options: Options,
+    times: Times | None,
+    motion: Array | None,
 ) -> Trajectory:
     tape, asked = tape_for(system, options), None if times is None else times.of(p)
-    run = None if tape is None else tape.run(x, p, options, asked)
+    run = None if tape is None else tape.run(x, p, options, asked, motion)
     if run is None or run.status == HAND_OVER:
         return Driver(system, x, p, options).run()
     return trajectory(system, p, options, run)

@@ -11,7 +11,8 @@ class Status(IntEnum):
     It reached its end (REACHED_END) or a stop (STOPPED); the motion is not unique (NON_UNIQUE); events
     accumulate (ACCUMULATION); several surfaces meet where no motion is stable (INTERSECTION); steps
     became too short (STEP_TOO_SMALL); a value is not finite (NOT_FINITE); a limit on events or steps was
-    reached (TOO_MANY_EVENTS, TOO_MANY_STEPS); a constraint cannot hold (INCONSISTENT). The message of a
+    reached (TOO_MANY_EVENTS, TOO_MANY_STEPS); a constraint cannot hold (INCONSISTENT); jumps at one instant
+    do not end (ENDLESS_JUMPS). The message of a
     run says more. The values are stable: ensembles store them in arrays and files.
     """
 
@@ -25,6 +26,7 @@ class Status(IntEnum):
     TOO_MANY_EVENTS = 7
     TOO_MANY_STEPS = 8
     INCONSISTENT = 9
+    ENDLESS_JUMPS = 10
 
     def __str__(self) -> str:
         return self.name
@@ -53,5 +55,7 @@ ADVICE: dict[Status, str] = {
     "logarithms, roots and divisions at the last state.",
     Status.TOO_MANY_EVENTS: "Raise max_events if this many are expected; otherwise the motion "
     "chatters.",
+    Status.ENDLESS_JUMPS: "Each jump makes another one due at the same instant: give these events a when= "
+    "that a jump makes false, or raise max_jumps if this many are expected.",
     Status.TOO_MANY_STEPS: "Raise max_steps if the run is long; otherwise loosen tol.",
 }

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 from ..model import Array, FilippovSystem, PointError, real_array
 from ..notebook import card, lines
 from . import tables
+from .names import shown_mode
 from .saving import Savable, savable
 from .status import Status
 
 
-@savable(x="n", x_after="n")
+@savable(x="n", x_after="n", motion="* nan")
 @dataclass(frozen=True)
 class Event:
     """Something that happened at one instant.
@@ -44,6 +45,8 @@ class Event:
     side : int
         Of a crossing or entry the side, +1 or -1, from which the motion comes; of the end of sliding
         the one to which it goes; of a stop or reset its direction; of an impact 1; otherwise 0.
+    motion : ndarray or None
+        Sides of all conditions and what else is due then, for ``simulate(system, start=event)``.
     """
 
     kind: str
@@ -55,6 +58,7 @@ class Event:
     x_after: Array = None  # type: ignore[assignment]  # x unless given
     element: int = -1
     side: int = 0
+    motion: Array | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.x_after is None:
@@ -74,6 +78,8 @@ class Segment:
         Times at which it begins and ends.
     first, last : int
         Its steps are those with the numbers ``first`` to ``last - 1`` of ``Trajectory.steps``.
+    discrete : tuple of float
+        Values of the discrete states.
     """
 
     mode: str
@@ -81,6 +87,7 @@ class Segment:
     t_end: float
     first: int
     last: int
+    discrete: tuple[float, ...] = ()
 
 
 @savable(starts="s", coefficients="s; N *")
@@ -107,10 +114,10 @@ class Steps:
         """Return the steps first to last - 1."""
         return Steps(self.starts[first:last], self.coefficients[first:last])
 
-    def at(self, t: Array, n: int, forward: bool = True) -> Array:
+    def at(self, t: Array, n: int, forward: bool = True, side: Any = "right") -> Array:
         """Evaluate the first n states at times (m,); (m, n)."""
         starts = self.starts if forward else -self.starts
-        step = np.searchsorted(starts, t if forward else -t, side="right") - 1
+        step = np.searchsorted(starts, t if forward else -t, side=side) - 1
         step = np.clip(step, 0, len(starts) - 1)
         result = np.empty((t.size, n))
         for k in np.unique(step):
@@ -181,10 +188,31 @@ class Trajectory(
     @property
     def itinerary(self) -> str:
         """Modes in order, separated by blanks, e.g. ``"- s -"``."""
-        return " ".join(s.mode or "o" for s in self.segments)
+        shown = [shown_mode(self.system, s.mode, s.discrete) for s in self.segments]
+        return " ".join(mode or "o" for mode in shown)
 
-    def __call__(self, t: ArrayLike) -> Array:
-        """Evaluate the dense output."""
+    def __call__(self, t: ArrayLike, side: str = "right") -> Array:
+        """Evaluate the dense output.
+
+        Parameters
+        ----------
+        t : array_like
+            Times of the run.
+        side : {"right", "left"}, optional
+            At a jump the value after all jumps of that instant, or the value before them.
+
+        Returns
+        -------
+        ndarray (..., n)
+            States. The right value at the end is ``x[-1]``.
+
+        Raises
+        ------
+        PointError
+            Times outside the run, or another ``side``.
+        """
+        if side not in ("right", "left"):
+            raise PointError(f'side is {side!r}. Give "right" or "left".')
         times = real_array(t, "time")
         low, high = sorted((float(self.t[0]), float(self.t[-1])))
         slack = 1e-12 * max(1.0, abs(low), abs(high))
@@ -197,7 +225,12 @@ class Trajectory(
         if not len(self.steps):
             return np.broadcast_to(self.x[-1], (*times.shape, n)).copy()
         forward = bool(self.t[-1] >= self.t[0])
-        return self.steps.at(times.ravel(), n, forward).reshape(*times.shape, n)
+        found = self.steps.at(times.ravel(), n, forward, side).reshape(*times.shape, n)
+        if side == "right":
+            found[times == self.t[-1]] = self.x[-1]
+        else:
+            found[times == self.t[0]] = self.x[0]
+        return found
 
     def to_pandas(self, what: str = "points") -> Any:
         """Return a DataFrame: steps and events in time, a row each event, or the samples.

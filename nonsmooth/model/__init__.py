@@ -9,7 +9,7 @@ from .definition.lift import LiftedSwitch
 from .definition.parse_definition import read_function
 from .definition.regularise import regularise
 from .definition.system import FilippovSystem, multiplier_enters, require_system
-from .derivatives.forcing import is_function, periods, read_period
+from .derivatives.forcing import clock_periods, is_function, periods, read_period
 from .derivatives.start_maps import StartMap
 from .errors import (
     ConvergenceError,
@@ -23,7 +23,7 @@ from .errors import (
     explain,
 )
 from .laws import complementarity
-from .laws.coupled import Coupled, ErrorScales, coupled_of
+from .laws.coupled import Coupled, ErrorScales, coupled_of, raised_of
 from .laws.evaluators import Evaluator, Resets, Surfaces, evaluator
 from .laws.layer import Layer, LayerNumbers, Loop, layer_of, loop_at
 from .laws.motion import Motion, followed, mode_field, motion, watched_functions
@@ -62,6 +62,7 @@ __all__ = [
     "Stop",
     "Surfaces",
     "call",
+    "clock_periods",
     "complementarity",
     "coupled_of",
     "evaluator",
@@ -76,6 +77,7 @@ __all__ = [
     "motion",
     "multiplier_enters",
     "periods",
+    "raised_of",
     "read_function",
     "read_period",
     "real",

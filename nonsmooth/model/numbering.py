@@ -18,6 +18,9 @@ TAPE_RULES = tuple(
     "shift lower below scale over under turn gated".split()
 )
 
+#: Most numbers in a condition of an event, and how a function in it is located that is not watched.
+MOST_CODES, UNWATCHED = 256, 2
+
 #: A step ends where |h| has fallen to this part: towards h = 0 a series may go on as -|h|.
 FALL = 0.1
 

@@ -26,8 +26,8 @@ def two_relay_spiral() -> Problem:
     Examples
     --------
     >>> run = two_relay_spiral().run()
-    >>> run.status.name, round(run.accumulation_time, 9)
-    ('ACCUMULATION', 0.75)
+    >>> run.status.name, run.events[-2].kind, round(run.events[-2].t, 9)
+    ('REACHED_END', 'rest', 0.75)
     """
     x1, x2, s1, s2 = (ca.SX.sym(s) for s in ("x1", "x2", "s1", "s2"))
     system = FilippovSystem(
@@ -46,7 +46,7 @@ def two_relay_spiral() -> Problem:
             "0.68518518518518518519",
             "0.72839506172839506173",
         ),
-        stated("accumulation time", "Trajectory.accumulation_time", "0.75"),
+        stated("time of rest", "time of the event 'rest'", "0.75"),
         title="Filippov's spiral of two relays",
         source="Filippov 1988; closed form",
     )

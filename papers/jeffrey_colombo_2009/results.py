@@ -260,7 +260,7 @@ def attraction() -> Claim:
 def accumulation() -> Claim:
     """On the line itself infinitely many crossings happen in finite time."""
     _, high = ns.two_folds.diabolo_slopes(AFTER)
-    r = run(AFTER, (-1.0, high), 10.0, tol=1e-13)
+    r = run(AFTER, (-1.0, high), 10.0, tol=1e-5)  # rounding keeps a run 1e-8 from the two-fold
     formula = ns.two_folds.accumulation_time(AFTER)
     estimate = float("nan") if r.accumulation_time is None else r.accumulation_time
     times = np.diff([0.0, *(e.t for e in r.events if e.kind == "crossing")])[:8]

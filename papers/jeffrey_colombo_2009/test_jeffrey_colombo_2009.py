@@ -32,7 +32,9 @@ def test_ring_of_120_sliding_orbits(v, count):
 
 
 def test_accumulation_on_the_inner_line():
-    r = model.run(model.AFTER, (-1.0, 2 + math.sqrt(2)), 10.0, tol=1e-13)
+    # The line repels along another direction: rounding has grown to the distance that is left at 1e-8 from the
+    # two-fold, so a run does not come closer.
+    r = model.run(model.AFTER, (-1.0, 2 + math.sqrt(2)), 10.0, tol=1e-5)
     assert r.status is ns.Status.ACCUMULATION
     assert r.accumulation_time == pytest.approx(3.828427124746, rel=0, abs=1e-8)
 

@@ -116,7 +116,7 @@ def test_operations_that_are_not_smooth_are_refused_by_name(op):
         lambda e: ns.FilippovSystem([x, y], field=[1, e]),
         lambda e: ns.FilippovSystem([x, y], surface=x, above=[1, e], below=[1, 1]),
         lambda e: ns.FilippovSystem([x, y], surface=x - e / 9, above=[1, 1], below=[1, 1]),
-        lambda e: ns.FilippovSystem([x, y], field=[1, 1], stops=ns.Stop(x - e)),
+        lambda e: ns.FilippovSystem([x, y], field=[1, 1], stops=ns.Stop(ca.sin(x - e))),
     ):
         with pytest.raises(ns.NotSmoothError) as caught:
             call(given)

@@ -50,7 +50,6 @@ OPEN = {
             204,
             205,
         ],
-        "a contact beside a product": [16, 107, 115, 196, 212],
         "jumps fire nothing": [20, 40, 50, 58, 66, 97, 98, 158, 164, 170],
     }.items()
     for seed in seeds

@@ -12,11 +12,7 @@ from scipy.optimize import brentq
 import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
-OPEN = {
-    "test_a_chain_of_two_resets": "jumps fire nothing",
-    "test_a_map_with_a_condition_and_a_guard_that_is_a_minimum": "maps refuse conditions",
-    "test_values_of_the_trigger": "no values= and priority=",
-}
+OPEN = {}
 
 k, x, y, u, v, w, t, h = (ca.SX.sym(name) for name in "kxyuvwth")
 REACHED = ns.Status.REACHED_END

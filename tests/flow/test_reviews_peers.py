@@ -11,14 +11,9 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_fireflies_fire_one_another": "jumps fire nothing",
     "test_a_tank_empties[0]": "no roots",
     "test_a_tank_empties[1]": "no roots",
-    "test_twisting_comes_to_rest_and_stays": "no rest",
-    "test_second_order_sliding_rests_from_its_limit[twisting]": "no rest",
     "test_second_order_sliding_rests_from_its_limit[super_twisting]": "no rest",
-    "test_a_hump_of_friction_releases_at_the_same_force_each_time[0.6495]": "fold of a hidden law",
-    "test_a_hump_of_friction_releases_at_the_same_force_each_time[1.5]": "fold of a hidden law",
 }
 
 x, y, u, v, w, p, q, t = (ca.SX.sym(name) for name in "xyuvwpqt")

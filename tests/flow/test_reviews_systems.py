@@ -8,14 +8,7 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_a_jump_over_another_reset_fires_it": "jumps fire nothing",
-    "test_a_jump_over_a_stop_stops": "jumps fire nothing",
-    "test_neurons_that_excite_one_another[5-0.05]": "jumps fire nothing",
-    "test_neurons_that_excite_one_another[20-0.02]": "jumps fire nothing",
-    "test_a_damped_relay_stays_at_rest": "no rest",
-    "test_twisting_rests_from_its_limit_on": "no rest",
     "test_super_twisting_rests_from_its_limit_on": "no rest",
-    "test_a_rocking_block_comes_to_rest": "no rest",
     "test_flow_through_an_orifice": "no roots",
     "test_flow_between_two_pressures": "no roots",
     "test_finite_time_control_with_powers[0.5-3.0812374]": "no roots",

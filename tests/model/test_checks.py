@@ -46,7 +46,7 @@ def test_what_is_no_real_number_is_no_time_and_no_tolerance(name, value):
         ns.simulate(SYSTEM, [3.0, 0.0], **options)
 
 
-@pytest.mark.parametrize("name", ["max_steps", "max_events"])
+@pytest.mark.parametrize("name", ["max_steps", "max_events", "max_jumps"])
 @pytest.mark.parametrize("value", [0, -1, 1.5, True, np.inf, "3", None], ids=repr)
 def test_limits_are_positive_whole_numbers(name, value):
     with pytest.raises(ns.OptionError, match=name):
@@ -143,12 +143,13 @@ def test_one_stop_needs_no_list():
     assert relay(stops=ns.Stop(X)).stops == (("stop", 0),)
 
 
-def test_a_surface_of_time_alone_is_refused_with_the_way_out():
+def test_a_surface_may_be_of_the_time_alone():
     def square(surface, states, field, **options):
         return ns.FilippovSystem(states, field=field, multipliers=LAM, surface=surface, **options)
 
-    with pytest.raises(ns.DefinitionError, match=r"surface 0.*time"):
-        square(ca.sin(T), [X], [LAM], time=T)
+    wave = square(ca.sin(T), [X], [LAM], time=T)
+    end = ns.simulate(wave, [0.0], 6.0).x[-1, 0]
+    assert end == pytest.approx(2.0 * np.pi - 6.0, abs=1e-9)
     wave = square(ca.sin(Y), [X, Y], [LAM, 1])
     end = ns.simulate(wave, [0.0, 0.5], 6.0).x[-1, 0]
     assert end == pytest.approx(6.0 - 2.0 * np.pi, abs=1e-9)

@@ -256,7 +256,12 @@ def hopf_node(problem, reference):
 # 5, 14, 15: several surfaces --------------------------------------------------------------------
 
 
-@check("two_relay_spiral", "accumulation time")
+@check("two_relay_spiral", "time of rest")
+def end_of_spiral(problem, reference):
+    (event,) = [e for e in run_of(problem.name).events if e.kind == "rest"]
+    return event.t
+
+
 @check("bouncing_ball", "Zeno time")
 def limit(problem, reference):
     run = run_of(problem.name)

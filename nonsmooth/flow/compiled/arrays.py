@@ -29,7 +29,7 @@ class OptionsStructure(ctypes.Structure):
 
     _fields_ = [
         *[(name, _D) for name in ("t_end", "rtol", "atol", "max_step")],
-        *[(name, _I64) for name in ("max_steps", "max_events")],
+        *[(name, _I64) for name in ("max_steps", "max_events", "max_jumps")],
         *[(name, _I32) for name in ("start_mode", "at_kind")],
         ("at_count", _I64),
         *[(name, _I32) for name in ("dense", "hit_after")],
@@ -86,6 +86,10 @@ class Run:
     event_before, event_after, event_guards : ndarray (e,)
         Events: kind (position in ``facts.KINDS``), modes before and after, row of the guard in
         ``guards(mode_before)`` or -1. The final "end" is not among them.
+    event_motions, motion : ndarray (e, w), (w,)
+        What a restart needs besides the state, after each event and at the end.
+    labels : sequence of tuple
+        Values of the discrete states by number of mode; empty without any.
     """
 
     status: int
@@ -110,6 +114,9 @@ class Run:
     event_before: NDArray[np.int32]
     event_after: NDArray[np.int32]
     event_guards: NDArray[np.int32]
+    event_motions: Array
+    motion: Array
+    labels: Sequence[tuple[float, ...]]
 
     @classmethod
     def of(
@@ -123,6 +130,8 @@ class Run:
         guards: Callable[[str], Sequence[Guard]],
         active: list[int],
         several: list[str],
+        motion: Array,
+        labels: Sequence[tuple[float, ...]],
     ) -> Run:
         """Put together what a run wrote, and what the driver says of its end."""
         return cls(
@@ -148,6 +157,9 @@ class Run:
             event_before=whole["event_before"],
             event_after=whole["event_after"],
             event_guards=whole["event_guard"],
+            event_motions=whole["event_motion"],
+            motion=motion,
+            labels=labels,
         )
 
 
@@ -188,6 +200,7 @@ def options_of(
         o.max_step,
         int(min(o.max_steps, limit)),
         int(min(o.max_events, limit)),
+        int(min(o.max_jumps, limit)),
         start_mode,
         kind,
         min(count, limit),

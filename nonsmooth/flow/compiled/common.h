@@ -13,7 +13,7 @@
 
 typedef struct {
   double t_end, rtol, atol, max_step;
-  int64_t max_steps, max_events;
+  int64_t max_steps, max_events, max_jumps;
   int32_t start_mode, at_kind;
   int64_t at_count;
   int32_t dense, hit_after;

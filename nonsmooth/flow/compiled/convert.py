@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from ...model import Array, FilippovSystem
 from .. import messages
@@ -19,9 +20,15 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
     status, modes = Status(run.status), run.letters
     limit = None if math.isnan(run.limit) else run.limit
     events = _events(system, run)
+    motion = run.motion if len(run.motion) else None
     if status is not Status.STOPPED:
         letters = system.spelled(modes[run.mode])
-        events.append(Event("end", float(run.t[-1]), run.x[-1], letters, letters, str(status)))
+        last = run.x[-1]
+        events.append(
+            Event("end", float(run.t[-1]), last, letters, letters, str(status), motion=motion)
+        )
+    elif motion is not None:
+        events[-1] = replace(events[-1], motion=motion)
     return Trajectory(
         system=system,
         parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),
@@ -45,10 +52,13 @@ def _events(system: FilippovSystem, run: Run) -> list[Event]:
         key = (modes[one], modes[two], row)
         if key not in known:
             known[key] = _named(system, run, *key)
-        before, after, name, *of = known[key]
+        before, after, name, element, side = known[key]
         t, kind = float(run.event_t[k]), KINDS[run.event_kinds[k]]
         states = run.event_x[k].copy(), run.event_after_x[k].copy()
-        found.append(Event(kind, t, states[0], before, after, name, states[1], *of))
+        motion = run.event_motions[k].copy() if len(run.motion) else None
+        found.append(
+            Event(kind, t, states[0], before, after, name, states[1], element, side, motion)
+        )
     return found
 
 
@@ -58,10 +68,13 @@ def _named(
     """Modes, name, element and side of an event."""
     if row >= 0:
         own = [run.guards(before)[row]]
-    else:  # the contacts that close together where impacts accumulate
-        opened = [g for g in run.guards(before) if g.kind == "release"]
-        own = [g for g in run.guards(after) if g.kind == "release" and g not in opened]
-    name = " and ".join([guard_name(system, guard) for guard in own])
+        name = guard_name(system, own[0])
+    else:  # what comes to rest together where events accumulate
+        held = run.guards(before)
+        own = [g for g in run.guards(after) if g not in held]
+        own = [g for g in own if g.kind == "release" or (g.kind == "exit" and g.side > 0)]
+        own = [replace(g, kind="surface", side=0) if g.kind == "exit" else g for g in own]
+        name = " and ".join([guard_name(system, guard) for guard in own])
     of = (own[0].element, own[0].side) if own else (-1, 0)
     return system.spelled(before), system.spelled(after), name, *of
 
@@ -69,13 +82,16 @@ def _named(
 def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
     """Stretches of steps in one mode; a run without a step has its one mode."""
     t_last, shown = float(run.t[-1]), [system.spelled(letters) for letters in run.letters]
+    discrete = len(system.definition.discrete)
+    labels = run.labels or [()] * len(shown)
     if not len(run.modes):
-        return [Segment(shown[run.mode], t_last, t_last, 0, 0)]
+        own = tuple(run.x[-1][system.dimension - discrete :].tolist())
+        return [Segment(shown[run.mode], t_last, t_last, 0, 0, own)]
     changes = (run.modes[1:] != run.modes[:-1]).nonzero()[0] + 1
     bounds = [0, *changes.tolist(), len(run.modes)]
     ends = [*(float(run.starts[k]) for k in changes), t_last]
     return [
-        Segment(shown[run.modes[a]], float(run.starts[a]), end, a, b)
+        Segment(shown[run.modes[a]], float(run.starts[a]), end, a, b, labels[run.modes[a]])
         for a, b, end in zip(bounds[:-1], bounds[1:], ends, strict=True)
     ]
 
@@ -88,6 +104,9 @@ def _message(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.sampled(run.where, t)
     if status is Status.STOPPED:
         return messages.stopped(system.stops[run.where][0], t)
+    if status is Status.ENDLESS_JUMPS:
+        at_once = [e for e in _events(system, run) if e.t == t][-options.max_jumps // 2 :]
+        return messages.endless_jumps(sorted({e.name for e in at_once}), t)
     if status is Status.ACCUMULATION and REASONS[run.reason] == "pressed":
         return messages.pressed(system.resets[run.where][0], t)
     if status is Status.ACCUMULATION:
@@ -115,6 +134,17 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.ambiguous([system.spelled(mode) for mode in run.several])
     if reason == "wrong_start":
         return messages.wrong_start(str(options.start_mode), modes[run.where])
+    if reason == "start_solutions":
+        return messages.start_solutions(str(options.start_mode), run.where)
+    if reason == "impossible_start":
+        return messages.impossible_start(str(options.start_mode))
+    if reason == "several_directions":
+        return messages.several_directions(run.where)
+    if reason == "indefinite":
+        return messages.indefinite(system.surface_names[run.where])
+    if reason == "undetermined":
+        firsts = [i for i in run.active if i in system.set_of and i == system.set_of[i][0]]
+        return messages.undetermined([system.surface_names[i] for i in firsts])
     if reason == "field":
         return messages.field_not_finite(modes[run.mode], run.x[-1].tolist())
     if reason == "state":
@@ -134,8 +164,12 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.no_reaction(contacts)
     if reason == "no_stable_motion":
         return messages.no_stable_motion(entries)
+    if reason == "high_degree":
+        return messages.high_degree(system.entry_of(run.where))
     if reason == "possibly_several":
         return messages.possibly_several(entries)
+    if reason == "discrete_value":
+        return messages.discrete_value(system.resets[run.where][0], t)
     if reason == "reset_map":
         return messages.reset_not_finite(system.resets[run.where][0], t)
     return messages.surface_not_finite() if reason == "surface" else messages.degenerate()

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, Coupled, FilippovSystem, coupled_of
+from ...model import Array, Coupled, FilippovSystem, raised_of
 from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
 from ..constants import FULL, RUNNING
+from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
 from .arrays import (
@@ -43,6 +44,7 @@ _ARRAYS = {
     "event_t": (float, "event"),
     "event_x": (float, "event"),
     "event_after_x": (float, "event"),
+    "event_motion": (float, "event"),
     "step_mode": (np.int32, "step"),
     "event_kind": (np.int32, "event"),
     "event_before": (np.int32, "event"),
@@ -65,11 +67,14 @@ Rooms = Mapping[str, int]
 
 
 @lru_cache(maxsize=64)
-def _layout(n: int, order: int) -> tuple[dict[str, tuple[int, tuple[int, ...]]], dict[str, int]]:
+def _layout(
+    n: int, order: int, motion: int
+) -> tuple[dict[str, tuple[int, tuple[int, ...]]], dict[str, int]]:
     """For each array the bytes before it in its block, by room, and its shape; bytes of each kind."""
     shapes: dict[str, tuple[int, ...]] = {
         "coefficients": (n, order + 1),
         **dict.fromkeys(("point_x", "event_x", "event_after_x"), (n,)),
+        "event_motion": (motion,),
     }
     used, places = dict.fromkeys(_FIRST, 0), {}
     for name, (dtype, kind) in _ARRAYS.items():  # those of floats first
@@ -91,8 +96,8 @@ class Output:
             *[(name, ctypes.c_void_p) for name in _ARRAYS],
         ]
 
-    def __init__(self, n: int, order: int, rooms: Rooms = _FIRST):
-        self._places, self._sizes = _layout(n, order)
+    def __init__(self, n: int, order: int, rooms: Rooms = _FIRST, motion: int = 0):
+        self._places, self._sizes = _layout(n, order, motion)
         self._rooms = {
             kind: max(least, min(rooms[kind], _SMALL // self._sizes[kind]))
             for kind, least in _FIRST.items()
@@ -179,9 +184,18 @@ class _Entries(ctypes.Structure):
     _fields_ = [("count", _I32), ("pad", _I32), ("row", _POINTER), ("column", _POINTER)]
 
 
-_VALUES = ("point", "surfaces", "maps", "restitution", "columns")
+_VALUES = ("point", "surfaces", "maps", "atoms", "choices", "restitution", "columns")
 _ENTRIES = tuple(field.name for field in fields(Tape) if field.type == "Entries")
-_TABLES = ("stop_direction", "reset_direction", "continuous", "scaled", "carries", "component")
+_TABLES = ("continuous", "scaled", "carries", "component")
+
+
+class _Rules(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I32) for name in ("atoms", "triggers", "clocks", "discrete", "keeps", "width")],
+        *[(name, _POINTER) for name in ("way", "trigger_event", "trigger_at", "condition")],
+        *[(name, _POINTER) for name in ("filter_at", "filter", "flags", "initially", "named")],
+        *[(name, _POINTER) for name in ("clock_reset", "clock_state", "value_at", "value")],
+    ]
 
 
 class _System(ctypes.Structure):
@@ -196,8 +210,10 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets")],
-        *[(name, _POINTER) for name in ("set_first", "set_size", "set_of", "early", "early_free")],
+        *[(name, _POINTER) for name in ("mixed", "set_first", "set_size", "set_of")],
+        *[(name, _POINTER) for name in ("degree", "lower_first", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
+        ("rules", _Rules),
     ]
 
 
@@ -219,7 +235,8 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     made.table_read.argtypes = [_POINTER] * 4
     made.run_new.argtypes = [_POINTER] * 2
     made.run_ask.argtypes = [_POINTER, _POINTER, _I64]
-    made.run_begin.argtypes = [*[_POINTER] * 6, _D]
+    made.run_begin.argtypes = [*[_POINTER] * 6, _D, _POINTER]
+    made.run_motion.argtypes = [_POINTER] * 2
     made.run_continue.argtypes = [_POINTER, _I64]
     made.run_read.argtypes = [_POINTER] * 5
     made.run_resume.argtypes = [_POINTER] * 2
@@ -234,10 +251,6 @@ def _place(system: FilippovSystem, i: int) -> int:
 
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
     """Return the interpreter with a system at the options' tolerance, or None where it has none."""
-    if any(system.nonlinear):
-        return None
-    if system.impacts and not coupled_of(system).affine:
-        return None
     order = tape_order(system, options)
     if order >= MOST_ORDER:
         return None
@@ -273,12 +286,17 @@ class _Held:
         self.free(self.pointer)
 
 
+def _ends(parts: Sequence[Sequence[Any]]) -> list[int]:
+    """Where parts of a row begin, and the end of the last."""
+    return [0, *np.cumsum([len(part) for part in parts], dtype=int).tolist()]
+
+
 class TapeEngine:
     """The driver in C with one system at one order."""
 
     def __init__(self, system: FilippovSystem, order: int):
         self.system, self.order = system, order
-        self.coupled = coupled_of(system)
+        self.coupled = raised_of(system)
         tape = system.cached("tape", lambda: tape_of(self.coupled))
         self.guards = lru_cache(maxsize=4096)(self.coupled.guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
@@ -312,14 +330,13 @@ class TapeEngine:
         for i, carried in enumerate(coupled.carriers):
             carries[i, carried] = 1
         tables: dict[str, Any] = {
-            "stop_direction": [direction for _, direction in system.stops],
-            "reset_direction": [direction for _, direction in system.resets],
             "continuous": coupled.continuous,
             "scaled": coupled.scaled,
             "carries": carries.ravel(),
             "component": tape.component,
             "slope_output": tape.slope_output,
             "slope_moves": tape.slope_moves,
+            "mixed": coupled.mixed.ravel(),
             "bent": coupled.linearity.bent_rows,
             "bent_free": coupled.linearity.bent_free_rows,
             "bent_guards": coupled.linearity.bent_guards,
@@ -327,6 +344,8 @@ class TapeEngine:
             "set_first": [members[0] for members in system.sets],
             "set_size": [len(members) for members in system.sets],
             "set_of": [_place(system, i) for i in range(m)],
+            "degree": [len(own) + 1 for own in coupled.lower],
+            "lower_first": m + 2 * c + np.cumsum([0, *map(len, coupled.lower)]),
             "early": tape.series.early,
             "early_free": tape.free.early,
         }
@@ -334,6 +353,47 @@ class TapeEngine:
         made.early_count, made.early_free_count = len(tape.series.early), len(tape.free.early)
         for name, values in tables.items():
             setattr(made, name, self._at(np.array([*values, 0], np.int32)))
+        made.rules = self._rules()
+        return made
+
+    def _rules(self) -> _Rules:
+        """Conditions of stops and resets as C reads them."""
+        d, n = self.system.definition, self.system.dimension
+        conditions = [tree for rule in d.rules for tree in rule.triggers]
+        filters = [rule.when or () for rule in d.rules]
+        values = [own or () for own in d.discrete]
+        flags = [
+            rule.level + 2 * rule.by_jumps + 4 * rule.persistent + 8 * rule.at_trigger
+            for rule in d.rules
+        ]
+        tables: dict[str, Any] = {
+            "way": d.located,
+            "trigger_event": [k for k, rule in enumerate(d.rules) for _ in rule.triggers],
+            "trigger_at": _ends(conditions),
+            "condition": [code for tree in conditions for code in tree],
+            "filter_at": _ends(filters),
+            "filter": [code for tree in filters for code in tree],
+            "flags": flags,
+            "initially": [rule.initially for rule in d.rules],
+            "named": [i in rule.named for rule in d.rules[len(d.stops) :] for i in range(n)],
+            "clock_reset": [reset for reset, _ in d.clocks],
+            "clock_state": [state for _, state in d.clocks],
+            "value_at": _ends(values),
+        }
+        atoms, keeps = d.guards.numel(), any(rule.at_trigger for rule in d.rules)
+        width = 5 + 4 * atoms + len(conditions) + 2 * len(d.clocks)
+        width += len(conditions) * self.system.extended_dimension * keeps
+        made = _Rules(
+            atoms=atoms,
+            triggers=len(conditions),
+            clocks=len(d.clocks),
+            discrete=len(d.discrete),
+            keeps=int(keeps),
+            width=width if atoms else 0,
+        )
+        for name, table in tables.items():
+            setattr(made, name, self._at(np.array([*table, 0], np.int32)))
+        made.value = self._at(np.array([*[v for own in values for v in own], 0.0], float))
         return made
 
     def _at(self, array: NDArray[Any]) -> int:
@@ -345,16 +405,27 @@ class TapeEngine:
 
     # one trajectory ----------------------------------------------------------------------------
 
-    def run(self, x: Array, p: Array, options: Options, asked: Array | None = None) -> Run:
+    def run(
+        self,
+        x: Array,
+        p: Array,
+        options: Options,
+        asked: Array | None = None,
+        motion: Array | None = None,
+    ) -> Run:
         """Run one trajectory from an extended start, dense output kept, to be read at ``asked`` times."""
-        output = Output(self.system.extended_dimension, self.order, self._rooms)
+        # ``motion`` is that of a run or event that is continued.
+        width = self._c.rules.width
+        output = Output(self.system.extended_dimension, self.order, self._rooms, width)
         x, p = np.array(x, float), np.array([*p, 0.0], float)
         start = self._start_mode(options)
         with self._table() as table, self._state(table) as state:
             c_options = ctypes.byref(options_of(self.system, options, dense=True))
             given = (address(x), address(p), address(start))
             library().run_ask(state, address(asked), 0 if asked is None else len(asked))
-            library().run_begin(state, c_options, output.pointer, *given, options.t_start)
+            library().run_begin(
+                state, c_options, output.pointer, *given, options.t_start, address(motion)
+            )
             while True:
                 # Python hears Ctrl-C between the calls.
                 while (status := library().run_continue(state, BURST)) == RUNNING:
@@ -366,6 +437,9 @@ class TapeEngine:
                 library().run_resume(state, output.pointer)
             self._rooms = rooms_of(counts[7:10])  # of the next run, which is often a similar one
             modes, words = self._words(table, [counts[4]])
+            labels = self._labels(table)
+            final = np.zeros(width)
+            library().run_motion(state, address(final))
         return Run.of(
             output.filled(counts[7:10]),
             self.system.dimension,
@@ -376,6 +450,8 @@ class TapeEngine:
             guards=self.guards,
             active=active,
             several=[modes[k] for k in several],
+            motion=final,
+            labels=labels,
         )
 
     def _start_mode(self, options: Options) -> NDArray[np.int8] | None:
@@ -383,9 +459,15 @@ class TapeEngine:
             return None
         return np.array([*self.system.parse_letters(options.start_mode), 0], np.int8)
 
+    @property
+    def _width(self) -> int:
+        """Bytes of a mode: letters, then values of discrete states."""
+        system = self.system
+        return system.surface_count + len(system.impacts) + 8 * len(system.definition.discrete)
+
     def _table(self) -> _Held:
-        made, width = library(), self.system.surface_count + len(self.system.impacts)
-        return _Held(made.table_new(width), made.table_free)
+        made = library()
+        return _Held(made.table_new(self._width), made.table_free)
 
     def _state(self, table: int) -> _Held:
         made = library()
@@ -403,19 +485,39 @@ class TapeEngine:
 
     def _words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
         """Modes that were met, and itineraries of some nodes of their tree."""
-        made, width = library(), self.system.surface_count + len(self.system.impacts)
-        size, count = made.table_size(table), made.table_modes(table)
-        parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
-        letters = np.empty((count, max(width, 1)), np.int8)
-        made.table_read(table, address(parent), address(mode), address(letters))
+        parent, mode, letters = self._tree(table)
+        width = self.system.surface_count + len(self.system.impacts)
         modes = [self._spelled(row) for row in letters[:, :width].tolist()]
         spelled = [self.system.spelled(letters) for letters in modes]
+        if self.system.definition.discrete:
+            rows = self._labels(table)
+            spelled = [
+                shown_mode(self.system, one, row) for one, row in zip(spelled, rows, strict=True)
+            ]
         return modes, words_of(parent, mode, spelled, nodes)
+
+    def _tree(self, table: int) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int8]]:
+        """Parents and modes of the nodes of a tree, and the modes that were met, as bytes."""
+        made, width = library(), self._width
+        size, count = made.table_size(table), made.table_modes(table)
+        parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
+        met = np.empty(count * width + 1, np.int8)
+        made.table_read(table, address(parent), address(mode), address(met))
+        return parent, mode, met[:-1].reshape(count, width)
+
+    def _labels(self, table: int) -> list[tuple[float, ...]]:
+        """Values of the discrete states in the modes that were met."""
+        discrete = len(self.system.definition.discrete)
+        if not discrete:
+            return []
+        _, _, letters = self._tree(table)
+        rows = np.ascontiguousarray(letters[:, -8 * discrete :]).view(np.float64)
+        return [tuple(row) for row in rows.tolist()]
 
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``interpreter/sets.c`` for those of sets."""
         m = self.system.surface_count
-        surfaces = ("-s+*bll"[sign + 1] for sign in signs[:m])
+        surfaces = ("-s+*blli"[sign + 1] for sign in signs[:m])
         return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
 
     # many trajectories -------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from ..warn import warn_once
 from .chunks import Job
 from .lazy_starts import LazyStarts
 from .on_device import CHUNK, require_device, run_on_device
-from .starts import Starts
+from .starts import Starts, require_start
 from .store import Store
 from .work import Work, checked_work, run_all, size_of_chunk
 
@@ -45,6 +45,7 @@ def ensemble(
     max_step: float = math.inf,
     max_steps: int = 1_000_000,
     max_events: int = 100_000,
+    max_jumps: int = 1_000,
     at_event: tuple[str, int] | None = None,
     t_eval: ArrayLike | None = None,
     at: Any = None,
@@ -65,7 +66,7 @@ def ensemble(
         Time at which every run starts; default 0.
     parameters : mapping, optional
         Values that replace defaults: numbers, or arrays that broadcast with the starts.
-    tol, rtol, atol, start_mode, max_step, max_steps, max_events : optional
+    tol, rtol, atol, start_mode, max_step, max_steps, max_events, max_jumps : optional
         As in :func:`simulate`; a start with another side than ``start_mode`` says gets the status
         NON_UNIQUE.
     at_event : (kind, k), optional
@@ -118,6 +119,7 @@ def ensemble(
         max_step=max_step,
         max_steps=max_steps,
         max_events=max_events,
+        max_jumps=max_jumps,
         start_mode=start_mode,
     )
     require_system(system, sets=True)
@@ -127,6 +129,9 @@ def ensemble(
     system, at = sectioned(system, at)
     starts = Starts(system, x0, parameters, t_start)
     number = _event_number(at_event)
+    if system.definition.discrete or system.definition.clocks:
+        for first in range(0, starts.count, CHUNK):
+            require_start(system, *starts.part(first, min(first + CHUNK, starts.count)))
     p = starts.p if at is None else starts.every_parameter()
     sampling = read_sampling(system, t_eval, at, options.t_start, options.t_end, p)
     if sampling.hits is not None:

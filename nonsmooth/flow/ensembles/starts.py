@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import Array, FilippovSystem, OptionError, PointError, Surfaces
+from ...model import Array, FilippovSystem, OptionError, PointError, Surfaces, clock_periods
 from ..constants import ON_SURFACE
 from ..options import Options
 from ..reference.modes import rounding_scale
@@ -147,6 +147,29 @@ def require_start_mode(system: FilippovSystem, x: Array, p: Array, options: Opti
             f"start_mode is {mode!r}, but the start is where {', '.join(wrong)}. Give these letters; only "
             "on a surface or set, h = 0, is there a choice."
         )
+
+
+def require_start(system: FilippovSystem, x: Array, p: Array) -> None:
+    """Refuse starts (..., N) with other values of discrete states, or phases outside their periods."""
+    d, n = system.definition, system.dimension
+    for k, values in enumerate(d.discrete):
+        own, name = x[..., n - len(d.discrete) + k], system.state_names[n - len(d.discrete) + k]
+        wrong = np.isfinite(own) & ~np.isin(own, values or own)
+        if wrong.any():
+            raise PointError(
+                f"x0 has {name} = {np.extract(wrong, own)[0]:g}, but the discrete state {name} has the values "
+                f"{values}. Give one of them."
+            )
+    for k, (_, state) in enumerate(d.clocks):
+        period = clock_periods(system, k, p)
+        phase = x[..., state]
+        wrong = np.isfinite(phase) & ~((phase >= 0.0) & (phase < period))
+        if wrong.any():
+            name = system.state_names[state]
+            raise OptionError(
+                f"x0 has {name} = {np.extract(wrong, phase)[0]:g}, but the phase of a clock starts from 0 to "
+                f"below its period, {float(np.max(period)):g}. Give the time since the last tick."
+            )
 
 
 def _numbered(which: slice | Index) -> Index:

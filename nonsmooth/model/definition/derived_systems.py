@@ -10,6 +10,7 @@ import casadi as ca
 
 from ..cache import Content
 from ..errors import DefinitionError
+from .conditions import Rule, passages
 from .parse_definition import read_function
 from .system import FilippovSystem
 
@@ -38,9 +39,9 @@ def reversed_system(system: FilippovSystem) -> FilippovSystem:
                 "nonsmooth.flow.follow runs one smooth mode backward."
             )
     d = system.definition
-    return system.cached(
-        "reversed", lambda: _changed(system, field=-d.field, guards=d.guards[:0], stops=())
-    )
+    none: dict[str, Any] = dict.fromkeys(("guards", "whens", "priorities"), d.guards[:0])
+    none |= {"stops": (), "rules": ()}
+    return system.cached("reversed", lambda: _changed(system, field=-d.field, **none))
 
 
 def with_section(system: FilippovSystem, function: Any, direction: int) -> FilippovSystem:
@@ -55,9 +56,18 @@ def with_section(system: FilippovSystem, function: Any, direction: int) -> Filip
     name = next(n for n in chain([SECTION], numbered) if n not in taken)
 
     def build() -> FilippovSystem:
-        guards = ca.vertcat(d.guards, h) if d.guards.numel() else h
-        maps = ca.horzcat(d.maps, d.states) if d.resets else d.states
-        return _changed(system, guards=guards, maps=maps, resets=(*d.resets, (name, direction)))
+        count = len(d.stops) + len(d.resets)
+        own, others = d.guards[:count], d.guards[count:]
+        rule = Rule(passages(count, direction), by_jumps=False)
+        return _changed(
+            system,
+            guards=ca.vertcat(*[g for g in (own, h, others) if g.numel()]),
+            maps=ca.horzcat(d.maps, d.states) if d.resets else d.states,
+            whens=ca.vertcat(d.whens, 1) if count else ca.SX(1),
+            priorities=ca.vertcat(d.priorities, 0) if count else ca.SX(0),
+            resets=(*d.resets, (name, direction)),
+            rules=(*[r.moved(count) for r in d.rules], rule),
+        )
 
     return system.cached((SECTION, Content([known], h), direction), build)
 

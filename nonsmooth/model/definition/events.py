@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
 
+from ..checks import real
 from ..errors import DefinitionError
 from ..reading import Expression, column, listed, scalar
 
 
 @dataclass(frozen=True)
 class Stop:
-    """A surface that ends a run, with the status STOPPED.
+    """A condition that ends a run, with the status STOPPED.
 
     Parameters
     ----------
     function : expression
-        The run ends where it is zero.
+        A guard: the run ends where it passes zero. ``fmin`` and ``fmax`` of guards are allowed. Or a
+        condition: comparisons, ``casadi.logic_and``, ``logic_or``, ``logic_not`` of them; the run ends
+        where it becomes true.
     direction : {-1, 0, 1}
-        Only when falling, either way, only when rising.
+        Of a guard: only when falling, either way, only when rising.
     name : str
         Shown in events and messages.
+    when, level, initially, by_jumps, priority, persistent : optional
+        As in :class:`Reset`.
 
     Examples
     --------
@@ -38,22 +43,54 @@ class Stop:
     function: Expression
     direction: int = 0
     name: str = "stop"
+    when: Expression | None = field(default=None, kw_only=True)
+    level: bool = field(default=False, kw_only=True)
+    initially: bool | None = field(default=None, kw_only=True)
+    by_jumps: bool = field(default=True, kw_only=True)
+    priority: Expression = field(default=0.0, kw_only=True)
+    persistent: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)
 class Reset:
-    """A surface on which the state jumps to ``map``.
+    """A condition at which the state jumps to ``map``.
 
     Parameters
     ----------
     function : expression
-        The jump happens where it is zero.
-    map : sequence of expressions
-        The new state, in the order of the states.
+        A guard: the jump happens where it passes zero. ``fmin`` and ``fmax`` of guards are allowed. Or a
+        condition: comparisons, ``casadi.logic_and``, ``logic_or``, ``logic_not`` of them; the jump
+        happens where it becomes true.
+    map : sequence of expressions or mapping
+        The new state, in the order of the states; or new values of some states, the others stay. It may
+        have ``if_else``, ``fmin``, ``fmax`` and comparisons.
     direction : {-1, 0, 1}
-        Only when falling, either way, only when rising.
+        Of a guard: only when falling, either way, only when rising.
     name : str
         Shown in events and messages.
+    when : condition, optional
+        A filter: the event is served only if it holds at that instant.
+    level : bool, optional
+        Due while the condition (and ``when``) is true: at the start, after a jump, by the motion.
+        Otherwise where the condition becomes true.
+    initially : bool, optional
+        True: due at the start if true there. False: never due at the start. Unless given, what is clearly
+        true at the start is not due; a reset on its zero is, if the motion goes in.
+    by_jumps : bool, optional
+        Whether a jump of another event that makes the condition true makes the event due.
+    priority : number or expression, optional
+        Of several events due at one instant the largest is served first, evaluated then; then in the order of
+        definition. Stops are served before resets.
+    persistent : bool, optional
+        Stay due where another event of the instant makes the condition false.
+    values : {"now", "trigger"}, optional
+        State that the map takes: the present one, or the one when the event became due; such a map changes
+        only the states that it names.
+
+    Notes
+    -----
+    A jump that makes the condition of an event true makes it due at the same instant. Events that are due at
+    one instant are served one at a time, and all is evaluated again after each.
 
     Examples
     --------
@@ -69,9 +106,16 @@ class Reset:
     """
 
     function: Expression
-    map: Sequence[Expression]
+    map: Sequence[Expression] | Mapping[Any, Expression]
     direction: int = 0
     name: str = "reset"
+    when: Expression | None = field(default=None, kw_only=True)
+    level: bool = field(default=False, kw_only=True)
+    initially: bool | None = field(default=None, kw_only=True)
+    by_jumps: bool = field(default=True, kw_only=True)
+    priority: Expression = field(default=0.0, kw_only=True)
+    persistent: bool = field(default=False, kw_only=True)
+    values: str = field(default="now", kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -129,8 +173,9 @@ class Clock:
     ----------
     period : expression or number
         Positive; may depend on parameters.
-    map : sequence of expressions, optional
-        The other states after a tick (a kick, a latch, a sampled control); unchanged unless given.
+    map : sequence of expressions or mapping, optional
+        The other states after a tick (a kick, a latch, a sampled control), or some of them; unchanged unless
+        given.
     name : str, optional
         Shown in events; ``at=`` takes it.
 
@@ -141,8 +186,9 @@ class Clock:
 
     Notes
     -----
-    A tick leads to ``phase - period``, which is zero to rounding, so clocks do not drift. If the jump of
-    the phase changes the side of a surface, that is part of the same event (contract of events, 8).
+    Tick n is at the time of the first plus n periods, counted and never summed, so clocks do not drift. A start
+    has a phase from 0 to below the period. If the jump of the phase changes the side of a surface, that is part
+    of the same event.
 
     Examples
     --------
@@ -161,7 +207,7 @@ class Clock:
     """
 
     period: Expression
-    map: Sequence[Expression] | None = None
+    map: Sequence[Expression] | Mapping[Any, Expression] | None = None
     name: str = "clock"
     phase: ca.SX = field(init=False, repr=False)
 
@@ -177,11 +223,10 @@ class Clock:
         return f"Clock(period={self.period}, name={self.name!r})"
 
 
-def with_clocks(clocks: Any, given: dict[str, Any]) -> dict[str, Any]:
-    """Put clocks into the arguments of a definition: phases as states, ticks as resets."""
+def with_added_states(clocks: Any, discrete: Any, given: dict[str, Any]) -> dict[str, Any]:
+    """Put clocks and discrete states into the arguments of a definition: as states, with ticks as resets."""
     clocks = [clocks] if isinstance(clocks, Clock) else listed(clocks)
-    if not clocks:
-        return given
+    values = dict(discrete) if isinstance(discrete, Mapping) else dict.fromkeys(listed(discrete))
     for i, clock in enumerate(clocks):
         if not isinstance(clock, Clock):
             raise DefinitionError(
@@ -189,26 +234,52 @@ def with_clocks(clocks: Any, given: dict[str, Any]) -> dict[str, Any]:
                 "Write clocks=[nonsmooth.Clock(period)]."
             )
     states, phases = listed(given["states"]), [c.phase for c in clocks]
-    n, result = len(states), {**given, "states": [*states, *phases]}
+    n, still = len(states), list(values)
+    result = {**given, "states": [*states, *phases, *still], "clocks": clocks}
+    result["discrete"] = [_values(symbol, given) for symbol, given in values.items()]
+    if not clocks and not still:
+        return result
     for name in ("above", "below", "field", "rhs"):
         if given.get(name) is not None:
             entries = column(given[name], name, n)
-            result[name] = [*ca.vertsplit(entries), *[1.0] * len(clocks)]
+            result[name] = [*ca.vertsplit(entries)[: entries.numel()], *[1.0] * len(clocks)]
+            result[name] += [0.0] * len(still)
     resets = [given["resets"]] if isinstance(given["resets"], Reset) else listed(given["resets"])
-    ticks = [_tick(clock, clocks, states) for clock in clocks]
-    result["resets"] = [*[_widened(r, n, phases) for r in resets], *ticks]
+    ticks = [_tick(clock, states, still) for clock in clocks]
+    result["resets"] = [*[_widened(r, states, phases, still) for r in resets], *ticks]
     return result
 
 
-def _widened(reset: Any, n: int, phases: Sequence[Any]) -> Any:
+def _values(symbol: Any, values: Any) -> tuple[float, ...] | None:
+    """The values that a discrete state may have; None for any."""
+    if values is None:
+        return None
+    what = f"values of {symbol}"
+    found = tuple(real(v, what, error=DefinitionError) for v in listed(values))
+    if not found:
+        raise DefinitionError(
+            f"{what}: expected numbers, received none. Write {{{symbol}: (0, 1)}}."
+        )
+    return found
+
+
+def _widened(reset: Any, states: list[Any], phases: list[Any], still: list[Any]) -> Any:
     """A reset of the other states, which leaves the phases as they are."""
-    if not isinstance(reset, Reset) or len(listed(reset.map)) != n:
+    if not isinstance(reset, Reset) or isinstance(reset.map, Mapping):
+        return reset
+    n, entries = len(states), listed(reset.map)
+    if len(entries) != n + len(still):
         return reset  # the definition refuses it
-    return Reset(reset.function, [*listed(reset.map), *phases], reset.direction, reset.name)
+    return replace(reset, map=[*entries[:n], *phases, *entries[n:]])
 
 
-def _tick(clock: Clock, clocks: Sequence[Clock], states: Sequence[Any]) -> Reset:
-    what = f"map of {clock.name!r}"
-    jumped = states if clock.map is None else ca.vertsplit(column(clock.map, what, len(states)))
-    phases = [c.phase - (c.period if c is clock else 0.0) for c in clocks]
-    return Reset(clock.phase - clock.period, [*jumped, *phases], 1, clock.name)
+def _tick(clock: Clock, states: list[Any], still: list[Any]) -> Reset:
+    jumped: dict[Any, Any]
+    if clock.map is None or isinstance(clock.map, Mapping):
+        jumped = dict(clock.map or {})
+    else:
+        others = [*states, *still]
+        entries = column(clock.map, f"map of {clock.name!r}", len(others))
+        jumped = dict(zip(others, ca.vertsplit(entries), strict=True))
+    jumped[clock.phase] = clock.phase - clock.period
+    return Reset(clock.phase - clock.period, jumped, 1, clock.name, level=True)

@@ -17,10 +17,12 @@ from ..checks import is_real
 from ..errors import DefinitionError
 from ..expressions.float_arithmetic import BINARY, UNARY
 from ..expressions.graph import Node, evaluate, instructions, operation
+from ..numbering import MOST_CODES
 from ..reading import listed
 from ..values import Array
+from .conditions import OR, Rule
 from .lift import LiftedSwitch
-from .parse_definition import LARGEST, Definition, require_consistent
+from .parse_definition import LARGEST, OUTPUTS, Definition, require_consistent
 from .system import FilippovSystem
 
 #: Operations of an instruction list; a list names those that it uses.
@@ -31,13 +33,12 @@ _OPERATIONS = ("const", "input", *UNARY, *BINARY)
 MOST, DEEPEST = 200_000, 4_000
 
 _INPUTS = ("states", "time", "parameters", "multipliers", "reactions")
-_OUTPUTS = ("field", "surfaces", "guards", "maps", "gaps", "restitutions")
 
 
 def written(system: FilippovSystem) -> dict[str, Any]:
     """Return plain values from which ``read_system`` makes an equal system."""
     d = system.definition
-    inputs, outputs = ([getattr(d, name) for name in names] for names in (_INPUTS, _OUTPUTS))
+    inputs, outputs = ([getattr(d, name) for name in names] for names in (_INPUTS, OUTPUTS))
     nodes, rows = instructions(inputs, outputs, merged=False)
     operations = sorted({node.op for node in nodes})
     size, depth = max(len(nodes), sum(map(len, rows))), _depth(nodes)
@@ -64,6 +65,9 @@ def written(system: FilippovSystem) -> dict[str, Any]:
         "names": [[str(s) for s in listed(v)] for v in inputs],
         "defaults": d.defaults,
         "events": [[list(e) for e in d.stops], [list(e) for e in d.resets], list(d.impacts)],
+        "rules": [_plain_rule(rule) for rule in d.rules],
+        "clocks": [list(pair) for pair in d.clocks],
+        "discrete": [None if own is None else list(own) for own in d.discrete],
         "hidden": d.hidden,
         "sizes": list(d.sizes),
         "renamed": [list(pair) for pair in d.renamed],
@@ -81,10 +85,13 @@ def read_system(plain: Any) -> FilippovSystem:
     sizes = [_whole(v, "sizes", 1, LARGEST) for v in _list(plain, "sizes")]
     definition = Definition(
         **dict(zip(_INPUTS, vectors, strict=True)),
-        **dict(zip(_OUTPUTS, expressions, strict=True)),
+        **dict(zip(OUTPUTS, expressions, strict=True)),
         stops=_directed(stops),
         resets=_directed(resets),
         impacts=tuple(_texts(impacts, "impacts")),
+        rules=tuple(map(_rule, _list(plain, "rules", len(stops) + len(resets)))),
+        clocks=_clocks(plain, len(resets)),
+        discrete=tuple(map(_values, _list(plain, "discrete"))),
         defaults=_defaults(plain, names[2]),
         hidden=_flag(plain.get("hidden")),
         sizes=tuple(sizes),
@@ -127,7 +134,7 @@ def _depth(nodes: Sequence[Node]) -> int:
 def _expressions(plain: Mapping[str, Any], vectors: Sequence[ca.SX]) -> list[ca.SX]:
     nodes = _nodes(plain, [v.numel() for v in vectors])
     outputs = _array(plain, "outputs", np.int32)
-    shapes = [_shape(s) for s in _list(plain, "shapes", len(_OUTPUTS))]
+    shapes = [_shape(s) for s in _list(plain, "shapes", len(OUTPUTS))]
     _require(outputs.size <= MOST, f"at most {MOST} outputs")
     _require(sum(r * c for r, c in shapes) == outputs.size, "as many outputs as shapes have")
     _require(_within(outputs, len(nodes)), "outputs among the instructions")
@@ -237,6 +244,57 @@ def _directed(values: Any) -> tuple[tuple[str, int], ...]:
     return tuple((name, direction) for name, direction in values)
 
 
+#: Parts of a rule in a file, after its conditions.
+_RULE_FLAGS = ("level", "by_jumps", "persistent", "at_trigger")
+
+
+def _plain_rule(rule: Rule) -> list[Any]:
+    when = None if rule.when is None else list(rule.when)
+    flags = [getattr(rule, name) for name in _RULE_FLAGS]
+    return [[list(t) for t in rule.triggers], when, flags, rule.initially, list(rule.named)]
+
+
+def _rule(value: Any) -> Rule:
+    _require(isinstance(value, list) and len(value) == 5, "rules of five parts")
+    triggers, when, flags, initially, named = value
+    _require(isinstance(triggers, list) and 1 <= len(triggers) <= 2, "one or two conditions")
+    _require(isinstance(flags, list) and len(flags) == len(_RULE_FLAGS), "flags of a rule")
+    _require(isinstance(named, list), "states that a map names")
+    return Rule(
+        tuple(map(_tree, triggers)),
+        None if when is None else _tree(when),
+        initially=_whole(initially, "initially", -1, 1),
+        named=tuple(_whole(i, "states", 0, MOST) for i in named),
+        **{name: _flag(own) for name, own in zip(_RULE_FLAGS, flags, strict=True)},
+    )
+
+
+def _tree(value: Any) -> tuple[int, ...]:
+    """A condition in postfix order, in which each operation has its two arguments."""
+    _require(isinstance(value, list) and 0 < len(value) <= MOST_CODES, "conditions")
+    height = 0
+    for code in value:
+        height += 1 if _whole(code, "codes", OR, 8 * MOST) >= 0 else -1
+        _require(height > 0 and (code < 0 or code % 8 > 0), "conditions that are whole")
+    _require(height == 1, "conditions that are whole")
+    return tuple(value)
+
+
+def _clocks(plain: Mapping[str, Any], resets: int) -> tuple[tuple[int, int], ...]:
+    pairs = _list(plain, "clocks")
+    for pair in pairs:
+        _require(isinstance(pair, list) and len(pair) == 2, "pairs of clocks")
+        _whole(pair[0], "resets", 0, resets - 1)
+        _whole(pair[1], "states", 0, MOST)
+    return tuple((reset, state) for reset, state in pairs)
+
+
+def _values(value: Any) -> tuple[float, ...] | None:
+    fits = isinstance(value, list) and value and all(map(is_real, value))
+    _require(value is None or bool(fits), "values of discrete states")
+    return None if value is None else tuple(map(float, value))
+
+
 def _shape(value: Any) -> tuple[int, int]:
     _require(isinstance(value, list) and len(value) == 2, "shapes of two numbers")
     rows, columns = (_whole(v, "shapes", 0, MOST) for v in value)
@@ -270,7 +328,9 @@ def _require_shapes(d: Definition) -> None:
     columns = {
         "field": n,
         "surfaces": d.multipliers.numel(),
-        "guards": guards,
+        "whens": guards,
+        "priorities": guards,
+        "periods": len(d.clocks),
         "gaps": contacts,
         "restitutions": contacts,
     }
@@ -279,6 +339,19 @@ def _require_shapes(d: Definition) -> None:
     for name, rows in columns.items():
         shape = getattr(d, name).shape
         _require(shape == (rows, 1) or (not rows and shape in _EMPTY), f"{name} of {rows} rows")
+    atoms = d.guards.numel()
+    _require(
+        (d.guards.shape == (atoms, 1) and atoms >= guards)
+        or (not guards and d.guards.shape in _EMPTY),
+        f"at least {guards} guards",
+    )
+    trees = [t for rule in d.rules for t in (*rule.triggers, *([rule.when] if rule.when else []))]
+    _require(
+        all(code < 8 * atoms for tree in trees for code in tree), "conditions of known functions"
+    )
+    _require(all(i < n for rule in d.rules for i in rule.named), "states that maps name")
+    _require(len(d.discrete) <= n, "discrete states among the states")
+    _require(all(state < n for _, state in d.clocks), "phases among the states")
     k = len(d.resets)
     _require(
         d.maps.shape == (n, k) or (not k and d.maps.shape in _EMPTY), f"maps of shape {(n, k)}"

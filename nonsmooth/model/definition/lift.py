@@ -93,10 +93,10 @@ class Switches:
                 if origin not in self.all[i].origins:
                     self.all[i].origins.append(origin)
                 return i, 1 if ratio > 0 else -1
-        if not ca.depends_on(h, self.states):
+        if not ca.depends_on(h, self.inputs[0]):
             raise DefinitionError(
-                f"a switch: {origin} of {h} does not depend on the states. Make the clock a state with "
-                "derivative 1, and switch on that."
+                f"a switch: {origin} of {h} depends neither on the states nor on the time. Give a number "
+                "in place of it, or make the parameter a state."
             )
         k = len(self.all)
         lam, even = ca.SX.sym(f"{self.prefix}{k}"), ca.SX.sym(f"{self.prefix}{k}_even")

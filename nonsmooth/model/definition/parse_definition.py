@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -30,7 +31,18 @@ from ..reading import (
     symbols,
 )
 from ..values import Array, parameter_values
-from .events import Impact, Reset, Stop
+from .conditions import Atoms, Rule, located, passages
+from .events import Clock, Impact, Reset, Stop
+from .read_events import direction_of, read_maps, read_rules, read_when, require_no_endless_level
+
+#: No expressions.
+_NONE = ca.SX(0, 1)
+
+#: Expressions of a definition, in the order in which they are written down.
+OUTPUTS = (
+    *("field", "surfaces", "guards", "maps", "gaps", "restitutions"),
+    *("whens", "priorities", "periods"),
+)
 
 
 @dataclass(frozen=True)
@@ -53,8 +65,32 @@ class Definition:
     impacts: tuple[str, ...]
     defaults: dict[str, float | None]
     hidden: bool
+    whens: ca.SX = _NONE
+    priorities: ca.SX = _NONE
+    periods: ca.SX = _NONE
+    rules: tuple[Rule, ...] = ()
+    clocks: tuple[tuple[int, int], ...] = ()
+    discrete: tuple[tuple[float, ...] | None, ...] = ()
     sizes: tuple[int, ...] = ()
     renamed: tuple[tuple[str, str], ...] = ()
+
+    @cached_property
+    def plain(self) -> bool:
+        """Whether all events are guards that are passed, without conditions or discrete states."""
+        directions = [d for _, d in (*self.stops, *self.resets)]
+        ticks = {len(self.stops) + reset for reset, _ in self.clocks}
+        return not self.discrete and all(
+            replace(rule, by_jumps=True, named=(), level=rule.level and k not in ticks)
+            == Rule(passages(k, direction))
+            for k, (rule, direction) in enumerate(zip(self.rules, directions, strict=True))
+        )
+
+    @property
+    def located(self) -> list[int]:
+        """How each atom, a row of ``guards``, is located along a motion (``conditions``)."""
+        atoms = ca.vertsplit(self.guards)[: self.guards.numel()]
+        count = self.states.numel() - len(self.discrete)
+        return located(self.rules, atoms, ca.vertcat(self.states[:count], self.time))
 
     @property
     def extended_states(self) -> ca.SX:
@@ -80,8 +116,9 @@ class Definition:
     def state(self) -> dict[str, Any]:
         """Plain values from which ``from_state`` makes an equal definition."""
         inputs = [self.states, self.time, self.parameters, self.multipliers, self.reactions]
-        outputs = [self.field, self.surfaces, self.guards, self.maps, self.gaps, self.restitutions]
-        some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed}
+        outputs = [getattr(self, name) for name in OUTPUTS]
+        some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed, "rules": self.rules}
+        some |= {"clocks": self.clocks, "discrete": self.discrete}
         return {
             **{name: value for name, value in some.items() if value},
             "definition": ca.Function("definition", inputs, outputs).serialize(),
@@ -101,11 +138,11 @@ class Definition:
         vectors = [v if v.numel() else ca.SX(0, 1) for v in vectors]
         expressions = [ca.SX(e) for e in function.call(vectors)]
         inputs = ("states", "time", "parameters", "multipliers", "reactions")
-        outputs = ("field", "surfaces", "guards", "maps", "gaps", "restitutions")
         rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
-        parts = dict(zip((*inputs, *outputs), (*vectors, *expressions), strict=True))
-        sizes, renamed = tuple(state.get("sizes", ())), tuple(state.get("renamed", ()))
-        return cls(**parts, **rest, sizes=sizes, renamed=renamed)
+        parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=True))
+        some = ("sizes", "renamed", "rules", "clocks", "discrete")
+        tuples: dict[str, Any] = {name: tuple(state.get(name, ())) for name in some}
+        return cls(**parts, **rest, **tuples)
 
 
 _DIRECTIONS = (-1, 0, 1)
@@ -126,6 +163,8 @@ def read_definition(
     resets: Any,
     impacts: Any,
     hidden: bool,
+    clocks: Sequence[Clock] = (),
+    discrete: Sequence[tuple[float, ...] | None] = (),
 ) -> Definition:
     """Read and check the arguments of FilippovSystem."""
     x = symbols(states, "states")
@@ -143,9 +182,14 @@ def read_definition(
     _one_multiplier_each(lam, h)
     kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
     (stops, resets, impacts), renamed = _distinct([_items(*k) for k in kinds], _own_names(sizes))
-    guards = [column([s.function], f"stop {s.name!r}", 1) for s in stops]
-    guards += [column([r.function], f"reset {r.name!r}", 1) for r in resets]
-    maps = [column(r.map, f"map of reset {r.name!r}", x.numel()) for r in resets]
+    maps, named = read_maps(resets, x)
+    moving = ca.vertcat(x[: x.numel() - len(discrete)], t)
+    atoms = Atoms(ca.vertcat(x, t), moving, p)
+    rules = read_rules(stops, resets, atoms, named)
+    ticks = len(resets) - len(clocks)
+    require_no_endless_level(
+        rules[: len(stops) + ticks], len(stops), resets[:ticks], atoms.functions, x
+    )
     reactions, f = _reactions(impacts, x, t, f)
     definition = Definition(
         states=x,
@@ -160,10 +204,20 @@ def read_definition(
         impacts=tuple(i.name for i in impacts),
         field=f,
         surfaces=h,
-        guards=ca.vertcat(*guards),
+        guards=ca.vertcat(*atoms.functions),
         maps=ca.horzcat(*maps),
-        stops=tuple((s.name, s.direction) for s in stops),
-        resets=tuple((r.name, r.direction) for r in resets),
+        whens=ca.vertcat(*[read_when(e) for e in (*stops, *resets)]),
+        priorities=ca.vertcat(
+            *[scalar(e.priority, f"priority of {e.name!r}") for e in (*stops, *resets)]
+        ),
+        periods=ca.vertcat(*[scalar(c.period, f"period of {c.name!r}") for c in clocks]),
+        rules=rules,
+        clocks=tuple(
+            (ticks + k, x.numel() - len(discrete) - len(clocks) + k) for k in range(len(clocks))
+        ),
+        discrete=tuple(discrete),
+        stops=tuple((s.name, direction_of(s)) for s in stops),
+        resets=tuple((r.name, direction_of(r)) for r in resets),
         defaults=defaults,
         hidden=hidden,
         sizes=sizes if max(sizes, default=1) > 1 else (),
@@ -391,17 +445,21 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     """Refuse unknown symbols, functions that are not smooth, and multipliers that do not fit."""
     # Sections of derived systems may have multiple zeros; only ``given`` guards must have simple ones.
     guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
+    atoms = [*guards, *["a condition"] * (d.guards.numel() - len(guards))]
     named = [("field", d.field, True)]
     named += [(f"surface {i}", e, False) for i, e in enumerate(listed(d.surfaces))]
-    named += [(name, d.guards[i], False) for i, name in enumerate(guards)]
-    named += [(f"map of reset {n!r}", d.maps[:, j], False) for j, (n, _) in enumerate(d.resets)]
+    named += [(name, d.guards[i], False) for i, name in enumerate(atoms)]
+    switched = [(f"map of reset {n!r}", d.maps[:, j]) for j, (n, _) in enumerate(d.resets)]
+    switched += [(f"when of {name}", d.whens[i]) for i, name in enumerate(guards)]
+    switched += [(f"priority of {name}", d.priorities[i]) for i, name in enumerate(guards)]
+    switched += [("period of a clock", e) for e in listed(d.periods)]
     for j, name in enumerate(d.impacts):
         named += [(f"gap of {name!r}", d.gaps[j], False)]
         named += [(f"restitution of {name!r}", d.restitutions[j], False)]
     known = ca.vertcat(d.extended_states, d.parameters, d.multipliers, d.reactions)
     require_unique(known)
     moving = ca.vertcat(d.extended_states, d.multipliers, d.reactions)
-    for what, expression, multipliers in named:
+    for what, expression, multipliers in [*named, *[(w, e, False) for w, e in switched]]:
         require_known(expression, known, what, **d.names)
         if not multipliers and ca.depends_on(expression, ca.vertcat(d.multipliers, d.reactions)):
             raise DefinitionError(
@@ -409,13 +467,20 @@ def require_consistent(d: Definition, given: bool = True) -> None:
                 "with a multiplier. Only the field may contain multipliers."
             )
         require_finite(expression, known, what)
+    for what, expression, _ in named:
         require_smooth(expression, moving, d.parameters, what)
-    for i, name in enumerate(guards):
+    for period in listed(d.periods):
+        if ca.depends_on(period, d.extended_states):
+            raise DefinitionError(
+                f"period of a clock: {period} depends on states. Give a number or parameters."
+            )
+    _require_locally_constant(d)
+    for i, name in enumerate(atoms):
         _require_states(name, d.guards[i], d.extended_states, d)
         if given:
             _require_simple(name, d.guards[i], d)
     for i, h in enumerate(listed(d.surfaces)):
-        _require_states(f"surface {i}", h, d.states, d)
+        _require_states(f"surface {i}", h, d.extended_states, d)
         _require_simple(f"surface {i}", h, d)
     for j in range(len(d.impacts)):
         _check_impact(d, j)
@@ -473,6 +538,21 @@ def _require_linear(d: Definition) -> None:
                 "dynamics (Jeffrey 2018): say hidden=True if they are meant. Products of "
                 "different multipliers are fine."
             )
+
+
+def _require_locally_constant(d: Definition) -> None:
+    """Refuse maps of discrete states that depend smoothly on states that move."""
+    count = d.states.numel() - len(d.discrete)
+    moving = ca.vertcat(d.states[:count], d.time)
+    for j, (name, _) in enumerate(d.resets):
+        for i in range(count, d.states.numel()):
+            slope = ca.simplify(ca.densify(ca.jacobian(d.maps[i, j], moving)))
+            if not slope.is_zero():
+                raise DefinitionError(
+                    f"map of reset {name!r}: the discrete state {d.states[i]} becomes {d.maps[i, j]}, which "
+                    "varies smoothly with a state. A number that is sampled and held is an ordinary state "
+                    "with the field 0."
+                )
 
 
 def _require_states(what: str, function: ca.SX, states: ca.SX, d: Definition) -> None:

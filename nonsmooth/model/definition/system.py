@@ -6,7 +6,7 @@ If the system depends on time, time is the last component of the state, in Lie d
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -21,11 +21,12 @@ from ..checks import real
 from ..errors import DefinitionError, PointError
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
-from .events import Clock, Impact, Reset, Stop, with_clocks
+from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .parse_definition import Definition, consistent_parameters, read_definition
 
 T = TypeVar("T")
+Discrete = Sequence[Expression] | Mapping[Any, Sequence[float] | None]
 
 
 class FilippovSystem:
@@ -62,6 +63,9 @@ class FilippovSystem:
         Contacts that cannot be passed.
     clocks : sequence of Clock, optional
         What is periodic in time; each adds its phase to the states.
+    discrete : sequence of SX symbols or mapping, optional
+        States that change at resets only; starts have them last. A mapping gives the values that each
+        may have: ``{q: (0, 1)}``. The field may depend on them and has no entry for them.
     hidden : bool, optional
         Allow multipliers that enter nonlinearly (hidden dynamics, Jeffrey 2018): sliding then
         follows a stable solution $lambda$ of $grad h . f(x, lambda) = 0$.
@@ -105,6 +109,7 @@ class FilippovSystem:
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
         clocks: Sequence[Clock] | Clock = (),
+        discrete: Discrete = (),
         hidden: bool = False,
     ):
         given = {
@@ -122,7 +127,7 @@ class FilippovSystem:
             "impacts": impacts,
             "hidden": hidden,
         }
-        self._adopt(read_definition(**with_clocks(clocks, given)))
+        self._adopt(read_definition(**with_added_states(clocks, discrete, given)))
 
     # construction ------------------------------------------------------------------------------
 
@@ -138,6 +143,7 @@ class FilippovSystem:
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
         clocks: Sequence[Clock] | Clock = (),
+        discrete: Discrete = (),
         hidden: bool = False,
     ) -> FilippovSystem:
         """Find sign, fabs, fmin, fmax and if_else in a right-hand side and make them surfaces.
@@ -149,8 +155,8 @@ class FilippovSystem:
 
         Parameters
         ----------
-        states, parameters, time, stops, resets, impacts, clocks
-            As for the class. Stops, resets and gaps must be smooth.
+        states, parameters, time, stops, resets, impacts, clocks, discrete
+            As for the class. Gaps must be smooth.
         rhs : sequence of n expressions
             In states, parameters and time, with switches.
         hidden : bool, optional
@@ -180,26 +186,19 @@ class FilippovSystem:
         (SX([v, (-(x+0.4))]), SX([v, (-(x+-0.3))]))
         """
         column(rhs, "rhs", len(listed(states)))  # before clocks are added
-        widened = with_clocks(clocks, {"states": states, "rhs": rhs, "resets": resets})
-        states, rhs, resets = widened["states"], widened["rhs"], widened["resets"]
-        n = len(listed(states))
-        frame = cls(states, field=[0] * n, parameters=parameters, time=time).definition
+        given = {"states": states, "rhs": rhs, "parameters": parameters, "time": time}
+        given |= {"stops": stops, "resets": resets, "impacts": impacts, "hidden": hidden}
+        given = with_added_states(clocks, discrete, given)
+        n, rhs = len(listed(given["states"])), given.pop("rhs")
+        frame = cls(given["states"], field=[0] * n, parameters=parameters, time=time).definition
         entries = column(rhs, "rhs", n)
         known = ca.vertcat(frame.extended_states, frame.parameters)
         require_known(entries, known, "rhs", **frame.names)
         found = lift(entries, frame.states, frame.time, frame.parameters, hidden=hidden)
-        system = cls(
-            states,
-            field=found.field,
-            multipliers=found.multipliers,
-            surfaces=found.surfaces,
-            parameters=parameters,
-            time=time,
-            stops=stops,
-            resets=resets,
-            impacts=impacts,
-            hidden=hidden,
-        )
+        given |= {"field": found.field, "multipliers": found.multipliers, "surface": None}
+        given |= {"surfaces": found.surfaces, "above": None, "below": None}
+        system = cls.__new__(cls)
+        system._adopt(read_definition(**given))
         system.lifted = found.switches
         return system
 

@@ -102,3 +102,11 @@ def frequencies(system: FilippovSystem) -> list[ca.SX]:
                     found.append(rate)
         stack += [node.dep(k) for k in range(node.n_dep())]
     return found
+
+
+def clock_periods(system: FilippovSystem, clock: int, p: Array) -> Array:
+    """Periods of a clock for parameters (np,) or (m, np)."""
+    read = lambda: read_period(system, system.definition.periods[clock])
+    period = system.cached(("period of clock", clock), read)
+    assert period is not None  # the definition refuses one that depends on states
+    return periods(period, p)

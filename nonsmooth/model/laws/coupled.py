@@ -34,6 +34,7 @@ from ..expressions.taylor_rules import lower, touched
 from ..expressions.unused_terms import without_unused_terms
 from ..numbering import FALL, LIMIT_FALL
 from ..values import Array
+from .degree import Degree, degree_of
 from .evaluators import Evaluator
 from .switches import Guard, event_guards
 
@@ -89,7 +90,9 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
 class Coupled:
     """Series of states, surfaces, stops and multipliers of a system in any mode."""
 
-    def __init__(self, system: FilippovSystem, watched: Sequence[ca.SX] = ()):
+    def __init__(
+        self, system: FilippovSystem, watched: Sequence[ca.SX] = (), by_degree: bool = False
+    ):
         self.system, d = system, system.definition
         self._surfaces, self._watched = system.surface_count, len(watched)
         #: Surfaces and impacts: the letters of a mode.
@@ -111,13 +114,18 @@ class Coupled:
         self._stable: dict[tuple[int, ...], list[ca.SX]] = {}
         self._series: dict[tuple[int, ...], tuple[Expansion, list[int]]] = {}
         self.layer = ca.densify(ca.jtimes(ca.vertcat(d.surfaces, d.gap_rates), x, field))
+        #: Of each surface, derivatives that vanish while it rests; the layer has the next one.
+        self.lower: list[tuple[ca.SX, ...]] = [()] * self._surfaces
+        if by_degree:
+            for i, found in enumerate(self.degrees(field, lam, unknowns)):
+                self.lower[i], self.layer[i] = found.lower, found.row
         stops = ca.vertcat(d.guards, *watched)
         stops = ca.densify(stops) if stops.numel() else ca.SX(0, 1)
         heights = ca.densify(ca.vertcat(d.surfaces, d.gaps))
         factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
         self.outputs = [field, self.layer, heights, factor, stops]
         every = ca.vertcat(*unknowns, d.reactions)
-        self.slope = ca.jacobian(self.layer, every)
+        self.slope, self._every = ca.jacobian(self.layer, every), every
         #: Whether the unknown multipliers of a mode enter linearly together.
         self.affine = bool(ca.is_linear(field, every))
         guards, rest = ca.vertcat(heights, stops), (x, every, not system.sets, d.time)
@@ -135,6 +143,26 @@ class Coupled:
         pieces = [e for e in ca.vertsplit(ca.densify(column)) if not e.is_zero()]
         h, others = d.surfaces[surface], ca.vertcat(d.parameters, d.multipliers, d.reactions)
         return all(ca.depends_on(e, x) for e in pieces) and vanish_on(pieces, h, x, others)
+
+    def degrees(self, field: ca.SX, lam: ca.SX, unknowns: Sequence[ca.SX]) -> list[Degree]:
+        """Relative degrees of the surfaces."""
+        x, d, found = self.system.extended_states, self.system.definition, list[Degree]()
+        scaled = [e for e, own in zip(unknowns, self.scaled, strict=True) if own]
+        every = [*ca.vertsplit(lam), *scaled, *ca.vertsplit(d.reactions)]
+        for i in range(self._surfaces):
+            found.append(Degree((), self.layer[i]))
+            if self.continuous[i] or self.system.nonlinear[i] or i in self.system.set_of:
+                continue
+            own = ca.vertcat(lam[i], unknowns[i]) if self.scaled[i] else lam[i]
+            others = ca.vertcat(*[e for e in every if not ca.depends_on(own, e)])
+            found[i] = degree_of(d.surfaces[i], self.layer[i], own, others, x, field)
+        return found
+
+    @property
+    def kept(self) -> ca.SX:
+        """What closed contacts and sliding surfaces keep at zero: h, gaps, their rates, lower derivatives."""
+        d = self.system.definition
+        return ca.vertcat(d.surfaces, d.gaps, d.gap_rates, *[e for own in self.lower for e in own])
 
     # shape -------------------------------------------------------------------------------------
 
@@ -218,6 +246,15 @@ class Coupled:
         for i, j in zip(sparsity.row(), sparsity.get_col(), strict=True):
             moves[i, j] = ca.depends_on(self.slope[i, j], self.moving)
         return moves
+
+    @cached_property
+    def mixed(self) -> NDArray[np.bool_]:
+        """Pairs of unknowns that do not enter the field linearly together (m, m)."""
+        mixed = np.zeros((self.count, self.count), bool)
+        for j in range(0 if self.affine else self.count):
+            bent = ca.jacobian(self.columns_of_field[:, j], self._every)
+            mixed[j, bent.sparsity().get_col()] = True
+        return mixed
 
     def _changing(self, sliding: Sequence[int]) -> list[int]:
         """Unknowns that the stability of sliding is read from."""
@@ -416,6 +453,18 @@ def _sign(row: Array) -> float:
 def coupled_of(system: FilippovSystem) -> Coupled:
     """Return the program of all modes of a system, built once."""
     return system.cached("coupled", lambda: Coupled(system))
+
+
+def raised_of(system: FilippovSystem) -> Coupled:
+    """Return the same with the derivatives of surfaces that their multipliers enter first in the layer."""
+
+    def build() -> Coupled:
+        plain = coupled_of(system)
+        unknowns = [plain.unknown(i) for i in range(system.surface_count)]
+        degrees = plain.degrees(plain.field, plain.multipliers, unknowns)
+        return Coupled(system, by_degree=True) if any(own.lower for own in degrees) else plain
+
+    return system.cached("raised", build)
 
 
 # multipliers of a mode as power series ---------------------------------------------------------

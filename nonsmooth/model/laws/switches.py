@@ -23,7 +23,7 @@ class Guard:
 
     Attributes
     ----------
-    kind : {"surface", "exit", "near", "slip", "branch", "impact", "release", "stop", "reset", "zero"}
+    kind : {"surface", "exit", "near", "slip", "branch", "impact", "release", "stop", "reset", "atom", "zero"}
     index : int
         Of the switching function, gap, stop or reset in the definition.
     side : int
@@ -216,4 +216,6 @@ def guards_of(system: FilippovSystem, mode: str, law: Sliding) -> Guarded:
 def event_guards(system: FilippovSystem) -> list[Guard]:
     """Guards of stops and resets, the same in all modes."""
     kinds = (("stop", system.stops), ("reset", system.resets))
-    return [Guard(kind, j, d, j) for kind, own in kinds for j, (_, d) in enumerate(own)]
+    events = [Guard(kind, j, d, j) for kind, own in kinds for j, (_, d) in enumerate(own)]
+    further = range(system.definition.guards.numel() - len(events))
+    return [*events, *[Guard("atom", k, 0, k) for k in further]]

@@ -102,6 +102,8 @@ class Tape:
     point: Values
     surfaces: Values
     maps: Values
+    atoms: Values
+    choices: Values
     restitution: Values
     columns: Values
     slope: Entries
@@ -110,6 +112,7 @@ class Tape:
     stop_gradient: Entries
     factor_gradient: Entries
     surface_gradient: Entries
+    atom_gradient: Entries
     column: Entries
     component: Integers
     slope_output: Integers
@@ -123,9 +126,11 @@ def tape_of(coupled: Coupled) -> Tape:
     x, p = system.extended_states, system.parameter_symbols
     slope, gradients = _sparse(coupled.slope), [_sparse(g) for g in coupled.gradients]
     matrices = [slope, *gradients]
-    kept = ca.vertcat(d.surfaces, d.gaps, d.gap_rates)
+    kept = coupled.kept
     surface_gradient = _sparse(ca.jacobian(kept, x)) if kept.numel() else _sparse(ca.SX(0, 1))
     column = _sparse(coupled.columns_of_field)
+    atoms = d.guards if d.guards.numel() else ca.SX(0, 1)
+    gradient = _sparse(ca.jacobian(atoms, x) if d.guards.numel() else ca.SX(0, x.numel()))
     output, moves, slopes = _moving_slopes(coupled)
     point = [coupled.layer, coupled.factors, *[nonzeros for nonzeros, _ in matrices]]
     series, free = _series_of_modes(coupled, slopes)
@@ -135,6 +140,8 @@ def tape_of(coupled: Coupled) -> Tape:
         point=values_of([coupled.moving, p], coupled.awake(point), (4, 5)),
         surfaces=values_of([x, p], [kept, surface_gradient[0]]),
         maps=values_of([x, p], [d.maps]),
+        atoms=values_of([x, p], [atoms, gradient[0]]),
+        choices=values_of([x, p], [d.whens, d.priorities, d.periods]),
         restitution=values_of([x, p], [d.restitutions]),
         columns=values_of([coupled.moving, p], coupled.awake([column[0]])),
         slope=slope[1],
@@ -143,6 +150,7 @@ def tape_of(coupled: Coupled) -> Tape:
         stop_gradient=gradients[2][1],
         factor_gradient=gradients[3][1],
         surface_gradient=surface_gradient[1],
+        atom_gradient=gradient[1],
         column=column[1],
         component=_components(surface_gradient[1], kept.numel()),
         slope_output=output,

@@ -190,18 +190,6 @@ def test_a_body_at_rest_on_its_reset_surface_accumulates_at_once():
     assert run.status is ns.Status.ACCUMULATION and run.t[-1] == 0.0
 
 
-def test_two_relays_accumulate():
-    system = ns.FilippovSystem(
-        [x, y], field=[-lam + 2 * kap, -2 * lam - kap], multipliers=[lam, kap], surfaces=[x, y]
-    )
-    run = ns.simulate(system, [1.0, 0.5], 2.0)
-    assert run.status is ns.Status.ACCUMULATION
-    np.testing.assert_allclose(
-        [e.t for e in run.events[:3]], [1 / 6, 5 / 9, 0.6851851851851852], atol=1e-13
-    )
-    assert run.accumulation_time == pytest.approx(0.75, abs=1e-6)
-
-
 def test_several_surfaces_switch_independently():
     """Two uncoupled oscillators with friction: the same events as two separate runs."""
     w = ca.SX.sym("w")

@@ -151,7 +151,7 @@ def test_non_smooth_operations_are_refused_with_advice(operation, where):
     changes = {
         "above": {"above": [v, operation]},
         "surface": {"surface": operation + v},
-        "stops": {"stops": [ns.Stop(operation)]},
+        "stops": {"stops": [ns.Stop(ca.sin(operation))]},  # fmin and fmax of guards are conditions
     }[where]
     with pytest.raises(ns.NotSmoothError, match="surface"):
         stick_slip(**changes)

@@ -21,8 +21,8 @@ MOST_ORDER = 48
 #: The driver in C, in the order in which it is read: one text.
 _FILES = (
     *("programs.h", "linear.h", "state.c", "modes.c", "jets.c", "sets.c", "stepper.c"),
-    *("surfaces.c", "record.c", "decide.c", "contacts.c", "approach.c", "driver.c"),
-    *("accumulation.c", "memory.c", "entry.c"),
+    *("surfaces.c", "record.c", "spiral.c", "decide.c", "candidates.c", "layer.c", "contacts.c"),
+    *("approach.c", "events.c", "driver.c", "accumulation.c", "memory.c", "entry.c"),
 )
 
 

@@ -10,7 +10,7 @@ static const Happened *back(const Run *r, int64_t k) { return &r->past[(r->histo
  * repeated, or 0; the time left to the limit, and how much the last block has changed the estimate. */
 static int block_of(const Run *r, double *left, double *error) {
   int at_once = r->history > AT_ONCE;
-  for (int k = 1; at_once && k <= AT_ONCE; k++) at_once = back(r, k)->interval == 0;
+  for (int k = 1; at_once && k <= AT_ONCE; k++) at_once = back(r, k)->interval == 0 && back(r, k)->kind != RESET;
   *left = *error = 0;
   if (at_once) return AT_ONCE;
   for (int l = 0; l < LAG_COUNT; l++) {
@@ -62,7 +62,9 @@ static int is_quiet(Run *r, Expansion *e, const int32_t *drop, const double *nea
   guard_sums(r, e, near, 1, noise);
   for (int row = 0; row < e->l.rows; row++) {
     const double *c = e->guards + (int64_t)row * r->stride + drop[row];
+    if (is_atom(e->l.kind[row]) && (!r->instant.side[row - e->l.atoms] || e->l.side[row] == UNWATCHED)) continue;
     if (drop[row] > order || is_repeated(r, block, e->l.kind[row], e->l.index[row])) continue;
+    if (block && e->l.kind[row] == SURFACE_GUARD && fabs(c[0]) <= noise[row]) continue; /* is zero at the limit */
     if (!(fabs(c[0]) - (drop[row] ? 0 : noise[row]) > rest_of(c, order - drop[row], time))) return 0;
   }
   return 1;
@@ -82,6 +84,21 @@ static int gathered(Run *r, int block, int32_t *which, double *speed) {
   return count;
 }
 
+/* The motion at a point where some elements come to rest, whatever rounding says, as r->chosen; 0 if there is none. */
+static int decide_among(Run *r, const int32_t *which, int count) {
+  letters_of(r, r->start);
+  active_surfaces(r, -1, r->start);
+  for (int i = 0; i < count; i++) {
+    int at = 0;
+    while (at < r->active_count && r->active[at] < which[i]) at++;
+    if (at < r->active_count && r->active[at] == which[i]) continue;
+    memmove(r->active + at + 1, r->active + at, sizeof(int32_t) * (r->active_count - at));
+    r->active[at] = which[i];
+    r->active_count++;
+  }
+  return r->status == RUNNING && decide(r, r->start, 0, 0) && rests_unstably(r, r->chosen.letter) < 0;
+}
+
 /* The mode of closed contacts as r->chosen, and the state in it as r->x; 0 if there is none. */
 static int choose_closed(Run *r, const int32_t *contact, int count) {
   int kept = 0, m = r->m, c = r->c;
@@ -91,22 +108,20 @@ static int choose_closed(Run *r, const int32_t *contact, int count) {
   for (int i = 0; i < count; i++) which[kept++] = m + contact[i];
   for (int i = 0; i < count; i++) which[kept++] = m + c + contact[i];
   project(r, which, kept);
-  letters_of(r, r->start);
-  active_surfaces(r, -1, r->start);
-  for (int i = 0; i < count; i++) { /* those that rest are so, whatever rounding says */
-    int at = 0;
-    while (at < r->active_count && r->active[at] < which[i]) at++;
-    if (at < r->active_count && r->active[at] == which[i]) continue;
-    memmove(r->active + at + 1, r->active + at, sizeof(int32_t) * (r->active_count - at));
-    r->active[at] = which[i];
-    r->active_count++;
-  }
-  return r->status == RUNNING && decide(r, r->start, 0, 0);
+  return decide_among(r, which, count);
 }
 
 /* Whether a time is below the rounding of the run's times. */
 static int is_instant(const Run *r, double time) {
   return time <= SHORTEST * time_scale(r);
+}
+
+/* Move on to the limit in the mode that holds from there. */
+static void go_to_limit(Run *r, double left, int kind, int before) {
+  r->history = 0;
+  if (!advance(r, &r->e, smaller(left, r->o.t_end - r->t - r->t_low))) return;
+  r->limit = r->t;
+  event(r, kind, before, -1, r->x);
 }
 
 /* Close the contacts of impacts that accumulate, unless further impacts are to be served. */
@@ -127,40 +142,113 @@ static void close_contacts(Run *r, int block, double left, double error) {
   }
   adopt(r, &r->chosen);
   note(r);
-  r->history = 0;
   int closed = 0;
   for (int i = r->m; i < r->width; i++) closed |= r->letter[i] == 0;
-  left = smaller(left, r->o.t_end - r->t - r->t_low);
-  if (closed && r->e.finite && advance(r, &r->e, left)) {
-    r->limit = r->t;
-    event(r, change_kind(r, before, r->mode), before, -1, r->x);
-  }
+  if (closed && r->e.finite) go_to_limit(r, left, change_kind(r, before, r->mode), before);
 }
 
-/* End a run whose events accumulate, unless further ones are to be served. */
+/* Surfaces that are zero at a limit, with their lower derivatives, if the states change by ``near`` until then. */
+static int vanishing(Run *r, const double *near, int32_t *which) {
+  double *change = r->small, *own = r->vector;
+  int count = 0;
+  surface_values(r, r->x);
+  for (int i = 0; i < r->n; i++) own[i] = 4 * near[i] + ON_SURFACE * (r->size + fabs(r->x[i])); /* rates may jump */
+  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, own, 1, change);
+  for (int i = 0; i < r->m; i++) {
+    int small = set_of(r, i) < 0 && fabs(r->rates[i]) <= change[i], first = r->s->lower_first[i];
+    for (int k = first; k < first + r->s->degree[i] - 1; k++) small &= fabs(r->rates[k]) <= change[k];
+    if (small) which[count++] = i;
+  }
+  return count;
+}
+
+/* Put the state where some surfaces rest, as r->x, and the motion from there as r->chosen; 0 with the old state where
+ * there is none, or where that is farther than ``near`` allows. */
+static int choose_rest(Run *r, const int32_t *element, int count, const double *near) {
+  double *x = r->saved;
+  int kept = 0, close = 1, status = r->status;
+  int32_t *which = r->involved + r->width;
+  memcpy(x, r->x, sizeof(double) * r->n);
+  for (int i = 0; i < count; i++) which[kept++] = element[i];
+  for (int i = 0; i < count; i++) kept += lower_rows(r, element[i], which + kept);
+  project(r, which, kept);
+  for (int i = 0; near && i < r->n; i++)
+    close &= fabs(r->x[i] - x[i]) <= 4 * near[i] + VANISHES * (r->size + fabs(x[i]));
+  if (close && decide_among(r, element, count)) {
+    int rests = 0;
+    for (int i = 0; i < count; i++) rests |= r->chosen.letter[element[i]] == 0;
+    if (rests) return 1;
+  }
+  r->status = status;
+  memcpy(r->x, x, sizeof(double) * r->n);
+  return 0;
+}
+
+/* Rest where crossings and resets accumulate; 0 where no motion follows from there. */
+static int come_to_rest(Run *r, double left, const double *near) {
+  int before = r->mode, count = vanishing(r, near, r->involved);
+  if (!count || !choose_rest(r, r->involved, count, near)) return 0;
+  adopt(r, &r->chosen);
+  note(r);
+  expand(r, r->letter, r->x, r->unknowns, &r->e);
+  if (r->e.finite) go_to_limit(r, left, REST, before);
+  return 1;
+}
+
+/* Rest that rounding has let begin a little before the limit of events that accumulate: go on to the limit. 0 where that
+ * is no such event. */
+static int rest_at_limit(Run *r, int before) {
+  const int8_t *letter = r->table->letter + (int64_t)before * r->width;
+  double left, error, *near = r->before;
+  int rests = 0, block = block_of(r, &left, &error);
+  for (int i = 0; i < r->m; i++) rests |= r->letter[i] == 0 && letter[i] != 0 && r->s->degree[i] > 1;
+  left -= r->since;
+  if (!block || !rests || left < 0) return 0;
+  memset(near, 0, sizeof(double) * r->n);
+  expand(r, r->letter, r->x, r->unknowns, &r->e);
+  if (!is_quiet(r, &r->e, r->drop, near, left + error, 0)) return 0;
+  go_to_limit(r, left, REST, before);
+  return 1;
+}
+
+/* Go to the limit of events that accumulate, where the motion rests or the run ends, unless further ones are to be
+ * served. */
 static void end_at_limit(Run *r, int block, double left, double error) {
   double *near = r->before, time = left + error;
+  int at_once = is_instant(r, left);
   expand(r, r->letter, r->x, r->unknowns, &r->e);
-  if (!is_instant(r, left)) {
-    for (int i = 0; i < r->s->dimension; i++) {
-      near[i] = time * fabs(r->e.states[(int64_t)i * r->stride + 1]);
-      if (!(near[i] <= larger(r->e.allowed[i], VANISHES * (r->size + fabs(r->x[i]))))) return;
-    }
-    if (r->s->timed) near[r->n - 1] = time;
-    if (!is_quiet(r, &r->e, r->drop, near, time, block)) return;
+  for (int i = 0; i < r->n; i++) {
+    near[i] = time * fabs(r->e.states[(int64_t)i * r->stride + 1]);
+    double small = larger(r->e.allowed[i], VANISHES * (r->size + fabs(r->x[i])));
+    if (!at_once && i < r->s->dimension && !(near[i] <= small)) return;
   }
+  if (!at_once && !is_quiet(r, &r->e, r->drop, near, time, block)) return;
+  if (come_to_rest(r, left, near)) return;
   r->limit = r->t + left;
   finish(r, ACCUMULATION, NO_REASON, 0);
 }
 
-/* Keep an event in mind, and see whether the last ones accumulate. */
-static void watch_accumulation(Run *r, int kind, int before, int guard) {
-  double left, error;
-  int64_t pattern = (((int64_t)kind * 4096 + guard + 1) << 40) + ((int64_t)before << 20) + r->mode;
+/* Keep an event in mind. */
+static void remember(Run *r, int kind, int guard) {
+  int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->met.kind << 32) + (guard < 0 ? -1 : r->met.index);
   r->past[r->history++ % HISTORY] = (Happened){r->since, pattern, kind, r->met};
   r->since = 0;
+}
+
+/* See whether the last events accumulate. */
+static void see_limit(Run *r) {
+  double left, error;
   int block = block_of(r, &left, &error), only_impacts = r->c > 0;
   if (!block || r->status != RUNNING) return;
   for (int k = 1; k <= block; k++) only_impacts &= back(r, k)->kind == IMPACT;
   if (only_impacts) close_contacts(r, block, left, error); else end_at_limit(r, block, left, error);
+}
+
+/* Whether events accumulate at a point where no series exists: the run ends there. */
+static int ends_at_singular(Run *r) {
+  double left, error;
+  if (!block_of(r, &left, &error)) return 0;
+  r->limit = r->t + left;
+  finish(r, ACCUMULATION, NO_REASON, 0);
+  return 1;
 }

@@ -3,6 +3,38 @@
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int change_kind(const Run *r, int before, int after);
 
+/* A solution of a x = b, whose rows may depend on one another, in place of b. ``a`` is lost. */
+static int solve_consistent(double *a, double *b, int n) {
+  double first = 0;
+  int32_t *place = (int32_t *)(b + n), rank = 0;
+  for (int i = 0; i < n; i++) place[i] = i;
+  for (; rank < n; rank++) {
+    int row = rank, column = rank;
+    for (int i = rank; i < n; i++)
+      for (int j = rank; j < n; j++)
+        if (fabs(a[i * n + j]) > fabs(a[row * n + column])) { row = i; column = j; }
+    double most = fabs(a[row * n + column]);
+    if (!(most < INFINITY)) return 0;
+    if (rank == 0) first = most;
+    if (!(most > VANISHES * n * first)) break;
+    for (int j = 0; j < n; j++) { double t = a[row * n + j]; a[row * n + j] = a[rank * n + j]; a[rank * n + j] = t; }
+    for (int i = 0; i < n; i++) { double t = a[i * n + column]; a[i * n + column] = a[i * n + rank]; a[i * n + rank] = t; }
+    double t = b[row]; b[row] = b[rank]; b[rank] = t;
+    int32_t p = place[column]; place[column] = place[rank]; place[rank] = p;
+    for (int i = 0; i < n; i++) {
+      double f = i == rank ? 0 : a[i * n + rank] / a[rank * n + rank];
+      if (f == 0) continue;
+      for (int j = rank; j < n; j++) a[i * n + j] -= f * a[rank * n + j];
+      b[i] -= f * b[rank];
+    }
+  }
+  double *x = a; /* the first row's place is free once all quotients are known */
+  for (int i = 0; i < rank; i++) b[i] /= a[i * n + i];
+  for (int i = rank; i < n; i++) b[i] = 0;
+  for (int i = 0; i < n; i++) x[place[i]] = b[i];
+  memcpy(b, x, sizeof(double) * n);
+  return finite_all(b, n);
+}
 
 /* h' = a - M lambda of the functions ``own``, with what else slides eliminated; 0 where that is impossible. */
 static int freeze(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
@@ -28,7 +60,7 @@ static int freeze(Run *r, const int8_t *letter, const double *x, const double *u
       for (int j = 0; j < count; j++) d[i * count + j] = r->slope[others[i] * w + others[j]];
       b[i] = column == k ? layer_of(r, others[i]) : r->slope[others[i] * w + own[column]] * factor_of(r, own[column]);
     }
-    if (!solve(d, b, count)) return 0;
+    if (!solve_consistent(d, b, count)) return 0;
     for (int i = 0; i < k; i++) {
       double through = 0;
       for (int j = 0; j < count; j++) through += r->slope[own[i] * w + others[j]] * b[j];
@@ -58,7 +90,7 @@ static int field_with(Run *r, const int8_t *letter, const double *x, const doubl
       for (int j = 0; j < count; j++) d[i * count + j] = r->slope[others[i] * w + others[j]];
       b[i] = -layer_of(r, others[i]);
     }
-    if (!solve(d, b, count)) return 0;
+    if (!solve_consistent(d, b, count)) return 0;
     for (int i = 0; i < count; i++) acting[others[i]] = b[i];
   }
   set_inputs(r, x, r->held, acting);
@@ -161,7 +193,7 @@ static void near_set(Run *r, int row, int fell) {
     scale = larger(scales_of[f + i], scale);
   }
   double radius = unit_of(h, k, u);
-  if (!freeze(r, r->letter, r->x, r->unknowns, own, k, a, m)) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+  if (!freeze(r, r->letter, r->x, r->unknowns, own, k, a, m)) { finish(r, NOT_FINITE, FIELD, 0); return; }
   int at_floor = radius <= VANISHES * scale;
   int hits = definite(r, m, k) && solve_block(m, k, k, 0, a, b);
   hits = hits && length_of(b, k) < 1;
@@ -195,7 +227,7 @@ static void near_set(Run *r, int row, int fell) {
     int good = field_with(r, r->letter, r->x, r->unknowns, f, k, mean, field);
     for (int i = 0; i < n; i++) end[i] = r->x[i] + dt * field[i];
     good = good && freeze(r, r->letter, end, r->unknowns, own, k, a2, m2);
-    if (!good) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+    if (!good) { finish(r, NOT_FINITE, FIELD, 0); return; }
     for (int i = 0; i < k; i++) bend += fabs(a2[i] - a[i]);
     for (int i = 0; i < k * k; i++) bend += fabs(m2[i] - m[i]);
     bend *= dt;
@@ -270,79 +302,140 @@ static int bounded_multipliers(Run *r, const double *a, const double *m, int n, 
   return finite_all(lam, n);
 }
 
+/* Coefficients of det(M + s)^2 - |adj(M + s) a|^2 in s (Faddeev and LeVerrier); its degree is 2 k. */
+static void secular(const double *a, const double *m, int k, double *polynomial) {
+  double adjugate[9] = {0}, determinant[4] = {1}, numerator[3][3], next[9];
+  for (int i = 0; i <= 2 * k; i++) polynomial[i] = 0;
+  for (int i = 0; i < k; i++) adjugate[i * (k + 1)] = 1;
+  for (int j = 1; j <= k; j++) { /* of highest powers first */
+    double trace = 0;
+    for (int i = 0; i < k; i++) {
+      numerator[j - 1][i] = 0;
+      for (int l = 0; l < k; l++) {
+        numerator[j - 1][i] += adjugate[i * k + l] * a[l];
+        next[i * k + l] = 0;
+        for (int q = 0; q < k; q++) next[i * k + l] -= m[i * k + q] * adjugate[q * k + l];
+      }
+      trace += next[i * k + i];
+    }
+    determinant[j] = -trace / j;
+    for (int i = 0; i < k; i++) next[i * (k + 1)] += determinant[j];
+    memcpy(adjugate, next, sizeof next);
+  }
+  for (int i = 0; i <= k; i++) for (int j = 0; j <= k; j++) polynomial[2 * k - i - j] += determinant[i] * determinant[j];
+  for (int i = 0; i < k; i++)
+    for (int j = 0; j < k; j++)
+      for (int l = 0; l < k; l++) polynomial[2 * k - 2 - i - j] -= numerator[i][l] * numerator[j][l];
+}
+
+/* Direction u = (M + s)^-1 a where its length is 1 close to s; 0 where Newton's method leads away. */
+static int direction_at(const double *a, const double *m, int k, double s, double *u) {
+  double d[3], w[3], start = s, n = 0;
+  for (int again = 0; again < LAYER_NEWTON; again++) {
+    if (!solve_block(m, k, k, s, a, d) || !solve_block(m, k, k, s, d, w)) return 0;
+    double slope = 0;
+    for (int i = 0; i < k; i++) slope += d[i] * w[i];
+    n = length_of(d, k);
+    double step = (n * n - 1) / (-2 * slope);
+    if (!(fabs(step) < INFINITY)) return 0;
+    s -= step;
+    if (fabs(step) <= EPSILON * fabs(s)) break;
+  }
+  if (!(fabs(n - 1) <= LAYER_APART && fabs(s - start) <= LEFT * (1 + fabs(start)))) return 0;
+  unit_of(d, k, u);
+  return 1;
+}
+
+/* Directions in which a set h' = a - M u is left at a rate that is not negative: all of (M + s) u = a, |u| = 1. */
+static int limit_directions(const double *given, const double *matrix, int k, double (*u)[3]) {
+  double a[3], m[9], p[P + 1], size = largest_of(given, k) + largest_of(matrix, k * k), at = -LAYER_RESIDUAL;
+  int degree = 2 * k, count = 0, zeros = 0;
+  if (!(size > 0)) return 0;
+  for (int i = 0; i < k; i++) a[i] = given[i] / size;
+  for (int i = 0; i < k * k; i++) m[i] = matrix[i] / size;
+  secular(a, m, k, p);
+  for (int i = 0; i < degree; i++) for (int j = degree - 1; j >= i; j--) p[j] += at * p[j + 1];
+  while (count < 2 * k && zeros < degree) {
+    double sign = ns_sign(p[zeros]), c[P + 1], left = 2 * k - at, root;
+    if (sign == 0) { zeros++; continue; }
+    for (int i = 0; i <= degree; i++) c[i] = sign * p[i];
+    root = first_root(c + zeros, degree - zeros, left);
+    if (root < 0) break;
+    at += root;
+    for (int i = 0; i < degree; i++) for (int j = degree - 1; j >= i; j--) p[j] += root * p[j + 1];
+    p[0] = 0;
+    zeros = 1;
+    count += direction_at(a, m, k, at, u[count]);
+  }
+  return count;
+}
+
+/* All unknowns of a mode in which sets are left; as mode_solutions. */
+static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found) {
+  int n = 0, sets = 0, w = r->width, count = 1;
+  int32_t *own = r->involved, *first = own + w;
+  double *a = r->laws, *lam = a + w, *m = lam + w, u[6][3], *unknowns = r->tried;
+  for (int i = 0; i < r->m; i++) {
+    if (l->letter[i] != LEAVING) continue;
+    if (i == first_of(r, set_of(r, i))) first[sets++] = n;
+    own[n++] = i;
+    unknowns[i] = 1; /* some direction, until it is known */
+  }
+  first[sets] = n;
+  if (!freeze(r, l->letter, r->x, unknowns, own, n, a, m)) return;
+  if (sets > 1) {
+    if (!bounded_multipliers(r, a, m, n, first, sets, lam)) return;
+  } else if (definite(r, m, n) && symmetric(m, n, VANISHES)) {
+    if (!leaving_direction(a, m, n, n, u[0])) return;
+  } else count = limit_directions(a, m, n, u);
+  for (int q = 0; q < count; q++) {
+    for (int i = 0; i < n; i++) unknowns[own[i]] = sets > 1 ? lam[i] : u[q][i];
+    if (l->slides && !improve(r, l, r->x, unknowns, 2)) continue;
+    memcpy(found->each + found->count++ * w, unknowns, sizeof(double) * w);
+  }
+}
+
 /* Whether sets are met: those are decided here. */
 static int meets_sets(const Run *r) {
   for (int i = 0; i < r->active_count; i++) if (set_of(r, r->active[i]) >= 0) return 1;
   return 0;
 }
 
-/* Whether the motion can continue in a mode: its guards that vanish here become positive. */
-static int continuation(Run *r, const int8_t *letter, const Known *known, int known_count, Continuation *result) {
-  Expansion *e = &r->trial;
-  lay_out(r, letter, &e->l);
-  if (e->l.slides) {
-    if (!is_known(r, &e->l)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
-    if (!improve(r, &e->l, r->x, result->unknowns, 1)) return 0;
-    error_scales(r, r->x, held_of(r, letter), result->unknowns);
+/* Whether the symmetric part of a matrix has a negative direction: a principal minor of it, shifted by a margin. */
+static int has_negative(const double *m, int k) {
+  double a[9], most = largest_of(m, k * k);
+  for (int i = 0; i < k; i++)
+    for (int j = 0; j < k; j++) a[i * k + j] = 0.5 * (m[i * k + j] + m[j * k + i]) + (i == j ? LAYER_ROUNDING * most : 0);
+  for (int set = 1; set < 1 << k; set++) {
+    int rows[3], count = 0;
+    for (int i = 0; i < k; i++) if (set >> i & 1) rows[count++] = i;
+    if (determinant(a, k, rows, count) < 0) return 1;
   }
-  expand(r, letter, r->x, result->unknowns, e);
-  if (!e->finite) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
-  memcpy(result->letter, letter, r->width);
-  result->strict = 1;
-  memset(result->drop, 0, sizeof(int32_t) * r->guards);
-  for (int row = 0; row < e->l.rows; row++) {
-    int kind = e->l.kind[row], index = e->l.index[row], of = index, active = 0, zeros = 0;
-    if (kind == STOP_GUARD || kind == RESET_GUARD) continue;
-    if (kind == NEAR_GUARD && letter[index] == 0) continue; /* ends steps only */
-    if (kind == IMPACT_GUARD || kind == RELEASE_GUARD) of += r->m;
-    for (int i = 0; i < r->active_count; i++) active |= r->active[i] == of;
-    if (!active) continue;
-    for (int i = 0; i < known_count; i++)
-      if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row]) zeros = known[i].zeros;
-    if ((kind == SURFACE_GUARD || kind == NEAR_GUARD) && zeros < 1) zeros = 1;
-    if (kind == IMPACT_GUARD && zeros < 2) zeros = 2;
-    double value;
-    int k = leading(r, e, row, zeros, &value);
-    if (value < 0) return 0;
-    if (value == 0) result->strict = 0;
-    result->drop[row] = value != 0 ? (k < r->order ? k : r->order) : r->order + 1;
-  }
-  return 1;
-}
-
-static void copy_continuation(const Run *r, Continuation *to, const Continuation *from) {
-  memcpy(to->letter, from->letter, r->width);
-  memcpy(to->drop, from->drop, sizeof(int32_t) * r->guards);
-  memcpy(to->unknowns, from->unknowns, sizeof(double) * r->width);
-  to->strict = from->strict;
-}
-
-static int rests(const Run *r, const int8_t *letter) {
-  for (int i = 0; i < r->width; i++) if (letter[i] == 0) return 1;
   return 0;
 }
 
-/* Choose, as r->chosen, the motion that continues from h = 0 of some sets. Surfaces or contacts that are met
- * too, and what is not known to be unique, are the reference driver's. */
-static int decide_sets(Run *r, const int8_t *letter, const Known *known, int known_count) {
-  enum { MOST = 24 };
-  int n = r->active_count, sets = 0, first[MOST + 1], undecided[MOST], open = 0, strict = 0, found = 0, resting = 0;
-  double a[MOST], m[MOST * MOST], lam[MOST];
-  int8_t *trial = (int8_t *)r->lam + sizeof(double) * r->width + r->width;
-  int32_t own[MOST];
-  if (n > MOST || n * n > r->width * r->width) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
-  for (int i = 0; i < n; i++) {
-    own[i] = r->active[i];
-    if (set_of(r, own[i]) < 0) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
-    if (own[i] == first_of(r, set_of(r, own[i]))) first[sets++] = i;
+/* Letters that are possible where sets are met, as bits: of sets leaving (1) and holding (4). One where the law of
+ * sets alone decides. 0 where the run ends. */
+static int sets_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count, int8_t *possible) {
+  int w = r->width, n = 0, sets = 0, *first = r->involved + w, bounded;
+  int32_t *own = r->involved;
+  double *a = r->laws, *lam = a + w, *m = lam + w, block[9];
+  for (int i = 0; i < r->active_count; i++) {
+    int which = r->active[i], s = set_of(r, which);
+    possible[i] = s < 0 && which < r->m ? 7 : 5;
+    if (s < 0) continue;
+    if (which == first_of(r, s)) first[sets++] = n;
+    own[n++] = which;
   }
   first[sets] = n;
-  if (!freeze(r, letter, r->x, r->unknowns, own, n, a, m) || !bounded_multipliers(r, a, m, n, first, sets, lam)) {
-    finish(r, HAND_OVER, NO_REASON, 0);
-    return 0;
-  }
-  memcpy(trial, letter, r->width);
+  if (!freeze(r, letter, r->x, r->unknowns, own, n, a, m)) return 1;
   for (int s = 0; s < sets; s++) {
+    int f = first[s], k = first[s + 1] - f;
+    for (int i = 0; i < k; i++) for (int j = 0; j < k; j++) block[i * k + j] = m[(f + i) * n + f + j];
+    if (has_negative(block, k)) { finish(r, NON_UNIQUE, INDEFINITE, own[f]); return 0; }
+  }
+  bounded = n == r->active_count && bounded_multipliers(r, a, m, n, first, sets, lam);
+  for (int s = 0; bounded && s < sets; s++) {
     int f = first[s], k = first[s + 1] - f, left = 0;
     double size = 0, rates[3];
     for (int i = 0; i < k; i++) {
@@ -353,46 +446,74 @@ static int decide_sets(Run *r, const int8_t *letter, const Known *known, int kno
     }
     for (int i = 0; i < known_count; i++) left |= known[i].kind == SLIP_GUARD && known[i].index == own[f];
     double room = 1 - length_of(lam + f, k);
-    int which = left ? -1 : room > 1e-9 ? 0 : length_of(rates, k) > 1e-9 * size ? LEAVING : -1;
-    if (which < 0) undecided[open++] = s;
-    for (int i = f; i < f + k; i++) trial[own[i]] = (int8_t)(which < 0 ? 0 : which);
+    for (int i = f; i < f + k && !left; i++) possible[i] = room > LAYER_BEYOND ? 4 : length_of(rates, k) > LAYER_BEYOND * size ? 1 : 5;
   }
-  if (open > 6) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
-  for (int number = 0; number < 1 << open && r->status == RUNNING; number++) {
-    for (int q = 0; q < open; q++)
-      for (int i = first[undecided[q]]; i < first[undecided[q] + 1]; i++)
-        trial[own[i]] = (int8_t)(number >> q & 1 ? LEAVING : 0);
-    double *unknowns = r->found.unknowns;
-    keep_carried(r, trial, unknowns);
-    for (int s = 0; s < sets; s++)
-      if (trial[own[first[s]]] == LEAVING) unit_of(lam + first[s], first[s + 1] - first[s], unknowns + own[first[s]]);
-    if (!continuation(r, trial, known, known_count, &r->found)) continue;
-    if (r->found.strict && strict++ == 0) copy_continuation(r, &r->one, &r->found);
-    if (found++ == 0) copy_continuation(r, &r->first, &r->found);
-    if (rests(r, trial) && resting++ == 0) copy_continuation(r, &r->rest, &r->found);
-  }
-  if (r->status != RUNNING) return 0;
-  if (strict == 1) copy_continuation(r, &r->chosen, &r->one);
-  else if (strict == 0 && found == 1) copy_continuation(r, &r->chosen, &r->first);
-  else if (strict == 0 && resting) copy_continuation(r, &r->chosen, &r->rest);
-  else { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
   return 1;
 }
 
-/* Whether the multiplier of a set is seen to make no difference, here and elsewhere: no friction. */
-static int without_friction(Run *r) {
-  double *x = r->at_work;
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s), k = size_of(r, s), enters = 0;
-    for (int trial = 0; trial < 3 && !enters; trial++) {
-      for (int i = 0; i < r->n; i++) x[i] = r->x[i] + trial * (0.37 + 0.11 * i);
-      error_scales(r, x, r->none, r->none);
-      for (int i = f; i < f + k; i++)
-        for (int j = f; j < f + k; j++) enters |= r->slope[i * r->width + j] * factor_of(r, j) != 0;
-    }
-    if (!enters) return 1;
+/* Choose, as r->chosen, the motion that continues from h = 0 of some sets, and of surfaces and contacts there. */
+static int decide_sets(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  int8_t *trial = r->tried_letter, *possible = trial + r->width, *each = (int8_t *)r->lam + sizeof(double) * r->width;
+  Solutions all = {0};
+  Tally tally = {0};
+  if (!sets_by_rates(r, letter, known, known_count, possible)) return 0;
+  for (int i = 0; i < r->active_count; i++) { /* a set has one letter, that of its first function */
+    int s = set_of(r, r->active[i]);
+    each[i] = s < 0 || r->active[i] == first_of(r, s) ? possible[i] : 4;
   }
-  return 0;
+  int total = choices_of(each, r->active_count);
+  if (total > TRIED) { many_may_hold(r); return 0; }
+  r->several_count = 0;
+  for (int number = 0; number < total && r->status == RUNNING; number++) {
+    spell_choice(r, letter, each, number, trial);
+    for (int i = 0; i < r->active_count; i++) {
+      int s = set_of(r, r->active[i]);
+      if (s >= 0) trial[r->active[i]] = trial[first_of(r, s)] ? LEAVING : 0;
+    }
+    lay_out(r, trial, &r->trial.l);
+    mode_solutions(r, &r->trial.l, &all);
+    for (int q = 0; q < all.count && r->status == RUNNING; q++) {
+      memcpy(r->found.unknowns, all.each + q * r->width, sizeof(double) * r->width);
+      if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
+    }
+  }
+  for (int i = 1, same = 1; i < r->several_count && same; i++) {
+    same = r->several[i] == r->several[0];
+    if (same && i == r->several_count - 1) finish(r, NON_UNIQUE, SEVERAL_DIRECTIONS, tally.strict);
+  }
+  return r->status == RUNNING && (choose_of(r, &tally) || no_motion(r, letter));
+}
+
+/* Nodes of a program that are zero whatever moves, from the values of those that do not. */
+static void find_zeros(const Values *t, const double *w, int8_t *zero) {
+  memset(zero, 0, t->size);
+  for (int32_t k = 0; k < t->still_count; k++) zero[t->still[k]] = w[t->still[k]] == 0;
+  for (int32_t k = 0; k < t->moving_count; k++) {
+    int32_t j = t->moving[k];
+    int a = zero[t->a[j]], b = zero[t->b[j]];
+    switch (t->op[j]) {
+      case OP_input: zero[j] = 0; break;
+      case OP_mul: case OP_if_else_zero: zero[j] = (int8_t)(a || b); break;
+      case OP_add: case OP_sub: case OP_hypot: case OP_fmin: case OP_fmax: zero[j] = (int8_t)(a && b); break;
+      case OP_assign: case OP_neg: case OP_twice: case OP_sq: case OP_sqrt: case OP_fabs: case OP_sign: case OP_sin:
+      case OP_tan: case OP_asin: case OP_atan: case OP_sinh: case OP_tanh: case OP_div: zero[j] = (int8_t)a; break;
+      default: zero[j] = 0;
+    }
+  }
+}
+
+/* Sets whose multiplier does not enter the field with these parameters: no friction. */
+static void find_idle(Run *r) {
+  const Entries *column = &r->s->column;
+  if (!r->s->sets) return;
+  memset(r->idle, 1, r->s->sets);
+  find_zeros(&r->s->columns, r->columns, r->vanishes);
+  for (int q = 0; q < column->count; q++) {
+    int s = set_of(r, column->column[q]);
+    if (s >= 0 && !r->vanishes[r->s->columns.output[q]]) r->idle[s] = 0;
+  }
+  find_zeros(&r->s->point, r->point, r->vanishes);
+  for (int s = 0; s < r->s->sets; s++) r->idle[s] |= r->vanishes[r->s->point.output[r->width + first_of(r, s)]];
 }
 
 /* After a step that ended with no guard: sets that are close may be reached to rounding. */

@@ -15,7 +15,7 @@ static int impulses_fit(Run *r, const double *x, const int32_t *involved, int co
   for (int i = 0; i < k; i++)
     for (int j = 0; j < k; j++) a[i * k + j] = r->slope[unknown[i] * w + unknown[j]];
   surface_values(r, x);
-  memcpy(scale, surface_scales(r, x), sizeof(double) * (m + 2 * r->c));
+  memcpy(scale, surface_scales(r, x), sizeof(double) * r->kept_rows);
   memcpy(h, r->rates, sizeof(double) * m);
   for (int j = 0; j < r->c; j++) h[m + j] = r->rates[m + r->c + j];
   for (int i = 0; i < k; i++) b[i] = i < stuck ? -h[unknown[i]] : target[unknown[i] - m];
@@ -67,7 +67,7 @@ static int strike(Run *r, const int32_t *involved, int count, int plastic, doubl
   int m = r->m, c = r->c, carries = 0, choices = 1;
   int32_t *carried = r->pending, *taking = carried + r->width;
   int8_t *letter = (int8_t *)(r->pending + 2 * r->width);
-  double *target = r->rates + 2 * (m + 2 * c), *x = r->x;
+  double *target = r->rates + 2 * r->kept_rows, *x = r->x;
   const double *h = surface_values(r, x);
   if (!plastic) values_run(&r->s->restitution, x, r->p, r->restitution);
   for (int j = 0; j < c; j++) {
@@ -79,7 +79,7 @@ static int strike(Run *r, const int32_t *involved, int count, int plastic, doubl
     for (int q = 0; q < count; q++) borne |= r->s->carries[i * c + involved[q]];
     if (borne) { carried[carries++] = i; choices = choices < 100000 ? 3 * choices : choices; }
   }
-  if (count > 12 || choices > 100000) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+  if (count > 12 || choices > 100000) { many_may_hold(r); return 0; }
   for (int size = count; size > 0; size--)
     for (int set = (1 << count) - 1; set > 0; set--) {
       int takes = 0;

@@ -28,7 +28,7 @@ typedef struct {
 /* Of a guard that ended the mode before so many coefficients vanish. */
 typedef struct { int kind, index, side, zeros; } Known;
 
-static int degree_of(const Run *r, int i) { return i < r->m ? 1 : 2; }
+static int degree_of(const Run *r, int i) { return i < r->m ? r->s->degree[i] : 2; }
 
 /* Lemke's method ------------------------------------------------------------------------------------ */
 
@@ -602,7 +602,7 @@ static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
 /* Rounding of the states' coefficients, and of the rows of each order: what is zero at rest is not compared with
  * itself. */
 static void read_noise(Run *r, Decision *d) {
-  int k = d->count, w = r->width, m = r->m, c = r->c, all = m + 2 * c, first = 2 * w + r->s->slope.count;
+  int k = d->count, w = r->width, all = r->kept_rows, first = 2 * w + r->s->slope.count;
   double *ones = r->vector + r->n + w, *steep = r->small, *height = r->rates + all;
   d->field = d->rate = 0;
   for (int i = 0; i < r->n; i++) ones[i] = 1;
@@ -612,7 +612,7 @@ static void read_noise(Run *r, Decision *d) {
   gradient_sums(r, &r->s->surfaces, r->heights, all, &r->s->surface_gradient, all, ones, 1, height);
   for (int i = 0; i < k; i++) {
     int own = d->own[i];
-    double of = height[own < m ? own : own + c];
+    double of = height[own >= r->m ? own + r->c : degree_of(r, own) > 1 ? r->s->lower_first[own + 1] - 1 : own];
     d->steep[i] = steep[own];
     if (!(of > 0)) continue;
     d->field = larger(d->field, d->yard[i] / of);
@@ -937,7 +937,7 @@ static void begin_decision(Decision *d) {
 
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
-  if (r->s->continuous[surface]) return 0;
+  if (r->s->continuous[surface] || r->s->degree[surface] > 1) return 0;
   double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
   for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
@@ -984,20 +984,26 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
   if (l->slides && !improve(r, l, r->x, r->chosen.unknowns, 1)) return 0;
   memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < l->rows; row++)
-    if (l->kind[row] == SURFACE_GUARD && l->index[row] == own) r->chosen.drop[row] = exits ? 2 : 1;
+    if (l->kind[row] == SURFACE_GUARD && l->index[row] == own) r->chosen.drop[row] = degree_of(r, own) + exits;
   return 1;
 }
 
-/* What is to be said of a point without a motion. */
-static int no_motion(Run *r, int contacts) {
+/* Where no mode continues: stay where all orbits spiral in, or say why the run ends. */
+static int no_motion(Run *r, const int8_t *letter) {
+  int contacts = 0, k = r->active_count;
+  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
+  if (r->status != RUNNING) return 0;
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
-  else if (meets_sets(r)) finish(r, HAND_OVER, NO_REASON, 0); /* M is singular, or nearly */
-  else if (r->active_count == 2 && r->n == 2) finish(r, HAND_OVER, NO_REASON, 0); /* orbits may spiral in */
-  else if (r->active_count > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
-  else finish(r, HAND_OVER, NO_REASON, 0); /* a degenerate tangency: other programs tell zeros apart */
+  else if (meets_sets(r)) finish(r, NON_UNIQUE, UNDETERMINED, 0);
+  else if (k == 2 && spirals_in(r, letter) && hold_there(r, letter)) return 1;
+  else if (k > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
+  else finish(r, NON_UNIQUE, DEGENERATE, 0);
   return 0;
 }
 
+static int is_mixed(const Run *r, const int32_t *own, int count);
+static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count);
+static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int decide_sets(Run *r, const int8_t *letter, const Known *known, int known_count);
 
 /* Choose, as r->chosen, the motion that continues from a point of the active elements; 0 if the run ends.
@@ -1006,23 +1012,23 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
   Decision *d = r->decision;
   int k = r->active_count, contacts = 0, several = 0;
   if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
+  if (is_mixed(r, r->active, k)) return decide_in_layer(r, letter, known, known_count);
   if (k == 1 && decide_by_rates(r, letter, known, known_count)) return 1;
   for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
   if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {
     finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);
     return 0;
   }
-  if (!r->s->affine && k > 1) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
   d->count = k;
   d->letter = letter;
   d->motions = d->branches = d->unstable = r->several_count = 0;
-  if (!read_law(r, d, letter)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+  if (!read_law(r, d, letter)) return try_modes(r, letter, known, known_count);
   find_blocks(d);
   begin_decision(d);
   read_old(r, d, letter, known, known_count);
   find_touched(d, letter);
   explore(r, d, 0, 0);
-  if (!d->motions) return no_motion(r, contacts);
+  if (!d->motions) return no_motion(r, letter);
   for (int i = 0; i < d->motions; i++) {
     int is_new = 1;
     for (int j = 0; j < i; j++) is_new &= !is_same_motion(r, d->motion + i, d->motion + j);

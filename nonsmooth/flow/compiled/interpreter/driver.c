@@ -25,21 +25,31 @@ static void adopt(Run *r, const Continuation *c) {
   memcpy(r->unknowns, c->unknowns, sizeof(double) * r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
+  r->repelling = 0;
   if (alike) return;
-  int shown = r->mode;
+  int shown = shown_number(r, r->letter);
   if (r->s->sets && shown == r->shown) { /* a set is passed again: another stretch, of the same letters */
     int8_t *letter = (int8_t *)r->heights_of;
     for (int i = 0; i < r->width; i++) letter[i] = r->letter[i] == LEAVING ? LEAVING_AGAIN : r->letter[i];
-    shown = mode_number(r->table, letter);
+    shown = shown_number(r, letter);
   }
   r->shown = shown;
   enter_segment(r, shown);
+}
+
+/* A surface that would come to rest though its multiplier enters only its third derivative or a later one: motions
+ * leave such a point by infinitely many switchings. -1 if there is none. */
+static int rests_unstably(const Run *r, const int8_t *letter) {
+  for (int i = 0; i < r->m; i++) if (r->s->degree[i] > 2 && letter[i] == 0 && r->letter[i] != 0) return i;
+  return -1;
 }
 
 /* Adopt the mode that continues; 0 where there is none or more than one. */
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count) {
   if (r->active_count) {
     if (!decide(r, letter, known, known_count)) return 0;
+    int unstable = rests_unstably(r, r->chosen.letter);
+    if (unstable >= 0) { finish(r, NON_UNIQUE, HIGH_DEGREE, unstable); return 0; }
   } else {
     memcpy(r->chosen.letter, letter, r->width);
     memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
@@ -54,7 +64,8 @@ static int letters_of(Run *r, int8_t *letter) {
   if (!r->width) return 1;
   const double *h = surface_values(r, r->x);
   int finite = finite_all(h, r->m + 2 * r->c);
-  for (int i = 0; i < r->width; i++) letter[i] = set_of(r, i) >= 0 ? OFF : i >= r->m || h[i] > 0 ? 1 : -1;
+  for (int i = 0; i < r->width; i++) letter[i] = set_of(r, i) >= 0 ? off_letter(r, i) : i >= r->m || h[i] > 0 ? 1 : -1;
+  take_sides(r, letter, -1);
   return finite;
 }
 
@@ -79,99 +90,59 @@ static void settle_in(Run *r) {
   strike_due(r);
 }
 
+/* Guards of the active elements in the mode that a run starts in: whether it can. Sliding from which both sides lead
+ * away is kept. */
+static int can_start(Run *r) {
+  Expansion *e = &r->e;
+  int exits = 0, holds = 1;
+  double most = -INFINITY, least = INFINITY;
+  expand(r, r->letter, r->x, r->unknowns, e);
+  for (int row = 0; row < e->l.rows; row++) {
+    int kind = e->l.kind[row], index = e->l.index[row], active = 0;
+    if (kind != SURFACE_GUARD && kind != EXIT_GUARD && kind != SLIP_GUARD && kind != NEAR_GUARD) continue;
+    if (kind == NEAR_GUARD && r->letter[index] == 0) continue; /* ends steps only */
+    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == index;
+    if (!active) continue;
+    double value;
+    r->drop[row] = leading(r, e, row, kind == SURFACE_GUARD || kind == NEAR_GUARD, &value);
+    if (kind != EXIT_GUARD) { holds &= value >= 0; continue; }
+    exits = 1;
+    most = larger(value, most);
+    least = smaller(value, least);
+  }
+  r->repelling = exits && most <= 0 && least < 0;
+  return holds && (!exits || r->repelling || least >= 0);
+}
+
 static void start_in(Run *r, const int8_t *asked) {
+  Solutions all = {0};
+  int8_t *letter = r->start;
   for (int i = 0; i < r->width; i++) {
     int active = 0;
     for (int j = 0; j < r->active_count; j++) active |= r->active[j] == i;
-    if (!active && asked[i] != r->letter[i]) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+    letter[i] = asked[i];
+    if (set_of(r, i) >= 0 && asked[i] == OFF) letter[i] = active ? LEAVING : r->letter[i] == IDLE ? IDLE : OFF;
+    if (!active && letter[i] != r->letter[i]) { finish(r, NON_UNIQUE, WRONG_START, r->mode); return; }
   }
-  memset(r->unknowns, 0, sizeof(double) * r->width);
-  memcpy(r->letter, asked, r->width);
+  memcpy(r->letter, letter, r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
-  if (!is_known(r, &r->now) || !improve(r, &r->now, r->x, r->unknowns, 1)) { finish(r, HAND_OVER, NO_REASON, 0); return; }
-  Expansion *e = &r->e;
-  expand(r, r->letter, r->x, r->unknowns, e);
-  for (int row = 0; row < e->l.rows; row++) {
-    int kind = e->l.kind[row], active = 0;
-    if (kind != SURFACE_GUARD && kind != EXIT_GUARD) continue;
-    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == e->l.index[row];
-    if (!active) continue;
-    double value;
-    int k = leading(r, e, row, kind == SURFACE_GUARD, &value);
-    r->drop[row] = k;
-    if (value < 0) { /* repelling sliding, or a mode that cannot hold: the reference knows which */
-      finish(r, HAND_OVER, NO_REASON, 0);
-      return;
-    }
-  }
+  mode_solutions(r, &r->now, &all);
+  if (all.count != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, all.count); return; }
+  memcpy(r->unknowns, all.each, sizeof(double) * r->width);
+  if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
 }
 
-/* After a reset that stays on its zero the motion turns round or passes; or it is pressed. */
-static void pass(Run *r, int row, int zeros, double value, int side) {
-  int heading = side ? -side : r->now.side[row];
-  if (zeros > 1 && value * heading > 0) {
-    r->limit = r->t;
-    finish(r, ACCUMULATION, PRESSED, r->now.index[row]);
-  }
-}
-
-/* The state after a reset; the time is kept. */
-static void reset_map(Run *r, int index, const double *x, double *after) {
-  int nd = r->s->dimension;
-  values_run(&r->s->maps, x, r->p, r->maps);
-  for (int i = 0; i < nd; i++) after[i] = out_of(&r->s->maps, r->maps, index * nd + i);
-  if (r->s->timed) after[nd] = x[nd];
-}
-
-/* Whether a start on the zero of a reset is met at once. */
-static int is_pressed(Run *r, int row, double value) {
-  if (r->now.side[row]) return value * r->now.side[row] > 0;
-  double *after = r->at_work, back;
-  reset_map(r, r->now.index[row], r->x, after);
-  expand(r, r->letter, after, r->unknowns, &r->trial);
-  int zeros = leading(r, &r->trial, row, 0, &back), least = zeros < r->drop[row] ? zeros : r->drop[row];
-  if (zeros > 0 && (back * value <= 0 || least > 1)) finish(r, NON_UNIQUE, TWO_SIDED, r->now.index[row]);
-  return 0;
-}
-
-/* The stop or reset, on whose zero the run stands, that is met; ``fired`` is the reset that led here or
- * -1. */
-static void arm(Run *r, int fired) {
-  int needed = 0;
-  r->due = -1;
-  if (r->status != RUNNING) return;
-  for (int j = 0; j < r->now.rows; j++) needed |= r->now.kind[j] == STOP_GUARD || r->now.kind[j] == RESET_GUARD;
-  if (!needed) return;
-  expand(r, r->letter, r->x, r->unknowns, &r->e);
-  for (int j = 0; j < r->now.rows; j++) {
-    int kind = r->now.kind[j], resets = kind == RESET_GUARD, met = 0;
-    double value;
-    if (kind != STOP_GUARD && !resets) continue;
-    r->drop[j] = leading(r, &r->e, j, 0, &value);
-    int32_t *kept = side_of(r, &r->now, j), side = *kept;
-    if (r->drop[j] == 0) *kept = value > 0 ? 1 : -1; /* where a jump carried it is no passage */
-    if (r->drop[j] == 0 || value == 0) continue;
-    if (resets && r->now.index[j] == fired) pass(r, j, r->drop[j], value, side);
-    else if (resets && r->fired[r->now.index[j]]) continue;
-    else if (side) met = side * value < 0 && side * r->now.side[j] <= 0;
-    else if (resets) met = is_pressed(r, j, value);
-    if (met && (r->due < 0 || PRIORITY[kind] < PRIORITY[r->now.kind[r->due]])) r->due = j;
-  }
-}
-
-static void begin(Run *r, const int8_t *start_mode) {
+static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   note(r);
+  find_idle(r);
   int finite = letters_of(r, r->letter);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
   if (!finite) { finish(r, NOT_FINITE, SURFACE, 0); return; }
-  if (r->s->sets && (start_mode || without_friction(r))) { finish(r, HAND_OVER, NO_REASON, 0); return; }
   active_surfaces(r, -1, r->letter);
   if (r->status == RUNNING) {
-    int surfaces = 0;
-    while (surfaces < r->active_count && r->active[surfaces] < r->m) surfaces++;
-    project(r, r->active, surfaces);
+    project(r, r->involved, gather(r, -1, r->m, r->involved));
     renote(r);
     if (start_mode) start_in(r, start_mode);
     else if (r->active_count) {
@@ -179,27 +150,10 @@ static void begin(Run *r, const int8_t *start_mode) {
       choose(r, r->start, 0, 0);
     }
   }
-  r->shown = r->mode;
-  enter_segment(r, r->mode);
+  r->shown = shown_number(r, r->letter);
+  enter_segment(r, r->shown);
   strike_due(r);
-  arm(r, -1);
-}
-
-static void reset(Run *r, int row) {
-  double *x = r->before;
-  int before = r->mode, index = r->now.index[row];
-  memcpy(x, r->x, sizeof(double) * r->n);
-  reset_map(r, index, x, r->x);
-  if (finite_all(r->x, r->s->dimension)) {
-    note(r);
-    settle_in(r);
-  } else {
-    memcpy(r->x, x, sizeof(double) * r->n);
-    finish(r, NOT_FINITE, RESET_MAP, index);
-  }
-  event(r, RESET, before, row, x);
-  r->fired[index] = 1;
-  arm(r, index);
+  begin_events(r, motion);
 }
 
 /* Functions that are kept, and gaps that are negative by no more than the tolerance: by what the root's error
@@ -236,7 +190,6 @@ static void impact(Run *r, int row) {
   note(r);
   settle_in(r);
   event(r, IMPACT, before, row, x);
-  arm(r, -1);
 }
 
 static void release(Run *r, int row) {
@@ -259,34 +212,32 @@ static void watch_two_fold(Run *r) {
   if (s >= 0 && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
 }
 
+static int rest_at_limit(Run *r, int before);
+
 static void serve(Run *r, int row) {
   int kind = r->now.kind[row], index = r->now.index[row], side = r->now.side[row], before = r->mode;
   r->met = (Met){kind, index, side};
-  if (kind == STOP_GUARD) {
-    event(r, STOP, r->mode, row, r->x);
-    finish(r, STOPPED, NO_REASON, index);
-  } else if (kind == RESET_GUARD) reset(r, row);
-  else if (kind == IMPACT_GUARD) impact(r, row);
+  if (kind == IMPACT_GUARD) impact(r, row);
   else if (kind == RELEASE_GUARD) release(r, row);
   else if (kind == NEAR_GUARD) near_set(r, row, 1);
   else {
-    Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, 2}};
+    Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, kind == EXIT_GUARD ? r->s->degree[index] + 1 : 2}};
     if (kind == SLIP_GUARD) {
       known[0] = (Known){SLIP_GUARD, index, 0, 1};
       known[1] = (Known){NEAR_GUARD, index, 0, 2};
     }
     active_surfaces(r, index, r->letter);
     if (r->status != RUNNING) return;
-    int kept = 0; /* contacts among them keep their gaps */
-    for (int i = 0; i < r->active_count; i++) r->involved[kept++] = r->active[i];
-    project(r, r->involved, kept);
+    project(r, r->involved, gather(r, index, r->width, r->involved));
     renote(r);
     if (kind == SLIP_GUARD) {}
     else if (kind != SURFACE_GUARD) watch_two_fold(r);
     else if (!is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
     if (r->status != RUNNING) return;
     memcpy(r->start, r->letter, r->width);
-    if (choose(r, r->start, known, kind == EXIT_GUARD || kind == SLIP_GUARD ? 2 : 0) && r->mode != before)
+    take_sides(r, r->start, index);
+    if (choose(r, r->start, known, kind == EXIT_GUARD || kind == SLIP_GUARD ? 2 : 0) && r->mode != before
+        && !rest_at_limit(r, before))
       event(r, change_kind(r, before, r->mode), before, row, r->x);
   }
 }
@@ -318,19 +269,40 @@ static int advance(Run *r, const Expansion *e, double dt) {
   return 1;
 }
 
+static int ends_at_singular(Run *r);
+
+/* Leave a point where only low derivatives exist; guards are looked at after the step. */
+static void leave_singular(Run *r, Expansion *e, double left) {
+  int huge = 0;
+  for (int i = 0; i < r->n; i++)
+    for (int k = 0; k < 2; k++) huge |= fabs(e->states[(int64_t)i * r->stride + k]) > HUGE;
+  double h = singular_step(r, e, smaller(left, r->o.max_step));
+  if ((h == 0 || huge) && !ends_at_singular(r)) finish(r, NOT_FINITE, FIELD, 0);
+  if (r->status != RUNNING) return;
+  if (!advance(r, e, h) || !r->s->rules.atoms) return;
+  expand(r, r->letter, r->x, r->unknowns, e);
+  for (int a = 0; a < r->s->rules.atoms; a++) /* sides that the start did not have */
+    if (!r->instant.side[a]) r->instant.side[a] = (int8_t)ns_sign(e->guards[(int64_t)(e->l.atoms + a) * r->stride]);
+}
+
 static void step(Run *r) {
-  if (r->due >= 0) { serve(r, r->due); return; }
-  if (r->due_impact >= 0) { serve(r, r->due_impact); return; }
+  if (r->instant.running) { instant_next(r); return; }
+  if (r->due_impact >= 0) { serve_between(r, r->due_impact); return; }
   double left = r->o.t_end - r->t - r->t_low, dt = 0;
   if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
   if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
   Expansion *e = &r->e;
   expand(r, r->letter, r->x, r->unknowns, e);
-  if (!e->finite) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+  if (!e->finite) { leave_singular(r, e, left); return; }
   double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
   if (h <= SHORTEST * time_scale(r) && h < left) {
     finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
     return;
+  }
+  if (is_fold_ahead(r, e, by_series)) {
+    int fold = reach_fold(r, e, left);
+    if (fold >= 0) serve_between(r, fold);
+    if (fold >= 0 || r->status != RUNNING) return;
   }
   int last = h >= left;
   if (last) h = left;
@@ -347,11 +319,12 @@ static void step(Run *r) {
   r->length = dt == wanted ? h : dt;
   int swallowed = dt < wanted && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
   if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
-  if (dt < wanted) { row = -1; last = 0; }
-  if (dt > 0) {
-    note_sides(r, e, dt);
-    memset(r->fired, 0, sizeof(int32_t) * (r->s->resets + 1));
+  if (dt < wanted) {
+    row = -1;
+    last = 0;
+    memset(r->instant.passing, 0, r->s->rules.atoms);
   }
+  if (dt > 0) note_sides(r, e, dt);
   r->falls = row >= 0 && is_steep(r, e, row, dt);
   last &= dt == h;
   if (!advance(r, e, dt)) return;
@@ -361,7 +334,8 @@ static void step(Run *r) {
     if (r->s->timed) r->x[r->n - 1] = r->t;
     if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
   }
-  if (row >= 0) serve(r, row);
+  if (row >= 0 && is_atom(r->now.kind[row])) arrive(r, e, dt, r->instant.tied);
+  else if (row >= 0) serve_between(r, row);
   else if (!last) {
     if (r->s->sets) look_at_sets(r);
     watch_two_fold(r);

@@ -10,7 +10,8 @@ Run *run_new(const System *s, Table *table) {
   r->table = table;
   r->n = s->n; r->m = s->m; r->c = s->c; r->width = s->m + s->c;
   r->order = s->order; r->stride = s->order + 1;
-  r->guards = 3 * s->m + 2 * s->c + s->stops + s->resets + 2;
+  r->kept_rows = s->lower_first[s->m];
+  r->guards = 3 * s->m + 2 * s->c + s->rules.atoms + 2;
   r->arena = calloc(1, place_run(r, 0));
   if (!r->arena) { free(r); return 0; }
   place_run(r, r->arena);
@@ -23,7 +24,7 @@ void run_free(Run *r) { free(r->arena); free(r); }
 void run_ask(Run *r, const double *times, int64_t count) { r->asked = times; r->asked_count = count; }
 
 void run_begin(Run *r, const Options *o, const Output *out, const double *x, const double *p,
-               const int8_t *start_mode, double t) {
+               const int8_t *start_mode, double t, const double *motion) {
   const System *s = r->s;
   r->o = *o;
   r->size = o->atol / o->rtol;
@@ -38,8 +39,11 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   values_prepare(&s->columns, r->p, r->columns);
   memset(r->unknowns, 0, sizeof(double) * r->width);
   memset(r->drop, 0, sizeof(int32_t) * r->guards);
-  memset(r->side, 0, sizeof(int32_t) * (s->stops + s->resets + 1));
-  memset(r->fired, 0, sizeof(int32_t) * (s->resets + 1));
+  values_prepare(&s->atoms, r->p, r->atom_work);
+  values_prepare(&s->choices, r->p, r->choice_work);
+  r->instant.running = 0;
+  r->instant.tied = -1;
+  memset(r->instant.passing, 0, s->rules.atoms);
   memset(r->kinds, 0, sizeof r->kinds);
   r->step_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
   r->itinerary = r->active_count = r->several_count = 0;
@@ -50,12 +54,14 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
+  r->met = (Met){0};
+  r->repelling = 0;
   r->reason = NO_REASON;
   r->where = 0;
   r->facts = 0;
   r->dependent = -1;
-  r->segment_mode = r->due = r->due_impact = r->length_mode = -1;
-  if (finite_all(r->x, r->n)) { begin(r, start_mode); return; }
+  r->segment_mode = r->due_impact = r->length_mode = -1;
+  if (finite_all(r->x, r->n)) { begin(r, start_mode, motion); return; }
   memset(r->letter, 1, r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
@@ -87,6 +93,9 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
   memcpy(active, r->active, sizeof(int32_t) * r->active_count);
   memcpy(several, r->several, sizeof(int32_t) * r->several_count);
 }
+
+/* What a restart needs, besides the state. */
+void run_motion(const Run *r, double *to) { if (r->s->rules.width) write_motion(r, to); }
 
 /* Go on with larger arrays of the same content. */
 void run_resume(Run *r, const Output *out) { r->out = *out; }
@@ -123,7 +132,7 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
     int64_t k = *next / 2, i = b->which ? b->which[k] : k;
     if (*next % 2 == 0) {
       sample_into(r, b, i);
-      run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, start_mode, b->t0);
+      run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, start_mode, b->t0, 0);
     }
     *next |= 1;
     if (go_on(r, &budget) == RUNNING) return 1;

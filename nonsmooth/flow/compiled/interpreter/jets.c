@@ -7,7 +7,7 @@ static const double *row_of(const Run *r, int output) {
 static const double *slope_row(const Run *r, int i, int j) {
   static const double zero[P + 1];
   int output = r->s->slope_output[i * r->width + j];
-  return output < 0 ? zero : row_of(r, r->n + 3 * r->width + r->s->stops + r->s->resets + output);
+  return output < 0 ? zero : row_of(r, r->n + 3 * r->width + r->s->rules.atoms + output);
 }
 
 /* The slope of one multiplier, determinant and trace of that of two, or its diagonal, turned to begin
@@ -36,7 +36,6 @@ static void branch_rows(const Run *r, const Layout *l, int count, double *g) {
 
 /* Guards from the series (or, with count 1, values) of what they are made of. */
 static void guard_rows(Run *r, const Layout *l, const double *series, int count, double *guards) {
-  const System *s = r->s;
   int w = r->width, n = r->n, stride = r->stride;
   for (int row = 0; row < l->rows; row++) {
     int kind = l->kind[row], i = l->index[row], side = l->side[row];
@@ -60,7 +59,7 @@ static void guard_rows(Run *r, const Layout *l, const double *series, int count,
       branch_rows(r, l, count, g);
       break;
     } else {
-      const double *stop = row_of(r, n + 3 * w + i + (kind == RESET_GUARD ? r->s->stops : 0));
+      const double *stop = row_of(r, n + 3 * w + row - l->atoms);
       memcpy(g, stop, sizeof(double) * count);
     }
   }
@@ -209,9 +208,6 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
   }
   e->finite = is_finite(r, e);
 }
-
-/* Whether the multipliers of a mode are the only ones: those that enter in products may have several values. */
-static int is_known(const Run *r, const Layout *l) { return r->s->affine || l->slides < 2; }
 
 /* The step of Newton's method where the layer's slope has no inverse; 0 where there is none. */
 static int step_dependent(Run *r, const Layout *l, const double *unknowns, double *b) {

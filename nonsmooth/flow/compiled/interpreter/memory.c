@@ -51,6 +51,22 @@ static size_t place_continuation(Continuation *c, char *base, size_t used, int w
   return used;
 }
 
+static size_t place_instant(Instant *i, char *base, size_t used, const System *s) {
+  int atoms = s->rules.atoms, triggers = s->rules.triggers, clocks = s->rules.clocks;
+  int8_t **flags[] = {&i->side, &i->view, &i->now, &i->passing, &i->zero};
+  for (int k = 0; k < 5; k++) *flags[k] = LETTERS(atoms);
+  i->pending = LETTERS(triggers);
+  i->was = LETTERS(triggers);
+  i->value = DOUBLES(atoms);
+  i->noise = DOUBLES(atoms);
+  i->residual = DOUBLES(atoms);
+  i->trigger_x = DOUBLES(s->rules.keeps ? (size_t)triggers * s->n : 0);
+  i->arrived = DOUBLES(s->n);
+  i->tick = DOUBLES(clocks);
+  i->count = place(base, &used, sizeof(int64_t), (size_t)clocks);
+  return used;
+}
+
 /* Lemke's method on a block of all takes most of it. */
 static size_t place_decision(Run *r, char *base, size_t used) {
   size_t w = r->width, square = w * w, orders = (ORDERS + 1) * w;
@@ -76,7 +92,7 @@ static size_t place_decision(Run *r, char *base, size_t used) {
 
 static size_t place_run(Run *r, char *base) {
   const System *s = r->s;
-  int n = r->n, w = r->width, c = r->c, all = r->m + 2 * c, g = r->guards, stride = r->stride;
+  int n = r->n, w = r->width, c = r->c, all = r->kept_rows, g = r->guards, stride = r->stride;
   size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
   used = place_layout(&r->now, base, used, w, g);
   used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets);
@@ -92,11 +108,12 @@ static size_t place_run(Run *r, char *base) {
   r->saved = DOUBLES(n);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
+  r->tried = DOUBLES(w);
+  r->solutions = DOUBLES(SOLUTIONS * w);
+  r->tried_letter = LETTERS(2 * w);
   r->drop = INTEGERS(g);
-  r->side = INTEGERS(s->stops + s->resets);
-  r->fired = INTEGERS(s->resets);
   r->active = INTEGERS(w);
-  r->involved = INTEGERS(3 * w + 1);
+  r->involved = INTEGERS(3 * w + 2 * all + 1);
   r->p = DOUBLES(s->parameters);
   r->series = DOUBLES((size_t)s->series.size * stride);
   r->point = DOUBLES(s->point.size);
@@ -115,7 +132,10 @@ static size_t place_run(Run *r, char *base) {
   r->rates = DOUBLES(2 * all + c);
   r->lam = DOUBLES(2 * w);
   r->matrix = DOUBLES(square + 6 * w + all + 2 * c);
-  r->small = DOUBLES(4 * w + s->stops + s->resets);
+  r->small = DOUBLES(4 * w + s->rules.atoms);
+  r->atom_work = DOUBLES(s->atoms.size);
+  r->choice_work = DOUBLES(s->choices.size);
+  used = place_instant(&r->instant, base, used, s);
   r->pending = INTEGERS(6 * w + 2 * all);
   r->sparse = INTEGERS(square + 2 * w + 1);
   r->direction = DOUBLES(w);
@@ -123,7 +143,11 @@ static size_t place_run(Run *r, char *base) {
   r->heights_of = DOUBLES(w);
   r->aside = DOUBLES(2 * n);
   r->moving = LETTERS(w);
-  r->root = DOUBLES(g);
+  r->idle = LETTERS(s->sets);
+  r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
+  r->of_defect = DOUBLES(g);
+  r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
+  r->key = LETTERS(w + 8 * s->rules.discrete);
   r->met_at = DOUBLES(g);
   return used;
 }

@@ -22,6 +22,8 @@ static int add_row(Layout *l, int kind, int index, int side) {
 
 static int is_pair(const Run *r, const Layout *l) { return l->slides == 2 && l->sliding[1] < r->m; }
 
+static int is_atom(int kind) { return kind == STOP_GUARD || kind == RESET_GUARD || kind == ATOM_GUARD; }
+
 /* Whether a guard is more than an affine function of the states, whose polynomial needs no check. */
 static int is_bent(const Run *r, int kind, int index) {
   const int32_t *bent = r->s->bent_guards;
@@ -29,7 +31,25 @@ static int is_bent(const Run *r, int kind, int index) {
   if (kind == IMPACT_GUARD) return bent[r->m + index];
   if (kind == STOP_GUARD) return bent[r->width + index];
   if (kind == RESET_GUARD) return bent[r->width + r->s->stops + index];
+  if (kind == ATOM_GUARD) return bent[r->width + r->s->stops + r->s->resets + index];
   return kind != BRANCH_GUARD;
+}
+
+/* Number of a mode, with values of the discrete states (or none) for those who look at it. */
+static int32_t numbered(const Run *r, const int8_t *letter, const double *values) {
+  int count = r->s->rules.discrete;
+  if (!count) return mode_number(r->table, letter);
+  memcpy(r->key, letter, r->width);
+  memset(r->key + r->width, 0, sizeof(double) * count);
+  for (int d = 0; values && d < count; d++) {
+    double value = values[d] + 0.0; /* not -0 */
+    memcpy(r->key + r->width + sizeof(double) * d, &value, sizeof(double));
+  }
+  return mode_number(r->table, r->key);
+}
+
+static int32_t shown_number(const Run *r, const int8_t *letter) {
+  return numbered(r, letter, r->x + r->s->dimension - r->s->rules.discrete);
 }
 
 static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
@@ -38,7 +58,7 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
   memmove(l->letter, letter, r->width);
   l->rows = l->slides = l->branches = 0;
   l->is_free = 1;
-  l->mode = mode_number(r->table, letter);
+  l->mode = numbered(r, letter, 0);
   for (int i = 0; i < r->width; i++) {
     l->is_free &= letter[i] != 0 && letter[i] != LEAVING;
     if (letter[i] == 0 && !is_idle(r, letter, i)) l->sliding[l->slides++] = i;
@@ -47,8 +67,12 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
     else if (letter[i]) add_row(l, SURFACE_GUARD, i, letter[i]);
     else { add_row(l, EXIT_GUARD, i, 1); add_row(l, EXIT_GUARD, i, -1); }
   }
-  for (int j = 0; j < r->s->stops; j++) add_row(l, STOP_GUARD, j, s->stop_direction[j]);
-  for (int j = 0; j < r->s->resets; j++) add_row(l, RESET_GUARD, j, s->reset_direction[j]);
+  l->atoms = l->rows;
+  for (int a = 0; a < s->rules.atoms; a++) {
+    int kind = a < s->stops ? STOP_GUARD : a < s->stops + s->resets ? RESET_GUARD : ATOM_GUARD;
+    int first = kind == STOP_GUARD ? 0 : kind == RESET_GUARD ? s->stops : s->stops + s->resets;
+    add_row(l, kind, a - first, s->rules.way[a]);
+  }
   int first = 0, w = r->width, moves = 0;
   for (int i = l->slides - 1; i >= 0; i--) if (l->sliding[i] < r->m) first = l->sliding[i];
   if (is_pair(r, l)) {
@@ -116,7 +140,7 @@ typedef struct { double *layer, *height, *stop, *factor; } Sums;
 static void point_sums(const Run *r, int is_free, const double *vector, int finite_only, const Sums *to) {
   const System *s = r->s;
   const Values *t = &s->point;
-  int w = r->width, first = 2 * w + s->slope.count, stops = r->s->stops + r->s->resets;
+  int w = r->width, first = 2 * w + s->slope.count, stops = r->s->rules.atoms;
   if (!is_free) gradient_sums(r, t, r->point, first, &s->layer_gradient, w, vector, finite_only, to->layer);
   first += s->layer_gradient.count;
   gradient_sums(r, t, r->point, first, &s->height_gradient, w, vector, finite_only, to->height);
@@ -129,7 +153,7 @@ static void point_sums(const Run *r, int is_free, const double *vector, int fini
 /* Error scales of the guards from those of surfaces, of sliding multipliers and of stops. */
 static void guard_sums(Run *r, const Expansion *e, const double *vector, int finite_only, double *result) {
   const Layout *l = &e->l;
-  int w = r->width, slides = l->slides, stops = r->s->stops + r->s->resets;
+  int w = r->width, slides = l->slides, stops = r->s->rules.atoms;
   double *layer = r->small, *height = layer + w, *stop = height + w, *through = stop + stops, *factor = through + w;
   double worst = 0;
   point_sums(r, l->is_free, vector, finite_only, &(Sums){layer, height, stop, factor});
@@ -153,6 +177,7 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
     else if (kind == RELEASE_GUARD) result[row] = layer[r->m + index];
     else if (kind == STOP_GUARD) result[row] = stop[index];
     else if (kind == RESET_GUARD) result[row] = stop[r->s->stops + index];
+    else if (kind == ATOM_GUARD) result[row] = stop[r->s->stops + r->s->resets + index];
     else if (kind == NEAR_GUARD || kind == SLIP_GUARD) result[row] = set_sum(r, e, row, height, layer, factor);
     else result[row] = worst;
   }

@@ -7,7 +7,8 @@ static void note(Run *r) {
   memcpy(r->out.point_x + k * r->n, r->x, sizeof(double) * r->n);
 }
 
-static int shown_mode(const Run *r) { return r->s->sets ? r->shown : r->mode; }
+/* The mode in which a step is shown. */
+static int shown_mode(const Run *r) { return r->s->sets || r->s->rules.discrete ? r->shown : r->mode; }
 
 /* Write a step whose polynomials are in powers of the time since its start. Where that start is no number the
  * polynomials are moved to the number that it is rounded to. */
@@ -62,12 +63,17 @@ static void count_hit(Run *r, int kind, int guard, int index, int side, const do
   if ((o->hit_side && side != o->hit_side) || r->t - r->begun + r->t_low <= AT_END * larger(1, time_scale(r))) return;
   r->hits++;
   if (r->hits <= o->hit_skip || (r->hits - o->hit_skip) % o->hit_every) return;
-  sample(r, r->t, o->hit_after ? r->x : x);
-  if (o->hit_count && r->hits >= o->hit_skip + o->hit_every * o->hit_count)
-    finish(r, STOPPED, SAMPLED, (int)o->hit_count);
+  /* Before the jumps of the instant, or after them. */
+  Instant *i = &r->instant;
+  int is_last = o->hit_count && r->hits >= o->hit_skip + o->hit_every * o->hit_count;
+  sample(r, r->t, o->hit_after ? r->x : i->running && i->jumps > (kind == RESET) ? i->arrived : x);
+  if (o->hit_after && i->running) { i->sampled = r->kept; i->is_last = is_last; }
+  else if (is_last) finish(r, STOPPED, SAMPLED, (int)o->hit_count);
 }
 
-static void watch_accumulation(Run *r, int kind, int before, int guard);
+static void remember(Run *r, int kind, int guard);
+static void see_limit(Run *r);
+static void write_motion(const Run *r, double *to);
 
 /* ``x`` is the state at the event, the present one unless the event changed it; ``guard`` a row of the mode
  * before, or -1. */
@@ -87,10 +93,13 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
     r->out.event_before[k] = before;
     r->out.event_after[k] = r->mode;
     r->out.event_guard[k] = guard;
+    if (r->s->rules.width) write_motion(r, r->out.event_motion + k * r->s->rules.width);
   }
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, r->met.index, r->met.side, x);
   if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, 0, 0, x); /* impacts that accumulated */
   if (kind == END || kind == STOP) return;
-  watch_accumulation(r, kind, before, guard);
+  remember(r, kind, guard);
+  if (r->instant.running) return; /* at the end of the instant */
+  see_limit(r);
   if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
 }

@@ -18,6 +18,7 @@ static double unit_of(const double *h, int k, double *u) {
 
 static int first_of(const Run *r, int set) { return r->s->set_first[set]; }
 static int size_of(const Run *r, int set) { return r->s->set_size[set]; }
+static int off_letter(const Run *r, int i) { return r->idle[r->s->set_of[i]] ? IDLE : OFF; }
 static int set_of(const Run *r, int i) { return r->s->sets && i < r->m ? r->s->set_of[i] : -1; }
 
 /* Multipliers of the sets at a state; ``unknowns`` are h of those left behind, and directions of those that are
@@ -27,8 +28,8 @@ static void aim(Run *r, const int8_t *letter, const double *x, const double *unk
   for (int s = 0; s < r->s->sets; s++) {
     int f = first_of(r, s), k = size_of(r, s);
     double *u = r->direction + f;
-    for (int i = f; i < f + k; i++) r->moving[i] = letter[f] > 1;
-    if (letter[f] < OFF) { for (int i = 0; i < k; i++) u[i] = 0; continue; }
+    for (int i = f; i < f + k; i++) r->moving[i] = letter[f] > 1 && letter[f] != IDLE;
+    if (letter[f] < OFF || letter[f] == IDLE) { for (int i = 0; i < k; i++) u[i] = 0; continue; }
     if (letter[f] != OFF) { unit_of(unknowns + f, k, u); continue; }
     if (!h) {
       values_run(&r->s->surfaces, x, r->p, r->heights);
@@ -42,7 +43,7 @@ static void aim(Run *r, const int8_t *letter, const double *x, const double *unk
 /* As the expansion began. */
 static void aim_again(Run *r, const Expansion *e) {
   for (int i = 0; r->s->sets && i < r->m; i++) {
-    r->moving[i] = e->l.letter[i] > 1;
+    r->moving[i] = e->l.letter[i] > 1 && e->l.letter[i] != IDLE;
     r->direction[i] = set_of(r, i) < 0 ? 0 : e->lambda[(int64_t)i * r->stride];
   }
 }
@@ -274,7 +275,7 @@ static double set_sum(Run *r, const Expansion *e, int row, const double *height,
 
 /* The rows of a set in a layout. */
 static void lay_out_set(const Run *r, Layout *l, int i) {
-  if (i != r->s->set_first[r->s->set_of[i]]) return;
+  if (i != r->s->set_first[r->s->set_of[i]] || l->letter[i] == IDLE) return;
   l->kind[l->rows] = l->letter[i] ? NEAR_GUARD : SLIP_GUARD;
   l->index[l->rows] = i; l->side[l->rows++] = 0;
   if (l->letter[i] || !r->s->scaled[i]) return;

@@ -12,6 +12,15 @@
 /* Entries of a sparse matrix in the order of a program's outputs. */
 typedef struct { int32_t count, pad; const int32_t *row, *column; } Entries;
 
+/* Conditions of stops and resets; ``trigger_at``, ``filter_at`` and ``value_at`` say where each begins. */
+typedef struct {
+  int32_t atoms, triggers, clocks, discrete, keeps, width; /* keeps: states when due are kept; width: of a motion */
+  const int32_t *way; /* how each atom is located: falling, either way, rising, UNWATCHED */
+  const int32_t *trigger_event, *trigger_at, *condition, *filter_at, *filter, *flags, *initially, *named;
+  const int32_t *clock_reset, *clock_state, *value_at;
+  const double *value; /* of discrete states */
+} Rules;
+
 typedef struct {
   int32_t n, dimension, timed, m, c, parameters, stops, resets, order, slope_outputs;
   Series series;      /* field, layer, surfaces and gaps, factors, stops and resets, slope_outputs slopes */
@@ -19,10 +28,12 @@ typedef struct {
   Values point;       /* layer, factors, entries of slope, gradients of layer, surfaces and gaps, stops, factors */
   Values surfaces;    /* surfaces, gaps, rates of gaps; entries of their gradients */
   Values maps;        /* states after each reset */
+  Values atoms;       /* guards of stops and resets, further functions of conditions; entries of their gradients */
+  Values choices;     /* filters and priorities of stops and resets, periods of clocks */
   Values restitution; /* of each impact */
   Values columns;     /* entries of the field's derivatives by the unknowns */
-  Entries slope, layer_gradient, height_gradient, stop_gradient, factor_gradient, surface_gradient, column;
-  const int32_t *stop_direction, *reset_direction, *continuous, *scaled, *carries, *component;
+  Entries slope, layer_gradient, height_gradient, stop_gradient, factor_gradient, surface_gradient, atom_gradient, column;
+  const int32_t *continuous, *scaled, *carries, *component;
   const int32_t *slope_output, *slope_moves; /* (m + c, m + c): output of the series or -1; whether it moves */
   int32_t linear, linear_free; /* whether field and guards are affine: in any mode, where nothing slides */
   /* Field's rows in any mode, where nothing slides; surfaces and gaps, stops and resets: 0 if affine, with sines of
@@ -30,15 +41,28 @@ typedef struct {
   const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
   int32_t sets; /* of codimension two and more */
+  const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   const int32_t *set_first, *set_size, *set_of; /* by set; the set of each switching function or -1 */
+  /* Of each surface the derivative of h that its multiplier enters; where those between are among what is kept. */
+  const int32_t *degree, *lower_first;
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
   int32_t early_count, early_free_count;
+  Rules rules;
 } System;
+
+/* What happens at one time (events.c). Of atoms: sides, as the jumps have made them, as evaluated now; those that are
+ * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before. */
+typedef struct {
+  int32_t running, first, settled, unsettled, last, tied, is_last;
+  int64_t jumps, counted, sampled, *count;
+  int8_t *side, *view, *now, *passing, *zero, *pending, *was;
+  double *value, *noise, *residual, *trigger_x, *arrived, *tick;
+} Instant;
 
 /* The guards of a mode, and what slides in it. */
 typedef struct {
   int8_t *letter; /* +1, -1, 0 for each surface; +1, 0 for open and closed contacts; see sets.c */
-  int32_t rows, slides, mode, branches, is_free; /* free: no letter is 0 */
+  int32_t rows, atoms, slides, mode, branches, is_free; /* atoms: first row of stops and resets; free: no letter is 0 */
   int32_t *sliding, *kind, *index, *side, *bent, bent_count; /* bent: guards that a step is checked with */
 } Layout;
 
@@ -51,8 +75,8 @@ typedef struct {
   double *lambda, *apart, *root, *rates, *slopes, *radius, *per_radius;
 } Expansion;
 
-/* Letters of a set: off it, its first step away from it, h carried along after that. */
-enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5 };
+/* Letters of a set: off it, h carried along after that, its first step away from it, and one without friction. */
+enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5, IDLE = 6 };
 
 /* A mode that can continue, and the zeros of its guards. */
 typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Continuation;
@@ -79,7 +103,7 @@ typedef struct { Tree tree; int32_t width, count, room; int8_t *letter; int32_t 
 /* What a run writes, when dense: steps, points and events, into arrays that the caller makes larger when full. */
 typedef struct {
   int64_t steps, points, events, step_room, point_room, event_room;
-  double *start, *coefficients, *point_t, *point_x, *event_t, *event_x, *event_after_x;
+  double *start, *coefficients, *point_t, *point_x, *event_t, *event_x, *event_after_x, *event_motion;
   int32_t *step_mode, *event_kind, *event_before, *event_after, *event_guard;
 } Output;
 
@@ -94,13 +118,15 @@ typedef struct {
   const System *s;
   Table *table;
   double *p;
-  int32_t n, m, c, width, order, stride, guards;
+  int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
   /* The time is t + t_low: that of an event is no number of its own where times are large. */
   double t, t_low, begun, since, limit, at_t, *x, *at_x, *unknowns;
-  int8_t *letter, *start; /* present ones, and those that a choice is made from */
+  int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
+  double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
   Layout now; /* of the present mode */
   Met met;
-  int32_t mode, status, reason, where, due, due_impact, falls, *drop, *side, *fired;
+  Instant instant;
+  int32_t mode, status, reason, where, due_impact, falls, repelling, *drop;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode;
   Happened past[HISTORY];
@@ -117,13 +143,14 @@ typedef struct {
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
-  double *root, *met_at; /* of each guard in the step: of its polynomial, and of itself; -1 if there is none */
+  double *atom_work, *choice_work;
+  double *met_at; /* root of each guard in the step, or -1 */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
   double *saved; /* a state to return to */
-  int8_t *moving;
+  int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
   int32_t shown;
   const Expansion *expansion;
   void *arena;

@@ -57,11 +57,11 @@ static double resolve(const double *g, int order, double h) {
 
 /* Whether a guard is a function of states and time, and one that its polynomial only comes near. */
 static int has_height(int kind) {
-  return kind == SURFACE_GUARD || kind == IMPACT_GUARD || kind == STOP_GUARD || kind == RESET_GUARD;
+  return kind == SURFACE_GUARD || kind == IMPACT_GUARD || is_atom(kind);
 }
 static int is_curved(const Run *r, const Layout *l, int row) {
-  int kind = l->kind[row], first = kind == SURFACE_GUARD ? 0 : kind == IMPACT_GUARD ? r->m : r->width;
-  return has_height(kind) && r->s->curved[first + l->index[row] + (kind == RESET_GUARD ? r->s->stops : 0)];
+  int kind = l->kind[row], index = kind == IMPACT_GUARD ? r->m + l->index[row] : l->index[row];
+  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : index];
 }
 
 /* The longest step in which term k of a guard is below ``allowed``, or below the tolerance's part of one of its
@@ -251,7 +251,7 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   const double *g = e->guards + (int64_t)row * r->stride, *c = g + drop;
   int kind = e->l.kind[row];
   if (drop > r->order) return -1;
-  if (kind == STOP_GUARD || kind == RESET_GUARD) return first_crossing(c, r->order - drop, h, e->l.side[row]);
+  if (is_atom(kind)) return first_crossing(c, r->order - drop, h, e->l.side[row]);
   if (c[0] <= 0) {
     double value;
     drop = leading(r, e, row, drop, &value);
@@ -277,8 +277,13 @@ static int is_steep(const Run *r, const Expansion *e, int row, double dt) {
   return blur(e->guards + (int64_t)row * r->stride, r->order, dt) > 0;
 }
 
-static int32_t *side_of(const Run *r, const Layout *l, int row) {
-  return r->side + l->index[row] + (l->kind[row] == RESET_GUARD ? r->s->stops : 0);
+/* The time of a clock's next tick, in two numbers: its ticks are counted. */
+static double tick_of(const Run *r, int c, double *low) {
+  double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
+  double first = r->instant.tick[c], count = (double)r->instant.count[c], since = count * period;
+  double sum = first + since, moved = sum - first;
+  *low = (first - (sum - moved)) + (since - moved) + fma(count, period, -since);
+  return sum;
 }
 
 /* The root of a guard's polynomial improved on the guard itself along the motion; as it is where its slope is
@@ -299,46 +304,122 @@ static double polished(Run *r, const Expansion *e, int row, double root) {
   return root;
 }
 
-/* The side of each stop and reset just before a time of a step; of those that pass there, before their roots. */
+/* The clock whose tick is the event of an atom, or -1. */
+static int clock_of(const Run *r, int atom) {
+  for (int c = 0; c < r->s->rules.clocks; c++) if (r->s->stops + r->s->rules.clock_reset[c] == atom) return c;
+  return -1;
+}
+
+/* Sides at the end of a step of the atoms that are located in one direction only. */
 static void note_sides(Run *r, Expansion *e, double dt) {
-  for (int j = 0; j < e->l.rows; j++) {
-    if (e->l.kind[j] != STOP_GUARD && e->l.kind[j] != RESET_GUARD) continue;
-    const double *g = e->guards + (int64_t)j * r->stride;
-    double before = r->root[j] > 0 && r->met_at[j] <= dt ? r->root[j] : dt;
-    *side_of(r, &e->l, j) = side_before(g, r->order, before, ON_SURFACE * scales(r, e)[j]);
+  Instant *i = &r->instant;
+  for (int a = 0; a < r->s->rules.atoms; a++) {
+    const double *g = e->guards + (int64_t)(e->l.atoms + a) * r->stride;
+    if (i->passing[a] || !i->side[a] || r->s->rules.way[a] == UNWATCHED || !r->s->rules.way[a]) continue;
+    int side = side_before(g, r->order, dt, ON_SURFACE * scales(r, e)[e->l.atoms + a]);
+    if (side) i->side[a] = (int8_t)side;
   }
+}
+
+/* Length of a short step from a point where high derivatives do not exist (a power law at zero), or 0. Each series
+ * keeps the coefficients before its first that is no number; the step is shortened until the defect of the equation
+ * at its end is below the tolerance. Guards are not located within it: none may fall in it, and what leaves zero at
+ * a rate must do so at that rate. */
+static double singular_step(Run *r, Expansion *e, double most) {
+  int n = r->n, order = r->order, stride = r->stride, rests = 0;
+  Expansion *there = &r->trial;
+  double *end = r->before, *unknowns = r->lam, *defect = r->at_work, *through = r->of_defect;
+  const double *noise = scales(r, e);
+  for (int i = 0; i < n + r->width; i++) {
+    double *c = i < n ? e->states + (int64_t)i * stride : e->series + (int64_t)(i - n) * stride;
+    int k = 0;
+    while (k <= order && fabs(c[k]) < INFINITY) k++;
+    if (k < 2 && i < n) return 0;
+    for (; k <= order; k++) c[k] = 0;
+  }
+  for (int i = 0; i < r->width; i++) rests |= e->l.letter[i] == 0;
+  if (r->s->sets || (rests && e->l.slides > 1)) return 0;
+  for (double h = smaller(most, SINGULAR_LONGEST); h > SINGULAR_SHORTEST; h *= SINGULAR_SHORTER) {
+    for (int i = 0; i < n; i++) end[i] = value_at(e->states + (int64_t)i * stride, order, h);
+    memcpy(unknowns, r->unknowns, sizeof(double) * r->width);
+    if (!improve(r, &e->l, end, unknowns, 2)) continue;
+    expand(r, e->l.letter, end, unknowns, there);
+    int fits = 1;
+    for (int i = 0; i < n; i++) {
+      double slope;
+      horner(e->states + (int64_t)i * stride, order, h, &slope);
+      defect[i] = fabs(there->states[(int64_t)i * stride + 1] - slope);
+      fits &= defect[i] * h <= e->allowed[i] / SAFETY;
+    }
+    if (!fits) continue;
+    guard_sums(r, there, defect, 1, through);
+    for (int row = 0; row < e->l.rows; row++) {
+      const double *g = e->guards + (int64_t)row * stride, after = there->guards[(int64_t)row * stride];
+      int leaves = fabs(g[0]) <= VANISHES * noise[row] && fabs(g[1]) < INFINITY && g[1] != 0;
+      fits &= !(ns_sign(after) * ns_sign(g[0]) < 0) && !(leaves && through[row] > SINGULAR_RATE * fabs(g[1]));
+    }
+    if (fits) return h;
+  }
+  return 0;
+}
+
+/* Sliding from which both sides lead away, as a run may start, ends where its exits rise through zero. */
+static void turn_exits(const Run *r, Expansion *e) {
+  for (int j = 0; j < e->l.rows; j++)
+    for (int k = 0; k <= r->order && e->l.kind[j] == EXIT_GUARD; k++) {
+      double *c = e->guards + (int64_t)j * r->stride + k;
+      *c = -*c;
+    }
+}
+
+/* Time to the zero of an atom, at which its side changes in the direction in which it is located; -1 if there is none
+ * within h. */
+static double atom_root(Run *r, Expansion *e, int atom, double h) {
+  int row = e->l.atoms + atom, side = r->instant.side[atom], clock = clock_of(r, atom);
+  const double *g = e->guards + (int64_t)row * r->stride;
+  if (clock >= 0) {
+    double low, tick = tick_of(r, clock, &low), left = larger(tick - r->t - r->t_low + low, 0);
+    return left <= h ? left : -1;
+  }
+  if (!side || r->s->rules.way[atom] == UNWATCHED) return -1;
+  if (!r->drop[row] && passed(g, r->order, side, e->l.side[row])) return 0;
+  return guard_root(r, e, row, r->drop[row], h);
 }
 
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->met_at;
   int first = -1, found = 0, rows = e->l.rows;
+  if (r->repelling) turn_exits(r, e);
   for (int j = 0; j < rows; j++) {
-    int kind = e->l.kind[j], at_once = 0;
-    const double *g = e->guards + (int64_t)j * r->stride;
-    if ((kind == STOP_GUARD || kind == RESET_GUARD) && !r->drop[j]) {
-      int side = *side_of(r, &e->l, j);
-      at_once = side && passed(g, r->order, side, e->l.side[j]);
-    }
-    time[j] = r->root[j] = at_once ? 0 : guard_root(r, e, j, r->drop[j], h);
+    time[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);
     if (time[j] < 0) continue;
     found++;
     if (first < 0 || time[j] < time[first]) first = j;
   }
-  double latest = first < 0 ? 0 : time[first] + RESOLVED * h;
-  for (int j = 0; j < rows && first >= 0; j++)
+  if (first < 0) { if (r->repelling) turn_exits(r, e); return -1; }
+  double latest = time[first] + RESOLVED * h;
+  for (int j = 0; j < rows; j++)
     if (time[j] > 0 && time[j] <= latest && is_curved(r, &e->l, j)) time[j] = polished(r, e, j, time[j]);
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
-  int best = first;
-  if (found > 1) {
-    double near = time[first] + TIE * larger(time_scale(r), 1)
-                  + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
-    for (int j = 0; j < rows; j++) {
-      if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;
-      int rank = PRIORITY[e->l.kind[j]], best_rank = PRIORITY[e->l.kind[best]];
-      if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
+  /* Guards whose times cannot be told apart: atoms are passed together, at the first time; others one by one. */
+  int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;
+  double near = time[first] + TIE * larger(time_scale(r), 1)
+                + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
+  for (int j = 0; j < rows && (found > 1 || passed_atoms); j++) {
+    if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;
+    if (is_atom(e->l.kind[j])) {
+      r->instant.passing[j - e->l.atoms] = 1;
+      if (atom < 0 || time[j] < time[atom]) atom = j;
+      continue;
     }
+    int rank = PRIORITY[e->l.kind[j]], best_rank = best < 0 ? rank + 1 : PRIORITY[e->l.kind[best]];
+    if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
   }
-  if (best >= 0) *dt = time[best];
+  if (r->repelling) turn_exits(r, e);
+  r->instant.tied = atom < 0 ? -1 : best;
+  if (atom >= 0) best = atom;
+  if (best < 0) best = first;
+  *dt = time[best];
   return best;
 }

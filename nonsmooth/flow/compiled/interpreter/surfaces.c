@@ -1,19 +1,18 @@
 /* Surfaces: nonsmooth/model/laws/evaluators.py ---------------------------------------------------------- */
 
-/* Surfaces, gaps and their rates at x; gradients stay among the program's values. */
+/* Surfaces, gaps, their rates and lower derivatives at x; gradients stay among the program's values. */
 static const double *surface_values(Run *r, const double *x) {
   const Values *t = &r->s->surfaces;
   values_run(t, x, r->p, r->heights);
-  for (int i = 0; i < r->m + 2 * r->c; i++) r->rates[i] = out_of(t, r->heights, i);
+  for (int i = 0; i < r->kept_rows; i++) r->rates[i] = out_of(t, r->heights, i);
   return r->rates;
 }
 
 /* Rounding in each of them, times epsilon, after surface_values. */
 static const double *surface_scales(Run *r, const double *x) {
-  double *near = r->vector, *scale = r->rates + r->m + 2 * r->c;
+  double *near = r->vector, *scale = r->rates + r->kept_rows;
   for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(x[i]);
-  gradient_sums(r, &r->s->surfaces, r->heights, r->m + 2 * r->c, &r->s->surface_gradient, r->m + 2 * r->c, near, 1,
-                scale);
+  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, near, 1, scale);
   return scale;
 }
 
@@ -21,7 +20,7 @@ static const double *surface_scales(Run *r, const double *x) {
  * made orthogonal one after the other, those that can overlap (a dependent row drops out). */
 static void project_to(Run *r, const int32_t *which, int count, const double *level) {
   const Entries *g = &r->s->surface_gradient;
-  int all = r->m + 2 * r->c, nd = r->s->dimension;
+  int all = r->kept_rows, nd = r->s->dimension;
   double *rows = r->gradient_row, *size = rows + (int64_t)all * r->n, *residual = size + all;
   for (int iteration = 0; count && iteration < 3; iteration++) {
     int any = 0, k = 0;
@@ -62,16 +61,70 @@ static void project_to(Run *r, const int32_t *which, int count, const double *le
 
 static void project(Run *r, const int32_t *which, int count) { project_to(r, which, count, 0); }
 
-/* Functions that a mode keeps at zero: surfaces, gaps and their rates. */
+/* Where the lower derivatives of a surface are; their number. */
+static int lower_rows(const Run *r, int i, int32_t *which) {
+  int first = r->s->lower_first[i], count = r->s->degree[i] - 1;
+  for (int k = 0; k < count; k++) which[k] = first + k;
+  return count;
+}
+
+/* The side to which a motion on a surface passes by the first lower derivative that is not zero to rounding; 0
+ * where all are. After surface_values and surface_scales. */
+static int passes_to(const Run *r, int i, const double *scale) {
+  int first = r->s->lower_first[i];
+  for (int k = first; k < first + r->s->degree[i] - 1; k++)
+    if (!(fabs(r->rates[k]) <= ON_SURFACE * scale[k])) return r->rates[k] > 0 ? 1 : -1;
+  return 0;
+}
+
+/* Letters of the surfaces that the motion passes by a lower derivative: the ``certain`` one (or -1) and those on which
+ * it is to rounding. */
+static void take_sides(Run *r, int8_t *letter, int certain) {
+  int needed = 0;
+  for (int i = 0; i < r->m; i++) needed |= r->s->degree[i] > 1;
+  if (!needed) return;
+  surface_values(r, r->x);
+  const double *scale = surface_scales(r, r->x);
+  for (int i = 0; i < r->m; i++) {
+    if (r->s->degree[i] == 1 || letter[i] == 0 || !(i == certain || fabs(r->rates[i]) <= ON_SURFACE * scale[i])) continue;
+    int side = passes_to(r, i, scale);
+    if (side) letter[i] = (int8_t)side;
+  }
+}
+
+/* What the active elements below ``width`` keep at zero, contacts their gaps, and the ``certain`` one (or -1), also if
+ * it is passed. */
+static int gather(const Run *r, int certain, int width, int32_t *which) {
+  int count = 0, found = certain < 0 || r->s->degree[certain] == 1;
+  for (int i = 0; i < r->active_count && r->active[i] < width; i++) {
+    which[count++] = r->active[i];
+    found |= r->active[i] == certain;
+  }
+  if (!found) which[count++] = certain;
+  for (int i = 0; i < r->active_count; i++)
+    if (r->active[i] < r->m) count += lower_rows(r, r->active[i], which + count);
+  return count;
+}
+
+/* Functions that a mode keeps at zero: surfaces with their lower derivatives, gaps and their rates. */
 static int kept_by(const Run *r, const int8_t *letter, int32_t *which) {
   int count = 0;
   for (int i = 0; i < r->width; i++) if (letter[i] == 0) which[count++] = i;
   for (int i = r->m; i < r->width; i++) if (letter[i] == 0) which[count++] = i + r->c;
+  for (int i = 0; i < r->m; i++) if (letter[i] == 0) count += lower_rows(r, i, which + count);
   return count;
+}
+
+/* Whether a surface is one of the time alone, onto which no step of the states leads. */
+static int is_of_time(const Run *r, int surface) {
+  const Entries *g = &r->s->surface_gradient;
+  for (int k = 0; k < g->count; k++) if (g->row[k] == surface && g->column[k] < r->s->dimension) return 0;
+  return 1;
 }
 
 /* Whether Newton's steps have led onto a surface: not where its zero is a multiple one. */
 static int is_on(Run *r, int surface) {
+  if (is_of_time(r, surface)) return 1;
   double h = surface_values(r, r->x)[surface];
   return fabs(h) <= VANISHES * surface_scales(r, r->x)[surface];
 }
@@ -108,6 +161,7 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
       rests = met;
       sure = certain >= f && certain < f + r->s->set_size[s];
     }
+    if (i < r->m && letter[i] != 0 && passes_to(r, i, scale)) continue; /* its letter follows from a lower derivative */
     if (rests || letter[i] == 0 || sure) r->active[r->active_count++] = i;
   }
 }

@@ -1,0 +1,431 @@
+/* Unknowns that enter nonlinearly: hidden laws and products of multipliers. In the layer of a surface lambda moves
+ * with the rate of h, x at rest, until an attracting root of that rate or its bound (Jeffrey 2018). */
+
+/* Solutions of a mode that are looked for; unknowns that can enter in products. */
+enum { SOLUTIONS = 16, FACTORS = 4, CORNERS = 1 << FACTORS };
+
+/* Solutions of one mode, each the unknowns of all elements. */
+typedef struct { double *each; int32_t count, width; } Solutions;
+
+static int is_mixed(const Run *r, const int32_t *own, int count) {
+  if (r->s->affine) return 0;
+  for (int i = 0; i < count; i++)
+    for (int j = 0; j < count; j++) if (r->s->mixed[own[i] * r->width + own[j]]) return 1;
+  return 0;
+}
+
+/* Series of the rate of an element along its multiplier, x and the others at rest. */
+static void rate_along(Run *r, const Layout *l, const double *unknowns, int own, double *g) {
+  const Series *t = &r->s->series;
+  double *x = r->vector, *lam = x + r->n;
+  aim(r, l->letter, r->x, unknowns);
+  held_of(r, l->letter);
+  for (int k = 0; k <= r->order; k++) {
+    memset(x, 0, sizeof(double) * (r->n + r->width));
+    if (k == 0) memcpy(x, r->x, sizeof(double) * r->n);
+    if (k == 0) memcpy(lam, unknowns, sizeof(double) * r->width);
+    if (k == 1) lam[own] = 1;
+    set_inputs(r, x, k ? r->none : r->held, lam);
+    series_rules(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
+    g[k] = row_of(r, r->n + own)[k];
+  }
+}
+
+/* Length up to which a series is exact to rounding, at most h. */
+static double exact_length(const double *g, int order, double h) {
+  for (int again = 0; again < DEPTH; again++) {
+    double power = pow(h, order - 1), size = fabs(g[0]) + rest_of(g, order - 2, h);
+    double last = power * larger(fabs(g[order]) * h, fabs(g[order - 1]));
+    if (last <= VANISHES * size || !(size > 0 && last < INFINITY)) break;
+    h *= 0.9 * pow(VANISHES * size / last, 1.0 / (order - 1));
+  }
+  return h;
+}
+
+/* Coefficients of a rate that vanish at a root, at least ``zeros``: two at a fold. */
+static int zeros_of(const double *g, int order, double h, int zeros) {
+  double size = fabs(g[0]) + rest_of(g, order, h), power = pow(h, zeros);
+  while (zeros < order && !(fabs(g[zeros]) * power > LAYER_ROUNDING * size)) { zeros++; power *= h; }
+  return zeros;
+}
+
+/* Roots of the rate of an element on the way of its multiplier from one value to another, of which ``zeros``
+ * coefficients vanish at the first; -1 where it is no number. */
+static int roots_along(Run *r, const Layout *l, double *unknowns, int own, double from, double to, int zeros,
+                       double *root) {
+  int order = r->order, count = 0;
+  double way = to > from ? 1 : -1, at = from, most = INFINITY, g[P + 1], next[P + 1];
+  unknowns[own] = at;
+  rate_along(r, l, unknowns, own, g);
+  for (int piece = 0; piece < LAYER_PIECES && (to - at) * way > 0 && count < SOLUTIONS; piece++) {
+    if (!finite_all(g, order + 1)) return -1;
+    if (way < 0) for (int k = 1; k <= order; k += 2) g[k] = -g[k];
+    double left = (to - at) * way, h = exact_length(g, order, smaller(left, most));
+    int drop = zeros_of(g, order, h, zeros);
+    double turn = ns_sign(g[drop]), end = value_at(g, order, h), size = fabs(g[0]) + rest_of(g, order, h);
+    for (int k = 0; k <= order; k++) g[k] *= turn;
+    double s = first_root(g + drop, order - drop, h), ahead = s > 0 ? s : h;
+    double there = ahead == left ? to : at + way * ahead;
+    unknowns[own] = there;
+    rate_along(r, l, unknowns, own, next);
+    if (fabs(next[0] - (s > 0 ? 0 : end)) > sqrt(EPSILON) * size) { /* a pole or a pulse that the series does not see */
+      most = 0.5 * h;
+      unknowns[own] = at;
+      rate_along(r, l, unknowns, own, g);
+      continue;
+    }
+    at = there;
+    most = INFINITY;
+    zeros = s > 0;
+    if (s > 0) root[count++] = at;
+    memcpy(g, next, sizeof g);
+  }
+  return count;
+}
+
+/* Add a solution that Newton's method improves and that is new; unknowns of surfaces are within their bounds. */
+static void keep_solution(Run *r, const Layout *l, double *unknowns, int steps, Solutions *found) {
+  int w = r->width;
+  if (found->count == SOLUTIONS || !improve(r, l, r->x, unknowns, steps)) return;
+  error_scales(r, r->x, held_of(r, l->letter), unknowns);
+  for (int i = 0; i < l->slides; i++) {
+    int own = l->sliding[i];
+    double slope = 0;
+    for (int j = 0; j < l->slides; j++) slope += fabs(r->slope[own * w + l->sliding[j]]);
+    if (!(fabs(layer_of(r, own)) <= LAYER_RESIDUAL * (1 + slope))) return;
+    if (own < r->m && !(fabs(unknowns[own]) <= fabs(factor_of(r, own)) * (1 + LAYER_BEYOND))) return;
+  }
+  for (int k = 0; k < found->count; k++) {
+    double apart = 0;
+    for (int i = 0; i < w; i++) apart = larger(fabs(unknowns[i] - found->each[k * w + i]), apart);
+    if (apart <= LAYER_APART) return;
+  }
+  memcpy(found->each + found->count++ * w, unknowns, sizeof(double) * w);
+}
+
+/* Products: functions that are linear in each of k variables in [0, 1], by their values at the corners. */
+
+/* Values and derivatives at a point. */
+static void at_point(const double *corner, int k, const double *u, double *value, double *slope) {
+  for (int f = 0; f < k; f++) value[f] = 0;
+  for (int i = 0; i < k * k; i++) slope[i] = 0;
+  for (int c = 0; c < 1 << k; c++)
+    for (int f = 0; f < k; f++) {
+      double whole = corner[c * k + f];
+      for (int i = 0; i < k; i++) whole *= c >> i & 1 ? u[i] : 1 - u[i];
+      value[f] += whole;
+      for (int j = 0; j < k; j++) {
+        double part = corner[c * k + f] * (c >> j & 1 ? 1 : -1);
+        for (int i = 0; i < k; i++) if (i != j) part *= c >> i & 1 ? u[i] : 1 - u[i];
+        slope[f * k + j] += part;
+      }
+    }
+}
+
+/* The box of a product's variables. */
+typedef struct { const Layout *l; const double *corner, *low, *width; double *unknowns; int k; } Cube;
+
+/* Newton's method from a point of the cube. */
+static void from_point(Run *r, const Cube *c, const double *start, Solutions *found) {
+  double u[FACTORS], value[FACTORS], slope[FACTORS * FACTORS];
+  memcpy(u, start, sizeof u);
+  for (int again = 0; again < LAYER_NEWTON; again++) {
+    double most = 0;
+    at_point(c->corner, c->k, u, value, slope);
+    if (!solve(slope, value, c->k)) return;
+    for (int i = 0; i < c->k; i++) { u[i] -= value[i]; most = larger(fabs(value[i]), most); }
+    if (most <= EPSILON) break;
+  }
+  for (int i = 0; i < c->k; i++) {
+    if (!(u[i] >= -LAYER_APART && u[i] <= 1 + LAYER_APART)) return;
+    c->unknowns[c->l->sliding[i]] = c->low[i] + u[i] * c->width[i];
+  }
+  keep_solution(r, c->l, c->unknowns, 3, found);
+}
+
+/* Solutions in a box by halving: a function that is linear in each variable is between its values at the corners. */
+static void search_cube(Run *r, const Cube *c, const double *corner, const double *at, double size, int depth,
+                        Solutions *found) {
+  int k = c->k, axis = depth % k, step = 1 << axis;
+  double half[CORNERS * FACTORS], next[FACTORS], start[FACTORS];
+  for (int f = 0; f < k; f++) {
+    double low = INFINITY, high = -INFINITY;
+    for (int i = 0; i < 1 << k; i++) { low = smaller(corner[i * k + f], low); high = larger(corner[i * k + f], high); }
+    if (!(low <= 0 && high >= 0)) return;
+  }
+  if (depth == LAYER_HALVINGS * k) {
+    for (int i = 0; i <= 1 << k; i++) { /* two solutions may be close to a fold: from the corners and the centre */
+      for (int j = 0; j < k; j++) start[j] = at[j] + size * (i == 1 << k ? 0.5 : i >> j & 1);
+      from_point(r, c, start, found);
+    }
+    return;
+  }
+  memcpy(next, at, sizeof next);
+  for (int side = 0; side < 2; side++) {
+    for (int i = 0; i < 1 << k; i++)
+      for (int f = 0; f < k; f++)
+        half[i * k + f] = (i >> axis & 1) == side ? corner[i * k + f]
+                                                  : 0.5 * (corner[i * k + f] + corner[(i ^ step) * k + f]);
+    next[axis] = at[axis] + side * 0.5 * size;
+    search_cube(r, c, half, next, axis == k - 1 ? 0.5 * size : size, depth + 1, found);
+  }
+}
+
+/* Solutions of a mode whose multipliers enter in products, each linearly. */
+static void solve_products(Run *r, const Layout *l, double *unknowns, Solutions *found) {
+  int k = l->slides;
+  double corner[CORNERS * FACTORS], low[FACTORS], width[FACTORS], start[FACTORS] = {0};
+  error_scales(r, r->x, held_of(r, l->letter), unknowns);
+  for (int i = 0; i < k; i++) {
+    low[i] = -fabs(factor_of(r, l->sliding[i])) * (1 + LAYER_BEYOND);
+    width[i] = -2 * low[i];
+  }
+  for (int c = 0; c < 1 << k; c++) {
+    for (int i = 0; i < k; i++) unknowns[l->sliding[i]] = low[i] + (c >> i & 1) * width[i];
+    error_scales(r, r->x, held_of(r, l->letter), unknowns);
+    for (int f = 0; f < k; f++) corner[c * k + f] = layer_of(r, l->sliding[f]);
+  }
+  if (!finite_all(corner, k << k)) return;
+  search_cube(r, &(Cube){l, corner, low, width, unknowns, k}, corner, start, 1, 0, found);
+}
+
+/* The same for other laws, and with reactions: Newton's method from a grid. */
+static void solve_from_grid(Run *r, const Layout *l, double *unknowns, Solutions *found) {
+  int surfaces = 0, points = 1;
+  for (int i = 0; i < l->slides; i++) surfaces += l->sliding[i] < r->m;
+  for (int i = 0; i < surfaces && points < LAYER_STARTS; i++) points *= LAYER_GRID;
+  for (int number = 0; number < points; number++) {
+    memset(unknowns, 0, sizeof(double) * r->width);
+    for (int i = 0, rest = number; i < l->slides; i++)
+      if (l->sliding[i] < r->m) {
+        unknowns[l->sliding[i]] = (2.0 * (rest % LAYER_GRID) + 1) / LAYER_GRID - 1;
+        rest /= LAYER_GRID;
+      }
+    keep_solution(r, l, unknowns, LAYER_NEWTON, found);
+  }
+}
+
+static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found);
+
+/* All unknowns with which a mode keeps what slides in it. */
+static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
+  int w = r->width, bent = 0, contacts = 0;
+  double *unknowns = r->tried, root[SOLUTIONS];
+  found->each = r->solutions;
+  found->count = 0;
+  keep_carried(r, l->letter, unknowns);
+  for (int i = 0; r->s->sets && i < r->m; i++)
+    if (l->letter[i] == LEAVING) { solutions_of_leaving(r, l, found); return; }
+  if (!is_mixed(r, l->sliding, l->slides)) {
+    if (l->slides && !improve(r, l, r->x, unknowns, 2)) return;
+    memcpy(found->each, unknowns, sizeof(double) * w);
+    found->count = 1;
+    return;
+  }
+  for (int i = 0; i < l->slides; i++) {
+    bent |= r->s->mixed[l->sliding[i] * (w + 1)];
+    contacts |= l->sliding[i] >= r->m;
+  }
+  if (l->slides == 1) {
+    int own = l->sliding[0], count = roots_along(r, l, unknowns, own, -1 - LAYER_BEYOND, 1 + LAYER_BEYOND, 0, root);
+    for (int k = 0; k < count; k++) { unknowns[own] = root[k]; keep_solution(r, l, unknowns, 2, found); }
+  } else if (!bent && !contacts && l->slides <= FACTORS) solve_products(r, l, unknowns, found);
+  else solve_from_grid(r, l, unknowns, found);
+}
+
+/* Where the multiplier of the one active surface comes from, and which way it moves; 0 where that is not known. */
+static int way_in_layer(Run *r, const Layout *l, double *from) {
+  int own = r->active[0], kind = r->met.kind;
+  double g[P + 1];
+  if (r->active_count != 1 || r->met.index != own) return 0;
+  *from = r->met.side;
+  if (kind == SURFACE_GUARD) return -r->met.side;
+  if (kind == EXIT_GUARD) return r->met.side;
+  if (kind != BRANCH_GUARD) return 0;
+  memcpy(r->tried, r->unknowns, sizeof(double) * r->width);
+  rate_along(r, l, r->tried, own, g);
+  *from = r->unknowns[own];
+  return g[2] > 0 ? 1 : -1;
+}
+
+/* The mode that one surface's layer leads to: the first attracting root on the way, or the side at its end. */
+static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  int own = r->active[0], count;
+  double from, root[SOLUTIONS];
+  Layout *l = &r->trial.l;
+  int8_t *trial = r->tried_letter;
+  memcpy(trial, letter, r->width);
+  trial[own] = 0;
+  lay_out(r, trial, l);
+  int way = way_in_layer(r, l, &from);
+  if (!way) return 0;
+  keep_carried(r, trial, r->tried);
+  count = roots_along(r, l, r->tried, own, from, way, r->met.kind == BRANCH_GUARD ? 2 : 0, root);
+  for (int k = 0; k <= count && r->status == RUNNING; k++) {
+    trial[own] = k < count ? 0 : (int8_t)way;
+    keep_carried(r, trial, r->found.unknowns);
+    if (k < count) r->found.unknowns[own] = root[k];
+    if (!continues(r, trial, known, known_count, &r->found) || !r->found.strict) continue;
+    copy_continuation(r, &r->chosen, &r->found);
+    return 1;
+  }
+  return 0;
+}
+
+/* Choose, as r->chosen, the motion that continues, of all modes and all their solutions. */
+static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  int k = r->active_count;
+  int8_t *trial = r->tried_letter, *possible = trial + r->width;
+  Solutions all = {0};
+  Tally tally = {0};
+  for (int i = 0; i < k; i++) possible[i] = r->active[i] < r->m ? 7 : 5;
+  int total = choices_of(possible, k);
+  if (total > TRIED) { many_may_hold(r); return 0; }
+  r->several_count = 0;
+  for (int number = 0; number < total && r->status == RUNNING; number++) {
+    spell_choice(r, letter, possible, number, trial);
+    lay_out(r, trial, &r->trial.l);
+    mode_solutions(r, &r->trial.l, &all);
+    for (int q = 0; q < all.count && r->status == RUNNING; q++) {
+      memcpy(r->found.unknowns, all.each + q * r->width, sizeof(double) * r->width);
+      if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
+    }
+  }
+  return r->status == RUNNING && (choose_of(r, &tally) || no_motion(r, letter));
+}
+
+/* The same where unknowns of the active elements enter nonlinearly. */
+static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  int alone = r->active_count == 1;
+  if (alone && is_two_fold(r, letter, r->active[0], 0)) { finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]); return 0; }
+  return (alone && follow_in_layer(r, letter, known, known_count)) || (r->status == RUNNING && try_modes(r, letter, known, known_count));
+}
+
+/* Folds of sliding: where the slope of what slides vanishes the multipliers go with a root of the time. With one of
+ * them as the independent variable states, time and the others are regular there. */
+
+static int advance(Run *r, const Expansion *e, double dt);
+
+/* Whether sliding may end in a fold within some steps of length h. */
+static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
+  if (!is_mixed(r, e->l.sliding, e->l.slides)) return 0;
+  for (int row = 0; row < e->l.rows; row++) {
+    const double *g = e->guards + (int64_t)row * r->stride;
+    if (e->l.kind[row] == BRANCH_GUARD && g[0] < -FOLD_AHEAD * h * g[1]) return 1;
+  }
+  return 0;
+}
+
+/* Rules of order k of all that a mode needs, with the multipliers' own coefficients. */
+static void rules_of(Run *r, const Expansion *f, int k) {
+  const Series *t = &r->s->series;
+  double *x = r->vector, *lam = x + r->n;
+  for (int i = 0; i < r->n; i++) x[i] = f->states[(int64_t)i * r->stride + k];
+  for (int i = 0; i < r->width; i++) lam[i] = f->series[(int64_t)i * r->stride + k];
+  set_inputs(r, x, k ? r->none : r->held, lam);
+  series_rules(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
+}
+
+/* Series in the multiplier of sliding[lead], which moves in a direction, of states, of the others and of the rate
+ * of the time; 0 where there is none. */
+static int series_in_multiplier(Run *r, Expansion *f, int lead, double way, double *rate) {
+  int slides = f->l.slides, w = r->width, n = r->n, order = r->order, stride = r->stride;
+  double *drift = r->lam, *a = r->work, *b = a + slides * slides;
+  held_of(r, f->l.letter);
+  rules_of(r, f, 0);
+  for (int i = 0; i < n; i++) f->states[(int64_t)i * stride + 1] = row_of(r, i)[0];
+  rules_of(r, f, 1);
+  for (int i = 0; i < slides; i++) drift[i] = row_of(r, n + f->l.sliding[i])[1];
+  for (int k = 1; k <= order; k++) {
+    for (int i = 0; i < n; i++) {
+      double *x = f->states + (int64_t)i * stride;
+      x[k] = 0;
+      for (int j = 0; j < k - 1; j++) x[k] += rate[j] * row_of(r, i)[k - 1 - j] / k;
+    }
+    f->series[(int64_t)f->l.sliding[lead] * stride + k] = k == 1 ? way : 0;
+    rules_of(r, f, k);
+    for (int i = 0; i < slides; i++) {
+      b[i] = -row_of(r, n + f->l.sliding[i])[k];
+      for (int j = 0; j < slides; j++)
+        a[i * slides + j] = j == lead ? drift[i] / k : r->slope[f->l.sliding[i] * w + f->l.sliding[j]];
+    }
+    if (!solve(a, b, slides)) return 0;
+    rate[k - 1] = b[lead];
+    for (int i = 0; i < slides; i++) if (i != lead) f->series[(int64_t)f->l.sliding[i] * stride + k] = b[i];
+    for (int i = 0; i < n; i++) f->states[(int64_t)i * stride + k] += row_of(r, i)[0] * b[lead] / k;
+    rules_of(r, f, k);
+  }
+  rate[order] = 0;
+  return 1;
+}
+
+/* Integral of a series. */
+static double integral(const double *c, int order, double s) {
+  double sum = 0;
+  for (int k = order; k >= 0; k--) sum = (sum + c[k] / (k + 1)) * s;
+  return sum;
+}
+
+/* States of a step as cubic polynomials of the time, from those in a multiplier; 0 where that is not accurate. */
+static int in_time(Run *r, Expansion *f, const double *rate, double s, double dt, const double *field) {
+  int order = r->order, stride = r->stride;
+  for (int i = 0; i < r->n; i++) {
+    double *x = f->states + (int64_t)i * stride, end = value_at(x, order, s), slope, cubic[4];
+    double start = rate[0] != 0 ? x[1] / rate[0] : field[i], mean = (end - x[0]) / dt;
+    cubic[0] = x[0];
+    cubic[1] = start;
+    cubic[2] = (3 * mean - 2 * start - field[i]) / dt;
+    cubic[3] = (start + field[i] - 2 * mean) / (dt * dt);
+    for (int q = 1; q < 4; q++) {
+      double part = 0.25 * q * s, at = integral(rate, order, part);
+      double off = fabs(horner(cubic, 3, at, &slope) - value_at(x, order, part));
+      if (off > f->allowed[i] + VANISHES * (r->size + fabs(x[0])) + (i < r->s->dimension ? 0 : TIE * fabs(x[0]))) return 0;
+    }
+    memset(x, 0, sizeof(double) * stride);
+    memcpy(x, cubic, sizeof cubic);
+  }
+  return 1;
+}
+
+/* Go to the fold of what slides, if it is met next; its row, or -1. */
+static int reach_fold(Run *r, const Expansion *e, double left) {
+  int slides = e->l.slides, lead = 0, order = r->order, stride = r->stride, row, last = -1;
+  double rate[P + 1], h = INFINITY, ds, *end = r->lam, *field = r->at_work;
+  Expansion *f = &r->trial;
+  for (int i = 1; i < slides; i++)
+    if (fabs(e->series[(int64_t)e->l.sliding[i] * stride + 1]) > fabs(e->series[(int64_t)e->l.sliding[lead] * stride + 1])) lead = i;
+  lay_out(r, e->l.letter, &f->l);
+  memset(f->series, 0, sizeof(double) * r->width * stride);
+  memset(f->states, 0, sizeof(double) * r->n * stride);
+  for (int i = 0; i < r->n; i++) f->states[(int64_t)i * stride] = r->x[i];
+  for (int i = 0; i < slides; i++) f->series[(int64_t)e->l.sliding[i] * stride] = r->unknowns[e->l.sliding[i]];
+  memcpy(f->inverse, e->inverse, sizeof(double) * slides * slides);
+  memcpy(f->allowed, e->allowed, sizeof(double) * r->n);
+  f->scaled = f->steepened = 0;
+  weigh_point(r, f, r->x, r->unknowns);
+  if (!series_in_multiplier(r, f, lead, ns_sign(e->series[(int64_t)e->l.sliding[lead] * stride + 1]), rate)) return -1;
+  h = exact_length(rate, order - 1, 2 * (1 + fabs(r->unknowns[e->l.sliding[lead]])));
+  for (int i = 0; i < r->n; i++) h = exact_length(f->states + (int64_t)i * stride, order, h);
+  for (int i = 0; i < slides; i++) h = exact_length(f->series + (int64_t)e->l.sliding[i] * stride, order, h);
+  double s = rate[0] > 0 ? first_root(rate, order - 1, h) : -1, dt = s > 0 ? integral(rate, order - 1, s) : -1;
+  if (!(dt > 0 && dt <= smaller(left, r->o.max_step))) return -1;
+  r->expansion = f;
+  guard_rows(r, &f->l, f->series, order + 1, f->guards);
+  row = first_hit(r, f, s, &ds);
+  memset(r->instant.passing, 0, r->s->rules.atoms);
+  for (int k = 0; k < f->l.rows; k++) if (f->l.kind[k] == BRANCH_GUARD && (last < 0 || k == row)) last = k;
+  if (last < 0 || (row >= 0 && row != last && ds < s)) return -1;
+  note_sides(r, f, s);
+  for (int i = 0; i < r->width; i++) end[i] = value_at(f->series + (int64_t)i * stride, order, s);
+  for (int i = 0; i < r->n; i++) r->before[i] = value_at(f->states + (int64_t)i * stride, order, s);
+  set_inputs(r, r->before, held_of(r, f->l.letter), end);
+  first_values(r, 0);
+  for (int i = 0; i < r->n; i++) field[i] = row_of(r, i)[0];
+  if (!in_time(r, f, rate, s, dt, field)) return -1;
+  memcpy(r->tried, end, sizeof(double) * r->width);
+  memset(f->series, 0, sizeof(double) * r->width * stride);
+  for (int i = 0; i < slides; i++) f->series[(int64_t)e->l.sliding[i] * stride] = end[e->l.sliding[i]];
+  if (!advance(r, f, dt)) return -1;
+  memcpy(r->unknowns, r->tried, sizeof(double) * r->width);
+  return last;
+}

@@ -1,0 +1,63 @@
+/* Orbits of the plane round the point where two surfaces meet (nonsmooth/model/laws/layer.py has the same with its
+ * derivation): r -> ratio r (1 + bend r) in a turn. Where they spiral in, the point is reached and held. */
+
+/* Rates of two surfaces in a quadrant, and their derivatives by the surfaces; 0 where these are dependent. */
+static int in_quadrant(Run *r, const int8_t *letter, const int *sign, double *rate, double *slope) {
+  const Entries *of_layer = &r->s->layer_gradient, *of_height = &r->s->height_gradient;
+  int w = r->width, first = 2 * w + r->s->slope.count;
+  double g[4] = {0}, h[4] = {0};
+  held_of(r, letter);
+  for (int i = 0; i < 2; i++) r->held[r->active[i]] = sign[i];
+  error_scales(r, r->x, r->held, r->none);
+  for (int i = 0; i < 2; i++) rate[i] = layer_of(r, r->active[i]);
+  for (int i = 0; i < 2; i++) {
+    for (int q = 0; q < of_layer->count; q++)
+      if (of_layer->row[q] == r->active[i]) g[2 * i + of_layer->column[q]] = out_of(&r->s->point, r->point, first + q);
+    for (int q = 0; q < of_height->count; q++)
+      if (of_height->row[q] == r->active[i])
+        h[2 * i + of_height->column[q]] = out_of(&r->s->point, r->point, first + of_layer->count + q);
+  }
+  double determinant = h[0] * h[3] - h[1] * h[2];
+  for (int i = 0; i < 2; i++) {
+    slope[2 * i] = (g[2 * i] * h[3] - g[2 * i + 1] * h[2]) / determinant;
+    slope[2 * i + 1] = (g[2 * i + 1] * h[0] - g[2 * i] * h[1]) / determinant;
+  }
+  return finite_all(slope, 4) && finite_all(rate, 2);
+}
+
+/* Whether orbits run round the point of the two active surfaces, and towards it. */
+static int spirals_in(Run *r, const int8_t *letter) {
+  static const int turns[2][4][2] = {{{1, 1}, {-1, 1}, {-1, -1}, {1, -1}}, {{1, 1}, {1, -1}, {-1, -1}, {-1, 1}}};
+  double ratio = 1, bend = 0, size = 0, f[2], d[4];
+  if (r->n != 2 || r->active_count != 2 || r->active[1] >= r->m) return 0;
+  if (!in_quadrant(r, letter, turns[0][0], f, d)) return 0;
+  int clockwise = !(f[0] < 0);
+  for (int q = 0; q < 4; q++) { /* from the half axis where ``near`` is on its own side to that where it is zero */
+    const int *s = turns[clockwise][q];
+    int near = (s[0] * s[1] > 0) == !clockwise ? 0 : 1, far = 1 - near;
+    if (!in_quadrant(r, letter, s, f, d)) return 0;
+    double u = f[near] * s[near], v = f[far] * s[far], accel[2];
+    if (!(u < 0 && 0 < v)) return 0;
+    for (int i = 0; i < 2; i++) for (int j = 0; j < 2; j++) d[2 * i + j] *= s[i] * s[j];
+    for (int i = 0; i < 2; i++) accel[i] = d[2 * i] * f[0] * s[0] + d[2 * i + 1] * f[1] * s[1];
+    double first = -1 / u, second = -(d[3 * near] * first + 0.5 * accel[near] * first * first) / u, factor = v * first;
+    double grown = (v * second + d[2 * far + near] * first + 0.5 * accel[far] * first * first) / factor;
+    bend += grown * ratio;
+    size += fabs(grown) * ratio;
+    ratio *= factor;
+  }
+  if (!(fabs(ratio * size) < INFINITY)) return 0;
+  if (fabs(ratio - 1) > TURN_ROUNDING) return ratio < 1;
+  return fabs(bend) > TURN_ROUNDING * size && bend < 0;
+}
+
+/* Stay where two surfaces meet though no layer attracts: all orbits spiral in, so none leaves. */
+static int hold_there(Run *r, const int8_t *letter) {
+  Continuation *c = &r->chosen;
+  memcpy(c->letter, letter, r->width);
+  for (int i = 0; i < 2; i++) c->letter[r->active[i]] = 0;
+  keep_carried(r, c->letter, c->unknowns);
+  lay_out(r, c->letter, &r->trial.l);
+  memset(c->drop, 0, sizeof(int32_t) * r->guards);
+  return improve(r, &r->trial.l, r->x, c->unknowns, 2);
+}

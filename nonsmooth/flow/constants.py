@@ -115,6 +115,8 @@ TENFOLD = 20.0
 #: they are larger than this.
 OVERFLOW = 1e280
 
+#: Motions that can continue from a point, at most so many are kept.
+SEVERAL = 16
 # Unknowns that enter nonlinearly. Roots of a rate along a multiplier: coefficients below this part of all terms
 # vanish, the pieces of the way are counted, and its ends are a little beyond the bounds. Solutions of several
 # multipliers: how far two are apart, halvings of each side before Newton's method, its steps, and a grid of
@@ -149,17 +151,8 @@ DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 
 #: Kinds of events, by number in ensembles and in C.
 KINDS = (
-    "crossing",
-    "entry",
-    "exit",
-    "stop",
-    "reset",
-    "impact",
-    "contact",
-    "release",
-    "rest",
-    "rest_below",
-    "end",
+    *("crossing", "entry", "exit", "stop", "reset"),
+    *("impact", "contact", "release", "stability", "rest", "rest_below", "end"),
 )
 
 #: The first and the last of these, as many, can happen without resets and impacts.
@@ -207,6 +200,7 @@ REASONS = (
     "no_reaction",
     "no_stable_motion",
     "possibly_several",
+    "stability_lost",
     "start_solutions",
     "impossible_start",
     "several_directions",

@@ -32,6 +32,14 @@ def ambiguous(modes: Sequence[str]) -> str:
     )
 
 
+def stability_lost(name: str, t: float) -> str:
+    """Loss of the stability of sliding on several surfaces."""
+    return (
+        f"At t = {t:.8g} sliding on {name} and other surfaces loses its stability across their layers: an "
+        "eigenvalue of dh/dx df/dlambda, or a pair, reaches the imaginary axis."
+    )
+
+
 def multiple_zero(surface: int) -> str:
     """The gradient of a switching function vanishes with it."""
     return (

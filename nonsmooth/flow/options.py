@@ -38,6 +38,7 @@ class Options:
     max_jumps: int = 1_000
     start_mode: str | None = None
     hits: Hits | None = None
+    rest_below: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("t_end", "t_start"):
@@ -68,6 +69,15 @@ class Options:
             low = math.nextafter(0.0, 1.0)
             step = real(self.max_step, "max_step", expected="a positive number", low=low)
             self._set("max_step", step)
+        if self.rest_below is not None:
+            speed = real(
+                self.rest_below,
+                "rest_below",
+                expected="a positive number",
+                advice="It is a speed, in the unit of a switching function per time.",
+                low=math.nextafter(0.0, 1.0),
+            )
+            self._set("rest_below", speed)
         for name in ("max_steps", "max_events", "max_jumps"):
             self._set(name, whole(getattr(self, name), name))
 

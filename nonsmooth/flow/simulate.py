@@ -36,6 +36,7 @@ def simulate(
     max_steps: int = 1_000_000,
     max_events: int = 100_000,
     max_jumps: int = 1_000,
+    rest_below: float | None = None,
     t_eval: ArrayLike | None = None,
     at: Any = None,
 ) -> Trajectory:
@@ -68,6 +69,11 @@ def simulate(
         time that a step may bridge, can still be missed. A ``max_step`` of its width excludes that.
     max_steps, max_events, max_jumps : optional
         Limits of the run; of the jumps at one instant, beyond which it ends with ``ENDLESS_JUMPS``.
+    rest_below : float, optional
+        Speed below which a surface rests whose multiplier enters the second derivative of its function first
+        (a relay in a position, a rocking body): where its rate at two zeros in turn is below, and falls, the run
+        goes on at rest. An approximation of the order of this speed: an event of the kind ``"rest_below"``. Without
+        it motions that need infinitely many switches for all times end with TOO_MANY_EVENTS.
     t_eval : array_like (K,), optional
         Keep the states at these times, sorted, in ``sample_t`` and ``sample_x`` of the result.
     at : Section, str, number or expression, optional
@@ -127,6 +133,7 @@ def simulate(
         max_steps=max_steps,
         max_events=max_events,
         max_jumps=max_jumps,
+        rest_below=rest_below,
         start_mode=start_mode,
     )
     system, at = sectioned(system, at)

@@ -54,7 +54,7 @@ ADVICE: dict[Status, str] = {
     Status.NOT_FINITE: "A field or a switching function is not a finite number here: check "
     "logarithms, roots and divisions at the last state.",
     Status.TOO_MANY_EVENTS: "Raise max_events if this many are expected; otherwise the motion "
-    "chatters.",
+    "chatters. rest_below= lets a relay in a position, or a body on an edge, rest once it is slow.",
     Status.ENDLESS_JUMPS: "Each jump makes another one due at the same instant: give these events a when= "
     "that a jump makes false, or raise max_jumps if this many are expected.",
     Status.TOO_MANY_STEPS: "Raise max_steps if the run is long; otherwise loosen tol.",

@@ -131,6 +131,42 @@ class Steps:
         return result
 
 
+@savable(rates="n")
+@dataclass(frozen=True)
+class Continuation:
+    """A motion that can continue where more than one can.
+
+    Attributes
+    ----------
+    mode : str
+        Its letters.
+    rates : ndarray (n,)
+        Rates of the states with which it begins.
+    """
+
+    mode: str
+    rates: Array
+
+
+@savable()
+@dataclass(frozen=True)
+class Facts:
+    """What the decisions of a run rest on.
+
+    Attributes
+    ----------
+    depends_on_widths : bool
+        Whether sliding on several surfaces is stable, or not, only for some ratios of the widths of their
+        layers. It was decided for the ``layer_widths`` of the system.
+    unproved : bool
+        One solution was found for more than eight elements that act on one another, and no test shows that it
+        is the only one.
+    """
+
+    depends_on_widths: bool = False
+    unproved: bool = False
+
+
 def _require_whole(run: Trajectory) -> None:
     """Raise ValueError where points, steps and segments of a saved run do not belong together."""
     steps = np.diff(run.t)
@@ -170,6 +206,11 @@ class Trajectory(
         Accepted steps with their Taylor polynomials.
     sample_t, sample_x : ndarray (K,), (K, n) or None
         Times and states of the samples by ``t_eval`` (NaN after an early end) or ``at``.
+    continuations : list of Continuation
+        The motions that can continue from the last point, up to 16, when the status is NON_UNIQUE and they are
+        known.
+    facts : Facts
+        What the decisions of the run rest on.
     """
 
     system: FilippovSystem
@@ -184,6 +225,8 @@ class Trajectory(
     steps: Steps = field(default_factory=Steps)
     sample_t: Array | None = None
     sample_x: Array | None = None
+    continuations: list[Continuation] = field(default_factory=list)
+    facts: Facts = field(default_factory=Facts)
 
     @property
     def itinerary(self) -> str:

@@ -14,10 +14,30 @@ class CompilerWarning(UserWarning):
     """A compiler failed, or the cache of compiled libraries is not used."""
 
 
+class DecisionWarning(UserWarning):
+    """A decision of a run rests on a convention, or on no proof."""
+
+
+def warn_of_facts(depends_on_widths: bool, unproved: bool) -> None:
+    """Warn of what the decisions of a run rest on."""
+    if depends_on_widths:
+        warn_once(
+            "Whether sliding on several surfaces is stable depends here on the widths of their layers, which are "
+            "equal in the units of the functions unless layer_widths= is given (run.facts.depends_on_widths).",
+            DecisionWarning,
+        )
+    if unproved:
+        warn_once(
+            "One motion was found for more than eight elements that act on one another; no test shows that it is "
+            "the only one (run.facts.unproved).",
+            DecisionWarning,
+        )
+
+
 @lru_cache(maxsize=64)
-def warn_once(message: str) -> None:
+def warn_once(message: str, kind: type[UserWarning] = CompilerWarning) -> None:
     """Warn, once in a process for each message, about the caller's line and not one of ours."""
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
         level, frame = level + 1, frame.f_back
-    warnings.warn(message, CompilerWarning, stacklevel=level)
+    warnings.warn(message, kind, stacklevel=level)

@@ -131,7 +131,7 @@ def planar_body(data: dict) -> dict:
 def accelerations(run: ns.Trajectory) -> np.ndarray:
     """Those of all motions that continue from the start, sorted."""
     if run.continuations:
-        found = np.array([rates[3:] for _, rates in run.continuations])
+        found = np.array([own.rates[3:] for own in run.continuations])
     else:
         found = run.steps.coefficients[:1, 3:6, 1]
     return found[np.lexsort(found.T[::-1].round(7))]

@@ -1,7 +1,9 @@
 """The law of elements against cases whose truth was found without the library."""
 
+import pickle
 import warnings
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -17,12 +19,7 @@ NOW = [own for own in EVERY if not own["id"].startswith(LATER)]
 
 #: Tests that do not pass yet, and why.
 OPEN = {
-    "test_a_case_is_as_known[layer-two-surfaces]": "the law of elements is being built",
-    "test_a_case_is_as_known[layer-ring-three]": "the law of elements is being built",
-    "test_a_case_is_as_known[layer-units-1.9]": "the law of elements is being built",
-    "test_a_case_is_as_known[layer-units-2.1]": "the law of elements is being built",
     "test_a_case_is_as_known[parallel-1e-10]": "the law of elements is being built",
-    "test_a_case_is_as_known[body-two-contacts-several-1]": "the law of elements is being built",
 }
 
 
@@ -60,3 +57,33 @@ def check(case: Case) -> None:
         assert max(errors.values()) < 1e-8, errors
     if set(data.get("itinerary", "x")) <= set("+-s "):
         assert run.itinerary == data["itinerary"]
+
+
+def ring(widths=None):
+    """Two surfaces on which sliding is stable for some ratios of the widths of their layers."""
+    x, y, z, l1, l2 = (ca.SX.sym(name) for name in ("x", "y", "z", "l1", "l2"))
+    field = [0.1 - (l1 + 2 * l2), 0.05 - (-2 * l1 - 0.5 * l2), l1]
+    return ns.FilippovSystem(
+        [x, y, z], field=field, surfaces=[x, y], multipliers=[l1, l2], layer_widths=widths
+    )
+
+
+@pytest.mark.parametrize(("widths", "stable"), [((1.0, 0.6), True), ((1.0, 0.4), False)])
+def test_widths_of_layers_decide_where_stability_depends_on_them(widths, stable):
+    """The trace of the layer is 1/e1 - 1/(2 e2)."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        run = ns.simulate(ring(widths), [0, 0, 0], 1.0)
+    assert run.facts.depends_on_widths
+    assert run.status is (ns.Status.REACHED_END if stable else ns.Status.INTERSECTION)
+
+
+def test_widths_are_part_of_a_system():
+    system = ring((1.0, 0.6))
+    assert pickle.loads(pickle.dumps(system)).layer_widths == (1.0, 0.6)
+    assert system != ring()
+    assert ring((2.0, 2.0)) == ring()
+    with pytest.raises(ns.DefinitionError, match="layer_widths"):
+        ring((1.0,))
+    with pytest.raises(ns.DefinitionError, match="layer_widths"):
+        ring((1.0, -1.0))

@@ -132,3 +132,29 @@ def test_two_relays_rest_at_the_limit_of_their_spiral():
     rest = next(event for event in run.events if event.kind == "rest")
     assert rest.t == pytest.approx(0.75, abs=1e-9) and rest.name == "h0 and h1"
     assert run.itinerary.endswith("ss") and run.x[-1][:2].tolist() == [0, 0]
+
+
+def test_slow_relay_rests_below_a_speed():
+    # Speeds at zeros fall by 2/3 v^2 each: 3/(2 v) of them down to v.
+    run = ns.simulate(_relay(-lam - v), [1, 0], 100.0, rest_below=1e-2)
+    last = run.events[-2]
+    assert (last.kind, last.name, last.mode_after) == ("rest_below", "h0", "s")
+    assert len(run.events) == pytest.approx(150, abs=5) and run.x[-1].tolist() == [0, 0]
+    crossings = [abs(event.x[1]) for event in run.events if event.kind == "crossing"]
+    assert crossings[-1] < 1e-2 and crossings[-3] >= 1e-2
+    many = ns.ensemble(_relay(-lam - v), [[1, 0]], 100.0, rest_below=1e-2)
+    assert many.itinerary[0] == run.itinerary
+
+
+def test_endless_switching_names_rest_below():
+    run = ns.simulate(_relay(-lam - v), [1, 0], 100.0, max_events=50)
+    assert run.status is ns.Status.TOO_MANY_EVENTS and "rest_below=" in run.message
+    # speeds that do not fall are no rest
+    run = ns.simulate(_relay(-lam), [1e-4, 0], 1.0, rest_below=1.0, max_events=30)
+    assert run.status is ns.Status.TOO_MANY_EVENTS
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, math.nan, "slow"])
+def test_speed_of_rest_is_positive(speed):
+    with pytest.raises(ns.OptionError, match="rest_below"):
+        ns.simulate(_relay(-lam), [1, 0], 1.0, rest_below=speed)

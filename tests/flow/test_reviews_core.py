@@ -11,8 +11,6 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_sliding_on_two_surfaces_ends_where_the_layer_loses_stability": "loss of stability is no guard",
-    "test_sliding_on_three_surfaces_ends_where_the_layer_loses_stability": "loss of stability is no guard",
     "test_nearly_parallel_surfaces_are_crossed_one_by_one[1e-08-2e-07]": "thrown onto the intersection",
     "test_nearly_parallel_surfaces_are_crossed_one_by_one[1e-10-2e-05]": "thrown onto the intersection",
     "test_a_clock_does_not_drift": "ticks are summed",

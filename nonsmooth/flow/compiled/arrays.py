@@ -28,7 +28,7 @@ class OptionsStructure(ctypes.Structure):
     """``Options`` of common.h."""
 
     _fields_ = [
-        *[(name, _D) for name in ("t_end", "rtol", "atol", "max_step")],
+        *[(name, _D) for name in ("t_end", "rtol", "atol", "max_step", "rest_below")],
         *[(name, _I64) for name in ("max_steps", "max_events", "max_jumps")],
         *[(name, _I32) for name in ("start_mode", "at_kind")],
         ("at_count", _I64),
@@ -78,6 +78,10 @@ class Run:
         Surfaces and contacts at the last point that was decided.
     several : list of str
         Modes that could continue there, where more than one could.
+    rates : ndarray (k, n)
+        Rates of the states in them.
+    facts : int
+        What was noted about the decisions, as bits.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
     starts, coefficients, modes : ndarray (s,), (s, N, P+1), (s,)
@@ -102,6 +106,8 @@ class Run:
     guards: Callable[[str], Sequence[Guard]]
     active: list[int]
     several: list[str]
+    rates: Array
+    facts: int
     t: Array
     x: Array
     starts: Array
@@ -130,6 +136,7 @@ class Run:
         guards: Callable[[str], Sequence[Guard]],
         active: list[int],
         several: list[str],
+        rates: Array,
         motion: Array,
         labels: Sequence[tuple[float, ...]],
     ) -> Run:
@@ -145,6 +152,8 @@ class Run:
             guards=guards,
             active=active,
             several=several,
+            rates=rates,
+            facts=counts[12],
             t=whole["point_t"],
             x=whole["point_x"][:, :n],
             starts=whole["start"],
@@ -198,6 +207,7 @@ def options_of(
         o.rtol,
         o.atol,
         o.max_step,
+        o.rest_below or 0.0,
         int(min(o.max_steps, limit)),
         int(min(o.max_events, limit)),
         int(min(o.max_jumps, limit)),

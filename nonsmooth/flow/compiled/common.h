@@ -2,7 +2,7 @@
  *
  * The generated text defines before this file: the facts of nonsmooth/flow/constants.py under their names in
  * capitals (EPSILON, SAFETY, ..., the enumerations of statuses, kinds of events and guards, reasons); P the
- * order or more, MODES a number of modes or more.
+ * order or more.
  */
 #ifndef ON_DEVICE
 #include <math.h>
@@ -12,7 +12,7 @@
 #endif
 
 typedef struct {
-  double t_end, rtol, atol, max_step;
+  double t_end, rtol, atol, max_step, rest_below; /* the last: 0 for none */
   int64_t max_steps, max_events, max_jumps;
   int32_t start_mode, at_kind;
   int64_t at_count;
@@ -38,6 +38,31 @@ typedef struct {
   double *sample_t, *sample_x;
   int64_t kinds_width; /* kinds that are counted: the first ones, and the last */
 } Batch;
+
+/* Events that are remembered. */
+#define HISTORY 48
+
+/* An event: the time since the one before; kinds of event and guard, and its index, as a number. */
+typedef struct { double interval; int64_t pattern; } Recent;
+
+/* What a run is between two steps: lanes give it to the driver for a step that is not clear, and take it back. */
+typedef struct {
+  double t, since, length, shortened; /* since: the last event; length of the step before in this mode, or 0 */
+  int64_t steps, events, segment_steps, history;
+  int64_t *kinds;
+  double *x;
+  int8_t *letter, *side; /* side: of stops */
+  Recent *past;
+  int32_t drop, itinerary, status; /* drop: first coefficients of the first guard that vanish */
+} Suspended;
+
+/* The driver as lanes call it: a run, and what begins one or makes a step of it. */
+typedef struct {
+  void *run;
+  void (*begin)(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m);
+  void (*step)(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m);
+  int64_t random; /* not 0: every other step is given to the driver, at random, which changes no result */
+} Core;
 
 #ifndef ON_DEVICE
 /* Sizes of what Python and C share, compared when a library is loaded. */
@@ -258,10 +283,8 @@ static inline int finite_all(const double *a, int n) {
 }
 
 #ifndef ON_DEVICE
-/* Modes met, as a tree: a node is an itinerary, its parent the itinerary without the last mode. With
- * few modes a node has its children by number, else a list of them. */
-#define FEW_MODES (MODES <= 4)
-typedef struct { int32_t parent, mode, child[FEW_MODES ? MODES : 1], sibling; } Node;
+/* Modes met, as a tree: a node is an itinerary, its parent the itinerary without the last mode. */
+typedef struct { int32_t parent, mode, child, sibling; } Node;
 typedef struct { Node *node; int32_t size, room; } Tree;
 
 static __attribute__((noinline)) int32_t tree_grow(Tree *tree, int32_t parent, int mode) {
@@ -271,30 +294,15 @@ static __attribute__((noinline)) int32_t tree_grow(Tree *tree, int32_t parent, i
     tree->node = more;
     tree->room *= 2;
   }
-  int32_t at = tree->size++, *child = &tree->node[parent].child[FEW_MODES ? mode : 0];
+  int32_t at = tree->size++, *child = &tree->node[parent].child;
   tree->node[at] = (Node){.parent = parent, .mode = mode, .sibling = *child};
   *child = at;
   return at;
 }
 
 static inline int32_t tree_child(Tree *tree, int32_t parent, int mode) {
-  int32_t at = tree->node[parent].child[FEW_MODES ? mode : 0];
-  if (!FEW_MODES) while (at && tree->node[at].mode != mode) at = tree->node[at].sibling;
+  int32_t at = tree->node[parent].child;
+  while (at && tree->node[at].mode != mode) at = tree->node[at].sibling;
   return at ? at : tree_grow(tree, parent, mode);
 }
-
-Tree *tree_new(void) {
-  Tree *tree = malloc(sizeof(Tree));
-  *tree = (Tree){malloc(64 * sizeof(Node)), 1, 64};
-  tree->node[0] = (Node){.parent = -1, .mode = -1};
-  return tree;
-}
-int32_t tree_size(const Tree *tree) { return tree->size; }
-void tree_read(const Tree *tree, int32_t *parent, int32_t *mode) {
-  for (int32_t k = 0; k < tree->size; k++) {
-    parent[k] = tree->node[k].parent;
-    mode[k] = tree->node[k].mode;
-  }
-}
-void tree_free(Tree *tree) { free(tree->node); free(tree); }
 #endif

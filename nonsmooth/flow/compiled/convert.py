@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from ...model import Array, FilippovSystem
+from ...model import Array, FilippovSystem, Guard
 from .. import messages
-from ..constants import KINDS, REASONS
+from ..constants import DEPENDS_ON_WIDTHS, KINDS, REASONS, UNPROVED
 from ..names import guard_name
 from ..options import Options
 from ..status import ADVICE, Status
-from ..trajectory import Event, Segment, Steps, Trajectory
+from ..trajectory import Continuation, Event, Facts, Segment, Steps, Trajectory
+from ..warn import warn_of_facts
 from .arrays import Run
 
 
@@ -19,6 +20,8 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
     """Convert a dense run."""
     status, modes = Status(run.status), run.letters
     limit = None if math.isnan(run.limit) else run.limit
+    facts = Facts(bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED))
+    warn_of_facts(facts.depends_on_widths, facts.unproved)
     events = _events(system, run)
     motion = run.motion if len(run.motion) else None
     if status is not Status.STOPPED:
@@ -40,6 +43,12 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         message=f"{_message(system, options, run)} {ADVICE[status]}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
         steps=Steps(run.starts, run.coefficients),
+        continuations=[
+            Continuation(system.spelled(mode), rates)
+            for mode, rates in zip(run.several, run.rates, strict=True)
+            if status is Status.NON_UNIQUE
+        ],
+        facts=facts,
     )
 
 
@@ -66,7 +75,11 @@ def _named(
     system: FilippovSystem, run: Run, before: str, after: str, row: int
 ) -> tuple[str, str, str, int, int]:
     """Modes, name, element and side of an event."""
-    if row >= 0:
+    if row >= len(run.guards(before)):  # of stability, of which the driver has more
+        k = system.entry_of(before.index("s"))
+        own = [Guard("branch", k, 0, k)]
+        name = guard_name(system, own[0])
+    elif row >= 0:
         own = [run.guards(before)[row]]
         name = guard_name(system, own[0])
     else:  # what comes to rest together where events accumulate
@@ -164,6 +177,8 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.no_reaction(contacts)
     if reason == "no_stable_motion":
         return messages.no_stable_motion(entries)
+    if reason == "stability_lost":
+        return messages.stability_lost(system.surface_names[run.where], t)
     if reason == "high_degree":
         return messages.high_degree(system.entry_of(run.where))
     if reason == "possibly_several":

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...model import Array, Coupled, FilippovSystem, raised_of
 from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
-from ..constants import FULL, RUNNING
+from ..constants import FULL, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
@@ -206,11 +206,14 @@ class _System(ctypes.Structure):
         ("free", SeriesStructure),
         *[(name, ValuesStructure) for name in _VALUES],
         *[(name, _Entries) for name in _ENTRIES],
-        *[(name, _POINTER) for name in (*_TABLES, "slope_output", "slope_moves")],
+        *[
+            (name, _POINTER)
+            for name in (*_TABLES, "slope_output", "slope_moves", "slope_symmetric")
+        ],
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets")],
-        *[(name, _POINTER) for name in ("mixed", "set_first", "set_size", "set_of")],
+        *[(name, _POINTER) for name in ("mixed", "set_first", "set_size", "set_of", "layer_width")],
         *[(name, _POINTER) for name in ("degree", "lower_first", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
@@ -228,9 +231,9 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     require_size(made.batch_size, BatchStructure)
     require_size(made.system_size, _System)
     require_size(made.output_size, Output.Structure)
-    made.table_new.restype = made.run_new.restype = _POINTER
+    made.table_new.restype = made.run_new.restype = made.lanes_tree.restype = _POINTER
     made.table_new.argtypes = [_I32]
-    for name in ("table_modes", "table_size", "table_free", "run_free"):
+    for name in ("table_modes", "table_size", "table_free", "run_free", "lanes_tree"):
         getattr(made, name).argtypes = [_POINTER]
     made.table_read.argtypes = [_POINTER] * 4
     made.run_new.argtypes = [_POINTER] * 2
@@ -238,7 +241,7 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     made.run_begin.argtypes = [*[_POINTER] * 6, _D, _POINTER]
     made.run_motion.argtypes = [_POINTER] * 2
     made.run_continue.argtypes = [_POINTER, _I64]
-    made.run_read.argtypes = [_POINTER] * 5
+    made.run_read.argtypes = [_POINTER] * 6
     made.run_resume.argtypes = [_POINTER] * 2
     made.run_many.argtypes = [*[_POINTER] * 5, _I64]
     return made
@@ -336,6 +339,7 @@ class TapeEngine:
             "component": tape.component,
             "slope_output": tape.slope_output,
             "slope_moves": tape.slope_moves,
+            "slope_symmetric": tape.slope_symmetric,
             "mixed": coupled.mixed.ravel(),
             "bent": coupled.linearity.bent_rows,
             "bent_free": coupled.linearity.bent_free_rows,
@@ -350,6 +354,7 @@ class TapeEngine:
             "early_free": tape.free.early,
         }
         made.sets = len(system.sets)
+        made.layer_width = self._at(np.array([*system.layer_widths, 0.0]))
         made.early_count, made.early_free_count = len(tape.series.early), len(tape.free.early)
         for name, values in tables.items():
             setattr(made, name, self._at(np.array([*values, 0], np.int32)))
@@ -419,7 +424,7 @@ class TapeEngine:
         output = Output(self.system.extended_dimension, self.order, self._rooms, width)
         x, p = np.array(x, float), np.array([*p, 0.0], float)
         start = self._start_mode(options)
-        with self._table() as table, self._state(table) as state:
+        with self.held_table() as table, self.held_run(table) as state:
             c_options = ctypes.byref(options_of(self.system, options, dense=True))
             given = (address(x), address(p), address(start))
             library().run_ask(state, address(asked), 0 if asked is None else len(asked))
@@ -430,13 +435,13 @@ class TapeEngine:
                 # Python hears Ctrl-C between the calls.
                 while (status := library().run_continue(state, BURST)) == RUNNING:
                     pass
-                numbers, counts, active, several = self._read(state)
+                numbers, counts, active, several, rates = self._read(state)
                 if status != FULL:
                     break
                 output.grow(counts[7:10])
                 library().run_resume(state, output.pointer)
             self._rooms = rooms_of(counts[7:10])  # of the next run, which is often a similar one
-            modes, words = self._words(table, [counts[4]])
+            modes, words = self.words(table, [counts[4]])
             labels = self._labels(table)
             final = np.zeros(width)
             library().run_motion(state, address(final))
@@ -450,6 +455,7 @@ class TapeEngine:
             guards=self.guards,
             active=active,
             several=[modes[k] for k in several],
+            rates=rates[:, : self.system.dimension],
             motion=final,
             labels=labels,
         )
@@ -465,25 +471,27 @@ class TapeEngine:
         system = self.system
         return system.surface_count + len(system.impacts) + 8 * len(system.definition.discrete)
 
-    def _table(self) -> _Held:
+    def held_table(self) -> _Held:
         made = library()
         return _Held(made.table_new(self._width), made.table_free)
 
-    def _state(self, table: int) -> _Held:
+    def held_run(self, table: int) -> _Held:
         made = library()
         state = made.run_new(ctypes.byref(self._c), table)
         if not state:
             raise MemoryError("the compiled engine: no memory for a run of this system")
         return _Held(state, made.run_free)
 
-    def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int]]:
-        numbers, counts = (_D * 3)(), (_I64 * 12)()
+    def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
+        numbers, counts = (_D * 3)(), (_I64 * 13)()
         width = self.system.surface_count + len(self.system.impacts)
-        active, several = (_I32 * (width + 1))(), (_I32 * 16)()
-        library().run_read(state, numbers, counts, active, several)
-        return numbers[:], counts[:], active[: counts[10]], several[: counts[11]]
+        active, several = (_I32 * (width + 1))(), (_I32 * SEVERAL)()
+        rates = np.empty((SEVERAL, self.system.extended_dimension))
+        library().run_read(state, numbers, counts, active, several, address(rates))
+        known, found = active[: counts[10]], several[: counts[11]]
+        return numbers[:], counts[:], known, found, rates[: len(found)]
 
-    def _words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
+    def words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
         """Modes that were met, and itineraries of some nodes of their tree."""
         parent, mode, letters = self._tree(table)
         width = self.system.surface_count + len(self.system.impacts)
@@ -541,11 +549,11 @@ class TapeEngine:
         batch = batch_of(x, p, options.t_start, chunk, times, None)
         start, done = self._start_mode(options), np.zeros(1, np.int64)
         c_options = options_of(self.system, options, dense=False, at=at)
-        with self._table() as table, self._state(table) as state:
+        with self.held_table() as table, self.held_run(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
             while library().run_many(*call, address(start), BURST):
                 if stop():
                     raise Stopped
             used = np.flatnonzero(np.bincount(chunk.itinerary)).tolist()
-            chunk.rename(self._words(table, used)[1])
+            chunk.rename(self.words(table, used)[1])
         return chunk

@@ -46,6 +46,7 @@ def ensemble(
     max_steps: int = 1_000_000,
     max_events: int = 100_000,
     max_jumps: int = 1_000,
+    rest_below: float | None = None,
     at_event: tuple[str, int] | None = None,
     t_eval: ArrayLike | None = None,
     at: Any = None,
@@ -66,7 +67,7 @@ def ensemble(
         Time at which every run starts; default 0.
     parameters : mapping, optional
         Values that replace defaults: numbers, or arrays that broadcast with the starts.
-    tol, rtol, atol, start_mode, max_step, max_steps, max_events, max_jumps : optional
+    tol, rtol, atol, start_mode, max_step, max_steps, max_events, max_jumps, rest_below : optional
         As in :func:`simulate`; a start with another side than ``start_mode`` says gets the status
         NON_UNIQUE.
     at_event : (kind, k), optional
@@ -120,6 +121,7 @@ def ensemble(
         max_steps=max_steps,
         max_events=max_events,
         max_jumps=max_jumps,
+        rest_below=rest_below,
         start_mode=start_mode,
     )
     require_system(system, sets=True)

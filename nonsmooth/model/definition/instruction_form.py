@@ -71,6 +71,7 @@ def written(system: FilippovSystem) -> dict[str, Any]:
         "hidden": d.hidden,
         "sizes": list(d.sizes),
         "renamed": [list(pair) for pair in d.renamed],
+        "layer_widths": list(d.layer_widths),
         "lifted": system.lifted,
     }
 
@@ -83,6 +84,8 @@ def read_system(plain: Any) -> FilippovSystem:
     expressions = _expressions(plain, vectors)
     stops, resets, impacts = _list(plain, "events", 3)
     sizes = [_whole(v, "sizes", 1, LARGEST) for v in _list(plain, "sizes")]
+    widths = _list(plain, "layer_widths") if "layer_widths" in plain else []
+    _require(all(is_real(v) and v > 0 for v in widths), "layer_widths that are positive numbers")
     definition = Definition(
         **dict(zip(_INPUTS, vectors, strict=True)),
         **dict(zip(OUTPUTS, expressions, strict=True)),
@@ -96,6 +99,7 @@ def read_system(plain: Any) -> FilippovSystem:
         hidden=_flag(plain.get("hidden")),
         sizes=tuple(sizes),
         renamed=tuple((a, b) for a, b in map(_pair, _list(plain, "renamed"))),
+        layer_widths=tuple(map(float, widths)),
     )
     _require_shapes(definition)
     require_consistent(definition, given=False)
@@ -358,5 +362,6 @@ def _require_shapes(d: Definition) -> None:
     )
     sizes = sum(d.sizes) == d.multipliers.numel() and max(d.sizes, default=1) > 1
     _require(not d.sizes or sizes, "sizes of the sets")
+    _require(len(d.layer_widths) in (0, d.surfaces.numel()), "one layer width for each surface")
     names = [*(n for n, _ in (*d.stops, *d.resets)), *d.impacts]
     _require(len({*names}) == len(names), "events of different names")

@@ -73,6 +73,7 @@ class Definition:
     discrete: tuple[tuple[float, ...] | None, ...] = ()
     sizes: tuple[int, ...] = ()
     renamed: tuple[tuple[str, str], ...] = ()
+    layer_widths: tuple[float, ...] = ()
 
     @cached_property
     def plain(self) -> bool:
@@ -119,6 +120,7 @@ class Definition:
         outputs = [getattr(self, name) for name in OUTPUTS]
         some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed, "rules": self.rules}
         some |= {"clocks": self.clocks, "discrete": self.discrete}
+        some |= {"layer_widths": self.layer_widths}
         return {
             **{name: value for name, value in some.items() if value},
             "definition": ca.Function("definition", inputs, outputs).serialize(),
@@ -140,7 +142,7 @@ class Definition:
         inputs = ("states", "time", "parameters", "multipliers", "reactions")
         rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
         parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=True))
-        some = ("sizes", "renamed", "rules", "clocks", "discrete")
+        some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths")
         tuples: dict[str, Any] = {name: tuple(state.get(name, ())) for name in some}
         return cls(**parts, **rest, **tuples)
 
@@ -165,6 +167,7 @@ def read_definition(
     hidden: bool,
     clocks: Sequence[Clock] = (),
     discrete: Sequence[tuple[float, ...] | None] = (),
+    layer_widths: Any = None,
 ) -> Definition:
     """Read and check the arguments of FilippovSystem."""
     x = symbols(states, "states")
@@ -197,10 +200,8 @@ def read_definition(
         parameters=p,
         multipliers=lam,
         reactions=reactions,
-        gaps=ca.vertcat(*[column([i.gap], f"gap of {i.name!r}", 1) for i in impacts]),
-        restitutions=ca.vertcat(
-            *[column([i.restitution], f"restitution of {i.name!r}", 1) for i in impacts]
-        ),
+        gaps=_of_impacts(impacts, "gap"),
+        restitutions=_of_impacts(impacts, "restitution"),
         impacts=tuple(i.name for i in impacts),
         field=f,
         surfaces=h,
@@ -222,9 +223,28 @@ def read_definition(
         hidden=hidden,
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
+        layer_widths=_widths(layer_widths, h.numel()),
     )
     require_consistent(definition)
     return definition
+
+
+def _of_impacts(impacts: Sequence[Any], what: str) -> ca.SX:
+    """One expression of each impact."""
+    return ca.vertcat(*[column([getattr(i, what)], f"{what} of {i.name!r}", 1) for i in impacts])
+
+
+def _widths(values: Any, count: int) -> tuple[float, ...]:
+    """Widths of the layers of the surfaces; nothing where they are equal."""
+    if values is None:
+        return ()
+    widths = tuple(real(v, "layer_widths") for v in listed(values))
+    if len(widths) != count or not all(0 < v < float("inf") for v in widths):
+        raise DefinitionError(
+            f"layer_widths is {values!r}, but the system has {count} switching functions. Give a "
+            "positive number for each."
+        )
+    return widths if len(set(widths)) > 1 else ()
 
 
 def _one_multiplier_each(lam: ca.SX, h: ca.SX) -> None:

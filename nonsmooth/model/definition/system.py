@@ -69,6 +69,10 @@ class FilippovSystem:
     hidden : bool, optional
         Allow multipliers that enter nonlinearly (hidden dynamics, Jeffrey 2018): sliding then
         follows a stable solution $lambda$ of $grad h . f(x, lambda) = 0$.
+    layer_widths : sequence of float, optional
+        Widths of the layers of the surfaces, in the units of their functions; equal unless given. Where
+        several surfaces slide, it can depend on their ratios whether sliding is stable; ``run.facts`` says
+        where it does.
 
     Raises
     ------
@@ -111,6 +115,7 @@ class FilippovSystem:
         clocks: Sequence[Clock] | Clock = (),
         discrete: Discrete = (),
         hidden: bool = False,
+        layer_widths: Sequence[float] | None = None,
     ):
         given = {
             "states": states,
@@ -126,6 +131,7 @@ class FilippovSystem:
             "resets": resets,
             "impacts": impacts,
             "hidden": hidden,
+            "layer_widths": layer_widths,
         }
         self._adopt(read_definition(**with_added_states(clocks, discrete, given)))
 
@@ -290,6 +296,11 @@ class FilippovSystem:
         sizes = self.definition.sizes or (1,) * self.surface_count
         firsts = [sum(sizes[:i]) for i in range(len(sizes))]
         return tuple(tuple(range(f, f + k)) for f, k in zip(firsts, sizes, strict=True))
+
+    @cached_property
+    def layer_widths(self) -> tuple[float, ...]:
+        """Widths of the layers of the switching functions."""
+        return self.definition.layer_widths or (1.0,) * self.surface_count
 
     @cached_property
     def sets(self) -> tuple[tuple[int, ...], ...]:

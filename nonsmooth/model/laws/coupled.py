@@ -248,6 +248,21 @@ class Coupled:
         return moves
 
     @cached_property
+    def slope_symmetric(self) -> NDArray[np.bool_]:
+        """Which pairs of those derivatives are equal, as those of mechanical systems are, by numbers (m, m)."""
+        if not self.count:
+            return np.zeros((0, 0), bool)
+        function, rng = ca.Function("slope", self._symbols, [self.slope]), np.random.default_rng(1)
+        equal = np.ones((self.count, self.count), bool)
+        for _ in range(3):
+            found = np.array(
+                function(*[rng.uniform(0.2, 0.9, s.numel()) for s in self._symbols]), float
+            )
+            size = abs(found).max(initial=0.0)
+            equal &= abs(found - found.T) <= 1e-12 * size
+        return equal
+
+    @cached_property
     def mixed(self) -> NDArray[np.bool_]:
         """Pairs of unknowns that do not enter the field linearly together (m, m)."""
         mixed = np.zeros((self.count, self.count), bool)

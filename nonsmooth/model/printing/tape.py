@@ -117,6 +117,7 @@ class Tape:
     component: Integers
     slope_output: Integers
     slope_moves: Integers
+    slope_symmetric: Integers
     slope_outputs: int
 
 
@@ -155,6 +156,7 @@ def tape_of(coupled: Coupled) -> Tape:
         component=_components(surface_gradient[1], kept.numel()),
         slope_output=output,
         slope_moves=moves,
+        slope_symmetric=_integers(coupled.slope_symmetric.ravel()),
         slope_outputs=slopes.numel(),
     )
 
@@ -327,7 +329,8 @@ def _sparse(matrix: ca.SX) -> tuple[ca.SX, Entries]:
 def _moving_slopes(coupled: Coupled) -> tuple[Integers, Integers, ca.SX]:
     """Series that the stability of sliding is read from."""
     output, moves = np.full((coupled.count, coupled.count), -1), coupled.slope_moves
-    if not moves.any():
+    weighted = any(coupled.scaled) and not coupled.slope_symmetric.all()
+    if not moves.any() and not weighted:
         return _integers(output.ravel()), _integers(moves.ravel()), ca.SX(0, 1)
     sparsity = coupled.slope.sparsity()
     output[sparsity.row(), sparsity.get_col()] = range(sparsity.nnz())

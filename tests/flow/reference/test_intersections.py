@@ -92,7 +92,7 @@ def test_hidden_sliding_where_linear_filippov_crosses():
     hidden = ns.FilippovSystem([x, y], field=field, multipliers=lam, surface=x, hidden=True)
     run = ns.simulate(hidden, [-1.0, 0.2], 6.0, tol=1e-12)
     assert run.itinerary == "- s +"
-    assert run.events[1].x[1] == pytest.approx(-0.1225, abs=1e-6)
+    assert run.events[1].x[1] == pytest.approx(-0.1225, abs=1e-13)
     linear = ns.FilippovSystem([x, y], surface=x, above=[0.6 - y, -0.1], below=[1.2 - y, -0.1])
     assert ns.simulate(linear, [-1.0, 0.2], 6.0).itinerary == "- +"
 

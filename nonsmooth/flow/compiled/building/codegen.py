@@ -14,17 +14,22 @@ _MOST_LINEAR = 22
 
 def supports_lanes(system: FilippovSystem) -> bool:
     """Whether the lanes engine can be generated for a system."""
-    return system.surface_count <= 1 and not (
-        system.resets or system.impacts or any(system.nonlinear)
-    )
+    return system.surface_count <= 1 and _has_only_plain_stops(system)
 
 
 def supports_set_lanes(coupled: Coupled) -> bool:
     """Whether lanes can be generated for a system with a set: one, alone, of constant slopes."""
     system = coupled.system
     alone = len(system.sets) == 1 and system.surface_count == len(system.sets[0])
+    moves = not coupled.affine or coupled.slope_moves.any()
+    return alone and not moves and _has_only_plain_stops(system)
+
+
+def _has_only_plain_stops(system: FilippovSystem) -> bool:
+    """Whether all events are stops at a guard, without conditions, and multipliers enter linearly."""
+    definition = system.definition
     others = system.resets or system.impacts or any(system.nonlinear)
-    return alone and not others and coupled.affine and not coupled.slope_moves.any()
+    return not others and definition.plain and definition.whens.is_constant()
 
 
 def tape_order(system: FilippovSystem, options: Options) -> int:
@@ -38,7 +43,7 @@ def tape_order(system: FilippovSystem, options: Options) -> int:
 def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
     """C source of the engine for ``width`` trajectories in step."""
     head, program = _lanes_head(system, order)
-    texts = map(driver_text, ("common.h", "lanes/vector.h", "lanes/polynomials.h"))
+    texts = map(driver_text, ("common.h", "lanes/vector.h", "lanes/sines.h", "lanes/polynomials.h"))
     return "".join(
         [
             f"#define W {width}\n",
@@ -55,7 +60,7 @@ def device_source(system: FilippovSystem, order: int, threads: int, resident: in
     compiler."""
     head, program = _lanes_head(system, order)
     sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n"
-    texts = map(driver_text, ("common.h", "device/lane.h", "lanes/polynomials.h"))
+    texts = map(driver_text, ("common.h", "device/lane.h", "lanes/sines.h", "lanes/polynomials.h"))
     parts = [driver_text("device/head.h"), sizes, head, *texts, program]
     return "".join([*parts, driver_text("lanes/lanes.c"), driver_text("device/kernel.c")])
 
@@ -100,7 +105,7 @@ def set_lanes_source(coupled: Coupled, order: int, width: int) -> str:
         f"__attribute__((unused)) static const int OWN[] = {{{listed(program.states) or 0}}};\n"
     )
     drivers = ("lanes/polynomials.h", "lanes/records.h", "lanes/set_lanes.c", "lanes/set_steps.c")
-    texts = [driver_text("common.h"), driver_text("lanes/vector.h"), program.text]
+    texts = [*map(driver_text, ("common.h", "lanes/vector.h", "lanes/sines.h")), program.text]
     return "".join(
         [facts_header(), _sizes(system, order), defines, *texts, *map(driver_text, drivers)]
     )
@@ -118,7 +123,6 @@ def _sizes(system: FilippovSystem, order: int) -> str:
         "ND": system.dimension,
         "P": order,
         "M": system.surface_count,
-        "MODES": len(system.modes),
         "TIMED": int(system.time_dependent),
     }
     return "".join(f"#define {name} {value}\n" for name, value in sizes.items())

@@ -20,9 +20,19 @@ MOST_ORDER = 48
 
 #: The driver in C, in the order in which it is read: one text.
 _FILES = (
-    *("programs.h", "linear.h", "state.c", "modes.c", "jets.c", "sets.c", "stepper.c"),
+    *(
+        "programs.h",
+        "linear.h",
+        "state.c",
+        "modes.c",
+        "jets.c",
+        "stability.c",
+        "sets.c",
+        "stepper.c",
+    ),
     *("surfaces.c", "record.c", "spiral.c", "decide.c", "candidates.c", "layer.c", "contacts.c"),
     *("approach.c", "events.c", "driver.c", "accumulation.c", "memory.c", "entry.c"),
+    "motion.c",
 )
 
 
@@ -45,7 +55,7 @@ def core_source() -> str:
         f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
         for prefix, names in enumerations
     )
-    sizes = f"#define UNFUSED\n#define P {MOST_ORDER}\n#define MODES 1000000\n"
+    sizes = f"#define UNFUSED\n#define P {MOST_ORDER}\n"
     driver = [driver_text(f"interpreter/{name}") for name in _FILES]
     flows = [driver_text("interpreter/flow.c"), _extended("programs.h", "flow.c")]
     fixed = driver_text("interpreter/fixed.c")

@@ -70,7 +70,10 @@ static inline void store(Lanes *s, Work *w, int, int status) {
 }
 
 /* More modes than a number holds. */
-static inline void shorten_codes(Lanes *s, Work *w) { hand_over(s, w, I(-1)); }
+static inline void shorten_codes(Lanes *s, Work *w) { finish_lanes(s, w, I(-1), HAND_OVER); }
+
+static inline void begin_elsewhere(Lanes *s, Work *w, I which) { finish_lanes(s, w, which, HAND_OVER); }
+INLINE I by_chance(const Lanes *, const Work *) { return NONE; }
 
 INLINE void keep_event(const Lanes *s, Work *w, int kind, I which) {
   if (w->o.at_kind != kind || !w->out.at_x || !any(which & (s->kinds[kind] == w->o.at_count))) return;
@@ -92,10 +95,11 @@ static inline int load(Lanes *s, Work *w) {
   }
   if (TIMED) s->x[N - 1] = BC(g->t0);
   s->q = (const T *)(g->q + i * g->q_stride);
-  s->t = s->last_event = BC(g->t0);
+  s->t = BC(g->t0);
+  s->since = BC(0);
   s->shortest = BC(1e-3);
   s->length = BC(0);
-  s->code = s->steps = s->events = s->shrinking = s->drop = s->slides = s->above = I(0);
+  s->code = s->steps = s->entered = s->events = s->shrinking = s->drop = s->slides = s->above = I(0);
   s->lambda = BC(0);
   UNROLL for (int k = 0; k < LAST_KIND; k++) s->kinds[k] = I(0);
   UNROLL for (int k = 0; k < STOPS; k++) s->above_stop[k] = I(0);
@@ -118,7 +122,8 @@ static inline void step(Lanes *s, Work *w) {
   expand_step(s, w, &e);
   sort_step(s, &e);
   first_hits(1, s, &e);
-  take_step(s, w, &e);
+  I unclear = take_step(s, w, &e);
+  finish_lanes(s, w, unclear, HAND_OVER);
 }
 
 /* A thread whose run has ended takes its next start at once: its neighbours wait for that, and all make their step

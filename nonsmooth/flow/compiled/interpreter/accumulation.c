@@ -228,6 +228,28 @@ static void end_at_limit(Run *r, int block, double left, double error) {
   finish(r, ACCUMULATION, NO_REASON, 0);
 }
 
+/* Rest of a surface of relative degree two whose speeds at two zeros in turn are below a limit and fall; an
+ * approximation that is asked for. */
+static void rest_if_slow(Run *r) {
+  int before = r->mode;
+  for (int i = 0; i < r->m && r->status == RUNNING; i++) {
+    int32_t one = i;
+    double speed, *last = r->speed + i;
+    surface_values(r, r->x);
+    if (r->s->degree[i] != 2 || r->letter[i] == 0) continue;
+    if (!(fabs(r->rates[i]) <= VANISHES * surface_scales(r, r->x)[i])) continue;
+    speed = fabs(r->rates[r->s->lower_first[i]]);
+    int slow = speed < r->o.rest_below && *last < r->o.rest_below && speed < (1 - VANISHES) * *last;
+    *last = speed;
+    if (!slow || !choose_rest(r, &one, 1, 0)) continue;
+    adopt(r, &r->chosen);
+    note(r);
+    r->history = 0;
+    event(r, REST_BELOW, before, -1, r->x);
+    return;
+  }
+}
+
 /* Keep an event in mind. */
 static void remember(Run *r, int kind, int guard) {
   int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->met.kind << 32) + (guard < 0 ? -1 : r->met.index);
@@ -238,7 +260,10 @@ static void remember(Run *r, int kind, int guard) {
 /* See whether the last events accumulate. */
 static void see_limit(Run *r) {
   double left, error;
-  int block = block_of(r, &left, &error), only_impacts = r->c > 0;
+  int block;
+  if (r->o.rest_below > 0 && r->status == RUNNING) rest_if_slow(r);
+  block = block_of(r, &left, &error);
+  int only_impacts = r->c > 0;
   if (!block || r->status != RUNNING) return;
   for (int k = 1; k <= block; k++) only_impacts &= back(r, k)->kind == IMPACT;
   if (only_impacts) close_contacts(r, block, left, error); else end_at_limit(r, block, left, error);

@@ -726,8 +726,8 @@ static int is_positive_stable(double *a, int n, double *work) {
   for (int again = 0; again < DEPTH; again++) {
     double size = 0;
     for (int i = 0; i < n * n; i++) size = larger(fabs(power[i]), size);
+    if (!finite_all(power, n * n)) return 0;
     if (size < TIED) return 1;
-    if (!(size < INFINITY)) return 0;
     for (int i = 0; i < n; i++)
       for (int j = 0; j < n; j++) {
         next[i * n + j] = 0;
@@ -749,7 +749,7 @@ static int final_state(const Decision *d, int i, int orders) {
 
 /* The matrix of the surfaces that slide in a block, with the closed contacts in balance, and its rows times the
  * bounds over the widths of the layers; its size, -1 where it cannot be had. */
-static int layer_matrix(const Decision *d, int which, int orders, double *a, double *weight) {
+static int layer_matrix(const Run *r, const Decision *d, int which, int orders, double *a, double *weight) {
   int k = d->count, rows = 0, all = 0, n;
   int32_t *own = d->pivot;
   double *m = d->work;
@@ -773,7 +773,7 @@ static int layer_matrix(const Decision *d, int which, int orders, double *a, dou
   for (int i = 0; i < rows; i++) {
     double bound = d->b[own[i]];
     for (int j = 0; j < k; j++) bound += d->share[own[i] * k + j] * d->nu[j];
-    weight[i] = bound > 0 ? bound : 1;
+    weight[i] = (bound > 0 ? bound : 1) / r->s->layer_width[d->own[own[i]]];
     for (int j = 0; j < rows; j++) a[i * rows + j] = m[i * n + j];
   }
   return rows;
@@ -784,7 +784,7 @@ static int is_stable_block(Run *r, Decision *d, int which, int orders) {
   int size = d->first[which + 1] - d->first[which];
   if (!d->is_touched[d->order[d->first[which]]] || d->proved[which] == UNIQUE_AND_STABLE || d->proved[which] == SEMIDEFINITE) return 1;
   double *a = d->block, *weight = a + (int64_t)size * size, *scaled = weight + size, *rest = scaled + (int64_t)size * size;
-  int n = layer_matrix(d, which, orders, a, weight), stable, falling = 0;
+  int n = layer_matrix(r, d, which, orders, a, weight), stable, falling = 0;
   if (n == 0) return 1;
   if (n == 1) return a[0] > 0;
   int proved = certificate(a, n, d->work, d->pivot);
@@ -1035,6 +1035,7 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
     if (!is_new) continue;
     several++;
     letters_of_motion(r, d, d->motion + i, r->found.letter);
+    for (int q = 0; q < r->n; q++) r->rates_of_several[r->several_count * r->n + q] = d->motion[i].series[q * COMPARED];
     r->several[r->several_count++] = mode_number(r->table, r->found.letter);
   }
   if (several > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }

@@ -97,8 +97,10 @@ static int can_start(Run *r) {
   int exits = 0, holds = 1;
   double most = -INFINITY, least = INFINITY;
   expand(r, r->letter, r->x, r->unknowns, e);
+  r->turned_mode = r->mode;
   for (int row = 0; row < e->l.rows; row++) {
     int kind = e->l.kind[row], index = e->l.index[row], active = 0;
+    r->turned[row] = e->guards[(int64_t)row * r->stride] < 0 ? -1 : 1;
     if (kind != SURFACE_GUARD && kind != EXIT_GUARD && kind != SLIP_GUARD && kind != NEAR_GUARD) continue;
     if (kind == NEAR_GUARD && r->letter[index] == 0) continue; /* ends steps only */
     for (int j = 0; j < r->active_count; j++) active |= r->active[j] == index;
@@ -128,6 +130,7 @@ static void start_in(Run *r, const int8_t *asked) {
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
   mode_solutions(r, &r->now, &all);
+  if (all.count > 1) keep_stable(r, &r->now, &all);
   if (all.count != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, all.count); return; }
   memcpy(r->unknowns, all.each, sizeof(double) * r->width);
   if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
@@ -220,6 +223,10 @@ static void serve(Run *r, int row) {
   if (kind == IMPACT_GUARD) impact(r, row);
   else if (kind == RELEASE_GUARD) release(r, row);
   else if (kind == NEAR_GUARD) near_set(r, row, 1);
+  else if (kind == BRANCH_GUARD && side != OF_ONE) {
+    event(r, STABILITY, r->mode, row, r->x);
+    finish(r, INTERSECTION, STABILITY_LOST, index);
+  }
   else {
     Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, kind == EXIT_GUARD ? r->s->degree[index] + 1 : 2}};
     if (kind == SLIP_GUARD) {

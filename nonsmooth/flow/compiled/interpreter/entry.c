@@ -23,13 +23,8 @@ void run_free(Run *r) { free(r->arena); free(r); }
 /* Times at which the run is read: no approximation of the motion may span one of them. */
 void run_ask(Run *r, const double *times, int64_t count) { r->asked = times; r->asked_count = count; }
 
-void run_begin(Run *r, const Options *o, const Output *out, const double *x, const double *p,
-               const int8_t *start_mode, double t, const double *motion) {
+static void set_parameters(Run *r, const double *p) {
   const System *s = r->s;
-  r->o = *o;
-  r->size = o->atol / o->rtol;
-  r->out = *out;
-  memcpy(r->x, x, sizeof(double) * r->n);
   memcpy(r->p, p, sizeof(double) * s->parameters);
   series_prepare(&s->series, r->stride, r->p, r->series);
   values_prepare(&s->point, r->p, r->point);
@@ -37,10 +32,17 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   values_prepare(&s->maps, r->p, r->maps);
   values_prepare(&s->restitution, r->p, r->restitution);
   values_prepare(&s->columns, r->p, r->columns);
-  memset(r->unknowns, 0, sizeof(double) * r->width);
-  memset(r->drop, 0, sizeof(int32_t) * r->guards);
   values_prepare(&s->atoms, r->p, r->atom_work);
   values_prepare(&s->choices, r->p, r->choice_work);
+}
+
+/* A run that has not begun. */
+static void clear(Run *r, const Options *o, double t) {
+  const System *s = r->s;
+  r->o = *o;
+  r->size = o->atol / o->rtol;
+  memset(r->unknowns, 0, sizeof(double) * r->width);
+  memset(r->drop, 0, sizeof(int32_t) * r->guards);
   r->instant.running = 0;
   r->instant.tied = -1;
   memset(r->instant.passing, 0, s->rules.atoms);
@@ -51,6 +53,7 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->t = r->begun = t;
   r->t_low = 0;
   r->since = 0;
+  for (int i = 0; i < r->m; i++) r->speed[i] = INFINITY;
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
@@ -59,8 +62,16 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   r->reason = NO_REASON;
   r->where = 0;
   r->facts = 0;
-  r->dependent = -1;
+  r->dependent = r->turned_mode = -1;
   r->segment_mode = r->due_impact = r->length_mode = -1;
+}
+
+void run_begin(Run *r, const Options *o, const Output *out, const double *x, const double *p,
+               const int8_t *start_mode, double t, const double *motion) {
+  clear(r, o, t);
+  r->out = *out;
+  memcpy(r->x, x, sizeof(double) * r->n);
+  set_parameters(r, p);
   if (finite_all(r->x, r->n)) { begin(r, start_mode, motion); return; }
   memset(r->letter, 1, r->width);
   lay_out(r, r->letter, &r->now);
@@ -83,15 +94,17 @@ static int go_on(Run *r, int64_t *budget) {
 
 int run_continue(Run *r, int64_t budget) { return go_on(r, &budget); }
 
-void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, int32_t *several) {
+void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, int32_t *several,
+              double *rates) {
   numbers[0] = r->t;
   numbers[1] = r->limit;
   numbers[2] = r->at_t;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
-                    r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count};
+                    r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts};
   memcpy(counts, head, sizeof head);
   memcpy(active, r->active, sizeof(int32_t) * r->active_count);
   memcpy(several, r->several, sizeof(int32_t) * r->several_count);
+  memcpy(rates, r->rates_of_several, sizeof(double) * r->several_count * r->n);
 }
 
 /* What a restart needs, besides the state. */

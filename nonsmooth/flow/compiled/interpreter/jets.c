@@ -10,30 +10,6 @@ static const double *slope_row(const Run *r, int i, int j) {
   return output < 0 ? zero : row_of(r, r->n + 3 * r->width + r->s->rules.atoms + output);
 }
 
-/* The slope of one multiplier, determinant and trace of that of two, or its diagonal, turned to begin
- * positive. */
-static void branch_rows(const Run *r, const Layout *l, int count, double *g) {
-  int stride = r->stride, row = 0;
-  if (is_pair(r, l)) {
-    int i = l->sliding[0], j = l->sliding[1];
-    const double *a = slope_row(r, i, i), *b = slope_row(r, i, j), *c = slope_row(r, j, i), *d = slope_row(r, j, j);
-    for (int k = 0; k < count; k++) {
-      g[k] = convolve(a, d, k, 0, k) - convolve(b, c, k, 0, k);
-      g[stride + k] = a[k] + d[k];
-    }
-    row = 2;
-  } else {
-    for (int i = 0; i < l->slides; i++)
-      if (r->s->slope_moves[l->sliding[i] * (r->width + 1)])
-        memcpy(g + (int64_t)row++ * stride, slope_row(r, l->sliding[i], l->sliding[i]), sizeof(double) * count);
-  }
-  for (int j = 0; j < row; j++) {
-    double *own = g + (int64_t)j * stride, turn = 1;
-    for (int k = 0; k < count; k++) if (own[k] != 0) { turn = ns_sign(own[k]); break; }
-    for (int k = 0; k < count; k++) own[k] *= turn;
-  }
-}
-
 /* Guards from the series (or, with count 1, values) of what they are made of. */
 static void guard_rows(Run *r, const Layout *l, const double *series, int count, double *guards) {
   int w = r->width, n = r->n, stride = r->stride;
@@ -56,8 +32,7 @@ static void guard_rows(Run *r, const Layout *l, const double *series, int count,
     } else if (kind == NEAR_GUARD || kind == SLIP_GUARD) {
       set_row(r, l, row, series, count, g);
     } else if (kind == BRANCH_GUARD) {
-      branch_rows(r, l, count, g);
-      break;
+      branch_row(r, l, row, count, g);
     } else {
       const double *stop = row_of(r, n + 3 * w + row - l->atoms);
       memcpy(g, stop, sizeof(double) * count);

@@ -233,6 +233,19 @@ static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
   else solve_from_grid(r, l, unknowns, found);
 }
 
+/* Of several solutions of a mode with a hidden law keep those that attract in the layer. */
+static void keep_stable(Run *r, const Layout *l, Solutions *found) {
+  int kept = 0, w = r->width, bent = 0;
+  for (int i = 0; i < l->slides; i++) bent |= r->s->mixed[l->sliding[i] * (w + 1)];
+  if (!bent) return;
+  for (int k = 0; k < found->count; k++) {
+    const double *own = found->each + k * w;
+    error_scales(r, r->x, held_of(r, l->letter), own);
+    if (is_stable(r, l)) memmove(found->each + kept++ * w, own, sizeof(double) * w);
+  }
+  found->count = kept;
+}
+
 /* Where the multiplier of the one active surface comes from, and which way it moves; 0 where that is not known. */
 static int way_in_layer(Run *r, const Layout *l, double *from) {
   int own = r->active[0], kind = r->met.kind;

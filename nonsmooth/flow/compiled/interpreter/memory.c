@@ -14,6 +14,7 @@ static void *place(char *base, size_t *used, size_t size, size_t count) {
 static size_t place_layout(Layout *l, char *base, size_t used, int width, int guards) {
   l->letter = LETTERS(width);
   l->sliding = INTEGERS(width);
+  l->group = INTEGERS(width);
   l->kind = INTEGERS(guards);
   l->index = INTEGERS(guards);
   l->side = INTEGERS(guards);
@@ -106,6 +107,7 @@ static size_t place_run(Run *r, char *base) {
   r->at_x = DOUBLES(n);
   r->before = DOUBLES(n);
   r->saved = DOUBLES(n);
+  r->speed = DOUBLES(w);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
   r->tried = DOUBLES(w);
@@ -143,6 +145,10 @@ static size_t place_run(Run *r, char *base) {
   r->heights_of = DOUBLES(w);
   r->aside = DOUBLES(2 * n);
   r->moving = LETTERS(w);
+  r->turned = LETTERS(g);
+  r->rates_of_several = DOUBLES(SEVERAL * n);
+  size_t q = r->m < MOST_ENUMERATED ? r->m : MOST_ENUMERATED, sums = q * (q - (q > 0)) / 2;
+  r->layer_series = DOUBLES(s->slope_outputs ? (q * q + sums * sums) * stride : 0);
   r->idle = LETTERS(s->sets);
   r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
   r->of_defect = DOUBLES(g);

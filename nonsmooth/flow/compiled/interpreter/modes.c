@@ -20,8 +20,6 @@ static int add_row(Layout *l, int kind, int index, int side) {
   return k;
 }
 
-static int is_pair(const Run *r, const Layout *l) { return l->slides == 2 && l->sliding[1] < r->m; }
-
 static int is_atom(int kind) { return kind == STOP_GUARD || kind == RESET_GUARD || kind == ATOM_GUARD; }
 
 /* Whether a guard is more than an affine function of the states, whose polynomial needs no check. */
@@ -73,17 +71,7 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
     int first = kind == STOP_GUARD ? 0 : kind == RESET_GUARD ? s->stops : s->stops + s->resets;
     add_row(l, kind, a - first, s->rules.way[a]);
   }
-  int first = 0, w = r->width, moves = 0;
-  for (int i = l->slides - 1; i >= 0; i--) if (l->sliding[i] < r->m) first = l->sliding[i];
-  if (is_pair(r, l)) {
-    int one = l->sliding[0], two = l->sliding[1];
-    moves |= s->slope_moves[one * w + one] | s->slope_moves[one * w + two];
-    moves |= s->slope_moves[two * w + one] | s->slope_moves[two * w + two];
-    l->branches = moves ? 2 : 0;
-  } else {
-    for (int i = 0; i < l->slides; i++) l->branches += s->slope_moves[l->sliding[i] * (w + 1)];
-  }
-  for (int k = 0; k < l->branches; k++) add_row(l, BRANCH_GUARD, first, 0);
+  add_branches(r, l);
   l->bent_count = 0;
   for (int k = 0; k < l->rows; k++) if (is_bent(r, l->kind[k], l->index[k])) l->bent[l->bent_count++] = k;
 }

@@ -4,8 +4,6 @@
  * driver}.py; read those first. What is rare and slow anyway (points where the jet is not finite, starts in
  * repelling sliding, stability that no simple test shows) is handed over to them.
  */
-#define HISTORY 48
-#define SEVERAL 16 /* modes that can continue, for the message */
 
 #define TINY 2.2250738585072014e-308
 
@@ -34,7 +32,8 @@ typedef struct {
   Values columns;     /* entries of the field's derivatives by the unknowns */
   Entries slope, layer_gradient, height_gradient, stop_gradient, factor_gradient, surface_gradient, atom_gradient, column;
   const int32_t *continuous, *scaled, *carries, *component;
-  const int32_t *slope_output, *slope_moves; /* (m + c, m + c): output of the series or -1; whether it moves */
+  /* (m + c, m + c): output of the series or -1; whether it moves; whether the matrix is symmetric */
+  const int32_t *slope_output, *slope_moves, *slope_symmetric;
   int32_t linear, linear_free; /* whether field and guards are affine: in any mode, where nothing slides */
   /* Field's rows in any mode, where nothing slides; surfaces and gaps, stops and resets: 0 if affine, with sines of
    * the time, nothing to be checked; the latter: 0 if affine in states and time, polynomials are exact. */
@@ -43,6 +42,7 @@ typedef struct {
   int32_t sets; /* of codimension two and more */
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   const int32_t *set_first, *set_size, *set_of; /* by set; the set of each switching function or -1 */
+  const double *layer_width; /* of the surfaces */
   /* Of each surface the derivative of h that its multiplier enters; where those between are among what is kept. */
   const int32_t *degree, *lower_first;
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
@@ -63,7 +63,7 @@ typedef struct {
 typedef struct {
   int8_t *letter; /* +1, -1, 0 for each surface; +1, 0 for open and closed contacts; see sets.c */
   int32_t rows, atoms, slides, mode, branches, is_free; /* atoms: first row of stops and resets; free: no letter is 0 */
-  int32_t *sliding, *kind, *index, *side, *bent, bent_count; /* bent: guards that a step is checked with */
+  int32_t *sliding, *group, *kind, *index, *side, *bent, bent_count; /* bent: guards that a step is checked with */
 } Layout;
 
 typedef struct {
@@ -128,7 +128,7 @@ typedef struct {
   Instant instant;
   int32_t mode, status, reason, where, due_impact, falls, repelling, *drop;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
-  int32_t itinerary, segment_mode;
+  int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
   double size, length, shortened;
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
@@ -136,6 +136,9 @@ typedef struct {
   Continuation chosen, one, first, rest, found;
   Decision *decision;
   int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
+  int32_t turned_mode; /* a mode that was asked for, whose guards of stability begin with these signs */
+  int8_t *turned;
+  double *layer_series, *rates_of_several;
   Output out;
   int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
   const double *times, *asked; /* times of samples in the row; times at which any run is read */
@@ -149,13 +152,15 @@ typedef struct {
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
-  double *saved; /* a state to return to */
+  double *saved, *speed; /* a state to return to; of each surface at its last zero */
   int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
   int32_t shown;
   const Expansion *expansion;
   void *arena;
 } Run;
 
+static void add_branches(const Run *r, Layout *l);
+static void branch_row(const Run *r, const Layout *l, int row, int count, double *g);
 static int set_of(const Run *r, int i);
 static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns);
 static void aim_again(Run *r, const Expansion *e);
@@ -220,7 +225,10 @@ Table *table_new(int32_t width) {
 int32_t table_modes(const Table *t) { return t->count; }
 int32_t table_size(const Table *t) { return t->tree.size; }
 void table_read(const Table *t, int32_t *parent, int32_t *mode, int8_t *letter) {
-  tree_read(&t->tree, parent, mode);
+  for (int32_t k = 0; k < t->tree.size; k++) {
+    parent[k] = t->tree.node[k].parent;
+    mode[k] = t->tree.node[k].mode;
+  }
   memcpy(letter, t->letter, (size_t)t->count * t->width);
 }
 void table_free(Table *t) { free(t->tree.node); free(t->letter); free(t->bucket); free(t); }

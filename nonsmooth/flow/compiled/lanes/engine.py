@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -17,15 +17,14 @@ from ..arrays import (
     BURST,
     BatchStructure,
     OptionsStructure,
-    address,
     batch_of,
     options_of,
     require_size,
-    words_of,
 )
 from ..building.build import build
 from ..building.codegen import lanes_source, set_lanes_source, supports_lanes, supports_set_lanes
 from ..building.compilers import lane_width
+from ..tape import library as core_library
 from ..tape import tape_for
 
 _I64, _POINTER = ctypes.c_int64, ctypes.c_void_p
@@ -34,8 +33,17 @@ _I64, _POINTER = ctypes.c_int64, ctypes.c_void_p
 FLAGS = ("-march=native", "-ffp-contract=fast")
 
 
+class _Core(ctypes.Structure):
+    """``Core`` of common.h."""
+
+    _fields_ = [*[(name, _POINTER) for name in ("run", "begin", "step")], ("random", _I64)]
+
+
 class Lanes:
     """The library that runs a system's trajectories in step, built when first needed."""
+
+    #: Not 0: every other step, at random, is made by the driver, which changes no result.
+    random = 0
 
     def __init__(self, system: FilippovSystem, order: int):
         self.system, self.order = system, order
@@ -66,20 +74,20 @@ class Lanes:
         stop: Callable[[], bool] = lambda: False,
     ) -> Chunk:
         """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
-        # What is rare is run again one by one, by the interpreter.
+        # What is not clear the driver does, for a step.
         chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
         x, p = np.ascontiguousarray(x, float), np.ascontiguousarray(p, float)
+        padded = np.append(p, np.zeros((*p.shape[:-1], 1)), axis=-1)
         c_options = options_of(self.system, options, dense=False, at=at)
-        library = self.library
-        tree = library.tree_new()
-        try:
-            batch = batch_of(x, p, options.t_start, chunk, None, None)
-            _call(library, batch, c_options, tree, stop)
+        tape = tape_for(self.system, options)
+        assert tape is not None
+        with tape.held_table() as table, tape.held_run(table) as run:
+            tree = core_library().lanes_tree(run)
+            batch = batch_of(x, padded, options.t_start, chunk, None, None)
+            _call(self.library, batch, c_options, tree, _core(run, self.random), stop)
             used = np.flatnonzero(np.bincount(chunk.itinerary))
-            chunk.rename(_words(library, tree, self.system.modes, used.tolist()))
-        finally:
-            library.tree_free(tree)
+            chunk.rename(tape.words(table, used.tolist())[1])
         self._run_rest(x, p, options, at, chunk, stop)
         return chunk
 
@@ -105,11 +113,12 @@ def _call(
     batch: BatchStructure,
     options: OptionsStructure,
     tree: int,
+    core: _Core,
     stop: Callable[[], bool],
 ) -> None:
     memory = np.zeros(library.many_size() + 64, np.uint8)
     state = memory.ctypes.data + -memory.ctypes.data % 64
-    call = (state, ctypes.byref(batch), ctypes.byref(options), tree, BURST)
+    call = (state, ctypes.byref(batch), ctypes.byref(options), tree, ctypes.byref(core), BURST)
     while library.run_many(*call):
         if stop():
             raise Stopped
@@ -118,29 +127,21 @@ def _call(
 def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
     require_size(library.options_size, OptionsStructure)
     require_size(library.batch_size, BatchStructure)
-    library.tree_new.restype = _POINTER
-    library.tree_size.argtypes = [_POINTER]
-    library.tree_read.argtypes = [_POINTER] * 3
-    library.tree_free.argtypes = [_POINTER]
     library.many_size.restype = _I64
-    library.run_many.argtypes = [*[_POINTER] * 4, _I64]
+    library.run_many.argtypes = [*[_POINTER] * 5, _I64]
     return library
 
 
-def _words(
-    library: ctypes.CDLL, tree: int, modes: Sequence[str], nodes: Sequence[int]
-) -> Mapping[int, str]:
-    """Itineraries of some nodes of a tree, as strings."""
-    size = library.tree_size(tree)
-    parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
-    library.tree_read(tree, address(parent), address(mode))
-    return words_of(parent, mode, modes, nodes)
+def _core(run: int, random: int) -> _Core:
+    """The driver as C of the lanes calls it."""
+    begin, step = core_library().core_begin, core_library().core_step
+    return _Core(run, *[ctypes.cast(f, _POINTER).value for f in (begin, step)], random)
 
 
 def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
     """Return what runs a system's trajectories in step at the options' tolerance, or None where they
     cannot be: several surfaces, resets, a start's mode that is asked for, times that one number rounds."""
-    if options.start_mode is not None or options.begins_late:
+    if options.start_mode is not None or options.rest_below is not None or options.begins_late:
         return None
     if not (supports_set_lanes(coupled_of(system)) if system.sets else supports_lanes(system)):
         return None

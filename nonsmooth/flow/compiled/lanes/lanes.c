@@ -3,9 +3,8 @@
  * Each lane holds one trajectory and is refilled when it ends. Whatever is common is done for all
  * lanes at once: expansion, step size, roots, projection, the decision at a surface where both
  * fields are clearly transversal. Whatever is rare (tangency, repelling sliding, ties, accumulating
- * events, limits, points that are not finite) is handed over: the trajectory gets the status
- * HAND_OVER and runs again from its start in the interpreter. No lane's result depends on its
- * neighbours.
+ * events, limits, points that are not finite) is not clear: the lane gives its trajectory to the driver for that
+ * step and takes it back (on a GPU it runs again from its start there). No lane's result depends on its neighbours.
  *
  * The generated text defines, besides what common.h asks for: N states with time, ND without, M surfaces,
  * TIMED whether time is a state, W, SLOTS guards (surface or exit to +, exit to -, stops), STOPS, DIRECTION[STOPS],
@@ -18,16 +17,28 @@
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 60)
 
+#if RARE_CASES_HERE
+/* Of a trajectory, what only the driver needs: the last events; halved steps, and up to which step that is so. */
+typedef struct { Recent event[HISTORY]; int64_t count, steps; double shortened; } Past;
+#endif
+
 typedef struct {
   T x[N];
   OWN(T, q, NQ); /* prepared from the parameters */
-  T t, lambda, last_event, shortest, length; /* of the step before in the same mode, or 0 */
-  I slides, above, drop, live, steps, events, kinds[LAST_KIND], shrinking;
+  T t, lambda, since, length; /* time since the last event; of the step before in the same mode, or 0 */
+  I slides, above, drop, live, steps, events, kinds[LAST_KIND];
+  I entered; /* number of steps when the mode began */
   I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
   I above_stop[STOPS > 0 ? STOPS : 1]; /* where the guard of a stop was at the start of the step before */
   double size; /* of states at which both tolerances are as large */
   int64_t index[W];
   int32_t base[W];
+#if RARE_CASES_HERE
+  Past past[W];
+#else
+  T shortest;
+  I shrinking;
+#endif
 } Lanes;
 
 /* What feeds the lanes and takes their results: batch.c, or device.c on a GPU. */
@@ -35,11 +46,16 @@ typedef struct Work Work;
 INLINE const Options *limits(const Work *w);
 static void store(Lanes *s, Work *w, int l, int status);
 static void shorten_codes(Lanes *s, Work *w);
+static void begin_elsewhere(Lanes *s, Work *w, I which);
+INLINE I by_chance(const Lanes *s, const Work *w);
 INLINE void keep_event(const Lanes *s, Work *w, int kind, I which);
 
+/* Number of the mode: 0 above, 1 below, 2 sliding. */
+INLINE I mode_of(const Lanes *s) { return (s->slides & 2) | (~s->slides & ~s->above & (M > 0)); }
+
 static void note_modes(Lanes *s, Work *w, I which) {
-  I digit = 1 + ((s->slides & 2) | (~s->slides & ~s->above & (M > 0)));
-  s->code = (s->code & ~which) | (((s->code << 2) + digit) & which);
+  s->code = (s->code & ~which) | (((s->code << 2) + mode_of(s) + 1) & which);
+  s->entered = (s->entered & ~which) | (s->steps & which);
   if (any(s->code >= LONG_CODE)) shorten_codes(s, w);
 }
 
@@ -54,8 +70,6 @@ INLINE void finish_lanes(Lanes *s, Work *w, I which, int status) {
   s->live &= ~which;
   store_lanes(s, w, which, status);
 }
-
-INLINE void hand_over(Lanes *s, Work *w, I which) { finish_lanes(s, w, which, HAND_OVER); }
 
 /* The surface -------------------------------------------------------------------------------- */
 
@@ -140,7 +154,7 @@ static void begin(Lanes *s, Work *w, I fresh) {
 #endif
   set_lambda(s);
   note_modes(s, w, fresh & ~unclear);
-  hand_over(s, w, unclear);
+  begin_elsewhere(s, w, fresh & unclear);
 }
 
 /* Step size ------------------------------------------------------------------------------------ */
@@ -148,7 +162,7 @@ static void begin(Lanes *s, Work *w, I fresh) {
 /* Ratios of the last two terms of the guards that are not affine to their allowances (an affine
  * guard is bounded by the states). */
 INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T *of_guards, T g[S1][P + 1],
-                         T *last, T *before, T *sum) {
+                         T *last, T *before, T *sum, I *vanish) {
   T gradient[S1][N], value[S1];
 #if M > 0
   if (!AFFINE[0] || !AFFINE[1]) {
@@ -175,12 +189,15 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T *
     *sum += SELECT(counts, p + b, BC(0));
     *last = MAX(*last, SELECT(counts, p, BC(0)));
     *before = MAX(*before, SELECT(counts, b, BC(0)));
+    I zero = (g[j][P] == 0) | (g[j][P - 1] == 0), ahead = (g[j][P - 2] != 0) | (g[j][P - 3] != 0);
+    *vanish |= counts & zero & ahead;
   }
 }
 
-/* ``allowed`` and ``of_guards`` are the tolerances of states and of guards that are not affine. */
+/* ``allowed`` and ``of_guards`` are the tolerances of states and of guards that are not affine; the last terms of
+ * some guards ``vanish``, and earlier ones bound the step. */
 INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], T *allowed, T *of_guards,
-                   I *finite) {
+                   I *finite, I *vanish) {
   T last = BC(1e-300), before = BC(1e-300), sum = BC(0);
   UNROLL for (int i = 0; i < N; i++) {
     allowed[i] = i < ND ? SAFETY * (o->atol + o->rtol * ABS(s->x[i])) : BC(0);
@@ -190,7 +207,8 @@ INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 
     last = MAX(last, p);
     before = MAX(before, b);
   }
-  guard_ratios(s, o, allowed, of_guards, g, &last, &before, &sum);
+  *vanish = NONE;
+  guard_ratios(s, o, allowed, of_guards, g, &last, &before, &sum, vanish);
   *finite = ABS(sum) < INFINITY;
   T h1 = LOG2(MIN(last, BC(1e300))) * (-1.0 / P), h2 = LOG2(MIN(before, BC(1e300))) * (-1.0 / (P - 1));
   return EXP2(MIN(h1, h2));
@@ -428,15 +446,60 @@ INLINE void first_hits(int n, const Lanes *s, Step *e) {
 
 /* Events --------------------------------------------------------------------------------------- */
 
-/* Zeno: ever shorter intervals are left to the interpreter, which knows their limit. */
-INLINE I watch_intervals(Lanes *s, I which) {
-  T interval = s->t - s->last_event;
-  I shorter = which & (interval < SHRINKS * s->shortest);
-  s->last_event = SELECT(which, s->t, s->last_event);
-  s->shortest = SELECT(shorter, interval, s->shortest);
+#if RARE_CASES_HERE
+/* Sum of the last intervals but ``back``. */
+static double block(const Past *p, int64_t back, int lag) {
+  double sum = 0;
+  for (int k = 0; k < lag; k++) sum += p->event[(p->count - 1 - back - k) % HISTORY].interval;
+  return sum;
+}
+
+/* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
+static int may_accumulate(const Past *p) {
+  for (int l = 0; l < LAG_COUNT; l++) {
+    int lag = LAGS[l];
+    if (p->count < (BLOCKS + 1) * lag) return 0;
+    double later = block(p, 0, lag), low = INFINITY, high = 0, last = 0;
+    if (!(later > 0)) return 1;
+    for (int b = 1; b < BLOCKS; b++) {
+      double earlier = block(p, b * lag, lag), ratio = later / earlier;
+      low = smaller(ratio, low);
+      high = larger(ratio, high);
+      if (b == 1) last = ratio;
+      if (!(high < SHRINKS && high - low <= SPREAD * (1 - last))) break;
+      if (b == BLOCKS - 1) return 1;
+      later = earlier;
+    }
+  }
+  return 0;
+}
+
+/* Remember events of the lanes ``which`` by their kinds and those of their guards; those that may accumulate are
+ * returned, and not clear. */
+SELDOM I remember(Lanes *s, I which, I kind, I guard) {
+  I unclear = NONE;
+  I pattern = (kind << 40) + (guard << 32);
+  for EACH(l, which) {
+    Past *p = &s->past[l];
+    p->event[p->count++ % HISTORY] = (Recent){LANE(s->since, l), LANE_I(pattern, l)};
+    if (p->count > BLOCKS && may_accumulate(p)) {
+      LANE_I(unclear, l) = -1;
+      p->count--;
+    }
+  }
+  s->since = SELECT(which & ~unclear, BC(0), s->since);
+  return unclear;
+}
+#else
+/* Ever shorter intervals are left to the driver, which knows their limit. */
+INLINE I remember(Lanes *s, I which, I, I) {
+  I shorter = which & (s->since < SHRINKS * s->shortest);
+  s->shortest = SELECT(shorter, s->since, s->shortest);
+  s->since = SELECT(which, BC(0), s->since);
   s->shrinking -= shorter;
   return which & (s->shrinking >= 3);
 }
+#endif
 
 INLINE void count(Lanes *s, Work *w, int kind, I which) {
   s->kinds[kind] -= which;
@@ -446,7 +509,7 @@ INLINE void count(Lanes *s, Work *w, int kind, I which) {
 
 #if M > 0
 /* Lanes that met the surface or an end of sliding change their mode; ``slope`` is that of the guard
- * over the step. The lanes that need the interpreter are returned. */
+ * over the step. Those that are not clear are returned, and have no event. */
 INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   T value[2], scale[2];
   lie(s, value, scale);
@@ -460,18 +523,16 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   s->slides &= ~ends;
   s->above = (s->above & ~ends) | up;
   s->drop = (s->drop & ~ends) | (ends & 2);
-  I all = (met | ends) & ~unclear;
-  I entered = all & s->slides & ~was, changed = all & (s->slides ^ was | s->above ^ was_above);
-  unclear |= all & ~changed;
-  count(s, w, ENTRY, entered);
+  unclear |= s->events + 1 >= limits(w)->max_events;
+  I all = (met | ends) & ~unclear & (s->slides ^ was | s->above ^ was_above);
+  I entered = all & s->slides & ~was, kind = (entered & ENTRY) | (ends & EXIT) | (~entered & ~ends & CROSSING);
+  all &= ~remember(s, all, kind, ends & EXIT_GUARD);
+  count(s, w, ENTRY, entered & all);
   count(s, w, EXIT, all & ends);
-  count(s, w, CROSSING, changed & ~ends & ~entered);
-  unclear |= watch_intervals(s, all);
-  s->length = SELECT(all, BC(0), s->length);
-  unclear |= s->events >= limits(w)->max_events;
+  count(s, w, CROSSING, all & ~ends & ~entered);
   set_lambda(s);
-  note_modes(s, w, all & ~unclear);
-  return unclear;
+  note_modes(s, w, all);
+  return (met | ends) & ~all;
 }
 
 /* Lanes that slide towards a two-fold where the sliding field is 0/0. */
@@ -494,6 +555,7 @@ INLINE void state_at(T *x, T c[N][P + 1], T dt, int degree) {
 INLINE void advance(Lanes *s, const T *x, T dt) {
   UNROLL for (int i = 0; i < N; i++) s->x[i] = x[i];
   s->t += dt;
+  s->since += dt;
   if (TIMED) s->x[N - 1] = s->t;
   s->steps += 1;
   s->drop = NONE;
@@ -523,9 +585,9 @@ INLINE I disagrees(const Lanes *s, T c[N][P + 1], T g[S1][P + 1], const T *x, co
 }
 #endif
 
-/* Lanes whose step is left to the interpreter: it would be held back, or its defect is too large. */
-INLINE I unchecked(Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], const T *allowed,
-                   const T *of_guards, T by_series, T h, T dt, const T *end) {
+/* Lanes whose step is not clear: it would be held back, or its defect is too large. */
+INLINE I unchecked(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], const T *allowed,
+                   const T *of_guards, T by_series, T dt, const T *end) {
   I wrong = {0};
 #if ROWS + GUARDS > 0
   I same = s->length > 0;
@@ -538,7 +600,6 @@ INLINE I unchecked(Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], co
     wrong |= disagrees(s, c, g, x, allowed, of_guards, at, dt, INNER);
   }
   wrong |= disagrees(s, c, g, end, allowed, of_guards, dt, dt, P);
-  s->length = h;
   wrong &= ~((s->slides & -AFFINE_MODES[2]) | (~s->slides & s->above & -AFFINE_MODES[0])
              | (~s->slides & ~s->above & -AFFINE_MODES[1]));
 #endif
@@ -546,14 +607,13 @@ INLINE I unchecked(Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], co
 }
 
 /* Lanes where a stop was passed between two steps: rounding hid it from the first. */
-INLINE I passed_between(Lanes *s, T g[S1][P + 1]) {
+INLINE I passed_between(const Lanes *s, T g[S1][P + 1]) {
   I passed = {0};
   UNROLL for (int j = 0; j < STOPS; j++) {
     T value = g[FIRST_STOP + j][0];
     I above = value > 0, was = s->above_stop[j];
     if (DIRECTION[j] <= 0) passed |= was & ~above;
     if (DIRECTION[j] >= 0) passed |= ~was & (I)(value >= 0);
-    s->above_stop[j] = above;
   }
   return passed;
 }
@@ -567,12 +627,12 @@ INLINE I finite_lanes(const Lanes *s) {
 /* The series of a step, its length, and which guards have a root in it. */
 INLINE void expand_step(Lanes *s, Work *w, Step *e) {
   const Options *o = limits(w);
-  I finite;
+  I finite, vanish;
   jet(s->x, s->q, s->slides, s->above, s->lambda, &e->c[0][0], &e->g[0][0]);
-  e->by_series = step_size(s, o, e->c, e->g, e->allowed, e->of_guards, &finite);
+  e->by_series = step_size(s, o, e->c, e->g, e->allowed, e->of_guards, &finite, &vanish);
   T h = MIN(e->by_series, BC(o->max_step)), left = o->t_end - s->t;
   e->last = h >= left;
-  e->unclear = ~finite;
+  e->unclear = ~finite | vanish;
   e->unclear |= ~e->last & (h <= SHORTEST * MAX(BC(1), ABS(s->t)));
   e->unclear |= (s->steps >= o->max_steps) | passed_between(s, e->g);
   /* What happens at the end, to rounding, happens. */
@@ -587,35 +647,93 @@ INLINE void sort_step(Lanes *s, Step *e) {
   if (any(hard)) e->unclear |= resolve(&e->v);
 }
 
-INLINE void take_step(Lanes *s, Work *w, Step *e) {
+/* Roots on a surface and on stops that are not affine are improved on these functions, as in the driver; the lanes
+ * are returned where one of Newton's steps is not enough. */
+INLINE I polish_times(const Lanes *s, Step *e, I slot, T *dt, T *end) {
+  I curved = NONE;
+  T value = BC(0), slope = BC(0);
+#if M > 0
+  if (CURVED && any(curved = s->live & (slot == 1) & ~s->slides)) {
+    T h, gradient[N];
+    surface_values(end, s->q, s->slides, s->above, s->lambda, &h, gradient);
+    value = SELECT(curved, s->lambda * h, value);
+  }
+#endif
+#if STOPS > 0
+  I here = NONE;
+  for (int j = 0; j < STOPS; j++) if (!AFFINE[FIRST_STOP + j]) here |= s->live & (slot == FIRST_STOP + j + 1);
+  if (any(here)) {
+    T stop[STOPS], gradient[STOPS][N];
+    stop_values(end, s->q, s->slides, s->above, s->lambda, stop, &gradient[0][0]);
+    for (int j = 0; j < STOPS; j++) value = SELECT(here & (slot == FIRST_STOP + j + 1), stop[j], value);
+    curved |= here;
+  }
+#endif
+  if (!any(curved)) return NONE;
+  UNROLL for (int j = 0; j < SLOTS; j++) {
+    T d = BC(0);
+    UNROLL for (int k = P; k >= 1; k--) d = d * *dt + (double)k * e->g[j][k];
+    slope = SELECT(slot == j + 1, d, slope);
+  }
+  T change = value / slope;
+  *dt = SELECT(curved, *dt - change, *dt);
+  state_at(end, e->c, *dt, P);
+  return curved & ~(I)(ABS(change) <= CLOSE * *dt);
+}
+
+/* What a step may have changed in the lanes ``which`` is again as at its start. */
+INLINE void undo_step(Lanes *s, const Step *e, T t, T since, I drop, I slides, I above, I which) {
+  UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(which, e->c[i][0], s->x[i]);
+  s->t = SELECT(which, t, s->t);
+  s->since = SELECT(which, since, s->since);
+  s->steps += which;
+  s->drop = (s->drop & ~which) | (drop & which);
+  s->slides = (s->slides & ~which) | (slides & which);
+  s->above = (s->above & ~which) | (above & which);
+  set_lambda(s);
+}
+
+/* Take the step where it is clear; the lanes are returned where it is not. */
+INLINE I take_step(Lanes *s, Work *w, Step *e) {
   const Options *o = limits(w);
-  T left = e->left, dt = e->dt;
-  I last = e->last & (e->h >= left), unclear = e->unclear, slot = e->slot;
+  T left = e->left, dt = e->dt, t = s->t, since = s->since;
+  I last = e->last & (e->h >= left), unclear = e->unclear | by_chance(s, w), slot = e->slot;
   dt = MIN(dt, SELECT(last, left, dt));
   unclear |= last & (dt == left) & (slot != 0) & (slot <= FIRST_STOP); /* a mode without a step */
   T h = MIN(e->h, left), end[N];
   state_at(end, e->c, dt, P);
-  unclear |= unchecked(s, o, e->c, e->g, e->allowed, e->of_guards, e->by_series, h, dt, end);
-  I was_sliding = s->slides;
+  unclear |= polish_times(s, e, slot, &dt, end) | (I)(dt > left);
+  unclear |= unchecked(s, o, e->c, e->g, e->allowed, e->of_guards, e->by_series, dt, end);
+  I drop = s->drop, slides = s->slides, above = s->above;
   advance(s, end, dt);
   I live = s->live & ~unclear, met = {0}, up = {0}, down = {0}, stopped = {0};
+  T length = ROWS + GUARDS > 0 ? SELECT(live, h, s->length) : s->length;
+  unclear |= ~finite_lanes(s);
 #if M > 0
-  met = live & ~was_sliding & (slot == 1);
-  up = live & was_sliding & (slot == 1);
+  met = live & ~slides & (slot == 1);
+  up = live & slides & (slot == 1);
   down = live & (slot == 2);
-  if (any(met | (live & was_sliding))) unclear |= project(s, met | was_sliding);
-  I on = live & was_sliding & (slot == 0) & ~last;
+  if (any(met | (live & slides))) unclear |= project(s, met | slides);
+  I on = live & slides & (slot == 0) & ~last;
   if (!CANCELLED && any(on)) unclear |= on & near_two_fold(s, o->rtol);
+  met &= ~unclear;
+  up &= ~unclear;
+  down &= ~unclear;
   if (any(met | up | down)) unclear |= change_modes(s, w, met, up, down, e->slope);
+  length = SELECT((met | up | down) & ~unclear, BC(0), length);
 #endif
+  unclear &= s->live;
+  if (any(unclear)) undo_step(s, e, t, since, drop, slides, above, unclear);
+  live &= ~unclear;
+  s->length = SELECT(live, length, s->length);
 #if STOPS > 0
+  for (int j = 0; j < STOPS; j++)
+    s->above_stop[j] = (s->above_stop[j] & ~live) | ((I)(e->g[FIRST_STOP + j][0] > 0) & live);
   stopped = live & (slot > FIRST_STOP);
   if (any(stopped)) count(s, w, STOP, stopped);
 #endif
   s->t = SELECT(live & last & (I)(dt == left), BC(o->t_end), s->t);
-  last &= live & (slot == 0);
-  unclear |= ~finite_lanes(s);
-  hand_over(s, w, unclear);
-  finish_lanes(s, w, stopped & ~unclear, STOPPED);
-  finish_lanes(s, w, last & ~unclear, REACHED_END);
+  finish_lanes(s, w, stopped, STOPPED);
+  finish_lanes(s, w, last & live & (slot == 0), REACHED_END);
+  return unclear;
 }

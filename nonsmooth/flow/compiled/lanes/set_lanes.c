@@ -18,7 +18,6 @@
 #define LONG_CODE (1LL << 60)
 #define WAITING (4 * GROUPS * W)
 #define OFTEN 8 /* fewer groups run where the starts do not fill all of them so many times */
-#define CLOSE 1e-8 /* only where |h| is this much of its terms its time to zero is asked for */
 #define FALLEN 0.01 /* a step ends where |h| has fallen to this part, closer to rounding to FALL */
 #define PASSED 1e-11 /* what passes h = 0 closer than this much of its terms may cross it: the interpreter sees to it */
 #define TURNED 1e-7 /* to this at least the direction is known in which a set is left */
@@ -47,6 +46,7 @@ typedef struct { int64_t word[WORDS]; } Traveller;
 typedef struct {
   const Batch *b;
   const Options *o;
+  const Core *core;
   Words words;
   int64_t next;
   double size; /* of states at which both tolerances are as large */

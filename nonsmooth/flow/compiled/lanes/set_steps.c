@@ -462,11 +462,12 @@ typedef struct { Lanes lanes[POOLS][GROUPS]; Work work; int begun; } Many;
 
 int64_t many_size(void) { return sizeof(Many); }
 
-static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree) {
+static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree, const Core *core) {
   Work *w = &many->work;
   double q[NQ];
   w->b = b;
   w->o = o;
+  w->core = core;
   w->words.tree = tree;
   w->size = o->atol / o->rtol;
   w->groups = b->count >= OFTEN * GROUPS * W ? GROUPS : 1 + (int)(b->count / (OFTEN * W));
@@ -495,9 +496,9 @@ static int chosen(const Work *w) {
 
 /* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``many``
  * is zero before the first, and aligned like a vector. */
-int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t budget) {
+int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, const Core *core, int64_t budget) {
   Work *w = &many->work;
-  if (!many->begun) begin_all(many, b, o, tree);
+  if (!many->begun) begin_all(many, b, o, tree, core);
   for (;;) {
     int pool = chosen(w);
     if (pool < 0) return 0;

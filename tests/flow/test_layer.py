@@ -1,0 +1,86 @@
+"""Unknowns that enter nonlinearly: folds of hidden laws, several roots in a layer, products of multipliers."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, y, z, t, lam = (ca.SX.sym(s) for s in ("x", "y", "z", "t", "lam"))
+REACHED = ns.Status.REACHED_END
+
+
+def test_a_slide_ends_where_its_two_solutions_merge():
+    """(lam - 1/2)(lam + 1/5) = y has the roots 0.15 -+ sqrt(0.1225 + y); lam is what z' shows."""
+    field = [(lam - 0.5) * (lam + 0.2) - y, -0.1, lam]
+    system = ns.FilippovSystem([x, y, z], surface=x, multipliers=lam, field=field, hidden=True)
+    times = 3.225 - np.array([0.3, 1e-2, 1e-4, 1e-6, 1e-9])
+    run = ns.simulate(system, [0.0, 0.2, 0.0], 6.0, start_mode="s", tol=1e-12, t_eval=times)
+    assert run.itinerary == "s +" and run.status is REACHED
+    assert run.events[0].t == pytest.approx(3.225, abs=1e-13)
+    assert run.events[0].x[1] == pytest.approx(-0.1225, abs=1e-14)
+    root = lambda s: (0.1225 + 0.2 - 0.1 * s) ** 1.5 / 0.15
+    exact = lambda s: 0.15 * s - root(0.0) + root(s)
+    assert run.events[0].x[2] == pytest.approx(exact(3.225), abs=1e-12)
+    np.testing.assert_allclose(run.sample_x[:, 2], exact(times), rtol=0, atol=1e-12)
+
+
+def test_a_multiplier_jumps_from_a_fold_to_the_next_root():
+    """8 lam^3 - 2 lam = y turns round at lam = -1/sqrt(12), where the third root is 2/sqrt(12)."""
+    law = lambda a: 8 * a**3 - 2 * a
+    system = ns.FilippovSystem(
+        [x, y, z], surface=x, multipliers=lam, field=[y - law(lam), 1, lam], hidden=True
+    )
+    run = ns.simulate(system, [0.0, -5.0, 0.0], 10.0, tol=1e-12)
+    assert run.status is REACHED and run.itinerary == "s"
+    primitive = lambda a: 6 * a**4 - a**2  # of a dy = a (24 a^2 - 2) da
+    ends = [float(np.roots([8, 0, -2, -v])[0].real) for v in (5.0,)]
+    turn = 1 / np.sqrt(12)
+    lower = primitive(-turn) - primitive(-ends[0])
+    upper = primitive(ends[0]) - primitive(2 * turn)
+    assert run.x[-1, 2] == pytest.approx(lower + upper, abs=1e-10)
+
+
+def test_static_friction_above_kinetic_lets_go_at_its_maximum():
+    """A driven block with friction lam (1 + c (1 - lam^2)) breaks away 19 times, each time at 1.1."""
+    force, speed = 1.3, 0.3
+    c = 0.683612466405776  # (2/3) (1 + c) sqrt((1 + c)/(3 c)) = 1.1
+    top = (2 / 3) * (1 + c) * np.sqrt((1 + c) / (3 * c))
+    drive = force * ca.cos(speed * t)
+    field = [y, -0.1 * y - x + drive - lam * (1 + c * (1 - lam**2))]
+    system = ns.FilippovSystem([x, y], surface=y, multipliers=lam, field=field, time=t, hidden=True)
+    run = ns.simulate(system, [0.0, 1.0], 200.0, tol=1e-11)
+    assert run.status is REACHED
+    left = [abs(force * np.cos(speed * e.t) - e.x[0]) for e in run.events if e.kind == "exit"]
+    assert len(left) == 19
+    np.testing.assert_allclose(left, top, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_products_of_multipliers_are_solved_together(count):
+    """Each surface slides with lam_i = a_i + lam_1 ... lam_n / 4, which one point of [-1, 1]^n solves."""
+    a = np.array([0.3, -0.2, 0.4, 0.1])[:count]
+    h = [ca.SX.sym(f"h{i}") for i in range(count)]
+    w = [ca.SX.sym(f"w{i}") for i in range(count)]
+    own = [ca.SX.sym(f"l{i}") for i in range(count)]
+    product = own[0]
+    for other in own[1:]:
+        product = product * other
+    rates = [float(v) - u + product / 4 for v, u in zip(a, own, strict=True)]
+    system = ns.FilippovSystem([*h, *w], field=[*rates, *own], multipliers=own, surfaces=h)
+    run = ns.simulate(system, [0.0] * (2 * count), 1.0, tol=1e-12)
+    assert run.itinerary == "s" * count
+    lam_ = run.x[-1, count:]
+    np.testing.assert_allclose(lam_, a + np.prod(lam_) / 4, rtol=0, atol=1e-14)
+
+
+def test_all_solutions_of_a_product_are_found():
+    """1/8 - a + 3 a b/2 with b = a: attracting at the smaller root of 3 a^2/2 - a + 1/8, not at the other."""
+    a, b, v = (ca.SX.sym(s) for s in "abv")
+    field = [1 / 8 - a + 1.5 * a * b, 2 * (a - b), a]
+    system = ns.FilippovSystem([x, y, v], field=field, multipliers=[a, b], surfaces=[x, y])
+    run = ns.simulate(system, [0.0, 0.0, 0.0], 1.0, tol=1e-12)
+    assert run.status is REACHED and run.itinerary == "ss"
+    assert run.x[-1, 2] == pytest.approx(1 / 6, abs=1e-14)
+    both = ns.simulate(system, [0.0, 0.0, 0.0], 1.0, start_mode="ss")
+    assert both.status is ns.Status.NON_UNIQUE and "2 sliding solutions" in both.message

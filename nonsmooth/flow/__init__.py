@@ -24,7 +24,7 @@ from .ensembles.lazy_starts import Grid, RandomStarts
 from .ensembles.outcomes import Outcomes, outcomes
 from .ensembles.work import Work
 from .follow import follow
-from .reference.polynomial import first_crossing, first_root
+from .polynomial import first_crossing, first_root
 from .results import Ensemble
 from .saving import load
 from .section import Section

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model import Array
 from .names import change
-from .reference.polynomial import shift
+from .polynomial import shift
 from .trajectory import Event, Segment, Steps, Trajectory
 
 

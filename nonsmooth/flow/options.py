@@ -39,6 +39,7 @@ class Options:
     start_mode: str | None = None
     hits: Hits | None = None
     rest_below: float | None = None
+    passed: tuple[bool, ...] = ()  # stops that do not end the run, which has no section
 
     def __post_init__(self) -> None:
         for name in ("t_end", "t_start"):

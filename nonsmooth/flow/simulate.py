@@ -12,10 +12,8 @@ from numpy.typing import ArrayLike
 from ..model import Array, FilippovSystem, OptionError, Parameters, require_system
 from .compiled.convert import trajectory
 from .compiled.tape import tape_for
-from .constants import HAND_OVER
 from .ensembles.starts import require_start, require_start_mode
 from .options import Options, tolerances
-from .reference.driver import Driver
 from .section import Section, Times, read_sampling, sampled, sectioned
 from .trajectory import Event, Trajectory
 
@@ -190,8 +188,6 @@ def _run(
     times: Times | None,
     motion: Array | None,
 ) -> Trajectory:
-    tape, asked = tape_for(system, options), None if times is None else times.of(p)
-    run = None if tape is None else tape.run(x, p, options, asked, motion)
-    if run is None or run.status == HAND_OVER:
-        return Driver(system, x, p, options).run()
+    asked = None if times is None else times.of(p)
+    run = tape_for(system, options).run(x, p, options, asked, motion)
     return trajectory(system, p, options, run)

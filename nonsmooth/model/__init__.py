@@ -25,8 +25,9 @@ from .errors import (
 from .laws import complementarity
 from .laws.coupled import Coupled, ErrorScales, coupled_of, raised_of
 from .laws.evaluators import Evaluator, Resets, Surfaces, evaluator
+from .laws.followed import Followed, followed
 from .laws.layer import Layer, LayerNumbers, Loop, layer_of, loop_at
-from .laws.motion import Motion, followed, mode_field, motion, watched_functions
+from .laws.motion import Motion, mode_field, motion, watched_functions
 from .laws.multipliers import sliding_multipliers
 from .laws.switches import Guard
 from .reading import Parameters
@@ -43,6 +44,7 @@ __all__ = [
     "ErrorScales",
     "Evaluator",
     "FilippovSystem",
+    "Followed",
     "Guard",
     "Impact",
     "Layer",

@@ -137,6 +137,8 @@ def _without_rattle(events: list[tuple[float, str, str]]) -> list[tuple[float, s
 def difference(problem: Problem, truth: Outcome, run: Any, tol: float = TOLERANCE) -> str:
     """What differs between a run and the truth, or an empty string."""
     events, true = _without_rattle(package_events(run)), _without_rattle(truth.events)
+    if truth.status == run.status.name == "ENDLESS_JUMPS":  # counted further there
+        events = events[: len(true)]
     # the mode is that after the last jump of an instant
     words = [(what, mode) if mode else (what, None) for _, what, mode in true]
     got = [
@@ -151,6 +153,8 @@ def difference(problem: Problem, truth: Outcome, run: Any, tol: float = TOLERANC
         return f"event {k}: true {true[k : k + 2]}, came {events[k : k + 2]}, {run.status.name}"
     if run.status.name != truth.status:
         return f"status: true {truth.status}, came {run.status.name} at {run.t[-1]:.6g}"
+    if truth.status == "ENDLESS_JUMPS":
+        return ""
     late = max(  # the limit of impacts is extrapolated sooner where tol is larger
         [
             abs(a[0] - b[0]) / (10 if a[1] == "mode" and a[2].endswith("c") else 1)

@@ -86,12 +86,14 @@ def test_sliding_along_a_corner_is_followed_with_both_multipliers():
     np.testing.assert_allclose(back.x[-1], 0.0, atol=1e-10)
 
 
-def test_a_field_that_ends_or_is_nowhere_defined_ends_the_run():
+def test_a_field_that_is_nowhere_defined_ends_the_run():
     root = ns.FilippovSystem([x, y], field=[ca.sqrt(y), -1])
     run = ns.flow.follow(root, [0.0, -1.0], 1.0, mode="")
     assert run.status is ns.Status.NOT_FINITE
     assert "(0, -1)" in run.message
-    assert ns.flow.follow(root, [0.0, 0.0], -1.0, mode="").status is ns.Status.NOT_FINITE
+    back = ns.flow.follow(root, [0.0, 0.0], -1.0, mode="")  # x = -2/3 (-t)^(3/2), y = -t
+    assert back.status is ns.Status.REACHED_END
+    np.testing.assert_allclose(back.x[-1], [-2 / 3, 1.0], atol=1e-10)
 
 
 def test_a_run_has_no_more_steps_than_were_allowed():

@@ -13,7 +13,6 @@ import nonsmooth as ns
 OPEN = {
     "test_nearly_parallel_surfaces_are_crossed_one_by_one[1e-08-2e-07]": "thrown onto the intersection",
     "test_nearly_parallel_surfaces_are_crossed_one_by_one[1e-10-2e-05]": "thrown onto the intersection",
-    "test_a_clock_does_not_drift": "ticks are summed",
     "test_osculating_surfaces": "thrown onto the intersection",
 }
 

@@ -11,9 +11,6 @@ from scipy.optimize import brentq
 
 import nonsmooth as ns
 
-#: Tests that fail, and why; a repair deletes its line.
-OPEN = {}
-
 k, x, y, u, v, w, t, h = (ca.SX.sym(name) for name in "kxyuvwth")
 REACHED = ns.Status.REACHED_END
 LEVELS = np.random.default_rng(3).uniform(-0.9, 0.9, 100)

@@ -36,8 +36,9 @@ class OptionsStructure(ctypes.Structure):
         *[(name, _I64) for name in ("hit_kinds", "hit_width", "hit_side", "hit_skip", "hit_every")],
         ("hit_count", _I64),
         ("hit_named", _POINTER),
+        ("passed", _POINTER),
     ]
-    kept: NDArray[Any]  # what hit_named points to
+    kept: tuple[NDArray[Any], ...]  # what the last two point to
 
 
 class BatchStructure(ctypes.Structure):
@@ -218,13 +219,18 @@ def options_of(
     )
     made.hit_every = 1
     if o.hits is not None:
-        made.kept = _named(system, o.hits)
-        made.hit_named, made.hit_width = address(made.kept), made.kept.shape[1]
+        named = _named(system, o.hits)
+        made.kept = (named,)
+        made.hit_named, made.hit_width = address(named), named.shape[1]
         made.hit_after, last = int(o.hits.after), o.hits.last
         made.hit_skip, made.hit_every = min(o.hits.skip, limit), min(o.hits.every, limit)
         made.hit_kinds = sum(1 << i for i, kind in enumerate(KINDS) if kind in o.hits.kinds)
         made.hit_count = o.hits.count if o.hits.count is not None and last <= limit else 0
         made.hit_side = 0 if o.hits.letter is None else (1 if o.hits.letter[1] == "+" else -1)
+    if o.passed:
+        passed = np.array(o.passed, np.int8)
+        made.kept = (passed,)
+        made.passed = address(passed)
     return made
 
 

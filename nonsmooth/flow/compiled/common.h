@@ -20,6 +20,7 @@ typedef struct {
   /* Events that are hits: kinds as bits; whether each guard is named, by kind and index; side (or 0). */
   int64_t hit_kinds, hit_width, hit_side, hit_skip, hit_every, hit_count;
   const int8_t *hit_named;
+  const int8_t *passed; /* stops that do not end the run, or NULL */
 } Options;
 
 /* Trajectories of a call: all of the arrays, or those listed in ``which``; where results go. */

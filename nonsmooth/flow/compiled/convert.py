@@ -40,7 +40,7 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         events=events,
         segments=_segments(system, run),
         status=status,
-        message=f"{_message(system, options, run)} {ADVICE[status]}",
+        message=f"{message_of(system, options, run)} {ADVICE[status]}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
         steps=Steps(run.starts, run.coefficients),
         continuations=[
@@ -109,7 +109,8 @@ def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
     ]
 
 
-def _message(system: FilippovSystem, options: Options, run: Run) -> str:
+def message_of(system: FilippovSystem, options: Options, run: Run) -> str:
+    """What happened at the end of a run, in words."""
     status, t = Status(run.status), float(run.t[-1])
     if status is Status.REACHED_END:
         return messages.reached_end(options.t_end)

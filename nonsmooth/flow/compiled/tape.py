@@ -30,7 +30,6 @@ from .arrays import (
     words_of,
 )
 from .building.codegen import tape_order
-from .building.core_source import MOST_ORDER
 from .library import core_library
 
 # Where a dense run is written: arrays of steps, points and events, which grow.
@@ -233,6 +232,9 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     require_size(made.output_size, Output.Structure)
     made.table_new.restype = made.run_new.restype = made.lanes_tree.restype = _POINTER
     made.table_new.argtypes = [_I32]
+    made.polynomial_root.restype = made.polynomial_crossing.restype = _D
+    made.polynomial_root.argtypes = [_POINTER, _I32, _D]
+    made.polynomial_crossing.argtypes = [*made.polynomial_root.argtypes, _I32]
     for name in ("table_modes", "table_size", "table_free", "run_free", "lanes_tree"):
         getattr(made, name).argtypes = [_POINTER]
     made.table_read.argtypes = [_POINTER] * 4
@@ -252,11 +254,9 @@ def _place(system: FilippovSystem, i: int) -> int:
     return system.sets.index(system.set_of[i]) if i in system.set_of else -1
 
 
-def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
-    """Return the interpreter with a system at the options' tolerance, or None where it has none."""
+def tape_for(system: FilippovSystem, options: Options) -> TapeEngine:
+    """Return the driver with a system at the options' tolerance."""
     order = tape_order(system, options)
-    if order >= MOST_ORDER:
-        return None
     return system.cached(("tape", order), lambda: TapeEngine(system, order))
 
 

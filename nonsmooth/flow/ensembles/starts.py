@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from ...model import Array, FilippovSystem, OptionError, PointError, Surfaces, clock_periods
 from ..constants import ON_SURFACE
 from ..options import Options
-from ..reference.modes import rounding_scale
 from .lazy_starts import Grid, Index, LazyStarts, RandomStarts, part_of
 
 
@@ -133,7 +132,8 @@ def require_start_mode(system: FilippovSystem, x: Array, p: Array, options: Opti
     mode = options.start_mode
     system.require_mode(mode)
     h, gradient = Surfaces(system).values(x, p)
-    scale = rounding_scale(np.abs(gradient), x, options.size)
+    steep = np.where(np.isfinite(gradient), np.abs(gradient), 0.0)  # not that of a root at zero
+    scale = steep @ (options.size + np.abs(x))
     sides = np.sign(np.where(np.abs(h) <= ON_SURFACE * scale, 0.0, h))
     wrong = []
     for k, members in enumerate(system.entries):

@@ -15,13 +15,12 @@ from functools import cached_property
 
 import casadi as ca
 
-from ..cache import Content
 from ..definition.parse_definition import read_function
 from ..definition.system import FilippovSystem, require_system
 from ..errors import DefinitionError
 from ..expressions.jets import taylor
 from ..expressions.linearity import bent
-from .switches import Guard, Guarded, Implicit, Sliding, guards_of, sliding
+from .switches import Guarded, Implicit, Sliding, guards_of, sliding
 
 
 class Motion:
@@ -96,22 +95,6 @@ def watched_functions(system: FilippovSystem, watched: Sequence[ca.SX]) -> list[
     return [
         read_function(system.definition, w, f"watched function {k}") for k, w in enumerate(watched)
     ]
-
-
-def followed(system: FilippovSystem, mode: str, watched: Sequence[ca.SX] = ()) -> Motion:
-    """Return a mode whose functions are only watched."""
-    expressions = watched_functions(system, watched)
-    symbols = [system.extended_states, system.parameter_symbols]
-    key = Content(symbols, ca.vertcat(*expressions)) if expressions else ()
-
-    def build() -> Motion:
-        of_mode = motion(system, mode)
-        functions = [of_mode.functions[k] for k in range(len(of_mode.guards))]
-        functions += expressions
-        guarded = [(Guard("zero", k, 0, k), function) for k, function in enumerate(functions)]
-        return Motion(system, mode, of_mode.law, guarded, ("followed", key) if expressions else ())
-
-    return system.cached(("followed", mode, key), build)
 
 
 def mode_field(system: FilippovSystem, mode: str) -> ca.SX:

@@ -201,8 +201,8 @@ class Run:
             self._instant(None)
             while not self.status:
                 self._advance()
-                times = [at for at, what, _ in self.events[-8:] if what not in ("mode", "impact 0")]
-                if len(times) == 8 and times[-1] - times[0] < 1e-4:
+                gaps = np.diff([at for at, what, _ in self.events if what.startswith("jump")][-4:])
+                if len(gaps) == 3 and 0 < gaps[2] < 1e-7 and gaps[2] < gaps[1] < gaps[0]:
                     raise Undecided("jumps accumulate")
         except (Undecided, np.linalg.LinAlgError, OverflowError, ValueError) as error:
             trouble = f"{type(error).__name__}: {error}"

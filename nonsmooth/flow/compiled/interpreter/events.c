@@ -217,7 +217,7 @@ static void serve_event(Run *r, int served) {
   i->last = served;
   if (served < r->s->stops) {
     event(r, STOP, r->mode, row, r->x);
-    finish(r, STOPPED, NO_REASON, served);
+    if (!r->o.passed || !r->o.passed[served]) finish(r, STOPPED, NO_REASON, served);
     return;
   }
   memcpy(x, r->x, sizeof(double) * r->n);

@@ -101,11 +101,13 @@ class Lanes:
         stop: Callable[[], bool],
     ) -> None:
         """Give what the lanes hand over to the interpreter."""
-        rest, tape = np.flatnonzero(out.status == HAND_OVER), tape_for(self.system, options)
-        if not rest.size or tape is None:
+        rest = np.flatnonzero(out.status == HAND_OVER)
+        if not rest.size:
             return
         own = p if p.ndim == 1 else p[rest]
-        out.replace(rest, tape.run_many(x[rest], own, options, at, None, stop))
+        out.replace(
+            rest, tape_for(self.system, options).run_many(x[rest], own, options, at, None, stop)
+        )
 
 
 def _call(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from nonsmooth.flow.reference.polynomial import first_crossing, first_root, shift
+from nonsmooth.flow.polynomial import first_crossing, first_root, shift
 
 
 def from_roots(roots, scale=1.0):

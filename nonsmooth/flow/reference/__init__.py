@@ -1,1 +1,0 @@
-"""The readable truth: Taylor steps, roots, Filippov's logic and accumulation in pure Python."""

@@ -76,6 +76,9 @@ TIED = 1e-10
 #: In an element whose guard ended a mode they are zero to this many relative tolerances: its root has that error.
 KNOWN_TO = 100.0
 
+#: A second surface is met if Newton's step onto both changes no state by more than this part of it.
+PARALLEL = 1e-13
+
 #: Solutions and motions that differ by this part are one; pivots below this part are zero.
 MERGED, SINGULAR = 1e-8, 1e-12
 

@@ -17,11 +17,6 @@ LATER = ("rest", "twisting", "super-twisting", "tank")
 EVERY = [own for own in cases() if not any(key in own for key in MISSING)]
 NOW = [own for own in EVERY if not own["id"].startswith(LATER)]
 
-#: Tests that do not pass yet, and why.
-OPEN = {
-    "test_a_case_is_as_known[parallel-1e-10]": "the law of elements is being built",
-}
-
 
 @pytest.mark.parametrize("data", NOW, ids=lambda own: own["id"])
 def test_a_case_is_as_known(data):
@@ -87,3 +82,41 @@ def test_widths_are_part_of_a_system():
         ring((1.0,))
     with pytest.raises(ns.DefinitionError, match="layer_widths"):
         ring((1.0, -1.0))
+
+
+@pytest.mark.parametrize("count", [24, 60])
+def test_many_balls_land_and_are_let_go_together(count):
+    """They fall with z - 2, land at one instant, and leave when z passes 2."""
+    heights = [ca.SX.sym(f"h{i}") for i in range(count)]
+    speeds = [ca.SX.sym(f"k{i}") for i in range(count)]
+    z = ca.SX.sym("z")
+    system = ns.FilippovSystem(
+        [*heights, *speeds, z],
+        field=[*speeds, *[z - 2.0] * count, 1],
+        impacts=[ns.Impact(h, name=f"ball{i}") for i, h in enumerate(heights)],
+    )
+    run = ns.simulate(system, [0.1] * count + [0] * (count + 1), 4.0)
+    assert run.status is ns.Status.REACHED_END
+    assert [event.kind for event in run.events] == ["impact", "release", "end"]
+    assert abs(run.x[-1, :count] - 4 / 3).max() < 1e-10
+
+
+def test_a_bar_lands_on_many_feet():
+    """Fourteen reactions of which two are independent; a plastic impact stops the bar whole or tilted."""
+    y, tilt, v, w = (ca.SX.sym(name) for name in ("y", "tilt", "v", "w"))
+    feet = np.linspace(-1, 1, 14)
+    reactions = [ca.SX.sym(f"r{i}") for i in range(14)]
+    turn = 3 * sum(p * r for p, r in zip(feet, reactions, strict=True))
+    system = ns.FilippovSystem(
+        [y, tilt, v, w],
+        field=[v, w, sum(reactions) - 9.81, turn],
+        impacts=[
+            ns.Impact(y + p * tilt, reaction=r, restitution=0.0, name=f"foot{i}")
+            for i, (p, r) in enumerate(zip(feet, reactions, strict=True))
+        ],
+    )
+    for start in ([1.0, 0.0, 0.0, 0.0], [1.0, 0.1, 0.0, 0.0]):
+        run = ns.simulate(system, start, 2.0)
+        assert run.status is ns.Status.REACHED_END, run.message
+        assert abs(run.x[-1]).max() < 1e-12
+        assert run.segments[-1].mode == "c" * 14

@@ -10,11 +10,7 @@ import pytest
 import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
-OPEN = {
-    "test_nearly_parallel_surfaces_are_crossed_one_by_one[1e-08-2e-07]": "thrown onto the intersection",
-    "test_nearly_parallel_surfaces_are_crossed_one_by_one[1e-10-2e-05]": "thrown onto the intersection",
-    "test_osculating_surfaces": "thrown onto the intersection",
-}
+OPEN = {}
 
 x, y, u, v, w, z, t = (ca.SX.sym(name) for name in "xyuvwzt")
 l1, l2, l3 = (ca.SX.sym(f"l{i}") for i in (1, 2, 3))

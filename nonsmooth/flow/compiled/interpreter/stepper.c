@@ -31,8 +31,9 @@ static void pass_time(Run *r, double dt) {
   if (r->s->timed) r->x[r->n - 1] = r->t;
 }
 
-/* A step's length changed so little that the time after it is one number. */
+/* A step's length in a run that begins late, changed so little that the time after it is one number. */
 static double to_number(const Run *r, double dt) {
+  if (fabs(r->t) <= FAR * (r->o.t_end - r->begun)) return dt;
   double to = (r->t + dt) - r->t - r->t_low;
   return fabs(to - dt) <= RESOLVED * dt ? to : dt;
 }

@@ -141,6 +141,35 @@ static const double *gaps(Run *r, const double *x) {
  * ``certain`` one (or -1). The run ends where a gap is negative. */
 static int is_met(Run *r, const int8_t *letter, int set, const double *h, const double *scales_of);
 
+/* Of the active surfaces, those stay that Newton's steps from the others lead onto within rounding of the states: one
+ * that is nearly parallel is passed by itself, its nearer root first. */
+static void leave_parallel(Run *r, int certain, const int8_t *letter) {
+  double *x = r->before, *first = r->at_work;
+  int32_t *onto = r->involved;
+  int count = 0, kept = 0;
+  for (int i = 0; i < r->active_count; i++) {
+    int own = r->active[i];
+    if (letter[own] == 0 || own == certain) onto[kept++] = own; else count += own < r->m && set_of(r, own) < 0;
+  }
+  if (!count) return;
+  memcpy(x, r->x, sizeof(double) * r->n);
+  project(r, onto, kept);
+  memcpy(first, r->x, sizeof(double) * r->n);
+  count = 0;
+  for (int i = 0; i < r->active_count; i++) {
+    int own = r->active[i], is_near = 1;
+    if (own < r->m && set_of(r, own) < 0 && letter[own] != 0 && own != certain) {
+      memcpy(r->x, first, sizeof(double) * r->n);
+      onto[kept] = own;
+      project(r, onto, kept + 1);
+      for (int q = 0; q < r->n; q++) is_near &= fabs(r->x[q] - first[q]) <= PARALLEL * (r->size + fabs(first[q]));
+    }
+    if (is_near) r->active[count++] = own;
+  }
+  r->active_count = count;
+  memcpy(r->x, x, sizeof(double) * r->n);
+}
+
 static void active_surfaces(Run *r, int certain, const int8_t *letter) {
   r->active_count = 0;
   if (!r->width) return;
@@ -164,4 +193,5 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
     if (i < r->m && letter[i] != 0 && passes_to(r, i, scale)) continue; /* its letter follows from a lower derivative */
     if (rests || letter[i] == 0 || sure) r->active[r->active_count++] = i;
   }
+  if (certain >= 0 && certain < r->m && set_of(r, certain) < 0) leave_parallel(r, certain, letter);
 }

@@ -121,11 +121,12 @@ OVERFLOW = 1e280
 #: Motions that can continue from a point, at most so many are kept.
 SEVERAL = 16
 # Unknowns that enter nonlinearly. Roots of a rate along a multiplier: coefficients below this part of all terms
-# vanish, the pieces of the way are counted, and its ends are a little beyond the bounds. Solutions of several
+# vanish, the pieces of the way are counted and at most so long, and its ends are a little beyond the bounds. Of several
 # multipliers: how far two are apart, halvings of each side before Newton's method, its steps, and a grid of
 # starts where functions are not linear in each multiplier.
 LAYER_ROUNDING = 1e-13
 LAYER_PIECES = 4000
+LAYER_LONGEST = 0.25
 LAYER_BEYOND = 1e-9
 LAYER_APART = 1e-7
 LAYER_RESIDUAL = 1e-10

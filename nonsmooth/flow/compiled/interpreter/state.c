@@ -125,7 +125,7 @@ typedef struct {
   Layout now; /* of the present mode */
   Met met;
   Instant instant;
-  int32_t mode, status, reason, where, due_impact, falls, repelling, *drop;
+  int32_t mode, status, reason, where, due_impact, falls, repelling, folded, *drop;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];

@@ -150,6 +150,12 @@ HUGE = 1e300
 #: A fold of sliding is looked for where the slope would vanish within this many steps.
 FOLD_AHEAD = 10.0
 
+#: A fold is served at a root of the slope's series where it is this close, relative to the time.
+FOLD_NEAR = 1e-11
+
+#: Multipliers that are this close to those at a fold are the solution that ended there.
+FOLD_APART = 1e-5
+
 #: What a run notes about its decisions, as bits.
 DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 

@@ -223,7 +223,7 @@ static void serve(Run *r, int row) {
   if (kind == IMPACT_GUARD) impact(r, row);
   else if (kind == RELEASE_GUARD) release(r, row);
   else if (kind == NEAR_GUARD) near_set(r, row, 1);
-  else if (kind == BRANCH_GUARD && side != OF_ONE) {
+  else if (kind == BRANCH_GUARD && side != OF_ONE && !is_mixed(r, r->now.sliding, r->now.slides)) {
     event(r, STABILITY, r->mode, row, r->x);
     finish(r, INTERSECTION, STABILITY_LOST, index);
   }
@@ -322,6 +322,7 @@ static void step(Run *r) {
   /* What happens at the end, to rounding, happens. */
   int row = first_hit(r, e, last ? h + AT_END * larger(1, fabs(r->t + h)) : h, &dt);
   dt = row < 0 ? h : smaller(dt, h);
+  if (row >= 0 && is_before_fold(r, e, row, dt)) { dt *= 0.5; row = -1; last = 0; }
   double wanted = dt, safe = safe_length(r, e, by_series), good;
   while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
   int held = dt > STEADY * r->length && (dt > r->length / STEADY || dt > wanted / FAR);

@@ -308,6 +308,14 @@ static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int
   return 0;
 }
 
+/* Whether a solution is the one that has just ended in a fold. */
+static int is_folded(const Run *r, const int8_t *letter, const double *unknowns) {
+  double apart = 0;
+  if (r->met.kind != BRANCH_GUARD || memcmp(letter, r->letter, r->width)) return 0;
+  for (int i = 0; i < r->width; i++) apart = larger(fabs(unknowns[i] - r->unknowns[i]), apart);
+  return apart <= FOLD_APART;
+}
+
 /* Choose, as r->chosen, the motion that continues, of all modes and all their solutions. */
 static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int k = r->active_count;
@@ -324,6 +332,7 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
     mode_solutions(r, &r->trial.l, &all);
     for (int q = 0; q < all.count && r->status == RUNNING; q++) {
       memcpy(r->found.unknowns, all.each + q * r->width, sizeof(double) * r->width);
+      if (is_folded(r, trial, r->found.unknowns)) continue;
       if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
     }
   }
@@ -360,6 +369,12 @@ static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
     if (e->l.kind[row] == BRANCH_GUARD && g[0] < -FOLD_AHEAD * h * g[1]) return 1;
   }
   return 0;
+}
+
+/* Whether a step would end at a root that a series has where a fold is: no series sees it, so it is come closer to. */
+static int is_before_fold(const Run *r, const Expansion *e, int row, double dt) {
+  if (e->l.kind[row] != BRANCH_GUARD || !is_mixed(r, e->l.sliding, e->l.slides)) return 0;
+  return dt > FOLD_NEAR * larger(fabs(r->t), fabs(r->t - r->begun));
 }
 
 /* Rules of order k of all that a mode needs, with the multipliers' own coefficients. */

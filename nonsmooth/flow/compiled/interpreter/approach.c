@@ -1,4 +1,4 @@
-/* Sets of codimension two and more in a run: nonsmooth/flow/reference/{sets,laws_of_sets}.py --------------- */
+/* Sets of codimension two and more in a run ----------------------------------------------------------------- */
 
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int change_kind(const Run *r, int before, int after);

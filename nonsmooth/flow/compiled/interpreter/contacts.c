@@ -1,4 +1,4 @@
-/* Impacts: nonsmooth/flow/reference/contacts.py ------------------------------------------------------- */
+/* Impacts ------------------------------------------------------------------------------------------------- */
 
 /* Add what impulses change to ``after``. */
 static void add_impulses(Run *r, const double *x, const int8_t *letter, const double *impulses, double *after) {

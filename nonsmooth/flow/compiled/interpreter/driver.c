@@ -1,4 +1,4 @@
-/* Events: nonsmooth/flow/reference/driver.py ----------------------------------------------------------- */
+/* The loop: expand, locate, check, advance, serve ------------------------------------------------------- */
 
 static int change_kind(const Run *r, int before, int after) {
   const int8_t *one = r->table->letter + (int64_t)before * r->width;

@@ -1,4 +1,4 @@
-/* Small dense systems of linear equations, and complementarity: nonsmooth/flow/reference/complementarity.py.
+/* Small dense systems of linear equations, and complementarity.
  *
  * Matrices are row by row. What is zero is skipped, so that separate blocks cost what they cost alone.
  */

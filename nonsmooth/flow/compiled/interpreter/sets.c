@@ -1,5 +1,4 @@
-/* Sets of codimension two and more: nonsmooth/model/{multiplier_series,frozen}.py,
- * nonsmooth/flow/reference/{sets,laws_of_sets}.py. Their switching functions stand side by side; each has the
+/* Sets of codimension two and more. Their switching functions stand side by side; each has the
  * letter of its set: 0 on it, OFF, and for what comes after leaving it LEFT_BEHIND (h is carried along) and
  * LEAVING (its first step). */
 

@@ -1,8 +1,7 @@
-/* The reference driver in C for any number of surfaces and impacts; the system is data, not code.
+/* The driver: all that a run is. The system is data, not code.
  *
- * The functions have the names and the order of nonsmooth/flow/reference/{modes,stepper,switching,contacts,
- * driver}.py; read those first. What is rare and slow anyway (points where the jet is not finite, starts in
- * repelling sliding, stability that no simple test shows) is handed over to them.
+ * Read in the order of core_source.py: programs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c, decide.c,
+ * events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
  */
 
 #define TINY 2.2250738585072014e-308

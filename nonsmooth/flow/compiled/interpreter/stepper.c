@@ -1,4 +1,4 @@
-/* Numbers: nonsmooth/flow/reference/stepper.py ------------------------------------------------------- */
+/* Steps: their length, their check, first roots of guards ----------------------------------------------- */
 
 /* Binary logarithm and exponential to 1e-4: enough for a step size, a hundredth of libm's cost. */
 static inline double rough_log2(double a) {

@@ -142,9 +142,9 @@ class Orbit:
             found.append(Guard(kind, k, direction, c_k))
         return found
 
-    def _initial_signs(self, jumped: int | None = None) -> None:
-        """Signs of stops, resets and gaps at the start or after a jump."""
-        self.signs = {}
+    def _initial_signs(self, jumped: int | None = None, own: int | None = None) -> None:
+        """Signs of stops, resets and gaps at the start or after a jump, of the guard ``own``."""
+        before, self.signs = self.signs if own is not None else {}, {}
         c = motion(self.rates, self.states.values, 4)
         for g in self.guards(c):
             if g.kind in ("surface", "exit"):
@@ -155,6 +155,11 @@ class Orbit:
             due = g.kind == "reset" and order and jumped is None and g.direction * s >= 0
             if not s or due or (g.kind == "impact" and s < 0):
                 raise CheckError("the sign of a stop, reset or gap is undecided")
+            carried = g.kind != "impact" and g.index != own and before.get(g.index, s) * s < 0
+            if carried and g.direction * s >= 0:
+                raise CheckError(
+                    "a jump across a stop or reset, which happens at once, is not checked"
+                )
             self.signs[g.index] = s
             if order:
                 self.zeros[(g.kind, g.index)] = order
@@ -260,7 +265,7 @@ class Orbit:
                 x, kept, slides = self.modes.jumped(self.x, self.p, self.mode, g.index)
                 self.states.become([*x, *self.states.values[self.n :]])
                 self.mode = self.modes.mode_at(self.x, self.p, slides)
-                self._initial_signs(g.index if kept else None)
+                self._initial_signs(g.index if kept else None, g.index)
             return g.kind, self.modes.ends[g.index][1]
         self.mode, zeros, kind = self.modes.switched(
             (self.x, self.p), self.mode, g.kind, g.index, g.direction

@@ -133,8 +133,14 @@ class Hits:
 
     def fill(self, events: Sequence[Event], t: Array, x: Array) -> None:
         """Write the samples into arrays (K,) and (K, n)."""
-        for k, event in enumerate(self.select(events)[: len(t)]):
-            t[k], x[k] = event.t, event.x_after if self.after else event.x
+        found = self.select(events)[: len(t)]
+        if not found:
+            return
+        times = np.array([event.t for event in events])
+        for k, event in enumerate(found):
+            own = np.flatnonzero(times == event.t)  # the events of its instant
+            t[k] = event.t
+            x[k] = events[own[-1]].x_after if self.after else events[own[0]].x
 
 
 @dataclass(frozen=True)

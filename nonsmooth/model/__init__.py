@@ -8,7 +8,7 @@ from .definition.events import Clock, Impact, Reset, Stop
 from .definition.lift import LiftedSwitch
 from .definition.parse_definition import read_function
 from .definition.regularise import regularise
-from .definition.system import FilippovSystem, multiplier_enters, require_system
+from .definition.system import FilippovSystem, multiplier_enters, require_plain, require_system
 from .derivatives.forcing import clock_periods, is_function, periods, read_period
 from .derivatives.start_maps import StartMap
 from .errors import (
@@ -85,6 +85,7 @@ __all__ = [
     "real",
     "real_array",
     "regularise",
+    "require_plain",
     "require_system",
     "reversed_system",
     "sliding_multipliers",

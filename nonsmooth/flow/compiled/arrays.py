@@ -63,7 +63,7 @@ class Run:
     Attributes
     ----------
     status : int
-        A Status, or HAND_OVER: the reference driver must repeat the run.
+        A Status.
     reason, where : int
         Why, for the message (see ``facts.REASONS``): a surface, a stop.
     mode : int

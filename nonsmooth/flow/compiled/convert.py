@@ -1,4 +1,4 @@
-"""From the compiled engine's arrays to the same Trajectory that the reference driver returns."""
+"""From the arrays of a run to a Trajectory."""
 
 from __future__ import annotations
 

@@ -80,10 +80,15 @@ class Definition:
         """Whether all events are guards that are passed, without conditions or discrete states."""
         directions = [d for _, d in (*self.stops, *self.resets)]
         ticks = {len(self.stops) + reset for reset, _ in self.clocks}
-        return not self.discrete and all(
-            replace(rule, by_jumps=True, named=(), level=rule.level and k not in ticks)
-            == Rule(passages(k, direction))
-            for k, (rule, direction) in enumerate(zip(self.rules, directions, strict=True))
+        filtered = self.whens.numel() and not self.whens.is_constant()
+        return (
+            not self.discrete
+            and not filtered
+            and all(
+                replace(rule, by_jumps=True, named=(), level=rule.level and k not in ticks)
+                == Rule(passages(k, direction))
+                for k, (rule, direction) in enumerate(zip(self.rules, directions, strict=True))
+            )
         )
 
     @property

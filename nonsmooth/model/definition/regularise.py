@@ -34,7 +34,7 @@ from ..checks import real
 from ..errors import DefinitionError, OptionError
 from ..reading import scalar
 from .events import Reset, Stop
-from .system import FilippovSystem, require_system
+from .system import FilippovSystem, require_plain, require_system
 
 
 @dataclass(frozen=True)
@@ -113,6 +113,7 @@ def regularise(
     True
     """
     require_system(system)
+    require_plain(system, "regularise")
     if eps is not None:
         eps = real(
             eps,

@@ -646,6 +646,15 @@ def require_system(value: Any, sets: bool = False) -> None:
         )
 
 
+def require_plain(system: FilippovSystem, what: str) -> None:
+    """Refuse a system whose events have conditions, filters or levels, or that has discrete states."""
+    if not system.definition.plain:
+        raise DefinitionError(
+            f"system: {system!r} has conditions of events, when=, level=, or discrete states, which {what} "
+            "does not support. Give guards that are passed."
+        )
+
+
 def multiplier_enters(system: FilippovSystem, members: Sequence[int], p: Array) -> bool:
     """Whether the multiplier of a set enters the field with given parameters."""
     d = system.definition

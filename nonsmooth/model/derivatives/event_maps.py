@@ -5,18 +5,22 @@ g is the identity if the event does not reset the state.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
+import numpy as np
 
 from ..cache import Content
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
+from ..expressions.graph import evaluate, instructions, operation
 from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
 from ..laws.explicit import explicit, solved
 from ..laws.switches import Guard
+from ..numbering import UNWATCHED
 from ..printing.tape import Values, values_of
 from ..values import Array
 
@@ -141,7 +145,7 @@ def _after(system: FilippovSystem, mode: str, guard: Guard, letters: str) -> ca.
 
 
 def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -> ca.SX:
-    """The state after the impulses at a gap that closes (``flow/reference/contacts.py``)."""
+    """The state after the impulses at a gap that closes (``contacts.c``)."""
     # Contacts that are closed take part with the rate zero; friction on them acts with the impulse
     # in the same proportion as with the reaction, and ``letters`` say to which side.
     coupled, m, d = coupled_of(system), system.surface_count, system.definition
@@ -171,3 +175,71 @@ def surface_map(system: FilippovSystem, surface: int) -> EventMap:
         return EventMap(system, system.extended_states, system.surface_function(surface), guard)
 
     return system.cached(("surface map", surface), build)
+
+
+def atoms_at(system: FilippovSystem, kind: str, element: int, x: Array, p: Array) -> list[float]:
+    """Values of the functions that decide when a stop or reset is due and that move along a motion."""
+    d = system.definition
+    rule = d.rules[element if kind == "stop" else len(d.stops) + element]
+    trees = [*rule.triggers, *([rule.when] if rule.when and rule.level else [])]
+    located = d.located
+    atoms = sorted(
+        {c // 8 for tree in trees for c in tree if c >= 0 and located[c // 8] != UNWATCHED}
+    )
+    build = lambda: [d.guards[k] for k in atoms]
+    return _values_at(system, ("atoms of", kind, element), build, x, p)
+
+
+def choices_at(
+    system: FilippovSystem, kind: str, element: int, x: Array, p: Array
+) -> tuple[Array, Array]:
+    """Differences (k,) by which comparisons, fmin, fmax and if_else in a map and a filter decide, with gradients."""
+    d = system.definition
+
+    def build() -> list[ca.SX]:
+        i = element if kind == "stop" else len(d.stops) + element
+        outputs = [d.whens[i], *([d.maps[:, element]] if kind == "reset" else [])]
+        inputs = [system.extended_states, system.parameter_symbols]
+        found, moving = _Differences(inputs), d.states[: d.states.numel() - len(d.discrete)]
+        evaluate(instructions(inputs, outputs)[0], found)
+        return [e for e in found.seen if ca.depends_on(e, ca.vertcat(moving, d.time))]
+
+    seen = system.cached(("differences of", kind, element), build)
+    if not seen:
+        return np.zeros(0), np.zeros((0, len(x)))
+    own = ca.vertcat(*seen)
+    outputs = lambda: [own, ca.jacobian(own, system.extended_states)]
+    made = lambda: Evaluator(system.function(("choices", kind, element), outputs))
+    values, gradient = system.cached(("choices of", kind, element), made).copied(x, p)
+    return values.ravel(), gradient
+
+
+def _values_at(
+    system: FilippovSystem,
+    key: tuple[object, ...],
+    build: Callable[[], list[ca.SX]],
+    x: Array,
+    p: Array,
+) -> list[float]:
+    outputs = lambda: [ca.vertcat(*build(), 0)]
+    made = lambda: Evaluator(system.function(key, outputs))
+    found: list[float] = system.cached(("values", key), made).copied(x, p)[0].ravel().tolist()
+    return found[:-1]
+
+
+class _Differences:
+    """Expressions of a graph, and the differences by which its operations choose."""
+
+    def __init__(self, vectors: list[ca.SX]):
+        self._vectors, self.seen = vectors, list[ca.SX]()
+        self.constant = ca.SX
+
+    def symbol(self, vector: int, position: int) -> ca.SX:
+        return self._vectors[vector][position]
+
+    def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
+        if op in ("lt", "le", "eq", "ne", "fmin", "fmax"):
+            self.seen.append(args[0] - args[1])
+        elif op in ("sign", "fabs"):
+            self.seen.append(args[0])
+        return operation(op, args)

@@ -73,7 +73,7 @@ class Numbers:
         return None if a == 0.0 else a
 
     def inner(self, u: Sequence[float | None], v: Sequence[float | None]) -> float | None:
-        """Return the sum of products; the reference driver spends most of its time here."""
+        """Return the sum of products."""
         total = 0.0
         for a, b in zip(u, v, strict=True):
             if a is not None and b is not None:

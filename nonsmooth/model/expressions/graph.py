@@ -168,7 +168,8 @@ def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str
         if found := NOT_SMOOTH.get(node.op) or _beside_zero(node, nodes):
             raise NotSmoothError(
                 f"{what}: expected an expression with derivatives of every order, received one "
-                f"with {found} of the states. Declare the switch as a surface: "
+                f"with {found} of the states. Let FilippovSystem.from_expression find the switches of a field, or "
+                "declare each as a surface: "
                 "give the smooth pieces as above= and below= with surface= the argument whose "
                 "sign decides, or write sign(h) as a multiplier lam with surfaces=[h], "
                 "multipliers=[lam] (fabs(h) is lam*h, fmax(a, b) is (a + b + lam*(a - b))/2 with "

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 
@@ -24,8 +24,8 @@ from ..values import Array
 #: What is below this, relative to its terms, is rounding.
 _ROUNDING = 64 * sys.float_info.epsilon
 
-#: Minors of all subsets are computed up to this size, and all 3^k solutions up to the other.
-_MINORS, _ENUMERATED = 8, 6
+#: Minors of all subsets are computed up to this size.
+_MINORS = 8
 
 #: Exchanges of blocks that do not help before letters are exchanged one by one.
 _PATIENCE = 10
@@ -140,21 +140,3 @@ def _symmetrised(a: Array) -> Array | None:
     if np.abs(symmetric - symmetric.T).max(initial=0.0) > 1e-12 * np.abs(symmetric).max():
         return None
     return (symmetric + symmetric.T) / 2
-
-
-def all_solutions(a: Array, m: Array) -> list[Array] | None:
-    """All lambda with the complementarity, by their 3^k letters; None where these are too many."""
-    if len(a) > _ENUMERATED:
-        return None
-    found: list[Array] = []
-    slack = _ROUNDING * (np.abs(a) + np.abs(m).sum(axis=1))
-    for letters in product((0.0, 1.0, -1.0), repeat=len(a)):
-        lam = _held(a, m, np.array(letters), np.full(len(a), -1.0))
-        if lam is None or np.abs(lam).max(initial=0.0) > 1.0 + _ROUNDING:
-            continue
-        rates = a + m @ lam
-        if np.any(np.array(letters) * rates < -slack):
-            continue
-        if all(np.abs(lam - other).max() > 1e-9 for other in found):
-            found.append(np.clip(lam, -1.0, 1.0))
-    return found

@@ -1,9 +1,9 @@
-"""All modes of several surfaces as one program, with the multipliers as numbers or as series.
+"""All modes of several surfaces as one program, with the multipliers as inputs.
 
 On a surface that does not slide the multiplier is the number +1 or -1. On those that slide the
 multipliers keep G_i = grad h_i . f(x, lambda) at zero: coefficient k of lambda enters coefficient k of
-G linearly, with the matrix M = dG/dlambda at the start of the step (``MultiplierSeries``; also where
-lambda enters nonlinearly: hidden dynamics). The size does not grow with the number of modes.
+G linearly, with the matrix M = dG/dlambda at the start of the step (also where lambda enters
+nonlinearly: hidden dynamics). The size does not grow with the number of modes.
 
 Where the field is affine in all multipliers and what multiplies lambda_i has a factor n_i(x), the
 unknown is nu_i = n_i lambda_i (``factors``).
@@ -24,15 +24,9 @@ from numpy.typing import NDArray
 
 from ..definition.system import FilippovSystem
 from ..expressions.cancel import cancel_common_factor
-from ..expressions.float_arithmetic import Numbers
-from ..expressions.graph import depends_on, instructions
 from ..expressions.identity import vanish_on
-from ..expressions.jets import Expansion
 from ..expressions.linearity import linearity
-from ..expressions.simplification import simplified
-from ..expressions.taylor_rules import lower, touched
 from ..expressions.unused_terms import without_unused_terms
-from ..numbering import FALL, LIMIT_FALL
 from ..values import Array
 from .degree import Degree, degree_of
 from .evaluators import Evaluator
@@ -90,11 +84,9 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
 class Coupled:
     """Series of states, surfaces, stops and multipliers of a system in any mode."""
 
-    def __init__(
-        self, system: FilippovSystem, watched: Sequence[ca.SX] = (), by_degree: bool = False
-    ):
+    def __init__(self, system: FilippovSystem, by_degree: bool = False):
         self.system, d = system, system.definition
-        self._surfaces, self._watched = system.surface_count, len(watched)
+        self._surfaces = system.surface_count
         #: Surfaces and impacts: the letters of a mode.
         self.count = self._surfaces + len(system.impacts)
         x = system.extended_states
@@ -111,16 +103,13 @@ class Coupled:
         extra = [n for n, scaled in zip(unknowns, self.scaled, strict=True) if scaled]
         self.moving = ca.vertcat(x, lam, d.reactions, *extra)
         self._symbols = [self.moving, system.parameter_symbols]
-        self._stable: dict[tuple[int, ...], list[ca.SX]] = {}
-        self._series: dict[tuple[int, ...], tuple[Expansion, list[int]]] = {}
         self.layer = ca.densify(ca.jtimes(ca.vertcat(d.surfaces, d.gap_rates), x, field))
         #: Of each surface, derivatives that vanish while it rests; the layer has the next one.
         self.lower: list[tuple[ca.SX, ...]] = [()] * self._surfaces
         if by_degree:
             for i, found in enumerate(self.degrees(field, lam, unknowns)):
                 self.lower[i], self.layer[i] = found.lower, found.row
-        stops = ca.vertcat(d.guards, *watched)
-        stops = ca.densify(stops) if stops.numel() else ca.SX(0, 1)
+        stops = ca.densify(d.guards) if d.guards.numel() else ca.SX(0, 1)
         heights = ca.densify(ca.vertcat(d.surfaces, d.gaps))
         factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
         self.outputs = [field, self.layer, heights, factor, stops]
@@ -223,7 +212,6 @@ class Coupled:
             else:
                 result += [Guard("exit", i, side, self.system.entry_of(i)) for side in (1, -1)]
         result += event_guards(self.system)
-        result += [Guard("zero", k, 0, k) for k in range(self._watched)]
         sliding = self.sliding(mode)
         first = next((i for i in sliding if i < self._surfaces), 0)
         branches = len(self._changing(sliding))
@@ -276,18 +264,6 @@ class Coupled:
         if len(sliding) == 2 and max(sliding) < self._surfaces:
             return list(sliding) if self.slope_moves[np.ix_(sliding, sliding)].any() else []
         return [i for i in sliding if self.slope_moves[i, i]]
-
-    def _stability(self, sliding: Sequence[int]) -> list[ca.SX]:
-        """Functions that pass zero where sliding loses its stability across the layer."""
-        # The slope of one multiplier, determinant and trace of that of two; of more, or with contacts,
-        # its diagonal, each of which has to keep its sign.
-        changing = self._changing(sliding)
-        if len(sliding) == 2 and len(changing) == 2 and max(sliding) < self._surfaces:
-            if (pair := tuple(changing)) not in self._stable:
-                both = ca.densify(self.slope[changing, changing])
-                self._stable[pair] = [ca.det(both), ca.trace(both)]
-            return self._stable[pair]
-        return [self.slope[i, i] for i in changing]
 
     # expressions --------------------------------------------------------------------------------
 
@@ -365,14 +341,6 @@ class Coupled:
             layer.ravel(), slope, factors.ravel(), *[np.abs(gradient) for gradient in gradients]
         )
 
-    def columns(self, x: Array, multipliers: Array, p: Array) -> Array:
-        """Derivatives of the field by the unknowns (N, m), with the multipliers held."""
-        return self._columns.copied(self._inputs(x, multipliers, np.zeros(self.count)), p)[0]
-
-    @cached_property
-    def _columns(self) -> Evaluator:
-        return self._evaluator([self.columns_of_field])
-
     def _inputs(self, x: Array, multipliers: Array, unknowns: Array) -> Array:
         scaled = self._scaled
         return np.concatenate([x, multipliers + np.where(scaled, 0.0, unknowns), unknowns[scaled]])
@@ -388,81 +356,6 @@ class Coupled:
     @cached_property
     def _values(self) -> Evaluator:
         return self._evaluator(self.outputs)
-
-    def _expansion(self, mode: str) -> tuple[Expansion, list[int]]:
-        """Return the expansion for a mode, and the rules that the unknowns enter."""
-        stability = self._stability(self.sliding(mode))
-        key = tuple(self.sliding(mode)) if stability else ()
-        if key not in self._series:
-            outputs = [*self.outputs, ca.vertcat(*stability) if stability else ca.SX(0, 1)]
-            outputs = simplified(self._symbols, self.awake(outputs), [True, False])
-            nodes, rows = instructions(self._symbols, outputs)
-            rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
-            rows = [[rule_of[j] for j in row] for row in rows]
-            late = touched(rules, self.system.extended_dimension)
-            self._series[key] = Expansion(rules, rows, [], Numbers()), late
-        return self._series[key]
-
-    def jets(self, law: MultiplierSeries, x: Array, p: Array) -> tuple[Array, Array]:
-        """Taylor coefficients in a mode."""
-        expansion, late = self._expansion(law.mode)
-        expansion.restart([v or None for v in p.tolist()])
-        order = law.order
-        states = np.zeros((x.size, order + 1))
-        states[:, 0] = x
-        found: list[list[list[float]]] = []
-        for k in range(order + 1):
-            outputs = expansion.advance(k, self._now(states[:, k], law, k))
-            if law.follow(k, outputs[2]):
-                outputs = expansion.again(k, self._now(states[:, k], law, k), late)
-            if law.solve(k, outputs[1]):
-                outputs = expansion.again(k, self._now(states[:, k], law, k), late)
-            law.close(k, outputs[1])
-            numbers = [[v or 0.0 for v in row] for row in outputs]
-            found.append(numbers[1:])
-            if k < order:
-                states[:, k + 1] = np.array(numbers[0]) / (k + 1)
-        parts = [np.array([numbers[j] for numbers in found]).T for j in range(5)]
-        of_sets = law.rows(parts[1], parts[2], self) if self.system.sets else []
-        return states, self.rows(law.mode, law.series, of_sets, *parts)
-
-    def _now(self, states: Array, law: MultiplierSeries, k: int) -> list[float | None]:
-        """Coefficients k of the moving inputs: states, lambda and reactions, nu."""
-        values = self._inputs(states, law.held[:, k], law.acting[:, k])
-        return [v or None for v in values.tolist()]
-
-    def rows(
-        self,
-        mode: str,
-        series: Array,
-        of_sets: Sequence[list[Array]],
-        layer: Array,
-        heights: Array,
-        factors: Array,
-        stops: Array,
-        stability: Array | None = None,
-    ) -> Array:
-        """Guards of a mode, from coefficients or values (rows) of what they are made of."""
-        rows: list[Array] = []
-        signs, first = self.system.parse_letters(mode), [s[0] for s in self.system.sets]
-        for i, sign in enumerate(signs):
-            if i in self.system.set_of:
-                rows += of_sets[first.index(i)] if i in first and mode[i] != "i" else []
-            elif sign:
-                rows.append(sign * heights[i])
-            elif i >= self._surfaces:
-                rows.append(series[i])
-            elif self._is_idle(i, signs):
-                rows += [-layer[i], layer[i]]
-            else:
-                turn = _sign(factors[i])
-                rows += [turn * (factors[i] - series[i]), turn * (factors[i] + series[i])]
-        rows += [*stops, *[_sign(row) * row for row in (() if stability is None else stability)]]
-        return np.array(rows) if rows else np.zeros((0, *np.shape(series)[1:]))
-
-
-def _sign(row: Array) -> float:
-    return float(np.sign(next((v for v in np.ravel(row) if v), 1.0)))  # just after its start
 
 
 def coupled_of(system: FilippovSystem) -> Coupled:
@@ -482,241 +375,8 @@ def raised_of(system: FilippovSystem) -> Coupled:
     return system.cached("raised", build)
 
 
-# multipliers of a mode as power series ---------------------------------------------------------
-
-#: A rate of leaving below this part of its terms is zero by rounding.
-_STILL = 64 * np.finfo(float).eps
-
-Outputs = Sequence[Sequence[float | None]]
-
-
 def unit(h: Array) -> Array:
     """Direction of a vector of any size; NaN for zero."""
     with np.errstate(invalid="ignore", divide="ignore"):
         scaled = h / np.abs(h).max()
         return np.asarray(scaled / np.linalg.norm(scaled))
-
-
-class Direction:
-    """The series of h/|h|, order by order."""
-
-    def __init__(self, size: int, order: int):
-        self.radius = 0.0
-        self.h, self.u = np.zeros((size, order + 1)), np.zeros((size, order + 1))
-        self._root = np.zeros(order + 1)
-
-    def push(self, k: int, h: Array) -> Array:
-        """Coefficient k of the direction from that of h."""
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            if k == 0:
-                largest = float(np.abs(h).max())
-                self.radius = largest * float(np.linalg.norm(h / largest))
-            own, root = self.h, self._root
-            own[:, k] = h / self.radius
-            # Along a line the products are those of the root, exactly so along an axis.
-            curved = sum(_inner(row, k) for row in own) - _inner(root, k)
-            root[k] = float(own[:, 0] @ own[:, k]) + 0.5 * curved if k else 1.0
-            self.u[:, k] = own[:, k] - self.u[:, :k] @ root[k:0:-1]
-        return self.u[:, k]
-
-
-class MultiplierSeries:
-    """The multipliers of one step."""
-
-    def __init__(
-        self,
-        coupled: Coupled,
-        mode: str,
-        unknowns: Array,
-        held: Array,
-        slope: Array,
-        factors: Array,
-        order: int,
-    ):
-        self.mode, self.order = mode, order
-        self.sliding = coupled.sliding(mode)
-        self._slope = slope[np.ix_(self.sliding, self.sliding)]
-        self._inverse: Array | None = None
-        self.held, self.series = np.zeros((2, coupled.count, order + 1))
-        self.limits = np.zeros((0, order + 1))
-        self.held[:, 0] = held
-        self.series[self.sliding, 0] = unknowns[self.sliding]
-        sets = coupled.moving_sets(mode)
-        self._off = {s: Direction(len(s), order) for s in sets if mode[s[0]] != "l"}
-        self._leaving = [list(s) for s in sets if mode[s[0]] == "l"]
-        for s in self._off:
-            if mode[s[0]] == "b":
-                self.series[list(s), 0] = unknowns[list(s)]
-        self._radii = np.zeros((len(self._leaving), order + 2))
-        if self._leaving:
-            rates = slope * factors  # by the multipliers themselves
-            columns = [i for s in self._leaving for i in s]
-            self._rates = np.concatenate([slope[:, self.sliding], rates[:, columns]], axis=1)
-        self.acting = self.series if not sets else np.zeros_like(self.series)
-        self.acting[self.sliding, 0] = self.series[self.sliding, 0]
-
-    def follow(self, k: int, heights: Sequence[float | None]) -> bool:
-        """Coefficients k of what is h/|h|; whether there is any that was not known."""
-        for s, direction in self._off.items():
-            own = list(s)
-            if self.mode[s[0]] == "b":
-                h = self.series[own, k]
-            else:
-                h = np.array([heights[i] or 0.0 for i in own])
-            self.held[own, k] = direction.push(k, h)
-        return bool(self._off) and k > 0
-
-    def solve(self, k: int, layer: Sequence[float | None]) -> bool:
-        """Coefficients k of what keeps the rates where they have to be; whether there is any."""
-        if self._leaving:
-            self._leave(k, layer)
-            return k > 0
-        if not k or not self.sliding:
-            return False
-        residual = np.array([layer[i] or 0.0 for i in self.sliding])
-        if self._inverse is None:
-            self._inverse = _inverse(self._slope)
-        self.series[self.sliding, k] = self.acting[self.sliding, k] = -self._inverse @ residual
-        return True
-
-    def close(self, k: int, layer: Sequence[float | None]) -> None:
-        """Coefficients k + 1 of h that is carried along."""
-        if k == self.order:
-            return
-        for s in self._off:
-            if self.mode[s[0]] == "b":
-                self.series[list(s), k + 1] = [(layer[i] or 0.0) / (k + 1) for i in s]
-        for j, own in enumerate(self._leaving):
-            radius, u = self._radii[j], self.held[own]
-            self.series[own, k + 1] = u[:, : k + 1] @ radius[k + 1 : 0 : -1]
-
-    def _leave(self, k: int, layer: Sequence[float | None]) -> None:
-        """Coefficients k of the directions and k + 1 of the distances, with those of what slides."""
-        rates = np.array([v or 0.0 for v in layer])
-        if k == 0:
-            for radius, own in zip(self._radii, self._leaving, strict=True):
-                u, g = self.held[own, 0], rates[own]
-                size = np.abs(u) @ (np.abs(g) + np.abs(self._rates[own]).sum(axis=1))
-                rate = float(u @ g)
-                radius[1] = rate if abs(rate) > _STILL * size else 0.0
-            return
-        slides, n = len(self.sliding), self._rates.shape[1]
-        rows = [*self.sliding, *[i for own in self._leaving for i in own]]
-        matrix = np.zeros((n + len(self._leaving),) * 2)
-        right = np.zeros(n + len(self._leaving))
-        matrix[:n, :n], right[:n] = self._rates[rows], -rates[rows]
-        first = slides
-        for j, (radius, own) in enumerate(zip(self._radii, self._leaving, strict=True)):
-            u, last = self.held[own], first + len(own)
-            here = slice(first, last)
-            matrix[here, here] -= (k + 1) * radius[1] * np.eye(len(own))
-            matrix[here, n + j] = -(k + 1) * u[:, 0]
-            matrix[n + j, here] = u[:, 0]
-            right[here] += (k + 1) * (u[:, 1:k] @ radius[k:1:-1])
-            right[n + j] = -0.5 * float((u[:, 1:k] * u[:, k - 1 : 0 : -1]).sum())
-            first = last
-        found = _solve(matrix, right)
-        self.series[self.sliding, k] = self.acting[self.sliding, k] = found[:slides]
-        first = slides
-        for j, own in enumerate(self._leaving):
-            self.held[own, k] = found[first : first + len(own)]
-            self._radii[j, k + 1] = found[n + j]
-            first += len(own)
-
-    def rows(self, heights: Array, factors: Array, coupled: Coupled) -> list[list[Array]]:
-        """Series of the guards of each set: how far |h| has fallen, or how far friction can rise."""
-        result: list[list[Array]] = []
-        self.limits = factors[[s[0] for s in coupled.system.sets]]
-        for s, limit in zip(coupled.system.sets, self.limits, strict=True):
-            own, letter = list(s), self.mode[s[0]]
-            if letter in "si":
-                result.append(_on(self.series[own], limit, abs(limit[0]), coupled.scaled[s[0]]))
-            elif letter == "l":
-                j = self._leaving.index(own)
-                result.append([self._radii[j, : self.order + 1]])
-            else:
-                h = heights[own] if letter == "*" else self.series[own]
-                result.append([remaining(h, self._off[s].radius)])
-        return result
-
-    @property
-    def directions(self) -> Array:
-        """Series whose relative accuracy counts, whatever the size of the states."""
-        rows: list[Array] = []
-        for s, direction in self._off.items():
-            if self.mode[s[0]] == "b":
-                rows += [*direction.u, *direction.h]
-        rows += [row for own in self._leaving for row in self.held[own]]
-        return np.array(rows) if rows else np.zeros((0, self.order + 1))
-
-    def radii(self, coupled: Coupled) -> Array:
-        """|h| at the start for each set, and on it the magnitude of its factor (sets,)."""
-        pairs = zip(coupled.system.sets, self.limits, strict=True)
-        off = self._off
-        return np.array([off[s].radius if s in off else abs(limit[0]) for s, limit in pairs])
-
-
-def _inner(row: Array, k: int) -> float:
-    """Coefficient k of a square, without its first and last products."""
-    return float(row[1:k] @ row[k - 1 : 0 : -1]) if k > 1 else 0.0
-
-
-def product(a: Array, b: Array) -> Array:
-    """Product of two series of one length."""
-    return np.convolve(a, b)[: len(a)]
-
-
-def _on(unknowns: Array, factor: Array, size: float, scaled: bool) -> list[Array]:
-    """Guards on a set: friction's limit is not reached, and has not fallen too far for its square."""
-    rows = [room(unknowns, factor)]
-    if scaled and size > 0.0:
-        rows.append(remaining(factor[None, :], size, LIMIT_FALL))
-    elif scaled:
-        rows.append(np.eye(1, factor.size)[0])
-    return rows
-
-
-def remaining(h: Array, radius: float, fall: float = FALL) -> Array:
-    """Series (k, n) of h to that of |h|^2/|h(0)|^2 - fall^2."""
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        scaled = h / radius
-        total = sum((product(row, row) for row in scaled), np.zeros(h.shape[1]))
-    total[0] -= fall * fall
-    return np.asarray(total)
-
-
-def room(unknowns: Array, factor: Array) -> Array:
-    """Series of n^2 - |nu|^2, which is positive while |lambda| < 1."""
-    used = sum((product(row, row) for row in unknowns), np.zeros(factor.size))
-    return np.asarray(product(factor, factor) - used)
-
-
-def set_values(
-    coupled: Coupled, mode: str, unknowns: Array, heights: Array, factors: Array, radii: Array
-) -> list[list[Array]]:
-    """Values of the guards of all sets, as ``MultiplierSeries.rows``."""
-    result: list[list[Array]] = []
-    for s, radius in zip(coupled.system.sets, radii, strict=True):
-        own, letter = list(s), mode[s[0]]
-        if letter in "si":
-            result.append(_on(unknowns[own], factors[own[0]], radius, coupled.scaled[own[0]]))
-        elif letter == "l":
-            result.append([np.array([np.linalg.norm(unknowns[own])])])
-        else:
-            result.append([remaining(heights[own] if letter == "*" else unknowns[own], radius)])
-    return result
-
-
-def _inverse(matrix: Array) -> Array:
-    """Inverse of a matrix; NaN where it has none."""
-    try:
-        return np.asarray(np.linalg.inv(matrix), float)
-    except np.linalg.LinAlgError:
-        return np.full_like(matrix, np.nan)
-
-
-def _solve(matrix: Array, right: Array) -> Array:
-    try:
-        return np.asarray(np.linalg.solve(matrix, right), float)
-    except np.linalg.LinAlgError:
-        return np.full_like(right, np.nan)

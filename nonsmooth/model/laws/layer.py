@@ -143,15 +143,3 @@ def _in_surfaces(
     values[chosen] = quadrant
     found = layer.at(x, values, p)
     return found.rates[chosen], found.rates_x[chosen] @ np.linalg.inv(found.h_x[chosen])
-
-
-def spirals_in(
-    system: FilippovSystem, x: Array, multipliers: Array, p: Array, surfaces: Sequence[int]
-) -> bool:
-    """Whether orbits of the plane run round the point where two surfaces meet, and towards it."""
-    # ``multipliers`` begin with those of the surfaces; false for contacts and outside the plane.
-    m = system.surface_count
-    if system.extended_dimension != 2 or max(surfaces) >= m or len(surfaces) != 2:
-        return False
-    loop = loop_at(layer_of(system), x, surfaces, multipliers[:m], p)
-    return loop is not None and loop.attracts is True

@@ -20,7 +20,7 @@ from ..definition.system import FilippovSystem, require_system
 from ..errors import DefinitionError
 from ..expressions.jets import taylor
 from ..expressions.linearity import bent
-from .switches import Guarded, Implicit, Sliding, guards_of, sliding
+from .switches import Guarded, Sliding, guards_of, sliding
 
 
 class Motion:
@@ -39,11 +39,6 @@ class Motion:
         self.guards = tuple(guard for guard, _ in guarded)
         functions = [function for _, function in guarded]
         self.functions = ca.densify(ca.vertcat(*functions)) if functions else ca.SX(0, 1)
-
-    @property
-    def implicit(self) -> Implicit | None:
-        """The kind of sliding where multipliers are further states, None elsewhere."""
-        return self.law if isinstance(self.law, Implicit) else None
 
     @property
     def regular(self) -> bool:

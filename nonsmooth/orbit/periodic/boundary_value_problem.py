@@ -159,6 +159,21 @@ class BoundaryProblem:
         return self.system.extended_dimension
 
     @cached_property
+    def labels(self) -> Array | None:
+        """Values of the discrete states of each leg, which are no unknowns; None without any."""
+        rows = [leg.discrete for leg in self.legs]
+        return np.array(rows) if all(rows) else None
+
+    def _label(self, flows: LegFlows) -> None:
+        """Give the discrete states the values of the following leg, whatever is perturbed."""
+        if self.labels is not None:
+            n, count = self.system.dimension, self.labels.shape[1]
+            flows.after[:, n - count : n] = np.roll(self.labels, -1, axis=0)
+            for slopes in (flows.after_state, flows.after_parameters):
+                slopes[:, n - count : n] = 0.0
+            flows.by_start[:, :, n - count : n] = 0.0
+
+    @cached_property
     def has_many(self) -> bool:
         """Whether equations are solved from leg to leg: many legs, each with an event, and no more."""
         return self.size > _DENSE and not self.kept and not any(leg.timed for leg in self.legs)
@@ -216,6 +231,7 @@ class BoundaryProblem:
         starts, durations = self.split(u)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
             flows = self.integrator(chosen)(starts, durations, p, tol)
+            self._label(flows)
             return self._assembled(flows, starts, durations, p, list(chosen))
 
     def _assembled(
@@ -265,7 +281,7 @@ class BoundaryProblem:
         extended : bool, optional
         """
         starts, durations = self.split(u)
-        if self.phase is not None or self.kept:
+        if self.phase is not None or self.kept or self.labels is not None:
             return None
         found = self.integrator(()).ends(starts, durations, p, extended)
         if found is None:

@@ -123,7 +123,7 @@ def recurrence(
     about: float | None = None,
 ) -> _Recurrence | None:
     """The legs of a run that nearly close; None if there are none."""
-    parts = [part for part in stretches(run) if part.duration > 0.0]
+    parts = [part for part in stretches(run, begins=False) if part.duration > 0.0]
     if len(parts) > 1 and parts[-1].leg.timed:
         if parts[-1].duration > _QUIET * sum(part.duration for part in parts):
             found = _without_events(run, parts[-1:], symmetry, period, first, about)

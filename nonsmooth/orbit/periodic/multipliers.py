@@ -38,7 +38,8 @@ class Multipliers:
     Attributes
     ----------
     values : ndarray (N - 1 or N,)
-        The nontrivial ones and the structural zeros, largest first; of the whole period.
+        The nontrivial ones and the structural zeros, largest first; of the whole period. Discrete states
+        have none.
     of_map : ndarray
         Those of the legs' map alone, the half map of a symmetric orbit.
     zeros : int
@@ -78,7 +79,8 @@ def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multip
     n = problem.dimension
     reduced = _condensed(problem, at, p)
     nontrivial = np.linalg.eigvals(reduced) if len(reduced) > 1 else reduced.ravel()
-    zeros = n - 1 - nontrivial.size
+    discrete = 0 if problem.labels is None else problem.labels.shape[1]
+    zeros = n - 1 - nontrivial.size - discrete
     of_map = values = _sorted(np.concatenate([nontrivial, np.zeros(zeros)]))
     if problem.symmetry is not None:
         values = _sorted(of_map**2)

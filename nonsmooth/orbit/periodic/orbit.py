@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...flow.fixed import flow_for
-from ...flow.names import described
+from ...flow.names import described, shown_mode
+from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
 from ...model import Array, FilippovSystem, ParameterError, Surfaces
 from ...model.derivatives.variational import variational_field
 from ...notebook import card, circle
 from ..runs.guards import faults_along, watch
+from ..runs.legs import integrate_leg
 from .boundary_value_problem import BoundaryProblem, Evaluation, mirrored
 from .multipliers import Multipliers, multipliers_of, stability
 from .orbit_run import OrbitLeg, orbit_leg, orbit_run
@@ -147,7 +149,10 @@ class PeriodicOrbit:
     @property
     def itinerary(self) -> str:
         """Modes of the whole orbit in order, separated by blanks."""
-        return " ".join(leg.mode or "o" for leg in self.legs)
+        shown = [shown_mode(self.system, leg.mode, leg.discrete) for leg in self.problem.legs]
+        if len(shown) < len(self.legs):  # of a half orbit
+            return " ".join(leg.mode or "o" for leg in self.legs)
+        return " ".join(mode or "o" for mode in shown)
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -301,7 +306,26 @@ def faults_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
     """Violations of guards along a solution, leg by leg."""
     speeds = (at.flows.gradient * at.flows.rate).sum(axis=1)
     closes = problem.symmetry is None
-    return faults_along(problem.system, problem.legs, at.starts, at.durations, speeds, p, closes)
+    found = faults_along(problem.system, problem.legs, at.starts, at.durations, speeds, p, closes)
+    return found if found or problem.system.definition.plain else _fault_of_run(problem, at, p)
+
+
+def _fault_of_run(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
+    """Whether the motion, with all conditions of events, has the events of the legs."""
+    system, legs = problem.system, problem.legs
+    if problem.symmetry is not None or any(leg.timed for leg in legs):
+        return []
+    half, n = 0.5 * float(at.durations[0]), system.dimension
+    start = integrate_leg(system, legs[0], at.starts[0], half, p).end
+    t = float(start[n]) if system.time_dependent else 0.0
+    run = simulate(
+        system, start[:n], t + float(at.durations.sum()), t_start=t, parameters=named(system, p)
+    )
+    found = [event.name for event in run.events if event.kind != "end"]
+    wanted = [one.name(system) for leg in legs for one in (leg, *leg.further)]
+    if found == wanted:
+        return []
+    return [f"a run from the middle of leg 1 has the events {found} instead of {wanted}"]
 
 
 def _margins(orbit: PeriodicOrbit) -> list[Margin]:

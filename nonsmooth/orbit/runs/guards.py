@@ -57,7 +57,7 @@ def _approaches(field: GuardedField, rows: Array, p: Array) -> list[Approach]:
     guards, found = field.motion.guards, list[Approach]()
     for row in rows:
         guard, (t, value, bend) = guards[int(row[0])], row[1:4].tolist()
-        if bend and (bend > 0.0 or guard.kind in ("stop", "reset")):
+        if bend and (bend > 0.0 or guard.kind in ("stop", "reset")) and guard.kind != "atom":
             slope = field.gradients.copied(row[4:], p)[0][int(row[0])]
             size = math.sqrt(float(slope @ slope))
             if size > 0.0:
@@ -90,9 +90,9 @@ def _violations_along(field: GuardedField, rows: Array, p: Array) -> list[str]:
     positive = {k for k, _, value in rows[:, :3].tolist() if value > 0.0}
     for row in rows:
         k, (t, value), scale = int(row[0]), row[1:3].tolist(), 0.0
-        if k not in positive and guards[k].kind in ("stop", "reset", "zero"):
+        if k not in positive and guards[k].kind in ("stop", "reset", "zero", "atom"):
             continue  # no change of sign
-        if value < 0.0 and guards[k].kind not in ("stop", "reset"):
+        if value < 0.0 and guards[k].kind not in ("stop", "reset", "atom"):
             slope = np.abs(field.gradients.copied(row[4:], p)[0][k])
             scale = float(slope @ np.abs(row[4:])) + math.sqrt(float(slope @ slope)) * 1e-3
         seen[k].append((t, value, scale))
@@ -107,7 +107,9 @@ def _violations(
 ) -> list[str]:
     """Violations of one guard inside a leg, earliest first."""
     ordered = sorted(values)
-    if guard.kind in ("stop", "reset", "zero"):
+    if guard.kind in ("stop", "reset", "zero", "atom"):
+        if guard.kind == "atom" or not system.definition.plain:
+            return []  # the orbit is run, with its conditions
         for (_, a, _), (t, b, _) in pairwise(ordered):
             if a * b < 0.0 and guard.side in (0, 1 if b > a else -1) and guard.kind != "zero":
                 name = guard_name(system, guard)
@@ -169,7 +171,7 @@ def _negative(field: GuardedField, begin: Array, p: Array) -> str:
         return ""
     slopes, sizes = field.gradients.copied(states[:, 0], p)[0], np.abs(states).max(axis=0)
     for k, guard in enumerate(guards):
-        if guard.kind in ("stop", "reset", "zero", "branch"):
+        if guard.kind in ("stop", "reset", "zero", "branch", "atom"):
             continue
         length = math.sqrt(float(slopes[k] @ slopes[k]))
         scale = length * sizes

@@ -15,11 +15,21 @@ import numpy as np
 
 from ...flow.constants import TIE
 from ...flow.fixed import flow_for
-from ...flow.names import event_name
+from ...flow.names import event_name, shown_mode
 from ...flow.trajectory import Event, Trajectory
 from ...model import Array, DegenerateError, FilippovSystem, coupled_of
-from ...model.derivatives.event_maps import AtEvent, EventMap, event_map
+from ...model.derivatives.event_maps import (
+    AtEvent,
+    EventMap,
+    atoms_at,
+    choices_at,
+    event_map,
+    instant_map,
+)
 from ...model.derivatives.variational import VariationalField, variational_field
+
+#: Errors of located events, relative to the size of the states.
+_LOCATED = 1e-7
 
 #: Directions that differ by less than this are one: the gradients of events at one instant.
 _PARALLEL = 1e-7
@@ -40,6 +50,8 @@ class Leg:
         Sides of the friction at an impact.
     further : tuple of Leg
         Resets and impacts caused by the event, at the same instant.
+    discrete : tuple of float
+        Values of the discrete states in it.
     """
 
     mode: str
@@ -48,6 +60,7 @@ class Leg:
     side: int = 0
     letters: str = ""
     further: tuple[Leg, ...] = ()
+    discrete: tuple[float, ...] = ()
 
     @property
     def timed(self) -> bool:
@@ -85,7 +98,7 @@ class Leg:
 def leg_name(system: FilippovSystem, leg: Leg) -> str:
     """Describe a leg by its mode and its event."""
     end = "" if leg.timed else f", ended by {leg.name(system)}"
-    return f"({leg.mode or 'o'}{end})"
+    return f"({shown_mode(system, leg.mode, leg.discrete) or 'o'}{end})"
 
 
 def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
@@ -157,12 +170,13 @@ class Stretch:
     after: Array
 
 
-def stretches(run: Trajectory) -> list[Stretch]:
-    """Split a run into legs, one for each instant with events."""
+def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
+    """Split a run into legs, one for each instant with events; ``begins``: those at its start count."""
     system, p = run.system, run.system.parameter_vector(run.parameters)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
     known: dict[tuple[object, ...], Leg] = {}
+    discrete = len(system.definition.discrete)
     for group in _instants(run.events):
         first, last = group[0], group[-1]
         _require_countable(group)
@@ -172,10 +186,18 @@ def stretches(run: Trajectory) -> list[Stretch]:
             leg = known.get(key) or known.setdefault(key, leg_of(system, first, p))
         else:
             leg = leg_of(system, first, p)
+            if system.resets or not system.definition.plain:
+                _require_smooth_choices(system, group, p)
+            if not system.definition.plain:
+                if begins or first.t > t:
+                    _require_located(system, first, x_end, p, leg)
             further = [leg_of(system, e, p) for e in group[1:] if e.kind not in ("end", "stop")]
             if further:
                 leg = replace(leg, further=_caused(system, leg, further, x_end, p, first.t))
         after = _extended(system, last.x_after, last.t)
+        if discrete:
+            own = x[system.dimension - discrete : system.dimension]
+            leg = replace(leg, discrete=tuple(own.tolist()))
         result.append(Stretch(leg, t, first.t - t, x, x_end, after))
         t, x = last.t, after
     return result
@@ -219,6 +241,52 @@ def leg_of(system: FilippovSystem, event: Event, p: Array) -> Leg:
     _require_one_surface(system, event)
     letters = _letters(system, event, p) if event.kind == "impact" else ""
     return Leg(event.mode_before, event.kind, event.element, event.side, letters)
+
+
+def _is_zero(at: AtEvent, y: Array) -> bool:
+    """Whether an event's function is zero at a state, to the error of its location."""
+    return abs(at.value) <= _LOCATED * float(np.abs(at.gradient) @ (1.0 + np.abs(y)))
+
+
+def _require_located(system: FilippovSystem, event: Event, x: Array, p: Array, leg: Leg) -> None:
+    """Refuse an event whose time another function than its own guard determines."""
+    if event.kind not in ("stop", "reset"):
+        return
+    y = leg.field(system).states_at(x, p)
+    size = 1.0 + float(np.abs(x).max())
+    values = atoms_at(system, event.kind, event.element, x, p)
+    vanishing = [value for value in values if abs(value) <= _LOCATED * size]
+    if _is_zero(leg.at_end(system, y, p), y) and len(vanishing) == 1:
+        return
+    if len(vanishing) > 1:
+        raise DegenerateError(
+            f"event at t = {event.t:.10g}: expected one function of the condition of {event.name!r} to "
+            f"vanish, received {len(vanishing)} (a corner). Its derivatives are one-sided: move the start or "
+            "a parameter."
+        )
+    raise DegenerateError(
+        f"event at t = {event.t:.10g}: expected {event.name!r} where its own guard passes zero, received "
+        "one whose condition another function, or the start, makes true; its derivatives are not "
+        "implemented. Start after it, or give the event the guard that passes zero there."
+    )
+
+
+def _require_smooth_choices(system: FilippovSystem, group: Sequence[Event], p: Array) -> None:
+    """Refuse an instant at which a comparison in a map or filter changes: a corner."""
+    moves = np.eye(system.extended_dimension)  # of the state by that before the instant
+    for event in group:
+        if event.kind not in ("stop", "reset"):
+            continue
+        x = _extended(system, event.x, event.t)
+        values, gradient = choices_at(system, event.kind, event.element, x, p)
+        near = np.abs(values) <= _LOCATED * (1.0 + np.abs(gradient) @ np.abs(x))
+        if np.any(gradient[near] @ moves):
+            raise DegenerateError(
+                f"event at t = {event.t:.10g}: a comparison in the map or when= of {event.name!r} changes "
+                "there (a corner), so that derivatives are one-sided. Move the start or a parameter."
+            )
+        own = instant_map(system, event.mode_before, event.kind, event.element)
+        moves = own(x, p).after_state @ moves
 
 
 def _require_one_surface(system: FilippovSystem, event: Event) -> None:
@@ -281,6 +349,9 @@ def _caused(
         start = then.field(system).initial(at.after, p)
         other = then.at_end(system, start[:, 0], p)
         n = len(at.after)
+        if then.kind in ("reset", "stop") and not _is_zero(other, start[:, 0]):
+            kept = (*kept, then) if then.kind == "reset" else kept
+            continue  # a jump led clearly to its other side: it follows, whatever the times are
         pulled = (other.gradient @ start[:, 1 : 1 + n]) @ at.after_state
         if not parallel(pulled, at.gradient):
             raise DegenerateError(corner(t, leg.name(system), then.name(system)))

@@ -24,7 +24,14 @@ import numpy as np
 
 from ...flow.constants import TIE
 from ...flow.trajectory import Event, Trajectory
-from ...model import Array, DegenerateError, FilippovSystem, multiplier_enters, sliding_multipliers
+from ...model import (
+    Array,
+    DegenerateError,
+    FilippovSystem,
+    multiplier_enters,
+    require_plain,
+    sliding_multipliers,
+)
 from ...model.derivatives.event_maps import AtEvent, instant_map
 from ...model.laws.frozen import Frozen
 from ...model.laws.limit_directions import leaving_direction
@@ -324,6 +331,7 @@ class Variation:
 def set_sensitivity(run: Trajectory, names: Sequence[str]) -> Sensitivity:
     """Derivatives of a run of a system with sets; as ``nonsmooth.sensitivity``."""
     system = run.system
+    require_plain(system, "sensitivity with sets")
     chosen = [system.parameter_names.index(name) for name in names]
     passage = _Passage(run, Variation(system, system.parameter_vector(run.parameters), chosen))
     passage.follow()

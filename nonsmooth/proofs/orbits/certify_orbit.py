@@ -7,7 +7,7 @@ from fractions import Fraction
 from itertools import groupby
 from typing import Any, NamedTuple
 
-from ...model import FilippovSystem, OptionError, PointError, require_system, whole
+from ...model import FilippovSystem, OptionError, PointError, require_plain, require_system, whole
 from ..arithmetic.decimals import enclosure, given
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.flint import arb, ctx
@@ -98,6 +98,7 @@ def certify_orbit(
     (True, '- s -', '0.523598775598298873... +- ...')
     """
     require_system(system)
+    require_plain(system, "certify_orbit")
     duration = exact(t_end, numbers, "t_end")
     if duration <= 0:
         raise OptionError(f"t_end={t_end!r} is not positive. Give the duration of the orbit.")

@@ -195,6 +195,14 @@ class OrbitEnclosure(ValidatedFlow):
             value = c[k][1 if at_zero else 0]
             if not sign(value) or (w.kind == "impact" and not value > 0):
                 raise UnprovenError(f"{w.name}: its sign after {function.name} is undecided")
+            carried = (
+                w.kind in ("stop", "reset") and not at_zero and self.signs[w.index] * value < 0
+            )
+            if carried and w.direction * sign(value) >= 0:
+                raise UnprovenError(
+                    f"{where}: the jump carries the state across {w.name}, which happens at the same instant; "
+                    "such chains of jumps are not proven"
+                )
             self.signs[w.index] = sign(value)
             if at_zero:
                 self.zeros[k] = 1

@@ -164,3 +164,10 @@ def test_an_event_that_some_orbits_meet_after_the_end_is_not_claimed():
     for end, proven, ticks in (("1.05", True, 1), ("1.3", False, 1), ("1.5", True, 2)):
         orbit = ns.certify_orbit(clock, [("-0.4", "-0.1")], t_end=end)
         assert orbit.proven == proven and len(orbit.events) == ticks, orbit
+
+
+def test_a_jump_across_another_reset_is_not_proven():
+    leap, edge = ns.Reset(x - 1, [x + 2], 1, "leap"), ns.Reset(x - 2, [0], 1, "edge")
+    system = ns.FilippovSystem([x], field=[1], resets=[leap, edge])
+    proof = ns.certify_orbit(system, [0], t_end=4)
+    assert not proof.proven and "carries the state across" in proof.why

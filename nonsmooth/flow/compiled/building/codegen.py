@@ -27,9 +27,8 @@ def supports_set_lanes(coupled: Coupled) -> bool:
 
 def _has_only_plain_stops(system: FilippovSystem) -> bool:
     """Whether all events are stops at a guard, without conditions, and multipliers enter linearly."""
-    definition = system.definition
     others = system.resets or system.impacts or any(system.nonlinear)
-    return not others and definition.plain and definition.whens.is_constant()
+    return not others and system.definition.plain
 
 
 def tape_order(system: FilippovSystem, options: Options) -> int:

@@ -1,10 +1,7 @@
-/* Sets of codimension two and more in a run: nonsmooth/flow/reference/{sets,laws_of_sets}.py --------------- */
+/* Sets of codimension two and more in a run ----------------------------------------------------------------- */
 
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int change_kind(const Run *r, int before, int after);
-
-/* The mode in which a step is shown. */
-static int shown_mode(const Run *r) { return r->s->sets || r->s->rules.discrete ? r->shown : r->mode; }
 
 /* A solution of a x = b, whose rows may depend on one another, in place of b. ``a`` is lost. */
 static int solve_consistent(double *a, double *b, int n) {
@@ -140,7 +137,7 @@ static int leaving_direction(const double *a, const double *m, int stride, int k
     double n = length_of(d, k), slope = 0;
     for (int i = 0; i < k; i++) slope += d[i] * w[i];
     s += (n - 1) * n * n / slope;
-    if (!(fabs(n - 1) > 4e-16)) break;
+    if (!(fabs(n - 1) > SOLVED)) break;
   }
   if (!solve_block(m, stride, k, s, a, d)) return 0;
   unit_of(d, k, u);
@@ -156,19 +153,13 @@ static void jump(Run *r, const double *rate, double dt) {
     memset(c, 0, sizeof(double) * stride);
     c[0] = r->x[i]; c[1] = rate[i];
   }
-  if (r->o.dense) {
-    int64_t k = r->out.steps++;
-    r->out.start[k] = r->t;
-    r->out.step_mode[k] = shown_mode(r);
-    memcpy(r->out.coefficients + k * n * stride, e->states, sizeof(double) * n * stride);
-  }
+  note_step(r, e);
   if (r->times) sample_step(r, e, dt);
   for (int i = 0; i < n; i++) r->x[i] += dt * rate[i];
-  r->t += dt;
+  pass_time(r, dt);
   r->since += dt;
   r->step_count++;
   r->segment_steps++;
-  if (r->s->timed) r->x[n - 1] = r->t;
   memset(r->drop, 0, sizeof(int32_t) * r->guards);
   note(r);
 }
@@ -182,7 +173,7 @@ static int is_met(Run *r, const int8_t *letter, int set, const double *h, const 
   int32_t own[3];
   double a[3], m[9], scale = 0, radius = length_of(h + f, k), speed = 0;
   for (int i = 0; i < k; i++) { own[i] = f + i; scale = larger(scales_of[f + i], scale); }
-  if (!(radius > 0) || radius <= VANISHES * scale || radius > 1e-8 * scale) return !(radius > VANISHES * scale);
+  if (!(radius > 0) || radius <= VANISHES * scale || radius > CLOSE * scale) return !(radius > VANISHES * scale);
   if (!freeze(r, letter, r->x, r->unknowns, own, k, a, m)) return 0;
   for (int i = 0; i < k * k; i++) speed += m[i] * m[i];
   return radius < shortest(r) * (length_of(a, k) + sqrt(speed));
@@ -212,7 +203,7 @@ static void near_set(Run *r, int row, int fell) {
   for (int i = 0; i < k; i++) {
     double g = a[i];
     for (int j = 0; j < k; j++) {
-      same &= fabs(m[i * k + j] - (i == j ? c : 0)) <= 1e-12 * c;
+      same &= fabs(m[i * k + j] - (i == j ? c : 0)) <= SYMMETRIC * c;
       g -= m[i * k + j] * u[j];
     }
     rate += u[i] * g;
@@ -220,7 +211,7 @@ static void near_set(Run *r, int row, int fell) {
     square += a[i] * a[i];
   }
   dt = hits && same ? (c * radius + along) / (c * c - square) : rate < 0 ? radius / -rate : INFINITY;
-  at_floor |= dt < larger(shortest(r), TENFOLD * SHORTEST * larger(fabs(r->t), fabs(r->t - r->begun)));
+  at_floor |= dt < larger(shortest(r), TENFOLD * SHORTEST * time_scale(r));
   if (!hits && !at_floor) return;
   if (!(dt > 0 && dt < INFINITY)) {
     if (!(at_floor && (hits || fell))) return;
@@ -251,7 +242,7 @@ static void near_set(Run *r, int row, int fell) {
       }
       if (bend > REACHED * radius) return;
     }
-    if (bend <= radius) jump(r, field, smaller(dt, r->o.t_end - r->t));
+    if (bend <= radius) jump(r, field, smaller(dt, r->o.t_end - r->t - r->t_low));
   }
   active_surfaces(r, f, r->letter);
   if (r->status != RUNNING) return;
@@ -290,7 +281,7 @@ static void after_step(Run *r) {
 
 /* Multipliers of sets at h = 0 together; 0 where M is not symmetric and positive definite. */
 static int bounded_multipliers(Run *r, const double *a, const double *m, int n, const int *first, int sets, double *lam) {
-  if (!definite(r, m, n) || !symmetric(m, n, 1e-12)) return 0;
+  if (!definite(r, m, n) || !symmetric(m, n, SYMMETRIC)) return 0;
   for (int i = 0; i < n; i++) lam[i] = 0;
   for (int again = 0; again < 2000; again++) {
     double change = 0;
@@ -535,6 +526,6 @@ static void look_at_sets(Run *r) {
     const double *h = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
     double scale = 0, radius = length_of(r->letter[f] == LEFT_BEHIND ? r->unknowns + f : h + f, k);
     for (int i = f; i < f + k; i++) scale = larger(scales_of[i], scale);
-    if (radius <= 1e-8 * scale) { near_set(r, row, 0); return; }
+    if (radius <= CLOSE * scale) { near_set(r, row, 0); return; }
   }
 }

@@ -1,4 +1,4 @@
-/* Modes: nonsmooth/model/laws/coupled.py, nonsmooth/flow/reference/modes.py --------------------------------- */
+/* Modes: nonsmooth/model/laws/coupled.py --------------------------------------------------------------------- */
 
 /* Whether a multiplier makes no difference: on its surface, or where all contacts are open that carry it. */
 static int is_idle(const Run *r, const int8_t *letter, int i) {

@@ -1,5 +1,4 @@
-/* Sets of codimension two and more: nonsmooth/model/{multiplier_series,frozen}.py,
- * nonsmooth/flow/reference/{sets,laws_of_sets}.py. Their switching functions stand side by side; each has the
+/* Sets of codimension two and more. Their switching functions stand side by side; each has the
  * letter of its set: 0 on it, OFF, and for what comes after leaving it LEFT_BEHIND (h is carried along) and
  * LEAVING (its first step). */
 
@@ -313,7 +312,7 @@ static double slip_root(const Run *r, const Expansion *e, int row, double dt, do
     if (!(slope < 0)) return dt;
     root = smaller(larger(root - (fabs(n) - length) / slope, 0), h);
   }
-  return fabs(root - dt) <= 1e-6 * h ? root : dt;
+  return fabs(root - dt) <= SLIP_ROOT * h ? root : dt;
 }
 
 /* Friction's limit at the start of a step on a set. */

@@ -1,11 +1,9 @@
-/* The reference driver in C for any number of surfaces and impacts; the system is data, not code.
+/* The driver: all that a run is. The system is data, not code.
  *
- * The functions have the names and the order of nonsmooth/flow/reference/{modes,stepper,switching,contacts,
- * driver}.py; read those first. What is rare and slow anyway (points where the jet is not finite, starts in
- * repelling sliding, stability that no simple test shows) is handed over to them.
+ * Read in the order of core_source.py: programs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c, decide.c,
+ * events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
  */
 
-#define TINY 2.2250738585072014e-308
 
 /* Entries of a sparse matrix in the order of a program's outputs. */
 typedef struct { int32_t count, pad; const int32_t *row, *column; } Entries;
@@ -119,7 +117,8 @@ typedef struct {
   Table *table;
   double *p;
   int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
-  double t, begun, since, limit, at_t, *x, *at_x, *unknowns;
+  /* The time is t + t_low: that of an event is no number of its own where times are large. */
+  double t, t_low, begun, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
   double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
   Layout now; /* of the present mode */
@@ -146,7 +145,7 @@ typedef struct {
   /* programs' values, inputs, error scales */
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
   double *atom_work, *choice_work;
-  double *root, *met_at; /* of each guard in the step: of its polynomial, and of itself; -1 if there is none */
+  double *met_at; /* root of each guard in the step, or -1 */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */

@@ -9,9 +9,6 @@ import pytest
 
 import nonsmooth as ns
 
-#: Tests that fail, and why; a repair deletes its line.
-OPEN = {}
-
 x, y, u, v, w, z, t = (ca.SX.sym(name) for name in "xyuvwzt")
 l1, l2, l3 = (ca.SX.sym(f"l{i}") for i in (1, 2, 3))
 REACHED, STOPPED = ns.Status.REACHED_END, ns.Status.STOPPED

@@ -332,3 +332,11 @@ def test_the_multiplier_of_a_relay_with_hysteresis():
         for s in (1e-6, -1e-6)
     ]
     assert abs(orbit.multipliers[1] - (back[0] - back[1]) / 2e-6) < 1e-7
+
+
+def test_a_triple_zero_is_one_passage():
+    """A flat guard: its root is located to a millionth only, and the motion goes on."""
+    count = ns.Reset(y, {v: v + 1}, 0)
+    system = ns.FilippovSystem([x, y, v], field=[1, 3 * (x - 1) ** 2, 0], resets=count)
+    run = ns.simulate(system, [0.0, -1.0, 0.0], 2.0)
+    assert run.status is REACHED and run.x[-1, 2] == 1.0

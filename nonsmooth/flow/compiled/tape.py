@@ -444,7 +444,8 @@ class TapeEngine:
             modes, words = self.words(table, [counts[4]])
             labels = self._labels(table)
             final = np.zeros(width)
-            library().run_motion(state, address(final))
+            if width:
+                library().run_motion(state, address(final))
         return Run.of(
             output.filled(counts[7:10]),
             self.system.dimension,

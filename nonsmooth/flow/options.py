@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..model import OptionError, real, whole
-from .constants import SAFETY
+from .constants import EPSILON, FAR, SAFETY
 from .section import Hits
 
 
@@ -81,6 +81,13 @@ class Options:
             self._set("rest_below", speed)
         for name in ("max_steps", "max_events", "max_jumps"):
             self._set(name, whole(getattr(self, name), name))
+
+    @property
+    def begins_late(self) -> bool:
+        """Whether one number rounds times by more than a run of this length from 0 and the tolerance allow."""
+        latest = max(abs(self.t_start), abs(self.t_end))
+        far = latest > FAR * (self.t_end - self.t_start)
+        return far and EPSILON * latest > SAFETY * (self.rtol + self.atol)
 
     @property
     def order(self) -> int:

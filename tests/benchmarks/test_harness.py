@@ -47,7 +47,7 @@ def test_peers_and_library_get_the_same_fields(name):
 def test_mpmath_scipy_and_the_library_agree(name):
     starts = problems.random_starts(2, seed=7)
     truth = reference.solve(name, starts)
-    for solve in (library.reference_driver(name, 1e-13), scipy_dop853.make(name, 1e-11)):
+    for solve in (library.make(name, 1e-13), scipy_dop853.make(name, 1e-11)):
         ends = solve(starts)
         assert reference.error(ends, truth).max() < 1e-9
         assert (ends.itinerary == truth.itinerary).all()

@@ -16,7 +16,7 @@ import numpy as np
 
 import nonsmooth as ns
 
-from .independent.hybrid import Contact, Jump, Outcome, Problem, follow, package_system
+from .independent.hybrid import Contact, Jump, Model, Outcome, Problem, follow, package_system
 
 TOLERANCE = 1e-9
 T_END = 3.0
@@ -172,6 +172,23 @@ def difference(problem: Problem, truth: Outcome, run: Any, tol: float = TOLERANC
     return f"digits: state {error:.2g}, times {late:.2g}, errors of the start grow by {growth:.2g}"
 
 
+def wrong_side(problem: Problem, run: Any) -> str:
+    """A segment whose letters disagree with the signs of the surfaces inside it, or an empty string."""
+    if not problem.surfaces:
+        return ""
+    surfaces = Model(problem).guards
+    for segment in run.segments:
+        length = segment.t_end - segment.t_start
+        for part in (0.1, 0.5, 0.9) if length > 1e-6 else ():
+            t = segment.t_start + part * length
+            values = surfaces(run(t), t)
+            for letter, h in zip(segment.mode, values[: len(problem.surfaces)], strict=False):
+                inside = {"+": h > -1e-7, "-": h < 1e-7, "s": abs(h) < 1e-7}
+                if not inside[letter]:
+                    return f"side: mode {segment.mode} at {t:.9g}, where h = {values}"
+    return ""
+
+
 def compare(seed: int) -> tuple[str, str, frozenset[str]]:
     """Verdict (right, undecided, wrong: what), status of the integrator, kinds."""
     problem, kinds = draw(seed)
@@ -182,7 +199,7 @@ def compare(seed: int) -> tuple[str, str, frozenset[str]]:
         run = ns.simulate(package_system(problem), problem.start, problem.t_end, tol=TOLERANCE)
     except (TypeError, ns.DefinitionError) as error:
         return f"refused: {str(error)[:80]}", truth.status, kinds
-    found = difference(problem, truth, run)
+    found = difference(problem, truth, run) or wrong_side(problem, run)
     return (f"wrong: {found}" if found else "right"), truth.status, kinds
 
 

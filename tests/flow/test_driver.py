@@ -447,7 +447,8 @@ def test_a_stop_at_the_end_of_a_step_is_met(offset, direction, speed):
         expected = (offset - starts[:, 0]) / speed
         many = ns.ensemble(system, starts, 50 * step, max_step=step, work=ns.Work(progress=False))
         assert np.all(many.status == ns.Status.STOPPED)
-        np.testing.assert_allclose(many.t, expected, rtol=0, atol=1e-14 * (1 + offset))
+        # times are exact, states rounded once a step: up to 40 times 2e-15
+        np.testing.assert_allclose(many.t, expected, rtol=0, atol=2e-14 * (1 + offset))
         run = ns.simulate(system, starts[7], 50 * step, max_step=step)
         assert run.status is ns.Status.STOPPED
 

@@ -9,11 +9,6 @@ import pytest
 
 import nonsmooth as ns
 
-#: Tests that fail, and why; a repair deletes its line.
-OPEN = {
-    "test_an_autonomous_run_does_not_depend_on_when_it_starts[1700000000.0]": "time is one double",
-}
-
 x, y, u, v, w, z, t = (ca.SX.sym(name) for name in "xyuvwzt")
 l1, l2, l3 = (ca.SX.sym(f"l{i}") for i in (1, 2, 3))
 REACHED, STOPPED = ns.Status.REACHED_END, ns.Status.STOPPED

@@ -43,6 +43,8 @@ def _unsupported(system: FilippovSystem, options: Options) -> str:
         return "a system of several surfaces" if several else "a system with resets or contacts"
     if options.start_mode is not None:
         return "a start_mode"
+    if options.begins_late:
+        return "times whose rounding is above the tolerance"
     return "" if options.t_end > options.t_start else "t_end = t_start"
 
 

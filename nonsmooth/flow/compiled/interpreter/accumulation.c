@@ -113,13 +113,13 @@ static int choose_closed(Run *r, const int32_t *contact, int count) {
 
 /* Whether a time is below the rounding of the run's times. */
 static int is_instant(const Run *r, double time) {
-  return time <= SHORTEST * larger(fabs(r->t), fabs(r->t - r->begun));
+  return time <= SHORTEST * time_scale(r);
 }
 
 /* Move on to the limit in the mode that holds from there. */
 static void go_to_limit(Run *r, double left, int kind, int before) {
   r->history = 0;
-  if (!advance(r, &r->e, smaller(left, r->o.t_end - r->t))) return;
+  if (!advance(r, &r->e, smaller(left, r->o.t_end - r->t - r->t_low))) return;
   r->limit = r->t;
   event(r, kind, before, -1, r->x);
 }

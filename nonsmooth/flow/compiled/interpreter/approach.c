@@ -3,9 +3,6 @@
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int change_kind(const Run *r, int before, int after);
 
-/* The mode in which a step is shown. */
-static int shown_mode(const Run *r) { return r->s->sets || r->s->rules.discrete ? r->shown : r->mode; }
-
 /* A solution of a x = b, whose rows may depend on one another, in place of b. ``a`` is lost. */
 static int solve_consistent(double *a, double *b, int n) {
   double first = 0;
@@ -156,19 +153,13 @@ static void jump(Run *r, const double *rate, double dt) {
     memset(c, 0, sizeof(double) * stride);
     c[0] = r->x[i]; c[1] = rate[i];
   }
-  if (r->o.dense) {
-    int64_t k = r->out.steps++;
-    r->out.start[k] = r->t;
-    r->out.step_mode[k] = shown_mode(r);
-    memcpy(r->out.coefficients + k * n * stride, e->states, sizeof(double) * n * stride);
-  }
+  note_step(r, e);
   if (r->times) sample_step(r, e, dt);
   for (int i = 0; i < n; i++) r->x[i] += dt * rate[i];
-  r->t += dt;
+  pass_time(r, dt);
   r->since += dt;
   r->step_count++;
   r->segment_steps++;
-  if (r->s->timed) r->x[n - 1] = r->t;
   memset(r->drop, 0, sizeof(int32_t) * r->guards);
   note(r);
 }
@@ -220,7 +211,7 @@ static void near_set(Run *r, int row, int fell) {
     square += a[i] * a[i];
   }
   dt = hits && same ? (c * radius + along) / (c * c - square) : rate < 0 ? radius / -rate : INFINITY;
-  at_floor |= dt < larger(shortest(r), TENFOLD * SHORTEST * larger(fabs(r->t), fabs(r->t - r->begun)));
+  at_floor |= dt < larger(shortest(r), TENFOLD * SHORTEST * time_scale(r));
   if (!hits && !at_floor) return;
   if (!(dt > 0 && dt < INFINITY)) {
     if (!(at_floor && (hits || fell))) return;
@@ -251,7 +242,7 @@ static void near_set(Run *r, int row, int fell) {
       }
       if (bend > REACHED * radius) return;
     }
-    if (bend <= radius) jump(r, field, smaller(dt, r->o.t_end - r->t));
+    if (bend <= radius) jump(r, field, smaller(dt, r->o.t_end - r->t - r->t_low));
   }
   active_surfaces(r, f, r->letter);
   if (r->status != RUNNING) return;

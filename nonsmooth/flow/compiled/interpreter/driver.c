@@ -255,19 +255,13 @@ static int advance(Run *r, const Expansion *e, double dt) {
   double *x = r->at_work;
   for (int i = 0; i < r->s->dimension; i++) x[i] = value_at(e->states + (int64_t)i * stride, r->order, dt);
   if (!finite_all(x, r->s->dimension)) { finish(r, NOT_FINITE, STATE, 0); return 0; }
-  if (r->o.dense) {
-    int64_t k = r->out.steps++;
-    r->out.start[k] = r->t;
-    r->out.step_mode[k] = shown_mode(r);
-    memcpy(r->out.coefficients + k * n * stride, e->states, sizeof(double) * n * stride);
-  }
+  note_step(r, e);
   if (r->times) sample_step(r, e, dt);
   memcpy(r->x, x, sizeof(double) * r->s->dimension);
-  r->t += dt;
+  pass_time(r, dt);
   r->since += dt;
   r->step_count++;
   r->segment_steps++;
-  if (r->s->timed) r->x[n - 1] = r->t;
   kept = kept_by(r, r->letter, r->involved);
   project(r, r->involved, kept);
   if (e->l.slides || r->s->sets) {
@@ -301,14 +295,14 @@ static void leave_singular(Run *r, Expansion *e, double left) {
 static void step(Run *r) {
   if (r->instant.running) { instant_next(r); return; }
   if (r->due_impact >= 0) { serve_between(r, r->due_impact); return; }
-  double left = r->o.t_end - r->t, dt = 0;
+  double left = r->o.t_end - r->t - r->t_low, dt = 0;
   if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
   if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
   Expansion *e = &r->e;
   expand(r, r->letter, r->x, r->unknowns, e);
   if (!e->finite) { leave_singular(r, e, left); return; }
   double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
-  if (h <= SHORTEST * larger(fabs(r->t), fabs(r->t - r->begun)) && h < left) {
+  if (h <= SHORTEST * time_scale(r) && h < left) {
     finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
     return;
   }
@@ -320,8 +314,9 @@ static void step(Run *r) {
   int last = h >= left;
   if (last) h = left;
   /* What happens at the end, to rounding, happens. */
-  int row = first_hit(r, e, last ? h + AT_END * larger(1, fabs(r->t + h)) : h, &dt);
-  dt = row < 0 ? h : smaller(dt, h);
+  double after = AT_END * larger(1, time_scale(r) + h);
+  int row = first_hit(r, e, last ? h + after : h, &dt);
+  dt = row >= 0 ? smaller(dt, h) : last ? h : to_number(r, h);
   double wanted = dt, safe = safe_length(r, e, by_series), good;
   while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
   int held = dt > STEADY * r->length && (dt > r->length / STEADY || dt > wanted / FAR);
@@ -329,7 +324,7 @@ static void step(Run *r) {
   r->shortened = larger(0, r->shortened + (shrinks ? 1 : -0.2));
   r->length_mode = r->mode;
   r->length = dt == wanted ? h : dt;
-  int swallowed = dt < wanted && dt <= SHORTEST * fabs(r->t); /* close to t = 0 steps may be tiny */
+  int swallowed = dt < wanted && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
   if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
   if (dt < wanted) {
     row = -1;
@@ -342,6 +337,7 @@ static void step(Run *r) {
   if (!advance(r, e, dt)) return;
   if (last) {
     r->t = r->o.t_end;
+    r->t_low = 0;
     if (r->s->timed) r->x[r->n - 1] = r->t;
     if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
   }

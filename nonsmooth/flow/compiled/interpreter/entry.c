@@ -56,6 +56,7 @@ static void clear(Run *r, const Options *o, double t) {
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
   r->t = r->begun = t;
+  r->t_low = 0;
   r->since = 0;
   for (int i = 0; i < r->m; i++) r->speed[i] = INFINITY;
   r->limit = r->at_t = NAN;

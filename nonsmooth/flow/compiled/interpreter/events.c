@@ -369,7 +369,7 @@ static void arrive(Run *r, const Expansion *e, double dt, int tied) {
   begin_instant(r, tied);
   for (int c = 0; c < u->clocks; c++) /* a tick is exact */
     if (i->passing[r->s->stops + u->clock_reset[c]]) {
-      r->t = tick_of(r, c);
+      r->t = tick_of(r, c, &r->t_low);
       r->x[u->clock_state[c]] = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
       if (r->s->timed) r->x[r->n - 1] = r->t;
       if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;

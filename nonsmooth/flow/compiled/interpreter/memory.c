@@ -155,7 +155,6 @@ static size_t place_run(Run *r, char *base) {
   r->of_defect = DOUBLES(g);
   r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
   r->key = LETTERS(w + 8 * s->rules.discrete);
-  r->root = DOUBLES(g);
   r->met_at = DOUBLES(g);
   return used;
 }

@@ -7,6 +7,24 @@ static void note(Run *r) {
   memcpy(r->out.point_x + k * r->n, r->x, sizeof(double) * r->n);
 }
 
+/* The mode in which a step is shown. */
+static int shown_mode(const Run *r) { return r->s->sets || r->s->rules.discrete ? r->shown : r->mode; }
+
+/* Write a step whose polynomials are in powers of the time since its start. Where that start is no number the
+ * polynomials are moved to the number that it is rounded to. */
+static void note_step(Run *r, const Expansion *e) {
+  if (!r->o.dense) return;
+  int64_t k = r->out.steps++, stride = r->stride;
+  double *c = r->out.coefficients + k * r->n * stride, low = r->t_low;
+  r->out.start[k] = r->t;
+  r->out.step_mode[k] = shown_mode(r);
+  memcpy(c, e->states, sizeof(double) * r->n * stride);
+  if (fabs(low) <= EPSILON * larger(1, fabs(r->t - r->begun))) return;
+  for (int i = 0; i < r->s->dimension; i++, c += stride)
+    for (int j = 0; j < r->order; j++)
+      for (int q = r->order - 1; q >= j; q--) c[q] -= low * c[q + 1];
+}
+
 static void renote(Run *r) {
   if (r->o.dense && r->out.points)
     memcpy(r->out.point_x + (r->out.points - 1) * r->n, r->x, sizeof(double) * r->n);
@@ -32,8 +50,8 @@ static void sample(Run *r, double t, const double *x) {
 /* Samples at the times from the present one to less than that plus dt. */
 static void sample_step(Run *r, const Expansion *e, double dt) {
   double *x = r->vector, ignored;
-  while (r->kept < r->room && r->times[r->kept] < r->t + dt) {
-    double s = r->times[r->kept] - r->t;
+  while (r->kept < r->room && r->times[r->kept] - r->t - r->t_low < dt) {
+    double s = r->times[r->kept] - r->t - r->t_low;
     for (int i = 0; i < r->s->dimension; i++) x[i] = horner(e->states + (int64_t)i * r->stride, r->order, s, &ignored);
     sample(r, r->times[r->kept], x);
   }
@@ -42,7 +60,7 @@ static void sample_step(Run *r, const Expansion *e, double dt) {
 static void count_hit(Run *r, int kind, int guard, int index, int side, const double *x) {
   const Options *o = &r->o;
   if (!(o->hit_kinds >> kind & 1) || !o->hit_named[guard * o->hit_width + index]) return;
-  if ((o->hit_side && side != o->hit_side) || r->t <= r->begun + AT_END * larger(1, fabs(r->begun))) return;
+  if ((o->hit_side && side != o->hit_side) || r->t - r->begun + r->t_low <= AT_END * larger(1, time_scale(r))) return;
   r->hits++;
   if (r->hits <= o->hit_skip || (r->hits - o->hit_skip) % o->hit_every) return;
   /* Before the jumps of the instant, or after them. */

@@ -120,7 +120,8 @@ typedef struct {
   Table *table;
   double *p;
   int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
-  double t, begun, since, limit, at_t, *x, *at_x, *unknowns;
+  /* The time is t + t_low: that of an event is no number of its own where times are large. */
+  double t, t_low, begun, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
   double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
   Layout now; /* of the present mode */
@@ -147,7 +148,7 @@ typedef struct {
   /* programs' values, inputs, error scales */
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
   double *atom_work, *choice_work;
-  double *root, *met_at; /* of each guard in the step: of its polynomial, and of itself; -1 if there is none */
+  double *met_at; /* root of each guard in the step, or -1 */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */

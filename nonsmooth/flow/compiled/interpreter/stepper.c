@@ -23,6 +23,26 @@ static double bound_at(double part, int order) {
   return part > 1e-300 ? rough_exp2(rough_log2(smaller(part, 1e300)) * (-1.0 / order)) : INFINITY;
 }
 
+/* Move the time on, in two numbers; it is kept to the rounding of the steps, not of their sum. */
+static void pass_time(Run *r, double dt) {
+  double sum = r->t + dt, moved = sum - r->t, lost = (r->t - (sum - moved)) + (dt - moved) + r->t_low;
+  r->t = sum + lost;
+  r->t_low = lost - (r->t - sum);
+  if (r->s->timed) r->x[r->n - 1] = r->t;
+}
+
+/* A step's length in a run that begins late, changed so little that the time after it is one number. */
+static double to_number(const Run *r, double dt) {
+  if (fabs(r->t) <= FAR * (r->o.t_end - r->begun)) return dt;
+  double to = (r->t + dt) - r->t - r->t_low;
+  return fabs(to - dt) <= RESOLVED * dt ? to : dt;
+}
+
+/* Rounding of times is relative to this: where they enter no formula, to how long the run is. */
+static double time_scale(const Run *r) {
+  return r->s->timed ? larger(fabs(r->t), fabs(r->t - r->begun)) : fabs(r->t - r->begun);
+}
+
 /* Shorten a step until a guard's series converges within it. */
 static double resolve(const double *g, int order, double h) {
   while (h < INFINITY) {
@@ -258,9 +278,13 @@ static int is_steep(const Run *r, const Expansion *e, int row, double dt) {
   return blur(e->guards + (int64_t)row * r->stride, r->order, dt) > 0;
 }
 
-static double tick_of(const Run *r, int c) {
+/* The time of a clock's next tick, in two numbers: its ticks are counted. */
+static double tick_of(const Run *r, int c, double *low) {
   double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
-  return r->instant.tick[c] + r->instant.count[c] * period;
+  double first = r->instant.tick[c], count = (double)r->instant.count[c], since = count * period;
+  double sum = first + since, moved = sum - first;
+  *low = (first - (sum - moved)) + (since - moved) + fma(count, period, -since);
+  return sum;
 }
 
 /* The root of a guard's polynomial improved on the guard itself along the motion; as it is where its slope is
@@ -355,7 +379,7 @@ static double atom_root(Run *r, Expansion *e, int atom, double h) {
   int row = e->l.atoms + atom, side = r->instant.side[atom], clock = clock_of(r, atom);
   const double *g = e->guards + (int64_t)row * r->stride;
   if (clock >= 0) {
-    double left = larger(tick_of(r, clock) - r->t, 0);
+    double low, tick = tick_of(r, clock, &low), left = larger(tick - r->t - r->t_low + low, 0);
     return left <= h ? left : -1;
   }
   if (!side || r->s->rules.way[atom] == UNWATCHED) return -1;
@@ -369,7 +393,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   int first = -1, found = 0, rows = e->l.rows;
   if (r->repelling) turn_exits(r, e);
   for (int j = 0; j < rows; j++) {
-    time[j] = r->root[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);
+    time[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);
     if (time[j] < 0) continue;
     found++;
     if (first < 0 || time[j] < time[first]) first = j;
@@ -381,7 +405,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
   /* Guards whose times cannot be told apart: atoms are passed together, at the first time; others one by one. */
   int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;
-  double near = time[first] + TIE * larger(fabs(r->t), 1)
+  double near = time[first] + TIE * larger(time_scale(r), 1)
                 + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
   for (int j = 0; j < rows && (found > 1 || passed_atoms); j++) {
     if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;

@@ -142,8 +142,8 @@ def _core(run: int, random: int) -> _Core:
 
 def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
     """Return what runs a system's trajectories in step at the options' tolerance, or None where they
-    cannot be: several surfaces, resets, a start's mode that is asked for."""
-    if options.start_mode is not None or options.rest_below is not None:
+    cannot be: several surfaces, resets, a start's mode that is asked for, times that one number rounds."""
+    if options.start_mode is not None or options.rest_below is not None or options.begins_late:
         return None
     if not (supports_set_lanes(coupled_of(system)) if system.sets else supports_lanes(system)):
         return None

@@ -411,6 +411,8 @@ typedef struct {
   T c[N][P + 1], g[S1][P + 1], allowed[N], of_guards[S1], by_series, h, left;
   T dt, slope; /* to the first event, or the step's end, and how fast the event's guard falls */
   I unclear, last, slot;
+  T t, since; /* of the lanes at its start */
+  I drop, slides, above;
   Guards v;
 } Step;
 
@@ -562,9 +564,10 @@ INLINE void advance(Lanes *s, const T *x, T dt) {
 }
 
 #if ROWS + GUARDS > 0
-/* Lanes where field and guards at a time of the step are not those of the polynomials. */
+/* Lanes where field and guards at a time of the step are not those of the polynomials. A surface or a stop that is
+ * ``met`` there has to be zero to the tolerance of a step: else its root is improved by the driver. */
 INLINE I disagrees(const Lanes *s, T c[N][P + 1], T g[S1][P + 1], const T *x, const T *allowed,
-                   const T *of_guards, T at, T dt, int degree) {
+                   const T *of_guards, T at, T dt, int degree, I met, I *missed) {
   T f[ROWS + 1], guard[GUARDS + 1];
   I wrong = {0};
   check_values(x, s->q, s->slides, s->above, s->lambda, f, guard);
@@ -580,6 +583,8 @@ INLINE I disagrees(const Lanes *s, T c[N][P + 1], T g[S1][P + 1], const T *x, co
     UNROLL for (int k = degree - 1; k >= 0; k--) v = v * at + g[j][k];
     I counts = M > 0 && j == 1 ? s->slides : ~NONE;
     wrong |= counts & ~(I)(ABS(guard[m] - v) <= WRONG * of_guards[j]);
+    I height = j >= FIRST_STOP ? ~NONE : j == 0 ? ~s->slides : NONE;
+    *missed |= height & (met == j + 1) & ~(I)(ABS(guard[m]) <= of_guards[j]);
   }
   return wrong;
 }
@@ -587,21 +592,22 @@ INLINE I disagrees(const Lanes *s, T c[N][P + 1], T g[S1][P + 1], const T *x, co
 
 /* Lanes whose step is not clear: it would be held back, or its defect is too large. */
 INLINE I unchecked(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], const T *allowed,
-                   const T *of_guards, T by_series, T dt, const T *end) {
+                   const T *of_guards, T by_series, T dt, const T *end, I met) {
   I wrong = {0};
 #if ROWS + GUARDS > 0
-  I same = s->length > 0;
+  I same = s->length > 0, missed = {0};
   wrong |= same & (I)(by_series > GROWTH * s->length);
   UNROLL for (int i = 0; i < N; i++)
     wrong |= ~same & (I)(by_series * ABS(c[i][1]) > FAR * (ABS(c[i][0]) + s->size));
   for (int k = 1; k <= CHECKS; k++) {
     T x[N], at = dt * ((double)k / (CHECKS + 1));
     state_at(x, c, at, INNER);
-    wrong |= disagrees(s, c, g, x, allowed, of_guards, at, dt, INNER);
+    wrong |= disagrees(s, c, g, x, allowed, of_guards, at, dt, INNER, NONE, &missed);
   }
-  wrong |= disagrees(s, c, g, end, allowed, of_guards, dt, dt, P);
+  wrong |= disagrees(s, c, g, end, allowed, of_guards, dt, dt, P, met, &missed);
   wrong &= ~((s->slides & -AFFINE_MODES[2]) | (~s->slides & s->above & -AFFINE_MODES[0])
              | (~s->slides & ~s->above & -AFFINE_MODES[1]));
+  wrong |= missed;
 #endif
   return wrong;
 }
@@ -647,64 +653,34 @@ INLINE void sort_step(Lanes *s, Step *e) {
   if (any(hard)) e->unclear |= resolve(&e->v);
 }
 
-/* Roots on a surface and on stops that are not affine are improved on these functions, as in the driver; the lanes
- * are returned where one of Newton's steps is not enough. */
-INLINE I polish_times(const Lanes *s, Step *e, I slot, T *dt, T *end) {
-  I curved = NONE;
-  T value = BC(0), slope = BC(0);
-#if M > 0
-  if (CURVED && any(curved = s->live & (slot == 1) & ~s->slides)) {
-    T h, gradient[N];
-    surface_values(end, s->q, s->slides, s->above, s->lambda, &h, gradient);
-    value = SELECT(curved, s->lambda * h, value);
-  }
-#endif
-#if STOPS > 0
-  I here = NONE;
-  for (int j = 0; j < STOPS; j++) if (!AFFINE[FIRST_STOP + j]) here |= s->live & (slot == FIRST_STOP + j + 1);
-  if (any(here)) {
-    T stop[STOPS], gradient[STOPS][N];
-    stop_values(end, s->q, s->slides, s->above, s->lambda, stop, &gradient[0][0]);
-    for (int j = 0; j < STOPS; j++) value = SELECT(here & (slot == FIRST_STOP + j + 1), stop[j], value);
-    curved |= here;
-  }
-#endif
-  if (!any(curved)) return NONE;
-  UNROLL for (int j = 0; j < SLOTS; j++) {
-    T d = BC(0);
-    UNROLL for (int k = P; k >= 1; k--) d = d * *dt + (double)k * e->g[j][k];
-    slope = SELECT(slot == j + 1, d, slope);
-  }
-  T change = value / slope;
-  *dt = SELECT(curved, *dt - change, *dt);
-  state_at(end, e->c, *dt, P);
-  return curved & ~(I)(ABS(change) <= CLOSE * *dt);
-}
-
 /* What a step may have changed in the lanes ``which`` is again as at its start. */
-INLINE void undo_step(Lanes *s, const Step *e, T t, T since, I drop, I slides, I above, I which) {
+SELDOM void undo_step(Lanes *s, const Step *e, I which) {
   UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(which, e->c[i][0], s->x[i]);
-  s->t = SELECT(which, t, s->t);
-  s->since = SELECT(which, since, s->since);
+  s->t = SELECT(which, e->t, s->t);
+  s->since = SELECT(which, e->since, s->since);
   s->steps += which;
-  s->drop = (s->drop & ~which) | (drop & which);
-  s->slides = (s->slides & ~which) | (slides & which);
-  s->above = (s->above & ~which) | (above & which);
+  s->drop = (s->drop & ~which) | (e->drop & which);
+  s->slides = (s->slides & ~which) | (e->slides & which);
+  s->above = (s->above & ~which) | (e->above & which);
   set_lambda(s);
 }
 
 /* Take the step where it is clear; the lanes are returned where it is not. */
 INLINE I take_step(Lanes *s, Work *w, Step *e) {
   const Options *o = limits(w);
-  T left = e->left, dt = e->dt, t = s->t, since = s->since;
+  T left = e->left, dt = e->dt;
   I last = e->last & (e->h >= left), unclear = e->unclear | by_chance(s, w), slot = e->slot;
   dt = MIN(dt, SELECT(last, left, dt));
   unclear |= last & (dt == left) & (slot != 0) & (slot <= FIRST_STOP); /* a mode without a step */
   T h = MIN(e->h, left), end[N];
   state_at(end, e->c, dt, P);
-  unclear |= polish_times(s, e, slot, &dt, end) | (I)(dt > left);
-  unclear |= unchecked(s, o, e->c, e->g, e->allowed, e->of_guards, e->by_series, dt, end);
-  I drop = s->drop, slides = s->slides, above = s->above;
+  unclear |= unchecked(s, o, e->c, e->g, e->allowed, e->of_guards, e->by_series, dt, end, slot);
+  I slides = s->slides;
+  e->t = s->t;
+  e->since = s->since;
+  e->drop = s->drop;
+  e->slides = slides;
+  e->above = s->above;
   advance(s, end, dt);
   I live = s->live & ~unclear, met = {0}, up = {0}, down = {0}, stopped = {0};
   T length = ROWS + GUARDS > 0 ? SELECT(live, h, s->length) : s->length;
@@ -723,7 +699,7 @@ INLINE I take_step(Lanes *s, Work *w, Step *e) {
   length = SELECT((met | up | down) & ~unclear, BC(0), length);
 #endif
   unclear &= s->live;
-  if (any(unclear)) undo_step(s, e, t, since, drop, slides, above, unclear);
+  if (any(unclear)) undo_step(s, e, unclear);
   live &= ~unclear;
   s->length = SELECT(live, length, s->length);
 #if STOPS > 0

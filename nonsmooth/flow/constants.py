@@ -58,6 +58,32 @@ NEAR = 1e-13
 POLISHED = 3
 CLOSE = 1e-8
 
+#: A root is steep where rounding moves it by less than this part of its time.
+STEEP = 1e-9
+#: Lanes decide an exit where its guard falls at more than this part of the rates' scale.
+STEEP_EXIT = 1e-10
+
+#: Iterations are over where they change a value of order 1 by this much; multipliers by that.
+SOLVED = 4e-16
+IMPROVED = 1e-16
+
+#: Matrices are symmetric, and multiples of the identity, to this part of their entries; the squared
+#: rest of a gradient below DEPENDENT of its square depends on others.
+SYMMETRIC = 1e-12
+DEPENDENT = 1e-24
+
+#: A multiplier's bound in an impact, and the time of a slip: parts that they may be off by.
+ROOM = 1e-9
+SLIP_ROOT = 1e-6
+
+#: Numbers beyond these are no sizes any more; of a quotient with such a value and divisor nothing is left.
+SMALLEST, LARGEST = 1e-300, 1e300
+TINY = sys.float_info.min
+TINY_VALUE, HUGE_DIVISOR = 1e-100, 1e150
+
+#: Shortest step of a flow of known duration, relative to it.
+FIXED_SHORTEST = 1e-14
+
 #: Rounding of a polynomial's value, relative to the sum of the magnitudes of its terms.
 ROUNDING = 4 * EPSILON
 

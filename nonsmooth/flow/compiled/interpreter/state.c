@@ -4,7 +4,6 @@
  * events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
  */
 
-#define TINY 2.2250738585072014e-308
 
 /* Entries of a sparse matrix in the order of a program's outputs. */
 typedef struct { int32_t count, pad; const int32_t *row, *column; } Entries;

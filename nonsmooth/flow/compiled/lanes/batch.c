@@ -196,7 +196,7 @@ INLINE I by_chance(const Lanes *s, const Work *w) {
   return which;
 }
 
-typedef struct { Lanes lanes[GROUPS]; Step steps[GROUPS]; Work work; int begun; } Many;
+typedef struct { Lanes lanes[GROUPS]; Step steps[GROUPS]; Past past[GROUPS][W]; Work work; int begun; } Many;
 
 int64_t many_size(void) { return sizeof(Many); }
 
@@ -222,6 +222,7 @@ static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree, 
   prepare(b->p, q);
   for (int i = 0; i < GROUPS; i++) {
     many->lanes[i].size = o->atol / o->rtol;
+    many->lanes[i].past = many->past[i];
     for (int k = 0; k < NQ; k++) many->lanes[i].q[k] = BC(q[k]);
   }
   many->begun = 1;

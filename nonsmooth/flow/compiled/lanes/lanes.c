@@ -34,7 +34,7 @@ typedef struct {
   int64_t index[W];
   int32_t base[W];
 #if RARE_CASES_HERE
-  Past past[W];
+  Past *past; /* of each lane */
 #else
   T shortest;
   I shrinking;
@@ -189,8 +189,8 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T *
     *sum += SELECT(counts, p + b, BC(0));
     *last = MAX(*last, SELECT(counts, p, BC(0)));
     *before = MAX(*before, SELECT(counts, b, BC(0)));
-    I zero = (g[j][P] == 0) | (g[j][P - 1] == 0), ahead = (g[j][P - 2] != 0) | (g[j][P - 3] != 0);
-    *vanish |= counts & zero & ahead;
+    I zero = counts & (MIN(p, b) == 0);
+    if (any(zero)) *vanish |= zero & ((g[j][P - 2] != 0) | (g[j][P - 3] != 0));
   }
 }
 
@@ -457,7 +457,7 @@ static double block(const Past *p, int64_t back, int lag) {
 }
 
 /* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
-static int may_accumulate(const Past *p) {
+SELDOM int may_accumulate(const Past *p) {
   for (int l = 0; l < LAG_COUNT; l++) {
     int lag = LAGS[l];
     if (p->count < (BLOCKS + 1) * lag) return 0;
@@ -483,7 +483,7 @@ SELDOM I remember(Lanes *s, I which, I kind, I guard) {
   I pattern = (kind << 40) + (guard << 32);
   for EACH(l, which) {
     Past *p = &s->past[l];
-    p->event[p->count++ % HISTORY] = (Recent){LANE(s->since, l), LANE_I(pattern, l)};
+    p->event[(uint32_t)p->count++ % HISTORY] = (Recent){LANE(s->since, l), LANE_I(pattern, l)};
     if (p->count > BLOCKS && may_accumulate(p)) {
       LANE_I(unclear, l) = -1;
       p->count--;
@@ -516,7 +516,7 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   T value[2], scale[2];
   lie(s, value, scale);
   I ends = up | down, was = s->slides, unclear = {0};
-  I steep = slope < -1e-10 * MAX(scale[0], scale[1]);
+  I steep = slope < -STEEP_EXIT * MAX(scale[0], scale[1]);
   double clear = CANCELLED ? VANISHES : 2 * (limits(w)->rtol + TANGENT); /* not an exit at a two-fold */
   I attracts = (up & (I)(value[1] > clear * scale[1])) | (down & (I)(value[0] < -clear * scale[0]));
   unclear |= ends & ~(steep & attracts);

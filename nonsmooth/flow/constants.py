@@ -230,6 +230,7 @@ REASONS = (
     "no_stable_motion",
     "possibly_several",
     "stability_lost",
+    "undetermined_rates",
     "start_solutions",
     "impossible_start",
     "several_directions",

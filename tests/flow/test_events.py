@@ -214,6 +214,8 @@ def test_start_excludes_a_state():
         ns.simulate(thermostat(), [20.0, 0], 2.0, start=run)
     with pytest.raises(ns.OptionError, match="start is"):
         ns.simulate(thermostat(), start=3, t_end=2.0)
+    with pytest.raises(ns.OptionError, match="another section"):
+        ns.simulate(thermostat(), start=run, t_end=2.0, at=x - 20)
     with pytest.raises(ns.OptionError, match="x0 is missing"):
         ns.simulate(thermostat(), t_end=2.0)
 

@@ -58,6 +58,32 @@ NEAR = 1e-13
 POLISHED = 3
 CLOSE = 1e-8
 
+#: A root is steep where rounding moves it by less than this part of its time.
+STEEP = 1e-9
+#: Lanes decide an exit where its guard falls at more than this part of the rates' scale.
+STEEP_EXIT = 1e-10
+
+#: Iterations are over where they change a value of order 1 by this much; multipliers by that.
+SOLVED = 4e-16
+IMPROVED = 1e-16
+
+#: Matrices are symmetric, and multiples of the identity, to this part of their entries; the squared
+#: rest of a gradient below DEPENDENT of its square depends on others.
+SYMMETRIC = 1e-12
+DEPENDENT = 1e-24
+
+#: A multiplier's bound in an impact, and the time of a slip: parts that they may be off by.
+ROOM = 1e-9
+SLIP_ROOT = 1e-6
+
+#: Numbers beyond these are no sizes any more; of a quotient with such a value and divisor nothing is left.
+SMALLEST, LARGEST = 1e-300, 1e300
+TINY = sys.float_info.min
+TINY_VALUE, HUGE_DIVISOR = 1e-100, 1e150
+
+#: Shortest step of a flow of known duration, relative to it.
+FIXED_SHORTEST = 1e-14
+
 #: Rounding of a polynomial's value, relative to the sum of the magnitudes of its terms.
 ROUNDING = 4 * EPSILON
 
@@ -121,11 +147,12 @@ OVERFLOW = 1e280
 #: Motions that can continue from a point, at most so many are kept.
 SEVERAL = 16
 # Unknowns that enter nonlinearly. Roots of a rate along a multiplier: coefficients below this part of all terms
-# vanish, the pieces of the way are counted, and its ends are a little beyond the bounds. Solutions of several
+# vanish, the pieces of the way are counted and at most so long, and its ends are a little beyond the bounds. Of several
 # multipliers: how far two are apart, halvings of each side before Newton's method, its steps, and a grid of
 # starts where functions are not linear in each multiplier.
 LAYER_ROUNDING = 1e-13
 LAYER_PIECES = 4000
+LAYER_LONGEST = 0.25
 LAYER_BEYOND = 1e-9
 LAYER_APART = 1e-7
 LAYER_RESIDUAL = 1e-10
@@ -148,6 +175,12 @@ HUGE = 1e300
 
 #: A fold of sliding is looked for where the slope would vanish within this many steps.
 FOLD_AHEAD = 10.0
+
+#: A fold is served at a root of the slope's series where it is this close, relative to the time.
+FOLD_NEAR = 1e-11
+
+#: Multipliers that are this close to those at a fold are the solution that ended there.
+FOLD_APART = 1e-5
 
 #: What a run notes about its decisions, as bits.
 DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
@@ -204,6 +237,7 @@ REASONS = (
     "no_stable_motion",
     "possibly_several",
     "stability_lost",
+    "undetermined_rates",
     "start_solutions",
     "impossible_start",
     "several_directions",

@@ -146,7 +146,7 @@ static double newton(const double *c, int n, double lo, double hi, double x) {
     double d, f = horner(c, n, x, &d);
     if (f > 0) lo = x; else hi = x;
     double step = d != 0 ? f / d : INFINITY, next = x - step;
-    if (fabs(step) <= 4e-16 * larger(fabs(x), hi)) return next < lo ? lo : next > hi ? hi : next;
+    if (fabs(step) <= SOLVED * larger(fabs(x), hi)) return next < lo ? lo : next > hi ? hi : next;
     if (!(next > lo && next < hi)) {
       next = 0.5 * (lo + hi);
       if (!(next > lo && next < hi)) return hi;
@@ -231,7 +231,7 @@ static inline int stays_positive(const double *c, int n, double h) {
 static double first_root(const double *c, int n, double h) {
   if (c[0] <= 0) return 0;
   double a[P + 1], power = 1, rest = rest_of(c, n, h);
-  if (c[0] > rest || (rest < 1e300 && stays_positive(c, n, h))) return -1;
+  if (c[0] > rest || (rest < LARGEST && stays_positive(c, n, h))) return -1;
   /* More halvings than there are would be needed, or an overflow. */
   if (!(rest < ldexp(c[0], DEPTH))) h = smaller(h, largest_root(c, n));
   a[0] = c[0];

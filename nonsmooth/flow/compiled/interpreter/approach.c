@@ -137,7 +137,7 @@ static int leaving_direction(const double *a, const double *m, int stride, int k
     double n = length_of(d, k), slope = 0;
     for (int i = 0; i < k; i++) slope += d[i] * w[i];
     s += (n - 1) * n * n / slope;
-    if (!(fabs(n - 1) > 4e-16)) break;
+    if (!(fabs(n - 1) > SOLVED)) break;
   }
   if (!solve_block(m, stride, k, s, a, d)) return 0;
   unit_of(d, k, u);
@@ -173,7 +173,7 @@ static int is_met(Run *r, const int8_t *letter, int set, const double *h, const 
   int32_t own[3];
   double a[3], m[9], scale = 0, radius = length_of(h + f, k), speed = 0;
   for (int i = 0; i < k; i++) { own[i] = f + i; scale = larger(scales_of[f + i], scale); }
-  if (!(radius > 0) || radius <= VANISHES * scale || radius > 1e-8 * scale) return !(radius > VANISHES * scale);
+  if (!(radius > 0) || radius <= VANISHES * scale || radius > CLOSE * scale) return !(radius > VANISHES * scale);
   if (!freeze(r, letter, r->x, r->unknowns, own, k, a, m)) return 0;
   for (int i = 0; i < k * k; i++) speed += m[i] * m[i];
   return radius < shortest(r) * (length_of(a, k) + sqrt(speed));
@@ -203,7 +203,7 @@ static void near_set(Run *r, int row, int fell) {
   for (int i = 0; i < k; i++) {
     double g = a[i];
     for (int j = 0; j < k; j++) {
-      same &= fabs(m[i * k + j] - (i == j ? c : 0)) <= 1e-12 * c;
+      same &= fabs(m[i * k + j] - (i == j ? c : 0)) <= SYMMETRIC * c;
       g -= m[i * k + j] * u[j];
     }
     rate += u[i] * g;
@@ -281,7 +281,7 @@ static void after_step(Run *r) {
 
 /* Multipliers of sets at h = 0 together; 0 where M is not symmetric and positive definite. */
 static int bounded_multipliers(Run *r, const double *a, const double *m, int n, const int *first, int sets, double *lam) {
-  if (!definite(r, m, n) || !symmetric(m, n, 1e-12)) return 0;
+  if (!definite(r, m, n) || !symmetric(m, n, SYMMETRIC)) return 0;
   for (int i = 0; i < n; i++) lam[i] = 0;
   for (int again = 0; again < 2000; again++) {
     double change = 0;
@@ -526,6 +526,6 @@ static void look_at_sets(Run *r) {
     const double *h = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
     double scale = 0, radius = length_of(r->letter[f] == LEFT_BEHIND ? r->unknowns + f : h + f, k);
     for (int i = f; i < f + k; i++) scale = larger(scales_of[i], scale);
-    if (radius <= 1e-8 * scale) { near_set(r, row, 0); return; }
+    if (radius <= CLOSE * scale) { near_set(r, row, 0); return; }
   }
 }

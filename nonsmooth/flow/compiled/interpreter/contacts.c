@@ -41,7 +41,7 @@ static int impulses_fit(Run *r, const double *x, const int32_t *involved, int co
   for (int i = 0; i < m; i++) limit[i] = fabs(factor_of(r, i));
   for (int i = 0; i < takes; i++) if (!plastic && every[m + taking[i]] < 0) return 0;
   for (int i = 0; i < stuck; i++)
-    if (!plastic && fabs(every[unknown[i]]) > limit[unknown[i]] * (1 + 1e-9) + 1e-300) return 0;
+    if (!plastic && fabs(every[unknown[i]]) > limit[unknown[i]] * (1 + ROOM) + SMALLEST) return 0;
   for (int i = 0; i < carries; i++) {
     int own = carried[i];
     if (letter[own] && letter[own] * h[own] < -ON_SURFACE * scale[own]) return 0;

@@ -86,7 +86,7 @@ static double flow_step(const Flow *w) {
     const double *own = w->watched + (int64_t)j * (order + 1);
     h = smaller(scaled_step(w, fabs(own[0]), fabs(own[1]), fabs(own[order - 1]), fabs(own[order])), h);
   }
-  if (!(h > 1e-14 * w->whole)) return 0;
+  if (!(h > FIXED_SHORTEST * w->whole)) return 0;
   /* Two equal steps rather than a long one and the rest of it. */
   if (h >= w->left) return w->left;
   return w->left < 1.5 * h ? smaller(h, 0.5 * w->left) : h;

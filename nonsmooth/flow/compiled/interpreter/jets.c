@@ -226,7 +226,7 @@ static int improve(Run *r, const Layout *l, const double *x, double *unknowns, i
       largest = larger(fabs(b[i]), largest);
     }
     for (int i = 0; i < w; i++) most = larger(fabs(unknowns[i]), most);
-    if (largest <= 1e-16 * (1 + most)) break;
+    if (largest <= IMPROVED * (1 + most)) break;
   }
   return 1;
 }

@@ -241,7 +241,7 @@ static int symmetrised(const double *a, int n, double *d, double *result, int *p
   for (int i = 0; i < n; i++)
     for (int j = 0; j < i; j++) {
       double one = result[i * n + j], other = result[j * n + i];
-      if (fabs(one - other) > 1e-12 * largest) return 0;
+      if (fabs(one - other) > SYMMETRIC * largest) return 0;
       result[i * n + j] = result[j * n + i] = (one + other) / 2;
     }
   return 1;

@@ -61,6 +61,7 @@ static size_t place_instant(Instant *i, char *base, size_t used, const System *s
   i->value = DOUBLES(atoms);
   i->noise = DOUBLES(atoms);
   i->residual = DOUBLES(atoms);
+  i->germ = DOUBLES(GERM * atoms);
   i->trigger_x = DOUBLES(s->rules.keeps ? (size_t)triggers * s->n : 0);
   i->arrived = DOUBLES(s->n);
   i->tick = DOUBLES(clocks);

@@ -166,7 +166,7 @@ static inline double ratio(double a, double b) { return a == 0 && b == 0 ? NAN :
 /* A later coefficient of a quotient: nothing is left of one that is no number because the divisor's overflow,
  * as in 1/(1 + exp(1000)). */
 static inline double settled(double coefficient, double value, double divisor) {
-  return isfinite(coefficient) || !(fabs(value) < 1e-100 && fabs(divisor) > 1e150) ? coefficient : 0;
+  return isfinite(coefficient) || !(fabs(value) < TINY_VALUE && fabs(divisor) > HUGE_DIVISOR) ? coefficient : 0;
 }
 
 static double power_coefficient(const double *u, const double *w, double exponent, int k) {

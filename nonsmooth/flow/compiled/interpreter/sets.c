@@ -312,7 +312,7 @@ static double slip_root(const Run *r, const Expansion *e, int row, double dt, do
     if (!(slope < 0)) return dt;
     root = smaller(larger(root - (fabs(n) - length) / slope, 0), h);
   }
-  return fabs(root - dt) <= 1e-6 * h ? root : dt;
+  return fabs(root - dt) <= SLIP_ROOT * h ? root : dt;
 }
 
 /* Friction's limit at the start of a step on a set. */

@@ -4,7 +4,6 @@
  * events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
  */
 
-#define TINY 2.2250738585072014e-308
 
 /* Entries of a sparse matrix in the order of a program's outputs. */
 typedef struct { int32_t count, pad; const int32_t *row, *column; } Entries;
@@ -49,13 +48,15 @@ typedef struct {
   Rules rules;
 } System;
 
+enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
+
 /* What happens at one time (events.c). Of atoms: sides, as the jumps have made them, as evaluated now; those that are
  * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before. */
 typedef struct {
   int32_t running, first, settled, unsettled, last, tied, is_last;
   int64_t jumps, counted, sampled, *count;
   int8_t *side, *view, *now, *passing, *zero, *pending, *was;
-  double *value, *noise, *residual, *trigger_x, *arrived, *tick;
+  double *value, *noise, *residual, *germ, *trigger_x, *arrived, *tick; /* germ: first coefficients on arrival */
 } Instant;
 
 /* The guards of a mode, and what slides in it. */
@@ -125,7 +126,7 @@ typedef struct {
   Layout now; /* of the present mode */
   Met met;
   Instant instant;
-  int32_t mode, status, reason, where, due_impact, falls, repelling, *drop;
+  int32_t mode, status, reason, where, due_impact, falls, repelling, folded, *drop;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];

@@ -20,7 +20,7 @@ static inline double rough_exp2(double a) {
 
 /* The longest step for a term of an order, given as part of what is allowed at length 1. */
 static double bound_at(double part, int order) {
-  return part > 1e-300 ? rough_exp2(rough_log2(smaller(part, 1e300)) * (-1.0 / order)) : INFINITY;
+  return part > SMALLEST ? rough_exp2(rough_log2(smaller(part, LARGEST)) * (-1.0 / order)) : INFINITY;
 }
 
 /* Move the time on, in two numbers; it is kept to the rounding of the steps, not of their sum. */
@@ -270,7 +270,7 @@ static double blur(const double *c, int order, double dt) {
   double slope, noise = ROOT_ROUNDING * (fabs(c[0]) + rest_of(c, order, dt));
   horner(c, order, dt, &slope);
   slope = fabs(slope);
-  return noise < 1e-9 * dt * slope ? noise / slope : 0;
+  return noise < STEEP * dt * slope ? noise / slope : 0;
 }
 
 /* Whether a guard passes its root with a slope that is no rounding. */

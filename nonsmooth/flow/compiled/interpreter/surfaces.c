@@ -49,7 +49,7 @@ static void project_to(Run *r, const int32_t *which, int count, const double *le
       }
       size[i] = 0;
       for (int l = 0; l < nd; l++) size[i] += row[l] * row[l];
-      if (size[i] > 1e-24 * full) kept[k++] = i;
+      if (size[i] > DEPENDENT * full) kept[k++] = i;
     }
     for (int j = 0; j < k; j++) {
       const double *row = rows + (int64_t)kept[j] * r->n;

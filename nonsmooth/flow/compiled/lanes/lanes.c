@@ -516,7 +516,7 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   T value[2], scale[2];
   lie(s, value, scale);
   I ends = up | down, was = s->slides, unclear = {0};
-  I steep = slope < -1e-10 * MAX(scale[0], scale[1]);
+  I steep = slope < -STEEP_EXIT * MAX(scale[0], scale[1]);
   double clear = CANCELLED ? VANISHES : 2 * (limits(w)->rtol + TANGENT); /* not an exit at a two-fold */
   I attracts = (up & (I)(value[1] > clear * scale[1])) | (down & (I)(value[0] < -clear * scale[0]));
   unclear |= ends & ~(steep & attracts);

@@ -48,6 +48,16 @@ BEFORE_EVENT = 0.99
 #: Events closer than this, relative to the time, and than the rounding of their roots, are simultaneous.
 TIE = 8 * EPSILON
 
+#: Close to a surface on which a field has a root the root changes the rate of h by this part, or it is all but
+#: this part of it.
+ROOT_SHARE = 1e-3
+
+#: Close to rest on a surface with a root steps are shorter than flights by the inverse of this, and below rounding.
+ROOT_REST = 1e-7
+
+#: Part of the time in which the states change by their size over which a rate is differenced.
+REACH = 1e-6
+
 #: An event this much after the end of a run, relative to the time, is at its end.
 AT_END = 64 * EPSILON
 

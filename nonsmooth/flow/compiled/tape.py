@@ -213,7 +213,7 @@ class _System(ctypes.Structure):
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets")],
         *[(name, _POINTER) for name in ("mixed", "set_first", "set_size", "set_of", "layer_width")],
-        *[(name, _POINTER) for name in ("degree", "lower_first", "early", "early_free")],
+        *[(name, _POINTER) for name in ("degree", "lower_first", "power", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
     ]
@@ -354,6 +354,7 @@ class TapeEngine:
             "early_free": tape.free.early,
         }
         made.sets = len(system.sets)
+        made.power = self._at(np.array([*coupled.powers, 0.0]))
         made.layer_width = self._at(np.array([*system.layer_widths, 0.0]))
         made.early_count, made.early_free_count = len(tape.series.early), len(tape.free.early)
         for name, values in tables.items():

@@ -277,6 +277,7 @@ static int advance(Run *r, const Expansion *e, double dt) {
 }
 
 static int ends_at_singular(Run *r);
+static int pass_root(Run *r, double left);
 
 /* Leave a point where only low derivatives exist; guards are looked at after the step. */
 static void leave_singular(Run *r, Expansion *e, double left) {
@@ -298,6 +299,7 @@ static void step(Run *r) {
   double left = r->o.t_end - r->t - r->t_low, dt = 0;
   if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
   if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
+  if (r->has_roots && pass_root(r, left)) return;
   Expansion *e = &r->e;
   expand(r, r->letter, r->x, r->unknowns, e);
   if (!e->finite) { leave_singular(r, e, left); return; }

@@ -109,6 +109,7 @@ static size_t place_run(Run *r, char *base) {
   r->before = DOUBLES(n);
   r->saved = DOUBLES(n);
   r->speed = DOUBLES(w);
+  r->at_root = DOUBLES(3 * n);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
   r->tried = DOUBLES(w);

@@ -2,7 +2,7 @@
 
 /* Whether lanes can go on from here: nothing is to be served, and only the first guard has known zeros. */
 static int is_plain(const Run *r) {
-  if (r->instant.running || r->due_impact >= 0 || r->t >= r->o.t_end) return 0;
+  if (r->instant.running || r->due_impact >= 0) return 0;
   for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m ? 0 : 2)) return 0;
   for (int j = 0; j < r->s->stops; j++) if (!r->instant.side[j]) return 0;
   return 1;

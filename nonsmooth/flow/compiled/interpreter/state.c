@@ -43,6 +43,7 @@ typedef struct {
   const double *layer_width; /* of the surfaces */
   /* Of each surface the derivative of h that its multiplier enters; where those between are among what is kept. */
   const int32_t *degree, *lower_first;
+  const double *power; /* of each surface the smallest power of its function in the field, or 0 */
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
   int32_t early_count, early_free_count;
   Rules rules;
@@ -152,9 +153,9 @@ typedef struct {
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
-  double *saved, *speed; /* a state to return to; of each surface at its last zero */
+  double *saved, *speed, *at_root; /* a state to return to; of each surface at its last zero */
   int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
-  int32_t shown;
+  int32_t shown, has_roots;
   const Expansion *expansion;
   void *arena;
 } Run;

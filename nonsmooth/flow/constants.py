@@ -48,6 +48,16 @@ BEFORE_EVENT = 0.99
 #: Events closer than this, relative to the time, and than the rounding of their roots, are simultaneous.
 TIE = 8 * EPSILON
 
+#: Close to a surface on which a field has a root the root changes the rate of h by this part, or it is all but
+#: this part of it.
+ROOT_SHARE = 1e-3
+
+#: Close to rest on a surface with a root steps are shorter than flights by the inverse of this, and below rounding.
+ROOT_REST = 1e-7
+
+#: Part of the time in which the states change by their size over which a rate is differenced.
+REACH = 1e-6
+
 #: An event this much after the end of a run, relative to the time, is at its end.
 AT_END = 64 * EPSILON
 
@@ -147,11 +157,12 @@ OVERFLOW = 1e280
 #: Motions that can continue from a point, at most so many are kept.
 SEVERAL = 16
 # Unknowns that enter nonlinearly. Roots of a rate along a multiplier: coefficients below this part of all terms
-# vanish, the pieces of the way are counted, and its ends are a little beyond the bounds. Solutions of several
+# vanish, the pieces of the way are counted and at most so long, and its ends are a little beyond the bounds. Of several
 # multipliers: how far two are apart, halvings of each side before Newton's method, its steps, and a grid of
 # starts where functions are not linear in each multiplier.
 LAYER_ROUNDING = 1e-13
 LAYER_PIECES = 4000
+LAYER_LONGEST = 0.25
 LAYER_BEYOND = 1e-9
 LAYER_APART = 1e-7
 LAYER_RESIDUAL = 1e-10
@@ -174,6 +185,12 @@ HUGE = 1e300
 
 #: A fold of sliding is looked for where the slope would vanish within this many steps.
 FOLD_AHEAD = 10.0
+
+#: A fold is served at a root of the slope's series where it is this close, relative to the time.
+FOLD_NEAR = 1e-11
+
+#: Multipliers that are this close to those at a fold are the solution that ended there.
+FOLD_APART = 1e-5
 
 #: What a run notes about its decisions, as bits.
 DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
@@ -230,6 +247,7 @@ REASONS = (
     "no_stable_motion",
     "possibly_several",
     "stability_lost",
+    "undetermined_rates",
     "start_solutions",
     "impossible_start",
     "several_directions",

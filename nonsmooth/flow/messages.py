@@ -32,6 +32,15 @@ def ambiguous(modes: Sequence[str]) -> str:
     )
 
 
+def undetermined_rates(entries: Sequence[int]) -> str:
+    """Several multipliers keep the same surfaces, with different fields."""
+    surfaces = " and ".join(f"h{k}" for k in entries)
+    return (
+        f"On {surfaces} = 0 many sets of multipliers keep the motion on the surfaces, and the field differs "
+        "between them: only a combination of them is determined."
+    )
+
+
 def stability_lost(name: str, t: float) -> str:
     """Loss of the stability of sliding on several surfaces."""
     return (

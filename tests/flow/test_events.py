@@ -214,6 +214,8 @@ def test_start_excludes_a_state():
         ns.simulate(thermostat(), [20.0, 0], 2.0, start=run)
     with pytest.raises(ns.OptionError, match="start is"):
         ns.simulate(thermostat(), start=3, t_end=2.0)
+    with pytest.raises(ns.OptionError, match="another section"):
+        ns.simulate(thermostat(), start=run, t_end=2.0, at=x - 20)
     with pytest.raises(ns.OptionError, match="x0 is missing"):
         ns.simulate(thermostat(), t_end=2.0)
 
@@ -332,3 +334,11 @@ def test_the_multiplier_of_a_relay_with_hysteresis():
         for s in (1e-6, -1e-6)
     ]
     assert abs(orbit.multipliers[1] - (back[0] - back[1]) / 2e-6) < 1e-7
+
+
+def test_a_triple_zero_is_one_passage():
+    """A flat guard: its root is located to a millionth only, and the motion goes on."""
+    count = ns.Reset(y, {v: v + 1}, 0)
+    system = ns.FilippovSystem([x, y, v], field=[1, 3 * (x - 1) ** 2, 0], resets=count)
+    run = ns.simulate(system, [0.0, -1.0, 0.0], 2.0)
+    assert run.status is REACHED and run.x[-1, 2] == 1.0

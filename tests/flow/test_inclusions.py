@@ -1,5 +1,6 @@
 """The law of elements against cases whose truth was found without the library."""
 
+import itertools
 import pickle
 import warnings
 
@@ -84,6 +85,16 @@ def test_widths_are_part_of_a_system():
         ring((1.0, -1.0))
 
 
+def test_multipliers_that_are_not_determined_may_not_act_elsewhere():
+    """Both relays act on u alone: their sum is determined, and z follows one of them."""
+    u, z, l1, l2 = (ca.SX.sym(name) for name in ("u", "z", "l1", "l2"))
+    for acts, status in ((0, ns.Status.REACHED_END), (1, ns.Status.NON_UNIQUE)):
+        system = ns.FilippovSystem(
+            [u, z], field=[0.5 - l1 - l2, acts * l1], surfaces=[u, u], multipliers=[l1, l2]
+        )
+        assert ns.simulate(system, [0.0, 0.0], 1.0).status is status
+
+
 @pytest.mark.parametrize("count", [24, 60])
 def test_many_balls_land_and_are_let_go_together(count):
     """They fall with z - 2, land at one instant, and leave when z passes 2."""
@@ -120,3 +131,61 @@ def test_a_bar_lands_on_many_feet():
         assert run.status is ns.Status.REACHED_END, run.message
         assert abs(run.x[-1]).max() < 1e-12
         assert run.segments[-1].mode == "c" * 14
+
+
+def motions_of(body):
+    """Accelerations of a planar body by all letters: open, slip to either side, stick."""
+    weight, load = np.diag([1, 1, 1 / body["inertia"]]), np.array(body["load"])
+    mu, rows = body["mu"], []
+    for (px, py), angle in zip(body["points"], body["normal_angles"], strict=True):
+        n, s = (np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))
+        rows.append([np.array([*d, px * d[1] - py * d[0]]) for d in (n, s)])
+    found: list[np.ndarray] = []
+    for letters in itertools.product("o+-s", repeat=len(rows)):
+        kept, forces, acting = [], [], []
+        for letter, (n, s) in zip(letters, rows, strict=True):
+            if letter == "s":
+                kept, forces = [*kept, n, s], [*forces, n, -s]
+            elif letter != "o":
+                kept, forces = [*kept, n], [*forces, n - mu * s * (1 if letter == "+" else -1)]
+            acting.append(len(forces))
+        rates, size = weight @ load, np.zeros(len(forces))
+        if forces:
+            matrix = np.array(kept) @ weight @ np.array(forces).T
+            size = np.linalg.lstsq(matrix, -np.array(kept) @ rates, rcond=1e-12)[0]
+            if abs(matrix @ size + np.array(kept) @ rates).max() > 1e-9:
+                continue
+            rates = rates + weight @ np.array(forces).T @ size
+        holds = True
+        for letter, last, (n, s) in zip(letters, acting, rows, strict=True):
+            if letter == "o":
+                holds &= n @ rates >= -1e-9
+            elif letter == "s":
+                normal, tangent = size[last - 2 : last]
+                holds &= normal >= -1e-9 and abs(tangent) <= mu * normal + 1e-9
+            else:
+                holds &= size[last - 1] >= -1e-9
+                holds &= (s @ rates) * (1 if letter == "+" else -1) >= -1e-9
+        if holds and not any(abs(rates - own).max() < 1e-7 for own in found):
+            found.append(rates)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_accelerations_of_a_body_are_those_of_all_letters(seed):
+    rng = np.random.default_rng(seed)
+    count = 1 + seed % 2
+    body = {
+        "id": "body",
+        "inertia": 0.3,
+        "mu": float(rng.choice([0.1, 0.4, 0.8])),
+        "points": rng.uniform(-0.5, 0.5, (count, 2)).round(2).tolist(),
+        "normal_angles": rng.uniform(0, 6.28, count).round(2).tolist(),
+        "load": (4 * rng.normal(size=3)).round(1).tolist(),
+    }
+    want = motions_of(body)
+    run = Case(body).run()
+    assert (run.status is ns.Status.NON_UNIQUE) == (len(want) > 1), run.message
+    found = accelerations(run)
+    assert found.shape == want.shape
+    assert abs(found - want[np.lexsort(want.T[::-1].round(7))]).max() < 1e-7

@@ -10,11 +10,7 @@ import pytest
 import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
-OPEN = {
-    "test_a_tank_empties[0]": "no roots",
-    "test_a_tank_empties[1]": "no roots",
-    "test_second_order_sliding_rests_from_its_limit[super_twisting]": "no rest",
-}
+OPEN = {}
 
 x, y, u, v, w, p, q, t = (ca.SX.sym(name) for name in "xyuvwpqt")
 th, a, b, r1, r2 = (ca.SX.sym(name) for name in ("th", "a", "b", "r1", "r2"))

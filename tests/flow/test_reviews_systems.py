@@ -8,9 +8,6 @@ import nonsmooth as ns
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {
-    "test_super_twisting_rests_from_its_limit_on": "no rest",
-    "test_flow_through_an_orifice": "no roots",
-    "test_flow_between_two_pressures": "no roots",
     "test_finite_time_control_with_powers[0.5-3.0812374]": "no roots",
     "test_finite_time_control_with_powers[-0.5-2.5849508]": "no roots",
 }

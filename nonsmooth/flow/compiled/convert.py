@@ -178,6 +178,8 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.no_reaction(contacts)
     if reason == "no_stable_motion":
         return messages.no_stable_motion(entries)
+    if reason == "undetermined_rates":
+        return messages.undetermined_rates(entries)
     if reason == "stability_lost":
         return messages.stability_lost(system.surface_names[run.where], t)
     if reason == "high_degree":

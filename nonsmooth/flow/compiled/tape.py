@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, Coupled, FilippovSystem, raised_of
+from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
 from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
 from ..constants import FULL, RUNNING, SEVERAL
 from ..names import shown_mode
@@ -213,7 +213,7 @@ class _System(ctypes.Structure):
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets")],
         *[(name, _POINTER) for name in ("mixed", "set_first", "set_size", "set_of", "layer_width")],
-        *[(name, _POINTER) for name in ("degree", "lower_first", "early", "early_free")],
+        *[(name, _POINTER) for name in ("degree", "lower_first", "power", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
     ]
@@ -354,6 +354,7 @@ class TapeEngine:
             "early_free": tape.free.early,
         }
         made.sets = len(system.sets)
+        made.power = self._at(np.array([*coupled.powers, 0.0]))
         made.layer_width = self._at(np.array([*system.layer_widths, 0.0]))
         made.early_count, made.early_free_count = len(tape.series.early), len(tape.free.early)
         for name, values in tables.items():
@@ -421,6 +422,8 @@ class TapeEngine:
         """Run one trajectory from an extended start, dense output kept, to be read at ``asked`` times."""
         # ``motion`` is that of a run or event that is continued.
         width = self._c.rules.width
+        if motion is not None:
+            motion = self._checked(motion)
         output = Output(self.system.extended_dimension, self.order, self._rooms, width)
         x, p = np.array(x, float), np.array([*p, 0.0], float)
         start = self._start_mode(options)
@@ -444,7 +447,8 @@ class TapeEngine:
             modes, words = self.words(table, [counts[4]])
             labels = self._labels(table)
             final = np.zeros(width)
-            library().run_motion(state, address(final))
+            if width:
+                library().run_motion(state, address(final))
         return Run.of(
             output.filled(counts[7:10]),
             self.system.dimension,
@@ -458,6 +462,18 @@ class TapeEngine:
             rates=rates[:, : self.system.dimension],
             motion=final,
             labels=labels,
+        )
+
+    def _checked(self, motion: Array) -> Array:
+        """What a run or event keeps for a restart, if it is of this system."""
+        rules, d = self._c.rules, self.system.definition
+        sides = motion[5 : 5 + 3 * rules.atoms]
+        fits = len(motion) == rules.width and bool(np.isfinite(motion).all())
+        if fits and (np.isin(sides, (-1, 0, 1)).all() and -1 <= motion[2] < len(d.rules)):
+            return np.ascontiguousarray(motion)
+        raise OptionError(
+            "start is a run or event of another system, or with another section. Continue it with its own "
+            "system and at=, or give its state as x0 and its time as t_start."
         )
 
     def _start_mode(self, options: Options) -> NDArray[np.int8] | None:

@@ -32,10 +32,14 @@ class _Modular:
 
     def __init__(self, values: Sequence[Sequence[int]], seed: int):
         self.values, self.seed = values, seed
+        self._positive = set[int]()  # constants
 
     def constant(self, value: float) -> int:
         exact = Fraction(value)
-        return exact.numerator * pow(exact.denominator, -1, PRIME) % PRIME
+        found = exact.numerator * pow(exact.denominator, -1, PRIME) % PRIME
+        if exact > 0:
+            self._positive.add(found)
+        return found
 
     def symbol(self, vector: int, position: int) -> int:
         return self.values[vector][position]
@@ -52,6 +56,8 @@ class _Modular:
             result = _root(a)
         elif op in ("pow", "constpow") and (n := _small(b)) is not None:
             result = pow(a, n, PRIME) if n >= 0 else pow(_inverse(a), -n, PRIME)
+        elif op in ("pow", "constpow") and a == 0 and b in self._positive:
+            result = 0
         else:
             result = random.Random(f"{self.seed} {op} {list(args)}").randrange(1, PRIME)
         return result % PRIME

@@ -30,6 +30,7 @@ from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .degree import Degree, degree_of
 from .evaluators import Evaluator
+from .roots import gate_roots
 from .switches import Guard, event_guards
 
 # error scales ----------------------------------------------------------------------------------
@@ -92,7 +93,13 @@ class Coupled:
         x = system.extended_states
         lam = ca.vertcat(*[ca.SX.sym(f"lambda{i}") for i in range(self._surfaces)])
         field, factors, unknowns = with_factors(system, lam)
-        self.scaled = tuple(not f.is_one() for f in factors)
+        #: Exponents of the roots of surfaces in the field; 0 where there is none.
+        self.powers: list[float] = [0.0] * self._surfaces
+        if by_degree:
+            field = self._without_roots(field, lam, factors, unknowns)
+        self.scaled = tuple(
+            not f.is_one() or power > 0.0 for f, power in zip(factors, self.powers, strict=True)
+        )
         self._scaled = np.array([*self.scaled, *[False] * len(system.impacts)], bool)
         #: Impacts whose reaction a surface's multiplier is multiplied with: friction at a contact.
         self.carriers = tuple(
@@ -132,6 +139,27 @@ class Coupled:
         pieces = [e for e in ca.vertsplit(ca.densify(column)) if not e.is_zero()]
         h, others = d.surfaces[surface], ca.vertcat(d.parameters, d.multipliers, d.reactions)
         return all(ca.depends_on(e, x) for e in pieces) and vanish_on(pieces, h, x, others)
+
+    def _without_roots(
+        self, field: ca.SX, lam: ca.SX, factors: list[ca.SX], unknowns: list[ca.SX]
+    ) -> ca.SX:
+        """The field in which roots of switching functions are zero on their surfaces, where lambda_i is."""
+        d, x = self.system.definition, self.system.extended_states
+        gates = ca.SX.sym("gate", self._surfaces)
+        field, powers = gate_roots(field, d.surfaces, x, ca.vertsplit(gates))
+        for i, factor in enumerate(factors):
+            factors[i] = gate_roots(factor, d.surfaces, x, ca.vertsplit(gates))[0]
+        for i, power in powers.items():
+            if i in self.system.set_of:
+                continue
+            self.powers[i] = power
+            if factors[i].is_one():
+                unknowns[i] = ca.SX.sym(f"nu{i}")
+                field = ca.substitute(field, lam[i], lam[i] + unknowns[i])
+        open_gates = [lam[i] if power > 0.0 else ca.SX(1) for i, power in enumerate(self.powers)]
+        for i, factor in enumerate(factors):
+            factors[i] = ca.substitute(factor, gates, ca.vertcat(*open_gates))
+        return ca.substitute(field, gates, ca.vertcat(*open_gates))
 
     def degrees(self, field: ca.SX, lam: ca.SX, unknowns: Sequence[ca.SX]) -> list[Degree]:
         """Relative degrees of the surfaces."""
@@ -370,7 +398,10 @@ def raised_of(system: FilippovSystem) -> Coupled:
         plain = coupled_of(system)
         unknowns = [plain.unknown(i) for i in range(system.surface_count)]
         degrees = plain.degrees(plain.field, plain.multipliers, unknowns)
-        return Coupled(system, by_degree=True) if any(own.lower for own in degrees) else plain
+        d, ones = system.definition, [ca.SX(1)] * system.surface_count
+        roots = gate_roots(d.field, d.surfaces, system.extended_states, ones)[1]
+        raised = bool(roots) or any(own.lower for own in degrees)
+        return Coupled(system, by_degree=True) if raised else plain
 
     return system.cached("raised", build)
 

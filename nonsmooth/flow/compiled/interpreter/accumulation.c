@@ -57,7 +57,8 @@ static int is_repeated(const Run *r, int block, int kind, int index) {
 static int is_quiet(Run *r, Expansion *e, const int32_t *drop, const double *near, double time, int block) {
   double *noise = r->work;
   int order = r->order;
-  if (!e->finite || is_awaited(r, time) || step_size(r, e) < time) return 0;
+  int singular = !e->finite && r->has_roots; /* on a surface where a root has no series */
+  if (is_awaited(r, time) || (!singular && (!e->finite || step_size(r, e) < time))) return 0;
   weigh_again(r, e);
   guard_sums(r, e, near, 1, noise);
   for (int row = 0; row < e->l.rows; row++) {
@@ -65,6 +66,7 @@ static int is_quiet(Run *r, Expansion *e, const int32_t *drop, const double *nea
     if (is_atom(e->l.kind[row]) && (!r->instant.side[row - e->l.atoms] || e->l.side[row] == UNWATCHED)) continue;
     if (drop[row] > order || is_repeated(r, block, e->l.kind[row], e->l.index[row])) continue;
     if (block && e->l.kind[row] == SURFACE_GUARD && fabs(c[0]) <= noise[row]) continue; /* is zero at the limit */
+    if (singular && !(fabs(c[0]) <= noise[row])) continue;
     if (!(fabs(c[0]) - (drop[row] ? 0 : noise[row]) > rest_of(c, order - drop[row], time))) return 0;
   }
   return 1;
@@ -215,12 +217,12 @@ static int rest_at_limit(Run *r, int before) {
  * served. */
 static void end_at_limit(Run *r, int block, double left, double error) {
   double *near = r->before, time = left + error;
-  int at_once = is_instant(r, left);
+  int at_once = is_instant(r, left), is_short = r->has_roots && is_instant(r, ROOT_REST * time);
   expand(r, r->letter, r->x, r->unknowns, &r->e);
   for (int i = 0; i < r->n; i++) {
     near[i] = time * fabs(r->e.states[(int64_t)i * r->stride + 1]);
     double small = larger(r->e.allowed[i], VANISHES * (r->size + fabs(r->x[i])));
-    if (!at_once && i < r->s->dimension && !(near[i] <= small)) return;
+    if (!at_once && !is_short && i < r->s->dimension && !(near[i] <= small)) return;
   }
   if (!at_once && !is_quiet(r, &r->e, r->drop, near, time, block)) return;
   if (come_to_rest(r, left, near)) return;

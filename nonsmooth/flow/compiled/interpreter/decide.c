@@ -688,6 +688,7 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
   }
   count = n == 1 ? solve_single(&b, found)
                  : solve_block_of_many(&b, certificate_of(d, &b, which), position, found, d->work, d->pivot);
+  if (n > MOST_ENUMERATED && d->proved[which] == NOTHING && order == 0) r->facts |= UNPROVED;
   for (int q = 0; q < count; q++) {
     double *nu = found + q * n, terms;
     int agrees = order == 0;
@@ -747,37 +748,41 @@ static int final_state(const Decision *d, int i, int orders) {
   return state == AT_TOP ? ABOVE : state == AT_BOTTOM ? BELOW : INSIDE;
 }
 
-/* The matrix of the surfaces that slide in a block, with the closed contacts in balance, and its rows times the
- * bounds over the widths of the layers; its size, -1 where it cannot be had. */
+/* The matrix of the surfaces that slide in a block, and bounds over widths of their layers; its size. */
 static int layer_matrix(const Run *r, const Decision *d, int which, int orders, double *a, double *weight) {
-  int k = d->count, rows = 0, all = 0, n;
+  int k = d->count, n = 0;
   int32_t *own = d->pivot;
-  double *m = d->work;
-  for (int contacts = 0; contacts < 2; contacts++) {
-    for (int q = d->first[which]; q < d->first[which + 1]; q++) {
-      int i = d->order[q];
-      if (!d->is_contact[i] && d->state[orders * k + i] == UNDECIDED) continue; /* its bound is zero: no friction */
-      if (final_state(d, i, orders) == INSIDE && d->is_contact[i] == contacts && !d->is_idle[i]) own[all++] = i;
-    }
-    if (!contacts) rows = all;
+  for (int q = d->first[which]; q < d->first[which + 1]; q++) {
+    int i = d->order[q];
+    if (!d->is_contact[i] && d->state[orders * k + i] == UNDECIDED) continue; /* its bound is zero: no friction */
+    if (final_state(d, i, orders) == INSIDE && !d->is_contact[i] && !d->is_idle[i]) own[n++] = i;
   }
-  n = all;
-  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) m[i * n + j] = d->matrix[own[i] * k + own[j]];
-  for (int l = n - 1; l >= rows; l--) { /* eliminate the contacts */
-    double head = m[l * n + l];
-    if (!(fabs(head) > SINGULAR * d->most)) continue;
-    for (int i = 0; i < l; i++) {
-      double f = m[i * n + l] / head;
-      if (f != 0) for (int j = 0; j < l; j++) m[i * n + j] -= f * m[l * n + j];
-    }
-  }
-  for (int i = 0; i < rows; i++) {
+  for (int i = 0; i < n; i++) {
     double bound = d->b[own[i]];
     for (int j = 0; j < k; j++) bound += d->share[own[i] * k + j] * d->nu[j];
     weight[i] = (bound > 0 ? bound : 1) / r->s->layer_width[d->own[own[i]]];
-    for (int j = 0; j < rows; j++) a[i * rows + j] = m[i * n + j];
+    for (int j = 0; j < n; j++) a[i * n + j] = d->matrix[own[i] * k + own[j]];
   }
-  return rows;
+  return n;
+}
+
+/* Move the eigenvalues that are zero because elements depend on one another: they move nothing. */
+static void lift_null_space(double *a, int n, double *work, int32_t *pivot) {
+  double *z = work, *rest = z + (int64_t)n * n, most = 0;
+  int count = null_space(a, n, n, z, rest, pivot);
+  for (int i = 0; i < n * n; i++) most = larger(fabs(a[i]), most);
+  for (int l = 0; l < count; l++) {
+    double *own = z + (int64_t)l * n, length = 0;
+    for (int q = 0; q < l; q++) {
+      double part = 0;
+      for (int i = 0; i < n; i++) part += own[i] * z[(int64_t)q * n + i];
+      for (int i = 0; i < n; i++) own[i] -= part * z[(int64_t)q * n + i];
+    }
+    for (int i = 0; i < n; i++) length += own[i] * own[i];
+    if (!(length > 0)) continue;
+    for (int i = 0; i < n; i++) own[i] /= sqrt(length);
+    for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) a[i * n + j] += most * own[i] * own[j];
+  }
 }
 
 /* Whether the sliding of a block is stable across its layers; what depends on their widths is noted. */
@@ -795,6 +800,7 @@ static int is_stable_block(Run *r, Decision *d, int which, int orders) {
     for (int j = 0; j < n; j++) scaled[i * n + j] = weight[i] * a[i * n + j];
   }
   double determinant = n == 2 ? a[0] * a[3] - a[1] * a[2] : 1;
+  lift_null_space(scaled, n, rest, d->pivot);
   stable = is_positive_stable(scaled, n, rest);
   int for_all = n == 2 ? determinant <= 0 || (a[0] >= 0 && a[3] >= 0 && a[0] + a[3] > 0) || falling == 2 : !stable && falling == n;
   if (!for_all) r->facts |= DEPENDS_ON_WIDTHS;
@@ -892,6 +898,38 @@ static void letters_of_motion(const Run *r, const Decision *d, const Motion *own
   }
 }
 
+/* Whether a block may have more than one vector of unknowns. */
+static int may_depend(const Decision *d) {
+  for (int q = 0; q < d->blocks; q++)
+    if (d->first[q + 1] - d->first[q] > 1 && d->proved[q] >= 0 && d->proved[q] < UNIQUE) return 1;
+  return 0;
+}
+
+/* Whether the field is the same for all unknowns of a mode that keep its surfaces, r->slope having no inverse. */
+static int is_determined(Run *r, const Layout *l, const int8_t *letter) {
+  int n = l->slides, w = r->width;
+  double *m = r->decision->work, *z = m + (int64_t)n * n, *rest = z + (int64_t)n * n, *change = r->vector;
+  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) m[i * n + j] = r->slope[l->sliding[i] * w + l->sliding[j]];
+  int count = null_space(m, n, n, z, rest, r->decision->pivot);
+  set_inputs(r, r->x, held_of(r, letter), r->none);
+  values_run(&r->s->columns, r->input, r->p, r->columns);
+  const Entries *column = &r->s->column;
+  for (int q = 0; q < count; q++) {
+    double *terms = change + r->n, most = 0;
+    for (int j = 0; j < n; j++) most = larger(fabs(z[(int64_t)q * n + j]), most);
+    for (int i = 0; i < 2 * r->n; i++) change[i] = 0;
+    for (int e = 0; e < column->count; e++)
+      for (int j = 0; j < n; j++) {
+        if (l->sliding[j] != column->column[e]) continue;
+        double of = out_of(&r->s->columns, r->columns, e);
+        change[column->row[e]] += of * z[(int64_t)q * n + j];
+        terms[column->row[e]] += fabs(of) * most; /* not of what rounding has left of z */
+      }
+    for (int i = 0; i < r->n; i++) if (fabs(change[i]) > MERGED * terms[i]) return 0;
+  }
+  return 1;
+}
+
 /* The mode of a motion to r->chosen, with the zeros of its guards. */
 static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   Continuation *to = &r->chosen;
@@ -901,6 +939,13 @@ static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   for (int i = 0; i < d->count; i++)
     if (to->letter[d->own[i]] == 0 && !is_idle(r, to->letter, d->own[i])) to->unknowns[d->own[i]] = own->nu[i];
   lay_out(r, to->letter, l);
+  if (l->slides > 1 && may_depend(d)) {
+    error_scales(r, r->x, held_of(r, to->letter), to->unknowns);
+    if (!invert_layer(r, l, to->unknowns, r->matrix)) {
+      r->dependent = l->mode;
+      if (!is_determined(r, l, to->letter)) finish(r, NON_UNIQUE, UNDETERMINED_RATES, 0);
+    }
+  }
   if (l->slides) improve(r, l, r->x, to->unknowns, 1); /* bounds that were reached to a tolerance are exact now */
   memset(to->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < l->rows; row++) {
@@ -1041,5 +1086,5 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
   }
   if (several > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
   choose_motion(r, d, d->motion);
-  return 1;
+  return r->status == RUNNING;
 }

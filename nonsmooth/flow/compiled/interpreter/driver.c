@@ -223,7 +223,7 @@ static void serve(Run *r, int row) {
   if (kind == IMPACT_GUARD) impact(r, row);
   else if (kind == RELEASE_GUARD) release(r, row);
   else if (kind == NEAR_GUARD) near_set(r, row, 1);
-  else if (kind == BRANCH_GUARD && side != OF_ONE) {
+  else if (kind == BRANCH_GUARD && side != OF_ONE && !is_mixed(r, r->now.sliding, r->now.slides)) {
     event(r, STABILITY, r->mode, row, r->x);
     finish(r, INTERSECTION, STABILITY_LOST, index);
   }
@@ -277,6 +277,7 @@ static int advance(Run *r, const Expansion *e, double dt) {
 }
 
 static int ends_at_singular(Run *r);
+static int pass_root(Run *r, double left);
 
 /* Leave a point where only low derivatives exist; guards are looked at after the step. */
 static void leave_singular(Run *r, Expansion *e, double left) {
@@ -298,6 +299,7 @@ static void step(Run *r) {
   double left = r->o.t_end - r->t - r->t_low, dt = 0;
   if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
   if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
+  if (r->has_roots && pass_root(r, left)) return;
   Expansion *e = &r->e;
   expand(r, r->letter, r->x, r->unknowns, e);
   if (!e->finite) { leave_singular(r, e, left); return; }
@@ -317,6 +319,7 @@ static void step(Run *r) {
   double after = AT_END * larger(1, time_scale(r) + h);
   int row = first_hit(r, e, last ? h + after : h, &dt);
   dt = row >= 0 ? smaller(dt, h) : last ? h : to_number(r, h);
+  if (row >= 0 && is_before_fold(r, e, row, dt)) { dt = to_number(r, 0.5 * dt); row = -1; last = 0; }
   double wanted = dt, safe = safe_length(r, e, by_series), good;
   while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
   int held = dt > STEADY * r->length && (dt > r->length / STEADY || dt > wanted / FAR);

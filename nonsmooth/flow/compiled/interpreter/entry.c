@@ -58,7 +58,7 @@ static void clear(Run *r, const Options *o, double t) {
   r->t = r->begun = t;
   r->t_low = 0;
   r->since = 0;
-  for (int i = 0; i < r->m; i++) r->speed[i] = INFINITY;
+  for (int i = 0; i < r->m; i++) { r->speed[i] = INFINITY; r->has_roots |= s->power[i] > 0; }
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;

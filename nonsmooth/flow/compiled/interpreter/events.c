@@ -253,6 +253,26 @@ static int is_pressed(Run *r, int atom, int zeros, int sign) {
   return 0;
 }
 
+/* Coefficients of an atom's polynomial at the time of an arrival, beyond the zero. */
+static void keep_germ(const Run *r, const double *g, double dt, double *germ) {
+  double c[P + 1];
+  memcpy(c, g, sizeof(double) * (r->order + 1));
+  for (int i = 0; i <= GERM && i < r->order; i++)
+    for (int k = r->order - 1; k >= i; k--) c[k] += dt * c[k + 1];
+  memcpy(germ, c + 1, sizeof(double) * GERM);
+}
+
+/* Whether an atom that is passed goes on as it arrived: what a multiple zero leaves is then no motion that turns. */
+static int goes_on(const Run *r, int atom) {
+  const double *germ = r->instant.germ + GERM * atom;
+  const double *g = r->e.guards + (int64_t)(r->now.atoms + atom) * r->stride;
+  if (!r->instant.passing[atom]) return 0;
+  for (int k = 0; k < GERM; k++)
+    if (!(fabs(g[k + 1] - germ[k]) <= RESOLVED * RESOLVED * (fabs(g[k + 1]) + fabs(germ[k])) + ON_SURFACE * r->instant.noise[atom]))
+      return 0;
+  return 1;
+}
+
 /* Sides of the atoms at zero by the first coefficient of the motion that follows that is not zero. */
 static void leave_zeros(Run *r) {
   Instant *i = &r->instant;
@@ -267,6 +287,7 @@ static void leave_zeros(Run *r) {
     r->drop[row] = 0;
     if (!i->zero[a]) continue;
     r->drop[row] = leading(r, &r->e, row, 1, &value);
+    if (r->drop[row] > 1 && goes_on(r, a)) { value = -i->side[a]; r->drop[row] = 1; }
     if (i->jumps && is_pressed(r, a, r->drop[row], sign_of(value))) {
       r->limit = r->t;
       finish(r, ACCUMULATION, PRESSED, i->last - r->s->stops);
@@ -362,6 +383,7 @@ static void arrive(Run *r, const Expansion *e, double dt, int tied) {
       i->passing[a] = slope * i->side[a] < 0;
     }
     else if (i->passing[a] && u->way[a]) i->side[a] = (int8_t)-u->way[a]; /* it may have turned within the step */
+    if (i->passing[a]) keep_germ(r, e->guards + (int64_t)(e->l.atoms + a) * r->stride, dt, i->germ + GERM * a);
     if (i->passing[a]) { i->residual[a] = fabs(i->value[a]); i->zero[a] = 1; }
     i->view[a] = (int8_t)(i->passing[a] ? -i->side[a] : i->side[a]);
     if (u->way[a] == UNWATCHED && !i->zero[a]) i->side[a] = i->view[a] = (int8_t)sign_of(i->value[a]);

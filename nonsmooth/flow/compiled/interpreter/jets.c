@@ -159,6 +159,23 @@ static int invert_layer(Run *r, const Layout *l, const double *unknowns, double 
   return invert_any(m, n, size, inverse, size + n, r->pending) && 0;
 }
 
+/* Close to a surface a root makes of an error in h one that is larger by far: h has a relative tolerance there. */
+static void allow_for_roots(Run *r, Expansion *e) {
+  const Entries *g = &r->s->surface_gradient;
+  const double *x = r->vector, *h = r->rates;
+  double *state = r->vector;
+  for (int k = 0; k < r->n; k++) state[k] = e->states[(int64_t)k * r->stride];
+  values_run(&r->s->surfaces, x, r->p, r->heights);
+  for (int i = 0; i < r->m; i++) r->rates[i] = out_of(&r->s->surfaces, r->heights, i);
+  for (int q = 0; q < g->count; q++) {
+    int i = g->row[q], k = g->column[q];
+    if (i >= r->m || r->s->power[i] == 0 || e->l.letter[i] == 0 || k >= r->s->dimension) continue;
+    double slope = fabs(out_of(&r->s->surfaces, r->heights, r->kept_rows + q));
+    double allowed = slope > 0 ? larger(SAFETY * r->o.rtol * fabs(h[i]) / slope, EPSILON * EPSILON) : INFINITY;
+    e->allowed[k] = smaller(e->allowed[k], larger(allowed, EPSILON * fabs(state[k])));
+  }
+}
+
 /* Jets of a mode at x, with the multipliers of what slides; inverses of the layer's slope. */
 static void expand(Run *r, const int8_t *letter, const double *x, const double *unknowns, Expansion *e) {
   int w = r->width, stride = r->stride;
@@ -173,6 +190,7 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
   for (int i = 0; i < slides; i++) e->series[(int64_t)e->l.sliding[i] * stride] = unknowns[e->l.sliding[i]];
   for (int i = 0; i < r->n; i++)
     e->allowed[i] = i < r->s->dimension ? SAFETY * (r->o.atol + r->o.rtol * fabs(x[i])) : 0;
+  if (r->has_roots) allow_for_roots(r, e);
   if (r->s->sets) begin_sets(r, e, unknowns);
   else guard_sums(r, e, e->allowed, 0, e->of_guards);
   e->scaled = e->steepened = 0;

@@ -60,7 +60,7 @@ static int roots_along(Run *r, const Layout *l, double *unknowns, int own, doubl
   for (int piece = 0; piece < LAYER_PIECES && (to - at) * way > 0 && count < SOLUTIONS; piece++) {
     if (!finite_all(g, order + 1)) return -1;
     if (way < 0) for (int k = 1; k <= order; k += 2) g[k] = -g[k];
-    double left = (to - at) * way, h = exact_length(g, order, smaller(left, most));
+    double left = (to - at) * way, h = exact_length(g, order, smaller(smaller(left, most), LAYER_LONGEST));
     int drop = zeros_of(g, order, h, zeros);
     double turn = ns_sign(g[drop]), end = value_at(g, order, h), size = fabs(g[0]) + rest_of(g, order, h);
     for (int k = 0; k <= order; k++) g[k] *= turn;
@@ -250,7 +250,7 @@ static void keep_stable(Run *r, const Layout *l, Solutions *found) {
 static int way_in_layer(Run *r, const Layout *l, double *from) {
   int own = r->active[0], kind = r->met.kind;
   double g[P + 1];
-  if (r->active_count != 1 || r->met.index != own) return 0;
+  if (r->active_count != 1 || (kind == BRANCH_GUARD ? r->folded : r->met.index) != own) return 0;
   *from = r->met.side;
   if (kind == SURFACE_GUARD) return -r->met.side;
   if (kind == EXIT_GUARD) return r->met.side;
@@ -259,6 +259,29 @@ static int way_in_layer(Run *r, const Layout *l, double *from) {
   rate_along(r, l, r->tried, own, g);
   *from = r->unknowns[own];
   return g[2] > 0 ? 1 : -1;
+}
+
+/* Unknowns that are known in a mode: those that go on beside the element that is decided. */
+static void keep_others(const Run *r, const int8_t *letter, int own, double *unknowns) {
+  keep_carried(r, letter, unknowns);
+  for (int i = 0; i < r->width; i++) if (i != own && letter[i] == 0 && r->letter[i] == 0) unknowns[i] = r->unknowns[i];
+}
+
+/* The element that a guard or a fold was met of, if all other active ones are held as before and no unknown acts on
+ * both; else -1. */
+static int moves_alone(Run *r, const int8_t *letter) {
+  int own = r->met.kind == BRANCH_GUARD ? r->folded : r->met.index, w = r->width, is_active = 0;
+  if (r->met.kind != SURFACE_GUARD && r->met.kind != EXIT_GUARD && r->met.kind != BRANCH_GUARD) return -1;
+  if (r->met.kind != BRANCH_GUARD && !r->met.side) return -1;
+  error_scales(r, r->x, held_of(r, r->letter), r->unknowns);
+  for (int k = 0; k < r->active_count; k++) {
+    int i = r->active[k];
+    is_active |= i == own;
+    if (i == own) continue;
+    if (r->letter[i] != 0 || letter[i] != 0 || r->s->mixed[own * w + i] || r->s->mixed[i * w + own]) return -1;
+    if (r->slope[own * w + i] != 0 || r->slope[i * w + own] != 0) return -1;
+  }
+  return is_active && r->s->mixed[own * (w + 1)] ? own : -1;
 }
 
 /* The mode that one surface's layer leads to: the first attracting root on the way, or the side at its end. */
@@ -272,17 +295,25 @@ static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int
   lay_out(r, trial, l);
   int way = way_in_layer(r, l, &from);
   if (!way) return 0;
-  keep_carried(r, trial, r->tried);
+  keep_others(r, trial, own, r->tried);
   count = roots_along(r, l, r->tried, own, from, way, r->met.kind == BRANCH_GUARD ? 2 : 0, root);
   for (int k = 0; k <= count && r->status == RUNNING; k++) {
     trial[own] = k < count ? 0 : (int8_t)way;
-    keep_carried(r, trial, r->found.unknowns);
+    keep_others(r, trial, own, r->found.unknowns);
     if (k < count) r->found.unknowns[own] = root[k];
     if (!continues(r, trial, known, known_count, &r->found) || !r->found.strict) continue;
     copy_continuation(r, &r->chosen, &r->found);
     return 1;
   }
   return 0;
+}
+
+/* Whether a solution is the one that has just ended in a fold. */
+static int is_folded(const Run *r, const int8_t *letter, const double *unknowns) {
+  double apart = 0;
+  if (r->met.kind != BRANCH_GUARD || memcmp(letter, r->letter, r->width)) return 0;
+  for (int i = 0; i < r->width; i++) apart = larger(fabs(unknowns[i] - r->unknowns[i]), apart);
+  return apart <= FOLD_APART;
 }
 
 /* Choose, as r->chosen, the motion that continues, of all modes and all their solutions. */
@@ -301,6 +332,7 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
     mode_solutions(r, &r->trial.l, &all);
     for (int q = 0; q < all.count && r->status == RUNNING; q++) {
       memcpy(r->found.unknowns, all.each + q * r->width, sizeof(double) * r->width);
+      if (is_folded(r, trial, r->found.unknowns)) continue;
       if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
     }
   }
@@ -309,9 +341,19 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
 
 /* The same where unknowns of the active elements enter nonlinearly. */
 static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count) {
-  int alone = r->active_count == 1;
-  if (alone && is_two_fold(r, letter, r->active[0], 0)) { finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]); return 0; }
-  return (alone && follow_in_layer(r, letter, known, known_count)) || (r->status == RUNNING && try_modes(r, letter, known, known_count));
+  int alone = r->active_count == 1, own = alone ? r->active[0] : moves_alone(r, letter), count = r->active_count;
+  if (own >= r->m) own = -1;
+  if (own >= 0 && is_two_fold(r, letter, own, 0)) { finish(r, NON_UNIQUE, TWO_FOLD, own); return 0; }
+  if (own >= 0) {
+    int32_t first = r->active[0];
+    r->active[0] = own;
+    r->active_count = 1;
+    int found = follow_in_layer(r, letter, known, known_count);
+    r->active[0] = first;
+    r->active_count = count;
+    if (found) return 1;
+  }
+  return r->status == RUNNING && try_modes(r, letter, known, known_count);
 }
 
 /* Folds of sliding: where the slope of what slides vanishes the multipliers go with a root of the time. With one of
@@ -327,6 +369,12 @@ static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
     if (e->l.kind[row] == BRANCH_GUARD && g[0] < -FOLD_AHEAD * h * g[1]) return 1;
   }
   return 0;
+}
+
+/* Whether a step would end at a root that a series has where a fold is: no series sees it, so it is come closer to. */
+static int is_before_fold(const Run *r, const Expansion *e, int row, double dt) {
+  if (e->l.kind[row] != BRANCH_GUARD || !is_mixed(r, e->l.sliding, e->l.slides)) return 0;
+  return dt > FOLD_NEAR * larger(fabs(r->t), fabs(r->t - r->begun));
 }
 
 /* Rules of order k of all that a mode needs, with the multipliers' own coefficients. */
@@ -439,6 +487,7 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   memset(f->series, 0, sizeof(double) * r->width * stride);
   for (int i = 0; i < slides; i++) f->series[(int64_t)e->l.sliding[i] * stride] = end[e->l.sliding[i]];
   if (!advance(r, f, dt)) return -1;
+  r->folded = e->l.sliding[lead];
   memcpy(r->unknowns, r->tried, sizeof(double) * r->width);
   return last;
 }

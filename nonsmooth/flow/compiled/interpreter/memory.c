@@ -61,6 +61,7 @@ static size_t place_instant(Instant *i, char *base, size_t used, const System *s
   i->value = DOUBLES(atoms);
   i->noise = DOUBLES(atoms);
   i->residual = DOUBLES(atoms);
+  i->germ = DOUBLES(GERM * atoms);
   i->trigger_x = DOUBLES(s->rules.keeps ? (size_t)triggers * s->n : 0);
   i->arrived = DOUBLES(s->n);
   i->tick = DOUBLES(clocks);
@@ -108,6 +109,7 @@ static size_t place_run(Run *r, char *base) {
   r->before = DOUBLES(n);
   r->saved = DOUBLES(n);
   r->speed = DOUBLES(w);
+  r->at_root = DOUBLES(3 * n);
   r->at_work = DOUBLES(n);
   r->unknowns = DOUBLES(w);
   r->tried = DOUBLES(w);

@@ -43,10 +43,13 @@ typedef struct {
   const double *layer_width; /* of the surfaces */
   /* Of each surface the derivative of h that its multiplier enters; where those between are among what is kept. */
   const int32_t *degree, *lower_first;
+  const double *power; /* of each surface the smallest power of its function in the field, or 0 */
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
   int32_t early_count, early_free_count;
   Rules rules;
 } System;
+
+enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
 
 /* What happens at one time (events.c). Of atoms: sides, as the jumps have made them, as evaluated now; those that are
  * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before. */
@@ -54,7 +57,7 @@ typedef struct {
   int32_t running, first, settled, unsettled, last, tied, is_last;
   int64_t jumps, counted, sampled, *count;
   int8_t *side, *view, *now, *passing, *zero, *pending, *was;
-  double *value, *noise, *residual, *trigger_x, *arrived, *tick;
+  double *value, *noise, *residual, *germ, *trigger_x, *arrived, *tick; /* germ: first coefficients on arrival */
 } Instant;
 
 /* The guards of a mode, and what slides in it. */
@@ -124,7 +127,7 @@ typedef struct {
   Layout now; /* of the present mode */
   Met met;
   Instant instant;
-  int32_t mode, status, reason, where, due_impact, falls, repelling, *drop;
+  int32_t mode, status, reason, where, due_impact, falls, repelling, folded, *drop;
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
@@ -150,9 +153,9 @@ typedef struct {
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
-  double *saved, *speed; /* a state to return to; of each surface at its last zero */
+  double *saved, *speed, *at_root; /* a state to return to; of each surface at its last zero */
   int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
-  int32_t shown;
+  int32_t shown, has_roots;
   const Expansion *expansion;
   void *arena;
 } Run;

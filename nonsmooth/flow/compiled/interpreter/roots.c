@@ -1,0 +1,163 @@
+/* Roots of switching functions -----------------------------------------------------------------------
+ *
+ * A field with |h|^p, 0 < p < 1, has no derivatives on h = 0, where the root is zero (lambda_i is zero there and
+ * multiplies it). Steps come close to the surface, as far as their series converge; the rest of the way, which is
+ * below the tolerance, is a line with the mean of a field in which the root is a power of the time.
+ */
+
+/* The field of the present mode at a state, with the root of a surface or without; the rate of its h. */
+static double field_at_root(Run *r, int i, const double *x, int with_root, double *field) {
+  const Entries *g = &r->s->surface_gradient;
+  double *unknowns = r->lam, rate = 0;
+  memcpy(unknowns, r->unknowns, sizeof(double) * r->width);
+  aim(r, r->letter, x, unknowns);
+  held_of(r, r->letter);
+  if (!with_root) { unknowns[i] = r->held[i]; r->held[i] = 0; }
+  set_inputs(r, x, r->held, unknowns);
+  first_values(r, 0);
+  for (int k = 0; k < r->n; k++) field[k] = row_of(r, k)[0];
+  surface_values(r, x);
+  for (int k = 0; k < g->count; k++)
+    if (g->row[k] == i) rate += out_of(&r->s->surfaces, r->heights, r->kept_rows + k) * field[g->column[k]];
+  return rate;
+}
+
+/* What the tolerance of the states makes of h, after surface_values. */
+static double near_root(Run *r, int i) {
+  double *allowed = r->vector;
+  for (int k = 0; k < r->n; k++) allowed[k] = k < r->s->dimension ? SAFETY * (r->o.atol + r->o.rtol * fabs(r->x[k])) : 0;
+  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, allowed, 1, r->small);
+  return r->small[i];
+}
+
+/* Move along a line. */
+static int move_by(Run *r, const double *field, double dt) {
+  Expansion *e = &r->e;
+  int64_t stride = r->stride;
+  lay_out(r, r->letter, &e->l);
+  memset(e->states, 0, sizeof(double) * r->n * stride);
+  memset(e->series, 0, sizeof(double) * r->width * stride);
+  for (int k = 0; k < r->n; k++) { e->states[k * stride] = r->x[k]; e->states[k * stride + 1] = field[k]; }
+  for (int i = 0; i < e->l.slides; i++) e->series[e->l.sliding[i] * stride] = r->unknowns[e->l.sliding[i]];
+  if (!advance(r, e, dt)) return 0;
+  if (r->t >= r->o.t_end) r->t = r->o.t_end;
+  return 1;
+}
+
+/* How fast the rate of h without its root changes along a field. */
+static double change_of_rate(Run *r, int i, double bare, const double *field) {
+  double time = INFINITY, *x = r->at_root + r->n, *other = x + r->n;
+  for (int k = 0; k < r->n; k++) if (field[k] != 0) time = smaller((r->size + fabs(r->x[k])) / fabs(field[k]), time);
+  if (!(time < INFINITY)) return 0;
+  time *= REACH;
+  for (int k = 0; k < r->n; k++) x[k] = r->x[k] + time * field[k];
+  return (field_at_root(r, i, x, 0, other) - bare) / time;
+}
+
+/* Pass the zero of what balances a root: h is below the tolerance before and after it. Whether the surface is reached. */
+static int pass_balance(Run *r, int i, double bare, const double *field, double left) {
+  double change = change_of_rate(r, i, bare, field), dt = -2 * bare / change;
+  if (!(change * bare < 0)) return 0;
+  move_by(r, field, smaller(dt, left));
+  return dt < left;
+}
+
+/* Leave a surface whose h is hardly driven away yet, to where h has the size ``level``; 0 where it is not driven away. */
+static int grow_off_root(Run *r, int i, double rate, const double *bare, double level, double left) {
+  double change = change_of_rate(r, i, rate, bare), *with = r->at_root + 2 * r->n, own, dt;
+  int32_t which = i;
+  double height = r->letter[i] * level;
+  if (!(change * r->letter[i] > 0) || (rate * r->letter[i] < 0 && rate * rate > level * fabs(change))) return 0;
+  memcpy(r->saved, r->x, sizeof(double) * r->n);
+  project_to(r, &which, 1, &height);
+  own = fabs(field_at_root(r, i, r->x, 1, with) - rate); /* what the root is there */
+  memcpy(r->x, r->saved, sizeof(double) * r->n);
+  dt = larger((own - fabs(rate)) / fabs(change), sqrt(2 * level / fabs(change)));
+  if (!move_by(r, bare, smaller(dt, left))) return 1;
+  project_to(r, &which, 1, &height);
+  renote(r);
+  return 1;
+}
+
+/* Go to a surface with a root that is near; whether it is reached. */
+static int approach_root(Run *r, int i, double h, double level, double left) {
+  double p = r->s->power[i], *with = r->before, *mean = r->at_root, own, bare, share = 0, dt;
+  own = field_at_root(r, i, r->x, 1, with);
+  bare = field_at_root(r, i, r->x, 0, mean);
+  int side = r->letter[i];
+  if (bare * side > 0 && r->s->degree[i] == 1 && fabs(h) <= level) {
+    if (pass_balance(r, i, bare, with, left)) return 1;
+    if (h * side <= 0 && r->t < r->o.t_end) { /* rounding has put it beyond */
+      int32_t which = i;
+      double height = side * level;
+      project_to(r, &which, 1, &height);
+      renote(r);
+    }
+    return 0;
+  }
+  if (h * side <= 0) return 1;
+  if (!(own * h < 0) || bare * h > 0) return 0;
+  if (fabs(own - bare) <= ROOT_SHARE * fabs(bare)) share = 1 / (1 + p); /* the root is a power p of the time */
+  else if (fabs(bare) <= ROOT_SHARE * fabs(own)) share = 1 - p; /* h' = -k h^p */
+  else if (fabs(h) <= level && r->s->degree[i] == 1) share = 1;
+  if (share == 0) return 0;
+  for (int k = 0; k < r->n; k++) mean[k] += share * (with[k] - mean[k]);
+  dt = -h / (bare + share * (own - bare));
+  move_by(r, mean, smaller(dt, left));
+  return dt < left;
+}
+
+/* Leave a surface with a root on which the run is; 0 where the motion does not lead away from it. */
+static int leave_root(Run *r, int i, double near, double level, double left) {
+  double p = r->s->power[i], *bare = r->before, *mean = r->at_root, *x = mean + r->n, *with = x + r->n;
+  double rate = field_at_root(r, i, r->x, 0, bare), dt = near / fabs(rate);
+  if (!(rate * r->letter[i] > 0)) return grow_off_root(r, i, rate, bare, level, left);
+  for (int count = 0; count < DEPTH; count++, dt *= FALL) { /* the root changes the rate by a small part */
+    for (int k = 0; k < r->n; k++) x[k] = r->x[k] + dt * bare[k];
+    if (fabs(field_at_root(r, i, x, 1, with) - rate) <= ROOT_SHARE * fabs(rate)) break;
+  }
+  if (r->s->degree[i] == 1 && dt * fabs(rate) < level && grow_off_root(r, i, rate, bare, level, left)) return 1;
+  for (int k = 0; k < r->n; k++) mean[k] = bare[k] + (with[k] - bare[k]) / (1 + p);
+  move_by(r, mean, smaller(dt, left));
+  return 1;
+}
+
+/* Rest on a surface with a root and its lower derivatives where they are below the tolerance: there may be no crossings
+ * that accumulate. */
+static int rest_near_root(Run *r, int i) {
+  int before = r->mode, first = r->s->lower_first[i];
+  int32_t own = i;
+  double allowed;
+  if (r->s->degree[i] == 1) return 0;
+  allowed = KNOWN_TO / SAFETY * r->small[first];
+  for (int k = first; k < first + r->s->degree[i] - 1; k++) if (fabs(r->rates[k]) > KNOWN_TO / SAFETY * r->small[k]) return 0;
+  if (fabs(field_at_root(r, i, r->x, 1, r->before)) > allowed || is_awaited(r, 0) || !choose_rest(r, &own, 1, 0)) return 0;
+  adopt(r, &r->chosen);
+  note(r);
+  r->history = 0;
+  event(r, REST, before, -1, r->x);
+  return 1;
+}
+
+/* Pass a surface with a root, where no series converges; whether the run has moved. */
+static int pass_root(Run *r, double left) {
+  for (int i = 0; i < r->m; i++) {
+    if (r->s->power[i] == 0 || r->letter[i] == 0) continue;
+    double h = surface_values(r, r->x)[i], near = near_root(r, i);
+    if (!(fabs(h) <= near)) continue;
+    if (rest_near_root(r, i)) return 1;
+    double rounding = ON_SURFACE * surface_scales(r, r->x)[i], level = larger(ROOT_SHARE * ROOT_SHARE * near, rounding);
+    int before = r->letter[i], is_there = r->since == 0 && fabs(h) <= rounding;
+    if (is_there && leave_root(r, i, near, level, left)) return 1;
+    if (!is_there && !approach_root(r, i, h, level, left)) {
+      if (r->t >= r->o.t_end || r->status != RUNNING) return 1;
+      continue;
+    }
+    for (int row = 0; row < r->now.rows && r->status == RUNNING; row++)
+      if (r->now.kind[row] == SURFACE_GUARD && r->now.index[row] == i) { serve_between(r, row); break; }
+    if (r->status == RUNNING && r->letter[i] == before && (is_there || !leave_root(r, i, near, level, r->o.t_end - r->t)))
+      finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0);
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,78 @@
+"""Roots and powers of switching functions, which are zero on their surfaces and have no derivatives there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from ..expressions.graph import evaluate, instructions, operation
+from ..expressions.identity import vanish_on
+
+_POWERS = ("sqrt", "pow", "constpow")
+
+#: Random points at which signs are compared.
+_DRAWS = 21
+
+
+class _Gated:
+    """The algebra of expressions in which roots of switching functions are there on their side only."""
+
+    def __init__(self, symbols: ca.SX, surfaces: Sequence[ca.SX], x: ca.SX, gates: Sequence[ca.SX]):
+        self._symbols, self._surfaces, self._x, self._gates = symbols, surfaces, x, gates
+        #: Smallest exponent by surface.
+        self.powers: dict[int, float] = {}
+
+    def constant(self, value: float) -> ca.SX:
+        return ca.SX(value)
+
+    def symbol(self, vector: int, position: int) -> ca.SX:
+        del vector
+        return self._symbols[position]
+
+    def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
+        result, power = operation(op, list(args)), self._power(op, args)
+        if power is None or not ca.depends_on(args[0], self._x):
+            return result
+        for i, h in enumerate(self._surfaces):
+            rest = [s for s in ca.symvar(ca.vertcat(h, args[0])) if not ca.depends_on(self._x, s)]
+            if vanish_on([args[0]], h, self._x, ca.vertcat(*rest)):
+                self.powers[i] = min(power, self.powers.get(i, power))
+                gate = _side(args[0], h) * self._gates[i]
+                return gate * (1 + gate) / 2 * result
+        return result
+
+    def _power(self, op: str, args: Sequence[ca.SX]) -> float | None:
+        """The exponent of a positive power that is not a whole number."""
+        if op == "sqrt":
+            return 0.5
+        if op not in _POWERS or not args[1].is_constant():
+            return None
+        power = float(args[1])
+        return power if power > 0.0 and power != int(power) else None
+
+
+def _side(e: ca.SX, h: ca.SX) -> int:
+    """Whether an expression that vanishes with h is positive where h is (1), where -h is (-1)."""
+    symbols = ca.vertcat(*ca.symvar(ca.vertcat(e, h)))
+    value = ca.Function("side", [symbols], [e * h])
+    generator = np.random.default_rng(0)
+    points = [float(value(generator.normal(size=symbols.numel()))) for _ in range(_DRAWS)]
+    return 1 if sum(np.sign(p) for p in points if p == p) >= 0.0 else -1
+
+
+def gate_roots(
+    field: ca.SX, surfaces: ca.SX, x: ca.SX, gates: Sequence[ca.SX]
+) -> tuple[ca.SX, dict[int, float]]:
+    """Multiply roots and powers of switching functions with what a ``gate`` of 1, -1 or 0 makes of them.
+
+    It is 1 on the side on which they are defined, 0 on the other and on the surface. Smallest exponents by surface.
+    """
+    symbols = ca.vertcat(*ca.symvar(field)) if field.numel() else ca.SX(0, 1)
+    nodes, rows = instructions([symbols], [field])
+    if not any(node.op in _POWERS for node in nodes):
+        return field, {}
+    algebra = _Gated(symbols, ca.vertsplit(surfaces), x, gates)
+    values = evaluate(nodes, algebra)
+    return ca.vertcat(*[values[k] for k in rows[0]]), algebra.powers

@@ -1,0 +1,71 @@
+"""Fields with roots of switching functions, through the zero of the root."""
+
+import casadi as ca
+import pytest
+
+import nonsmooth as ns
+
+x, y, v, t, one, two = (ca.SX.sym(n) for n in ("x", "y", "v", "t", "one", "two"))
+
+
+@pytest.mark.parametrize("below", [0, 1])
+def test_a_tank_empties(below):
+    tank = ns.FilippovSystem([x], surface=x, above=[-ca.sqrt(x)], below=[below])
+    run = ns.simulate(tank, [1.0], 5.0)
+    assert run.itinerary == "+ s" and run.x[-1].tolist() == [0]
+    assert run.events[0].t == pytest.approx(2.0, abs=1e-9)
+    assert run(1.0)[0] == pytest.approx(0.25, abs=1e-9)
+
+
+def test_two_tanks_in_cascade():
+    first, second = (1 + one) / 2 * ca.sqrt(x), (1 + two) / 2 * ca.sqrt(y)
+    tanks = ns.FilippovSystem(
+        [x, y], surfaces=[x, y], multipliers=[one, two], field=[-first, first - second]
+    )
+    run = ns.simulate(tanks, [1.0, 1.0], 5.0)
+    assert run.itinerary == "++ s+ ss" and run.x[-1].tolist() == [0, 0]
+    assert [e.t for e in run.events[:2]] == pytest.approx([2.0, 3.0925860317], abs=1e-9)
+
+
+def test_cube_root_reaches_zero_in_finite_time():
+    rhs = [-ca.sign(x) * ca.fabs(x) ** (1 / 3)]
+    run = ns.simulate(ns.FilippovSystem.from_expression([x], rhs), [1.0], 5.0)
+    assert run.itinerary == "+ s" and run.events[0].t == pytest.approx(1.5, abs=1e-9)
+
+
+def test_valve_passes_zero():
+    # Values by an implicit Runge-Kutta method (Radau) at two tolerances.
+    rhs = [-2 * ca.sign(x) * ca.sqrt(ca.fabs(x)) + 0.3 * ca.cos(t)]
+    run = ns.simulate(ns.FilippovSystem.from_expression([x], rhs, time=t), [1.0], 20.0)
+    assert run.x[-1] == pytest.approx([0.00518905], abs=1e-8)
+    flow = ca.sign(x - v) * ca.sqrt(ca.fabs(x - v))
+    rhs = [-flow + 0.3 * ca.cos(t), flow]
+    run = ns.simulate(ns.FilippovSystem.from_expression([x, v], rhs, time=t), [1.0, 0.0], 20.0)
+    assert run.x[-1] == pytest.approx([0.63953631, 0.63434726], abs=1e-8)
+
+
+def _super_twisting(gain, push=0.0):
+    return ns.FilippovSystem(
+        [x, v], surface=x, above=[v - gain * ca.sqrt(x), push - 1.1],
+        below=[v + gain * ca.sqrt(-x), push + 1.1], time=t,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("start", "limit"), [(0.2, 0.7788952494520), (1.0, 1.7416627251264)])
+def test_super_twisting_comes_to_rest(start, limit):
+    # limits by matrix exponentials: linear in sqrt(x) and a time of its own
+    run = ns.simulate(_super_twisting(1.5), [start, 0.0], 5.0)
+    assert run.itinerary.endswith("s") and run.x[-1].tolist() == [0, 0]
+    rest = run.events[-2]
+    assert (rest.kind, rest.name) == ("rest", "h0")
+    assert rest.t == pytest.approx(limit, abs=2e-8)  # it rests once its speed is below 1e-8
+
+
+def test_super_twisting_without_oscillation_rests_too():
+    run = ns.simulate(_super_twisting(4.0), [1.0, 0.3], 5.0)
+    assert run.itinerary == "+ - s" and run.x[-1].tolist() == [0, 0]
+
+
+def test_super_twisting_holds_a_disturbance():
+    run = ns.simulate(_super_twisting(1.5, 0.9 * ca.sin(t)), [0, 0], 10.0)
+    assert run.itinerary == "s" and run.x[-1].tolist() == [0, 0]

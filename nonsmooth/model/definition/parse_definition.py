@@ -190,15 +190,8 @@ def read_definition(
     _one_multiplier_each(lam, h)
     kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
     (stops, resets, impacts), renamed = _distinct([_items(*k) for k in kinds], _own_names(sizes))
-    maps, named = read_maps(resets, x)
-    moving = ca.vertcat(x[: x.numel() - len(discrete)], t)
-    atoms = Atoms(ca.vertcat(x, t), moving, p)
-    rules = read_rules(stops, resets, atoms, named)
-    ticks = len(resets) - len(clocks)
-    require_no_endless_level(
-        rules[: len(stops) + ticks], len(stops), resets[:ticks], atoms.functions, x
-    )
     reactions, f = _reactions(impacts, x, t, f)
+    require_smooth(f, ca.vertcat(x, t, lam, reactions), p, "field")  # before guards made of it
     definition = Definition(
         states=x,
         time=t,
@@ -210,28 +203,48 @@ def read_definition(
         impacts=tuple(i.name for i in impacts),
         field=f,
         surfaces=h,
-        guards=ca.vertcat(*atoms.functions),
-        maps=ca.horzcat(*maps),
-        whens=ca.vertcat(*[read_when(e) for e in (*stops, *resets)]),
-        priorities=ca.vertcat(
-            *[scalar(e.priority, f"priority of {e.name!r}") for e in (*stops, *resets)]
-        ),
-        periods=ca.vertcat(*[scalar(c.period, f"period of {c.name!r}") for c in clocks]),
-        rules=rules,
-        clocks=tuple(
-            (ticks + k, x.numel() - len(discrete) - len(clocks) + k) for k in range(len(clocks))
-        ),
-        discrete=tuple(discrete),
-        stops=tuple((s.name, direction_of(s)) for s in stops),
-        resets=tuple((r.name, direction_of(r)) for r in resets),
         defaults=defaults,
         hidden=hidden,
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
         layer_widths=_widths(layer_widths, h.numel()),
+        **_events(stops, resets, clocks, discrete, x, t, p),
     )
     require_consistent(definition)
     return definition
+
+
+def _events(
+    stops: Sequence[Stop],
+    resets: Sequence[Reset],
+    clocks: Sequence[Clock],
+    discrete: Sequence[tuple[float, ...] | None],
+    x: ca.SX,
+    t: ca.SX,
+    p: ca.SX,
+) -> dict[str, Any]:
+    """Parts of a definition that stops, resets, clocks and discrete states make."""
+    maps, named = read_maps(resets, x)
+    moving = ca.vertcat(x[: x.numel() - len(discrete)], t)
+    atoms = Atoms(ca.vertcat(x, t), moving, p)
+    rules = read_rules(stops, resets, atoms, named)
+    ticks = len(resets) - len(clocks)
+    require_no_endless_level(
+        rules[: len(stops) + ticks], len(stops), resets[:ticks], atoms.functions, x
+    )
+    first, every = x.numel() - len(discrete) - len(clocks), (*stops, *resets)
+    return {
+        "guards": ca.vertcat(*atoms.functions),
+        "maps": ca.horzcat(*maps),
+        "whens": ca.vertcat(*[read_when(e) for e in every]),
+        "priorities": ca.vertcat(*[scalar(e.priority, f"priority of {e.name!r}") for e in every]),
+        "periods": ca.vertcat(*[scalar(c.period, f"period of {c.name!r}") for c in clocks]),
+        "rules": rules,
+        "clocks": tuple((ticks + k, first + k) for k in range(len(clocks))),
+        "discrete": tuple(discrete),
+        "stops": tuple((s.name, direction_of(s)) for s in stops),
+        "resets": tuple((r.name, direction_of(r)) for r in resets),
+    }
 
 
 def _of_impacts(impacts: Sequence[Any], what: str) -> ca.SX:

@@ -181,8 +181,10 @@ def test_two_relays():
         [x, y], surfaces=[x, y], multipliers=[l1, l2], field=[-l1 + 2 * l2, -2 * l1 - l2]
     )
     run = same_runs(lift([x, y], [-s1 + 2 * s2, -2 * s1 - s2]), written, [1.0, 0.5], 2.0)
-    assert run.status is ns.Status.ACCUMULATION
-    assert run.accumulation_time == pytest.approx(0.75, abs=1e-9)
+    rest = run.events[-2]
+    assert run.status is ns.Status.REACHED_END and rest.kind == "rest"
+    assert rest.t == pytest.approx(0.75, abs=1e-9)
+    assert np.abs(run.x[-1]).max() < 1e-12
 
 
 def test_harvest_with_if_else():

@@ -189,3 +189,15 @@ def test_accelerations_of_a_body_are_those_of_all_letters(seed):
     found = accelerations(run)
     assert found.shape == want.shape
     assert abs(found - want[np.lexsort(want.T[::-1].round(7))]).max() < 1e-7
+
+
+@pytest.mark.parametrize("above", [1e-9, 1e-11, 1e-12, -1e-12, -1e-11, -1e-9])
+def test_one_element_decides_by_all_that_is_above_rounding(above):
+    """v' = (1 + above - l) u: with l = 1 the rate on the far side is ``above`` u, and decides."""
+    u, v, multiplier = (ca.SX.sym(s) for s in ("u", "v", "l"))
+    system = ns.FilippovSystem(
+        [u, v], field=[1, (1 + above - multiplier) * u], surfaces=[v], multipliers=[multiplier]
+    )
+    run = ns.simulate(system, [1.0, -1.0], 3.0)
+    assert run.itinerary == ("- +" if above > 0 else "- s")
+    np.testing.assert_allclose(run.x[-1, 0], 4.0, rtol=1e-12)

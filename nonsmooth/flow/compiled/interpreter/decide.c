@@ -758,6 +758,7 @@ static int layer_matrix(const Run *r, const Decision *d, int which, int orders, 
   int32_t *own = d->pivot;
   for (int q = d->first[which]; q < d->first[which + 1]; q++) {
     int i = d->order[q];
+    if (!d->is_contact[i] && d->state[orders * k + i] == UNDECIDED) continue; /* its bound is zero: no friction */
     if (final_state(d, i, orders) == INSIDE && !d->is_contact[i] && !d->is_idle[i]) own[n++] = i;
   }
   for (int i = 0; i < n; i++) {

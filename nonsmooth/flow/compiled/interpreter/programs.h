@@ -169,7 +169,15 @@ static inline double settled(double coefficient, double value, double divisor) {
   return isfinite(coefficient) || !(fabs(value) < TINY_VALUE && fabs(divisor) > HUGE_DIVISOR) ? coefficient : 0;
 }
 
+/* Of a power of what is zero: t^(i exponent) where t^i is the first term of ``u``, without further derivatives. */
+static double power_at_zero(const double *u, double exponent, int k) {
+  int i = 1;
+  while (i <= k && u[i] == 0) i++;
+  return i > k || k < i * exponent ? 0 : INFINITY;
+}
+
 static double power_coefficient(const double *u, const double *w, double exponent, int k) {
+  if (u[0] == 0) return power_at_zero(u, exponent, k);
   double sum = exponent * k * (u[k] * w[0]);
   for (int j = 1; j < k; j++) sum = MULADD(exponent * (k - j) - j, u[k - j] * w[j], sum);
   return settled(over(sum, u[0]) * (1.0 / k), w[0], u[0]);

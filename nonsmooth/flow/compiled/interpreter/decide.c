@@ -985,9 +985,16 @@ static void begin_decision(Decision *d) {
 
 /* One surface ------------------------------------------------------------------------------------------- */
 
+/* Whether a surface's row of the layer holds its own unknown; not where only those of other surfaces enter it. */
+static int holds_its_own(const Run *r, int surface) {
+  const Entries *slope = &r->s->slope;
+  for (int e = 0; e < slope->count; e++) if (slope->row[e] == surface && slope->column[e] == surface) return 1;
+  return 0;
+}
+
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
-  if (r->s->continuous[surface] || r->s->degree[surface] > 1) return 0;
+  if (r->s->continuous[surface] || r->s->degree[surface] > 1 || !holds_its_own(r, surface)) return 0;
   double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
   for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);

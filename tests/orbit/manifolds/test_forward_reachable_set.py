@@ -373,8 +373,18 @@ def test_a_planar_two_fold_is_left_by_sliding_at_the_mean_of_both_fields():
 
 
 def test_a_planar_visible_invisible_fold_has_one_future():
-    """L1 = x and L2 = x: nothing slides, and only the orbit above is there for t > 0."""
-    system = ns.FilippovSystem([x, z], surface=z, above=[1, x], below=[2, x])
+    """L1 = x and L2 = 2 x: nothing slides, and only the orbit above is there for t > 0."""
+    system = ns.FilippovSystem([x, z], surface=z, above=[1, x], below=[2, 2 * x])
     futures = ns.orbit.funnel(system, [0.0, 0.0], 2.0, samples=9)
     assert [d.side for d in futures.departures] == ["+"]
     np.testing.assert_allclose(futures(2.0)[0], [2.0, 2.0], atol=1e-9)
+
+
+def test_equal_rates_on_both_sides_are_no_two_fold():
+    """L1 = L2 = x: z'' = x' is 1 or 2 for any mixture, so that z = t^2/2 above is the one motion."""
+    system = ns.FilippovSystem([x, z], surface=z, above=[1, x], below=[2, x])
+    run = ns.simulate(system, [0.0, 0.0], 2.0)
+    assert run.itinerary == "+"
+    np.testing.assert_allclose(run.x[-1], [2.0, 2.0], atol=1e-12)
+    with pytest.raises(ns.PointError, match="unique"):
+        ns.orbit.funnel(system, [0.0, 0.0], 2.0)

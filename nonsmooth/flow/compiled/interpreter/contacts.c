@@ -75,7 +75,7 @@ static int strike_by_law(Run *r, const double *x, const int32_t *own, int n, con
   int w = r->width, m = r->m, solved;
   int32_t *which = d->own;
   int8_t *letter = (int8_t *)(r->pending + 2 * w), *position = d->block_state + 2 * w;
-  Block b = {.size = n, .own = which, .a = d->block, .state = d->block_state, .is_contact = d->block_state + w};
+  Block b = {.size = n, .tie = TIED, .own = which, .a = d->block, .state = d->block_state, .is_contact = d->block_state + w};
   b.b = b.a + n; b.floor = b.b + n; b.matrix = b.floor + n; b.share = b.matrix + n * n;
   memcpy(letter, r->letter, w);
   for (int i = 0; i < n; i++) { which[i] = own[i]; if (own[i] < m) letter[own[i]] = 0; }

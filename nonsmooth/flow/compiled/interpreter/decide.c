@@ -20,6 +20,7 @@ enum { MOST_SOLUTIONS = 16, MOST_FOUND = 64 };
 /* One block of elements that act on one another, with copies of its part of the law at one order. */
 typedef struct {
   int size, first, is_coupled;
+  double tie; /* part of terms that is zero */
   const int32_t *own;
   double *a, *b, *matrix, *share, *floor; /* share: bounds by the reactions in the block; floor: rounding of w */
   int8_t *state, *is_contact;
@@ -135,9 +136,9 @@ static double rate_of(const Block *k, int i, const double *nu, double *terms) {
 }
 
 /* What w_i and nu_i are zero to. */
-static double zero_of(const Block *k, int i, double terms) { return larger(k->floor[i], TIED * terms); }
+static double zero_of(const Block *k, int i, double terms) { return larger(k->floor[i], k->tie * terms); }
 static double room_zero(const Block *k, int i, double zero, double bound) {
-  double own = fabs(k->matrix[i * (k->size + 1)]), most = TIED * fabs(bound);
+  double own = fabs(k->matrix[i * (k->size + 1)]), most = k->tie * fabs(bound);
   return own > 0 ? larger(zero / own, most) : most;
 }
 
@@ -638,10 +639,13 @@ static void read_order(Run *r, Decision *d, int order) {
 
 /* Motions ------------------------------------------------------------------------------------------------ */
 
+/* Zeros of several elements tie to the wider tolerance; one element decides by all that is above rounding. */
+static double tie_of(const Decision *d) { return d->count > 1 ? TIED : VANISHES; }
+
 /* A block's part of the law at an order, with what blocks before it add. */
 static Block part_of_law(Decision *d, int order, int which) {
   int k = d->count, first = d->first[which], n = d->first[which + 1] - first, at = order * k;
-  Block b = {.size = n, .own = d->order + first, .a = d->block, .state = d->block_state, .is_contact = d->block_state + k};
+  Block b = {.size = n, .tie = tie_of(d), .own = d->order + first, .a = d->block, .state = d->block_state, .is_contact = d->block_state + k};
   b.b = b.a + n; b.floor = b.b + n; b.matrix = b.floor + n; b.share = b.matrix + n * n;
   const double *nu = d->nu + at;
   for (int i = 0; i < n; i++) {
@@ -973,7 +977,7 @@ static void begin_decision(Decision *d) {
   for (int i = 0; i < k; i++) {
     d->yard[i] = fabs(d->a[i]);
     for (int j = 0; j < k; j++) d->yard[i] += fabs(d->matrix[i * k + j]) * d->room[j];
-    d->floor[i] = larger(d->floor[i], TIED * d->yard[i]);
+    d->floor[i] = larger(d->floor[i], tie_of(d) * d->yard[i]);
     d->state[i] = UNDECIDED;
   }
   for (int q = 0; q < d->blocks; q++) d->proved[q] = -1;
@@ -981,9 +985,16 @@ static void begin_decision(Decision *d) {
 
 /* One surface ------------------------------------------------------------------------------------------- */
 
+/* Whether a surface's row of the layer holds its own unknown; not where only those of other surfaces enter it. */
+static int holds_its_own(const Run *r, int surface) {
+  const Entries *slope = &r->s->slope;
+  for (int e = 0; e < slope->count; e++) if (slope->row[e] == surface && slope->column[e] == surface) return 1;
+  return 0;
+}
+
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
-  if (r->s->continuous[surface] || r->s->degree[surface] > 1) return 0;
+  if (r->s->continuous[surface] || r->s->degree[surface] > 1 || !holds_its_own(r, surface)) return 0;
   double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
   for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);

@@ -792,13 +792,15 @@ static void lift_null_space(double *a, int n, double *work, int32_t *pivot) {
 /* Whether the sliding of a block is stable across its layers; what depends on their widths is noted. */
 static int is_stable_block(Run *r, Decision *d, int which, int orders) {
   int size = d->first[which + 1] - d->first[which];
-  if (!d->is_touched[d->order[d->first[which]]] || d->proved[which] == UNIQUE_AND_STABLE || d->proved[which] == SEMIDEFINITE) return 1;
+  if (!d->is_touched[d->order[d->first[which]]] || d->proved[which] == UNIQUE_AND_STABLE) return 1;
   double *a = d->block, *weight = a + (int64_t)size * size, *scaled = weight + size, *rest = scaled + (int64_t)size * size;
   int n = layer_matrix(r, d, which, orders, a, weight), stable, falling = 0;
   if (n == 0) return 1;
   if (n == 1) return a[0] > 0;
-  int proved = certificate(a, n, d->work, d->pivot);
-  if (proved == UNIQUE_AND_STABLE || proved == SEMIDEFINITE) return 1;
+  int proved = certificate(a, n, d->work, d->pivot), moves = 0, turns = 1; /* orbits that only turn: no trace */
+  for (int i = 0; i < n * n; i++) moves |= a[i] != 0;
+  for (int i = 0; i < n; i++) turns &= moves && a[i * n + i] == 0;
+  if (proved == UNIQUE_AND_STABLE || (proved == SEMIDEFINITE && !turns)) return 1;
   for (int i = 0; i < n; i++) {
     falling += !(a[i * n + i] > 0);
     for (int j = 0; j < n; j++) scaled[i * n + j] = weight[i] * a[i * n + j];

@@ -232,7 +232,8 @@ def _events(
     require_no_endless_level(
         rules[: len(stops) + ticks], len(stops), resets[:ticks], atoms.functions, x
     )
-    first, every = x.numel() - len(discrete) - len(clocks), (*stops, *resets)
+    first = x.numel() - len(discrete) - len(clocks)
+    every: tuple[Stop | Reset, ...] = (*stops, *resets)
     return {
         "guards": ca.vertcat(*atoms.functions),
         "maps": ca.horzcat(*maps),

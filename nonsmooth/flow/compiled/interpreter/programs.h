@@ -104,8 +104,7 @@ static void values_free(const Values *t, const double *x, const double *p, doubl
   values_nodes(t, t->free, t->free_count, x, p, w);
 }
 
-/* Sums of u_i v_(k-i) and of i u_i v_(k-i), i from first to last, in four chains. Generated programs
- * (nonsmooth/model/printing/recurrences.py) have each of these recurrences with the same operations. */
+/* Sums of u_i v_(k-i) and of i u_i v_(k-i), i from first to last, in four chains. */
 static inline double convolve(const double *u, const double *v, int k, int first, int last) {
   int count = last - first + 1, i = 4;
   if (count <= 0) return 0;

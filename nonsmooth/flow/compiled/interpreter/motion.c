@@ -71,7 +71,7 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
 }
 
 static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Suspended *m) {
-  while (r->status == RUNNING && !is_plain(r)) step(r);
+  while (r->status == RUNNING && (r->t >= r->o.t_end || !is_plain(r))) step(r); /* lanes give the end no mode */
   give(r, b, i, m);
 }
 

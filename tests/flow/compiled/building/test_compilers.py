@@ -89,9 +89,10 @@ for work in (lambda: ns.simulate(system, [1.0, 0.0], 1.0), lambda: ns.ensemble(s
         work()
     except ns.NonsmoothError as error:
         assert type(error).__name__ == "CompilerError", error
+        said = str(error)
     else:
         raise AssertionError("a compiler that fails was not told")
-print(error)
+print(said)
 """
 
 

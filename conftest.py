@@ -57,7 +57,6 @@ def pytest_collectstart(collector: pytest.Collector) -> None:
         importlib.import_module(".".join(path.parent.relative_to(HERE).parts))
 
 
-@pytest.hookimpl(tryfirst=True)
 #: Slow tests that the driver in C does not pass yet, and what is wrong: each is a defect to be repaired.
 OPEN = {
     "test_other_contact_models_have_it_too": "power laws from rest: the load begins with t^(3/2)",
@@ -70,6 +69,7 @@ OPEN = {
 }
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the slow cases of tests, before ``-m`` selects, and expect the failures of ``OPEN``."""
     for item in items:

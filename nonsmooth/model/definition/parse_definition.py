@@ -191,7 +191,6 @@ def read_definition(
     kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
     (stops, resets, impacts), renamed = _distinct([_items(*k) for k in kinds], _own_names(sizes))
     reactions, f = _reactions(impacts, x, t, f)
-    require_smooth(f, ca.vertcat(x, t, lam, reactions), p, "field")  # before guards made of it
     definition = Definition(
         states=x,
         time=t,

@@ -139,7 +139,6 @@ LAGS = (1, 2, 3, 4, 6)
 BLOCKS = 4
 SPREAD = 0.02
 SHRINKS = 0.9999
-REMAINING = 1e-6
 AT_ONCE = 40  # events at one instant
 
 #: A set h = 0 is reached in one step where the remaining rotation of friction is below this part of the
@@ -228,7 +227,6 @@ REASONS = (
     "two_fold",
     "slid_to_two_fold",
     "ambiguous",
-    "no_mode",
     "degenerate",
     "wrong_start",
     "field",

@@ -6,5 +6,5 @@
   codimension two and more ``limit_directions``, ``frozen``. In a run the driver decides (``flow/compiled``).
 - A mode as a system of its own: ``explicit``, ``motion``, ``followed``.
 
-Contact models are in ``bounce/contact``, classes of two-folds in ``nonsmooth/local/two_folds``.
+Classes of two-folds are in ``nonsmooth/local/two_folds``.
 """

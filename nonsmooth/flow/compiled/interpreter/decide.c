@@ -169,7 +169,7 @@ static int place_unknowns(const Block *k, const int8_t *position, double *nu, do
   return solve_any(m, nu, n, work + (int64_t)n * n, pivot);
 }
 
-/* The position that an element wants next, its own where it fits. */
+/* The position that an element takes next: its own where that is consistent. */
 static int wanted(const Block *k, int i, int position, const double *nu) {
   double terms, w = rate_of(k, i, nu, &terms), zero = zero_of(k, i, terms), bound = bound_of(k, i, nu);
   double low = k->is_contact[i] ? 0 : -bound, room = room_zero(k, i, zero, bound);
@@ -184,7 +184,7 @@ static int wanted(const Block *k, int i, int position, const double *nu) {
   return is_empty ? position == TOP ? BOTTOM : TOP : HELD;
 }
 
-/* Principal pivoting: all that do not fit change, one at a time where that does not help. */
+/* Principal pivoting: all that are not consistent change, one at a time where that does not help. */
 static int pivot_block(const Block *k, int8_t *position, double *nu, int most, double *work, int32_t *pivot) {
   int best = k->size + 1, patience = 10;
   for (int count = 0; count < most; count++) {

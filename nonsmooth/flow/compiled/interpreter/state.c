@@ -137,7 +137,7 @@ typedef struct {
   Continuation chosen, one, first, rest, found;
   Decision *decision;
   int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
-  int32_t turned_mode; /* a mode that was asked for, whose guards of stability begin with these signs */
+  int32_t turned_mode; /* the mode of start_mode, whose guards of stability begin with these signs */
   int8_t *turned;
   double *layer_series, *rates_of_several;
   Output out;

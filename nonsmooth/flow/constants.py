@@ -36,8 +36,8 @@ CHECKS, OCTAVE = 1, 8
 #: A run ends after this many steps that were halved for their defect, most of them in a row.
 SHORTENED = 40
 
-#: Halved steps above this part of the one before are steady. They end a run only if they do not grow and
-#: are much shorter (FAR) than the series allows: at a branch point.
+#: Halved steps end a run only if they are much shorter (FAR) than the series allows, and do not grow, so that this
+#: part of each is below the one before: at a branch point.
 STEADY = 0.9
 
 #: Part of a step at which its end is checked, and that of a step to an event, which may be the end of the

@@ -217,10 +217,6 @@ class Atoms:
                 "that moves is equal to a number at single instants only; write >= or <=."
             )
         require_smooth(function, self.states, self.parameters, what)
-        if not ca.depends_on(function, self.states):
-            raise DefinitionError(
-                f"{what}: expected comparisons of functions of the states or the time, received {function}."
-            )
         if self.slot is not None:
             at, self.slot = self.slot, None
             self.functions[at] = function

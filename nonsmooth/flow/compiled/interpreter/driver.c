@@ -322,8 +322,8 @@ static void step(Run *r) {
   if (row >= 0 && is_before_fold(r, e, row, dt)) { dt = to_number(r, 0.5 * dt); row = -1; last = 0; }
   double wanted = dt, safe = safe_length(r, e, by_series), good;
   while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
-  int held = dt > STEADY * r->length && (dt > r->length / STEADY || dt > wanted / FAR);
-  int shrinks = dt < wanted && !(r->mode == r->length_mode && held);
+  int grows = r->mode == r->length_mode && dt > r->length / STEADY;
+  int shrinks = dt <= wanted / FAR && !grows;
   r->shortened = larger(0, r->shortened + (shrinks ? 1 : -0.2));
   r->length_mode = r->mode;
   r->length = dt == wanted ? h : dt;

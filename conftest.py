@@ -62,8 +62,6 @@ OPEN = {
     "test_other_contact_models_have_it_too": "power laws from rest: the load begins with t^(3/2)",
     "test_in_3d_many_bounces_come_closer": "rest with elliptical friction",
     "test_the_frictionless_phase_at_every_scale": "rolling starts whose load begins at zero",
-    "test_chaos_beyond_the_touch_grows_in_proportion": "orbits beyond a touch",
-    "test_orbits_are_checked_and_altered_ones_are_refused": "a jump leads across a stop",
 }
 
 

@@ -1,5 +1,7 @@
 """Inputs on which a run or a derivative was silently wrong, against differences and closed forms."""
 
+import math
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -75,3 +77,12 @@ def test_derivatives_of_a_map_of_the_state_at_its_trigger(values):
         return
     found = ns.sensitivity(run).dx_dx0
     np.testing.assert_allclose(found, _differences(system, start, 1.4), rtol=0, atol=1e-8)
+
+
+def test_ticks_at_late_times():
+    late, end = 1.7e9, 0.0
+    system = ns.FilippovSystem([x], field=[-x], clocks=ns.Clock(0.3, {x: x + 1}))
+    run = ns.simulate(system, [0.0, 0.0], late + 1, t_start=late)
+    for _ in range(3):
+        end = end * math.exp(-0.3) + 1
+    np.testing.assert_allclose(run.x[-1], [end * math.exp(-0.1), 0.1], rtol=0, atol=1e-10)

@@ -12,6 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -165,7 +166,7 @@ def _graded(
         cuts |= {high - size} if ends else set()
         size *= 0.125
     ordered = sorted(cuts)
-    return list(zip(ordered[:-1], ordered[1:], strict=True))
+    return list(pairwise(ordered))
 
 
 def _without_derivative(what: str, t: float) -> str:
@@ -320,21 +321,20 @@ def saltation_after(
     # At the end of a run the field after it is that of the mode reached.
     if part.leg.timed:
         return None
-    system, n = run.system, len(part.start)
+    system = run.system
     at = part.leg.at_end(system, flow.end, p)
     ends = run.events[-1]
     leg = following.leg if following else Leg(ends.mode_before) if ends.kind == "end" else None
     if part.leg.kind == "stop" or leg is None:
+        return saltation(at, flow.rate, at.after_state @ flow.rate, _at(system, part))
+    after = _rate_after(system, part, leg, at, p)
+    if after is None and part.leg.kind == "exit":  # the fields agree
         after = at.after_state @ flow.rate
-    else:
-        after = _rate_after(system, part, leg, at, p)
-        if after is None and part.leg.kind == "exit":  # the fields agree
-            after = at.after_state @ flow.rate
-        if after is None:
-            raise DegenerateError(
-                f"{_at(system, part)}: the field after the event is not finite at {part.after.tolist()}. "
-                "Start or end the run on one side of it."
-            )
+    if after is None:
+        raise DegenerateError(
+            f"{_at(system, part)}: the field after the event is not finite at {part.after.tolist()}. "
+            "Start or end the run on one side of it."
+        )
     return saltation(at, flow.rate, after, _at(system, part))
 
 

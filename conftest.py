@@ -62,11 +62,8 @@ FAST = {"test_a_broken_model_is_refused", "test_claim_holds_and_is_in_the_readme
 OPEN = {
     "test_a_broken_model_is_refused": "another message",
     "test_claim_holds_and_is_in_the_readme": "accumulation at a repelling line",
-    "test_other_contact_models_have_it_too": "power laws from rest: the load begins with t^(3/2)",
     "test_without_another_compiler_a_run_says_what_to_install": "a file that is no library",
     "test_runs_under_sanitizers": "not seen to pass on the merged driver",
-    "test_in_3d_many_bounces_come_closer": "rest with elliptical friction",
-    "test_the_frictionless_phase_at_every_scale": "rolling starts whose load begins at zero",
     "test_chaos_beyond_the_touch_grows_in_proportion": "orbits beyond a touch",
     "test_a_drive_against_its_third_harmonic_grazes_and_adds": "the branch ends at its first graze",
     "test_lanes_of_any_width_and_instruction_set": "ends differ by 1e-6 between widths",

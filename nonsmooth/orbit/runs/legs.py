@@ -188,6 +188,7 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
             leg = leg_of(system, first, p)
             if system.resets or not system.definition.plain:
                 _require_smooth_choices(system, group, p)
+                _require_present_state(system, group)
             if not system.definition.plain:
                 if begins or first.t > t:
                     _require_located(system, first, x_end, p, leg)
@@ -226,6 +227,11 @@ def _instants(events: Sequence[Event]) -> list[list[Event]]:
 
 def _require_countable(group: Sequence[Event]) -> None:
     for event in group:
+        if event.kind == "rest":
+            raise DegenerateError(
+                f"event at t = {event.t:.10g}: expected finitely many events before {event.name!r} rests, "
+                "received events that accumulate. Infinitely many legs have no fixed itinerary: end the run before."
+            )
         if event.kind == "contact":
             raise DegenerateError(
                 f"event at t = {event.t:.10g}: expected finitely many impacts before a contact "
@@ -287,6 +293,17 @@ def _require_smooth_choices(system: FilippovSystem, group: Sequence[Event], p: A
             )
         own = instant_map(system, event.mode_before, event.kind, event.element)
         moves = own(x, p).after_state @ moves
+
+
+def _require_present_state(system: FilippovSystem, group: Sequence[Event]) -> None:
+    """Refuse a map of the state at its trigger after another event of the instant."""
+    for event in group[1:]:
+        if event.kind == "reset" and system.resets[event.element].at_trigger:
+            raise DegenerateError(
+                f"event at t = {event.t:.10g}: derivatives of {event.name!r}, which takes the state at its "
+                f"trigger, are not implemented after {group[0].name!r} at the same instant. Give it the present "
+                "state or the larger priority."
+            )
 
 
 def _require_one_surface(system: FilippovSystem, event: Event) -> None:

@@ -116,9 +116,19 @@ def _collocated(
         a = np.array([v[0] for v in values])
         b = np.zeros((_STAGES, *derivatives.shape))
         b[:, :, n:] = np.array([v[1][:, list(chosen)] for v in values])
-        derivatives = derivatives + h * _increment(a, b, derivatives, h * inner, weights)
+        try:
+            derivatives = derivatives + h * _increment(a, b, derivatives, h * inner, weights)
+        except np.linalg.LinAlgError:
+            raise DegenerateError(_without_derivative(leg_name(run.system, leg), low)) from None
     end, rate = _polynomial(run, last - 1, t_end, n)
     return LegFlow(end, derivatives[:, :n], derivatives[:, n:], rate)
+
+
+def _without_derivative(what: str, t: float) -> str:
+    return (
+        f"{what}: the derivative is not finite at t = {t:.10g}, as at the zero of a root. Start or end the run "
+        "on one side of it."
+    )
 
 
 def _polynomial(run: Trajectory, step: int, t: float, n: int) -> tuple[Array, Array]:
@@ -273,12 +283,30 @@ def saltation_after(
     if part.leg.kind == "stop" or leg is None:
         after = at.after_state @ flow.rate
     else:
-        field = leg.field(system)
-        start = field.states_at(at.after, p)
-        after = field.rate.copied(start, p)[0][:n, 0]
-        if not np.all(np.isfinite(after)):
+        after = _rate_after(system, part, leg, at, p)
+        if after is None and part.leg.kind == "exit":  # the fields agree
             after = at.after_state @ flow.rate
+        if after is None:
+            raise DegenerateError(
+                f"{_at(system, part)}: the field after the event is not finite at {part.after.tolist()}. "
+                "Start or end the run on one side of it."
+            )
     return saltation(at, flow.rate, after, _at(system, part))
+
+
+def _rate_after(
+    system: FilippovSystem, part: Stretch, leg: Leg, at: AtEvent, p: Array
+) -> Array | None:
+    """The field after an event, also where a root of its function has rounding as its argument."""
+    n, field = len(part.start), leg.field(system)
+    e = at.gradient[:n]
+    shift = _ROUNDING * float(np.abs(e) @ np.abs(part.after)) * e / max(float(e @ e), 1e-300)
+    with np.errstate(all="ignore"):
+        for x in (at.after, part.after, part.after + shift, part.after - shift):
+            rate = field.rate.copied(field.states_at(x, p), p)[0][:n, 0]
+            if np.all(np.isfinite(rate)):
+                return rate
+    return None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -378,6 +406,11 @@ def along(run: Trajectory, names: Sequence[str]) -> tuple[list[Passage], Sensiti
                 continue
         dx, dp = part.through(dx, dp, chosen)
     m, q = len(times), len(chosen)
+    if not (np.isfinite(dx).all() and np.isfinite(dp).all()):
+        first = next((k for k in parts if not np.isfinite(k.flow.by_start).all()), parts[-1])
+        raise DegenerateError(
+            _without_derivative(leg_name(system, first.stretch.leg), float(run.t[-1]))
+        )
     return parts, Sensitivity(
         dx_dx0=dx[:n, :n],
         dx_dp=dp[:n],

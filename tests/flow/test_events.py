@@ -104,7 +104,7 @@ def test_a_map_of_a_discrete_state_is_locally_constant():
         (lambda: ns.Reset(x - 1, {x: 0}, 1, values="later"), "now"),
         (lambda: ns.Reset(x - 1, {x: 0}, 1, initially=2), "initially"),
         (lambda: ns.Reset(x - 1, {x: 0}, 1, level=1), "level"),
-        (lambda: ns.Stop(p >= 1), "functions of the states"),
+        (lambda: ns.Stop(p >= 1), "function of the states"),
     ],
 )
 def test_wrong_events_are_refused(event, message):

@@ -387,7 +387,7 @@ class TapeEngine:
             "value_at": _ends(values),
         }
         atoms, keeps = d.guards.numel(), any(rule.at_trigger for rule in d.rules)
-        width = 5 + 4 * atoms + len(conditions) + 2 * len(d.clocks)
+        width = 5 + 4 * atoms + len(conditions) + 3 * len(d.clocks)
         width += len(conditions) * self.system.extended_dimension * keeps
         made = _Rules(
             atoms=atoms,

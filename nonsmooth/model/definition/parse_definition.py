@@ -597,7 +597,7 @@ def _require_states(what: str, function: ca.SX, states: ca.SX, d: Definition) ->
     """Refuse a function that does not depend on the states."""
     if not ca.depends_on(function, states):
         received = f"the constant {function}"
-        advice = "A surface is the zero set of a function of the states."
+        advice = "Its sign has to change along the motion."
         if d.time.numel() and ca.depends_on(function, d.time):
             received = f"the function {function} of time alone"
             advice = "Make a clock a state, c' = 1, and the surface a function of c."

@@ -426,15 +426,18 @@ def grown(problem: BoundaryProblem, u: Array, p: Array, fresh: Sequence[int], by
     """Unknowns near an orbit whose legs ``fresh`` last for ``by``."""
     # A leg that is added inside a slide begins before the point where the slide touched its boundary
     # and ends after it: h = L11 t^2/2 + L111 t^3/6 with an exit at -t/3 of a leg of the duration t.
+    # A slide that begins at a graze ends where the graze was.
     starts, durations = (np.array(part) for part in problem.split(u))
     legs = problem.legs
     for i in fresh:
         durations[i] = by
-        added = 0 < i < len(legs) - 1 and legs[i].kind == "entry" and legs[i - 1].kind == "exit"
-        if not added or durations[i - 1] < by or durations[i + 1] < by:
+        kinds = (legs[i - 1].kind, legs[i].kind) if 0 < i < len(legs) - 1 else ("", "")
+        before = {("exit", "entry"): by / 3, ("entry", "exit"): by}.get(kinds, 0.0)
+        through = kinds == ("exit", "entry") or legs[i - 1].mode == mode_after(legs[i])
+        if not before or not through or durations[i - 1] < by or durations[i + 1] < by:
             continue
-        durations[i - 1] -= by / 3
-        durations[i + 1] -= 2 * by / 3
+        durations[i - 1] -= before
+        durations[i + 1] -= by - before
         for k in (i - 1, i):
             flow = integrate_leg(problem.system, legs[k], starts[k], float(durations[k]), p)
             starts[k + 1] = flow.end[: problem.dimension]

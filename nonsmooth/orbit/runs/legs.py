@@ -298,7 +298,8 @@ def _require_smooth_choices(system: FilippovSystem, group: Sequence[Event], p: A
 def _require_present_state(system: FilippovSystem, group: Sequence[Event]) -> None:
     """Refuse a map of the state at its trigger after another event of the instant."""
     for event in group[1:]:
-        if event.kind == "reset" and system.resets[event.element].at_trigger:
+        rules = system.definition.rules[len(system.stops) :]
+        if event.kind == "reset" and event.element < len(rules) and rules[event.element].at_trigger:
             raise DegenerateError(
                 f"event at t = {event.t:.10g}: derivatives of {event.name!r}, which takes the state at its "
                 f"trigger, are not implemented after {group[0].name!r} at the same instant. Give it the present "

@@ -12,6 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -93,41 +94,85 @@ def _speed(at: AtEvent, rate: Array) -> float:
 
 _STAGES = 12
 
+#: Smallest panel at an end of a leg, where roots have no derivative, relative to the time.
+_SMALLEST = 1e-13
+
+#: Relative difference of derivatives with coarser panels above which they are refused.
+_COLLOCATED = 1e-6
+
 
 def _collocated(
     run: Trajectory, leg: Leg, t_start: float, t_end: float, p: Array, chosen: tuple[int, ...]
 ) -> LegFlow:
-    """Derivatives of a leg of a run between two times, by Gauss collocation."""
+    """Derivatives of a leg of a run between two times, by Gauss collocation on panels graded to both ends."""
+    coarse, end, rate = _by_panels(run, leg, t_start, t_end, p, chosen, 64 * _SMALLEST)
+    derivatives, _, _ = _by_panels(run, leg, t_start, t_end, p, chosen, _SMALLEST)
+    wrong = float(np.abs(derivatives - coarse).max())
+    if not wrong <= _COLLOCATED * max(1.0, float(np.abs(derivatives).max())):
+        raise DegenerateError(_without_derivative(leg_name(run.system, leg), t_end))
+    n = len(end)
+    return LegFlow(end, derivatives[:, :n], derivatives[:, n:], rate)
+
+
+def _by_panels(
+    run: Trajectory,
+    leg: Leg,
+    t_start: float,
+    t_end: float,
+    p: Array,
+    chosen: tuple[int, ...],
+    smallest: float,
+) -> tuple[Array, Array, Array]:
     field = leg.field(run.system, chosen)
     n, starts = field.blocks.starts, run.steps.starts
     first = max(int(np.searchsorted(starts, t_start, side="right")) - 1, 0)
     last = max(int(np.searchsorted(starts, t_end, side="left")), first + 1)
     start = _polynomial(run, first, t_start, n)[0]
-    initial = field.initial(start, p)
-    derivatives = initial[:, 1:]
+    derivatives = field.initial(start, p)[:, 1:]
     nodes, weights, inner = _gauss(_STAGES)
     for k in range(first, last):
         low = max(float(starts[k]), t_start)
         high = min(float(starts[k + 1]) if k + 1 < len(starts) else t_end, t_end)
         if high <= low:
             continue
-        h = high - low
-        values = [field.linear.copied(_polynomial(run, k, low + h * c, n)[0], p)[1:] for c in nodes]
-        a = np.array([v[0] for v in values])
-        b = np.zeros((_STAGES, *derivatives.shape))
-        b[:, :, n:] = np.array([v[1][:, list(chosen)] for v in values])
-        try:
-            derivatives = derivatives + h * _increment(a, b, derivatives, h * inner, weights)
-        except np.linalg.LinAlgError:
-            raise DegenerateError(_without_derivative(leg_name(run.system, leg), low)) from None
+        for one, two in _graded(low, high, k == first, k == last - 1, smallest):
+            h = two - one
+            innermost = h <= 2.0 * smallest * max(1.0, abs(one))
+            values = [
+                field.linear.copied(_polynomial(run, k, one + h * c, n)[0], p)[1:] for c in nodes
+            ]
+            a = np.array([v[0] for v in values])
+            b = np.zeros((_STAGES, *derivatives.shape))
+            b[:, :, n:] = np.array([v[1][:, list(chosen)] for v in values])
+            if innermost:  # the argument of a root may be rounding
+                a[~np.isfinite(a)] = b[~np.isfinite(b)] = 0.0
+            try:
+                increment = _increment(a, b, derivatives, h * inner, weights)
+            except np.linalg.LinAlgError:
+                raise DegenerateError(_without_derivative(leg_name(run.system, leg), one)) from None
+            derivatives = derivatives + h * increment
     end, rate = _polynomial(run, last - 1, t_end, n)
-    return LegFlow(end, derivatives[:, :n], derivatives[:, n:], rate)
+    return derivatives, end, rate
+
+
+def _graded(
+    low: float, high: float, begins: bool, ends: bool, smallest: float
+) -> list[tuple[float, float]]:
+    """Panels of a step, smaller and smaller toward the ends of its leg."""
+    least, size = smallest * max(1.0, abs(low)), 0.5 * (high - low)
+    cuts = {low, high}
+    while size > least:
+        cuts |= {low + size} if begins else set()
+        cuts |= {high - size} if ends else set()
+        size *= 0.125
+    ordered = sorted(cuts)
+    return list(pairwise(ordered))
 
 
 def _without_derivative(what: str, t: float) -> str:
     return (
-        f"{what}: the derivative is not finite at t = {t:.10g}, as at the zero of a root. Start or end the run "
-        "on one side of it."
+        f"{what}: the derivative is not finite, or not resolved, near t = {t:.10g}, as at the zero of a root. "
+        "Start or end the run on one side of it."
     )
 
 
@@ -276,21 +321,20 @@ def saltation_after(
     # At the end of a run the field after it is that of the mode reached.
     if part.leg.timed:
         return None
-    system, n = run.system, len(part.start)
+    system = run.system
     at = part.leg.at_end(system, flow.end, p)
     ends = run.events[-1]
     leg = following.leg if following else Leg(ends.mode_before) if ends.kind == "end" else None
     if part.leg.kind == "stop" or leg is None:
+        return saltation(at, flow.rate, at.after_state @ flow.rate, _at(system, part))
+    after = _rate_after(system, part, leg, at, p)
+    if after is None and part.leg.kind == "exit":  # the fields agree
         after = at.after_state @ flow.rate
-    else:
-        after = _rate_after(system, part, leg, at, p)
-        if after is None and part.leg.kind == "exit":  # the fields agree
-            after = at.after_state @ flow.rate
-        if after is None:
-            raise DegenerateError(
-                f"{_at(system, part)}: the field after the event is not finite at {part.after.tolist()}. "
-                "Start or end the run on one side of it."
-            )
+    if after is None:
+        raise DegenerateError(
+            f"{_at(system, part)}: the field after the event is not finite at {part.after.tolist()}. "
+            "Start or end the run on one side of it."
+        )
     return saltation(at, flow.rate, after, _at(system, part))
 
 

@@ -283,7 +283,7 @@ static int pass_root(Run *r, double left);
 static void leave_singular(Run *r, Expansion *e, double left) {
   int huge = 0;
   for (int i = 0; i < r->n; i++)
-    for (int k = 0; k < 2; k++) huge |= fabs(e->states[(int64_t)i * r->stride + k]) > HUGE;
+    for (int k = 0; k < 2; k++) huge |= fabs(e->states[(int64_t)i * r->stride + k]) > LARGEST;
   double h = singular_step(r, e, smaller(left, r->o.max_step));
   if ((h == 0 || huge) && !ends_at_singular(r)) finish(r, NOT_FINITE, FIELD, 0);
   if (r->status != RUNNING) return;
@@ -322,8 +322,8 @@ static void step(Run *r) {
   if (row >= 0 && is_before_fold(r, e, row, dt)) { dt = to_number(r, 0.5 * dt); row = -1; last = 0; }
   double wanted = dt, safe = safe_length(r, e, by_series), good;
   while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
-  int held = dt > STEADY * r->length && (dt > r->length / STEADY || dt > wanted / FAR);
-  int shrinks = dt < wanted && !(r->mode == r->length_mode && held);
+  int grows = r->mode == r->length_mode && dt > r->length / STEADY;
+  int shrinks = dt <= wanted / FAR && !grows;
   r->shortened = larger(0, r->shortened + (shrinks ? 1 : -0.2));
   r->length_mode = r->mode;
   r->length = dt == wanted ? h : dt;

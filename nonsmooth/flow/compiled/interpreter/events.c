@@ -122,15 +122,23 @@ static void reset_map(Run *r, int index, const double *x, double *after) {
   if (r->s->timed) after[nd] = x[nd];
 }
 
+/* The ticks of a clock are counted from its next one, a time of two numbers. */
+static void count_ticks(Run *r, int c) {
+  double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
+  double left = period - r->x[r->s->rules.clock_state[c]], sum = r->t + left, moved = sum - r->t;
+  r->instant.tick[2 * c] = sum;
+  r->instant.tick[2 * c + 1] = (r->t - (sum - moved)) + (left - moved) + r->t_low;
+  r->instant.count[c] = 0;
+}
+
 /* Clocks after a jump of an event: their ticks are counted, and counted anew where a jump moved the phase. */
 static void set_clocks(Run *r, int event, const double *before) {
   const Rules *u = &r->s->rules;
   Instant *i = &r->instant;
   for (int c = 0; c < u->clocks; c++) {
     int at = u->clock_state[c], own = event == r->s->stops + u->clock_reset[c];
-    double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
     if (own && r->x[at] == 0) i->count[c]++;
-    else if (own || r->x[at] != before[at]) { i->tick[c] = r->t + (period - r->x[at]); i->count[c] = 0; }
+    else if (own || r->x[at] != before[at]) count_ticks(r, c);
   }
 }
 
@@ -183,7 +191,7 @@ static void write_motion(const Run *r, double *to) {
   for (int k = 0; k < 3; k++) for (int a = 0; a < u->atoms; a++) *to++ = sides[k][a];
   for (int a = 0; a < u->atoms; a++) *to++ = i->residual[a];
   for (int k = 0; k < u->triggers; k++) *to++ = i->pending[k];
-  for (int c = 0; c < u->clocks; c++) { *to++ = i->tick[c]; *to++ = (double)i->count[c]; }
+  for (int c = 0; c < u->clocks; c++) { *to++ = i->tick[2 * c]; *to++ = i->tick[2 * c + 1]; *to++ = (double)i->count[c]; }
   if (u->keeps) memcpy(to, i->trigger_x, sizeof(double) * u->triggers * r->n);
 }
 
@@ -201,7 +209,11 @@ static void read_motion(Run *r, const double *from) {
   for (int k = 0; k < 3; k++) for (int a = 0; a < u->atoms; a++) sides[k][a] = (int8_t)*from++;
   for (int a = 0; a < u->atoms; a++) i->residual[a] = *from++;
   for (int k = 0; k < u->triggers; k++) i->pending[k] = (int8_t)*from++;
-  for (int c = 0; c < u->clocks; c++) { i->tick[c] = *from++; i->count[c] = (int64_t)*from++; }
+  for (int c = 0; c < u->clocks; c++) {
+    i->tick[2 * c] = *from++;
+    i->tick[2 * c + 1] = *from++;
+    i->count[c] = (int64_t)*from++;
+  }
   if (u->keeps) memcpy(i->trigger_x, from, sizeof(double) * u->triggers * r->n);
 }
 
@@ -420,11 +432,7 @@ static void begin_events(Run *r, const double *motion) {
   memset(i->residual, 0, sizeof(double) * u->atoms);
   memset(i->pending, 0, u->triggers);
   memset(i->passing, 0, u->atoms);
-  for (int c = 0; c < u->clocks; c++) {
-    double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
-    i->tick[c] = r->t + (period - r->x[u->clock_state[c]]);
-    i->count[c] = 0;
-  }
+  for (int c = 0; c < u->clocks; c++) count_ticks(r, c);
   look(r, r->x);
   if (motion) {
     read_motion(r, motion);

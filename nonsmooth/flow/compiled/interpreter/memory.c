@@ -64,7 +64,7 @@ static size_t place_instant(Instant *i, char *base, size_t used, const System *s
   i->germ = DOUBLES(GERM * atoms);
   i->trigger_x = DOUBLES(s->rules.keeps ? (size_t)triggers * s->n : 0);
   i->arrived = DOUBLES(s->n);
-  i->tick = DOUBLES(clocks);
+  i->tick = DOUBLES(2 * clocks);
   i->count = place(base, &used, sizeof(int64_t), (size_t)clocks);
   return used;
 }

@@ -57,7 +57,7 @@ typedef struct {
   int32_t running, first, settled, unsettled, last, tied, is_last;
   int64_t jumps, counted, sampled, *count;
   int8_t *side, *view, *now, *passing, *zero, *pending, *was;
-  double *value, *noise, *residual, *germ, *trigger_x, *arrived, *tick; /* germ: first coefficients on arrival */
+  double *value, *noise, *residual, *germ, *trigger_x, *arrived, *tick; /* two numbers each; germ: first coefficients on arrival */
 } Instant;
 
 /* The guards of a mode, and what slides in it. */

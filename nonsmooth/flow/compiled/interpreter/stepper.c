@@ -286,9 +286,9 @@ static int is_steep(const Run *r, const Expansion *e, int row, double dt) {
 /* The time of a clock's next tick, in two numbers: its ticks are counted. */
 static double tick_of(const Run *r, int c, double *low) {
   double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
-  double first = r->instant.tick[c], count = (double)r->instant.count[c], since = count * period;
+  double first = r->instant.tick[2 * c], count = (double)r->instant.count[c], since = count * period;
   double sum = first + since, moved = sum - first;
-  *low = (first - (sum - moved)) + (since - moved) + fma(count, period, -since);
+  *low = (first - (sum - moved)) + (since - moved) + fma(count, period, -since) + r->instant.tick[2 * c + 1];
   return sum;
 }
 

@@ -162,8 +162,7 @@ def test_an_interrupt_ends_the_compiler_and_leaves_nothing(monkeypatch, tmp_path
     assert list((tmp_path / "cache").iterdir()) == []
 
 
-@pytest.mark.parametrize("quiet", [False, True])
-def test_a_compiler_without_an_end_is_ended_with_all_it_started(quiet, monkeypatch, tmp_path):
+def test_a_compiler_without_an_end_is_ended_with_all_it_started(monkeypatch, tmp_path):
     """It is waited for once; then the next one does the work."""
     started, ended, real, sound = [], [], subprocess.Popen, find_compiler()
     hanging, kill = program(tmp_path / "hanging", "#!/bin/sh\nsleep 600 &\nwait\n"), os.killpg
@@ -181,13 +180,13 @@ def test_a_compiler_without_an_end_is_ended_with_all_it_started(quiet, monkeypat
     monkeypatch.setattr(build_module, "compilers", lambda: ((str(hanging),),))
     for _ in range(2):
         with pytest.raises(CompilerError, match=r"compiler[\s\S]*0\.5 s"):
-            build(SOURCE, run=build_module.Compilation(quiet))
+            build(SOURCE)
     assert len(started) == 1
     assert ended == [(started[0][1], signal.SIGKILL)]
     monkeypatch.setattr(build_module, "compilers", lambda: ((str(hanging),), sound))
     monkeypatch.setattr(build_module, "_LONGEST", 600.0)
     with pytest.warns(CompilerWarning, match="compiler.*hanging"):
-        assert build(SOURCE, run=build_module.Compilation(quiet)).answer() == 42
+        assert build(SOURCE).answer() == 42
     assert [command for command, _ in started] == [str(hanging), sound[0]]
 
 

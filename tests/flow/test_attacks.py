@@ -1,0 +1,88 @@
+"""Inputs on which a run or a derivative was silently wrong, against differences and closed forms."""
+
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, y, v, a, lam, kap = (ca.SX.sym(n) for n in ("x", "y", "v", "a", "lam", "kap"))
+
+
+def _differences(system, start, t_end, step=1e-5):
+    """Derivatives of the end of a run by central differences."""
+    ends = [
+        [ns.simulate(system, start + s * step * row, t_end, tol=1e-12).x[-1] for s in (1, -1)]
+        for row in np.eye(len(start))
+    ]
+    return np.array([(one - two) / (2 * step) for one, two in ends]).T
+
+
+def _root(force, power, jump):
+    """A body that falls on a spring with the law force * depth^power, and a jump of its load there."""
+    return ns.FilippovSystem(
+        [x, v], surface=x, above=[v, -1], below=[v, jump - 1 + force * (-x) ** power]
+    )
+
+
+@pytest.mark.parametrize(("power", "jump"), [(1.5, 0.5), (1.5, 0.0), (0.5, 0.5)])
+def test_derivatives_through_the_zero_of_a_power(power, jump):
+    system, start = _root(9.0, power, jump), np.array([0.5, 0.0])
+    found = ns.sensitivity(ns.simulate(system, start, 1.2, tol=1e-12)).dx_dx0
+    np.testing.assert_allclose(found, _differences(system, start, 1.2), rtol=0, atol=2e-6)
+
+
+def test_derivatives_of_super_twisting_have_the_jump_of_the_field():
+    system = ns.FilippovSystem(
+        [x, v], surface=x, above=[v - 1.5 * ca.sqrt(x), -1.1], below=[v + 1.5 * ca.sqrt(-x), 1.1]
+    )
+    start = np.array([0.2, 0.0])
+    found = ns.sensitivity(ns.simulate(system, start, 0.6, tol=1e-12)).dx_dx0
+    np.testing.assert_allclose(found, _differences(system, start, 0.6), rtol=0, atol=1e-6)
+
+
+def test_derivatives_that_are_not_resolved_are_refused():
+    surface = x + 0.1 * v**2
+    below = [v, -0.7 + 9 * (-surface) ** (1 / 3) - 0.3 * v]
+    run = ns.simulate(
+        ns.FilippovSystem([x, v], surface=surface, above=[v, -1], below=below), [0.5, 0], 2.5
+    )
+    with pytest.raises(ns.DegenerateError, match="not resolved"):
+        ns.sensitivity(run)
+
+
+def test_rest_after_infinitely_many_events_has_no_derivative():
+    twisting = ns.FilippovSystem(
+        [x, v], field=[v, -2 * lam - 0.9 * kap], surfaces=[x, v], multipliers=[lam, kap]
+    )
+    run = ns.simulate(twisting, [1.0, 0.1], 9.0)
+    assert run.x[-1].tolist() == [0, 0]
+    with pytest.raises(ns.DegenerateError, match="accumulate"):
+        ns.sensitivity(run)
+
+
+@pytest.mark.parametrize("values", ["now", "trigger"])
+def test_derivatives_of_a_map_of_the_state_at_its_trigger(values):
+    resets = [
+        ns.Reset(x - 1, {y: y**2 + x}, 1, "one"),
+        ns.Reset(x - 1, {x: x - 1.5 + 0.3 * y}, 1, "two", values=values),
+    ]
+    system = ns.FilippovSystem([x, y], field=[1, 0.7 * x - y], resets=resets)
+    run, start = ns.simulate(system, [0.0, 0.5], 1.4), np.array([0.0, 0.5])
+    if values == "trigger":
+        with pytest.raises(ns.DegenerateError, match="trigger"):
+            ns.sensitivity(run)
+        return
+    found = ns.sensitivity(run).dx_dx0
+    np.testing.assert_allclose(found, _differences(system, start, 1.4), rtol=0, atol=1e-8)
+
+
+def test_ticks_at_late_times():
+    late, end = 1.7e9, 0.0
+    system = ns.FilippovSystem([x], field=[-x], clocks=ns.Clock(0.3, {x: x + 1}))
+    run = ns.simulate(system, [0.0, 0.0], late + 1, t_start=late)
+    for _ in range(3):
+        end = end * math.exp(-0.3) + 1
+    np.testing.assert_allclose(run.x[-1], [end * math.exp(-0.1), 0.1], rtol=0, atol=1e-10)

@@ -59,9 +59,6 @@ def pytest_collectstart(collector: pytest.Collector) -> None:
 
 #: Slow tests that the driver in C does not pass yet, and what is wrong: each is a defect to be repaired.
 OPEN = {
-    "test_without_another_compiler_a_run_says_what_to_install": "a file that is no library",
-    "test_runs_under_sanitizers": "not seen to pass on the merged driver",
-    "test_lanes_of_any_width_and_instruction_set": "ends differ by 1e-6 between widths",
 }
 
 

@@ -123,8 +123,8 @@ def _library(source: str, command: Command, folder: Path, flags: Sequence[str]) 
         library.unlink(missing_ok=True)
         raise CompilerError(
             f"library {library}: compiled by {shlex.join(command)} but does not load ({error}). "
-            "Is it built for another machine, or the folder mounted noexec? Set NONSMOOTH_CACHE to "
-            "another folder.",
+            "If its folder is mounted noexec, set NONSMOOTH_CACHE to another one. Else this compiler is "
+            f"at fault, and another one is needed. {ADVICE}",
             f"compiler: what {shlex.join(command)} makes does not load.",
         ) from error
 

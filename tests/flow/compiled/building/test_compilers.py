@@ -101,7 +101,7 @@ print(said[0])
 @pytest.mark.parametrize(
     "stub", ["writes no library", "developer tools", "no program"], indirect=True
 )
-def test_without_another_compiler_a_run_says_what_to_install(stub):
+def test_without_another_compiler_a_run_says_what_to_install(stub, tmp_path):
     path = os.pathsep.join(p for p in sys.path if p)
     done = subprocess.run(
         [sys.executable, "-c", RUN],
@@ -112,6 +112,8 @@ def test_without_another_compiler_a_run_says_what_to_install(stub):
     told = [k for k in done.stderr.splitlines() if not k.startswith("nonsmooth: compiling")]
     assert done.returncode == 0 and told == [], done.stderr
     assert stub[1] in done.stdout and "pip install ziglang" in done.stdout
+    assert str(stub[0] / "cc") in done.stdout  # which one is at fault
+    assert list((tmp_path / "cache").glob("*.so")) == []
 
 
 @pytest.mark.parametrize("cc", [" ", "\t", "gcc 'x", 'gcc "', "''", "gcc \\"])

@@ -407,7 +407,8 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   if (first < 0) { if (r->repelling) turn_exits(r, e); return -1; }
   double latest = time[first] + RESOLVED * h;
   for (int j = 0; j < rows; j++)
-    if (time[j] > 0 && time[j] <= latest && (is_curved(r, &e->l, j) || (found > 1 && is_scaled_exit(r, &e->l, j)))) time[j] = polished(r, e, j, time[j]);
+    if (time[j] > 0 && time[j] <= latest && (is_curved(r, &e->l, j) || (found > 1 && is_scaled_exit(r, &e->l, j))))
+      time[j] = polished(r, e, j, time[j]);
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
   /* Guards whose times cannot be told apart: atoms are passed together, at the first time; others one by one. */
   int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;

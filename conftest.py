@@ -60,13 +60,8 @@ def pytest_collectstart(collector: pytest.Collector) -> None:
 #: Slow tests that the driver in C does not pass yet, and what is wrong: each is a defect to be repaired.
 OPEN = {
     "test_other_contact_models_have_it_too": "power laws from rest: the load begins with t^(3/2)",
-    "test_without_another_compiler_a_run_says_what_to_install": "a file that is no library",
-    "test_runs_under_sanitizers": "not seen to pass on the merged driver",
     "test_in_3d_many_bounces_come_closer": "rest with elliptical friction",
     "test_the_frictionless_phase_at_every_scale": "rolling starts whose load begins at zero",
-    "test_chaos_beyond_the_touch_grows_in_proportion": "orbits beyond a touch",
-    "test_lanes_of_any_width_and_instruction_set": "ends differ by 1e-6 between widths",
-    "test_orbits_are_checked_and_altered_ones_are_refused": "a jump leads across a stop",
 }
 
 

@@ -1,22 +1,25 @@
-"""Motion in time: events and resets, drivers, trajectories, ensembles.
+"""Motion in time: trajectories and ensembles, their options, results and files.
 
-The contract of events (``tests/flow/test_contract.py`` checks each sentence):
+``compiled`` has the driver, which decides at events; the modules here turn its arrays into results.
 
-1. A stop or reset fires where its function passes through zero in its direction: falling (-1), rising (1),
-   either way (0). A touch without a passage does not fire it.
-2. An event exactly at ``t_end``, to rounding, happens.
-3. At one instant a stop comes first and ends the run; then resets, in the order in which they were given;
-   then surfaces. After a reset the events of the new state are determined again. A zero that a jump moves
-   the state across is no event.
-4. A start on the zero of a stop is no event: the stop can fire once the motion has left its zero.
-5. A start on the zero of a reset with a direction fires it at once if the motion leaves zero that way.
-6. A start on the zero of a reset without a direction does not fire it. If the reset would reverse the
-   motion there, it is a wall whose side is not given: NON_UNIQUE.
-7. After firing, a reset can fire again only once its function has been nonzero. A motion that it leaves
-   pressed against its zero, without a rate, rests there: ACCUMULATION.
-8. A reset that changes the side of a surface is one event, with the mode that starts after it.
-9. After a reset that ends on the zero of another stop or reset, that one fires if the motion continues
-   through zero, from its side before the reset to the other.
+The contract of events (``tests/flow/test_contract.py`` and ``test_event_cases.py`` check each sentence):
+
+1. A stop or reset is due when its condition becomes true. The condition of a guard is that it passes zero in
+   its direction: falling (-1), rising (1), either way (0). A touch without a passage is no event.
+2. A passage is one event. A map that keeps its own guard at zero does not make its event due again.
+3. A jump that makes a condition true makes that event due at the same instant, unless it has
+   ``by_jumps=False``. Where a jump ends on a zero, the motion that follows decides.
+4. Of several events at one instant one is served at a time: stops first, then resets by ``priority``, then in
+   the order of definition, then impacts. All conditions are evaluated again after each jump; an event whose
+   condition has become false is no longer due, unless it is ``persistent``.
+5. ``when`` is a filter: an event is served only if it holds at that instant. An event with ``level=True`` is due
+   while its condition and ``when`` hold.
+6. Surfaces take their sides after the last jump of an instant. A jump across a surface is no event of it.
+7. What is true at a start is not due. A reset on its zero is, if the motion goes in; a stop is not. A reset
+   without a direction that would reverse the motion there is a wall whose side is not given: NON_UNIQUE.
+8. An event at ``t_end``, to rounding, happens, with all that follows at that instant.
+9. A motion that a reset leaves pressed against its zero, without a rate, rests there: ACCUMULATION. More than
+   ``max_jumps`` jumps at one instant end the run: ENDLESS_JUMPS.
 """
 
 from .ensembles.ensemble import ensemble

@@ -112,7 +112,7 @@ TIED = 1e-10
 #: In an element whose guard ended a mode they are zero to this many relative tolerances: its root has that error.
 KNOWN_TO = 100.0
 
-#: A second surface is met if Newton's step onto both changes no state by more than this part of it.
+#: A second surface is reached too if Newton's step onto both changes no state by more than this part of it.
 PARALLEL = 1e-13
 
 #: Solutions and motions that differ by this part are one; pivots below this part are zero.
@@ -139,7 +139,6 @@ LAGS = (1, 2, 3, 4, 6)
 BLOCKS = 4
 SPREAD = 0.02
 SHRINKS = 0.9999
-REMAINING = 1e-6
 AT_ONCE = 40  # events at one instant
 
 #: A set h = 0 is reached in one step where the remaining rotation of friction is below this part of the
@@ -156,34 +155,28 @@ OVERFLOW = 1e280
 
 #: Motions that can continue from a point, at most so many are kept.
 SEVERAL = 16
-# Unknowns that enter nonlinearly. Roots of a rate along a multiplier: coefficients below this part of all terms
-# vanish, the pieces of the way are counted and at most so long, and its ends are a little beyond the bounds. Of several
-# multipliers: how far two are apart, halvings of each side before Newton's method, its steps, and a grid of
-# starts where functions are not linear in each multiplier.
-LAYER_ROUNDING = 1e-13
-LAYER_PIECES = 4000
-LAYER_LONGEST = 0.25
-LAYER_BEYOND = 1e-9
-LAYER_APART = 1e-7
-LAYER_RESIDUAL = 1e-10
-LAYER_HALVINGS = 10
-LAYER_NEWTON = 30
-LAYER_GRID = 9
-LAYER_STARTS = 729
+
+#: Roots of a rate along a multiplier that enters nonlinearly: coefficients below this part of all terms vanish;
+#: the pieces of the way are at most so many and so long; its ends are this much beyond the bounds.
+LAYER_ROUNDING, LAYER_BEYOND = 1e-13, 1e-9
+LAYER_PIECES, LAYER_LONGEST = 4000, 0.25
+
+#: Solutions for several such multipliers: two are apart by this; residuals of one are this part of their terms.
+LAYER_APART, LAYER_RESIDUAL = 1e-7, 1e-10
+
+#: Halvings of each side of a box before Newton's method, its steps, and the grid of its starts and their number
+#: where functions are not linear in each multiplier.
+LAYER_HALVINGS, LAYER_NEWTON, LAYER_GRID, LAYER_STARTS = 10, 30, 9, 729
 
 #: Orbits round an intersection are closed to first (second) order where their ratio (bend) is this close to 1 (0).
 TURN_ROUNDING = 1e-12
 
-# A step from a point where high derivatives do not exist: its longest and shortest length, the part by which it is
-# shortened, and how exact the rates of guards that leave zero have to be. Derivatives of a field that is larger
-# than HUGE may be no numbers.
-SINGULAR_LONGEST = 1e-3
-SINGULAR_SHORTEST = 1e-15
-SINGULAR_SHORTER = 0.25
-SINGULAR_RATE = 0.1
-HUGE = 1e300
+#: A step from a point where high derivatives do not exist: its longest and shortest length, the part by which it
+#: is shortened, and how exact the rates of guards that leave zero have to be.
+SINGULAR_LONGEST, SINGULAR_SHORTEST = 1e-3, 1e-15
+SINGULAR_SHORTER, SINGULAR_RATE = 0.25, 0.1
 
-#: A fold of sliding is looked for where the slope would vanish within this many steps.
+#: Sliding may end in a fold where its slope would vanish within this many steps.
 FOLD_AHEAD = 10.0
 
 #: A fold is served at a root of the slope's series where it is this close, relative to the time.
@@ -228,7 +221,6 @@ REASONS = (
     "two_fold",
     "slid_to_two_fold",
     "ambiguous",
-    "no_mode",
     "degenerate",
     "wrong_start",
     "field",

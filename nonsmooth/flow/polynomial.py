@@ -49,8 +49,7 @@ def first_root(coefficients: Sequence[float], h: float) -> float | None:
     True
     """
     c = _floats(coefficients)
-    found: float = library().polynomial_root(address(c), c.size - 1, h)
-    return None if found < 0.0 else found
+    return _time(library().polynomial_root(address(c), c.size - 1, h))
 
 
 def first_crossing(coefficients: Sequence[float], h: float, direction: int) -> float | None:
@@ -73,7 +72,7 @@ def first_crossing(coefficients: Sequence[float], h: float, direction: int) -> f
     Raises
     ------
     OptionError
-        No numbers, or too many.
+        As :func:`first_root`.
 
     Examples
     --------
@@ -81,8 +80,7 @@ def first_crossing(coefficients: Sequence[float], h: float, direction: int) -> f
     2.0
     """
     c = _floats(coefficients)
-    found: float = library().polynomial_crossing(address(c), c.size - 1, h, direction)
-    return None if found < 0.0 else found
+    return _time(library().polynomial_crossing(address(c), c.size - 1, h, direction))
 
 
 def _floats(coefficients: Sequence[float]) -> Array:
@@ -95,6 +93,11 @@ def _floats(coefficients: Sequence[float]) -> Array:
             f"coefficients is {coefficients!r}. Give 1 to {MOST_ORDER} numbers, in increasing powers of t."
         )
     return c
+
+
+def _time(found: float) -> float | None:
+    """What the library found; it returns -1 where there is no root."""
+    return None if found < 0.0 else found
 
 
 def shift(coefficients: Sequence[float], t: float) -> list[float]:

@@ -24,7 +24,7 @@ from .errors import (
 )
 from .laws import complementarity
 from .laws.coupled import Coupled, ErrorScales, coupled_of, raised_of
-from .laws.evaluators import Evaluator, Resets, Surfaces, evaluator
+from .laws.evaluators import Evaluator, Surfaces, evaluator
 from .laws.followed import Followed, followed
 from .laws.layer import Layer, LayerNumbers, Loop, layer_of, loop_at
 from .laws.motion import Motion, mode_field, motion, watched_functions
@@ -59,7 +59,6 @@ __all__ = [
     "Parameters",
     "PointError",
     "Reset",
-    "Resets",
     "StartMap",
     "Stop",
     "Surfaces",

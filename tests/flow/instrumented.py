@@ -30,9 +30,7 @@ BUILDS = {
 }
 
 #: Files that decide: what the second command lists.
-DECISIONS = (
-    "decide.c", "complementarity.c", "events.c", "elements.c", "layer.c", "accumulation.c", "rest.c",
-)  # fmt: skip
+DECISIONS = ("decide.c", "events.c", "layer.c", "accumulation.c", "stability.c", "spiral.c")
 
 
 def marked_source() -> str:

@@ -165,7 +165,7 @@ def orbits():
         above=[v, 0],
         below=[v, -2],
         resets=[ns.Reset(x, [x, -0.5 * v], direction=-1, name="floor")],
-        stops=[ns.Stop(v + 0.5, 1, "fast")],
+        stops=[ns.Stop(x - 0.75, 1, "high")],
     )
     yield fold, [1, 0, 0], 3, "+ -"
     yield ball, [1, 0], 3, "o"

@@ -7,7 +7,7 @@ before them. A mask has the signs of the atom for which the relation holds.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 
@@ -27,37 +27,28 @@ Tree = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Rule:
-    """When a stop or reset is due, and what becomes of it.
+    """When a stop or reset is due, and what becomes of it."""
 
-    Attributes
-    ----------
-    triggers : tuple of trees
-        Conditions that make it due where they become true: one, or two without a direction.
-    when : tree or None
-        Filter as a tree; the expression is in ``Definition.whens`` in any case.
-    level : bool
-        Due while its condition is true.
-    initially : int
-        1: due at the start if true there; 0: never; -1: a reset on its zero, if the motion goes in.
-    by_jumps, persistent, at_trigger : bool
-        Whether jumps make it due; whether it stays due; whether its map takes the state when it became due.
-    named : tuple of int
-        States that its map names.
-    """
-
-    triggers: tuple[Tree, ...]
-    when: Tree | None = None
-    level: bool = False
-    initially: int = -1
-    by_jumps: bool = True
-    persistent: bool = False
-    at_trigger: bool = False
-    named: tuple[int, ...] = ()
+    triggers: tuple[Tree, ...]  # due where one becomes true: one, or two without a direction
+    when: Tree | None = None  # the filter as a tree; the expression is in ``Definition.whens``
+    level: bool = False  # due while the condition is true
+    initially: int = (
+        -1
+    )  # 1: due at a start if true; 0: never; -1: a reset on its zero, if the motion goes in
+    by_jumps: bool = True  # whether jumps make it due
+    persistent: bool = False  # whether it stays due
+    at_trigger: bool = False  # whether its map takes the state when it became due
+    named: tuple[int, ...] = ()  # states that its map names
 
     @property
     def atoms(self) -> set[int]:
         """Atoms of its conditions."""
         return {code // 8 for tree in self.triggers for code in tree if code >= 0}
+
+    @property
+    def located(self) -> tuple[Tree, ...]:
+        """Conditions whose changes along a motion are located: a filter only while it makes a level due."""
+        return (*self.triggers, *([self.when] if self.when and self.level else []))
 
     def moved(self, first: int) -> Rule:
         """Return the rule with the atoms from ``first`` on counted one higher."""
@@ -66,18 +57,16 @@ class Rule:
             return tuple(code + 8 if code >= 8 * first else code for code in codes)
 
         when = None if self.when is None else tree(self.when)
-        return Rule(
-            tuple(map(tree, self.triggers)),
-            when,
-            *(self.level, self.initially, self.by_jumps, self.persistent, self.at_trigger),
-            self.named,
-        )
+        return replace(self, triggers=tuple(map(tree, self.triggers)), when=when)
+
+
+#: Masks of the conditions that a guard is passed falling, either way, rising.
+_PASSED = {-1: (BELOW | ZERO,), 0: (ABOVE | ZERO, BELOW | ZERO), 1: (ABOVE | ZERO,)}
 
 
 def passages(atom: int, direction: int) -> tuple[Tree, ...]:
     """Triggers of a guard that is passed in a direction."""
-    rising, falling = (8 * atom + (ABOVE | ZERO),), (8 * atom + (BELOW | ZERO),)
-    return (rising, falling) if direction == 0 else (rising,) if direction > 0 else (falling,)
+    return tuple((8 * atom + mask,) for mask in _PASSED[direction])
 
 
 def holds(tree: Sequence[int], sides: Sequence[int]) -> bool:
@@ -175,8 +164,7 @@ class Atoms:
 
     def passages(self, e: ca.SX, direction: int, what: str) -> tuple[Tree, ...]:
         """Read a guard that is passed in a direction."""
-        masks = {1: (ABOVE | ZERO,), -1: (BELOW | ZERO,), 0: (ABOVE | ZERO, BELOW | ZERO)}
-        return tuple(self._signs(_pieces(e), mask, what) for mask in masks[direction])
+        return tuple(self._signs(_pieces(e), mask, what) for mask in _PASSED[direction])
 
     def _boolean(self, e: ca.SX, what: str, holds: bool) -> Tree:
         if e.is_op(ca.OP_NOT):
@@ -232,8 +220,7 @@ def located(rules: Sequence[Rule], atoms: Sequence[ca.SX], moving: ca.SX) -> lis
     """How each atom is located along a motion."""
     found = [UNWATCHED] * len(atoms)
     for rule in rules:
-        trees = [*rule.triggers, *([rule.when] if rule.when and rule.level else [])]
-        for code in (code for tree in trees for code in tree if code >= 0):
+        for code in (code for tree in rule.located for code in tree if code >= 0):
             atom, mask = divmod(code, 8)
             if not ca.depends_on(atoms[atom], moving):
                 continue  # it changes at jumps only

@@ -14,7 +14,20 @@ from ..reading import Expression, column, listed, scalar
 
 
 @dataclass(frozen=True)
-class Stop:
+class _Conditional:
+    """What stops and resets have in common."""
+
+    function: Expression
+    when: Expression | None = field(default=None, kw_only=True)
+    level: bool = field(default=False, kw_only=True)
+    initially: bool | None = field(default=None, kw_only=True)
+    by_jumps: bool = field(default=True, kw_only=True)
+    priority: Expression = field(default=0.0, kw_only=True)
+    persistent: bool = field(default=False, kw_only=True)
+
+
+@dataclass(frozen=True)
+class Stop(_Conditional):
     """A condition that ends a run, with the status STOPPED.
 
     Parameters
@@ -40,19 +53,12 @@ class Stop:
     ('STOPPED', 'floor', 3.0)
     """
 
-    function: Expression
     direction: int = 0
     name: str = "stop"
-    when: Expression | None = field(default=None, kw_only=True)
-    level: bool = field(default=False, kw_only=True)
-    initially: bool | None = field(default=None, kw_only=True)
-    by_jumps: bool = field(default=True, kw_only=True)
-    priority: Expression = field(default=0.0, kw_only=True)
-    persistent: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)
-class Reset:
+class Reset(_Conditional):
     """A condition at which the state jumps to ``map``.
 
     Parameters
@@ -105,16 +111,9 @@ class Reset:
     (1.0, [0.0, 1.6])
     """
 
-    function: Expression
     map: Sequence[Expression] | Mapping[Any, Expression]
     direction: int = 0
     name: str = "reset"
-    when: Expression | None = field(default=None, kw_only=True)
-    level: bool = field(default=False, kw_only=True)
-    initially: bool | None = field(default=None, kw_only=True)
-    by_jumps: bool = field(default=True, kw_only=True)
-    priority: Expression = field(default=0.0, kw_only=True)
-    persistent: bool = field(default=False, kw_only=True)
     values: str = field(default="now", kw_only=True)
 
 

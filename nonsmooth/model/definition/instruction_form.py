@@ -15,18 +15,15 @@ from numpy.typing import NDArray
 
 from ..checks import is_real
 from ..errors import DefinitionError
-from ..expressions.float_arithmetic import BINARY, UNARY
+from ..expressions.float_arithmetic import BINARY
 from ..expressions.graph import Node, evaluate, instructions, operation
-from ..numbering import MOST_CODES
+from ..numbering import MOST_CODES, OPERATIONS
 from ..reading import listed
 from ..values import Array
 from .conditions import OR, Rule
 from .lift import LiftedSwitch
 from .parse_definition import LARGEST, OUTPUTS, Definition, require_consistent
 from .system import FilippovSystem
-
-#: Operations of an instruction list; a list names those that it uses.
-_OPERATIONS = ("const", "input", *UNARY, *BINARY)
 
 #: Most instructions, and entries, of a system in a file, and most that are nested: CasADi prints nested ones
 #: by recursion.
@@ -156,7 +153,7 @@ def _expressions(plain: Mapping[str, Any], vectors: Sequence[ca.SX]) -> list[ca.
 def _nodes(plain: Mapping[str, Any], lengths: Sequence[int]) -> list[Node]:
     """The instructions, each of which has arguments before itself."""
     operations = _texts(plain.get("operations"), "operations")
-    _require({*operations} <= {*_OPERATIONS}, "operations that are known")
+    _require({*operations} <= {*OPERATIONS}, "operations that are known")
     op, args = _array(plain, "op", np.int32), _array(plain, "args", np.int32)
     constants: Array = _array(plain, "constants", np.float64)
     count = len(op)

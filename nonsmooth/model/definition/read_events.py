@@ -53,16 +53,12 @@ def read_rules(
     stops: Sequence[Stop], resets: Sequence[Reset], atoms: Atoms, named: Sequence[tuple[int, ...]]
 ) -> tuple[Rule, ...]:
     """Conditions of all events; the first atoms are the own ones of stops, then resets."""
-    events: list[tuple[Stop | Reset, str]] = [(s, "stop") for s in stops]
-    events += [(r, "reset") for r in resets]
+    events: list[tuple[Stop | Reset, str]] = [(s, f"stop {s.name!r}") for s in stops]
+    events += [(r, f"reset {r.name!r}") for r in resets]
     atoms.functions += [None] * len(events)
-    triggers = [
-        _triggers(event, k, f"{kind} {event.name!r}", atoms)
-        for k, (event, kind) in enumerate(events)
-    ]
+    triggers = [_triggers(event, k, what, atoms) for k, (event, what) in enumerate(events)]
     rules = []
-    for k, (event, kind) in enumerate(events):
-        what = f"{kind} {event.name!r}"
+    for k, (event, what) in enumerate(events):
         _require_options(event, what)
         when = None if event.when is None else read_when(event)
         tree = None

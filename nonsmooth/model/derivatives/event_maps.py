@@ -181,11 +181,8 @@ def atoms_at(system: FilippovSystem, kind: str, element: int, x: Array, p: Array
     """Values of the functions that decide when a stop or reset is due and that move along a motion."""
     d = system.definition
     rule = d.rules[element if kind == "stop" else len(d.stops) + element]
-    trees = [*rule.triggers, *([rule.when] if rule.when and rule.level else [])]
-    located = d.located
-    atoms = sorted(
-        {c // 8 for tree in trees for c in tree if c >= 0 and located[c // 8] != UNWATCHED}
-    )
+    own = {code // 8 for tree in rule.located for code in tree if code >= 0}
+    atoms = [k for k, way in enumerate(d.located) if k in own and way != UNWATCHED]
     build = lambda: [d.guards[k] for k in atoms]
     return _values_at(system, ("atoms of", kind, element), build, x, p)
 

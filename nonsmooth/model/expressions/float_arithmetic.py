@@ -1,9 +1,9 @@
-"""The arithmetic of doubles in Python, in which an undefined value is NaN and no error."""
+"""Operations of doubles in Python, by the names that CasADi gives them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 
 def _erfinv(y: float) -> float:
@@ -59,42 +59,3 @@ BINARY: dict[str, Callable[[float, float], float]] = {
     "or": lambda a, b: float(bool(a or b)),
     "if_else_zero": lambda a, b: b if a else 0.0,
 }
-
-
-class Numbers:
-    """Doubles as coefficients of series (see ``jets.Arithmetic``)."""
-
-    def number(self, value: float) -> float | None:
-        """Return a constant, None for 0."""
-        return float(value) if value else None
-
-    def clean(self, a: float) -> float | None:
-        """Return None for 0."""
-        return None if a == 0.0 else a
-
-    def inner(self, u: Sequence[float | None], v: Sequence[float | None]) -> float | None:
-        """Return the sum of products."""
-        total = 0.0
-        for a, b in zip(u, v, strict=True):
-            if a is not None and b is not None:
-                total += a * b
-        return total or None
-
-    def divide(self, a: float, b: float | None) -> float:
-        """Return a quotient; infinite where the divisor is zero."""
-        if b:
-            return a / b
-        return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a)
-
-    def apply(self, op: str, args: Sequence[float | None]) -> float:
-        """Return an operation of values, with 0 for None; NaN where it is undefined."""
-        values = [0.0 if a is None else a for a in args]
-        try:
-            if len(values) == 1:
-                return UNARY[op](values[0])
-            return BINARY[op](values[0], values[1])
-        except (OverflowError, ZeroDivisionError, ValueError):  # infinite or undefined
-            import casadi as ca
-
-            code, given = getattr(ca, "OP_" + op.upper()), map(ca.DM, values)
-            return float((ca.DM.unary if len(values) == 1 else ca.DM.binary)(code, *given))

@@ -27,9 +27,7 @@ class Linearity:
     bent_rows: list[bool]
     bent_free_rows: list[bool]
     bent_guards: list[bool]
-    curved_guards: list[
-        bool
-    ]  #: Not affine in states and time: their series end later than the states'.
+    curved_guards: list[bool]  # not affine in states and time
 
 
 def linearity(

@@ -23,11 +23,6 @@ class Degree:
     lower: tuple[ca.SX, ...]
     row: ca.SX
 
-    @property
-    def order(self) -> int:
-        """Relative degree."""
-        return len(self.lower) + 1
-
 
 def degree_of(h: ca.SX, rate: ca.SX, own: ca.SX, others: ca.SX, x: ca.SX, field: ca.SX) -> Degree:
     """Find the relative degree of ``h``, of this ``rate``, for the unknowns ``own``.

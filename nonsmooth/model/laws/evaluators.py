@@ -99,20 +99,6 @@ class Surfaces:
         return x
 
 
-class Resets:
-    """The maps of a system's resets as one function of state and parameters."""
-
-    def __init__(self, system: FilippovSystem):
-        self.system = system
-        self.evaluator = Evaluator(system.function("resets", lambda: [system.definition.maps]))
-
-    def apply(self, index: int, x: Array, p: Array) -> Array:
-        """Return the state after reset ``index``; the time is kept."""
-        after = x.copy()
-        after[: self.system.dimension] = self.evaluator.copied(x, p)[0][:, index]
-        return after
-
-
 def evaluator(
     system: FilippovSystem, key: Hashable, build: Callable[[], Sequence[ca.SX]]
 ) -> Evaluator:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nonsmooth.model import NotSmoothError
-from nonsmooth.model.expressions.float_arithmetic import BINARY, UNARY, Numbers
+from nonsmooth.model.expressions.float_arithmetic import BINARY, UNARY
 from nonsmooth.model.expressions.graph import operation
 from nonsmooth.model.expressions.jets import taylor
 
@@ -114,33 +114,27 @@ def test_an_operation_without_a_recurrence_is_refused():
         taylor(ca.floor(x), x, x, ca.SX(0, 1), 3)
 
 
-def test_values_outside_of_the_numbers_are_infinite_or_none():
-    """As C's: 10^400 overflows, 1/0 and log 0 are poles, sqrt(-1) has no value, x^y of both."""
-    numbers = Numbers()
-    assert numbers.apply("pow", [2.0, 10.0]) == 1024.0
-    assert numbers.apply("pow", [10.0, 400.0]) == math.inf
-    assert numbers.apply("exp", [1000.0]) == math.inf
-    assert numbers.apply("inv", [0.0]) == math.inf
-    assert numbers.apply("log", [0.0]) == -math.inf
-    assert math.isnan(numbers.apply("sqrt", [-1.0]))
-    assert numbers.apply("hypot", [3.0, 4.0]) == 5.0
-
-
 SPECIAL = [0.0, 1.0, -1.0, 0.5, -2.5, 3.0, 1000.0, -1000.0, 1e308, math.inf, -math.inf, math.nan]
 
 
 @pytest.mark.parametrize("op", [*UNARY, *BINARY])
-def test_numbers_have_the_values_of_casadi(op):
-    """Overflow with its sign, infinite and missing arguments: what CasADi's own evaluation gives."""
+def test_operations_have_the_values_of_casadi(op):
+    """Where Python raises no error for an overflow, a pole or a missing value."""
     a, b = ca.SX.sym("a"), ca.SX.sym("b")
     given = [a] if op in UNARY else [a, b]
-    evaluate = ca.Function("f", given, [operation(op, given)])
+    evaluate, own = ca.Function("f", given, [operation(op, given)]), {**UNARY, **BINARY}[op]
+    compared = 0
     for values in itertools.product(SPECIAL, repeat=len(given)):
-        own, expected = Numbers().apply(op, list(values)), float(evaluate(*values))
+        try:
+            found = own(*values)
+        except (OverflowError, ZeroDivisionError, ValueError):
+            continue
+        compared += 1
         rel = 1e-10 if op == "erfinv" else 1e-14  # CasADi's is less accurate
-        assert own == pytest.approx(expected, rel=rel, abs=0, nan_ok=True), values
+        assert found == pytest.approx(float(evaluate(*values)), rel=rel, abs=0, nan_ok=True), values
+    assert compared > 2
 
 
 def test_the_inverse_of_the_error_function_is_accurate():
     for y in (*np.linspace(-0.999, 0.999, 38), -1e-300, 1 - 2**-53, 1e-12 - 1):
-        assert math.erf(Numbers().apply("erfinv", [y])) == pytest.approx(y, rel=4e-16, abs=0)
+        assert math.erf(UNARY["erfinv"](y)) == pytest.approx(y, rel=4e-16, abs=0)

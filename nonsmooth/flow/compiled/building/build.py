@@ -3,7 +3,7 @@
 The key of an entry hashes the source, the flags, the compiler's path and version, and the processor,
 so a change of any of them is another entry. Entries appear by an atomic rename: processes that build
 the same one at once do double work and no harm. An entry that is damaged, or that does not load, is
-built again. A compiler that fails is told once and the next one is tried.
+built again. Where a compiler fails, a warning names it once and the next one is tried.
 """
 
 from __future__ import annotations
@@ -38,7 +38,6 @@ from .core_source import keyed
 from .store import cache_directory, is_intact, remove_leftovers, sealed, usable_folder
 
 __all__ = [
-    "Compilation",
     "CompilerError",
     "build",
     "cache_directory",
@@ -58,52 +57,31 @@ _WORK = "build-"
 _HANGING: set[Command] = set()
 
 
-class Compilation:
-    """How a compiler runs, and a way to stop it."""
-
-    def __init__(self, quiet: bool = False) -> None:
-        self.quiet, self.stopped, self.hangs = quiet, False, False
-        self._process: subprocess.Popen[bytes] | None = None
-
-    def stop(self) -> None:
-        """End the compiler that runs, and let none begin."""
-        self.stopped, process = True, self._process
-        if process is not None and process.poll() is None:
-            _end(process)
-
-    def call(self, command: list[str]) -> str:
-        """Run a compiler; what went wrong, or nothing. One that takes long says so on stderr."""
-        if self.stopped:
-            return "stopped"
-        name = "ziglang" if "ziglang" in command[:3] else command[0]
-        with tempfile.TemporaryFile() as errors:
+def _call(command: Sequence[str]) -> str:
+    """Run a compiler; what went wrong, or nothing. One that takes long says so on stderr."""
+    name = "ziglang" if "ziglang" in command[:3] else command[0]
+    with tempfile.TemporaryFile() as errors:
+        try:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=errors,
+                start_new_session=True,  # of which all processes can be ended together
+            )
+        except (OSError, ValueError) as error:
+            return str(error)
+        with process:
             try:
-                process = subprocess.Popen(
-                    command,
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    stderr=errors,
-                    start_new_session=True,  # of which all processes can be ended together
-                )
-            except (OSError, ValueError) as error:
-                return str(error)
-            self._process = process
-            with process:
-                try:
-                    if self.stopped:
-                        self.stop()
-                    _wait(process, "" if self.quiet else name)
-                except BaseException as error:
-                    _end(process)
-                    if not isinstance(error, subprocess.TimeoutExpired):
-                        raise
-                    self.hangs = True
-                    return _no_end()
-            if not process.returncode:
-                return ""
-            errors.seek(0)
-            text = errors.read().decode(errors="replace").strip()
-        return text or f"exit status {process.returncode} and no word about why"
+                _wait(process, name)
+            except BaseException:
+                _end(process)
+                raise
+        if not process.returncode:
+            return ""
+        errors.seek(0)
+        text = errors.read().decode(errors="replace").strip()
+    return text or f"exit status {process.returncode} without a message"
 
 
 def library_key(source: str, command: Command, flags: Sequence[str] = ()) -> str:
@@ -112,7 +90,7 @@ def library_key(source: str, command: Command, flags: Sequence[str] = ()) -> str
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 
-def build(source: str, flags: Sequence[str] = (), run: Compilation | None = None) -> ctypes.CDLL:
+def build(source: str, flags: Sequence[str] = ()) -> ctypes.CDLL:
     """Load the library of a C source, compiled unless the cache has it."""
     commands = compilers()
     if not commands:
@@ -120,10 +98,8 @@ def build(source: str, flags: Sequence[str] = (), run: Compilation | None = None
     failures: list[CompilerError] = []
     for command in commands:
         try:
-            library = _library(source, command, usable_folder(), flags, run or Compilation())
+            library = _library(source, command, usable_folder(), flags)
         except CompilerError as error:
-            if run is not None and run.stopped:
-                raise
             failures.append(error)
             continue
         if failures:
@@ -132,9 +108,7 @@ def build(source: str, flags: Sequence[str] = (), run: Compilation | None = None
     raise failures[0]
 
 
-def _library(
-    source: str, command: Command, folder: Path, flags: Sequence[str], run: Compilation
-) -> ctypes.CDLL:
+def _library(source: str, command: Command, folder: Path, flags: Sequence[str]) -> ctypes.CDLL:
     key = library_key(source, command, flags)
     library = folder / f"{key}.so"
     if is_intact(library):
@@ -142,15 +116,15 @@ def _library(
             return _loaded(library, key)
         except OSError:
             pass  # what it was built for is gone since: once more
-    compile_library(source, command, library, flags, run)
+    compile_library(source, command, library, flags)
     try:
         return _loaded(library, key)
     except OSError as error:
         library.unlink(missing_ok=True)
         raise CompilerError(
             f"library {library}: compiled by {shlex.join(command)} but does not load ({error}). "
-            "Is it built for another machine, or the folder mounted noexec? Set NONSMOOTH_CACHE to "
-            "another folder.",
+            "If its folder is mounted noexec, set NONSMOOTH_CACHE to another one. Else this compiler is "
+            f"at fault, and another one is needed. {ADVICE}",
             f"compiler: what {shlex.join(command)} makes does not load.",
         ) from error
 
@@ -174,15 +148,11 @@ def has_key(loaded: ctypes.CDLL, key: str) -> bool:
 
 
 def compile_library(
-    source: str,
-    command: Command,
-    library: Path,
-    flags: Sequence[str] = (),
-    run: Compilation | None = None,
+    source: str, command: Command, library: Path, flags: Sequence[str] = ()
 ) -> None:
     """Put the library of a source into its place, which has its key as name."""
     try:
-        _compile(source, command, flags, library, run or Compilation())
+        _compile(source, command, flags, library)
     except OSError as error:
         raise CompilerError(
             f"cache: expected to write {library}, received {error}. Make room, or set "
@@ -190,9 +160,7 @@ def compile_library(
         ) from error
 
 
-def _compile(
-    source: str, command: Command, flags: Sequence[str], library: Path, run: Compilation
-) -> None:
+def _compile(source: str, command: Command, flags: Sequence[str], library: Path) -> None:
     remove_leftovers(library.parent, [_WORK, files.PART], 6 * _LONGEST)
     # No TemporaryDirectory: it would go before the compiler does where a program ends meanwhile.
     work = Path(tempfile.mkdtemp(dir=library.parent, prefix=_WORK))
@@ -200,13 +168,14 @@ def _compile(
         text, output = work / "engine.c", work / "engine.so"
         text.write_text(keyed(source, library.stem), encoding="utf-8")
         call = [*command, *FLAGS, *flags, str(text), "-o", str(output), "-lm"]
-        failure = _no_end() if command in _HANGING else run.call(call)
-        if run.hangs:
-            _HANGING.add(command)
+        failure = f"no end within {_LONGEST:g} s"
+        if command not in _HANGING:
+            try:
+                failure = _call(call)
+            except subprocess.TimeoutExpired:
+                _HANGING.add(command)
         if not failure and not output.is_file():
             failure = "no error, but no library either"
-        if run.stopped:
-            raise CompilerError("compiler: stopped, because the program ends.")
         if failure:
             kept = library.with_suffix(".c")
             files.replace(kept, source.encode())
@@ -221,10 +190,7 @@ def _compile(
 
 
 def _wait(process: subprocess.Popen[bytes], name: str) -> None:
-    """Wait for a compiler; if it has a name and takes long, that is said on stderr."""
-    if not name:
-        _poll(process, _LONGEST)
-        return
+    """Wait for a compiler; one that takes long is named on stderr."""
     try:
         _poll(process, _QUIET)
         return
@@ -243,10 +209,6 @@ def _poll(process: subprocess.Popen[bytes], seconds: float) -> None:
         if time.monotonic() > end:
             raise subprocess.TimeoutExpired(process.args, seconds)
         time.sleep(0.005)
-
-
-def _no_end() -> str:
-    return f"no end within {_LONGEST:g} s"
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -776,15 +776,8 @@ static void lift_null_space(double *a, int n, double *work, int32_t *pivot) {
   int count = null_space(a, n, n, z, rest, pivot);
   for (int i = 0; i < n * n; i++) most = larger(fabs(a[i]), most);
   for (int l = 0; l < count; l++) {
-    double *own = z + (int64_t)l * n, length = 0;
-    for (int q = 0; q < l; q++) {
-      double part = 0;
-      for (int i = 0; i < n; i++) part += own[i] * z[(int64_t)q * n + i];
-      for (int i = 0; i < n; i++) own[i] -= part * z[(int64_t)q * n + i];
-    }
-    for (int i = 0; i < n; i++) length += own[i] * own[i];
-    if (!(length > 0)) continue;
-    for (int i = 0; i < n; i++) own[i] /= sqrt(length);
+    double *own = z + (int64_t)l * n;
+    if (!orthonormal(own, z, l, n, 1)) continue;
     for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) a[i * n + j] += most * own[i] * own[j];
   }
 }

@@ -283,7 +283,7 @@ static int pass_root(Run *r, double left);
 static void leave_singular(Run *r, Expansion *e, double left) {
   int huge = 0;
   for (int i = 0; i < r->n; i++)
-    for (int k = 0; k < 2; k++) huge |= fabs(e->states[(int64_t)i * r->stride + k]) > HUGE;
+    for (int k = 0; k < 2; k++) huge |= fabs(e->states[(int64_t)i * r->stride + k]) > LARGEST;
   double h = singular_step(r, e, smaller(left, r->o.max_step));
   if ((h == 0 || huge) && !ends_at_singular(r)) finish(r, NOT_FINITE, FIELD, 0);
   if (r->status != RUNNING) return;

@@ -137,6 +137,21 @@ static int null_space(const double *e, int rows, int columns, double *z, double 
   return count;
 }
 
+/* Make a vector orthogonal to ``count`` unit vectors of ``z``, and of length 1; 0 where nothing of it is left. */
+static int orthonormal(double *own, const double *z, int count, int n, int passes) {
+  double length = 0;
+  for (int pass = 0; pass < passes; pass++)
+    for (int l = 0; l < count; l++) {
+      double part = 0;
+      for (int i = 0; i < n; i++) part += own[i] * z[(int64_t)l * n + i];
+      for (int i = 0; i < n; i++) own[i] -= part * z[(int64_t)l * n + i];
+    }
+  for (int i = 0; i < n; i++) length += own[i] * own[i];
+  if (!(length > 0)) return 0;
+  for (int i = 0; i < n; i++) own[i] /= sqrt(length);
+  return 1;
+}
+
 /* A matrix G with M G M = M: the unknowns M G b solve what can be solved of M x = b, with the least sum of the squares
  * of x over ``size``. ``work`` has room for 3 n^2 + n. */
 static int invert_any(const double *m, int n, const double *size, double *inverse, double *work, int32_t *pivot) {
@@ -152,22 +167,13 @@ static int invert_any(const double *m, int n, const double *size, double *invers
     for (int j = 0; j < n; j++) inverse[pivot[i] * n + j] = a[2 * (int64_t)i * n + n + j] / unit[pivot[i]];
   for (int j = 0; j < n; j++) { /* directions that make no difference, orthogonal one after the other */
     int is_free = 1;
-    double *own = z + (int64_t)count * n, length = 0;
+    double *own = z + (int64_t)count * n;
     for (int i = 0; i < rank; i++) is_free &= pivot[i] != j;
     if (!is_free) continue;
     memset(own, 0, sizeof(double) * n);
     own[j] = 1 / (unit[j] * size[j]);
     for (int i = 0; i < rank; i++) own[pivot[i]] = -a[2 * (int64_t)i * n + j] / (unit[pivot[i]] * size[pivot[i]]);
-    for (int again = 0; again < 2; again++)
-      for (int l = 0; l < count; l++) {
-        double part = 0;
-        for (int i = 0; i < n; i++) part += own[i] * z[(int64_t)l * n + i];
-        for (int i = 0; i < n; i++) own[i] -= part * z[(int64_t)l * n + i];
-      }
-    for (int i = 0; i < n; i++) length += own[i] * own[i];
-    if (!(length > 0)) continue;
-    for (int i = 0; i < n; i++) own[i] /= sqrt(length);
-    count++;
+    count += orthonormal(own, z, count, n, 2);
   }
   for (int l = 0; l < count; l++) {
     const double *own = z + (int64_t)l * n;

@@ -162,7 +162,7 @@ static void begin(Lanes *s, Work *w, I fresh) {
 /* Ratios of the last two terms of the guards that are not affine to their allowances (an affine
  * guard is bounded by the states). */
 INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T *of_guards, T g[S1][P + 1],
-                         T *last, T *before, T *sum, I *vanish) {
+                         T *last, T *before, T *sum) {
   T gradient[S1][N], value[S1];
 #if M > 0
   if (!AFFINE[0] || !AFFINE[1]) {
@@ -190,14 +190,14 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T *
     *last = MAX(*last, SELECT(counts, p, BC(0)));
     *before = MAX(*before, SELECT(counts, b, BC(0)));
     I zero = counts & (MIN(p, b) == 0);
-    if (any(zero)) *vanish |= zero & ((g[j][P - 2] != 0) | (g[j][P - 3] != 0));
+    if (any(zero)) *sum = SELECT(zero & ((g[j][P - 2] != 0) | (g[j][P - 3] != 0)), BC(INFINITY), *sum);
   }
 }
 
-/* ``allowed`` and ``of_guards`` are the tolerances of states and of guards that are not affine; the last terms of
- * some guards ``vanish``, and earlier ones bound the step. */
+/* ``allowed`` and ``of_guards`` are the tolerances of states and of guards that are not affine. Not ``finite`` is also
+ * a lane where the last terms of a guard vanish, and earlier ones bound the step. */
 INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], T *allowed, T *of_guards,
-                   I *finite, I *vanish) {
+                   I *finite) {
   T last = BC(1e-300), before = BC(1e-300), sum = BC(0);
   UNROLL for (int i = 0; i < N; i++) {
     allowed[i] = i < ND ? SAFETY * (o->atol + o->rtol * ABS(s->x[i])) : BC(0);
@@ -207,8 +207,7 @@ INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 
     last = MAX(last, p);
     before = MAX(before, b);
   }
-  *vanish = NONE;
-  guard_ratios(s, o, allowed, of_guards, g, &last, &before, &sum, vanish);
+  guard_ratios(s, o, allowed, of_guards, g, &last, &before, &sum);
   *finite = ABS(sum) < INFINITY;
   T h1 = LOG2(MIN(last, BC(1e300))) * (-1.0 / P), h2 = LOG2(MIN(before, BC(1e300))) * (-1.0 / (P - 1));
   return EXP2(MIN(h1, h2));
@@ -411,7 +410,7 @@ typedef struct {
   T c[N][P + 1], g[S1][P + 1], allowed[N], of_guards[S1], by_series, h, left;
   T dt, slope; /* to the first event, or the step's end, and how fast the event's guard falls */
   I unclear, last, slot;
-  T t, since; /* of the lanes at its start */
+  T t, since, length; /* of the lanes at its start */
   I drop, slides, above;
   Guards v;
 } Step;
@@ -633,12 +632,12 @@ INLINE I finite_lanes(const Lanes *s) {
 /* The series of a step, its length, and which guards have a root in it. */
 INLINE void expand_step(Lanes *s, Work *w, Step *e) {
   const Options *o = limits(w);
-  I finite, vanish;
+  I finite;
   jet(s->x, s->q, s->slides, s->above, s->lambda, &e->c[0][0], &e->g[0][0]);
-  e->by_series = step_size(s, o, e->c, e->g, e->allowed, e->of_guards, &finite, &vanish);
+  e->by_series = step_size(s, o, e->c, e->g, e->allowed, e->of_guards, &finite);
   T h = MIN(e->by_series, BC(o->max_step)), left = o->t_end - s->t;
   e->last = h >= left;
-  e->unclear = ~finite | vanish;
+  e->unclear = ~finite;
   e->unclear |= ~e->last & (h <= SHORTEST * MAX(BC(1), ABS(s->t)));
   e->unclear |= (s->steps >= o->max_steps) | passed_between(s, e->g);
   /* What happens at the end, to rounding, happens. */
@@ -653,17 +652,23 @@ INLINE void sort_step(Lanes *s, Step *e) {
   if (any(hard)) e->unclear |= resolve(&e->v);
 }
 
+#if RARE_CASES_HERE
 /* What a step may have changed in the lanes ``which`` is again as at its start. */
 SELDOM void undo_step(Lanes *s, const Step *e, I which) {
   UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(which, e->c[i][0], s->x[i]);
   s->t = SELECT(which, e->t, s->t);
   s->since = SELECT(which, e->since, s->since);
+  s->length = SELECT(which, e->length, s->length);
   s->steps += which;
   s->drop = (s->drop & ~which) | (e->drop & which);
   s->slides = (s->slides & ~which) | (e->slides & which);
   s->above = (s->above & ~which) | (e->above & which);
   set_lambda(s);
 }
+#else
+/* The driver begins again from the trajectory's start. */
+INLINE void undo_step(Lanes *, const Step *, I) {}
+#endif
 
 /* Take the step where it is clear; the lanes are returned where it is not. */
 INLINE I take_step(Lanes *s, Work *w, Step *e) {
@@ -678,12 +683,13 @@ INLINE I take_step(Lanes *s, Work *w, Step *e) {
   I slides = s->slides;
   e->t = s->t;
   e->since = s->since;
+  e->length = s->length;
   e->drop = s->drop;
   e->slides = slides;
   e->above = s->above;
   advance(s, end, dt);
   I live = s->live & ~unclear, met = {0}, up = {0}, down = {0}, stopped = {0};
-  T length = ROWS + GUARDS > 0 ? SELECT(live, h, s->length) : s->length;
+  if (ROWS + GUARDS > 0) s->length = h;
   unclear |= ~finite_lanes(s);
 #if M > 0
   met = live & ~slides & (slot == 1);
@@ -696,12 +702,11 @@ INLINE I take_step(Lanes *s, Work *w, Step *e) {
   up &= ~unclear;
   down &= ~unclear;
   if (any(met | up | down)) unclear |= change_modes(s, w, met, up, down, e->slope);
-  length = SELECT((met | up | down) & ~unclear, BC(0), length);
+  s->length = SELECT(met | up | down, BC(0), s->length);
 #endif
   unclear &= s->live;
   if (any(unclear)) undo_step(s, e, unclear);
   live &= ~unclear;
-  s->length = SELECT(live, length, s->length);
 #if STOPS > 0
   for (int j = 0; j < STOPS; j++)
     s->above_stop[j] = (s->above_stop[j] & ~live) | ((I)(e->g[FIRST_STOP + j][0] > 0) & live);

@@ -58,7 +58,7 @@ def test_super_twisting_comes_to_rest(start, limit):
     assert run.itinerary.endswith("s") and run.x[-1].tolist() == [0, 0]
     rest = run.events[-2]
     assert (rest.kind, rest.name) == ("rest", "h0")
-    assert rest.t == pytest.approx(limit, abs=2e-8)  # it rests once its speed is below 1e-8
+    assert rest.t == pytest.approx(limit, abs=1e-10)
 
 
 def test_super_twisting_without_oscillation_rests_too():

@@ -127,15 +127,16 @@ static int leave_root(Run *r, int i, double near, double level, double left) {
 static int rest_near_root(Run *r, int i) {
   int before = r->mode, first = r->s->lower_first[i];
   int32_t own = i;
-  double allowed;
+  double allowed, left, error;
   if (r->s->degree[i] == 1) return 0;
   allowed = KNOWN_TO / SAFETY * r->small[first];
   for (int k = first; k < first + r->s->degree[i] - 1; k++) if (fabs(r->rates[k]) > KNOWN_TO / SAFETY * r->small[k]) return 0;
   if (fabs(field_at_root(r, i, r->x, 1, r->before)) > allowed || is_awaited(r, 0) || !choose_rest(r, &own, 1, 0)) return 0;
   adopt(r, &r->chosen);
   note(r);
-  r->history = 0;
-  event(r, REST, before, -1, r->x);
+  left = block_of(r, &left, &error) ? left - r->since : 0;
+  expand(r, r->letter, r->x, r->unknowns, &r->e);
+  go_to_limit(r, left > 0 && r->e.finite && step_size(r, &r->e) >= left ? left : 0, REST, before);
   return 1;
 }
 

@@ -89,7 +89,7 @@ typedef struct { int8_t *state, *order, *before; int32_t terms; double *nu, *ser
 /* The law of the active elements at a point; see decide.c. Matrices are (count, count), what has orders is
  * (orders, count). */
 typedef struct {
-  int32_t count, blocks, motions, branches, unstable;
+  int32_t count, blocks, motions, branches, unstable, last; /* last: order that growth decides instead of coefficients */
   const int8_t *letter;
   int32_t *own, *order, *first, *mark, *pivot, *proved;
   int8_t *is_contact, *is_idle, *is_touched, *is_known, *state, *block_state, *large_class;

@@ -76,7 +76,9 @@ def test_legs_are_judged_together_as_one_by_one():
     assert together == expected and len(together) >= 5
     assert sum("is violated" in fault for fault in together) >= 1
     assert sum("begins after it" in fault for fault in together) >= 1
-    assert sum("'out' reaches zero" in fault for fault in together) == 2  # from 7 to 8, and from 0 to 9
+    assert (
+        sum("'out' reaches zero" in fault for fault in together) == 2
+    )  # from 7 to 8, and from 0 to 9
 
 
 @pytest.mark.parametrize("kind", ["stop", "reset"])

@@ -189,6 +189,6 @@ def _run(
     times: Times | None,
     motion: Array | None,
 ) -> Trajectory:
-    asked = None if times is None else times.of(p)
-    run = tape_for(system, options).run(x, p, options, asked, motion)
+    read_at = None if times is None else times.of(p)
+    run = tape_for(system, options).run(x, p, options, read_at, motion)
     return trajectory(system, p, options, run)

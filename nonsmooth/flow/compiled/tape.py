@@ -239,7 +239,7 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
         getattr(made, name).argtypes = [_POINTER]
     made.table_read.argtypes = [_POINTER] * 4
     made.run_new.argtypes = [_POINTER] * 2
-    made.run_ask.argtypes = [_POINTER, _POINTER, _I64]
+    made.run_read_at.argtypes = [_POINTER, _POINTER, _I64]
     made.run_begin.argtypes = [*[_POINTER] * 6, _D, _POINTER]
     made.run_motion.argtypes = [_POINTER] * 2
     made.run_continue.argtypes = [_POINTER, _I64]
@@ -416,10 +416,10 @@ class TapeEngine:
         x: Array,
         p: Array,
         options: Options,
-        asked: Array | None = None,
+        read_at: Array | None = None,
         motion: Array | None = None,
     ) -> Run:
-        """Run one trajectory from an extended start, dense output kept, to be read at ``asked`` times."""
+        """Run one trajectory from an extended start, dense output kept, to be read at ``read_at`` times."""
         # ``motion`` is that of a run or event that is continued.
         width = self._c.rules.width
         if motion is not None:
@@ -430,7 +430,7 @@ class TapeEngine:
         with self.held_table() as table, self.held_run(table) as state:
             c_options = ctypes.byref(options_of(self.system, options, dense=True))
             given = (address(x), address(p), address(start))
-            library().run_ask(state, address(asked), 0 if asked is None else len(asked))
+            library().run_read_at(state, address(read_at), 0 if read_at is None else len(read_at))
             library().run_begin(
                 state, c_options, output.pointer, *given, options.t_start, address(motion)
             )

@@ -39,12 +39,12 @@ static int block_of(const Run *r, double *left, double *error) {
 
 /* Whether the run is read, or ends, within a time from now. */
 static int is_awaited(const Run *r, double time) {
-  int64_t low = 0, high = r->asked_count;
+  int64_t low = 0, high = r->read_count;
   while (low < high) {
     int64_t middle = (low + high) / 2;
-    if (r->asked[middle] < r->t) low = middle + 1; else high = middle;
+    if (r->read_at[middle] < r->t) low = middle + 1; else high = middle;
   }
-  return r->o.t_end <= r->t + time || (low < r->asked_count && r->asked[low] <= r->t + time);
+  return r->o.t_end <= r->t + time || (low < r->read_count && r->read_at[low] <= r->t + time);
 }
 
 /* Whether one of the last events was that of a guard. */

@@ -26,7 +26,7 @@ Run *run_new(const System *s, Table *table) {
 void run_free(Run *r) { free(r->arena); free(r); }
 
 /* Times at which the run is read: no approximation of the motion may span one of them. */
-void run_ask(Run *r, const double *times, int64_t count) { r->asked = times; r->asked_count = count; }
+void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = times; r->read_count = count; }
 
 static void set_parameters(Run *r, const double *p) {
   const System *s = r->s;
@@ -121,7 +121,7 @@ void run_resume(Run *r, const Output *out) { r->out = *out; }
 static void sample_into(Run *r, const Batch *b, int64_t i) {
   r->room = b->room;
   r->times = b->times ? b->times + i * b->times_stride : 0;
-  run_ask(r, r->times, r->times ? b->room : 0);
+  run_read_at(r, r->times, r->times ? b->room : 0);
   r->sample_t = b->sample_t + i * b->room;
   r->sample_x = b->sample_x + i * b->room * r->s->dimension;
 }

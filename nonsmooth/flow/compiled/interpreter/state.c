@@ -142,8 +142,8 @@ typedef struct {
   double *layer_series, *rates_of_several;
   Output out;
   int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
-  const double *times, *asked; /* times of samples in the row; times at which any run is read */
-  int64_t asked_count;
+  const double *times, *read_at; /* times of samples in the row; times at which any run is read */
+  int64_t read_count;
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;

@@ -57,24 +57,13 @@ def pytest_collectstart(collector: pytest.Collector) -> None:
         importlib.import_module(".".join(path.parent.relative_to(HERE).parts))
 
 
-#: Slow tests that the driver in C does not pass yet, and what is wrong: each is a defect to be repaired.
-OPEN = {
-    "test_other_contact_models_have_it_too": "power laws from rest: the load begins with t^(3/2)",
-    "test_in_3d_many_bounces_come_closer": "rest with elliptical friction",
-    "test_the_frictionless_phase_at_every_scale": "rolling starts whose load begins at zero",
-}
-
-
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the slow cases of tests, before ``-m`` selects, and expect the failures of ``OPEN``."""
+    """Mark the slow cases of tests, before ``-m`` selects."""
     for item in items:
         cases = {case for marker in item.iter_markers("slow_cases") for case in marker.args}
         if cases and item.callspec.id in cases:
             item.add_marker(pytest.mark.slow)
-        name = getattr(item, "originalname", None)
-        if name in OPEN and item.get_closest_marker("slow"):
-            item.add_marker(pytest.mark.xfail(reason=OPEN[name], strict=False))
 
 
 def pytest_collection_finish() -> None:

@@ -149,7 +149,7 @@ def _several(value: Any) -> list[Any]:
 def _stuck(
     system: FilippovSystem, mode: str, x: Array, p: Array, t: float, message: str
 ) -> Trajectory:
-    """A run that does not begin."""
+    """A run that ends at its start, where the multipliers are not unique."""
     status, x = Status.NON_UNIQUE, x[: system.dimension]
     return Trajectory(
         system=system,

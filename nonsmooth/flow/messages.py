@@ -37,7 +37,7 @@ def undetermined_rates(entries: Sequence[int]) -> str:
     surfaces = " and ".join(f"h{k}" for k in entries)
     return (
         f"On {surfaces} = 0 many sets of multipliers keep the motion on the surfaces, and the field differs "
-        "between them: only a combination of them is determined."
+        "between them. Only a combination of them is determined."
     )
 
 

@@ -166,7 +166,7 @@ class Ensemble(
         Names of the states, in their order on the last axis.
     engine : str
         What ran: ``"lanes"``, several trajectories in step, ``"core"``, one at a time, or ``"cuda"``.
-        Both promise the same itineraries, and numbers within the tolerance.
+        Itineraries are the same with each, and numbers within the tolerance.
     """
 
     x: Array

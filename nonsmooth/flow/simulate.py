@@ -49,8 +49,9 @@ def simulate(
     t_end : float
         Time at which the run ends, not before ``t_start``.
     start : Trajectory or Event, optional
-        Continue this run, or what follows an event, in place of ``x0`` and ``t_start``: as the unbroken run,
-        also amid an instant that ``max_events`` cut. The parameters are those of the run.
+        Run or event to continue, in place of ``x0`` and ``t_start``. The result is that of one unbroken run,
+        also where ``max_events`` ended the run between two jumps of one instant. The parameters are those of the
+        run.
     t_start : float, optional
         Time of the start.
     parameters : mapping, optional
@@ -68,10 +69,10 @@ def simulate(
     max_steps, max_events, max_jumps : optional
         Limits of the run; of the jumps at one instant, beyond which it ends with ``ENDLESS_JUMPS``.
     rest_below : float, optional
-        Speed below which a surface rests whose multiplier enters the second derivative of its function first
-        (a relay in a position, a rocking body): where its rate at two zeros in turn is below, and falls, the run
-        goes on at rest. An approximation of the order of this speed: an event of the kind ``"rest_below"``. Without
-        it motions that need infinitely many switches for all times end with TOO_MANY_EVENTS.
+        Speed below which a surface comes to rest if its multiplier first enters the second derivative of its
+        function (a relay in a position, a rocking body). The run continues at rest once the rate at two zeros
+        in turn is below this speed and falls, with an event of the kind ``"rest_below"`` and an error of the order
+        of this speed. Without it a motion that switches infinitely often ends with TOO_MANY_EVENTS.
     t_eval : array_like (K,), optional
         Keep the states at these times, sorted, in ``sample_t`` and ``sample_x`` of the result.
     at : Section, str, number or expression, optional
@@ -95,7 +96,7 @@ def simulate(
         A tolerance, a limit, a time or a section out of its range; a ``start_mode`` that
         contradicts the side on which the run starts.
     CompilerError
-        The driver in C is not there yet, and no C compiler builds it.
+        The driver in C is not compiled, and there is no C compiler.
 
     Notes
     -----

@@ -15,7 +15,7 @@ class CompilerWarning(UserWarning):
 
 
 class DecisionWarning(UserWarning):
-    """A decision of a run rests on a convention, or on no proof."""
+    """A decision of a run rests on a convention, or is not proved."""
 
 
 def warn_of_facts(depends_on_widths: bool, unproved: bool) -> None:

@@ -152,8 +152,7 @@ _LAYOUTS = 5  # at most: three do so far
 
 
 class PrintFigure(Figure):
-    """A figure that saves TrueType fonts into PDF and PostScript, whatever the user's settings, and
-    whose layout has settled before it is saved."""
+    """A figure that saves TrueType fonts into PDF and PostScript, and settles its layout before that."""
 
     def savefig(self, fname: Any, **options: Any) -> None:
         """Save the figure.

@@ -8,7 +8,7 @@ import pytest
 
 import nonsmooth as ns
 
-x, y, v, a, lam, kap = (ca.SX.sym(n) for n in ("x", "y", "v", "a", "lam", "kap"))
+x, y, v, a, lam, kap, time = (ca.SX.sym(n) for n in ("x", "y", "v", "a", "lam", "kap", "time"))
 
 
 def _differences(system, start, t_end, step=1e-5):
@@ -60,6 +60,18 @@ def test_rest_after_infinitely_many_events_has_no_derivative():
     run = ns.simulate(twisting, [1.0, 0.1], 9.0)
     assert run.x[-1].tolist() == [0, 0]
     with pytest.raises(ns.DegenerateError, match="accumulate"):
+        ns.sensitivity(run)
+
+
+def test_rest_of_second_degree_has_no_implemented_derivative():
+    # it leaves rest at t = 1/a, so that x = a s^3/6 with s = 3 - 1/a: dx/da = 10/3, and not 9/2
+    relay = ns.FilippovSystem(
+        [x, v], field=[v, a * time - lam], surfaces=[x], multipliers=[lam], time=time,
+        parameters={a: 1.0},
+    )  # fmt: skip
+    run = ns.simulate(relay, [0.0, 0.0], 3.0)
+    np.testing.assert_allclose(run.x[-1], [4 / 3, 2], rtol=0, atol=1e-9)
+    with pytest.raises(ns.DegenerateError, match="rest on 'h0'"):
         ns.sensitivity(run)
 
 

@@ -230,7 +230,7 @@ def test_a_start_off_a_set_goes_on_from_a_surface_that_repels():
     assert held.itinerary == "*s" and held.status == ns.Status.NON_UNIQUE
     assert held.x[-1] == pytest.approx(np.zeros(3), abs=1e-11)
     for mode in ("s+", "ss"):
-        with pytest.raises(ns.OptionError, match=r"^start_mode .*h0 = \[0.6, -0.8\] \('\*'\)"):
+        with pytest.raises(ns.OptionError, match=r"^start_mode .*h0 = "):
             run(start, mode)
     with pytest.raises(ns.OptionError, match=r"^start_mode .*h1 = 2 \('\+'\)"):
         run([0.6, -0.8, 2.0], "*s")

@@ -110,7 +110,7 @@ def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
 
 
 def message_of(system: FilippovSystem, options: Options, run: Run) -> str:
-    """What happened at the end of a run, in words."""
+    """The message of the end of a run."""
     status, t = Status(run.status), float(run.t[-1])
     if status is Status.REACHED_END:
         return messages.reached_end(options.t_end)

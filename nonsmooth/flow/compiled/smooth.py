@@ -90,8 +90,7 @@ class SmoothProgram:
     def watch(
         self, z: Array, p: Array, duration: float, tol: float, most_steps: int, margin: float
     ) -> tuple[Array, Array, float]:
-        """Extrema of the functions and their values at the ends of steps, the end, and what is
-        left."""
+        """Extrema of the functions and values at the ends of steps, the end, and the time left."""
         # Rows: number, time, value, second derivative (0 at the end of a step), state.
         count, room = ctypes.c_int64(), _ROOM
         while True:

@@ -59,7 +59,7 @@ _SMALL, _MUCH, _LITTLE = 1 << 26, 16, 2
 #: Rows that are copied at once.
 _COPIED = 1 << 16
 
-#: Rooms of all kinds that C asks for before a step.
+#: Rows of all arrays that C needs to be free before a step.
 _NEEDED = {"step": 2, "point": 4, "event": 4}
 
 Rooms = Mapping[str, int]

@@ -98,7 +98,7 @@ def ensemble(
     DefinitionError
         ``system`` is none; a ``start_mode`` that it does not have.
     CompilerError
-        The driver in C is not there yet, and no C compiler builds it.
+        The driver in C is not compiled, and there is no C compiler.
     DeviceError
         ``device="cuda"`` without a card, its driver or the packages.
 

@@ -344,7 +344,7 @@ class Coupled:
         return [ca.substitute(e, rest, held) for e in expressions]
 
     def awake(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
-        """Dense expressions in ``moving``, for numbers: terms that a mode leaves out are not looked at."""
+        """Dense expressions in ``moving``, for numbers: terms that a mode leaves out are not evaluated."""
         n, m, places = self.system.extended_dimension, self._surfaces, self.moving.numel()
         held: dict[int, tuple[float, ...]] = dict.fromkeys(range(n + m, places), (0.0,))
         for i in range(m):

@@ -12,7 +12,7 @@ import casadi as ca
 
 from ..expressions.identity import vanish_on
 
-#: Largest relative degree that is looked for.
+#: Largest relative degree.
 _MOST = 4
 
 
@@ -25,10 +25,7 @@ class Degree:
 
 
 def degree_of(h: ca.SX, rate: ca.SX, own: ca.SX, others: ca.SX, x: ca.SX, field: ca.SX) -> Degree:
-    """Find the relative degree of ``h``, of this ``rate``, for the unknowns ``own``.
-
-    It is 1 where other unknowns enter first.
-    """
+    """Relative degree of ``h``, of this ``rate``, for the unknowns ``own``; 1 where others enter first."""
     first, lower = Degree((), rate), list[ca.SX]()
     if not ca.depends_on(rate, own) and _distance(h, own, x, field) > _MOST:
         return first

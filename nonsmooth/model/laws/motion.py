@@ -86,7 +86,7 @@ def motion(system: FilippovSystem, mode: str) -> Motion:
 
 
 def watched_functions(system: FilippovSystem, watched: Sequence[ca.SX]) -> list[ca.SX]:
-    """Check functions that a user wants to watch."""
+    """Check functions that a user gives to be watched."""
     return [
         read_function(system.definition, w, f"watched function {k}") for k, w in enumerate(watched)
     ]

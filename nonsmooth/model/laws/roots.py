@@ -65,10 +65,8 @@ def _side(e: ca.SX, h: ca.SX) -> int:
 def gate_roots(
     field: ca.SX, surfaces: ca.SX, x: ca.SX, gates: Sequence[ca.SX]
 ) -> tuple[ca.SX, dict[int, float]]:
-    """Multiply roots and powers of switching functions with what a ``gate`` of 1, -1 or 0 makes of them.
-
-    It is 1 on the side on which they are defined, 0 on the other and on the surface. Smallest exponents by surface.
-    """
+    """Multiply each root of a switching function by its gate; also the smallest exponent for each surface."""
+    # A gate is 1 or -1, the side, or 0; a root is multiplied by 1 on the side where it is defined, else by 0.
     symbols = ca.vertcat(*ca.symvar(field)) if field.numel() else ca.SX(0, 1)
     nodes, rows = instructions([symbols], [field])
     if not any(node.op in _POWERS for node in nodes):

@@ -72,8 +72,8 @@ def blended_jet(system: FilippovSystem, order: int) -> Blend:
 def _checked(
     system: FilippovSystem, fields: list[ca.SX]
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Rows of the field that are not affine in every mode, without combinations of the others,
-    and guards that show more than they."""
+    """Rows of the field that are not affine in every mode, and guards that are no combination of them."""
+    # Rows that are combinations of the others are left out.
     x, p = system.extended_states, system.parameter_symbols
     rows = [i for i in range(x.numel()) if not all(ca.is_linear(f[i], x) for f in fields)]
     modes = [motion(system, mode).field for mode in ("+-s" if system.surface_count else ("",))]

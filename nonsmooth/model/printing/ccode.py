@@ -73,18 +73,10 @@ class _Function:
 
 
 class Program:
-    """C functions ``void name(const T *x, const T *q, [extra,] T *a, ...)`` of one system.
+    """C functions ``void name(const T *x, const T *q, [extra,] T *a, ...)`` of one system."""
 
-    Parameters
-    ----------
-    states, parameters : SX
-        Symbol vectors: ``x`` and what ``q`` is prepared from.
-    extra : SX, optional
-        Further symbols that differ between lanes and steps: multipliers and masks.
-    extra_types : sequence of str, optional
-        ``"T"`` or ``"I"`` (a mask of all or no bits) for each.
-    """
-
+    # ``x`` are the states; ``q`` is prepared from the parameters. Symbols of ``extra`` (multipliers, masks) differ
+    # between lanes and steps, and have the types "T" or "I", a mask of all or no bits.
     def __init__(
         self,
         states: ca.SX,
@@ -148,8 +140,7 @@ class _Graph:
         self.divisors = {j for j, k in count.items() if k > 1 or not self.moving[j]}
 
     def _find_sums(self, rows: Sequence[Sequence[int]]) -> None:
-        """Terms, with their signs, of sums whose partial sums nobody else uses, those that are
-        ready first first."""
+        """Terms, with signs, of sums whose partial sums have no other use, in the order in which they are known."""
         # A convolution's oldest terms can then be added while its newest are still computed. The difference of
         # two sums stays one: where they are equal it is zero.
         users = [0] * len(self.nodes)

@@ -54,33 +54,25 @@ class Values:
 
 @dataclass(frozen=True)
 class Series:
-    """Rules of power series.
+    """Rules of power series."""
 
-    Attributes
-    ----------
-    rule, a, b, c, op : ndarray of int32
-        Rule, its arguments (vector and position of an input in a and b), its operation.
-    first, second : ndarray
-        Its numbers.
-    still, moving, later, late : ndarray of int32
-        Rules that are known once the parameters are, those of which a first coefficient is needed, of
-        which further ones are, and those of the last that unknown multipliers enter.
-    early : ndarray of int32
-        Those of ``later`` that are not in ``late``.
-    outputs : ndarray of int32
-    """
-
+    #: Rule, its arguments (vector and position of an input in a and b), its operation.
     rule: Integers
     a: Integers
     b: Integers
     c: Integers
     op: Integers
+    #: first, second: Its numbers.
     first: Array
     second: Array
+    #: still, moving, later, late: Rules that are known once the parameters are, those of which a
+    #: first coefficient is needed, of which further ones are, and those of the last that unknown
+    #: multipliers enter.
     still: Integers
     moving: Integers
     later: Integers
     late: Integers
+    #: Those of ``later`` that are not in ``late``.
     early: Integers
     outputs: Integers
 

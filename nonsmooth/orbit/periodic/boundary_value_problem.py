@@ -33,19 +33,14 @@ from ..runs.legs import Leg, LegFlow, integrate_leg, surface_of
 
 
 class JacobianIndices(NamedTuple):
-    """Flat indices of the legs' equations in their matrix (m, m + q).
+    """Flat indices of the legs' equations in their matrix (m, m + q)."""
 
-    Attributes
-    ----------
-    own : ndarray (L, n + 1, n + 1 + q)
-        States and event of each leg, by its start, its duration and parameters.
-    following : ndarray (L, n)
-        The states by the start of the next leg.
-    next_leg : ndarray (L,)
-    """
-
+    #: (L, n + 1, n + 1 + q): States and event of each leg, by its start, its duration and
+    #: parameters.
     own: NDArray[Any]
+    #: (L, n): The states by the start of the next leg.
     following: NDArray[Any]
+    #: (L,)
     next_leg: NDArray[Any]
 
 
@@ -73,24 +68,18 @@ _FEW = 4
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """The equations at some unknowns.
+    """The equations at some unknowns."""
 
-    Attributes
-    ----------
-    residual : ndarray (m,)
-    whole : ndarray (m, m + q)
-        Derivatives by the unknowns, then by the chosen parameters.
-    flows : LegFlows
-        The legs, with the events at their ends; for a leg without an event the identity and the phase
-        condition.
-    starts : ndarray (N, n)
-    durations : ndarray (N,)
-    """
-
+    #: (m,)
     residual: Array
+    #: (m, m + q): Derivatives by the unknowns, then by the chosen parameters.
     whole: Array
+    #: The legs, with the events at their ends; for a leg without an event the identity and the phase
+    #: condition.
     flows: LegFlows
+    #: (N, n)
     starts: Array
+    #: (N,)
     durations: Array
 
     @property
@@ -116,33 +105,23 @@ class Evaluation:
 
 @dataclass(frozen=True, eq=False)
 class BoundaryProblem:
-    """A periodic orbit's equations: legs, symmetry, forcing, phase.
-
-    Attributes
-    ----------
-    system : FilippovSystem
-    legs : tuple of Leg
-    symmetry : ndarray (n, n) or None
-        R, on the states without the time.
-    periods : float
-        Forcing periods by which the legs advance the time; a whole number, or a half of one with a
-        symmetry.
-    forcing : Forcing or None
-        The forcing period as a function of the parameters.
-    phase : ndarray (N,) or None
-        For a leg without an event: the row of the phase condition ``phase . (x_1 - reference)``.
-    reference : ndarray (N,) or None
-    kept : tuple of int
-        Surfaces on which every leg slides.
-    """
+    """A periodic orbit's equations: legs, symmetry, forcing, phase."""
 
     system: FilippovSystem
     legs: tuple[Leg, ...]
+    #: (n, n) or None: R, on the states without the time.
     symmetry: Array | None = None
+    #: Forcing periods by which the legs advance the time; a whole number, or a half of one with a
+    #: symmetry.
     periods: float = 0.0
+    #: The forcing period as a function of the parameters.
     forcing: Forcing | None = None
+    #: (N,) or None: For a leg without an event: the row of the phase condition ``phase . (x_1 -
+    #: reference)``.
     phase: Array | None = None
+    #: (N,) or None
     reference: Array | None = None
+    #: Surfaces on which every leg slides.
     kept: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -211,23 +190,7 @@ class BoundaryProblem:
     def evaluate(
         self, u: Array, p: Array, chosen: tuple[int, ...] = (), tol: float = TOLERANCE
     ) -> Evaluation:
-        """Residual, Jacobian by the unknowns, and derivatives by chosen parameters.
-
-        Parameters
-        ----------
-        u : ndarray (m,)
-        p : ndarray
-            All parameters.
-        chosen : tuple of int
-            Parameters by which one differentiates.
-        tol : float, optional
-            Local errors of the steps.
-
-        Raises
-        ------
-        ConvergenceError, DegenerateError
-            A leg cannot be integrated.
-        """
+        """Residual, Jacobian by the unknowns, and derivatives by the chosen of all parameters p."""
         starts, durations = self.split(u)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
             flows = self.integrator(chosen)(starts, durations, p, tol)
@@ -272,14 +235,7 @@ class BoundaryProblem:
         return Evaluation(residual, whole, flows, starts, durations)
 
     def residual(self, u: Array, p: Array, extended: bool = False) -> Array | None:
-        """Residual without derivatives, if wanted in extended precision; None where legs do not allow it.
-
-        Parameters
-        ----------
-        u : ndarray (m,)
-        p : ndarray
-        extended : bool, optional
-        """
+        """Residual without derivatives, or in extended precision; None where the legs do not allow it."""
         starts, durations = self.split(u)
         if self.phase is not None or self.kept or self.labels is not None:
             return None
@@ -341,11 +297,9 @@ class BoundaryProblem:
             by_parameters[first + k] = at.by_parameters[list(columns)]
 
     def rephased(self, u: Array, p: Array) -> BoundaryProblem:
-        """The problem with the plane through an orbit's start across the flow there.
-
-        An autonomous orbit without events starts on a plane, which may miss the orbits that it
-        becomes as a parameter varies. Problems with events, or with forcing, do not change.
-        """
+        """The problem with the plane through an orbit's start across the flow there."""
+        # An autonomous orbit without events starts on a plane, which may miss the orbits that it becomes as a
+        # parameter varies. Problems with events, or with forcing, do not change.
         if self.phase is None or self.system.time_dependent:
             return self
         start, leg = self.split(u)[0][0], self.legs[0]
@@ -357,21 +311,14 @@ class BoundaryProblem:
         return replace(self, phase=rate / speed, reference=start.copy())
 
     def solve(self, matrix: Array, right: Array) -> Array:
-        """Solve these equations, with rows of a border below; by elimination where legs are many.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-        """
+        """Solve these equations, with rows of a border below; by elimination where legs are many."""
         if self.has_many:
             return eliminated(self, matrix, right).solution()
         return np.asarray(np.linalg.solve(matrix, right), float)
 
     def scales(self, u: Array, p: Array | None = None) -> Array:
-        """Sizes of the unknowns: states by their range over the legs, times by the duration.
-
-        With parameters ``p`` the states inside of few legs count, not only where they start.
-        """
+        """Sizes of the unknowns: states by their range over the legs, times by the duration."""
+        # With parameters ``p`` the states inside of few legs count, not only where they start.
         starts, durations = self.split(u)
         span = float(np.abs(durations).sum()) or 1.0
         seen = starts
@@ -438,19 +385,13 @@ def _turning(problem: BoundaryProblem) -> list[bool]:
 
 @dataclass(frozen=True, eq=False)
 class ReducedEquations:
-    """Bordered equations after elimination of the legs.
+    """Bordered equations after elimination of the legs."""
 
-    Attributes
-    ----------
-    matrix, right : ndarray (n + k, n + k), (n + k,)
-        For the first start and the k unknowns of no leg.
-    starts, durations : ndarray (L, n, n + k + 1), (L, n + k + 1)
-        Those of all legs by these, and the constant part.
-    pivots : float
-    """
-
+    #: matrix, right (n + k, n + k), (n + k,): For the first start and the k unknowns of no leg.
     matrix: Array
     right: Array
+    #: starts, durations (L, n, n + k + 1), (L, n + k + 1): Those of all legs by these, and the
+    #: constant part.
     starts: Array
     durations: Array
     pivots: float

@@ -33,29 +33,19 @@ _AT_ZERO = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Multipliers of the map of the legs, with the condensed map.
+    """Multipliers of the map of the legs, with the condensed map."""
 
-    Attributes
-    ----------
-    values : ndarray (N - 1 or N,)
-        The nontrivial ones and the structural zeros, largest first; of the whole period. Discrete states
-        have none.
-    of_map : ndarray
-        Those of the legs' map alone, the half map of a symmetric orbit.
-    zeros : int
-        How many are structurally zero.
-    reduced : ndarray (r, r)
-        The condensed map, whose eigenvalues are the nontrivial ones of ``of_map``.
-    problem : BoundaryProblem
-    at : Evaluation
-        The orbit.
-    """
-
+    #: (N - 1 or N,): The nontrivial ones and the structural zeros, largest first; of the whole
+    #: period. Discrete states have none.
     values: NDArray[np.complex128]
+    #: Those of the legs' map alone, the half map of a symmetric orbit.
     of_map: NDArray[np.complex128]
+    #: How many are structurally zero.
     zeros: int
+    #: (r, r): The condensed map, whose eigenvalues are the nontrivial ones of ``of_map``.
     reduced: Array
     problem: BoundaryProblem
+    #: The orbit.
     at: Evaluation
 
     @cached_property

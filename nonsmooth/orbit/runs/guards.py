@@ -113,7 +113,7 @@ def _violations(
         for (_, a, _), (t, b, _) in pairwise(ordered):
             if a * b < 0.0 and guard.side in (0, 1 if b > a else -1) and guard.kind != "zero":
                 name = guard_name(system, guard)
-                return [f"{guard.kind} {name!r} is met {t:.6g} after its start"]
+                return [f"{guard.kind} {name!r} reaches zero {t:.6g} after its start"]
         return []
     low = [(t, v) for t, v, scale in ordered if v < -_NEGATIVE * scale]
     if not low:
@@ -153,7 +153,7 @@ def _change_fault(
         condition, name = described(system, guard), leg.name(system)
         return f"at its end {condition} starts to hold instead of failing ({name})"
     if guard.kind in ("stop", "reset") and guard.side * speed < 0.0:
-        return f"{guard.kind} {leg.name(system)!r} is met from the wrong side at its end"
+        return f"{guard.kind} {leg.name(system)!r} reaches zero from the wrong side at its end"
     return _following_fault(field, begin, p)
 
 

@@ -28,31 +28,24 @@ EXTENDED = 2.0**-64
 
 @dataclass(frozen=True, eq=False)
 class LegFlows:
-    """Flows of legs; rows of legs with fewer states than S end in zeros.
+    """Flows of legs; rows of legs with fewer states than S end in zeros."""
 
-    Attributes
-    ----------
-    sizes : tuple of int
-        States of each leg.
-    end, before, rate : ndarray (L, S)
-        States at the ends, fields at the starts and at the ends.
-    by_start, by_parameters : ndarray (L, S, N), (L, S, q)
-        Derivatives of ``end``.
-    after, after_state, after_parameters : ndarray (L, N), (L, N, S), (L, N, np)
-        States after the events, and their derivatives.
-    value, gradient, value_parameters : ndarray (L,), (L, S), (L, np)
-        The events' functions, and their derivatives.
-    """
-
+    #: States of each leg.
     sizes: tuple[int, ...]
+    #: end, before, rate (L, S): States at the ends, fields at the starts and at the ends.
     end: Array
     before: Array
     rate: Array
+    #: by_start, by_parameters (L, S, N), (L, S, q): Derivatives of ``end``.
     by_start: Array
     by_parameters: Array
+    #: after, after_state, after_parameters (L, N), (L, N, S), (L, N, np): States after the events,
+    #: and their derivatives.
     after: Array
     after_state: Array
     after_parameters: Array
+    #: value, gradient, value_parameters (L,), (L, S), (L, np): The events' functions, and their
+    #: derivatives.
     value: Array
     gradient: Array
     value_parameters: Array
@@ -86,15 +79,7 @@ def _event_offsets(n: int, most: int, q: int) -> tuple[int, ...]:
 
 
 class LegIntegrator:
-    """Legs that are integrated repeatedly.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    legs : sequence of Leg
-    chosen : tuple of int
-        Parameters by which one differentiates.
-    """
+    """Legs that are integrated repeatedly, with derivatives by the ``chosen`` parameters."""
 
     def __init__(self, system: FilippovSystem, legs: Sequence[Leg], chosen: tuple[int, ...] = ()):
         self.system, self.legs, self.chosen = system, tuple(legs), chosen
@@ -128,14 +113,9 @@ class LegIntegrator:
     def ends(
         self, starts: Array, durations: Array, p: Array, extended: bool
     ) -> tuple[Array, Array | None, Array] | None:
-        """States after the events and the events' functions, without derivatives.
-
-        Returns
-        -------
-        after, rest, value : ndarray (L, N), (L, N) or None, (L,)
-            States rounded, and in extended precision what that leaves. None where legs fail or
-            where not each is a flow of the states to one event.
-        """
+        """States (L, N) after the events and the events' functions (L,), or None where a leg fails."""
+        # Between them what rounding leaves of the states, in extended precision. None, too, where not each leg
+        # is a flow of the states to one event.
         program = self._plain_program
         if program is None:
             return None

@@ -37,29 +37,19 @@ _PARALLEL = 1e-7
 
 @dataclass(frozen=True)
 class Leg:
-    """One mode and the event that ends it.
-
-    Attributes
-    ----------
-    mode : str
-    kind : str
-        Of the event: crossing, entry, exit, reset, impact, release, stop; end where a time ends it.
-    element, side : int
-        As of Event.
-    letters : str
-        Sides of the friction at an impact.
-    further : tuple of Leg
-        Resets and impacts caused by the event, at the same instant.
-    discrete : tuple of float
-        Values of the discrete states in it.
-    """
+    """One mode and the event that ends it."""
 
     mode: str
+    #: Of the event: crossing, entry, exit, reset, impact, release, stop; end where a time ends it.
     kind: str = "end"
+    #: element, side: As of Event.
     element: int = -1
     side: int = 0
+    #: Sides of the friction at an impact.
     letters: str = ""
+    #: Resets and impacts caused by the event, at the same instant.
     further: tuple[Leg, ...] = ()
+    #: Values of the discrete states in it.
     discrete: tuple[float, ...] = ()
 
     @property
@@ -115,21 +105,14 @@ def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
 
 @dataclass(frozen=True, eq=False)
 class LegFlow:
-    """Flow of a leg from its start over its duration.
+    """Flow of a leg from its start over its duration."""
 
-    Attributes
-    ----------
-    end : ndarray (N + k,)
-        State at the end, before the event, with multipliers that are states.
-    by_start, by_parameters : ndarray (N + k, N), (N + k, q)
-        Derivatives of ``end``.
-    rate : ndarray (N + k,)
-        The field there.
-    """
-
+    #: (N + k,): State at the end, before the event, with multipliers that are states.
     end: Array
+    #: by_start, by_parameters (N + k, N), (N + k, q): Derivatives of ``end``.
     by_start: Array
     by_parameters: Array
+    #: (N + k,): The field there.
     rate: Array
 
 
@@ -152,19 +135,13 @@ def integrate_leg(
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A leg of a run: where it starts and ends.
-
-    Attributes
-    ----------
-    leg : Leg
-    t, duration : float
-    start, end, after : ndarray (N,)
-        Extended states: at the start, before and after the event that ends it.
-    """
+    """A leg of a run: where it starts and ends."""
 
     leg: Leg
     t: float
     duration: float
+    #: start, end, after (N,): Extended states: at the start, before and after the event that ends
+    #: it.
     start: Array
     end: Array
     after: Array

@@ -49,8 +49,9 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
     Raises
     ------
     DegenerateError
-        An event that is grazed, two independent events at one instant, impacts that accumulate, a
-        status without an end.
+        An event that is grazed, two independent events at one instant, events that accumulate, rest on a
+        surface whose multiplier enters a higher derivative of its function first, a derivative that is not
+        finite at the zero of a root, a status without an end.
     ParameterError
         An unknown name in ``wrt``.
     OptionError
@@ -58,6 +59,10 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
 
     Notes
     -----
+    A run that starts on a sliding surface has the derivatives of the sliding field: they hold along the
+    surface, not for starts off it. Where a reset happens exactly at the end of the run, they hold for
+    neighbours that have jumped.
+
     Aizerman & Gantmakher 1958; Leine & Nijmeijer 2004, ch. 7.
 
     Examples

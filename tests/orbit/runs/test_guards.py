@@ -76,7 +76,9 @@ def test_legs_are_judged_together_as_one_by_one():
     assert together == expected and len(together) >= 5
     assert sum("is violated" in fault for fault in together) >= 1
     assert sum("begins after it" in fault for fault in together) >= 1
-    assert sum("'out' is met" in fault for fault in together) == 2  # from 7 to 8, and from 0 to 9
+    assert (
+        sum("'out' reaches zero" in fault for fault in together) == 2
+    )  # from 7 to 8, and from 0 to 9
 
 
 @pytest.mark.parametrize("kind", ["stop", "reset"])
@@ -95,7 +97,7 @@ def test_what_is_passed_inside_a_step_is_seen(kind, duration):
     )
     p = np.zeros(0)
     (fault,) = watch(system, "+", np.array([0.0, 0.0]), duration, p).faults
-    assert fault.startswith(f"{kind} 'out' is met ")
+    assert fault.startswith(f"{kind} 'out' reaches zero ")
     assert watch(system, "+", np.array([0.91, 0.0]), duration, p).faults == []
     late = np.array([0.9 - duration, 0.0])  # met at the very end, as by what ends the leg
     assert watch(system, "+", late, duration, p).faults == []

@@ -1,4 +1,4 @@
-"""The C sources of lanes and kernels: what Python and C share, then fixed texts, then what is generated."""
+"""C sources of lanes and kernels: constants that Python and C share, fixed texts, generated functions."""
 
 from __future__ import annotations
 
@@ -55,8 +55,7 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
 
 
 def device_source(system: FilippovSystem, order: int, threads: int, resident: int = 1) -> str:
-    """C++ source of the same engine with a trajectory for each thread, as CUDA or for any
-    compiler."""
+    """C++ source of the same engine with a trajectory for each thread, for CUDA or any compiler."""
     head, program = _lanes_head(system, order)
     sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n"
     texts = map(driver_text, ("common.h", "device/lane.h", "lanes/sines.h", "lanes/polynomials.h"))
@@ -65,7 +64,7 @@ def device_source(system: FilippovSystem, order: int, threads: int, resident: in
 
 
 def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
-    """What the lanes' text asks to be defined before it, and the functions of a system."""
+    """Definitions that the lanes' text needs before it, and the functions of a system."""
     program, blend = lanes_program(system, order)
     (rows, checked), affine = blend.checked, blend.affine
     slots = 2 * system.surface_count + len(system.stops)

@@ -1,4 +1,4 @@
-"""The C source of the driver, which knows no system: what Python and C share, then fixed texts.
+"""The C source of the driver: constants that Python and C share, then fixed texts. It is the same for all systems.
 
 A build of the package imports this module and what it imports, and no package that is installed.
 """

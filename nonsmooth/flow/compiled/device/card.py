@@ -24,24 +24,11 @@ _THREADS, _RESIDENT = 128, 2
 
 
 class Card:
-    """One CUDA device.
-
-    Parameters
-    ----------
-    core : module
-        ``cuda.core``.
-    fused : bool
-        Whether products and sums are fused, as in the lanes on a processor; without, the bits are those of
-        the same text as C++ compiled so.
-
-    Raises
-    ------
-    DeviceError
-        No driver, or no device.
-    """
+    """One CUDA device of the module ``cuda.core``; DeviceError without a driver or a device."""
 
     threads = _THREADS
 
+    # Products and sums are ``fused`` as in the lanes on a processor; unless, the bits are those of C++.
     def __init__(self, core: Any, fused: bool = True):
         self._core, self._fused = core, fused
         try:

@@ -73,7 +73,7 @@ static inline T LOG2(T given) {
   double high = (0.1424883991 * m - 0.3205988980) + z * ((0.0379969064 * m - 0.0712441996) - 0.0211093925 * z);
   return T((e + (0.5849625007 + 0.9617966939 * m)) + z * high);
 }
-/* A step of no finite size is looked at by its caller: the place of its exponent is then not of interest, but its
+/* A step of no finite size is handled by its caller: the place of its exponent is then not of interest, but its
  * conversion must be defined. */
 static inline T EXP2(T given) {
   double a = given.v, k = (a + 6755399441055744.0) - 6755399441055744.0, f = (a - k) * 0.6931471805599453;

@@ -230,8 +230,7 @@ static void end_at_limit(Run *r, int block, double left, double error) {
   finish(r, ACCUMULATION, NO_REASON, 0);
 }
 
-/* Rest of a surface of relative degree two whose speeds at two zeros in turn are below a limit and fall; an
- * approximation that is asked for. */
+/* Rest of a surface of relative degree two whose speeds at two zeros in turn are below ``rest_below`` and fall. */
 static void rest_if_slow(Run *r) {
   int before = r->mode;
   for (int i = 0; i < r->m && r->status == RUNNING; i++) {
@@ -252,14 +251,14 @@ static void rest_if_slow(Run *r) {
   }
 }
 
-/* Keep an event in mind. */
+/* Store an event among the last ones. */
 static void remember(Run *r, int kind, int guard) {
   int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->met.kind << 32) + (guard < 0 ? -1 : r->met.index);
   r->past[r->history++ % HISTORY] = (Happened){r->since, pattern, kind, r->met};
   r->since = 0;
 }
 
-/* See whether the last events accumulate. */
+/* Find whether the last events accumulate. */
 static void see_limit(Run *r) {
   double left, error;
   int block;

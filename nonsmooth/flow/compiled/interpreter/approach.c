@@ -179,7 +179,7 @@ static int is_met(Run *r, const int8_t *letter, int set, const double *h, const 
   return radius < shortest(r) * (length_of(a, k) + sqrt(speed));
 }
 
-/* |h| has fallen tenfold, or is small: the set is reached or passed now, or looked at again nearer. What has
+/* |h| has fallen tenfold, or is small: the set is reached or passed now, or the test is repeated nearer. What has
  * fallen to rounding is zero, whatever its direction says. */
 static void near_set(Run *r, int row, int fell) {
   int f = r->now.index[row], s = set_of(r, f), k = size_of(r, s), n = r->n, before = r->mode;
@@ -395,7 +395,7 @@ static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found) {
   }
 }
 
-/* Whether sets are met: those are decided here. */
+/* Whether the point is on sets: those are decided here. */
 static int meets_sets(const Run *r) {
   for (int i = 0; i < r->active_count; i++) if (set_of(r, r->active[i]) >= 0) return 1;
   return 0;
@@ -414,7 +414,7 @@ static int has_negative(const double *m, int k) {
   return 0;
 }
 
-/* Letters that are possible where sets are met, as bits: of sets leaving (1) and holding (4). One where the law of
+/* Letters that are possible at sets, as bits: of sets leaving (1) and holding (4). One where the law of
  * sets alone decides. 0 where the run ends. */
 static int sets_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count, int8_t *possible) {
   int w = r->width, n = 0, sets = 0, *first = r->involved + w, bounded;

@@ -169,7 +169,7 @@ static int place_unknowns(const Block *k, const int8_t *position, double *nu, do
   return solve_any(m, nu, n, work + (int64_t)n * n, pivot);
 }
 
-/* The position that an element wants next, its own where it fits. */
+/* The position that an element takes next: its own where that is consistent. */
 static int wanted(const Block *k, int i, int position, const double *nu) {
   double terms, w = rate_of(k, i, nu, &terms), zero = zero_of(k, i, terms), bound = bound_of(k, i, nu);
   double low = k->is_contact[i] ? 0 : -bound, room = room_zero(k, i, zero, bound);
@@ -184,7 +184,7 @@ static int wanted(const Block *k, int i, int position, const double *nu) {
   return is_empty ? position == TOP ? BOTTOM : TOP : HELD;
 }
 
-/* Principal pivoting: all that do not fit change, one at a time where that does not help. */
+/* Principal pivoting: all that are not consistent change, one at a time where that does not help. */
 static int pivot_block(const Block *k, int8_t *position, double *nu, int most, double *work, int32_t *pivot) {
   int best = k->size + 1, patience = 10;
   for (int count = 0; count < most; count++) {
@@ -474,28 +474,42 @@ static void find_blocks(Decision *d) {
   for (int i = 0; i < d->count; i++) if (!d->mark[i]) visit(d, i, &time, &top);
 }
 
-/* Rows, matrix and bounds at the present point with all active unknowns zero; 0 where they are no numbers. */
-static int read_law(Run *r, Decision *d, const int8_t *letter) {
-  int k = d->count, w = r->width, carried = 0;
-  double *near = r->vector + r->n + w; /* not where inputs are put together */
-  aim(r, letter, r->x, r->unknowns);
-  held_of(r, letter);
+/* Rows and bounds at a point with all active unknowns zero, and rounding in both; 0 where they are no numbers. */
+static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b, double *floor, double *room) {
+  int k = d->count, w = r->width;
+  double *near = r->vector + r->n + w, *factor = r->small + w; /* not where inputs are put together */
+  aim(r, d->letter, x, r->unknowns);
+  held_of(r, d->letter);
   for (int i = 0; i < k; i++) r->held[r->active[i]] = 0;
-  error_scales(r, r->x, r->held, r->none);
-  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
+  error_scales(r, x, r->held, r->none);
+  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(x[i]);
   gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
+  for (int i = 0; i < r->n; i++) near[i] = fabs(x[i]);
+  gradient_sums(r, &r->s->point, r->point, first_of_factors(r), &r->s->factor_gradient, w, near, 1, factor);
+  for (int i = 0; i < k; i++) {
+    int own = r->active[i];
+    a[i] = d->turn[i] * layer_of(r, own);
+    floor[i] = VANISHES * r->small[own];
+    b[i] = d->is_contact[i] || d->is_idle[i] ? 0 : factor_of(r, own);
+    room[i] = VANISHES * factor[own];
+    if (fabs(b[i]) <= room[i]) b[i] = 0;
+    if (!isfinite(a[i]) || !isfinite(b[i])) return 0;
+  }
+  return 1;
+}
+
+/* Rows, matrix and bounds at the present point; 0 where they are no numbers. */
+static int read_law(Run *r, Decision *d) {
+  int k = d->count, w = r->width, carried = 0;
   memset(d->share, 0, sizeof(double) * k * k);
   for (int i = 0; i < k; i++) {
     int own = d->own[i] = r->active[i];
     d->is_contact[i] = own >= r->m;
     d->turn[i] = d->is_contact[i] ? -1 : 1;
-    d->a[i] = d->turn[i] * layer_of(r, own);
-    d->floor[i] = VANISHES * r->small[own];
     d->is_idle[i] = own < r->m && r->s->continuous[own];
-    d->b[i] = d->is_contact[i] || d->is_idle[i] ? 0 : factor_of(r, own);
     for (int j = 0; j < r->c && own < r->m; j++) carried |= r->s->carries[own * r->c + j];
-    if (!isfinite(d->a[i]) || !isfinite(d->b[i])) return 0;
   }
+  if (!read_rows(r, d, r->x, d->a, d->b, d->floor, d->work)) return 0;
   for (int i = 0; i < k; i++)
     for (int j = 0; j < k; j++)
       d->matrix[i * k + j] = d->is_idle[j] ? 0 : -d->turn[i] * r->slope[d->own[i] * w + d->own[j]];
@@ -635,6 +649,42 @@ static void read_order(Run *r, Decision *d, int order) {
     d->floor[at] = d->steep[i] * (VANISHES * (order + 1) * speed + drift);
     if (d->state[at] == UNDECIDED && !d->is_contact[i]) turn_bound(d, i, d->b + at);
   }
+}
+
+/* Whether an order's rows and bounds are numbers. */
+static int is_finite_order(const Decision *d, int order) {
+  return finite_all(d->a + order * d->count, d->count) && finite_all(d->b + order * d->count, d->count);
+}
+
+/* In place of an order whose coefficients are no numbers, as those of t^(3/2), rows and bounds themselves at the shortest
+ * time at which they are above rounding: how they grow decides. 0 where they are no numbers there. */
+static int read_growth(Run *r, Decision *d, int order) {
+  Expansion *e = &r->trial;
+  int k = d->count, at = order * k, found = 0;
+  double *x = r->at_root, *a = d->work, *b = a + k, *floor = b + k, *room = floor + k, unit = INFINITY;
+  for (int i = 0; i < r->n; i++) {
+    double *c = e->states + (int64_t)i * r->stride;
+    for (int q = 1; q <= order; q++) {
+      if (!(fabs(c[q]) < INFINITY)) memset(c + q, 0, sizeof(double) * (order + 1 - q));
+      if (c[q] != 0) unit = smaller(unit, pow((fabs(c[0]) + r->size) / fabs(c[q]), 1.0 / q));
+    }
+  }
+  for (double part = SINGULAR_LONGEST; unit < INFINITY && part > SINGULAR_SHORTEST; part *= SINGULAR_SHORTER) {
+    int clear = 1;
+    for (int i = 0; i < r->n; i++) x[i] = value_at(e->states + (int64_t)i * r->stride, order, part * unit);
+    if (!read_rows(r, d, x, a, b, floor, room)) break;
+    for (int i = 0; i < k; i++) {
+      double most = larger(fabs(a[i]), fabs(d->matrix[i * (k + 1)] * b[i]));
+      clear &= d->state[at + i] >= INSIDE || (most > floor[i] / RESOLVED && !(fabs(b[i]) < room[i] / RESOLVED));
+    }
+    if (found && !clear) break;
+    found = 1;
+    memcpy(d->a + at, a, sizeof(double) * k);
+    memcpy(d->floor + at, floor, sizeof(double) * k);
+    for (int i = 0; i < k; i++) d->b[at + i] = d->sign[i] * b[i];
+  }
+  for (int i = 0; i < k && found; i++) if (d->state[at + i] == UNDECIDED && !d->is_contact[i]) turn_bound(d, i, d->b + at + i);
+  return found;
 }
 
 /* Motions ------------------------------------------------------------------------------------------------ */
@@ -823,6 +873,7 @@ static void add_motion(Run *r, Decision *d, int orders) {
     own->state[i] = (int8_t)final_state(d, i, orders);
     own->nu[i] = d->sign[i] * d->nu[i];
   }
+  orders -= d->last == orders - 1; /* what grew decided: it has no coefficients */
   own->terms = orders < COMPARED ? orders : COMPARED;
   for (int i = 0; i < r->n; i++)
     for (int j = 1; j <= own->terms; j++)
@@ -848,6 +899,7 @@ static void explore(Run *r, Decision *d, int order, int which) {
     if (which == d->blocks) {
       int open = 0, more = order < (d->branches ? COMPARED : 0) - 1;
       for (int i = 0; i < k; i++) open |= d->state[(order + 1) * k + i] < INSIDE;
+      if (order == d->last) { add_motion(r, d, order + 1); return; }
       if ((!open && !more) || order + 1 == ORDERS || order + 1 >= r->order) { /* the series is closed if it is compared */
         if (d->branches) close_with(r, d, order);
         add_motion(r, d, order + 1);
@@ -857,6 +909,9 @@ static void explore(Run *r, Decision *d, int order, int which) {
       if (++order == 1) read_noise(r, d);
       open_order(r, e, order);
       read_order(r, d, order);
+      d->last = is_finite_order(d, order) ? ORDERS : order;
+      if (d->last == order && !open) { add_motion(r, d, order); return; }
+      if (d->last == order && !read_growth(r, d, order)) return;
       which = 0;
       continue;
     }
@@ -1077,7 +1132,8 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
   d->count = k;
   d->letter = letter;
   d->motions = d->branches = d->unstable = r->several_count = 0;
-  if (!read_law(r, d, letter)) return try_modes(r, letter, known, known_count);
+  d->last = ORDERS;
+  if (!read_law(r, d)) return try_modes(r, letter, known, known_count);
   find_blocks(d);
   begin_decision(d);
   read_old(r, d, letter, known, known_count);

@@ -10,7 +10,7 @@ static int change_kind(const Run *r, int before, int after) {
   return slides > 0 ? ENTRY : slides < 0 ? EXIT : CROSSING;
 }
 
-/* Whether another mode is the present one for those who look at it: close to a set or far from it is the same. */
+/* Whether another mode is shown as the present one: close to a set or far from it is the same. */
 static int is_alike(const Run *r, const int8_t *letter) {
   if (!r->s->sets) return 0;
   for (int i = 0; i < r->width; i++)
@@ -279,7 +279,7 @@ static int advance(Run *r, const Expansion *e, double dt) {
 static int ends_at_singular(Run *r);
 static int pass_root(Run *r, double left);
 
-/* Leave a point where only low derivatives exist; guards are looked at after the step. */
+/* A step from a point where only low derivatives exist; guards are evaluated at its end. */
 static void leave_singular(Run *r, Expansion *e, double left) {
   int huge = 0;
   for (int i = 0; i < r->n; i++)

@@ -76,7 +76,7 @@ static int is_filtered(Run *r, int event) {
 }
 
 /* Whether a level event is due: while its condition and its filter hold in view. One with an atom at zero waits
- * for the motion that follows, except before the first jump, where view knows. */
+ * for the motion that follows, except before the first jump, where view decides. */
 static int is_level_due(const Run *r, int event) {
   const Rules *u = &r->s->rules;
   const Instant *i = &r->instant;

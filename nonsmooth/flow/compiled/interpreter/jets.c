@@ -10,6 +10,22 @@ static const double *slope_row(const Run *r, int i, int j) {
   return output < 0 ? zero : row_of(r, r->n + 3 * r->width + r->s->rules.atoms + output);
 }
 
+/* The sign of a bound's first coefficient that is not zero; one that rounding has left before it passes zero is. */
+static double turn_of(const Run *r, int i, const double *factor, int count) {
+  const Entries *g = &r->s->factor_gradient;
+  int k = 0;
+  while (k < count && factor[k] == 0) k++;
+  if (k == 0 && count > 1 && factor[0] * factor[1] < 0) {
+    double rounding = 0;
+    for (int e = 0; e < g->count; e++) {
+      double slope = fabs(out_of(&r->s->point, r->point, first_of_factors(r) + e));
+      if (g->row[e] == i && slope < INFINITY) rounding += slope * fabs(r->expansion->states[(int64_t)g->column[e] * r->stride]);
+    }
+    k = fabs(factor[0]) <= VANISHES * rounding;
+  }
+  return k < count ? ns_sign(factor[k]) : 1;
+}
+
 /* Guards from the series (or, with count 1, values) of what they are made of. */
 static void guard_rows(Run *r, const Layout *l, const double *series, int count, double *guards) {
   int w = r->width, n = r->n, stride = r->stride;
@@ -26,8 +42,7 @@ static void guard_rows(Run *r, const Layout *l, const double *series, int count,
       for (int k = 0; k < count; k++) g[k] = -side * layer[k];
     } else if (kind == EXIT_GUARD) {
       const double *factor = row_of(r, n + 2 * w + i), *lam = series + (int64_t)i * stride;
-      double turn = 1;
-      for (int k = 0; k < count; k++) if (factor[k] != 0) { turn = ns_sign(factor[k]); break; }
+      double turn = turn_of(r, i, factor, count);
       for (int k = 0; k < count; k++) g[k] = turn * (factor[k] - side * lam[k]);
     } else if (kind == NEAR_GUARD || kind == SLIP_GUARD) {
       set_row(r, l, row, series, count, g);

@@ -1,7 +1,7 @@
 /* Unknowns that enter nonlinearly: hidden laws and products of multipliers. In the layer of a surface lambda moves
  * with the rate of h, x at rest, until an attracting root of that rate or its bound (Jeffrey 2018). */
 
-/* Solutions of a mode that are looked for; unknowns that can enter in products. */
+/* Most solutions of a mode; unknowns that can enter in products. */
 enum { SOLUTIONS = 16, FACTORS = 4, CORNERS = 1 << FACTORS };
 
 /* Solutions of one mode, each the unknowns of all elements. */
@@ -267,7 +267,7 @@ static void keep_others(const Run *r, const int8_t *letter, int own, double *unk
   for (int i = 0; i < r->width; i++) if (i != own && letter[i] == 0 && r->letter[i] == 0) unknowns[i] = r->unknowns[i];
 }
 
-/* The element that a guard or a fold was met of, if all other active ones are held as before and no unknown acts on
+/* The element whose guard or fold ended the mode, if all other active ones are held as before and no unknown acts on
  * both; else -1. */
 static int moves_alone(Run *r, const int8_t *letter) {
   int own = r->met.kind == BRANCH_GUARD ? r->folded : r->met.index, w = r->width, is_active = 0;
@@ -448,7 +448,7 @@ static int in_time(Run *r, Expansion *f, const double *rate, double s, double dt
   return 1;
 }
 
-/* Go to the fold of what slides, if it is met next; its row, or -1. */
+/* Go to the fold of sliding, if it is the next event; its row, or -1. */
 static int reach_fold(Run *r, const Expansion *e, double left) {
   int slides = e->l.slides, lead = 0, order = r->order, stride = r->stride, row, last = -1;
   double rate[P + 1], h = INFINITY, ds, *end = r->lam, *field = r->at_work;

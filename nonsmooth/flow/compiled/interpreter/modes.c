@@ -33,7 +33,7 @@ static int is_bent(const Run *r, int kind, int index) {
   return kind != BRANCH_GUARD;
 }
 
-/* Number of a mode, with values of the discrete states (or none) for those who look at it. */
+/* Number of a mode, with values of the discrete states (or none), as results show it. */
 static int32_t numbered(const Run *r, const int8_t *letter, const double *values) {
   int count = r->s->rules.discrete;
   if (!count) return mode_number(r->table, letter);
@@ -111,7 +111,7 @@ static double layer_of(const Run *r, int i) { return out_of(&r->s->point, r->poi
 static double factor_of(const Run *r, int i) { return out_of(&r->s->point, r->point, r->width + i); }
 
 /* Sums over the states of |gradient| times a vector, for each row; infinite slopes, those of a square root
- * at zero, say nothing about rounding and are left out where asked for. */
+ * at zero, are left out with ``finite_only``. */
 static void gradient_sums(const Run *r, const Values *t, const double *w, int first, const Entries *g, int rows,
                           const double *vector, int finite_only, double *sum) {
   for (int i = 0; i < rows; i++) sum[i] = 0;
@@ -125,6 +125,11 @@ static void gradient_sums(const Run *r, const Values *t, const double *w, int fi
  * surfaces, gaps, stops and resets only where nothing slides. */
 typedef struct { double *layer, *height, *stop, *factor; } Sums;
 
+static int first_of_factors(const Run *r) {
+  const System *s = r->s;
+  return 2 * r->width + s->slope.count + s->layer_gradient.count + s->height_gradient.count + s->stop_gradient.count;
+}
+
 static void point_sums(const Run *r, int is_free, const double *vector, int finite_only, const Sums *to) {
   const System *s = r->s;
   const Values *t = &s->point;
@@ -134,8 +139,7 @@ static void point_sums(const Run *r, int is_free, const double *vector, int fini
   gradient_sums(r, t, r->point, first, &s->height_gradient, w, vector, finite_only, to->height);
   first += s->height_gradient.count;
   gradient_sums(r, t, r->point, first, &s->stop_gradient, stops, vector, finite_only, to->stop);
-  first += s->stop_gradient.count;
-  if (!is_free) gradient_sums(r, t, r->point, first, &s->factor_gradient, w, vector, finite_only, to->factor);
+  if (!is_free) gradient_sums(r, t, r->point, first_of_factors(r), &s->factor_gradient, w, vector, finite_only, to->factor);
 }
 
 /* Error scales of the guards from those of surfaces, of sliding multipliers and of stops. */

@@ -232,7 +232,7 @@ static void series_rules(const Series *t, const int32_t *which, int32_t count, i
         w[k] = over(top, r[0]) * (1.0 / k);
         break;
       }
-      /* A term that the mode leaves out, of which nothing is looked at, has a factor that is zero. */
+      /* A term that the mode leaves out has a factor that is zero; its other factors are not evaluated. */
       case RULE_gated: w[k] = u[0] != 0 ? v[k] : 0; break;
       case RULE_chosen: {
         int i = 0;

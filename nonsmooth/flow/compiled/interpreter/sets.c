@@ -5,8 +5,8 @@
 static double length_of(const double *h, int k) {
   double most = 0, sum = 0;
   for (int i = 0; i < k; i++) most = larger(fabs(h[i]), most);
-  for (int i = 0; i < k; i++) sum += (h[i] / most) * (h[i] / most);
-  return most * sqrt(sum);
+  for (int i = 0; i < k; i++) sum += most > 0 ? (h[i] / most) * (h[i] / most) : fabs(h[i]);
+  return most > 0 ? most * sqrt(sum) : sum;
 }
 
 static double unit_of(const double *h, int k, double *u) {

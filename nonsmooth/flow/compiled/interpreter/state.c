@@ -89,7 +89,7 @@ typedef struct { int8_t *state, *order, *before; int32_t terms; double *nu, *ser
 /* The law of the active elements at a point; see decide.c. Matrices are (count, count), what has orders is
  * (orders, count). */
 typedef struct {
-  int32_t count, blocks, motions, branches, unstable;
+  int32_t count, blocks, motions, branches, unstable, last; /* last: order that growth decides instead of coefficients */
   const int8_t *letter;
   int32_t *own, *order, *first, *mark, *pivot, *proved;
   int8_t *is_contact, *is_idle, *is_touched, *is_known, *state, *block_state, *large_class;
@@ -137,7 +137,7 @@ typedef struct {
   Continuation chosen, one, first, rest, found;
   Decision *decision;
   int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
-  int32_t turned_mode; /* a mode that was asked for, whose guards of stability begin with these signs */
+  int32_t turned_mode; /* the mode of start_mode, whose guards of stability begin with these signs */
   int8_t *turned;
   double *layer_series, *rates_of_several;
   Output out;

@@ -65,6 +65,11 @@ static int is_curved(const Run *r, const Layout *l, int row) {
   return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : index];
 }
 
+/* Whether a guard is the end of sliding within a bound that depends on the states. */
+static int is_scaled_exit(const Run *r, const Layout *l, int row) {
+  return l->kind[row] == EXIT_GUARD && r->s->scaled[l->index[row]] && !is_idle(r, l->letter, l->index[row]);
+}
+
 /* The longest step in which term k of a guard is below ``allowed``, or below the tolerance's part of one of its
  * first terms: a guard of time alone that begins at zero has nothing else. */
 static double reach(const double *g, int k, double allowed, double rtol, int by_terms) {
@@ -296,6 +301,7 @@ static double polished(Run *r, const Expansion *e, int row, double root) {
     if (!(blur(c, r->order, time) > 0)) return root;
     horner(c, r->order, time, &slope);
     at_time(r, e, time, x, lam);
+    if (e->l.kind[row] == EXIT_GUARD && !improve(r, &e->l, x, lam, 1)) return root;
     evaluate(r, e, x, lam);
     double change = guards_at(r, e, lam)[(int64_t)row * r->stride] / slope;
     if (!(fabs(change) < 0.5 * time)) return root;
@@ -401,7 +407,8 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   if (first < 0) { if (r->repelling) turn_exits(r, e); return -1; }
   double latest = time[first] + RESOLVED * h;
   for (int j = 0; j < rows; j++)
-    if (time[j] > 0 && time[j] <= latest && is_curved(r, &e->l, j)) time[j] = polished(r, e, j, time[j]);
+    if (time[j] > 0 && time[j] <= latest && (is_curved(r, &e->l, j) || (found > 1 && is_scaled_exit(r, &e->l, j))))
+      time[j] = polished(r, e, j, time[j]);
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
   /* Guards whose times cannot be told apart: atoms are passed together, at the first time; others one by one. */
   int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;

@@ -74,7 +74,7 @@ class Lanes:
         stop: Callable[[], bool] = lambda: False,
     ) -> Chunk:
         """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
-        # What is not clear the driver does, for a step.
+        # The driver takes steps that are not clear.
         chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
         x, p = np.ascontiguousarray(x, float), np.ascontiguousarray(p, float)
@@ -141,8 +141,7 @@ def _core(run: int, random: int) -> _Core:
 
 
 def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
-    """Return what runs a system's trajectories in step at the options' tolerance, or None where they
-    cannot be: several surfaces, resets, a start's mode that is asked for, times that one number rounds."""
+    """Return what runs a system's trajectories in step, or None where the driver has to run them."""
     if options.start_mode is not None or options.rest_below is not None or options.begins_late:
         return None
     if not (supports_set_lanes(coupled_of(system)) if system.sets else supports_lanes(system)):

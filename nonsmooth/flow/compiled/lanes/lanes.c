@@ -6,7 +6,7 @@
  * events, limits, points that are not finite) is not clear: the lane gives its trajectory to the driver for that
  * step and takes it back (on a GPU it runs again from its start there). No lane's result depends on its neighbours.
  *
- * The generated text defines, besides what common.h asks for: N states with time, ND without, M surfaces,
+ * The generated text defines, besides what common.h needs: N states with time, ND without, M surfaces,
  * TIMED whether time is a state, W, SLOTS guards (surface or exit to +, exit to -, stops), STOPS, DIRECTION[STOPS],
  * AFFINE[SLOTS], AFFINE_MODES[3] (above, below, sliding), LINEAR whether all are, CANCELLED, CURVED, prepare(p, q),
  * jet(x, q, slides, above, lambda, c, g), surface_values, lie_values, stop_values; ROW[ROWS] of the field and SLOT[GUARDS]

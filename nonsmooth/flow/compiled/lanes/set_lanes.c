@@ -3,11 +3,11 @@
  * Off the set, on it and leaving it are three programs, and what is done near it is a fourth; each has lanes of
  * its own, and a trajectory waits until all lanes of a program are filled (fewer run only when no start is left).
  * These are GROUPS of W: each part of a step is done for all groups before the next part, since a step's text is
- * longer than what a processor keeps of instructions close by. Whatever is rare is handed over as in lanes.c: such a
+ * longer than what a processor keeps of instructions close by. What is rare falls back to the driver: such a
  * trajectory gets the status HAND_OVER and runs again from its start in the interpreter. No lane's result depends on
  * its neighbours.
  *
- * The generated text defines, besides what common.h asks for: N states with time, ND without, K, STOPS,
+ * The generated text defines, besides what common.h needs: N states with time, ND without, K, STOPS,
  * DIRECTION[STOPS], TIMED, W, GROUPS, ROWS and ROW[ROWS] of the field that are not affine (on the set ON_ROWS),
  * BENT_SLIP, BENT_STOPS, OWN[K] states that the switching functions are (NAMED: whether they are), and the functions of
  * nonsmooth/model/printing/set_program.py.

@@ -105,19 +105,19 @@ def high_degree(surface: int) -> str:
     )
 
 
-def wrong_start(asked: str, actual: str) -> str:
+def wrong_start(mode: str, actual: str) -> str:
     """The start mode is not admissible."""
-    return f"start_mode {asked!r} is not admissible at the start, where the mode is {actual!r}."
+    return f"start_mode {mode!r} is not admissible at the start, where the mode is {actual!r}."
 
 
-def impossible_start(asked: str) -> str:
+def impossible_start(mode: str) -> str:
     """The start mode cannot leave the start."""
-    return f"start_mode {asked!r} cannot continue from the start: its field points elsewhere."
+    return f"start_mode {mode!r} cannot continue from the start: its field points elsewhere."
 
 
-def start_solutions(asked: str, count: int) -> str:
+def start_solutions(mode: str, count: int) -> str:
     """The start mode has no multipliers, or several sets."""
-    return f"start_mode {asked!r} has {count} sliding solutions here."
+    return f"start_mode {mode!r} has {count} sliding solutions here."
 
 
 def field_not_finite(mode: str, x: Sequence[float]) -> str:

@@ -23,7 +23,7 @@ from .errors import (
     explain,
 )
 from .laws import complementarity
-from .laws.coupled import Coupled, ErrorScales, coupled_of, raised_of
+from .laws.coupled import Coupled, coupled_of, raised_of
 from .laws.evaluators import Evaluator, Surfaces, evaluator
 from .laws.followed import Followed, followed
 from .laws.layer import Layer, LayerNumbers, Loop, layer_of, loop_at
@@ -41,7 +41,6 @@ __all__ = [
     "Coupled",
     "DefinitionError",
     "DegenerateError",
-    "ErrorScales",
     "Evaluator",
     "FilippovSystem",
     "Followed",

@@ -32,7 +32,7 @@ def floor(direction, restitution=0.8):
     return ns.FilippovSystem([y, v], field=[v, -G], resets=[reset])
 
 
-# 1 A stop or reset is met where its function passes zero in its direction; a touch is not.
+# 1 A stop or reset is due where its guard passes zero in its direction; a touch is no event.
 
 
 @one_and_many
@@ -52,7 +52,7 @@ def test_a_touch_is_not_met(many):
     assert status is ns.Status.REACHED_END and abs(state[0] - 4.0) < 1e-12
 
 
-# 2 What happens exactly at t_end, to rounding, happens.
+# 8 An event at t_end, to rounding, happens.
 
 
 @one_and_many
@@ -87,7 +87,7 @@ def test_what_happens_after_the_end_does_not(many):
     assert status is ns.Status.REACHED_END and state[0] < 2.0
 
 
-# 3 At one instant a stop is served first, then resets in their order, then surfaces.
+# 4 At one instant stops are served first, then resets in their order, then surfaces.
 
 
 @one_and_many
@@ -127,7 +127,7 @@ def test_what_a_jump_carries_across_is_met(many):
     assert status is ns.Status.STOPPED and abs(state[0] - 3.0) < 1e-14
 
 
-# 4 A start on the zero of a stop is no event: the stop is armed once the motion has left it.
+# 7 A start on the zero of a stop is no event.
 
 
 @one_and_many
@@ -139,7 +139,7 @@ def test_a_start_on_a_stop_is_no_event(direction, many):
     assert np.allclose(state, [0.0, -1.0 if direction < 1 else 1.0], atol=1e-9)
 
 
-# 5 A start on the zero of a reset with a direction: it is met at once if the motion leaves that way.
+# 7 At a start on its zero a reset with a direction is due if the motion goes in.
 
 
 @one_and_many
@@ -152,7 +152,7 @@ def test_a_start_on_the_floor(speed, many):
     assert abs(state[0] - up**2 / (2 * G)) < 1e-12
 
 
-# 6 One without a direction is not met at a start, and ambiguous if it would turn the motion round.
+# 7 A reset without a direction is not due there; NON_UNIQUE if it would reverse the motion.
 
 
 @one_and_many
@@ -181,7 +181,7 @@ def test_a_wall_of_two_sides_is_met_from_either(many):
         assert counts["reset"] == 1
 
 
-# 7 A reset is not met again before the motion has left its zero.
+# 2 A passage is one event. 9 A motion that is pressed against its zero rests.
 
 
 @one_and_many
@@ -214,7 +214,7 @@ def test_a_body_that_a_reset_leaves_pressed_against_its_zero_rests(many):
     assert "Impact" in ns.simulate(floor(-1, 0.0), [1.0, 0.0], 5.0).message
 
 
-# 8 A reset that changes the side of a surface is one event, with the mode that starts.
+# 6 A reset across a surface is one event, with the mode that starts.
 
 
 def ramp():
@@ -247,8 +247,7 @@ def test_events_know_what_they_led_to():
     assert all(np.array_equal(e.x, e.x_after) for e in run.events if e.kind != "reset")
 
 
-# 9 After a reset that ends on the zero of another stop or reset, that one is met if the motion goes on
-# to the other side.
+# 3 Where a reset ends on the zero of another event, the motion that follows decides.
 
 
 @one_and_many

@@ -22,6 +22,7 @@ from ...model import (
     FilippovSystem,
     Parameters,
     PointError,
+    Surfaces,
     coupled_of,
     require_system,
 )
@@ -154,9 +155,8 @@ def law_at(
     coupled = coupled_of(system)
     h = coupled.heights_at(x, p)
     letters = _letters(system, h, members, mode)
-    marks = coupled.error_scales(x, coupled.held(letters), np.zeros(coupled.count), p)
     own = list(members)
-    slope = float(np.linalg.norm(marks.surface_gradient[own]))
+    slope = float(np.linalg.norm(Surfaces(system).values(x, p)[1][own]))
     distance = float(np.linalg.norm(h[own]))
     if not distance <= tol * slope * (1.0 + float(np.linalg.norm(x))):
         raise PointError(

@@ -267,7 +267,7 @@ class Meeting:
         for unknowns in sliding_multipliers(coupled, mode, self.x, self.p, stable_only=False):
             lam = self._with(letters)
             held = coupled.held(mode)
-            factors = coupled.error_scales(self.x, held, unknowns, self.p).factors
+            factors = coupled.layer_at(self.x, held, unknowns, self.p).factors
             slides = [i for i in self.surfaces if mode[i] == "s"]
             with np.errstate(divide="ignore", invalid="ignore"):
                 lam[slides] = (unknowns / factors)[slides]

@@ -103,11 +103,11 @@ def sliding_branches(
     x, p = system.extended_point(point, t), system.parameter_vector(parameters)
     sliding, branches = coupled.sliding(mode), []
     for unknowns in sliding_multipliers(coupled, mode, x, p, stable_only=False):
-        marks = coupled.error_scales(x, held, unknowns, p)
-        multipliers = (unknowns / marks.factors)[sliding]
+        at = coupled.layer_at(x, held, unknowns, p)
+        multipliers = (unknowns / at.factors)[sliding]
         if np.abs(multipliers).max(initial=0.0) > 1.0 + 1e-9:
             continue
-        slope = (marks.slope * marks.factors)[np.ix_(sliding, sliding)]
+        slope = (at.slope * at.factors)[np.ix_(sliding, sliding)]
         velocity = coupled.values(x, held, unknowns, p)[0][: system.dimension]
         rates = np.linalg.eigvals(slope).astype(complex)
         branches.append(SlidingBranch(multipliers, velocity, rates))

@@ -33,20 +33,14 @@ from .evaluators import Evaluator
 from .roots import gate_roots
 from .switches import Guard, event_guards
 
-# error scales ----------------------------------------------------------------------------------
-
 
 @dataclass(frozen=True)
-class ErrorScales:
-    """Numbers at the start of a step."""
+class LayerValues:
+    """Rates G (m,) at a point, their slope by the unknowns (m, m), factors of the multipliers (m,)."""
 
     layer: Array
     slope: Array
     factors: Array
-    layer_gradient: Array
-    surface_gradient: Array
-    stop_gradient: Array
-    factor_gradient: Array
 
 
 # factors of multipliers ------------------------------------------------------------------------
@@ -355,19 +349,17 @@ class Coupled:
     # numbers -----------------------------------------------------------------------------------
 
     @cached_property
-    def _error_scales(self) -> Evaluator:
-        return self._evaluator([self.layer, self.slope, self.factors, *self.gradients])
+    def _layer_values(self) -> Evaluator:
+        return self._evaluator([self.layer, self.slope, self.factors])
 
     def _evaluator(self, outputs: Sequence[ca.SX]) -> Evaluator:
         return Evaluator(ca.Function("at", self._symbols, self.awake(outputs), {"cse": True}))
 
-    def error_scales(self, x: Array, multipliers: Array, unknowns: Array, p: Array) -> ErrorScales:
+    def layer_at(self, x: Array, multipliers: Array, unknowns: Array, p: Array) -> LayerValues:
         """Evaluate at an extended state, with lambda where nothing slides (else 0) and nu (else 0)."""
-        values = self._error_scales.copied(self._inputs(x, multipliers, unknowns), p)
-        layer, slope, factors, *gradients = values
-        return ErrorScales(
-            layer.ravel(), slope, factors.ravel(), *[np.abs(gradient) for gradient in gradients]
-        )
+        found = self._layer_values.copied(self._inputs(x, multipliers, unknowns), p)
+        layer, slope, factors = found
+        return LayerValues(layer.ravel(), slope, factors.ravel())
 
     def _inputs(self, x: Array, multipliers: Array, unknowns: Array) -> Array:
         scaled = self._scaled

@@ -42,17 +42,17 @@ def frozen(
     """The rates of the switching functions ``own`` as a - M lambda."""
     held = coupled.known_multipliers(mode, x, unknowns, p)
     held[list(own)] = 0.0
-    marks = coupled.error_scales(x, held, np.zeros(coupled.count), p)
-    slope = marks.slope * marks.factors
+    at = coupled.layer_at(x, held, np.zeros(coupled.count), p)
+    slope = at.slope * at.factors
     others = [i for i in coupled.sliding(mode) if i not in own]
     chosen = list(own)
-    a, d = marks.layer[chosen], slope[np.ix_(chosen, chosen)]
+    a, d = at.layer[chosen], slope[np.ix_(chosen, chosen)]
     if others:
         back = np.linalg.lstsq(
-            marks.slope[np.ix_(others, others)],
-            np.column_stack([marks.layer[others], slope[np.ix_(others, chosen)]]),
+            at.slope[np.ix_(others, others)],
+            np.column_stack([at.layer[others], slope[np.ix_(others, chosen)]]),
             rcond=None,
         )[0]
-        through = marks.slope[np.ix_(chosen, others)] @ back
+        through = at.slope[np.ix_(chosen, others)] @ back
         a, d = a - through[:, 0], d - through[:, 1:]
     return Frozen(a, -d)

@@ -46,16 +46,16 @@ def _is_solution(
 ) -> bool:
     sliding = of.sliding(mode)
     held = of.known_multipliers(mode, x, unknowns, p)
-    marks = of.error_scales(x, held, of.acting(mode, unknowns), p)
-    slope = marks.slope[np.ix_(sliding, sliding)]
-    g = marks.layer[sliding]
+    at = of.layer_at(x, held, of.acting(mode, unknowns), p)
+    slope = at.slope[np.ix_(sliding, sliding)]
+    g = at.layer[sliding]
     small = np.abs(g).max() <= 1e-10 * (1.0 + np.abs(slope).max())
-    largest = np.abs(marks.factors[sliding]) * (1.0 + 1e-9)
+    largest = np.abs(at.factors[sliding]) * (1.0 + 1e-9)
     if not of.affine and not (small and np.all(np.abs(unknowns[sliding]) <= largest)):
         return False
     if not np.all(np.isfinite(slope)):
         return False
-    return not stable_only or is_stable(of, sliding, slope, marks.factors)
+    return not stable_only or is_stable(of, sliding, slope, at.factors)
 
 
 def is_stable(of: Coupled, sliding: Sequence[int], slope: Array, factors: Array) -> bool:
@@ -72,9 +72,9 @@ def newton_multipliers(
     held, sliding = of.known_multipliers(mode, x, unknowns, p), of.sliding(mode)
     result = unknowns.copy()
     for _ in range(iterations):
-        marks = of.error_scales(x, held, of.acting(mode, result), p)
+        at = of.layer_at(x, held, of.acting(mode, result), p)
         try:
-            step = np.linalg.solve(marks.slope[np.ix_(sliding, sliding)], marks.layer[sliding])
+            step = np.linalg.solve(at.slope[np.ix_(sliding, sliding)], at.layer[sliding])
         except np.linalg.LinAlgError:
             return None
         result[sliding] -= step

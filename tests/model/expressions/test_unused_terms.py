@@ -68,5 +68,8 @@ def test_the_program_of_all_modes_has_values_where_the_mode_has():
     coupled, none = coupled_of(system), np.zeros(0)
     field, layer, *_ = coupled.values(np.array([-2.0, 0.5]), [-1.0, 1.0], np.zeros(2), none)
     assert field == pytest.approx([-1.0, np.sqrt(1.25)]) and layer == pytest.approx(field)
-    marks = coupled.error_scales(np.array([-2.0, 0.5]), np.array([-1.0, 1.0]), np.zeros(2), none)
-    assert marks.layer == pytest.approx(field) and np.all(np.isfinite(marks.layer_gradient))
+    at = coupled.layer_at(np.array([-2.0, 0.5]), np.array([-1.0, 1.0]), np.zeros(2), none)
+    assert at.layer == pytest.approx(field) and np.all(np.isfinite(at.slope))
+    gradient = ca.Function("g", [coupled.moving], coupled.awake([coupled.gradients[0]]))
+    inputs = [-2.0, 0.5, -1.0, 1.0, *np.zeros(coupled.moving.numel() - 4)]
+    assert np.all(np.isfinite(np.array(gradient(inputs))))

@@ -117,7 +117,7 @@ def test_without_another_compiler_a_run_says_what_to_install(stub, tmp_path):
 
 
 @pytest.mark.parametrize("cc", [" ", "\t", "gcc 'x", 'gcc "', "''", "gcc \\"])
-def test_a_malformed_cc_is_told(cc, monkeypatch):
+def test_a_malformed_cc_is_reported(cc, monkeypatch):
     monkeypatch.setenv("CC", cc)
     with pytest.raises(CompilerError, match=r"\bCC\b"):
         build(SOURCE)
@@ -192,7 +192,7 @@ def test_a_compiler_without_an_end_is_ended_with_all_it_started(monkeypatch, tmp
     assert [command for command, _ in started] == [str(hanging), sound[0]]
 
 
-def test_a_full_disk_is_told(monkeypatch):
+def test_a_full_disk_is_reported(monkeypatch):
     def full(path, data):
         raise OSError(28, "No space left on device")
 

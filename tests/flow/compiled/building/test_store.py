@@ -190,7 +190,7 @@ def test_what_is_no_library_is_replaced(kind, cache):
     assert place.is_file()
 
 
-def test_a_folder_in_the_place_of_an_entry_is_told(cache):
+def test_a_folder_in_the_place_of_an_entry_is_reported(cache):
     cache.mkdir(mode=0o700)
     entry(cache).mkdir()
     with pytest.raises(store.CompilerError, match="cache"):
@@ -299,7 +299,7 @@ def test_the_folder_of_a_mac_is_the_one_its_rules_name(monkeypatch, tmp_path):
     assert store.cache_directory() == tmp_path / "Library" / "Caches" / "nonsmooth"
 
 
-def test_a_folder_above_that_belongs_to_another_user_is_told(cache, tmp_path, monkeypatch):
+def test_a_folder_above_that_belongs_to_another_user_is_reported(cache, tmp_path, monkeypatch):
     real, foreign = os.lstat, os.lstat(tmp_path).st_ino
 
     def lstat(path, **options):

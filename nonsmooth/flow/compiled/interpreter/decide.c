@@ -752,10 +752,13 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
       for (int j = 0; j < n; j++) miss += b.matrix[i * n + j] * (nu[j] - d->old[b.own[j]]);
       agrees = fabs(miss) <= larger(KNOWN_TO * r->o.rtol * terms, zero_of(&b, i, terms));
     }
-    int is_dependent = 0; /* then what ends is the set of all solutions */
-    for (int i = 0; i < n && n > 1; i++) is_dependent |= d->is_known[b.own[i]] && d->proved[which] < UNIQUE;
+    int is_dependent = 0, contacts = 0; /* one of many solutions is at its bound; of contacts, all */
+    for (int i = 0; i < n && n > 1; i++) {
+      is_dependent |= d->is_known[b.own[i]] && d->proved[which] < UNIQUE;
+      contacts |= b.is_contact[i];
+    }
     for (int i = 0; i < n; i++) {
-      int is_loose = agrees && (is_dependent || d->is_known[b.own[i]]);
+      int is_loose = agrees && (is_dependent ? contacts : d->is_known[b.own[i]]);
       class[q * n + i] = (int8_t)class_of(&b, i, nu, is_loose ? KNOWN_TO * r->o.rtol : 0);
     }
   }

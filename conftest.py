@@ -1,7 +1,7 @@
 """What tests and the examples of docstrings have in common: no display, and little to compile.
 
 The fast tests compile the driver in C, once, and lanes and kernels without optimisation. Optimised lanes run
-in the tests named in ``SHIPPED``, in the slow tests, and in all of ``tests/flow/compiled`` where hypothesis
+in the tests named in ``SHIPPED``, in the slow tests, and in all of ``tests/flow/engine`` where hypothesis
 draws all its examples.
 """
 
@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from nonsmooth.flow.compiled import tape
-from nonsmooth.flow.compiled.building.build import CompilerError
-from nonsmooth.flow.compiled.lanes import engine
+from nonsmooth.flow.engine import lanes as engine
+from nonsmooth.flow.engine import tape
+from nonsmooth.flow.engine.building.build import CompilerError
 
 os.environ["MPLBACKEND"] = "Agg"
 
@@ -30,7 +30,7 @@ SHIPPED = {
     "ensembles/test_ensemble.py",
     "ensembles/test_store.py",
 }
-COMPILED = HERE / "tests" / "flow" / "compiled"
+COMPILED = HERE / "tests" / "flow" / "engine"
 WHOLE = os.environ.get("HYPOTHESIS_PROFILE", "quick") != "quick"
 
 # As often as Python collects garbage by default, it takes a twentieth of the time and finds little.

@@ -67,8 +67,8 @@ class CustomMetadataHook(MetadataHookInterface):  # type: ignore[misc]
 
 
 #: Packages without their `__init__`, of which a build imports modules that need nothing but Python.
-_BARE = ("", ".model", ".model.expressions", ".flow", ".flow.compiled", ".flow.compiled.building")
-_BUILDING = "nonsmooth.flow.compiled.building"
+_BARE = ("", ".model", ".model.expressions", ".flow", ".flow.engine", ".flow.engine.building")
+_BUILDING = "nonsmooth.flow.engine.building"
 
 
 def building(root: Path) -> tuple[Any, Any]:
@@ -125,7 +125,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[misc]
             return
         plain = (tag for tag in platform_tags() if not tag.startswith(("manylinux", "musllinux")))
         build_data["tag"], build_data["pure_python"] = f"py3-none-{next(plain)}", False
-        build_data["force_include"][str(library)] = f"nonsmooth/flow/compiled/{library.name}"
+        build_data["force_include"][str(library)] = f"nonsmooth/flow/engine/{library.name}"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Remove the folder of the library."""

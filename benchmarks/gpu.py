@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled.device.card import card
-from nonsmooth.flow.compiled.device.kernel import Kernel, Source
-from nonsmooth.flow.compiled.device.machine import DeviceError, Machine
 from nonsmooth.flow.constants import HAND_OVER
+from nonsmooth.flow.engine.device.card import card
+from nonsmooth.flow.engine.device.kernel import Kernel, Source
+from nonsmooth.flow.engine.device.machine import DeviceError, Machine
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
-from tests.flow.compiled.device.shim import Shim
+from tests.flow.engine.device.shim import Shim
 
 from .peers import diffrax_modes
 from .problems import T_MAX, Array, bounce_system, random_starts

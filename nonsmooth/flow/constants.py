@@ -1,6 +1,6 @@
 """Constants of the event logic in every driver: tolerances, kinds, priorities, reasons.
 
-``compiled/building/core_source.py`` writes them into the sources in C.
+``engine/building/core_source.py`` writes them into the sources in C.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..model import Array, ConvergenceError
 from ..model.derivatives.variational import ORDER, GuardedField
 from ..model.printing.tape import Series, Values
-from .compiled.smooth import LegsProgram, SmoothProgram, ValuesProgram, WatchProgram
+from .engine.smooth import LegsProgram, SmoothProgram, ValuesProgram, WatchProgram
 
 #: Part of the size of a group of states that the last terms of a step may reach.
 TOLERANCE = 2.0**-53

@@ -27,9 +27,9 @@ from ..model import (
     sliding_multipliers,
 )
 from . import messages
-from .compiled.arrays import Run
-from .compiled.convert import message_of
-from .compiled.tape import tape_for
+from .engine.arrays import Run
+from .engine.convert import message_of
+from .engine.tape import tape_for
 from .names import guard_name
 from .options import Options, tolerances
 from .status import ADVICE, Status

@@ -1,7 +1,7 @@
 """First root of a polynomial on an interval, with no root overlooked, and shifts of polynomials.
 
 In Bernstein form on [0, h] a polynomial has at most as many roots as its coefficients change sign: none
-excludes, one isolates, more are resolved by halving the interval (``first_root`` of ``compiled/common.h``).
+excludes, one isolates, more are resolved by halving the interval (``first_root`` of ``core/common.h``).
 
 Source: Lane & Riesenfeld 1981, "Bounds on a polynomial"; Mourrain & Pavone 2009. Declined: companion-matrix
 eigenvalues (all roots where one is wanted) and Sturm sequences (unstable).
@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..model import Array, OptionError
-from .compiled.arrays import address
-from .compiled.building.core_source import MOST_ORDER
-from .compiled.tape import library
+from .engine.arrays import address
+from .engine.building.core_source import MOST_ORDER
+from .engine.tape import library
 
 
 def first_root(coefficients: Sequence[float], h: float) -> float | None:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, OptionError, Parameters, require_system
-from .compiled.convert import trajectory
-from .compiled.tape import tape_for
+from .engine.convert import trajectory
+from .engine.tape import tape_for
 from .ensembles.starts import require_start, require_start_mode
 from .options import Options, tolerances
 from .section import Section, Times, read_sampling, sampled, sectioned

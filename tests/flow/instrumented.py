@@ -18,8 +18,8 @@ from pathlib import Path
 
 import pytest
 
-from nonsmooth.flow.compiled import find_compiler, library, tape
-from nonsmooth.flow.compiled.building import core_source
+from nonsmooth.flow.engine import find_compiler, library, tape
+from nonsmooth.flow.engine.building import core_source
 
 ROOT = Path(__file__).parents[2]
 
@@ -135,7 +135,7 @@ def main(kind: str, arguments: list[str]) -> int:
     if kind == "uncovered":
         names = os.environ.get("NONSMOOTH_UNCOVERED", ",".join(DECISIONS)).split(",")
         for name, lines in uncovered(folder, names).items():
-            (source,) = (ROOT / "nonsmooth" / "flow" / "compiled").rglob(name)
+            (source,) = (ROOT / "nonsmooth" / "flow" / "core").rglob(name)
             text = source.read_text().splitlines()
             print(f"{name}: {len(lines)} of {len(text)} lines were not run")
             for line in lines:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from nonsmooth.flow.compiled import find_compiler
+from nonsmooth.flow.engine import find_compiler
 
 from .instrumented import main, preloaded
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled import tape_for
+from nonsmooth.flow.engine import tape_for
 from nonsmooth.flow.options import Options
 
 from .independent import blocks

@@ -6,7 +6,7 @@ import casadi as ca
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled import find_compiler
+from nonsmooth.flow.engine import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 

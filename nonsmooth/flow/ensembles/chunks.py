@@ -10,8 +10,8 @@ from functools import lru_cache
 import numpy as np
 
 from ...model import Array, FilippovSystem
-from ..compiled.lanes.engine import lanes_for
-from ..compiled.tape import tape_for
+from ..engine.lanes import lanes_for
+from ..engine.tape import tape_for
 from ..options import Options
 from ..results import Chunk
 from ..section import Times

@@ -11,10 +11,10 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ...model import FilippovSystem, OptionError, require_system
-from ..compiled.building.compilers import ADVICE, CompilerError, find_compiler
-from ..compiled.lanes.engine import lanes_for
-from ..compiled.tape import library
 from ..constants import KINDS
+from ..engine.building.compilers import ADVICE, CompilerError, find_compiler
+from ..engine.lanes import lanes_for
+from ..engine.tape import library
 from ..options import Options, tolerances
 from ..results import Chunk, Collected, Ensemble
 from ..section import KINDS_OF_SECTIONS, read_sampling, sectioned

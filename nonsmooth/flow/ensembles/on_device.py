@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...model import Array, FilippovSystem, OptionError
-from ..compiled.building.codegen import supports_lanes
-from ..compiled.device.card import machine_for
-from ..compiled.device.kernel import Bins, Kernel, Reduced, Source
 from ..constants import HAND_OVER
+from ..engine.building.codegen import supports_lanes
+from ..engine.device.card import machine_for
+from ..engine.device.kernel import Bins, Kernel, Reduced, Source
 from ..options import Options
 from ..results import Chunk
 from .chunks import Job, run_chunk

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, require_system, whole
-from ..compiled.device.kernel import Bins, Reduced
+from ..engine.device.kernel import Bins, Reduced
 from ..options import Options, tolerances
 from ..results import Chunk
 from ..status import Status

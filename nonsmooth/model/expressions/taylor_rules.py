@@ -2,7 +2,7 @@
 
 Most operations need one rule. Others need further series: sin the cosine, tan its square plus one. A
 rule's arguments are numbers of rules; a sine and a cosine refer to each other. The recurrences of the
-rules are in ``jets`` (on any arithmetic) and in ``flow/compiled/interpreter/programs.h``.
+rules are in ``jets`` (on any arithmetic) and in ``flow/core/programs.h``.
 """
 
 from __future__ import annotations

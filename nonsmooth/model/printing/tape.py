@@ -87,7 +87,7 @@ class Entries:
 
 @dataclass(frozen=True)
 class Tape:
-    """What the driver in C reads of a system; see ``System`` in ``flow/compiled/interpreter/state.c``."""
+    """What the driver in C reads of a system; see ``System`` in ``flow/core/state.c``."""
 
     series: Series
     free: Series

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...flow.compiled.smooth import LegsProgram
+from ...flow.engine.smooth import LegsProgram
 from ...flow.fixed import MOST_STEPS, TOLERANCE, legs_program, stuck
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent

@@ -5,9 +5,9 @@ import pytest
 
 import bounce
 import nonsmooth as ns
-from nonsmooth.flow.compiled import find_compiler
+from nonsmooth.flow.engine import find_compiler
 from nonsmooth.flow.ensembles import on_device
-from tests.flow.compiled.device.shim import Shim
+from tests.flow.engine.device.shim import Shim
 
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from nonsmooth.flow import Status, simulate
-from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.constants import KINDS
+from nonsmooth.flow.engine import find_compiler
 from nonsmooth.flow.ensembles import chunks
 from nonsmooth.flow.ensembles import work as work_module
 from nonsmooth.flow.ensembles.ensemble import ensemble

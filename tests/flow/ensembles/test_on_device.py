@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled.device import card, machine
+from nonsmooth.flow.engine.device import card, machine
 
 
 def pair(**more):

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled import find_compiler
-from nonsmooth.flow.compiled.device import kernel
+from nonsmooth.flow.engine import find_compiler
+from nonsmooth.flow.engine.device import kernel
 from nonsmooth.flow.ensembles import on_device
-from tests.flow.compiled.device.shim import Shim
+from tests.flow.engine.device.shim import Shim
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 RANGES = {"x": (-1.0, 1.0), "t": (0.0, 4.0)}

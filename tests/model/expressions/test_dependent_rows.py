@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled import find_compiler
+from nonsmooth.flow.engine import find_compiler
 from nonsmooth.model.expressions.dependent_rows import in_span
 
 x, y, z, p = (ca.SX.sym(name) for name in "xyzp")

@@ -9,7 +9,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.flow import fixed
-from nonsmooth.flow.compiled import find_compiler
+from nonsmooth.flow.engine import find_compiler
 from nonsmooth.model.derivatives.variational import guarded_field
 from nonsmooth.orbit.branches import conditions
 from nonsmooth.orbit.branches.orbit_branches import OrbitCurve

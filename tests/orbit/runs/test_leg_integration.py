@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled import find_compiler
+from nonsmooth.flow.engine import find_compiler
 from nonsmooth.orbit.runs import leg_integration
 from nonsmooth.orbit.runs.guards import watch
 from nonsmooth.orbit.runs.leg_integration import LegIntegrator

@@ -1,1 +1,0 @@
-"""Lanes: several trajectories in step, by one vectorised C text."""

@@ -1,0 +1,138 @@
+"""C sources of lanes and kernels: constants that Python and C share, fixed texts, generated functions."""
+
+from __future__ import annotations
+
+from ....model import Coupled, FilippovSystem, coupled_of, motion
+from ....model.printing.programs import is_flat, lanes_program
+from ....model.printing.set_program import set_program
+from ...options import Options
+from .core_source import driver_text, facts_header, listed
+
+#: The order to which that of linear systems is raised: beyond, longer steps lose digits to terms that cancel.
+_MOST_LINEAR = 22
+
+
+def supports_lanes(system: FilippovSystem) -> bool:
+    """Whether the lanes engine can be generated for a system."""
+    return system.surface_count <= 1 and _has_only_plain_stops(system)
+
+
+def supports_set_lanes(coupled: Coupled) -> bool:
+    """Whether lanes can be generated for a system with a set: one, alone, of constant slopes."""
+    system = coupled.system
+    alone = len(system.sets) == 1 and system.surface_count == len(system.sets[0])
+    moves = not coupled.affine or coupled.slope_moves.any()
+    return alone and not moves and _has_only_plain_stops(system)
+
+
+def _has_only_plain_stops(system: FilippovSystem) -> bool:
+    """Whether all events are stops at a guard, without conditions, and multipliers enter linearly."""
+    others = system.resets or system.impacts or any(system.nonlinear)
+    return not others and system.definition.plain
+
+
+def tape_order(system: FilippovSystem, options: Options) -> int:
+    """Order of the series of one trajectory: a third more where all is linear."""
+    order = options.order
+    if system.coupled or not coupled_of(system).linearity.everywhere:
+        return order
+    return max(order, min((4 * order + 2) // 3, _MOST_LINEAR))
+
+
+def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
+    """C source of the engine for ``width`` trajectories in step."""
+    head, program = _lanes_head(system, order)
+    texts = map(
+        driver_text, ("core/common.h", "kernel/vector.h", "kernel/sines.h", "kernel/polynomials.h")
+    )
+    return "".join(
+        [
+            f"#define W {width}\n",
+            head,
+            *texts,
+            program,
+            *map(driver_text, ("kernel/lanes.c", "kernel/records.h", "kernel/batch.c")),
+        ]
+    )
+
+
+def device_source(system: FilippovSystem, order: int, threads: int, resident: int = 1) -> str:
+    """C++ source of the same engine with a trajectory for each thread, for CUDA or any compiler."""
+    head, program = _lanes_head(system, order)
+    sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n"
+    texts = map(
+        driver_text, ("core/common.h", "kernel/lane.h", "kernel/sines.h", "kernel/polynomials.h")
+    )
+    parts = [driver_text("kernel/cuda.h"), sizes, head, *texts, program]
+    return "".join([*parts, driver_text("kernel/lanes.c"), driver_text("kernel/cuda.c")])
+
+
+def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
+    """Definitions that the lanes' text needs before it, and the functions of a system."""
+    program, blend = lanes_program(system, order)
+    (rows, checked), affine = blend.checked, blend.affine
+    slots = 2 * system.surface_count + len(system.stops)
+    cancelled = system.surface_count == 0 or motion(system, "s").regular
+    directions = ", ".join(str(d) for _, d in system.stops) or "0"
+    defines = (
+        f"#define SLOTS {slots}\n#define STOPS {len(system.stops)}\n"
+        f"#define CANCELLED {int(cancelled)}\n#define ROWS {len(rows)}\n"
+        f"#define GUARDS {len(checked)}\n"
+        f"#define CURVED {int(bool(affine) and not is_flat(system))}\n"
+        f"#define LINEAR {int(all(_affine_modes(system)))}\n"
+        f"static const int DIRECTION[] = {{{directions}}};\n"
+        f"static const long long AFFINE_MODES[] = {{{listed(_affine_modes(system))}}};\n"
+        f"static const int ROW[] = {{{listed(rows) or 0}}}, SLOT[] = {{{listed(checked) or 0}}};\n"
+        f"static const int AFFINE[] = {{{', '.join(str(int(a)) for a in affine) or '1'}}};\n"
+    )
+    return facts_header() + _sizes(system, order) + defines, program
+
+
+#: Characters of a program from which on a step's instructions fill a processor's nearest memory of 32 KiB: measured.
+_LONG_TEXT = 200_000
+
+
+def set_lanes_source(coupled: Coupled, order: int, width: int) -> str:
+    """C source of the engine in step of a system that ``supports_set_lanes``."""
+    system, program = coupled.system, set_program(coupled, order)
+    directions = listed(d for _, d in system.stops) or "0"
+    groups = 8 if len(program.text) > _LONG_TEXT else 2
+    defines = (
+        f"#define W {width}\n#define GROUPS {groups}\n#define K {system.surface_count}\n#define STOPS {len(system.stops)}\n"
+        f"#define ROWS {len(program.rows)}\n#define ON_ROWS {len(program.on_rows)}\n#define NAMED {int(bool(program.states))}\n"
+        f"#define BENT_SLIP {int(program.bent_slip)}\n#define BENT_STOPS {int(program.bent_stops)}\n"
+        f"__attribute__((unused)) static const int DIRECTION[] = {{{directions}}};\n"
+        f"__attribute__((unused)) static const int ROW[] = {{{listed(program.rows) or 0}}};\n"
+        f"__attribute__((unused)) static const int ON_ROW[] = {{{listed(program.on_rows) or 0}}};\n"
+        f"__attribute__((unused)) static const int OWN[] = {{{listed(program.states) or 0}}};\n"
+    )
+    drivers = (
+        "kernel/polynomials.h",
+        "kernel/records.h",
+        "kernel/set_lanes.c",
+        "kernel/set_steps.c",
+    )
+    texts = [
+        *map(driver_text, ("core/common.h", "kernel/vector.h", "kernel/sines.h")),
+        program.text,
+    ]
+    return "".join(
+        [facts_header(), _sizes(system, order), defines, *texts, *map(driver_text, drivers)]
+    )
+
+
+def _affine_modes(system: FilippovSystem) -> list[int]:
+    """Of above, below and sliding; a system without a surface has one mode."""
+    modes = ["+", "-", "s"] if system.surface_count else [""] * 3
+    return [int(motion(system, mode).affine) for mode in modes]
+
+
+def _sizes(system: FilippovSystem, order: int) -> str:
+    sizes = {
+        "N": system.extended_dimension,
+        "ND": system.dimension,
+        "P": order,
+        "M": system.surface_count,
+        "TIMED": int(system.time_dependent),
+    }
+    return "".join(f"#define {name} {value}\n" for name, value in sizes.items())

@@ -1,0 +1,121 @@
+"""The C source of the driver: constants that Python and C share, then fixed texts. It is the same for all systems.
+
+A build of the package imports this module and what it imports, and no package that is installed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from ....model.numbering import OPERATIONS, TAPE_RULES
+from ... import constants
+from ...status import Status
+
+#: Orders of the series are below this, for arrays on the stack.
+MOST_ORDER = 48
+
+#: The driver in C, in the order in which it is read: one text.
+_FILES = (
+    *(
+        "programs.h",
+        "linear.h",
+        "state.c",
+        "modes.c",
+        "jets.c",
+        "stability.c",
+        "sets.c",
+        "stepper.c",
+    ),
+    *("surfaces.c", "record.c", "spiral.c", "decide.c", "candidates.c", "layer.c", "contacts.c"),
+    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "memory.c", "entry.c"),
+    "motion.c",
+)
+
+
+#: The folder of those of the C files.
+_SOURCES = Path(__file__).parents[2]
+
+
+@lru_cache(maxsize=32)
+def driver_text(name: str) -> str:
+    """Return one of the C files."""
+    return (_SOURCES / name).read_text(encoding="utf-8")
+
+
+@lru_cache(maxsize=1)
+def core_source() -> str:
+    """C of the driver."""
+    # UNFUSED: the same bits on every processor.
+    enumerations = [("OP", OPERATIONS), ("RULE", TAPE_RULES)]
+    head = "".join(
+        f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
+        for prefix, names in enumerations
+    )
+    sizes = f"#define UNFUSED\n#define P {MOST_ORDER}\n"
+    driver = [driver_text(f"core/{name}") for name in _FILES]
+    flows = [driver_text("core/flow.c"), _extended("programs.h", "flow.c")]
+    fixed = driver_text("core/fixed.c")
+    return "".join(
+        [facts_header(), sizes, head, driver_text("core/common.h"), *driver, *flows, fixed]
+    )
+
+
+def _extended(*files: str) -> str:
+    """Functions of some files once more, under other names, on long doubles."""
+    text = "".join(driver_text(f"core/{name}") for name in files)
+    text = re.sub(r"typedef struct \{[^}]*\} (Values|Series|Field);", "", text)
+    text = re.sub(r"\bdouble\b", "long double", text)
+    names = {
+        "Flow",
+        *re.findall(r"^(?:static|OUTSIDE) (?:inline )?[\w ]+?[ *](\w+)\(", text, re.MULTILINE),
+    }
+    defined = "".join(f"#define {name} {name}_extended\n" for name in sorted(names))
+    undone = "".join(f"#undef {name}\n" for name in sorted(names))
+    return f"#include <tgmath.h>\n{defined}{text}{undone}"
+
+
+@lru_cache(maxsize=1)
+def facts_header() -> str:
+    """C of ``flow/constants.py`` and of the statuses: constants, enumerations, priorities."""
+    numbers = {
+        n: v for n, v in vars(constants).items() if n.isupper() and isinstance(v, (int, float))
+    }
+    states = [n for n, v in numbers.items() if isinstance(v, int) and v < 0]
+    lines = [f"#define {n} {v!r}" for n, v in numbers.items() if n not in states]
+    statuses = ", ".join(f"{s.name} = {s.value}" for s in Status)
+    lines.append(f"enum {{ {statuses}, {', '.join(f'{n} = {numbers[n]}' for n in states)} }};")
+    lines.append(f"enum {{ {', '.join(k.upper() for k in constants.KINDS)}, KINDS }};")
+    lines.append(f"enum {{ {', '.join(k.upper() + '_GUARD' for k in constants.GUARDS)} }};")
+    lines.append(f"enum {{ {', '.join(r.upper() or 'NO_REASON' for r in constants.REASONS)} }};")
+    lines.append(_table("PRIORITY", [constants.PRIORITY[k] for k in constants.GUARDS]))
+    lines.append(f"enum {{ LAG_COUNT = {len(constants.LAGS)} }};\n{_table('LAGS', constants.LAGS)}")
+    return "\n".join(lines) + "\n"
+
+
+def _table(name: str, values: Sequence[int]) -> str:
+    return f"__attribute__((unused)) static const int {name}[] = {{{listed(values)}}};"
+
+
+def listed(values: Iterable[int]) -> str:
+    """Return numbers with commas between."""
+    return ", ".join(str(v) for v in values)
+
+
+def source_key() -> str:
+    """Identify the text of the driver."""
+    return hashlib.sha256(core_source().encode()).hexdigest()[:32]
+
+
+def keyed(source: str, key: str) -> str:
+    """Return a source whose library holds a key."""
+    return f'{source}\nconst char nonsmooth_key[] = "{key}";\n'
+
+
+def packaged_name(platform: str) -> str:
+    """Name of the driver's library in a wheel, beside ``library.py``."""
+    ending = {"darwin": "dylib", "win32": "dll"}.get(platform, "so")
+    return f"_core.{ending}"

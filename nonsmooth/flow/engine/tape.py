@@ -1,0 +1,575 @@
+"""The interpreter from Python: any system at once, with a library that is compiled once per machine."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
+from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
+from ..constants import FULL, RUNNING, SEVERAL
+from ..names import shown_mode
+from ..options import Options
+from ..results import Chunk, Stopped
+from .arrays import (
+    BURST,
+    BatchStructure,
+    OptionsStructure,
+    Run,
+    address,
+    batch_of,
+    options_of,
+    require_size,
+    words_of,
+)
+from .building.codegen import tape_order
+from .library import core_library
+
+# Where a dense run is written: arrays of steps, points and events, which grow.
+
+#: Arrays in the order of C's pointers: type, and what there is one of for each entry.
+_ARRAYS = {
+    "start": (float, "step"),
+    "coefficients": (float, "step"),
+    "point_t": (float, "point"),
+    "point_x": (float, "point"),
+    "event_t": (float, "event"),
+    "event_x": (float, "event"),
+    "event_after_x": (float, "event"),
+    "event_motion": (float, "event"),
+    "step_mode": (np.int32, "step"),
+    "event_kind": (np.int32, "event"),
+    "event_before": (np.int32, "event"),
+    "event_after": (np.int32, "event"),
+    "event_guard": (np.int32, "event"),
+}
+
+#: What there is several of, and room for at first; arrays of larger runs grow from there.
+_FIRST = {"step": 64, "point": 128, "event": 64}
+
+#: How rooms grow: pages that are not written cost nothing, so by much as long as they are small (bytes).
+_SMALL, _MUCH, _LITTLE = 1 << 26, 16, 2
+#: Rows that are copied at once.
+_COPIED = 1 << 16
+
+#: Rows of all arrays that C needs to be free before a step.
+_NEEDED = {"step": 2, "point": 4, "event": 4}
+
+Rooms = Mapping[str, int]
+
+
+@lru_cache(maxsize=64)
+def _layout(
+    n: int, order: int, motion: int
+) -> tuple[dict[str, tuple[int, tuple[int, ...]]], dict[str, int]]:
+    """For each array the bytes before it in its block, by room, and its shape; bytes of each kind."""
+    shapes: dict[str, tuple[int, ...]] = {
+        "coefficients": (n, order + 1),
+        **dict.fromkeys(("point_x", "event_x", "event_after_x"), (n,)),
+        "event_motion": (motion,),
+    }
+    used, places = dict.fromkeys(_FIRST, 0), {}
+    for name, (dtype, kind) in _ARRAYS.items():  # those of floats first
+        shape = shapes.get(name, ())
+        places[name] = used[kind], shape
+        used[kind] += math.prod(shape) * (8 if dtype is float else 4)
+    return places, used
+
+
+class Output:
+    """Arrays of a dense run, in a block of memory for each of steps, points and events."""
+
+    class Structure(ctypes.Structure):
+        """``Output`` of the drivers."""
+
+        _fields_ = [
+            *[(name, ctypes.c_int64) for name in ("steps", "points", "events")],
+            *[(name, ctypes.c_int64) for name in ("step_room", "point_room", "event_room")],
+            *[(name, ctypes.c_void_p) for name in _ARRAYS],
+        ]
+
+    def __init__(self, n: int, order: int, rooms: Rooms = _FIRST, motion: int = 0):
+        self._places, self._sizes = _layout(n, order, motion)
+        self._rooms = {
+            kind: max(least, min(rooms[kind], _SMALL // self._sizes[kind]))
+            for kind, least in _FIRST.items()
+        }
+        self._blocks = {kind: self._block(kind) for kind in _FIRST}
+        self._point_to((0, 0, 0))
+
+    def _block(self, kind: str) -> NDArray[np.uint8]:
+        return np.empty(self._rooms[kind] * self._sizes[kind], np.uint8)
+
+    def _point_to(self, counts: Sequence[int]) -> None:
+        first = {kind: address(block) or 0 for kind, block in self._blocks.items()}
+        rooms, places = self._rooms, self._places
+        at = [first[own] + rooms[own] * places[name][0] for name, (_, own) in _ARRAYS.items()]
+        self.pointer = ctypes.byref(self.Structure(*counts, *rooms.values(), *at))
+
+    def grow(self, counts: Sequence[int]) -> None:
+        """Make room where there is little, with the same content."""
+        for (kind, room), size in zip(self._rooms.items(), counts, strict=True):
+            if size + _NEEDED[kind] <= room:
+                continue
+            written = self._of(kind, size)
+            small = _MUCH * self._blocks[kind].nbytes < _SMALL
+            self._rooms[kind] = room * (_MUCH if small else _LITTLE)
+            self._blocks[kind] = self._block(kind)
+            for name, array in self._of(kind, size).items():
+                for k in range(0, size, _COPIED):  # Ctrl-C is heard between the pieces
+                    array[k : k + _COPIED] = written[name][k : k + _COPIED]
+        self._point_to(counts)
+
+    def filled(self, counts: Sequence[int]) -> dict[str, NDArray[Any]]:
+        """Return the parts that were written: steps, points and events."""
+        # They are views of the blocks, unless nearly all of these would be kept for nothing.
+        found = {}
+        for (kind, room), size in zip(self._rooms.items(), counts, strict=True):
+            own = self._of(kind, size)
+            if room > _FIRST[kind] and _MUCH * size < room:
+                own = {name: array.copy() for name, array in own.items()}
+            found.update(own)
+        return found
+
+    def _of(self, kind: str, size: int) -> dict[str, NDArray[Any]]:
+        room, block = self._rooms[kind], self._blocks[kind]
+        return {
+            name: np.ndarray((size, *shape), _ARRAYS[name][0], block, room * before)
+            for name, (before, shape) in self._places.items()
+            if _ARRAYS[name][1] == kind
+        }
+
+
+def rooms_of(counts: Sequence[int]) -> Rooms:
+    """Room for a run of so many steps, points and events."""
+    return {
+        kind: count + needed for (kind, needed), count in zip(_NEEDED.items(), counts, strict=True)
+    }
+
+
+_I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+
+
+class ValuesStructure(ctypes.Structure):
+    """A graph as C reads it."""
+
+    _fields_ = [
+        *[(name, _I32) for name in ("size", "still_count", "moving_count", "free_count")],
+        *[(name, _I32) for name in ("output_count", "pad")],
+        *[(name, _POINTER) for name in ("op", "a", "b", "still", "moving", "free", "output")],
+        ("constant", _POINTER),
+    ]
+
+
+class SeriesStructure(ctypes.Structure):
+    """Rules of series as C reads them."""
+
+    _fields_ = [
+        *[(name, _I32) for name in ("size", "still_count", "moving_count", "later_count")],
+        *[(name, _I32) for name in ("late_count", "output_count")],
+        *[(name, _POINTER) for name in ("rule", "a", "b", "c", "op", "still", "moving", "later")],
+        *[(name, _POINTER) for name in ("late", "output", "first", "second")],
+    ]
+
+
+class _Entries(ctypes.Structure):
+    _fields_ = [("count", _I32), ("pad", _I32), ("row", _POINTER), ("column", _POINTER)]
+
+
+_VALUES = ("point", "surfaces", "maps", "atoms", "choices", "restitution", "columns")
+_ENTRIES = tuple(field.name for field in fields(Tape) if field.type == "Entries")
+_TABLES = ("continuous", "scaled", "carries", "component")
+
+
+class _Rules(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I32) for name in ("atoms", "triggers", "clocks", "discrete", "keeps", "width")],
+        *[(name, _POINTER) for name in ("way", "trigger_event", "trigger_at", "condition")],
+        *[(name, _POINTER) for name in ("filter_at", "filter", "flags", "initially", "named")],
+        *[(name, _POINTER) for name in ("clock_reset", "clock_state", "value_at", "value")],
+    ]
+
+
+class _System(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I32) for name in ("n", "dimension", "timed", "m", "c", "parameters")],
+        *[(name, _I32) for name in ("stops", "resets", "order", "slope_outputs")],
+        ("series", SeriesStructure),
+        ("free", SeriesStructure),
+        *[(name, ValuesStructure) for name in _VALUES],
+        *[(name, _Entries) for name in _ENTRIES],
+        *[
+            (name, _POINTER)
+            for name in (*_TABLES, "slope_output", "slope_moves", "slope_symmetric")
+        ],
+        *[(name, _I32) for name in ("linear", "linear_free")],
+        *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
+        *[(name, _I32) for name in ("affine", "sets")],
+        *[(name, _POINTER) for name in ("mixed", "set_first", "set_size", "set_of", "layer_width")],
+        *[(name, _POINTER) for name in ("degree", "lower_first", "power", "early", "early_free")],
+        *[(name, _I32) for name in ("early_count", "early_free_count")],
+        ("rules", _Rules),
+    ]
+
+
+@lru_cache(maxsize=1)
+def library() -> ctypes.CDLL:
+    """Return the driver."""
+    return _declared(core_library())
+
+
+def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
+    require_size(made.options_size, OptionsStructure)
+    require_size(made.batch_size, BatchStructure)
+    require_size(made.system_size, _System)
+    require_size(made.output_size, Output.Structure)
+    made.table_new.restype = made.run_new.restype = made.lanes_tree.restype = _POINTER
+    made.table_new.argtypes = [_I32]
+    made.polynomial_root.restype = made.polynomial_crossing.restype = _D
+    made.polynomial_root.argtypes = [_POINTER, _I32, _D]
+    made.polynomial_crossing.argtypes = [*made.polynomial_root.argtypes, _I32]
+    for name in ("table_modes", "table_size", "table_free", "run_free", "lanes_tree"):
+        getattr(made, name).argtypes = [_POINTER]
+    made.table_read.argtypes = [_POINTER] * 4
+    made.run_new.argtypes = [_POINTER] * 2
+    made.run_read_at.argtypes = [_POINTER, _POINTER, _I64]
+    made.run_begin.argtypes = [*[_POINTER] * 6, _D, _POINTER]
+    made.run_motion.argtypes = [_POINTER] * 2
+    made.run_continue.argtypes = [_POINTER, _I64]
+    made.run_read.argtypes = [_POINTER] * 6
+    made.run_resume.argtypes = [_POINTER] * 2
+    made.run_many.argtypes = [*[_POINTER] * 5, _I64]
+    return made
+
+
+def _place(system: FilippovSystem, i: int) -> int:
+    """Number of the set of a switching function, -1 for a surface."""
+    return system.sets.index(system.set_of[i]) if i in system.set_of else -1
+
+
+def tape_for(system: FilippovSystem, options: Options) -> TapeEngine:
+    """Return the driver with a system at the options' tolerance."""
+    order = tape_order(system, options)
+    return system.cached(("tape", order), lambda: TapeEngine(system, order))
+
+
+def series_structure(s: Series, kept: list[NDArray[Any]]) -> SeriesStructure:
+    """Rules as C reads them; what it points to is added to ``kept``."""
+    lists = (s.still, s.moving, s.later, s.late, s.outputs)
+    arrays = (s.rule, s.a, s.b, s.c, s.op, *lists, s.first, s.second)
+    kept += arrays
+    return SeriesStructure(len(s.rule), *map(len, lists), *[a.ctypes.data for a in arrays])
+
+
+def values_structure(v: Values, kept: list[NDArray[Any]]) -> ValuesStructure:
+    """A graph as C reads it; what it points to is added to ``kept``."""
+    arrays = (v.op, v.a, v.b, v.still, v.moving, v.free, v.outputs, v.constant)
+    kept += arrays
+    sizes = (len(v.op), len(v.still), len(v.moving), len(v.free), len(v.outputs), 0)
+    return ValuesStructure(*sizes, *[a.ctypes.data for a in arrays])
+
+
+class _Held:
+    """Something of C's that is freed when a block ends."""
+
+    def __init__(self, pointer: int, free: Callable[[int], Any]):
+        self.pointer, self.free = pointer, free
+
+    def __enter__(self) -> int:
+        return self.pointer
+
+    def __exit__(self, *_: object) -> None:
+        self.free(self.pointer)
+
+
+def _ends(parts: Sequence[Sequence[Any]]) -> list[int]:
+    """Where parts of a row begin, and the end of the last."""
+    return [0, *np.cumsum([len(part) for part in parts], dtype=int).tolist()]
+
+
+class TapeEngine:
+    """The driver in C with one system at one order."""
+
+    def __init__(self, system: FilippovSystem, order: int):
+        self.system, self.order = system, order
+        self.coupled = raised_of(system)
+        tape = system.cached("tape", lambda: tape_of(self.coupled))
+        self.guards = lru_cache(maxsize=4096)(self.coupled.guards)
+        self._kept: list[NDArray[Any]] = []  # arrays that C points to
+        self._c = self._structure(self.coupled, tape)
+        self._rooms = rooms_of((0, 0, 0))
+
+    def _structure(self, coupled: Coupled, tape: Tape) -> _System:
+        system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
+        made = _System(
+            n=system.extended_dimension,
+            dimension=system.dimension,
+            timed=int(system.time_dependent),
+            m=m,
+            c=c,
+            parameters=len(system.parameter_names),
+            stops=len(system.stops),
+            resets=len(system.resets),
+            order=self.order,
+            slope_outputs=tape.slope_outputs,
+            series=series_structure(tape.series, self._kept),
+            free=series_structure(tape.free, self._kept),
+            affine=int(coupled.affine),
+            linear=int(coupled.linearity.everywhere),
+            linear_free=int(coupled.linearity.free),
+        )
+        for name in _VALUES:
+            setattr(made, name, values_structure(getattr(tape, name), self._kept))
+        for name in _ENTRIES:
+            setattr(made, name, self._entries(getattr(tape, name)))
+        carries = np.zeros((m, c))
+        for i, carried in enumerate(coupled.carriers):
+            carries[i, carried] = 1
+        tables: dict[str, Any] = {
+            "continuous": coupled.continuous,
+            "scaled": coupled.scaled,
+            "carries": carries.ravel(),
+            "component": tape.component,
+            "slope_output": tape.slope_output,
+            "slope_moves": tape.slope_moves,
+            "slope_symmetric": tape.slope_symmetric,
+            "mixed": coupled.mixed.ravel(),
+            "bent": coupled.linearity.bent_rows,
+            "bent_free": coupled.linearity.bent_free_rows,
+            "bent_guards": coupled.linearity.bent_guards,
+            "curved": coupled.linearity.curved_guards,
+            "set_first": [members[0] for members in system.sets],
+            "set_size": [len(members) for members in system.sets],
+            "set_of": [_place(system, i) for i in range(m)],
+            "degree": [len(own) + 1 for own in coupled.lower],
+            "lower_first": m + 2 * c + np.cumsum([0, *map(len, coupled.lower)]),
+            "early": tape.series.early,
+            "early_free": tape.free.early,
+        }
+        made.sets = len(system.sets)
+        made.power = self._at(np.array([*coupled.powers, 0.0]))
+        made.layer_width = self._at(np.array([*system.layer_widths, 0.0]))
+        made.early_count, made.early_free_count = len(tape.series.early), len(tape.free.early)
+        for name, values in tables.items():
+            setattr(made, name, self._at(np.array([*values, 0], np.int32)))
+        made.rules = self._rules()
+        return made
+
+    def _rules(self) -> _Rules:
+        """Conditions of stops and resets as C reads them."""
+        d, n = self.system.definition, self.system.dimension
+        conditions = [tree for rule in d.rules for tree in rule.triggers]
+        filters = [rule.when or () for rule in d.rules]
+        values = [own or () for own in d.discrete]
+        flags = [
+            rule.level + 2 * rule.by_jumps + 4 * rule.persistent + 8 * rule.at_trigger
+            for rule in d.rules
+        ]
+        tables: dict[str, Any] = {
+            "way": d.located,
+            "trigger_event": [k for k, rule in enumerate(d.rules) for _ in rule.triggers],
+            "trigger_at": _ends(conditions),
+            "condition": [code for tree in conditions for code in tree],
+            "filter_at": _ends(filters),
+            "filter": [code for tree in filters for code in tree],
+            "flags": flags,
+            "initially": [rule.initially for rule in d.rules],
+            "named": [i in rule.named for rule in d.rules[len(d.stops) :] for i in range(n)],
+            "clock_reset": [reset for reset, _ in d.clocks],
+            "clock_state": [state for _, state in d.clocks],
+            "value_at": _ends(values),
+        }
+        atoms, keeps = d.guards.numel(), any(rule.at_trigger for rule in d.rules)
+        width = 5 + 4 * atoms + len(conditions) + 3 * len(d.clocks)
+        width += len(conditions) * self.system.extended_dimension * keeps
+        made = _Rules(
+            atoms=atoms,
+            triggers=len(conditions),
+            clocks=len(d.clocks),
+            discrete=len(d.discrete),
+            keeps=int(keeps),
+            width=width if atoms else 0,
+        )
+        for name, table in tables.items():
+            setattr(made, name, self._at(np.array([*table, 0], np.int32)))
+        made.value = self._at(np.array([*[v for own in values for v in own], 0.0], float))
+        return made
+
+    def _at(self, array: NDArray[Any]) -> int:
+        self._kept.append(array)
+        return array.ctypes.data
+
+    def _entries(self, e: Entries) -> _Entries:
+        return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))
+
+    # one trajectory ----------------------------------------------------------------------------
+
+    def run(
+        self,
+        x: Array,
+        p: Array,
+        options: Options,
+        read_at: Array | None = None,
+        motion: Array | None = None,
+    ) -> Run:
+        """Run one trajectory from an extended start, dense output kept, to be read at ``read_at`` times."""
+        # ``motion`` is that of a run or event that is continued.
+        width = self._c.rules.width
+        if motion is not None:
+            motion = self._checked(motion)
+        output = Output(self.system.extended_dimension, self.order, self._rooms, width)
+        x, p = np.array(x, float), np.array([*p, 0.0], float)
+        start = self._start_mode(options)
+        with self.held_table() as table, self.held_run(table) as state:
+            c_options = ctypes.byref(options_of(self.system, options, dense=True))
+            given = (address(x), address(p), address(start))
+            library().run_read_at(state, address(read_at), 0 if read_at is None else len(read_at))
+            library().run_begin(
+                state, c_options, output.pointer, *given, options.t_start, address(motion)
+            )
+            while True:
+                # Python hears Ctrl-C between the calls.
+                while (status := library().run_continue(state, BURST)) == RUNNING:
+                    pass
+                numbers, counts, active, several, rates = self._read(state)
+                if status != FULL:
+                    break
+                output.grow(counts[7:10])
+                library().run_resume(state, output.pointer)
+            self._rooms = rooms_of(counts[7:10])  # of the next run, which is often a similar one
+            modes, words = self.words(table, [counts[4]])
+            labels = self._labels(table)
+            final = np.zeros(width)
+            if width:
+                library().run_motion(state, address(final))
+        return Run.of(
+            output.filled(counts[7:10]),
+            self.system.dimension,
+            numbers=numbers,
+            counts=counts,
+            itinerary=words[counts[4]],
+            letters=modes,
+            guards=self.guards,
+            active=active,
+            several=[modes[k] for k in several],
+            rates=rates[:, : self.system.dimension],
+            motion=final,
+            labels=labels,
+        )
+
+    def _checked(self, motion: Array) -> Array:
+        """What a run or event keeps for a restart, if it is of this system."""
+        rules, d = self._c.rules, self.system.definition
+        sides = motion[5 : 5 + 3 * rules.atoms]
+        fits = len(motion) == rules.width and bool(np.isfinite(motion).all())
+        if fits and (np.isin(sides, (-1, 0, 1)).all() and -1 <= motion[2] < len(d.rules)):
+            return np.ascontiguousarray(motion)
+        raise OptionError(
+            "start is a run or event of another system, or with another section. Continue it with its own "
+            "system and at=, or give its state as x0 and its time as t_start."
+        )
+
+    def _start_mode(self, options: Options) -> NDArray[np.int8] | None:
+        if options.start_mode is None:
+            return None
+        return np.array([*self.system.parse_letters(options.start_mode), 0], np.int8)
+
+    @property
+    def _width(self) -> int:
+        """Bytes of a mode: letters, then values of discrete states."""
+        system = self.system
+        return system.surface_count + len(system.impacts) + 8 * len(system.definition.discrete)
+
+    def held_table(self) -> _Held:
+        made = library()
+        return _Held(made.table_new(self._width), made.table_free)
+
+    def held_run(self, table: int) -> _Held:
+        made = library()
+        state = made.run_new(ctypes.byref(self._c), table)
+        if not state:
+            raise MemoryError("the compiled engine: no memory for a run of this system")
+        return _Held(state, made.run_free)
+
+    def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
+        numbers, counts = (_D * 3)(), (_I64 * 13)()
+        width = self.system.surface_count + len(self.system.impacts)
+        active, several = (_I32 * (width + 1))(), (_I32 * SEVERAL)()
+        rates = np.empty((SEVERAL, self.system.extended_dimension))
+        library().run_read(state, numbers, counts, active, several, address(rates))
+        known, found = active[: counts[10]], several[: counts[11]]
+        return numbers[:], counts[:], known, found, rates[: len(found)]
+
+    def words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
+        """Modes that were met, and itineraries of some nodes of their tree."""
+        parent, mode, letters = self._tree(table)
+        width = self.system.surface_count + len(self.system.impacts)
+        modes = [self._spelled(row) for row in letters[:, :width].tolist()]
+        spelled = [self.system.spelled(letters) for letters in modes]
+        if self.system.definition.discrete:
+            rows = self._labels(table)
+            spelled = [
+                shown_mode(self.system, one, row) for one, row in zip(spelled, rows, strict=True)
+            ]
+        return modes, words_of(parent, mode, spelled, nodes)
+
+    def _tree(self, table: int) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int8]]:
+        """Parents and modes of the nodes of a tree, and the modes that were met, as bytes."""
+        made, width = library(), self._width
+        size, count = made.table_size(table), made.table_modes(table)
+        parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
+        met = np.empty(count * width + 1, np.int8)
+        made.table_read(table, address(parent), address(mode), address(met))
+        return parent, mode, met[:-1].reshape(count, width)
+
+    def _labels(self, table: int) -> list[tuple[float, ...]]:
+        """Values of the discrete states in the modes that were met."""
+        discrete = len(self.system.definition.discrete)
+        if not discrete:
+            return []
+        _, _, letters = self._tree(table)
+        rows = np.ascontiguousarray(letters[:, -8 * discrete :]).view(np.float64)
+        return [tuple(row) for row in rows.tolist()]
+
+    def _spelled(self, signs: list[int]) -> str:
+        """Letters of all switching functions and contacts; see ``core/sets.c`` for those of sets."""
+        m = self.system.surface_count
+        surfaces = ("-s+*blli"[sign + 1] for sign in signs[:m])
+        return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
+
+    # many trajectories -------------------------------------------------------------------------
+
+    def run_many(
+        self,
+        x: Array,
+        p: Array,
+        options: Options,
+        at: tuple[int, int] | None,
+        out: Chunk | None = None,
+        stop: Callable[[], bool] = lambda: False,
+        times: Array | None = None,
+    ) -> Chunk:
+        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
+        # As ``Engine.run_many``, which is faster where many trajectories share a system.
+        chunk = out or Chunk.empty(len(x), self.system, at is not None)
+        chunk.forget()
+        x = np.ascontiguousarray(x, float)
+        p = np.ascontiguousarray(np.append(p, np.zeros((*p.shape[:-1], 1)), axis=-1), float)
+        batch = batch_of(x, p, options.t_start, chunk, times, None)
+        start, done = self._start_mode(options), np.zeros(1, np.int64)
+        c_options = options_of(self.system, options, dense=False, at=at)
+        with self.held_table() as table, self.held_run(table) as state:
+            call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
+            while library().run_many(*call, address(start), BURST):
+                if stop():
+                    raise Stopped
+            used = np.flatnonzero(np.bincount(chunk.itinerary)).tolist()
+            chunk.rename(self.words(table, used)[1])
+        return chunk

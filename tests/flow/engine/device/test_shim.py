@@ -1,0 +1,159 @@
+"""The GPU's kernels, as C++ on this processor, give what the lanes give: the same bits where nothing is fused."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+import nonsmooth.textbook as textbook
+from benchmarks.problems import bounce_system, random_starts
+from nonsmooth.flow.constants import HAND_OVER
+from nonsmooth.flow.engine import find_compiler
+from nonsmooth.flow.engine import lanes as engine
+from nonsmooth.flow.engine.device.kernel import word_of
+from nonsmooth.flow.ensembles import on_device
+from nonsmooth.flow.options import Options
+from tests.flow.engine.device.cases import TAKEN, block_on_a_belt, ends
+from tests.flow.engine.device.shim import Shim
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+
+LOOSE = Options(t_end=3.0, rtol=1e-5, atol=1e-5)
+
+
+STARTS = np.random.default_rng(3).normal(size=(200, 2)) * 0.8
+
+
+@pytest.fixture(scope="module")
+def system():
+    return block_on_a_belt()
+
+
+@pytest.fixture
+def shim():
+    return Shim(fused=False)
+
+
+@pytest.fixture
+def as_card(monkeypatch, shim):
+    """``device="cuda"`` runs in the shim."""
+    monkeypatch.setattr(on_device, "machine_for", lambda device: shim)
+
+
+def plain_lanes(system, x, p, options, at, monkeypatch):
+    """What four lanes say without fused operations."""
+    monkeypatch.setattr(engine, "FLAGS", (*engine.FLAGS, "-ffp-contract=off"))
+    monkeypatch.setattr(engine, "lane_width", lambda: 4)
+    return engine.Lanes(system, options.order).run_many(x, p, options, at)
+
+
+def compared(system, x, options, machine, monkeypatch, at=None, p=None):
+    """Trajectories that neither hands over: both results, and how many there are."""
+    x = np.concatenate([x, np.full((len(x), int(system.time_dependent)), options.t_start)], axis=1)
+    p = system.parameter_vector() if p is None else p
+    one = ends(machine, system, x, options, p, at)
+    two = plain_lanes(system, x, p, options, at, monkeypatch)
+    # What is not clear is handed over by the kernel, and made here for a step by the driver.
+    done = one.status != HAND_OVER
+    words = [[c.words[k] for k in c.itinerary[done]] for c in (one, two)]
+    assert words[0] == words[1]
+    for name in ("t", "x", "status", "kinds", "at_t", "at_x"):
+        if getattr(one, name) is not None:
+            pair = getattr(one, name)[done], getattr(two, name)[done]
+            assert np.array_equal(*pair, equal_nan=True), name
+    return done
+
+
+@pytest.mark.slow
+def test_same_bits_as_lanes_without_contraction(system, shim, monkeypatch):
+    done = compared(system, STARTS, LOOSE, shim, monkeypatch, at=(1, 1))
+    assert done.sum() > 150
+
+
+def test_same_bits_with_parameters_of_each_start(system, shim, monkeypatch):
+    p = system.parameter_vector() * np.linspace(0.5, 1.5, len(STARTS))[:, None]
+    assert compared(system, STARTS, LOOSE, shim, monkeypatch, p=p).sum() > 150
+
+
+def test_an_ensemble_there_is_the_ensemble_here(system, as_card):
+    """All starts, with what is handed over: itineraries and events equal, states to the tolerance's rounding."""
+    options = dict(t_end=3.0, tol=1e-5, at_event=("entry", 1))
+    x = STARTS.copy()
+    x[7] = np.nan
+    there = ns.ensemble(system, x, device="cuda", **options)
+    here = ns.ensemble(system, x, **options)
+    assert np.array_equal(there.itinerary, here.itinerary)
+    assert np.array_equal(there.status, here.status)
+    for kind, count in here.events.items():
+        assert np.array_equal(there.events[kind], count), kind
+    for name in ("x", "t", "event_x", "event_t"):
+        np.testing.assert_allclose(getattr(there, name), getattr(here, name), rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [
+        ns.Grid([np.linspace(-1, 1, 7), np.linspace(0.1, 0.9, 5)]),
+        ns.Grid([0.25, np.linspace(-1, 1, 9)]),
+        ns.RandomStarts(50, [-1.0, 0.5], [1.0, 0.5], seed=2**64 - 3),
+        ns.RandomStarts(50, [-1.0, -0.3], [0.7, 0.1], seed=5),
+    ],
+)
+def test_starts_made_there_have_the_bits_of_those_made_here(system, as_card, drawn):
+    rows = drawn.at(np.arange(np.prod(drawn.shape)))
+    options = dict(t_end=1.0, tol=1e-5, device="cuda", work=ns.Work(chunk=13))
+    made, given = ns.ensemble(system, drawn, **options), ns.ensemble(system, rows, **options)
+    assert made.t.shape == drawn.shape
+    assert np.array_equal(made.x.reshape(-1, 2), given.x)
+    assert np.array_equal(made.itinerary.ravel(), given.itinerary)
+
+
+def test_a_share_of_threads_changes_nothing(system):
+    """Persistent threads: how many there are, and how they share the starts, is not in the results."""
+    p, results = system.parameter_vector(), []
+    for blocks in (1, 2, 50):
+        x = np.concatenate([STARTS, np.zeros((len(STARTS), 1))], axis=1)
+        machine = Shim(fused=False, blocks=blocks)
+        results.append(ends(machine, system, x, LOOSE, p))
+    for other in results[1:]:
+        assert np.array_equal(results[0].x, other.x)
+        assert np.array_equal(results[0].itinerary, other.itinerary)
+
+
+def test_itineraries_too_long_for_a_number_are_run_here(as_card):
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    clock = ns.FilippovSystem([x, y], surface=x, above=[y, -1 - x], below=[y, 1 - x])
+    there = ns.ensemble(clock, [[1.0, 0.0], [0.01, 0.0]], 10.0, tol=1e-6, device="cuda")
+    here = ns.ensemble(clock, [[1.0, 0.0], [0.01, 0.0]], 10.0, tol=1e-6)
+    assert len(here.itinerary[1].split()) > 30
+    assert there.itinerary.tolist() == here.itinerary.tolist()
+
+
+def test_codes_are_read_from_the_first_mode_on():
+    assert word_of(0, "+-s") == ""
+    assert word_of(4 * (4 * 1 + 3) + 2, ("+", "-", "s")) == "+ s -"
+    assert word_of(1, ("",)) == "o"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["linear", "nonlinear"])
+def test_bounces(name, monkeypatch):
+    system, x, options = bounce_system(name), random_starts(2000, seed=5), Options(t_end=100.0)
+    done = compared(system, x, options, Shim(fused=False), monkeypatch)
+    assert done.mean() > 0.97
+    one, two = (ends(Shim(fused=fused), system, x, options) for fused in (False, True))
+    assert np.array_equal(one.status, two.status)
+    assert [one.words[k] for k in one.itinerary] == [two.words[k] for k in two.itinerary]
+    np.testing.assert_allclose(one.x[done], two.x[done], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(one.t[done], two.t[done], rtol=0, atol=1e-14)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TAKEN)
+def test_textbook_problems(name, monkeypatch):
+    problem = textbook.by_name(name)
+    scale = 0.1 * (1 + np.abs(problem.start))
+    x = problem.start + scale * np.random.default_rng(1).normal(size=(64, len(problem.start)))
+    p = problem.system.parameter_vector(problem.parameters)
+    options = Options(t_end=min(problem.t_end, 20.0), rtol=1e-8, atol=1e-8, max_steps=3000)
+    compared(problem.system, x, options, Shim(fused=False), monkeypatch, p=p)

@@ -1,3 +1,165 @@
+/* Memory ------------------------------------------------------------------------------------------- */
+
+/* Where ``count`` objects of a size begin; with no base, how far one has come. */
+static void *place(char *base, size_t *used, size_t size, size_t count) {
+  *used = (*used + 15) & ~(size_t)15;
+  void *at = base ? base + *used : 0;
+  *used += size * (count + 1);
+  return at;
+}
+#define DOUBLES(count) place(base, &used, sizeof(double), (size_t)(count))
+#define INTEGERS(count) place(base, &used, sizeof(int32_t), (size_t)(count))
+#define LETTERS(count) place(base, &used, 1, (size_t)(count))
+
+static size_t place_layout(Layout *l, char *base, size_t used, int width, int guards) {
+  l->letter = LETTERS(width);
+  l->sliding = INTEGERS(width);
+  l->group = INTEGERS(width);
+  l->kind = INTEGERS(guards);
+  l->index = INTEGERS(guards);
+  l->side = INTEGERS(guards);
+  l->bent = INTEGERS(guards);
+  return used;
+}
+
+static size_t place_expansion(Expansion *e, char *base, size_t used, int n, int width, int guards, int stride,
+                              int sets) {
+  used = place_layout(&e->l, base, used, width, guards);
+  e->states = DOUBLES(n * stride);
+  e->guards = DOUBLES(guards * stride);
+  e->series = DOUBLES(width * stride);
+  e->allowed = DOUBLES(n);
+  e->of_guards = DOUBLES(guards);
+  e->scale = DOUBLES(guards);
+  e->steep = DOUBLES(guards);
+  e->inverse = DOUBLES(width * width);
+  if (sets) {
+    e->lambda = DOUBLES(width * stride);
+    e->apart = DOUBLES(width * stride);
+    e->root = DOUBLES(sets * stride);
+    e->rates = DOUBLES(sets * (stride + 1));
+    e->slopes = DOUBLES(width * width);
+    e->radius = DOUBLES(sets);
+    e->per_radius = DOUBLES(sets);
+  }
+  return used;
+}
+
+static size_t place_continuation(Continuation *c, char *base, size_t used, int width, int guards) {
+  c->letter = LETTERS(width);
+  c->drop = INTEGERS(guards);
+  c->unknowns = DOUBLES(width);
+  return used;
+}
+
+static size_t place_instant(Instant *i, char *base, size_t used, const System *s) {
+  int atoms = s->rules.atoms, triggers = s->rules.triggers, clocks = s->rules.clocks;
+  int8_t **flags[] = {&i->side, &i->view, &i->now, &i->passing, &i->zero};
+  for (int k = 0; k < 5; k++) *flags[k] = LETTERS(atoms);
+  i->pending = LETTERS(triggers);
+  i->was = LETTERS(triggers);
+  i->value = DOUBLES(atoms);
+  i->noise = DOUBLES(atoms);
+  i->residual = DOUBLES(atoms);
+  i->germ = DOUBLES(GERM * atoms);
+  i->trigger_x = DOUBLES(s->rules.keeps ? (size_t)triggers * s->n : 0);
+  i->arrived = DOUBLES(s->n);
+  i->tick = DOUBLES(2 * clocks);
+  i->count = place(base, &used, sizeof(int64_t), (size_t)clocks);
+  return used;
+}
+
+/* Lemke's method on a block of all takes most of it. */
+static size_t place_decision(Run *r, char *base, size_t used) {
+  size_t w = r->width, square = w * w, orders = (ORDERS + 1) * w;
+  Decision *d = r->decision = place(base, &used, sizeof(Decision), 1);
+  if (!base) d = r->decision = 0;
+  Decision none = {0}, *to = d ? d : &none;
+  to->own = INTEGERS(w); to->order = INTEGERS(w); to->first = INTEGERS(w + 1); to->mark = INTEGERS(4 * w);
+  to->pivot = INTEGERS(8 * w + 8); to->proved = INTEGERS(w);
+  to->is_contact = LETTERS(w); to->is_idle = LETTERS(w); to->is_touched = LETTERS(w); to->is_known = LETTERS(w);
+  to->state = LETTERS(orders + w); to->block_state = LETTERS(3 * w); to->large_class = LETTERS(w);
+  to->matrix = DOUBLES(square); to->share = DOUBLES(square);
+  to->a = DOUBLES(orders); to->b = DOUBLES(orders); to->nu = DOUBLES(orders); to->floor = DOUBLES(orders);
+  to->turn = DOUBLES(w); to->sign = DOUBLES(w); to->old = DOUBLES(w); to->yard = DOUBLES(w); to->room = DOUBLES(w);
+  to->steep = DOUBLES(w); to->block = DOUBLES(6 * square + 8 * w); to->large = DOUBLES(w);
+  to->work = DOUBLES(90 * square + 90 * w + 64);
+  for (int i = 0; i < SEVERAL; i++) {
+    Motion *own = to->motion + i;
+    own->state = LETTERS(w); own->order = LETTERS(w); own->before = LETTERS(w);
+    own->nu = DOUBLES(w); own->series = DOUBLES(COMPARED * (size_t)r->n);
+  }
+  return used;
+}
+
+static size_t place_run(Run *r, char *base) {
+  const System *s = r->s;
+  int n = r->n, w = r->width, c = r->c, all = r->kept_rows, g = r->guards, stride = r->stride;
+  size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
+  used = place_layout(&r->now, base, used, w, g);
+  used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets);
+  used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets);
+  Continuation *each[] = {&r->chosen, &r->one, &r->first, &r->rest, &r->found};
+  for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, w, g);
+  used = place_decision(r, base, used);
+  r->letter = LETTERS(w);
+  r->start = LETTERS(w);
+  r->x = DOUBLES(n);
+  r->at_x = DOUBLES(n);
+  r->before = DOUBLES(n);
+  r->saved = DOUBLES(n);
+  r->speed = DOUBLES(w);
+  r->at_root = DOUBLES(3 * n);
+  r->at_work = DOUBLES(n);
+  r->unknowns = DOUBLES(w);
+  r->tried = DOUBLES(w);
+  r->solutions = DOUBLES(SOLUTIONS * w);
+  r->tried_letter = LETTERS(2 * w);
+  r->drop = INTEGERS(g);
+  r->active = INTEGERS(w);
+  r->involved = INTEGERS(3 * w + 2 * all + 1);
+  r->p = DOUBLES(s->parameters);
+  r->series = DOUBLES((size_t)s->series.size * stride);
+  r->point = DOUBLES(s->point.size);
+  r->heights = DOUBLES(s->surfaces.size);
+  r->maps = DOUBLES(s->maps.size);
+  r->restitution = DOUBLES(s->restitution.size);
+  r->columns = DOUBLES(s->columns.size);
+  r->input = DOUBLES(n + 2 * w);
+  r->held = DOUBLES(w);
+  r->none = DOUBLES(w);
+  r->slope = DOUBLES(square);
+  r->vector = DOUBLES(3 * n + 2 * w);
+  r->sample = DOUBLES(3 * ((size_t)n + w + g));
+  r->work = DOUBLES(6 * square + 8 * w + rows + g);
+  r->gradient_row = DOUBLES((size_t)all * n + 2 * all);
+  r->rates = DOUBLES(2 * all + c);
+  r->lam = DOUBLES(2 * w);
+  r->matrix = DOUBLES(square + 6 * w + all + 2 * c);
+  r->small = DOUBLES(4 * w + s->rules.atoms);
+  r->atom_work = DOUBLES(s->atoms.size);
+  r->choice_work = DOUBLES(s->choices.size);
+  used = place_instant(&r->instant, base, used, s);
+  r->pending = INTEGERS(6 * w + 2 * all);
+  r->sparse = INTEGERS(square + 2 * w + 1);
+  r->direction = DOUBLES(w);
+  r->later = DOUBLES(w);
+  r->heights_of = DOUBLES(w);
+  r->aside = DOUBLES(2 * n);
+  r->moving = LETTERS(w);
+  r->turned = LETTERS(g);
+  r->rates_of_several = DOUBLES(SEVERAL * n);
+  size_t q = r->m < MOST_ENUMERATED ? r->m : MOST_ENUMERATED, sums = q * (q - (q > 0)) / 2;
+  r->layer_series = DOUBLES(s->slope_outputs ? (q * q + sums * sums) * stride : 0);
+  r->idle = LETTERS(s->sets);
+  r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
+  r->of_defect = DOUBLES(g);
+  r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
+  r->key = LETTERS(w + 8 * s->rules.discrete);
+  r->met_at = DOUBLES(g);
+  return used;
+}
+
 /* Entry points --------------------------------------------------------------------------------- */
 
 int64_t system_size(void) { return sizeof(System); }
@@ -157,4 +319,113 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
     keep(r, b, i);
   }
   return 0;
+}
+
+/* Steps of runs that are lanes' between them ------------------------------------------------------- */
+
+/* Whether lanes can go on from here: nothing is to be served, and only the first guard has known zeros. */
+static int is_plain(const Run *r) {
+  if (r->instant.running || r->due_impact >= 0) return 0;
+  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m ? 0 : 2)) return 0;
+  for (int j = 0; j < r->s->stops; j++) if (!r->instant.side[j]) return 0;
+  return 1;
+}
+
+/* The number of a mode's letters in the driver's table is that of lanes. */
+static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Suspended *m) {
+  static const Output none;
+  clear(r, o, b->t0);
+  r->out = none;
+  if (b->p_stride || !r->prepared) set_parameters(r, b->p + i * b->p_stride);
+  r->prepared = 1;
+  memcpy(r->x, m->x, sizeof(double) * r->n);
+  memcpy(r->letter, m->letter, r->width);
+  lay_out(r, r->letter, &r->now);
+  improve(r, &r->now, r->x, r->unknowns, 2);
+  r->mode = r->shown = r->segment_mode = r->now.mode;
+  r->drop[0] = m->drop;
+  memcpy(r->instant.side, m->side, r->s->stops);
+  memcpy(r->instant.view, m->side, r->s->stops);
+  memset(r->instant.residual, 0, sizeof(double) * r->s->stops);
+  memset(r->instant.pending, 0, r->s->rules.triggers);
+  memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
+  r->t = m->t;
+  r->since = m->since;
+  r->length = m->length;
+  r->shortened = m->shortened;
+  if (m->length > 0) r->length_mode = r->mode;
+  r->step_count = m->steps;
+  r->event_count = m->events;
+  r->segment_steps = m->segment_steps;
+  r->itinerary = m->itinerary;
+  r->history = m->history;
+  for (int k = 0; k < HISTORY && k < m->history; k++) {
+    int64_t pattern = m->past[k].pattern;
+    Met met = {(int)(pattern >> 32 & 255), (int)(int32_t)pattern, 0};
+    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(pattern >> 40), met};
+  }
+}
+
+/* Give a run back, or store it where it ended. */
+static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
+  int64_t first = m->history > r->history - HISTORY ? m->history : r->history - HISTORY;
+  m->status = r->status;
+  if (r->status != RUNNING) { keep(r, b, i); return; }
+  if (b->at_x && isfinite(r->at_t)) {
+    b->at_t[i] = r->at_t;
+    memcpy(b->at_x + i * r->s->dimension, r->at_x, sizeof(double) * r->s->dimension);
+  }
+  memcpy(m->x, r->x, sizeof(double) * r->n);
+  memcpy(m->letter, r->letter, r->width);
+  m->drop = r->drop[0];
+  memcpy(m->side, r->instant.side, r->s->stops);
+  memcpy(m->kinds, r->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
+  m->t = r->t;
+  m->since = r->since;
+  m->length = r->length_mode == r->mode ? r->length : 0;
+  m->shortened = r->shortened;
+  m->steps = r->step_count;
+  m->events = r->event_count;
+  m->segment_steps = r->segment_steps;
+  m->itinerary = r->itinerary;
+  for (int64_t k = first; k < r->history; k++)
+    m->past[k % HISTORY] = (Recent){r->past[k % HISTORY].interval, r->past[k % HISTORY].pattern};
+  m->history = r->history;
+}
+
+static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Suspended *m) {
+  while (r->status == RUNNING && (r->t >= r->o.t_end || !is_plain(r))) step(r); /* lanes give the end no mode */
+  give(r, b, i, m);
+}
+
+/* Begin a run whose start is not clear to lanes. */
+void core_begin(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m) {
+  static const Output none;
+  Run *r = run;
+  m->history = 0;
+  run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, 0, b->t0, 0);
+  go_on_until_plain(r, b, i, m);
+}
+
+/* Make the step that is not clear to lanes. */
+void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m) {
+  Run *r = run;
+  take(r, b, o, i, m);
+  if (b->at_x) {
+    r->at_t = b->at_t[i];
+    memcpy(r->at_x, b->at_x + i * r->s->dimension, sizeof(double) * r->s->dimension);
+  }
+  step(r);
+  go_on_until_plain(r, b, i, m);
+}
+
+/* The tree of itineraries that lanes share with the driver; their modes get the first numbers: above, below, sliding;
+ * off a set and on it. */
+Tree *lanes_tree(Run *r) {
+  const int8_t surface[] = {1, -1, 0}, set[] = {OFF, 0};
+  for (int k = 0; k < (!r->width ? 1 : r->s->sets ? 2 : 3); k++) {
+    memset(r->start, r->s->sets ? set[k] : surface[k], r->width);
+    mode_number(r->table, r->start);
+  }
+  return &r->table->tree;
 }

@@ -30,9 +30,8 @@ _FILES = (
         "sets.c",
         "stepper.c",
     ),
-    *("surfaces.c", "record.c", "spiral.c", "decide.c", "candidates.c", "layer.c", "contacts.c"),
-    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "memory.c", "entry.c"),
-    "motion.c",
+    *("surfaces.c", "record.c", "spiral.c", "decide.c", "layer.c", "contacts.c"),
+    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c"),
 )
 
 

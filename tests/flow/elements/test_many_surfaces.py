@@ -12,8 +12,8 @@ import nonsmooth as ns
 from nonsmooth.flow.engine import tape_for
 from nonsmooth.flow.options import Options
 
-from .independent import blocks
-from .independent.integrator import Run
+from ..independent import blocks
+from ..independent.integrator import Run
 
 
 def chain(k):

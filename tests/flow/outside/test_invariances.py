@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 import nonsmooth as ns
 
-from .independent.hybrid import Problem, follow, package_system
-from .random_systems import draw, package_events
+from ..independent.hybrid import Problem, follow, package_system
+from ..random_systems import draw, package_events
 
 #: Tests that fail, and why; a repair deletes its line.
 OPEN = {"test_when_time_starts[1700000000.0]": "time is one double"}

@@ -16,7 +16,7 @@ CLOSE = 100 * TOL
 CASES = {
     case["id"]: case
     for case in json.loads(
-        (Path(__file__).parents[1] / "cases" / "events.json").read_text(encoding="utf-8")
+        (Path(__file__).parents[2] / "cases" / "events.json").read_text(encoding="utf-8")
     )["cases"]
 }
 #: Events of the contract; crossings and ends of sliding belong to the surfaces.

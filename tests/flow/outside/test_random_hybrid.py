@@ -3,7 +3,7 @@ integrator that shares no code with the package."""
 
 import pytest
 
-from .random_systems import compare, draw
+from ..random_systems import compare, draw
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 
 import nonsmooth as ns
 
-from .inclusions import MISSING, Case, accelerations, cases
+from ..inclusions import MISSING, Case, accelerations, cases
 
 #: Elements of relative degree two and roots.
 LATER = ("rest", "twisting", "super-twisting", "tank")

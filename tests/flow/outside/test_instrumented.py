@@ -6,9 +6,9 @@ import pytest
 
 from nonsmooth.flow.engine import find_compiler
 
-from .instrumented import main, preloaded
+from ..instrumented import main, preloaded
 
-HERE = Path(__file__).parent
+FLOW = Path(__file__).parents[1]
 
 
 @pytest.mark.slow
@@ -17,9 +17,9 @@ def test_runs_under_sanitizers(tmp_path):
     if not preloaded(tmp_path):
         pytest.skip("no library of the address sanitizer")
     files = [
-        "test_contract.py",
-        "test_random_hybrid.py",
-        "test_impacts.py",
-        *HERE.glob("test_reviews_*.py"),
+        "events/test_contract.py",
+        "outside/test_random_hybrid.py",
+        "events/test_impacts.py",
+        *FLOW.glob("outside/test_reviews_*.py"),
     ]
-    assert main("sanitize", ["-m", "not slow", *[str(HERE / file) for file in files]]) == 0
+    assert main("sanitize", ["-m", "not slow", *[str(FLOW / file) for file in files]]) == 0

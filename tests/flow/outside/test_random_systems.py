@@ -9,8 +9,8 @@ import pytest
 
 import nonsmooth as ns
 
-from .independent.family import Many, Size, draw, system, values
-from .independent.integrator import Path, Run
+from ..independent.family import Many, Size, draw, system, values
+from ..independent.integrator import Path, Run
 
 T_END = 4.0
 SIZES = [Size(n, m) for n in (2, 3, 4, 5) for m in (1, 2, 3)]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import nonsmooth as ns
 
-from . import plane_friction as plane
+from .. import plane_friction as plane
 
 
 @pytest.mark.slow_cases("three-rolls-reference")

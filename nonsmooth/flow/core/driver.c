@@ -44,12 +44,15 @@ static int rests_unstably(const Run *r, const int8_t *letter) {
   return -1;
 }
 
+static int leaves_by_root(Run *r);
+
 /* Adopt the mode that continues; 0 where there is none or more than one. */
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count) {
   if (r->active_count) {
     if (!decide(r, letter, known, known_count)) return 0;
     int unstable = rests_unstably(r, r->chosen.letter);
     if (unstable >= 0) { finish(r, NON_UNIQUE, HIGH_DEGREE, unstable); return 0; }
+    if (leaves_by_root(r)) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
   } else {
     memcpy(r->chosen.letter, letter, r->width);
     memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);

@@ -140,6 +140,45 @@ static int rest_near_root(Run *r, int i) {
   return 1;
 }
 
+/* Whether a surface in ``letter`` could be left to a side, where only its root moves h: h' = k h^p with k > 0. */
+static int is_driven_away(Run *r, int i, int side) {
+  double *field = r->before, *with = r->at_root, terms = 0, level, bare, own;
+  const Entries *g = &r->s->surface_gradient;
+  int32_t which = i;
+  r->letter[i] = (int8_t)side;
+  bare = field_at_root(r, i, r->x, 0, field);
+  for (int k = 0; k < g->count; k++)
+    if (g->row[k] == i) terms += fabs(out_of(&r->s->surfaces, r->heights, r->kept_rows + k) * field[g->column[k]]);
+  level = side * near_root(r, i);
+  if (fabs(bare) > VANISHES * terms || level == 0) return 0;
+  memcpy(r->saved, r->x, sizeof(double) * r->n);
+  project_to(r, &which, 1, &level);
+  own = field_at_root(r, i, r->x, 1, with) - field_at_root(r, i, r->x, 0, field);
+  memcpy(r->x, r->saved, sizeof(double) * r->n);
+  return own * side > 0;
+}
+
+/* Whether a root drives away from an active surface on which, or to whose other side, r->chosen goes on. */
+static int leaves_by_root(Run *r) {
+  for (int q = 0; r->has_roots && q < r->active_count; q++) {
+    int i = r->active[q];
+    if (i >= r->m || r->s->power[i] == 0 || r->s->degree[i] != 1) continue;
+    int8_t kept = r->letter[i];
+    for (int side = 1; side >= -1; side -= 2) {
+      int is_free = r->chosen.letter[i] != side && is_driven_away(r, i, side);
+      r->letter[i] = kept;
+      if (!is_free) continue;
+      r->several[0] = mode_number(r->table, r->chosen.letter);
+      r->chosen.letter[i] = (int8_t)side;
+      r->several[1] = mode_number(r->table, r->chosen.letter);
+      r->several_count = 2;
+      memset(r->rates_of_several, 0, sizeof(double) * 2 * r->n);
+      return 1;
+    }
+  }
+  return 0;
+}
+
 /* Pass a surface with a root, where no series converges; whether the run has moved. */
 static int pass_root(Run *r, double left) {
   for (int i = 0; i < r->m; i++) {

@@ -69,3 +69,26 @@ def test_super_twisting_without_oscillation_rests_too():
 def test_super_twisting_holds_a_disturbance():
     run = ns.simulate(_super_twisting(1.5, 0.9 * ca.sin(t)), [0, 0], 10.0)
     assert run.itinerary == "s" and run.x[-1].tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("above", "below", "start", "when"),
+    [
+        ([2 * ca.sqrt(x)], [-2 * ca.sqrt(-x)], 0.0, 0.0),  # 0, t^2 and -t^2
+        ([ca.sqrt(x)], [-1], 0.0, 0.0),  # rest in 0, t^2/4
+        ([ca.sqrt(x)], [1], -1.0, 1.0),  # arrives, and stays or leaves by (t - 1)^2/4
+        ([x ** (1 / 3)], [0], 0.0, 0.0),
+    ],
+)
+def test_a_root_that_drives_away_has_several_futures(above, below, start, when):
+    """h' = k h^p with k > 0 leaves zero in finite time, or stays."""
+    system = ns.FilippovSystem([x], surface=x, above=above, below=below)
+    run = ns.simulate(system, [start], 3.0)
+    assert run.status is ns.Status.NON_UNIQUE and run.t[-1] == pytest.approx(when, abs=1e-9)
+
+
+@pytest.mark.parametrize("rate", [1e-6, 1.0])
+def test_a_root_that_drives_away_from_where_the_rate_is_inward_does_not(rate):
+    system = ns.FilippovSystem([x], surface=x, above=[ca.sqrt(x) - rate], below=[1])
+    run = ns.simulate(system, [0.0], 1.0)
+    assert run.itinerary == "s" and run.x[-1, 0] == 0.0

@@ -53,11 +53,19 @@ static int is_repeated(const Run *r, int block, int kind, int index) {
   return 0;
 }
 
+/* Guards of the last events end no step: they may have no series at the limit. */
+static void forget_repeated(const Run *r, Expansion *e, int block) {
+  for (int row = 0; row < e->l.rows; row++)
+    if (is_repeated(r, block, e->l.kind[row], e->l.index[row]))
+      memset(e->guards + (int64_t)row * r->stride, 0, sizeof(double) * r->stride);
+}
+
 /* Whether no guard of a mode has a root within a time, also if the states are off by ``near``. */
 static int is_quiet(Run *r, Expansion *e, const int32_t *drop, const double *near, double time, int block) {
   double *noise = r->work;
   int order = r->order;
   int singular = !e->finite && r->has_roots; /* on a surface where a root has no series */
+  forget_repeated(r, e, block);
   if (is_awaited(r, time) || (!singular && (!e->finite || step_size(r, e) < time))) return 0;
   weigh_again(r, e);
   guard_sums(r, e, near, 1, noise);

@@ -348,7 +348,11 @@ static void step(Run *r) {
     if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
   }
   if (row >= 0 && is_atom(r->now.kind[row])) arrive(r, e, dt, r->instant.tied);
-  else if (row >= 0) serve_between(r, row);
+  else if (row >= 0) {
+    int64_t events = r->event_count;
+    serve_between(r, row);
+    if (r->event_count == events && dt <= SHORTEST * time_scale(r)) r->shortened++; /* back where it was */
+  }
   else if (!last) {
     if (r->s->sets) look_at_sets(r);
     watch_two_fold(r);

@@ -638,7 +638,7 @@ INLINE void expand_step(Lanes *s, Work *w, Step *e) {
   T h = MIN(e->by_series, BC(o->max_step)), left = o->t_end - s->t;
   e->last = h >= left;
   e->unclear = ~finite;
-  e->unclear |= ~e->last & (h <= SHORTEST * MAX(BC(1), ABS(s->t)));
+  e->unclear |= ~e->last & ((h <= SHORTEST * MAX(BC(1), ABS(s->t))) | (h >= LONG));
   e->unclear |= (s->steps >= o->max_steps) | passed_between(s, e->g);
   /* What happens at the end, to rounding, happens. */
   e->h = SELECT(e->last, left + AT_END * MAX(BC(1), ABS(s->t + left)), h);

@@ -9,7 +9,7 @@ without backward integration, which is impossible through an entry to sliding.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -94,8 +94,11 @@ def _speed(at: AtEvent, rate: Array) -> float:
 
 _STAGES = 12
 
-#: Smallest panel at an end of a leg, where roots have no derivative, relative to the time.
-_SMALLEST = 1e-13
+#: Power of the time from an end of a leg on which its nodes there lie: roots have no derivative at zero.
+_POWER = 8
+
+#: Ends of panels in the root of that power, coarse and fine.
+_COARSE, _FINE = (0.0, 0.25, 1.0), (0.0, 0.0625, 0.25, 0.5, 1.0)
 
 #: Relative difference of derivatives with coarser panels above which they are refused.
 _COLLOCATED = 1e-6
@@ -104,9 +107,9 @@ _COLLOCATED = 1e-6
 def _collocated(
     run: Trajectory, leg: Leg, t_start: float, t_end: float, p: Array, chosen: tuple[int, ...]
 ) -> LegFlow:
-    """Derivatives of a leg of a run between two times, by Gauss collocation on panels graded to both ends."""
-    coarse, end, rate = _by_panels(run, leg, t_start, t_end, p, chosen, 64 * _SMALLEST)
-    derivatives, _, _ = _by_panels(run, leg, t_start, t_end, p, chosen, _SMALLEST)
+    """Derivatives of a leg of a run between two times, by Gauss collocation graded to both ends."""
+    coarse, end, rate = _by_panels(run, leg, t_start, t_end, p, chosen, _COARSE)
+    derivatives, _, _ = _by_panels(run, leg, t_start, t_end, p, chosen, _FINE)
     wrong = float(np.abs(derivatives - coarse).max())
     if not wrong <= _COLLOCATED * max(1.0, float(np.abs(derivatives).max())):
         raise DegenerateError(_without_derivative(leg_name(run.system, leg), t_end))
@@ -121,52 +124,55 @@ def _by_panels(
     t_end: float,
     p: Array,
     chosen: tuple[int, ...],
-    smallest: float,
+    cuts: tuple[float, ...],
 ) -> tuple[Array, Array, Array]:
     field = leg.field(run.system, chosen)
     n, starts = field.blocks.starts, run.steps.starts
     first = max(int(np.searchsorted(starts, t_start, side="right")) - 1, 0)
     last = max(int(np.searchsorted(starts, t_end, side="left")), first + 1)
-    start = _polynomial(run, first, t_start, n)[0]
+    start = _polynomial(run, first, t_start - float(starts[first]), n)[0]
     derivatives = field.initial(start, p)[:, 1:]
-    nodes, weights, inner = _gauss(_STAGES)
+    _, weights, inner = _gauss(_STAGES)
     for k in range(first, last):
         low = max(float(starts[k]), t_start)
         high = min(float(starts[k + 1]) if k + 1 < len(starts) else t_end, t_end)
         if high <= low:
             continue
-        for one, two in _graded(low, high, k == first, k == last - 1, smallest):
-            h = two - one
-            innermost = h <= 2.0 * smallest * max(1.0, abs(one))
-            values = [
-                field.linear.copied(_polynomial(run, k, one + h * c, n)[0], p)[1:] for c in nodes
-            ]
-            a = np.array([v[0] for v in values])
+        low, high = low - float(starts[k]), high - float(starts[k])
+        for times, rates in _panels(low, high, k == first, k == last - 1, cuts):
+            values = [field.linear.copied(_polynomial(run, k, t, n)[0], p)[1:] for t in times]
+            a = rates[:, None, None] * np.array([v[0] for v in values])
             b = np.zeros((_STAGES, *derivatives.shape))
-            b[:, :, n:] = np.array([v[1][:, list(chosen)] for v in values])
-            if innermost:  # the argument of a root may be rounding
+            b[:, :, n:] = rates[:, None, None] * np.array([v[1][:, list(chosen)] for v in values])
+            if not np.array_equal(rates, rates[:1].repeat(_STAGES)):  # a root of rounding, maybe
                 a[~np.isfinite(a)] = b[~np.isfinite(b)] = 0.0
             try:
-                increment = _increment(a, b, derivatives, h * inner, weights)
+                derivatives = derivatives + _increment(a, b, derivatives, inner, weights)
             except np.linalg.LinAlgError:
-                raise DegenerateError(_without_derivative(leg_name(run.system, leg), one)) from None
-            derivatives = derivatives + h * increment
-    end, rate = _polynomial(run, last - 1, t_end, n)
+                at = float(starts[k]) + float(times[0])
+                raise DegenerateError(_without_derivative(leg_name(run.system, leg), at)) from None
+    end, rate = _polynomial(run, last - 1, t_end - float(starts[last - 1]), n)
     return derivatives, end, rate
 
 
-def _graded(
-    low: float, high: float, begins: bool, ends: bool, smallest: float
-) -> list[tuple[float, float]]:
-    """Panels of a step, smaller and smaller toward the ends of its leg."""
-    least, size = smallest * max(1.0, abs(low)), 0.5 * (high - low)
-    cuts = {low, high}
-    while size > least:
-        cuts |= {low + size} if begins else set()
-        cuts |= {high - size} if ends else set()
-        size *= 0.125
-    ordered = sorted(cuts)
-    return list(pairwise(ordered))
+def _panels(
+    low: float, high: float, begins: bool, ends: bool, cuts: tuple[float, ...]
+) -> Iterator[tuple[Array, Array]]:
+    """Nodes of the panels of a step, and the rates of time there for a panel of unit length."""
+    nodes = _gauss(_STAGES)[0]
+    middle = 0.5 * (low + high) if begins and ends else low if ends else high
+    if begins:
+        for one, two in pairwise(cuts):
+            s = one + (two - one) * nodes
+            rates = _POWER * s ** (_POWER - 1) * (two - one)
+            yield low + (middle - low) * s**_POWER, (middle - low) * rates
+    if not (begins or ends):
+        yield low + (high - low) * nodes, np.full(_STAGES, high - low)
+    if ends:
+        for two, one in pairwise(reversed(cuts)):
+            s = two + (one - two) * nodes
+            rates = _POWER * s ** (_POWER - 1) * (two - one)
+            yield high - (high - middle) * s**_POWER, (high - middle) * rates
 
 
 def _without_derivative(what: str, t: float) -> str:
@@ -177,15 +183,15 @@ def _without_derivative(what: str, t: float) -> str:
 
 
 def _polynomial(run: Trajectory, step: int, t: float, n: int) -> tuple[Array, Array]:
-    """State and rate at a time of a step."""
+    """State and rate at a time from the start of a step."""
     c = run.steps.coefficients[step][:n]
     degrees = np.arange(c.shape[1])
-    powered = (t - float(run.steps.starts[step])) ** degrees
+    powered = t**degrees
     return c @ powered, c[:, 1:] @ (degrees[1:] * powered[:-1])
 
 
 def _increment(a: Array, b: Array, s: Array, inner: Array, weights: Array) -> Array:
-    """Increment over h of S' = A S + B by collocation: sum_i w_i K_i, K = A (S + h a K) + B."""
+    """Increment over [0, 1] of S' = A S + B by collocation: sum_i w_i K_i, K = A (S + a K) + B."""
     m, n = a.shape[:2]
     system = np.eye(m * n) - (a[:, :, None, :] * inner[:, None, :, None]).reshape(m * n, m * n)
     rates = np.linalg.solve(system, (a @ s + b).reshape(m * n, -1)).reshape(m, n, -1)

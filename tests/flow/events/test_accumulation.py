@@ -130,3 +130,23 @@ def test_resets_end_at_their_limit():
     assert run.accumulation_time == pytest.approx(3.5, abs=1e-12)
     run = ns.simulate(system, [1, 0], 3.5 - 2**-18)
     assert run.status is ns.Status.REACHED_END
+
+
+def _turning():
+    """The surface is crossed at 1 - 2**(-k / 2 - 1 / 4), and has no series at the limit 1."""
+    turns = ca.cos(2 * ca.pi * ca.log(1 - v) / np.log(2.0))
+    return ns.FilippovSystem([y, v], surface=turns, above=[1, 1], below=[-1, 1])
+
+
+def test_a_surface_without_a_series_at_the_limit_ends_the_run_there():
+    run = _end(_turning(), [0, 0], 2.0)
+    assert run.status is ns.Status.ACCUMULATION and run.t[-1] < 1
+    assert run.accumulation_time == pytest.approx(1.0, abs=1e-10)
+    times = [event.t for event in run.events if event.kind == "crossing"]
+    first = [1 - 2 ** (-k / 2 - 1 / 4) for k in range(7)]
+    assert len(times) > 50 and times[:7] == pytest.approx(first, abs=1e-12)
+
+
+def test_a_run_that_is_read_at_the_limit_does_not_stand_still_there():
+    run = ns.simulate(_turning(), [0, 0], 2.0, t_eval=[1.0], max_steps=2000)
+    assert run.status in (ns.Status.STEP_TOO_SMALL, ns.Status.ACCUMULATION)

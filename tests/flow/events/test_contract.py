@@ -71,7 +71,7 @@ def test_a_reset_exactly_at_the_end_jumps(many):
     assert abs(state[0] + 3.0) < 1e-14
 
 
-@pytest.mark.slow_cases("ensemble")
+@pytest.mark.slow_cases("many")
 @one_and_many
 def test_a_surface_exactly_at_the_end_is_entered(many):
     system = ns.FilippovSystem([x], surface=x, above=[-1], below=[3])
@@ -273,7 +273,7 @@ def test_a_reset_onto_the_zero_of_another_one_from_which_the_motion_goes_back(ma
 # Surfaces that cannot be located to rounding are refused when they are met.
 
 
-@pytest.mark.slow_cases("ensemble")
+@pytest.mark.slow_cases("many")
 @one_and_many
 def test_a_multiple_zero_that_nobody_could_see_is_refused_when_it_is_met(many):
     surface = (ca.exp(x) - np.e) ** 3

@@ -34,6 +34,23 @@ def test_derivatives_through_the_zero_of_a_power(power, jump):
     np.testing.assert_allclose(found, _differences(system, start, 1.2), rtol=0, atol=2e-6)
 
 
+@pytest.mark.parametrize(("power", "within"), [(0.25, 1e-7), (0.3, 1e-7), (0.5, 1e-9)])
+@pytest.mark.parametrize("begins", [0.0, -0.3])
+def test_derivatives_where_damping_grows_like_a_power(power, within, begins):
+    """v + c x^(1 + power) is constant while x > 0; from x = 0 on the leg begins where the power has no slope."""
+    c = 0.7 / (1 + power)
+    system = ns.FilippovSystem([x, v], surface=x, above=[v, -0.7 * x**power * v], below=[v, 0])
+    run = ns.simulate(system, [begins, 1.0], 1.0, tol=1e-13)
+    found, end = ns.sensitivity(run).dx_dx0, run.x[-1, 0]
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    s = (end ** (1 / 8) * (nodes + 1) / 2, end ** (1 / 8) / 2 * weights)
+    time = float(s[1] @ (8 * s[0] ** 7 / (1 - c * s[0] ** (8 * (1 + power))) ** 2))
+    speed = 1 - c * end ** (1 + power)
+    of_x = speed * np.array([1.0, time - begins])  # by the start and by the speed there
+    exact = [of_x, np.array([0.0, 1.0]) - 0.7 * end**power * of_x]
+    np.testing.assert_allclose(found, exact, rtol=0, atol=within if begins else 1e-11)
+
+
 def test_derivatives_of_super_twisting_have_the_jump_of_the_field():
     system = ns.FilippovSystem(
         [x, v], surface=x, above=[v - 1.5 * ca.sqrt(x), -1.1], below=[v + 1.5 * ca.sqrt(-x), 1.1]

@@ -156,6 +156,9 @@ TENFOLD = 20.0
 #: they are larger than this.
 OVERFLOW = 1e280
 
+#: Derivatives have reached a set where |h| is this part of what it was on the way.
+ARRIVED = 1e-13
+
 #: Motions that can continue from a point, at most so many are kept.
 SEVERAL = 16
 

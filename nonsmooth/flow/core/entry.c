@@ -125,9 +125,10 @@ static size_t place_run(Run *r, char *base) {
   r->maps = DOUBLES(s->maps.size);
   r->restitution = DOUBLES(s->restitution.size);
   r->columns = DOUBLES(s->columns.size);
-  r->input = DOUBLES(n + 2 * w);
+  r->input = DOUBLES(2 * (n + 2 * w) + s->parameters);
   r->held = DOUBLES(w);
   r->none = DOUBLES(w);
+  r->zeros = DOUBLES(s->parameters);
   r->slope = DOUBLES(square);
   r->vector = DOUBLES(3 * n + 2 * w);
   r->sample = DOUBLES(3 * ((size_t)n + w + g));

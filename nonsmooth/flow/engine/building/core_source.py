@@ -31,7 +31,7 @@ _FILES = (
         "stepper.c",
     ),
     *("surfaces.c", "record.c", "spiral.c", "decide.c", "layer.c", "contacts.c"),
-    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c"),
+    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c", "variation.c"),
 )
 
 

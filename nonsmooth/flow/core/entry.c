@@ -415,7 +415,8 @@ void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended
     r->at_t = b->at_t[i];
     memcpy(r->at_x, b->at_x + i * r->s->dimension, sizeof(double) * r->s->dimension);
   }
-  step(r);
+  if (m->since == 0 && m->history) see_limit(r); /* the last event was a lane's */
+  if (r->status == RUNNING) step(r);
   go_on_until_plain(r, b, i, m);
 }
 

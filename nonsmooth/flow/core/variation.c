@@ -46,9 +46,9 @@ static void tangent_inputs(Run *r, const Expansion *d, int k, const double *dp) 
 static void tangent_rules(Run *r, const Expansion *d, int k, const double *dp, int late) {
   const Series *t = &r->s->tangent;
   tangent_inputs(r, d, k, dp);
-  if (late) series_rules(t, t->late, t->late_count, k, r->stride, r->input, r->series);
-  else if (k) series_rules(t, t->later, t->later_count, k, r->stride, r->input, r->series);
-  else series_rules(t, t->moving, t->moving_count, k, r->stride, r->input, r->series);
+  if (late) series_at(t, t->late, t->late_count, k, r->stride, r->input, r->series);
+  else if (k) series_at(t, t->later, t->later_count, k, r->stride, r->input, r->series);
+  else series_at(t, t->moving, t->moving_count, k, r->stride, r->input, r->series);
 }
 
 /* Coefficient k of the derivative of h/|h| from that of h. */
@@ -232,6 +232,7 @@ static void time_of_event(Run *r, const Leg *l, const Columns *c) {
 static int begin_leg(Run *r, const Leg *l) {
   Solutions all = {0};
   memcpy(r->x, l->x, sizeof(double) * r->n);
+  tell_time(r);
   memcpy(r->letter, l->letter, r->width);
   find_idle(r);
   const double *h = surface_values(r, r->x);
@@ -304,6 +305,7 @@ static int carry(Run *r, Leg *l, const Columns *c) {
     }
     if (l->hit < 0 ? l->left <= 0 : has_arrived(r, l->hit, &most)) {
       memcpy(l->x, r->x, sizeof(double) * r->n);
+      if (r->s->timed) l->x[r->n - 1] += r->t;
       if (l->time_row) time_of_event(r, l, c);
       return LEG_DONE;
     }
@@ -337,7 +339,7 @@ int32_t carry_columns(Run *r, Leg *l) {
   if (!c.h) return LEG_STUCK;
   c.states = c.h + count * r->m;
   c.series = c.states + count * r->n * r->stride;
-  clear(r, &o, 0);
+  clear(r, &o, (Pair){r->s->timed ? l->x[r->n - 1] : 0, 0});
   set_parameters(r, l->p);
   int status = carry(r, l, &c);
   free(c.h);

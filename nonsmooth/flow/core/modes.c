@@ -86,14 +86,17 @@ static const double *held_of(Run *r, const int8_t *letter) {
 static int is_moving(const Run *r, int i) { return r->s->sets && r->moving[i]; }
 
 /* The moving inputs: states, lambda and reactions, then nu. */
-static void set_inputs(Run *r, const double *x, const double *held, const double *unknowns) {
-  double *in = r->input;
+static void inputs_at(const Run *r, double *in, const double *x, const double *held, const double *unknowns) {
   memcpy(in, x, sizeof(double) * r->n);
   in += r->n;
   for (int i = 0; i < r->width; i++)
     in[i] = held[i] + (i < r->m && (r->s->scaled[i] || is_moving(r, i)) ? 0 : unknowns[i]);
   in += r->width;
   for (int i = 0; i < r->m; i++) if (r->s->scaled[i]) *in++ = is_moving(r, i) ? 0 : unknowns[i];
+}
+
+static void set_inputs(Run *r, const double *x, const double *held, const double *unknowns) {
+  inputs_at(r, r->input, x, held, unknowns);
 }
 
 static double out_of(const Values *t, const double *w, int k) { return w[t->output[k]]; }
@@ -103,7 +106,7 @@ static void error_scales(Run *r, const double *x, const double *held, const doub
   const Entries *slope = &r->s->slope;
   set_inputs(r, x, held, unknowns);
   r->stamp++;
-  values_run(&r->s->point, r->input, r->p, r->point);
+  values_at(&r->s->point, r->input, r->p, r->point);
   for (int k = 0; k < slope->count; k++)
     r->slope[slope->row[k] * r->width + slope->column[k]] = out_of(&r->s->point, r->point, 2 * r->width + k);
 }
@@ -182,7 +185,7 @@ static void weigh_point(Run *r, Expansion *e, const double *x, const double *unk
     r->stamp++;
     if (r->s->point.free_count) {
       set_inputs(r, x, held, unknowns);
-      values_free(&r->s->point, r->input, r->p, r->point);
+      values_free_at(&r->s->point, r->input, r->p, r->point);
     }
   } else error_scales(r, x, held_of(r, e->l.letter), unknowns);
   e->stamp = r->stamp;

@@ -1,6 +1,6 @@
 /* The driver: all that a run is. The system is data, not code.
  *
- * Read in the order of core_source.py: programs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c, decide.c,
+ * Read in the order of core_source.py: programs.h, pairs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c, decide.c,
  * events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
  */
 
@@ -21,6 +21,7 @@ typedef struct {
   int32_t n, dimension, timed, m, c, parameters, stops, resets, order, slope_outputs;
   Series series;      /* field, layer, surfaces and gaps, factors, stops and resets, slope_outputs slopes */
   Series free;        /* the same rules where nothing slides: field, surfaces and gaps, stops and resets */
+  Series tangent;     /* the same rules: derivatives of series' outputs, but slopes, along a direction; see variation.c */
   Values point;       /* layer, factors, entries of slope, gradients of layer, surfaces and gaps, stops, factors */
   Values surfaces;    /* surfaces, gaps, rates of gaps; entries of their gradients */
   Values maps;        /* states after each reset */
@@ -121,7 +122,8 @@ typedef struct {
   double *p;
   int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
   /* The time is t + t_low: that of an event is no number of its own where times are large. */
-  double t, t_low, begun, since, limit, at_t, *x, *at_x, *unknowns;
+  Pair begun;
+  double t, t_low, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
   double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
   Layout now; /* of the present mode */
@@ -146,7 +148,7 @@ typedef struct {
   int64_t read_count;
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
-  double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
+  double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *zeros, *slope, *vector, *sample;
   double *atom_work, *choice_work;
   double *met_at; /* root of each guard in the step, or -1 */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;

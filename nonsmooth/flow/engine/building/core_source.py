@@ -22,6 +22,7 @@ MOST_ORDER = 48
 _FILES = (
     *(
         "programs.h",
+        "pairs.h",
         "linear.h",
         "state.c",
         "modes.c",
@@ -31,7 +32,7 @@ _FILES = (
         "stepper.c",
     ),
     *("surfaces.c", "record.c", "spiral.c", "decide.c", "layer.c", "contacts.c"),
-    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c"),
+    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c", "variation.c"),
 )
 
 

@@ -46,7 +46,7 @@ def require_generic(
         raise DefinitionError(
             f"{what}: expected a surface on which orbits can slide, received surface {surface}, which is "
             f"{found.name}: both fields have the same L on it, and where L = 0 an orbit only touches it. classify "
-            "names touches, and boundary_equilibrium equilibria on it."
+            "names touches, points of rest between two forces, and equilibria on it."
         )
 
 

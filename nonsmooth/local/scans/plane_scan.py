@@ -128,8 +128,9 @@ class PlaneScan:
 
     @cached_property
     def folds(self) -> list[Fold]:
-        """Folds of both fields; none where nothing slides."""
-        return self._apart(self.tangencies) if self.where.switching.slides else []
+        """Folds of both fields, those in one point where a force jumps; none of a continuous surface."""
+        soft = self.where.switching.kind == "continuous"
+        return [] if soft else self._apart(self.tangencies)
 
     @cached_property
     def pseudo_equilibria(self) -> list[PseudoEquilibrium]:

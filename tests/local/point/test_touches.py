@@ -64,8 +64,10 @@ def test_what_needs_sliding_is_refused():
     for verb in (ns.find_fold, ns.local.fold):
         with pytest.raises(ns.DefinitionError, match="continuous of order 1"):
             verb(SPRING, [1.0, 0.0])
-    with pytest.raises(ns.DefinitionError, match="velocity continuous"):
-        ns.find_two_fold(_sides([v, -2.0, 1.0], [v, 1.0, 1.0], (x, v, z)), [0.0, 0.0, 0.0])
+    force = _sides([v, -2.0, 1.0], [v, 1.0, 1.0], (x, v, z))
+    for verb in (ns.find_two_fold, ns.find_pseudo_equilibrium, ns.find_fold):
+        with pytest.raises(ns.DefinitionError, match="velocity continuous"):
+            verb(force, [0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c["id"].startswith("focus_focus")])

@@ -200,6 +200,9 @@ KINDS = (
 #: The first and the last of these, as many, can happen without resets and impacts.
 SIMPLE_KINDS = 5
 
+#: Laws of elements, by number in C.
+LAWS = ("surface", "contact", "set")
+
 #: Kinds of guards, by number in C, and their priority among simultaneous ones (0 first).
 GUARDS = (
     *("surface", "exit", "stop", "reset", "impact", "release", "branch"),

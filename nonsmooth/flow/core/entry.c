@@ -97,8 +97,8 @@ static size_t place_run(Run *r, char *base) {
   int n = r->n, w = r->width, c = r->c, all = r->kept_rows, g = r->guards, stride = r->stride;
   size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
   used = place_layout(&r->now, base, used, w, g);
-  used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets);
-  used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets);
+  used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets ? r->m : 0);
+  used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets ? r->m : 0);
   Continuation *each[] = {&r->chosen, &r->one, &r->first, &r->rest, &r->found};
   for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, w, g);
   used = place_decision(r, base, used);
@@ -151,7 +151,7 @@ static size_t place_run(Run *r, char *base) {
   r->rates_of_several = DOUBLES(SEVERAL * n);
   size_t q = r->m < MOST_ENUMERATED ? r->m : MOST_ENUMERATED, sums = q * (q - (q > 0)) / 2;
   r->layer_series = DOUBLES(s->slope_outputs ? (q * q + sums * sums) * stride : 0);
-  r->idle = LETTERS(s->sets);
+  r->idle = LETTERS(s->m);
   r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
   r->of_defect = DOUBLES(g);
   r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
@@ -177,7 +177,7 @@ Run *run_new(const System *s, Table *table) {
   r->table = table;
   r->n = s->n; r->m = s->m; r->c = s->c; r->width = s->m + s->c;
   r->order = s->order; r->stride = s->order + 1;
-  r->kept_rows = s->lower_first[s->m];
+  r->kept_rows = s->kept_rows;
   r->guards = 3 * s->m + 2 * s->c + s->rules.atoms + 2;
   r->arena = calloc(1, place_run(r, 0));
   if (!r->arena) { free(r); return 0; }
@@ -220,7 +220,7 @@ static void clear(Run *r, const Options *o, double t) {
   r->t = r->begun = t;
   r->t_low = 0;
   r->since = 0;
-  for (int i = 0; i < r->m; i++) { r->speed[i] = INFINITY; r->has_roots |= s->power[i] > 0; }
+  for (int i = 0; i < r->m; i++) { r->speed[i] = INFINITY; r->has_roots |= element(r, i)->power > 0; }
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;

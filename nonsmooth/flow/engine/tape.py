@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
 from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
-from ..constants import FULL, RUNNING, SEVERAL
+from ..constants import FULL, LAWS, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
@@ -185,7 +185,13 @@ class _Entries(ctypes.Structure):
 
 _VALUES = ("point", "surfaces", "maps", "atoms", "choices", "restitution", "columns")
 _ENTRIES = tuple(field.name for field in fields(Tape) if field.type == "Entries")
-_TABLES = ("continuous", "scaled", "carries", "component")
+
+
+class _Element(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I32) for name in ("law", "first", "k", "degree", "lower", "flags")],
+        *[(name, _D) for name in ("width", "power")],
+    ]
 
 
 class _Rules(ctypes.Structure):
@@ -205,15 +211,12 @@ class _System(ctypes.Structure):
         ("free", SeriesStructure),
         *[(name, ValuesStructure) for name in _VALUES],
         *[(name, _Entries) for name in _ENTRIES],
-        *[
-            (name, _POINTER)
-            for name in (*_TABLES, "slope_output", "slope_moves", "slope_symmetric")
-        ],
+        *[(name, _POINTER) for name in ("element", "carries", "component")],
+        *[(name, _POINTER) for name in ("slope_output", "slope_moves", "slope_symmetric")],
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
-        *[(name, _I32) for name in ("affine", "sets")],
-        *[(name, _POINTER) for name in ("mixed", "set_first", "set_size", "set_of", "layer_width")],
-        *[(name, _POINTER) for name in ("degree", "lower_first", "power", "early", "early_free")],
+        *[(name, _I32) for name in ("affine", "sets", "kept_rows")],
+        *[(name, _POINTER) for name in ("mixed", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
     ]
@@ -249,9 +252,19 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     return made
 
 
-def _place(system: FilippovSystem, i: int) -> int:
-    """Number of the set of a switching function, -1 for a surface."""
-    return system.sets.index(system.set_of[i]) if i in system.set_of else -1
+def _elements(coupled: Coupled) -> list[_Element]:
+    """The element of each function: of surfaces and sets, then of contacts."""
+    system, m, c = coupled.system, coupled.system.surface_count, len(coupled.system.impacts)
+    made, lower = list[_Element](), m + 2 * c
+    for members in system.entries:
+        i, k = members[0], len(members)
+        flags = coupled.continuous[i] + 2 * coupled.scaled[i]
+        law, degree = LAWS.index("surface" if k == 1 else "set"), len(coupled.lower[i]) + 1
+        size = (system.layer_widths[i], coupled.powers[i])
+        made += [_Element(law, i, k, degree, lower, flags, *size)] * k
+        lower += degree - 1
+    law = LAWS.index("contact")
+    return [*made, *[_Element(law, m + j, 1, 2, m + c + j, 0, 1.0, 0.0) for j in range(c)]]
 
 
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine:
@@ -332,9 +345,8 @@ class TapeEngine:
         carries = np.zeros((m, c))
         for i, carried in enumerate(coupled.carriers):
             carries[i, carried] = 1
+        elements = _elements(coupled)
         tables: dict[str, Any] = {
-            "continuous": coupled.continuous,
-            "scaled": coupled.scaled,
             "carries": carries.ravel(),
             "component": tape.component,
             "slope_output": tape.slope_output,
@@ -345,17 +357,12 @@ class TapeEngine:
             "bent_free": coupled.linearity.bent_free_rows,
             "bent_guards": coupled.linearity.bent_guards,
             "curved": coupled.linearity.curved_guards,
-            "set_first": [members[0] for members in system.sets],
-            "set_size": [len(members) for members in system.sets],
-            "set_of": [_place(system, i) for i in range(m)],
-            "degree": [len(own) + 1 for own in coupled.lower],
-            "lower_first": m + 2 * c + np.cumsum([0, *map(len, coupled.lower)]),
             "early": tape.series.early,
             "early_free": tape.free.early,
         }
-        made.sets = len(system.sets)
-        made.power = self._at(np.array([*coupled.powers, 0.0]))
-        made.layer_width = self._at(np.array([*system.layer_widths, 0.0]))
+        made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
+        table = (_Element * (len(elements) + 1))(*elements)
+        made.element = self._at(np.frombuffer(bytes(table), np.uint8))
         made.early_count, made.early_free_count = len(tape.series.early), len(tape.free.early)
         for name, values in tables.items():
             setattr(made, name, self._at(np.array([*values, 0], np.int32)))
@@ -539,7 +546,7 @@ class TapeEngine:
         return [tuple(row) for row in rows.tolist()]
 
     def _spelled(self, signs: list[int]) -> str:
-        """Letters of all switching functions and contacts; see ``core/sets.c`` for those of sets."""
+        """Letters of all switching functions and contacts; see ``core/state.c`` for those of sets."""
         m = self.system.surface_count
         surfaces = ("-s+*blli"[sign + 1] for sign in signs[:m])
         return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])

@@ -946,7 +946,7 @@ static int is_determined(Run *r, const Layout *l, const int8_t *letter) {
   for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) m[i * n + j] = r->slope[l->sliding[i] * w + l->sliding[j]];
   int count = null_space(m, n, n, z, rest, r->decision->pivot);
   set_inputs(r, r->x, held_of(r, letter), r->none);
-  values_run(&r->s->columns, r->input, r->p, r->columns);
+  values_at(&r->s->columns, r->input, r->p, r->columns);
   const Entries *column = &r->s->column;
   for (int q = 0; q < count; q++) {
     double *terms = change + r->n, most = 0;

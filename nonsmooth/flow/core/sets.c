@@ -26,7 +26,7 @@ static void aim(Run *r, const int8_t *letter, const double *x, const double *unk
     if (letter[f] < OFF || letter[f] == IDLE) { for (int i = 0; i < k; i++) u[i] = 0; continue; }
     if (letter[f] != OFF) { unit_of(unknowns + f, k, u); continue; }
     if (!h) {
-      values_run(&r->s->surfaces, x, r->p, r->heights);
+      values_at(&r->s->surfaces, x, r->p, r->heights);
       h = r->heights_of;
       for (int i = 0; i < r->m; i++) r->heights_of[i] = out_of(&r->s->surfaces, r->heights, i);
     }

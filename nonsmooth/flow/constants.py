@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LIMIT_FALL, MOST_CODES, UNWATCHED
+from ..model.numbering import FALL, LAWS, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
+__all__ = ["FALL", "LAWS", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 
@@ -199,9 +199,6 @@ KINDS = (
 
 #: The first and the last of these, as many, can happen without resets and impacts.
 SIMPLE_KINDS = 5
-
-#: Laws of elements, by number in C.
-LAWS = ("surface", "contact", "set")
 
 #: Kinds of guards, by number in C, and their priority among simultaneous ones (0 first).
 GUARDS = (

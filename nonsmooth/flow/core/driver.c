@@ -144,6 +144,8 @@ static void start_in(Run *r, const int8_t *asked) {
 static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   note(r);
   find_idle(r);
+  if (start_mode || r->remembered) memcpy(r->letter, start_mode ? start_mode : r->remembered, r->width);
+  else memset(r->letter, -1, r->width);
   int finite = letters_of(r, r->letter);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;

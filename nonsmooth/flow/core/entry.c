@@ -190,6 +190,9 @@ void run_free(Run *r) { free(r->arena); free(r); }
 /* Times at which the run is read: no approximation of the motion may span one of them. */
 void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = times; r->read_count = count; }
 
+/* Letters from which elements with hysteresis go on, or none. */
+void run_remember(Run *r, const int8_t *letter) { r->remembered = letter; }
+
 static void set_parameters(Run *r, const double *p) {
   const System *s = r->s;
   const Values *program[] = {&s->point, &s->surfaces, &s->maps, &s->restitution, &s->columns, &s->atoms, &s->choices};

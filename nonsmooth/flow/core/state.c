@@ -19,7 +19,8 @@ typedef struct {
 
 /* An element: k functions that stand side by side from ``first``, with a multiplier each, and the law between them
  * (elements.c); each function has the entry of its element. The multiplier enters derivative ``degree`` of h; those
- * between are rows from ``lower`` on of what is kept: all functions, then these. */
+ * between are rows from ``lower`` on of what is kept: all functions, then these. With hysteresis h is that of the
+ * multiplier +1, and the row ``lower`` that of -1. */
 typedef struct {
   int32_t law, first, k, degree, lower, flags;
   double width, power; /* of the layer; the smallest power of h in the field, or 0 */
@@ -130,6 +131,7 @@ typedef struct {
   /* The time is t + t_low: that of an event is no number of its own where times are large. */
   Pair begun;
   double t, t_low, since, limit, at_t, *x, *at_x, *unknowns;
+  const int8_t *remembered; /* letters from which elements with hysteresis go on, or none */
   int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
   double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
   Layout now; /* of the present mode */
@@ -177,7 +179,7 @@ typedef struct {
   void (*lay_out)(const Run *r, Layout *l, int i); /* guards of a mode */
   void (*guard)(Run *r, const Layout *l, int row, const double *series, int count, double *g); /* their series */
   double (*rounding)(Run *r, const Expansion *e, int row, const Sums *of); /* in the guard of a row */
-  int8_t (*side)(const Run *r, int i, double h); /* letter off its zero; what is on it is decided */
+  int8_t (*side)(const Run *r, int i, double h); /* letter off its zero, where it has two by the present one */
   void (*serve)(Run *r, int row); /* at the zero of a guard */
 } Law;
 

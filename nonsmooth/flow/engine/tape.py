@@ -244,6 +244,7 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     made.table_read.argtypes = [_POINTER] * 4
     made.run_new.argtypes = [_POINTER] * 2
     made.run_read_at.argtypes = [_POINTER, _POINTER, _I64]
+    made.run_remember.argtypes = [_POINTER, _POINTER]
     made.run_begin.argtypes = [*[_POINTER] * 6, _D, _POINTER]
     made.run_motion.argtypes = [_POINTER] * 2
     made.run_continue.argtypes = [_POINTER, _I64]
@@ -257,13 +258,13 @@ def _elements(coupled: Coupled) -> list[_Element]:
     """The element of each function: of surfaces and sets, then of contacts."""
     system, m, c = coupled.system, coupled.system.surface_count, len(coupled.system.impacts)
     made, lower = list[_Element](), m + 2 * c
-    for members in system.entries:
-        i, k = members[0], len(members)
+    for name, members in zip(system.laws, system.entries, strict=True):
+        i, k, further = members[0], len(members), len(coupled.lower[members[0]])
         flags = coupled.continuous[i] + 2 * coupled.scaled[i]
-        law, degree = LAWS.index("surface" if k == 1 else "set"), len(coupled.lower[i]) + 1
+        law, degree = LAWS.index(name), 1 if i in system.remembering else further + 1
         size = (system.layer_widths[i], coupled.powers[i])
         made += [_Element(law, i, k, degree, lower, flags, *size)] * k
-        lower += degree - 1
+        lower += further
     law = LAWS.index("contact")
     return [*made, *[_Element(law, m + j, 1, 2, m + c + j, 0, 1.0, 0.0) for j in range(c)]]
 
@@ -427,19 +428,21 @@ class TapeEngine:
         options: Options,
         read_at: Array | None = None,
         motion: Array | None = None,
+        mode: str | None = None,
     ) -> Run:
         """Run one trajectory from an extended start, dense output kept, to be read at ``read_at`` times."""
-        # ``motion`` is that of a run or event that is continued.
+        # ``motion`` and ``mode`` are those of a run or event that is continued.
         width = self._c.rules.width
         if motion is not None:
             motion = self._checked(motion)
         output = Output(self.system.extended_dimension, self.order, self._rooms, width)
         x, p = np.array(x, float), np.array([*p, 0.0], float)
-        start = self._start_mode(options)
+        start, known = self._letters(options.start_mode), self._letters(mode)
         with self.held_table() as table, self.held_run(table) as state:
             c_options = ctypes.byref(options_of(self.system, options, dense=True))
             given = (address(x), address(p), address(start))
             library().run_read_at(state, address(read_at), 0 if read_at is None else len(read_at))
+            library().run_remember(state, address(known))
             library().run_begin(
                 state, c_options, output.pointer, *given, options.t_start, address(motion)
             )
@@ -487,10 +490,8 @@ class TapeEngine:
             "system and at=, or give its state as x0 and its time as t_start."
         )
 
-    def _start_mode(self, options: Options) -> NDArray[np.int8] | None:
-        if options.start_mode is None:
-            return None
-        return np.array([*self.system.parse_letters(options.start_mode), 0], np.int8)
+    def _letters(self, mode: str | None) -> NDArray[np.int8] | None:
+        return None if mode is None else np.array([*self.system.parse_letters(mode), 0], np.int8)
 
     @property
     def _width(self) -> int:
@@ -574,7 +575,7 @@ class TapeEngine:
         x = np.ascontiguousarray(x, float)
         p = np.ascontiguousarray(np.append(p, np.zeros((*p.shape[:-1], 1)), axis=-1), float)
         batch = batch_of(x, p, options.t_start, chunk, times, None)
-        start, done = self._start_mode(options), np.zeros(1, np.int64)
+        start, done = self._letters(options.start_mode), np.zeros(1, np.int64)
         c_options = options_of(self.system, options, dense=False, at=at)
         with self.held_table() as table, self.held_run(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))

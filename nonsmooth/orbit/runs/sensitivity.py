@@ -20,6 +20,7 @@ from ...model import (
     PointError,
     read_function,
     real_array,
+    require_system,
 )
 from ...model.derivatives.event_maps import EventMap, function_map
 from .set_variation import set_sensitivity
@@ -80,7 +81,8 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
            [3.  , 1.  ]]), array([[0.25],
            [1.  ]]), array([0.5]), array([[1. , 0.5]]))
     """
-    if _require_run(run).system.sets:
+    require_system(_require_run(run).system, sets=True)
+    if run.system.sets:
         return set_sensitivity(run, _names(run, wrt))
     _, result = along(run, _names(run, wrt))
     return result

@@ -125,9 +125,10 @@ static size_t place_run(Run *r, char *base) {
   r->maps = DOUBLES(pair_room(s->maps.size, 1));
   r->restitution = DOUBLES(pair_room(s->restitution.size, 1));
   r->columns = DOUBLES(pair_room(s->columns.size, 1));
-  r->input = DOUBLES(n + 2 * w);
+  r->input = DOUBLES(2 * (n + 2 * w) + s->parameters);
   r->held = DOUBLES(w);
   r->none = DOUBLES(w);
+  r->zeros = DOUBLES(s->parameters);
   r->slope = DOUBLES(square);
   r->vector = DOUBLES(3 * n + 2 * w);
   r->sample = DOUBLES(3 * ((size_t)n + w + g));
@@ -422,7 +423,8 @@ void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended
     r->at_t = b->at_t[i];
     memcpy(r->at_x, b->at_x + i * r->s->dimension, sizeof(double) * r->s->dimension);
   }
-  step(r);
+  if (m->since == 0 && m->history) see_limit(r); /* the last event was a lane's */
+  if (r->status == RUNNING) step(r);
   go_on_until_plain(r, b, i, m);
 }
 

@@ -82,55 +82,75 @@ static void follow_sets(Run *r, Expansion *e, int k) {
   }
 }
 
-/* Coefficients k of directions in which sets are left and k + 1 of the distances, with those of what slides. */
-static void leave_sets(Run *r, Expansion *e, int k) {
-  int slides = e->l.slides, n = 0, sets = 0, stride = r->stride, w = r->width;
-  int32_t *which = r->pending;
-  for (int i = 0; i < slides; i++) which[n++] = e->l.sliding[i];
+/* Rates at which sets are left, in the directions in which they are. */
+static void leave_at_rates(Run *r, Expansion *e) {
+  int w = r->width, stride = r->stride;
   EACH_SET(r, f) {
     int size = size_of(r, f);
     if (e->l.letter[f] != LEAVING) continue;
-    double *radius = e->rates + (int64_t)f * (stride + 1);
-    if (k == 0) {
-      double rate = 0, terms = 0;
-      for (int i = 0; i < size; i++) {
-        double u = e->lambda[(int64_t)(f + i) * stride], g = row_of(r, r->n + f + i)[0], sum = fabs(g);
-        for (int j = f; j < f + size; j++) sum += fabs(e->slopes[(f + i) * w + j]);
-        rate += u * g;
-        terms += fabs(u) * sum;
-      }
-      radius[0] = 0;
-      radius[1] = fabs(rate) > VANISHES * terms ? rate : 0;
-      e->radius[f] = 0;
-      continue;
+    double *radius = e->rates + (int64_t)f * (stride + 1), rate = 0, terms = 0;
+    for (int i = 0; i < size; i++) {
+      double u = e->lambda[(int64_t)(f + i) * stride], g = row_of(r, r->n + f + i)[0], sum = fabs(g);
+      for (int j = f; j < f + size; j++) sum += fabs(e->slopes[(f + i) * w + j]);
+      rate += u * g;
+      terms += fabs(u) * sum;
     }
-    for (int i = f; i < f + size; i++) which[n++] = i;
+    radius[0] = 0;
+    radius[1] = fabs(rate) > VANISHES * terms ? rate : 0;
+    e->radius[f] = 0;
+  }
+}
+
+/* The matrix, r->work, of coefficients k of what slides and of directions in which sets are left, listed as r->pending,
+ * and of coefficients k + 1 of the distances; its rows. ``count``: without the distances. */
+static int leaving_matrix(Run *r, const Expansion *e, int k, int *count) {
+  int slides = e->l.slides, n = 0, sets = 0, stride = r->stride, w = r->width, at = slides;
+  int32_t *which = r->pending;
+  for (int i = 0; i < slides; i++) which[n++] = e->l.sliding[i];
+  EACH_SET(r, f) {
+    if (e->l.letter[f] != LEAVING) continue;
+    for (int i = f; i < f + size_of(r, f); i++) which[n++] = i;
     sets++;
   }
-  if (k == 0) return;
-  int all = n + sets, at = slides, column = n;
-  double *a = r->work, *b = a + (int64_t)all * all;
+  int all = n + sets, column = n;
+  double *a = r->work;
   memset(a, 0, sizeof(double) * all * all);
-  for (int i = 0; i < n; i++) {
-    b[i] = -row_of(r, r->n + which[i])[k];
+  for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) a[i * all + j] = e->slopes[which[i] * w + which[j]];
+  EACH_SET(r, f) {
+    int size = size_of(r, f);
+    if (e->l.letter[f] != LEAVING) continue;
+    for (int i = f; i < f + size; i++, at++) {
+      double u = e->lambda[(int64_t)i * stride];
+      a[at * all + at] -= (k + 1) * e->rates[(int64_t)f * (stride + 1) + 1];
+      a[at * all + column] = -(k + 1) * u;
+      a[column * all + at] = u;
+    }
+    column++;
   }
+  *count = n;
+  return all;
+}
+
+/* Coefficients k of directions in which sets are left and k + 1 of the distances, with those of what slides. */
+static void leave_sets(Run *r, Expansion *e, int k) {
+  if (k == 0) { leave_at_rates(r, e); return; }
+  int slides = e->l.slides, stride = r->stride, n, all = leaving_matrix(r, e, k, &n), at = slides, column = n;
+  const int32_t *which = r->pending;
+  double *a = r->work, *b = a + (int64_t)all * all;
+  for (int i = 0; i < n; i++) b[i] = -row_of(r, r->n + which[i])[k];
   EACH_SET(r, f) {
     int size = size_of(r, f);
     if (e->l.letter[f] != LEAVING) continue;
     const double *radius = e->rates + (int64_t)f * (stride + 1);
     b[column] = 0;
-    for (int i = 0; i < size; i++) {
-      const double *u = e->lambda + (int64_t)(f + i) * stride;
+    for (int i = f; i < f + size; i++, at++) {
+      const double *u = e->lambda + (int64_t)i * stride;
       double sum = 0;
       for (int j = 1; j < k; j++) sum += u[j] * radius[k + 1 - j];
-      b[at + i] += (k + 1) * sum;
-      a[(at + i) * all + at + i] -= (k + 1) * radius[1];
-      a[(at + i) * all + column] = -(k + 1) * u[0];
-      a[column * all + at + i] = u[0];
+      b[at] += (k + 1) * sum;
       b[column] -= 0.5 * (k > 1 ? convolve(u, u, k, 1, k - 1) : 0);
     }
-    at += size;
     column++;
   }
   if (!solve(a, b, all)) for (int i = 0; i < all; i++) b[i] = NAN;

@@ -346,12 +346,28 @@ class Coupled:
 
     def awake(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Dense expressions in ``moving``, for numbers: terms that a mode leaves out are not evaluated."""
+        dense = [ca.densify(e) for e in expressions]
+        return without_unused_terms(self._symbols, dense, self._values_held)
+
+    @property
+    def _values_held(self) -> dict[int, tuple[float, ...]]:
+        """Values at which modes hold entries of ``moving``."""
         n, m, places = self.system.extended_dimension, self._surfaces, self.moving.numel()
         held: dict[int, tuple[float, ...]] = dict.fromkeys(range(n + m, places), (0.0,))
         for i in range(m):
             signs = () if i in self.system.set_of else (1.0, -1.0)
             held[n + i] = (*signs, 0.0) if self.scaled[i] else signs
-        return without_unused_terms(self._symbols, [ca.densify(e) for e in expressions], held)
+        return held
+
+    def tangents(self) -> tuple[ca.SX, list[ca.SX]]:
+        """Symbols of ``moving``, of a direction of it and one of the parameters; ``outputs`` derived along them."""
+        moving, p = self._symbols
+        size, n = moving.numel(), self.system.extended_dimension
+        by_moving, by_p = ca.SX.sym("d", size), ca.SX.sym("dp", p.numel())
+        every = ca.vertcat(moving, by_moving, by_p)
+        outputs = [ca.jtimes(e, moving, by_moving) + ca.jtimes(e, p, by_p) for e in self.outputs]
+        held = {**self._values_held, **{size + i: (0.0,) for i in range(n, size)}}
+        return every, without_unused_terms([every, p], [ca.densify(e) for e in outputs], held)
 
     # numbers -----------------------------------------------------------------------------------
 

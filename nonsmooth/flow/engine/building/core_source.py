@@ -32,7 +32,7 @@ _FILES = (
         "stepper.c",
     ),
     *("elements.c", "record.c", "spiral.c", "decide.c", "layer.c", "contacts.c"),
-    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c"),
+    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c", "variation.c"),
 )
 
 

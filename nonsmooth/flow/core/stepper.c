@@ -23,25 +23,28 @@ static double bound_at(double part, int order) {
   return part > SMALLEST ? rough_exp2(rough_log2(smaller(part, LARGEST)) * (-1.0 / order)) : INFINITY;
 }
 
+/* The time since the start is a state of a system with an explicit time. */
+static void tell_time(Run *r) {
+  if (r->s->timed) r->x[r->n - 1] = (r->t - r->begun.high) + (r->t_low - r->begun.low);
+}
+
 /* Move the time on, in two numbers; it is kept to the rounding of the steps, not of their sum. */
 static void pass_time(Run *r, double dt) {
   double sum = r->t + dt, moved = sum - r->t, lost = (r->t - (sum - moved)) + (dt - moved) + r->t_low;
   r->t = sum + lost;
   r->t_low = lost - (r->t - sum);
-  if (r->s->timed) r->x[r->n - 1] = r->t;
+  tell_time(r);
 }
 
 /* A step's length in a run that begins late, changed so little that the time after it is one number. */
 static double to_number(const Run *r, double dt) {
-  if (fabs(r->t) <= FAR * (r->o.t_end - r->begun)) return dt;
+  if (fabs(r->t) <= FAR * (r->o.t_end - r->begun.high)) return dt;
   double to = (r->t + dt) - r->t - r->t_low;
   return fabs(to - dt) <= RESOLVED * dt ? to : dt;
 }
 
-/* Rounding of times is relative to this: where they enter no formula, to how long the run is. */
-static double time_scale(const Run *r) {
-  return r->s->timed ? larger(fabs(r->t), fabs(r->t - r->begun)) : fabs(r->t - r->begun);
-}
+/* Rounding of times is relative to this, how long the run is. */
+static double time_scale(const Run *r) { return fabs(r->t - r->begun.high); }
 
 /* Shorten a step until a guard's series converges within it. */
 static double resolve(const double *g, int order, double h) {
@@ -61,13 +64,13 @@ static int has_height(int kind) {
   return kind == SURFACE_GUARD || kind == IMPACT_GUARD || is_atom(kind);
 }
 static int is_curved(const Run *r, const Layout *l, int row) {
-  int kind = l->kind[row], index = kind == IMPACT_GUARD ? r->m + l->index[row] : l->index[row];
-  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : index];
+  int kind = l->kind[row];
+  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : l->index[row]];
 }
 
 /* Whether a guard is the end of sliding within a bound that depends on the states. */
 static int is_scaled_exit(const Run *r, const Layout *l, int row) {
-  return l->kind[row] == EXIT_GUARD && r->s->scaled[l->index[row]] && !is_idle(r, l->letter, l->index[row]);
+  return l->kind[row] == EXIT_GUARD && is_scaled(r, l->index[row]) && !is_idle(r, l->letter, l->index[row]);
 }
 
 /* The longest step in which term k of a guard is below ``allowed``, or below the tolerance's part of one of its

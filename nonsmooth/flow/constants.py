@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LIMIT_FALL, MOST_CODES, UNWATCHED
+from ..model.numbering import FALL, LAWS, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
+__all__ = ["FALL", "LAWS", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 
@@ -157,6 +157,9 @@ TENFOLD = 20.0
 #: Coefficients of a series grow as the inverse time to a set to their order: the set is reached before
 #: they are larger than this.
 OVERFLOW = 1e280
+
+#: Derivatives have reached a set where |h| is this part of what it was on the way.
+ARRIVED = 1e-13
 
 #: Motions that can continue from a point, at most so many are kept.
 SEVERAL = 16

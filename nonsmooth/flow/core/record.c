@@ -96,7 +96,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
     write_motion(r, r->out.event_motion + k * r->s->rules.width);
   }
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, r->met.index, r->met.side, x);
-  if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, 0, 0, x); /* impacts that accumulated */
+  if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, r->m, 0, x); /* impacts that accumulated */
   if (kind == END || kind == STOP) return;
   remember(r, kind, guard);
   if (r->instant.running) return; /* at the end of the instant */

@@ -64,13 +64,13 @@ static int has_height(int kind) {
   return kind == SURFACE_GUARD || kind == IMPACT_GUARD || is_atom(kind);
 }
 static int is_curved(const Run *r, const Layout *l, int row) {
-  int kind = l->kind[row], index = kind == IMPACT_GUARD ? r->m + l->index[row] : l->index[row];
-  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : index];
+  int kind = l->kind[row];
+  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : l->index[row]];
 }
 
 /* Whether a guard is the end of sliding within a bound that depends on the states. */
 static int is_scaled_exit(const Run *r, const Layout *l, int row) {
-  return l->kind[row] == EXIT_GUARD && r->s->scaled[l->index[row]] && !is_idle(r, l->letter, l->index[row]);
+  return l->kind[row] == EXIT_GUARD && is_scaled(r, l->index[row]) && !is_idle(r, l->letter, l->index[row]);
 }
 
 /* The longest step in which term k of a guard is below ``allowed``, or below the tolerance's part of one of its

@@ -8,7 +8,7 @@
 
 /* What a leg begins with: columns, each a row of n derivatives of the state and one of its parameters. */
 typedef struct {
-  int32_t columns, hit, kind, index, side; /* the set that is reached at its end, or -1; the guard that ends it */
+  int32_t columns, hit, kind, index, side; /* the set that is reached at its end, by its first function, or -1; the guard that ends it */
   double duration, tol, left; /* left: of the duration, where it is stuck */
   int64_t most_steps;
   const double *p, *dp;
@@ -24,7 +24,7 @@ enum { LEG_DONE, LEG_STUCK, LEG_NOT_UNIQUE };
 
 static int moving_size(const Run *r) {
   int size = r->n + r->width;
-  for (int i = 0; i < r->m; i++) size += r->s->scaled[i] != 0;
+  for (int i = 0; i < r->m; i++) size += is_scaled(r, i) != 0;
   return size;
 }
 
@@ -52,13 +52,13 @@ static void tangent_rules(Run *r, const Expansion *d, int k, const double *dp, i
 }
 
 /* Coefficient k of the derivative of h/|h| from that of h. */
-static void turn_direction(Run *r, const Expansion *e, Expansion *d, int set, int k) {
-  int f = first_of(r, set), size = size_of(r, set), stride = r->stride;
-  const double *length = e->root + (int64_t)set * stride;
-  double *root = d->root + (int64_t)set * stride, sum = 0;
+static void turn_direction(Run *r, const Expansion *e, Expansion *d, int f, int k) {
+  int size = size_of(r, f), stride = r->stride;
+  const double *length = e->root + (int64_t)f * stride;
+  double *root = d->root + (int64_t)f * stride, sum = 0;
   for (int i = f; i < f + size; i++) {
     double *own = d->apart + (int64_t)i * stride;
-    own[k] = d->series[(int64_t)i * stride + k] * e->per_radius[set];
+    own[k] = d->series[(int64_t)i * stride + k] * e->per_radius[f];
     sum += convolve(e->apart + (int64_t)i * stride, own, k, 0, k);
   }
   root[k] = sum - convolve(length, root, k, 1, k);
@@ -75,10 +75,10 @@ static void turn_leaving(Run *r, const Expansion *e, Expansion *d, int k) {
   const int32_t *which = r->pending;
   double *a = r->work, *b = a + (int64_t)all * all;
   for (int i = 0; i < n; i++) b[i] = -tangent_row(r, r->n + which[i])[k];
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s), size = size_of(r, s), last = k < r->order ? k + 1 : k;
+  EACH_SET(r, f) {
+    int size = size_of(r, f), last = k < r->order ? k + 1 : k;
     if (e->l.letter[f] != LEAVING) continue;
-    const double *radius = e->rates + (int64_t)s * (stride + 1), *change = d->rates + (int64_t)s * (stride + 1);
+    const double *radius = e->rates + (int64_t)f * (stride + 1), *change = d->rates + (int64_t)f * (stride + 1);
     b[column] = 0;
     for (int i = f; i < f + size; i++, at++) {
       const double *u = e->lambda + (int64_t)i * stride, *own = d->lambda + (int64_t)i * stride;
@@ -90,8 +90,8 @@ static void turn_leaving(Run *r, const Expansion *e, Expansion *d, int k) {
   if (!solve(a, b, all)) for (int i = 0; i < all; i++) b[i] = NAN;
   for (int i = 0; i < slides; i++) d->series[(int64_t)which[i] * stride + k] = b[i];
   for (int i = slides; i < n; i++) d->lambda[(int64_t)which[i] * stride + k] = b[i];
-  for (int s = 0, j = n; s < r->s->sets; s++)
-    if (e->l.letter[first_of(r, s)] == LEAVING) d->rates[(int64_t)s * (stride + 1) + k + 1] = b[j++];
+  EACH_SET(r, f)
+    if (e->l.letter[f] == LEAVING) d->rates[(int64_t)f * (stride + 1) + k + 1] = b[n++];
 }
 
 /* Coefficients k + 1 of the derivatives of states and of h. */
@@ -112,20 +112,19 @@ static void next_terms(Run *r, const Expansion *e, Expansion *d, int k) {
 /* Coefficients of a column to an order, from the first of states and of h. */
 static void tangent_series(Run *r, const Expansion *e, Expansion *d, const double *dp, int order) {
   int slides = e->l.slides, leaving = 0, stride = r->stride;
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s);
+  EACH_SET(r, f) {
     if (e->l.letter[f] != LEAVING) continue;
-    double *change = d->rates + (int64_t)s * (stride + 1);
+    double *change = d->rates + (int64_t)f * (stride + 1);
     leaving = 1;
     change[0] = 0;
-    for (int i = f; i < f + size_of(r, s); i++)
+    for (int i = f; i < f + size_of(r, f); i++)
       change[0] += e->lambda[(int64_t)i * stride] * d->series[(int64_t)i * stride];
   }
   if (r->s->sets) memset(d->lambda, 0, sizeof(double) * r->m * stride);
   for (int k = 0; k <= order; k++) {
     tangent_rules(r, d, k, dp, 0);
-    for (int s = 0; s < r->s->sets; s++)
-      if (e->l.letter[first_of(r, s)] == LEFT_BEHIND) turn_direction(r, e, d, s, k);
+    EACH_SET(r, f)
+      if (e->l.letter[f] == LEFT_BEHIND) turn_direction(r, e, d, f, k);
     if (r->s->sets) tangent_rules(r, d, k, dp, 1);
     if (leaving) turn_leaving(r, e, d, k);
     else if (slides) follow_layer(r, e, &r->s->tangent, d->series, k, r->sparse);
@@ -192,7 +191,7 @@ static double column_step(const Run *r, const double *series, int64_t rows, doub
 /* How the time of the event depends on states and parameters, row after row: - dg/g' of its function g. */
 static void time_of_event(Run *r, const Leg *l, const Columns *c) {
   const Expansion *e = &r->e;
-  int n = r->n, w = r->width, q = r->s->parameters, stride = r->stride, f = l->hit < 0 ? -1 : first_of(r, l->hit);
+  int n = r->n, w = r->width, q = r->s->parameters, stride = r->stride, f = l->hit;
   int row = 0, own = l->index;
   while (row < e->l.rows && !(e->l.kind[row] == l->kind && e->l.index[row] == own && e->l.side[row] == l->side)) row++;
   for (int k = 0; k < n + q; k++) {
@@ -207,7 +206,7 @@ static void time_of_event(Run *r, const Leg *l, const Columns *c) {
     tangent_series(r, e, &d, r->zeros, 0);
     const double *factor = tangent_row(r, n + 2 * w + own);
     if (f >= 0) {
-      for (int i = f; i < f + size_of(r, l->hit); i++) {
+      for (int i = f; i < f + size_of(r, f); i++) {
         value += e->lambda[(int64_t)i * stride] * tangent_row(r, n + w + i)[0];
         rate += e->lambda[(int64_t)i * stride] * e->series[(int64_t)i * stride + 1];
       }
@@ -215,9 +214,9 @@ static void time_of_event(Run *r, const Leg *l, const Columns *c) {
       rate = e->guards[(int64_t)row * stride + 1];
       if (l->kind == SLIP_GUARD) {
         value = 2 * factor[0] * row_of(r, n + 2 * w + own)[0];
-        for (int i = own; i < own + size_of(r, set_of(r, own)); i++)
+        for (int i = own; i < own + size_of(r, own); i++)
           value -= 2 * e->series[(int64_t)i * stride] * d.series[(int64_t)i * stride];
-      } else if (l->kind == RELEASE_GUARD) value = d.series[(int64_t)(r->m + own) * stride];
+      } else if (l->kind == RELEASE_GUARD) value = d.series[(int64_t)own * stride];
       else if (is_idle(r, e->l.letter, own)) value = -l->side * tangent_row(r, n + own)[0];
       else
         value = turn_of(r, own, row_of(r, n + 2 * w + own), r->order + 1)
@@ -266,8 +265,8 @@ static void move_columns(Run *r, const Leg *l, const Columns *c, double dt) {
 }
 
 /* Whether a set is so close that nothing is left of the way to it. */
-static int has_arrived(const Run *r, int set, double *most) {
-  int f = first_of(r, set), k = size_of(r, set);
+static int has_arrived(const Run *r, int f, double *most) {
+  int k = size_of(r, f);
   double rate[3], radius = length_of(r->unknowns + f, k);
   for (int i = 0; i < k; i++) rate[i] = r->e.series[(int64_t)(f + i) * r->stride + 1];
   *most = larger(radius, *most);
@@ -275,10 +274,10 @@ static int has_arrived(const Run *r, int set, double *most) {
 }
 
 /* A step that is no longer than until |h| of a set has fallen tenfold. */
-static double near_step(const Run *r, int set, double h) {
+static double near_step(const Run *r, int f, double h) {
   const Expansion *e = &r->e;
   for (int row = 0; row < e->l.rows; row++) {
-    if (e->l.kind[row] != NEAR_GUARD || e->l.index[row] != first_of(r, set) || r->letter[first_of(r, set)] == LEAVING) continue;
+    if (e->l.kind[row] != NEAR_GUARD || e->l.index[row] != f || r->letter[f] == LEAVING) continue;
     double root = first_root(e->guards + (int64_t)row * r->stride, r->order, h);
     if (root > 0) return root;
   }

@@ -339,6 +339,19 @@ class FilippovSystem:
         return {i: members for members in self.sets for i in members}
 
     @cached_property
+    def laws(self) -> tuple[str, ...]:
+        """Name of the law of each surface, set or other element, in the order of ``entries``."""
+        return self.definition.laws or tuple(
+            "surface" if len(e) == 1 else "set" for e in self.entries
+        )
+
+    @cached_property
+    def remembering(self) -> tuple[int, ...]:
+        """Switching functions of elements with hysteresis, whose state follows from the past."""
+        widths = listed(self.definition.hysteresis)
+        return tuple(i for i, width in enumerate(widths) if not width.is_zero())
+
+    @cached_property
     def surface_names(self) -> tuple[str, ...]:
         """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set."""
         return tuple(f"h{k}" for k, members in enumerate(self.entries) for _ in members)
@@ -709,8 +722,8 @@ class FilippovSystem:
         return np.array([*values, moment]) if self.time_dependent else values
 
 
-def require_system(value: Any, sets: bool = False) -> None:
-    """Refuse all but a FilippovSystem; ``sets`` allows vector multipliers."""
+def require_system(value: Any, sets: bool = False, hysteresis: bool = False) -> None:
+    """Refuse all but a FilippovSystem; ``sets`` allows vector multipliers, ``hysteresis`` relays with it."""
     if not isinstance(value, FilippovSystem):
         raise DefinitionError(
             f"system: expected a FilippovSystem, received {value!r} ({type(value).__name__}). "
@@ -722,6 +735,11 @@ def require_system(value: Any, sets: bool = False) -> None:
             f"system: {value!r} has vector multipliers, which this function does not support. Sets of "
             "codimension two and three work in simulate, ensemble, sensitivity, region and "
             "limit_directions."
+        )
+    if value.remembering and not hysteresis:
+        raise DefinitionError(
+            f"system: {value!r} has elements with hysteresis, which this function does not support. They "
+            "work in simulate, ensemble and outcomes."
         )
 
 

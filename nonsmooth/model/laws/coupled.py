@@ -110,8 +110,12 @@ class Coupled:
         if by_degree:
             for i, found in enumerate(self.degrees(field, lam, unknowns)):
                 self.lower[i], self.layer[i] = found.lower, found.row
+        h = ca.SX(d.surfaces)
+        for i in system.remembering:  # h at multiplier +1, the further function at -1
+            self.lower[i] = (h[i] - d.hysteresis[i],)
+            h[i] -= (1 - lam[i]) / 2 * d.hysteresis[i]
         stops = ca.densify(d.guards) if d.guards.numel() else ca.SX(0, 1)
-        heights = ca.densify(ca.vertcat(d.surfaces, d.gaps))
+        heights = ca.densify(ca.vertcat(h, d.gaps))
         factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
         self.outputs = [field, self.layer, heights, factor, stops]
         every = ca.vertcat(*unknowns, d.reactions)
@@ -126,7 +130,7 @@ class Coupled:
 
     def _is_continuous(self, surface: int) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""
-        if surface in self.system.set_of:
+        if surface in (*self.system.set_of, *self.system.remembering):
             return False
         d, x = self.system.definition, self.system.extended_states
         column = ca.jacobian(d.field, d.multipliers[surface])
@@ -164,6 +168,8 @@ class Coupled:
         for i in range(self._surfaces):
             found.append(Degree((), self.layer[i]))
             if self.continuous[i] or self.system.nonlinear[i] or i in self.system.set_of:
+                continue
+            if i in self.system.remembering:
                 continue
             own = ca.vertcat(lam[i], unknowns[i]) if self.scaled[i] else lam[i]
             others = ca.vertcat(*[e for e in every if not ca.depends_on(own, e)])

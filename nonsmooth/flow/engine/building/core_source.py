@@ -29,6 +29,7 @@ _FILES = (
         "stability.c",
         "sets.c",
         "stepper.c",
+        "near_zeros.c",
     ),
     *("surfaces.c", "record.c", "spiral.c", "decide.c", "layer.c", "contacts.c"),
     *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c"),

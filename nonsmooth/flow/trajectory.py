@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..model import Array, FilippovSystem, PointError, real_array
 from ..notebook import card, lines
@@ -15,6 +15,9 @@ from . import tables
 from .names import shown_mode
 from .saving import Savable, savable
 from .status import Status
+
+#: Coefficients that are read at once, so that they stay in the cache.
+_BLOCK = 1 << 17
 
 
 @savable(x="n", x_after="n", motion="* nan")
@@ -119,16 +122,38 @@ class Steps:
         starts = self.starts if forward else -self.starts
         step = np.searchsorted(starts, t if forward else -t, side=side) - 1
         step = np.clip(step, 0, len(starts) - 1)
-        result = np.empty((t.size, n))
-        for k in np.unique(step):
-            chosen = step == k
-            s = (t[chosen] - self.starts[k])[:, None]
-            c = self.coefficients[k][:n]
-            value = np.broadcast_to(c[:, -1], (s.shape[0], n))
-            for j in range(c.shape[1] - 2, -1, -1):
-                value = value * s + c[:, j]
-            result[chosen] = value
+        s, result = (t - self.starts[step])[:, None], np.empty((t.size, n))
+        for chosen, rows, c in _stacks(self.coefficients, step):
+            block = max(1, _BLOCK // (c.shape[1] * c.shape[2]))
+            for k in range(0, rows.size, block):
+                part = chosen[k : k + block]
+                result[part] = _horner(c[rows[k : k + block], :n], s[part])
         return result
+
+
+def _stacks(
+    coefficients: Sequence[Array] | Array, step: NDArray[np.intp]
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], Array]]:
+    """Stacks of polynomials of one length: the times read from each, their rows in it, the stack."""
+    if isinstance(coefficients, np.ndarray):
+        yield np.arange(step.size), step, coefficients
+        return
+    used, row = np.unique(step, return_inverse=True)
+    lengths = np.array([coefficients[k].shape[1] for k in used], int)
+    for length in np.unique(lengths):
+        own = lengths == length
+        chosen = np.flatnonzero(own[row])
+        stack = np.stack([coefficients[k] for k in used[own]])
+        yield chosen, (np.cumsum(own) - 1)[row[chosen]], stack
+
+
+def _horner(c: Array, s: Array) -> Array:
+    """Values (m, n) at times (m, 1) of polynomials with coefficients (m, n, P+1)."""
+    value = c[..., -1].copy()
+    for j in range(c.shape[-1] - 2, -1, -1):
+        value *= s
+        value += c[..., j]
+    return value
 
 
 @savable(rates="n")

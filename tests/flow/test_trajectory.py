@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.flow.trajectory import Steps
 
 x, y, lam = (ca.SX.sym(s) for s in ("x", "y", "lam"))
 SYSTEM = ns.FilippovSystem([x, y], field=[y, -x - 0.4 * lam], multipliers=lam, surface=y)
@@ -61,3 +62,37 @@ def test_times_outside_the_run_are_refused_with_its_status(time):
 def test_the_representation_fits_a_line():
     text = repr(ns.simulate(SYSTEM, [300.0, 0.0], 3000.0))
     assert "events" in text and "REACHED_END" in text and len(text) < 150
+
+
+def by_hand(steps, t, n, forward, side):
+    """States at one time by Horner's scheme in numbers of Python, as the definition of a step says."""
+    sign, starts = (1 if forward else -1), steps.starts.tolist()
+    before = [sign * s <= sign * t if side == "right" else sign * s < sign * t for s in starts]
+    k = max(sum(before) - 1, 0)
+    found = []
+    for row in np.asarray(steps.coefficients[k])[:n].tolist():
+        value = row[-1]
+        for c in row[-2::-1]:
+            value = value * (t - starts[k]) + c
+        found.append(value)
+    return found
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("forward", [True, False])
+@pytest.mark.parametrize("orders", [[9], [9, 4, 9, 0, 1]])
+def test_steps_are_read_to_the_last_bit(orders, forward, side):
+    """One array where all steps have one order, or a list of polynomials of several lengths."""
+    rng, sign = np.random.default_rng(3), 1 if forward else -1
+    starts = sign * np.repeat(np.cumsum(rng.uniform(0.01, 1.0, 20)), rng.integers(1, 3, 20))
+    rows = [rng.normal(size=(3, orders[k % len(orders)] + 1)) for k in range(len(starts))]
+    steps = Steps(starts, np.array(rows) if len(orders) == 1 else rows)
+    low, high = sorted((starts[0], starts[-1]))
+    times = rng.permutation(np.concatenate([rng.uniform(low - 1, high + 1, 3000), starts, starts]))
+    found = steps.at(times, 2, forward, side)
+    assert found.tolist() == [by_hand(steps, t, 2, forward, side) for t in times.tolist()]
+
+
+def test_steps_without_times():
+    assert Steps(np.zeros(1), np.ones((1, 2, 4))).at(np.zeros(0), 2).shape == (0, 2)
+    assert Steps(np.zeros(1), [np.ones((2, 4))]).at(np.zeros(0), 2).shape == (0, 2)

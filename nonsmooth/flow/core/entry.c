@@ -97,8 +97,8 @@ static size_t place_run(Run *r, char *base) {
   int n = r->n, w = r->width, c = r->c, all = r->kept_rows, g = r->guards, stride = r->stride;
   size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
   used = place_layout(&r->now, base, used, w, g);
-  used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets);
-  used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets);
+  used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets ? r->m : 0);
+  used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets ? r->m : 0);
   Continuation *each[] = {&r->chosen, &r->one, &r->first, &r->rest, &r->found};
   for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, w, g);
   used = place_decision(r, base, used);
@@ -119,16 +119,17 @@ static size_t place_run(Run *r, char *base) {
   r->active = INTEGERS(w);
   r->involved = INTEGERS(3 * w + 2 * all + 1);
   r->p = DOUBLES(s->parameters);
-  r->series = DOUBLES((size_t)s->series.size * stride);
+  r->series = DOUBLES(pair_room(s->series.size, stride));
   r->rounding = DOUBLES(s->series.size);
-  r->point = DOUBLES(s->point.size);
-  r->heights = DOUBLES(s->surfaces.size);
-  r->maps = DOUBLES(s->maps.size);
-  r->restitution = DOUBLES(s->restitution.size);
-  r->columns = DOUBLES(s->columns.size);
-  r->input = DOUBLES(n + 2 * w);
+  r->point = DOUBLES(pair_room(s->point.size, 1));
+  r->heights = DOUBLES(pair_room(s->surfaces.size, 1));
+  r->maps = DOUBLES(pair_room(s->maps.size, 1));
+  r->restitution = DOUBLES(pair_room(s->restitution.size, 1));
+  r->columns = DOUBLES(pair_room(s->columns.size, 1));
+  r->input = DOUBLES(2 * (n + 2 * w) + s->parameters);
   r->held = DOUBLES(w);
   r->none = DOUBLES(w);
+  r->zeros = DOUBLES(s->parameters);
   r->slope = DOUBLES(square);
   r->vector = DOUBLES(3 * n + 2 * w);
   r->sample = DOUBLES(3 * ((size_t)n + w + g));
@@ -138,8 +139,8 @@ static size_t place_run(Run *r, char *base) {
   r->lam = DOUBLES(2 * w);
   r->matrix = DOUBLES(square + 6 * w + all + 2 * c);
   r->small = DOUBLES(4 * w + s->rules.atoms);
-  r->atom_work = DOUBLES(s->atoms.size);
-  r->choice_work = DOUBLES(s->choices.size);
+  r->atom_work = DOUBLES(pair_room(s->atoms.size, 1));
+  r->choice_work = DOUBLES(pair_room(s->choices.size, 1));
   used = place_instant(&r->instant, base, used, s);
   r->pending = INTEGERS(6 * w + 2 * all);
   r->sparse = INTEGERS(square + 2 * w + 1);
@@ -152,7 +153,7 @@ static size_t place_run(Run *r, char *base) {
   r->rates_of_several = DOUBLES(SEVERAL * n);
   size_t q = r->m < MOST_ENUMERATED ? r->m : MOST_ENUMERATED, sums = q * (q - (q > 0)) / 2;
   r->layer_series = DOUBLES(s->slope_outputs ? (q * q + sums * sums) * stride : 0);
-  r->idle = LETTERS(s->sets);
+  r->idle = LETTERS(s->m);
   r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
   r->of_defect = DOUBLES(g);
   r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
@@ -178,7 +179,7 @@ Run *run_new(const System *s, Table *table) {
   r->table = table;
   r->n = s->n; r->m = s->m; r->c = s->c; r->width = s->m + s->c;
   r->order = s->order; r->stride = s->order + 1;
-  r->kept_rows = s->lower_first[s->m];
+  r->kept_rows = s->kept_rows;
   r->guards = 3 * s->m + 2 * s->c + s->rules.atoms + 2;
   r->arena = calloc(1, place_run(r, 0));
   if (!r->arena) { free(r); return 0; }
@@ -191,21 +192,24 @@ void run_free(Run *r) { free(r->arena); free(r); }
 /* Times at which the run is read: no approximation of the motion may span one of them. */
 void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = times; r->read_count = count; }
 
+/* Letters from which elements with hysteresis go on, or none. */
+void run_remember(Run *r, const int8_t *letter) { r->remembered = letter; }
+
 static void set_parameters(Run *r, const double *p) {
   const System *s = r->s;
+  const Values *program[] = {&s->point, &s->surfaces, &s->maps, &s->restitution, &s->columns, &s->atoms, &s->choices};
+  double *work[] = {r->point, r->heights, r->maps, r->restitution, r->columns, r->atom_work, r->choice_work};
   memcpy(r->p, p, sizeof(double) * s->parameters);
   series_prepare(&s->series, r->stride, r->p, r->series);
-  values_prepare(&s->point, r->p, r->point);
-  values_prepare(&s->surfaces, r->p, r->heights);
-  values_prepare(&s->maps, r->p, r->maps);
-  values_prepare(&s->restitution, r->p, r->restitution);
-  values_prepare(&s->columns, r->p, r->columns);
-  values_prepare(&s->atoms, r->p, r->atom_work);
-  values_prepare(&s->choices, r->p, r->choice_work);
+  pairs_begin(s->series.size, r->stride, r->begun, r->series);
+  for (int k = 0; k < 7; k++) {
+    values_prepare(program[k], r->p, work[k]);
+    pairs_begin(program[k]->size, 1, r->begun, work[k]);
+  }
 }
 
 /* A run that has not begun. */
-static void clear(Run *r, const Options *o, double t) {
+static void clear(Run *r, const Options *o, Pair t) {
   const System *s = r->s;
   r->o = *o;
   r->size = o->atol / o->rtol;
@@ -219,10 +223,11 @@ static void clear(Run *r, const Options *o, double t) {
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
   r->hold = INFINITY;
-  r->t = r->begun = t;
-  r->t_low = 0;
+  r->begun = t;
+  r->t = t.high;
+  r->t_low = t.low;
   r->since = 0;
-  for (int i = 0; i < r->m; i++) { r->speed[i] = INFINITY; r->has_roots |= s->power[i] > 0; }
+  for (int i = 0; i < r->m; i++) { r->speed[i] = INFINITY; r->has_roots |= element(r, i)->power > 0; }
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
@@ -237,9 +242,10 @@ static void clear(Run *r, const Options *o, double t) {
 
 void run_begin(Run *r, const Options *o, const Output *out, const double *x, const double *p,
                const int8_t *start_mode, double t, const double *motion) {
-  clear(r, o, t);
+  clear(r, o, (Pair){t, motion ? *motion : 0});
   r->out = *out;
   memcpy(r->x, x, sizeof(double) * r->n);
+  tell_time(r);
   set_parameters(r, p);
   if (finite_all(r->x, r->n)) { begin(r, start_mode, motion); return; }
   memset(r->letter, 1, r->width);
@@ -277,7 +283,7 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
 }
 
 /* What a restart needs, besides the state. */
-void run_motion(const Run *r, double *to) { if (r->s->rules.width) write_motion(r, to); }
+void run_motion(const Run *r, double *to) { write_motion(r, to); }
 
 /* Go on with larger arrays of the same content. */
 void run_resume(Run *r, const Output *out) { r->out = *out; }
@@ -337,7 +343,7 @@ static int is_plain(const Run *r) {
 /* The number of a mode's letters in the driver's table is that of lanes. */
 static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Suspended *m) {
   static const Output none;
-  clear(r, o, b->t0);
+  clear(r, o, (Pair){b->t0, 0});
   r->out = none;
   if (b->p_stride || !r->prepared) set_parameters(r, b->p + i * b->p_stride);
   r->prepared = 1;
@@ -353,6 +359,7 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   memset(r->instant.pending, 0, r->s->rules.triggers);
   memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
   r->t = m->t;
+  tell_time(r);
   r->since = m->since;
   r->length = m->length;
   r->shortened = m->shortened;
@@ -379,6 +386,7 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
     memcpy(b->at_x + i * r->s->dimension, r->at_x, sizeof(double) * r->s->dimension);
   }
   memcpy(m->x, r->x, sizeof(double) * r->n);
+  if (r->s->timed) m->x[r->n - 1] = r->t;
   memcpy(m->letter, r->letter, r->width);
   m->drop = r->drop[0];
   memcpy(m->side, r->instant.side, r->s->stops);
@@ -418,7 +426,8 @@ void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended
     r->at_t = b->at_t[i];
     memcpy(r->at_x, b->at_x + i * r->s->dimension, sizeof(double) * r->s->dimension);
   }
-  step(r);
+  if (m->since == 0 && m->history) see_limit(r); /* the last event was a lane's */
+  if (r->status == RUNNING) step(r);
   go_on_until_plain(r, b, i, m);
 }
 

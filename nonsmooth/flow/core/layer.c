@@ -54,17 +54,15 @@ static int continues(Run *r, const int8_t *letter, const Known *known, int known
   result->strict = 1;
   memset(result->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < e->l.rows; row++) {
-    int kind = e->l.kind[row], index = e->l.index[row], of = index, active = 0, zeros = 0;
+    int kind = e->l.kind[row], index = e->l.index[row], active = 0, zeros = 0;
     if (is_atom(kind)) continue;
     if (kind == NEAR_GUARD && letter[index] == 0) continue; /* ends steps only */
-    if (kind == IMPACT_GUARD || kind == RELEASE_GUARD) of += r->m;
-    for (int i = 0; i < r->active_count; i++) active |= r->active[i] == of;
+    for (int i = 0; i < r->active_count; i++) active |= r->active[i] == index;
     if (!active) continue;
     for (int i = 0; i < known_count; i++)
       if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row]) zeros = known[i].zeros;
-    if (kind == SURFACE_GUARD && zeros < r->s->degree[index]) zeros = r->s->degree[index];
-    if (kind == NEAR_GUARD && zeros < 1) zeros = 1;
-    if (kind == IMPACT_GUARD && zeros < 2) zeros = 2;
+    int least = kind == SURFACE_GUARD || kind == NEAR_GUARD || kind == IMPACT_GUARD ? degree_of(r, index) : 0;
+    if (zeros < least) zeros = least;
     double value;
     int k = leading(r, e, row, zeros, &value);
     if (value < 0) return 0;
@@ -144,7 +142,7 @@ static void rate_along(Run *r, const Layout *l, const double *unknowns, int own,
     if (k == 0) memcpy(lam, unknowns, sizeof(double) * r->width);
     if (k == 1) lam[own] = 1;
     set_inputs(r, x, k ? r->none : r->held, lam);
-    series_rules(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
+    series_at(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
     g[k] = row_of(r, r->n + own)[k];
   }
 }
@@ -492,7 +490,7 @@ static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
 /* Whether a step would end at a root that a series has where a fold is: no series sees it, so it is come closer to. */
 static int is_before_fold(const Run *r, const Expansion *e, int row, double dt) {
   if (e->l.kind[row] != BRANCH_GUARD || !is_mixed(r, e->l.sliding, e->l.slides)) return 0;
-  return dt > FOLD_NEAR * larger(fabs(r->t), fabs(r->t - r->begun));
+  return dt > FOLD_NEAR * time_scale(r);
 }
 
 /* Rules of order k of all that a mode needs, with the multipliers' own coefficients. */
@@ -502,7 +500,7 @@ static void rules_of(Run *r, const Expansion *f, int k) {
   for (int i = 0; i < r->n; i++) x[i] = f->states[(int64_t)i * r->stride + k];
   for (int i = 0; i < r->width; i++) lam[i] = f->series[(int64_t)i * r->stride + k];
   set_inputs(r, x, k ? r->none : r->held, lam);
-  series_rules(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
+  series_at(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
 }
 
 /* Series in the multiplier of sliding[lead], which moves in a direction, of states, of the others and of the rate

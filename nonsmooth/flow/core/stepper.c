@@ -23,25 +23,28 @@ static double bound_at(double part, int order) {
   return part > SMALLEST ? rough_exp2(rough_log2(smaller(part, LARGEST)) * (-1.0 / order)) : INFINITY;
 }
 
+/* The time since the start is a state of a system with an explicit time. */
+static void tell_time(Run *r) {
+  if (r->s->timed) r->x[r->n - 1] = (r->t - r->begun.high) + (r->t_low - r->begun.low);
+}
+
 /* Move the time on, in two numbers; it is kept to the rounding of the steps, not of their sum. */
 static void pass_time(Run *r, double dt) {
   double sum = r->t + dt, moved = sum - r->t, lost = (r->t - (sum - moved)) + (dt - moved) + r->t_low;
   r->t = sum + lost;
   r->t_low = lost - (r->t - sum);
-  if (r->s->timed) r->x[r->n - 1] = r->t;
+  tell_time(r);
 }
 
 /* A step's length in a run that begins late, changed so little that the time after it is one number. */
 static double to_number(const Run *r, double dt) {
-  if (fabs(r->t) <= FAR * (r->o.t_end - r->begun)) return dt;
+  if (fabs(r->t) <= FAR * (r->o.t_end - r->begun.high)) return dt;
   double to = (r->t + dt) - r->t - r->t_low;
   return fabs(to - dt) <= RESOLVED * dt ? to : dt;
 }
 
-/* Rounding of times is relative to this: where they enter no formula, to how long the run is. */
-static double time_scale(const Run *r) {
-  return r->s->timed ? larger(fabs(r->t), fabs(r->t - r->begun)) : fabs(r->t - r->begun);
-}
+/* Rounding of times is relative to this, how long the run is. */
+static double time_scale(const Run *r) { return fabs(r->t - r->begun.high); }
 
 /* Shorten a step until a guard's series converges within it. */
 static double resolve(const double *g, int order, double h) {
@@ -61,13 +64,13 @@ static int has_height(int kind) {
   return kind == SURFACE_GUARD || kind == IMPACT_GUARD || is_atom(kind);
 }
 static int is_curved(const Run *r, const Layout *l, int row) {
-  int kind = l->kind[row], index = kind == IMPACT_GUARD ? r->m + l->index[row] : l->index[row];
-  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : index];
+  int kind = l->kind[row];
+  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : l->index[row]];
 }
 
 /* Whether a guard is the end of sliding within a bound that depends on the states. */
 static int is_scaled_exit(const Run *r, const Layout *l, int row) {
-  return l->kind[row] == EXIT_GUARD && r->s->scaled[l->index[row]] && !is_idle(r, l->letter, l->index[row]);
+  return l->kind[row] == EXIT_GUARD && is_scaled(r, l->index[row]) && !is_idle(r, l->letter, l->index[row]);
 }
 
 /* The longest step in which term k of a guard is below ``allowed``, or below the tolerance's part of one of its
@@ -184,10 +187,9 @@ static double output_rounding(const Run *r, int output) {
 
 /* The same of a guard that is a function of states and time. */
 static double guard_rounding(const Run *r, const Expansion *e, int row) {
-  int kind = e->l.kind[row], i = e->l.index[row], of = r->n + r->width + i;
-  if (kind == IMPACT_GUARD) of += r->m;
-  else if (is_atom(kind)) of = r->n + 3 * r->width + row - e->l.atoms;
-  return has_height(kind) ? output_rounding(r, of) : 0;
+  int kind = e->l.kind[row];
+  if (!has_height(kind)) return 0;
+  return output_rounding(r, r->n + (is_atom(kind) ? 3 * r->width + row - e->l.atoms : r->width + e->l.index[row]));
 }
 
 /* Rounding of what is ``sampled``. */
@@ -293,7 +295,7 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   }
   /* Most guards have no root, and all their terms: that is seen here, with the length known. */
   if (!drop && c[0] > rest_of(c, r->order, h)) return -1;
-  int is_root = kind == SURFACE_GUARD && r->s->power[e->l.index[row]] > 0; /* its series are those of no point beyond */
+  int is_root = kind == SURFACE_GUARD && element(r, e->l.index[row])->power > 0; /* its series are those of no point beyond */
   if (has_height(kind) && !is_root) return sure_root(r, e, row, c, r->order - drop, h, 0, drop, 0);
   double dt = first_root(c, r->order - drop, h);
   return kind == SLIP_GUARD && dt > 0 ? slip_root(r, e, row, dt, h) : dt; /* squares lose digits */
@@ -442,7 +444,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
   /* Guards whose times cannot be told apart: atoms are passed together, at the first time; others one by one. */
   int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;
-  double near = time[first] + TIE * larger(time_scale(r), 1)
+  double near = time[first] + TIE * (time_scale(r) + time[first])
                 + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
   for (int j = 0; j < rows && (found > 1 || passed_atoms); j++) {
     if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;

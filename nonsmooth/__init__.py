@@ -75,6 +75,7 @@ from .model import (
     call,
     regularise,
 )
+from .model.definition.friction import Friction
 from .orbit import (
     basins,
     continue_bifurcation,
@@ -114,6 +115,7 @@ __all__ = [
     "DegenerateError",
     "Ensemble",
     "FilippovSystem",
+    "Friction",
     "Grid",
     "Impact",
     "NonsmoothError",

@@ -75,6 +75,7 @@ from .model import (
     call,
     regularise,
 )
+from .model.definition.elements import Relay
 from .orbit import (
     basins,
     continue_bifurcation,
@@ -123,6 +124,7 @@ __all__ = [
     "PointError",
     "RandomStarts",
     "Region",
+    "Relay",
     "Reset",
     "Section",
     "Status",

@@ -7,6 +7,7 @@ from .point.higher_codimension import LimitDirection, limit_directions
 from .point.intersections import Continuation, Intersection, intersection, intersection_range
 from .point.regions import Region, alpha, region, sliding_field
 from .point.sliding_branches import SlidingBranch, sliding_branches
+from .searches.boundary_cycles import BoundaryCycle
 from .searches.boundary_equilibria import (
     BoundaryBifurcation,
     BoundaryEquilibrium,
@@ -22,6 +23,7 @@ from .searches.search import find_all
 
 __all__ = [
     "BoundaryBifurcation",
+    "BoundaryCycle",
     "BoundaryEquilibrium",
     "Continuation",
     "Equilibrium",

@@ -334,7 +334,7 @@ static void step(Run *r) {
   int last = h >= left;
   if (last) h = left;
   /* What happens at the end, to rounding, happens. */
-  double after = AT_END * larger(1, time_scale(r) + h);
+  double after = AT_END * (time_scale(r) + h);
   int row = first_hit(r, e, last ? h + after : h, &dt);
   dt = row >= 0 ? smaller(dt, h) : last ? h : to_number(r, h);
   if (row >= 0 && is_before_fold(r, e, row, dt)) { dt = to_number(r, 0.5 * dt); row = -1; last = 0; }

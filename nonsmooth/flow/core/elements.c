@@ -290,7 +290,7 @@ static int8_t side_of_relay(const Run *r, int i, double h) {
 /* Relays whose times cannot be told apart switch together. */
 static void serve_relay(Run *r, int row) {
   int before = r->mode;
-  double last = r->met_at[row] + TIE * larger(time_scale(r), 1);
+  double last = r->met_at[row] + TIE * time_scale(r);
   for (int k = 0; k < r->now.atoms; k++) {
     int i = r->now.index[k];
     if (has_law(r, i, RELAY_LAW) && r->met_at[k] >= 0 && r->met_at[k] <= last) r->letter[i] = (int8_t)-r->letter[i];

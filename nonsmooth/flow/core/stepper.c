@@ -415,7 +415,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
   /* Guards whose times cannot be told apart: atoms are passed together, at the first time; others one by one. */
   int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;
-  double near = time[first] + TIE * larger(time_scale(r), 1)
+  double near = time[first] + TIE * (time_scale(r) + time[first])
                 + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
   for (int j = 0; j < rows && (found > 1 || passed_atoms); j++) {
     if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;

@@ -668,10 +668,10 @@ INLINE void expand_step(Lanes *s, Work *w, Step *e) {
   I after = (s->since == 0) & (s->events > BLOCKS);
   if (any(after)) e->unclear |= watch_limit(s, e->c, e->allowed, after);
 #endif
-  e->unclear |= ~e->last & ((h <= SHORTEST * MAX(BC(1), ABS(s->t))) | (h >= LONG));
+  e->unclear |= ~e->last & ((h <= SHORTEST * ABS(s->t)) | (h >= LONG));
   e->unclear |= (s->steps >= o->max_steps) | passed_between(s, e->g);
   /* What happens at the end, to rounding, happens. */
-  e->h = SELECT(e->last, left + AT_END * MAX(BC(1), ABS(s->t + left)), h);
+  e->h = SELECT(e->last, left + AT_END * MAX(ABS(s->t), ABS(s->t + left)), h);
   e->left = left;
 }
 

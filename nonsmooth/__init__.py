@@ -75,6 +75,7 @@ from .model import (
     call,
     regularise,
 )
+from .model.definition.elements import Relay
 from .model.definition.friction import Friction
 from .orbit import (
     basins,
@@ -125,6 +126,7 @@ __all__ = [
     "PointError",
     "RandomStarts",
     "Region",
+    "Relay",
     "Reset",
     "Section",
     "Status",

@@ -37,6 +37,55 @@ class Element:
         raise NotImplementedError
 
 
+@dataclass(frozen=True)
+class Relay(Element):
+    """A relay with hysteresis: its multiplier is +1 or -1 and keeps its value between two thresholds.
+
+    Given in place of a switching function in ``surfaces=``. The multiplier becomes +1 where the signal
+    rises to ``on`` and -1 where it falls to ``off``; its letters are ``+`` and ``-``. A start between the
+    thresholds is off unless ``start_mode`` says ``+``; ``start=`` a run or an event goes on as that was.
+
+    Parameters
+    ----------
+    signal : expression
+        Of states, parameters and time.
+    on, off : expressions or numbers
+        Thresholds, ``on`` above ``off``; their difference may depend on parameters only.
+
+    Raises
+    ------
+    DefinitionError
+        Thresholds in the wrong order, or whose distance changes along a motion.
+
+    Examples
+    --------
+    A room that is cooled from 22 degrees down to 18:
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    >>> room = ns.FilippovSystem(
+    ...     [x], field=[20 - x - 4 * u], surfaces=[ns.Relay(x, on=22, off=18)], multipliers=[u])
+    >>> run = ns.simulate(room, [20.0], t_end=4.0)
+    >>> run.itinerary, bool(abs(run.events[1].t - run.events[0].t - ca.log(3)) < 1e-9)
+    ('- + - + -', True)
+    """
+
+    signal: Expression
+    on: Expression
+    off: Expression
+
+    def entry(self, what: str) -> Entry:
+        """Read the signal and the thresholds: h is above the lower one while the relay is on."""
+        signal, on = scalar(self.signal, f"signal of {what}"), scalar(self.on, f"on of {what}")
+        off = scalar(self.off, f"off of {what}")
+        if (width := on - off).is_constant() and not float(width) > 0.0:
+            raise DefinitionError(
+                f"{what}: on is {on} and off is {off}. Give a relay on= above off=; with equal thresholds "
+                "it is a surface."
+            )
+        return Entry("relay", (signal - off,), (width,))
+
+
 def read_entries(surface: Expression | None, surfaces: Sequence[Expression] | None) -> list[Entry]:
     """Surfaces, sets and other elements, in their order."""
     if surface is not None and surfaces is not None:

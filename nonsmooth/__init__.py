@@ -75,6 +75,8 @@ from .model import (
     call,
     regularise,
 )
+from .model.definition.elements import Relay
+from .model.definition.friction import Friction
 from .orbit import (
     basins,
     continue_bifurcation,
@@ -114,6 +116,7 @@ __all__ = [
     "DegenerateError",
     "Ensemble",
     "FilippovSystem",
+    "Friction",
     "Grid",
     "Impact",
     "NonsmoothError",
@@ -123,6 +126,7 @@ __all__ = [
     "PointError",
     "RandomStarts",
     "Region",
+    "Relay",
     "Reset",
     "Section",
     "Status",

@@ -76,6 +76,8 @@ from .model import (
     regularise,
 )
 from .model.definition.elements import Relay
+from .model.definition.friction import Friction
+from .model.definition.table import table
 from .orbit import (
     basins,
     continue_bifurcation,
@@ -115,6 +117,7 @@ __all__ = [
     "DegenerateError",
     "Ensemble",
     "FilippovSystem",
+    "Friction",
     "Grid",
     "Impact",
     "NonsmoothError",
@@ -166,6 +169,7 @@ __all__ = [
     "sensitivity",
     "simulate",
     "sliding_field",
+    "table",
     "textbook",
     "two_folds",
     "vjp",

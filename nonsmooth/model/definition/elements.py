@@ -17,11 +17,16 @@ LARGEST = 3
 
 @dataclass(frozen=True)
 class Entry:
-    """An element: its law (``flow/constants.py``), its functions, how much lower each is at multiplier -1."""
+    """An element: its law (``flow/constants.py``), its functions, how much lower each is at multiplier -1.
+
+    Also its multiplier, if it brings one, and whether that enters the field nonlinearly.
+    """
 
     law: str
     functions: tuple[ca.SX, ...]
     hysteresis: tuple[ca.SX, ...]
+    multiplier: ca.SX | None = None
+    hidden: bool = False
 
 
 class Element:
@@ -90,6 +95,24 @@ def read_entries(surface: Expression | None, surfaces: Sequence[Expression] | No
         )
     given = [surface] if surface is not None else listed(surfaces)
     return [_read_entry(v, f"surface {i}") for i, v in enumerate(given)]
+
+
+def multipliers_of(entries: Sequence[Entry], given: Any) -> list[Any]:
+    """Multipliers of all entries: those that were given, between those that elements bring."""
+    rest = listed(given)
+    if len(rest) == len(entries):
+        return rest
+    brought = [entry.multiplier for entry in entries]
+    missing = sum(own is None for own in brought)
+    if len(rest) != missing and any(own is not None for own in brought):
+        raise DefinitionError(
+            f"multipliers: expected {missing}, for what brings none of its own, received {len(rest)}. A friction "
+            "has its own."
+        )
+    if len(rest) != missing:
+        return rest
+    following = iter(rest)
+    return [next(following) if own is None else own for own in brought]
 
 
 def functions_of(entries: Sequence[Entry]) -> ca.SX:

@@ -14,7 +14,7 @@ typedef struct {
   const double *p, *dp;
   const int8_t *letter;
   double *x, *y;
-  double *start_rate, *end_rate, *time_row; /* time_row: of the event's time by states, then by parameters */
+  double *start_rate, *end_rate, *gradient; /* gradient: of the event's function by states, then by parameters */
 } Leg;
 
 /* Columns on their way: h of sets (m each), series of states and of unknowns (h is carried there). */
@@ -189,41 +189,40 @@ static double column_step(const Run *r, const double *series, int64_t rows, doub
   return h;
 }
 
-/* How the time of the event depends on states and parameters, row after row: - dg/g' of its function g. */
-static void time_of_event(Run *r, const Leg *l, const Columns *c) {
+/* The derivative of the event's function by a column whose first terms are known. */
+static double event_slope(Run *r, const Leg *l, const Expansion *d) {
   const Expansion *e = &r->e;
-  int n = r->n, w = r->width, q = r->s->parameters, stride = r->stride, f = l->hit < 0 ? -1 : first_of(r, l->hit);
-  int row = 0, own = l->index;
-  while (row < e->l.rows && !(e->l.kind[row] == l->kind && e->l.index[row] == own && e->l.side[row] == l->side)) row++;
+  int n = r->n, w = r->width, stride = r->stride, own = l->index;
+  double sum = 0;
+  if (l->hit >= 0) {
+    int f = first_of(r, l->hit);
+    for (int i = f; i < f + size_of(r, l->hit); i++) sum += e->lambda[(int64_t)i * stride] * tangent_row(r, n + w + i)[0];
+    return sum;
+  }
+  const double *factor = tangent_row(r, n + 2 * w + own), *unknown = d->series + (int64_t)own * stride;
+  if (l->kind == RELEASE_GUARD) return d->series[(int64_t)(r->m + own) * stride];
+  if (l->kind == EXIT_GUARD && is_idle(r, e->l.letter, own)) return -l->side * tangent_row(r, n + own)[0];
+  if (l->kind == EXIT_GUARD)
+    return turn_of(r, own, row_of(r, n + 2 * w + own), r->order + 1) * (factor[0] - l->side * unknown[0]);
+  for (int i = 0; i < size_of(r, set_of(r, own)); i++)
+    sum -= 2 * e->series[(int64_t)(own + i) * stride] * unknown[(int64_t)i * stride];
+  return sum + 2 * factor[0] * row_of(r, n + 2 * w + own)[0];
+}
+
+/* The gradient of the event's function by states and parameters. */
+static void event_gradient(Run *r, const Leg *l, const Columns *c) {
+  const Expansion *e = &r->e;
+  int n = r->n, q = r->s->parameters;
+  memset(c->h, 0, sizeof(double) * r->m);
   for (int k = 0; k < n + q; k++) {
-    double value = 0, rate = 0;
     for (int i = 0; i < q; i++) r->zeros[i] = i == k - n;
-    memset(c->h, 0, sizeof(double) * r->m);
     Expansion d = column_of(r, c, 0, 0);
-    if (k < n) d.states[(int64_t)k * stride] = 1;
+    if (k < n) d.states[(int64_t)k * r->stride] = 1;
     tangent_rules(r, &d, 0, r->zeros, 0);
     for (int i = 0; i < r->m; i++)
-      if (e->l.letter[i] == LEFT_BEHIND) d.series[(int64_t)i * stride] = tangent_row(r, n + w + i)[0];
+      if (e->l.letter[i] == LEFT_BEHIND) d.series[(int64_t)i * r->stride] = tangent_row(r, n + r->width + i)[0];
     tangent_series(r, e, &d, r->zeros, 0);
-    const double *factor = tangent_row(r, n + 2 * w + own);
-    if (f >= 0) {
-      for (int i = f; i < f + size_of(r, l->hit); i++) {
-        value += e->lambda[(int64_t)i * stride] * tangent_row(r, n + w + i)[0];
-        rate += e->lambda[(int64_t)i * stride] * e->series[(int64_t)i * stride + 1];
-      }
-    } else if (row < e->l.rows) {
-      rate = e->guards[(int64_t)row * stride + 1];
-      if (l->kind == SLIP_GUARD) {
-        value = 2 * factor[0] * row_of(r, n + 2 * w + own)[0];
-        for (int i = own; i < own + size_of(r, set_of(r, own)); i++)
-          value -= 2 * e->series[(int64_t)i * stride] * d.series[(int64_t)i * stride];
-      } else if (l->kind == RELEASE_GUARD) value = d.series[(int64_t)(r->m + own) * stride];
-      else if (is_idle(r, e->l.letter, own)) value = -l->side * tangent_row(r, n + own)[0];
-      else
-        value = turn_of(r, own, row_of(r, n + 2 * w + own), r->order + 1)
-                * (factor[0] - l->side * d.series[(int64_t)own * stride]);
-    }
-    l->time_row[k] = -value / rate;
+    l->gradient[k] = event_slope(r, l, &d);
   }
   memset(r->zeros, 0, sizeof(double) * q);
 }
@@ -306,7 +305,7 @@ static int carry(Run *r, Leg *l, const Columns *c) {
     if (l->hit < 0 ? l->left <= 0 : has_arrived(r, l->hit, &most)) {
       memcpy(l->x, r->x, sizeof(double) * r->n);
       if (r->s->timed) l->x[r->n - 1] += r->t;
-      if (l->time_row) time_of_event(r, l, c);
+      if (l->gradient) event_gradient(r, l, c);
       return LEG_DONE;
     }
     if (!e->finite) return LEG_STUCK;

@@ -56,15 +56,15 @@ static void guard_rows(Run *r, const Layout *l, const double *series, int count,
 }
 
 /* Coefficients k of the multipliers that slide keep those of the layer's rates at zero. */
-static void follow_layer(Run *r, const Expansion *e, const Series *t, double *series, int k, const int32_t *start) {
+static void follow_layer(Run *r, Expansion *e, int k, const int32_t *start) {
   int slides = e->l.slides;
   for (int i = 0; i < slides; i++) {
     double sum = 0;
     for (int q = start[i]; q < start[i + 1]; q++) {
       int j = start[slides + 1 + q];
-      sum += e->inverse[i * slides + j] * r->series[(int64_t)t->output[r->n + e->l.sliding[j]] * r->stride + k];
+      sum += e->inverse[i * slides + j] * row_of(r, r->n + e->l.sliding[j])[k];
     }
-    series[(int64_t)e->l.sliding[i] * r->stride + k] = -sum;
+    e->series[(int64_t)e->l.sliding[i] * r->stride + k] = -sum;
   }
 }
 
@@ -91,7 +91,7 @@ static void sliding_series(Run *r, Expansion *e, const int32_t *start) {
     else {
       series_at(t, t->later, t->later_count, k, stride, r->input, r->series);
       if (e->l.slides) {
-        follow_layer(r, e, t, e->series, k, start);
+        follow_layer(r, e, k, start);
         inputs_of(r, e, k);
         series_at(t, t->late, t->late_count, k, stride, r->input, r->series);
       }

@@ -216,7 +216,7 @@ static void set_series(Run *r, Expansion *e, const int32_t *start) {
       series_at(t, t->late, t->late_count, k, stride, r->input, r->series);
     }
     if (leaving) leave_sets(r, e, k);
-    else if (k && e->l.slides) follow_layer(r, e, t, e->series, k, start);
+    else if (k && e->l.slides) follow_layer(r, e, k, start);
     if (k && (leaving || e->l.slides)) {
       inputs_of_sets(r, e, k);
       series_at(t, t->late, t->late_count, k, stride, r->input, r->series);

@@ -60,10 +60,10 @@ class CarriedLeg(NamedTuple):
 
 
 class ColumnsEngine(TapeEngine):
-    """The driver with one system and its tangent program."""
+    """The driver with one system and the series of its derivatives."""
 
     def __init__(self, system: FilippovSystem, order: int):
-        super().__init__(system, order, tangents=True)
+        super().__init__(system, order, derived=True)
         require_size(library().leg_size, _Leg)
         library().carry_columns.argtypes = [_POINTER, _POINTER]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
-from ...model.printing.tape import Entries, Series, Tape, Values, tangent_series_of, tape_of
+from ...model.printing.tape import Entries, Series, Tape, Values, derived_series_of, tape_of
 from ..constants import FULL, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
@@ -204,7 +204,6 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("stops", "resets", "order", "slope_outputs")],
         ("series", SeriesStructure),
         ("free", SeriesStructure),
-        ("tangent", SeriesStructure),
         *[(name, ValuesStructure) for name in _VALUES],
         *[(name, _Entries) for name in _ENTRIES],
         *[
@@ -218,6 +217,7 @@ class _System(ctypes.Structure):
         *[(name, _POINTER) for name in ("degree", "lower_first", "power", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
+        ("derivatives", _Entries),
     ]
 
 
@@ -298,21 +298,21 @@ def _ends(parts: Sequence[Sequence[Any]]) -> list[int]:
 
 
 class TapeEngine:
-    """The driver in C with one system at one order, with ``tangents`` for derivatives."""
+    """The driver in C with one system at one order, with ``derived`` for derivatives."""
 
-    def __init__(self, system: FilippovSystem, order: int, tangents: bool = False):
+    def __init__(self, system: FilippovSystem, order: int, derived: bool = False):
         self.system, self.order = system, order
         self.coupled = raised_of(system)
         tape = system.cached("tape", lambda: tape_of(self.coupled))
         self.guards = lru_cache(maxsize=4096)(self.coupled.guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
-        tangent = None
-        if tangents:
-            series, tangent = tangent_series_of(self.coupled)
+        entries = None
+        if derived:
+            series, entries = derived_series_of(self.coupled)
             tape = replace(tape, series=series, free=series)
         self._c = self._structure(self.coupled, tape)
-        if tangent is not None:
-            self._c.tangent = series_structure(tangent, self._kept)
+        if entries is not None:
+            self._c.derivatives = self._entries(entries)
         self._rooms = rooms_of((0, 0, 0))
 
     def _structure(self, coupled: Coupled, tape: Tape) -> _System:

@@ -180,7 +180,9 @@ class SeriesStructure(ctypes.Structure):
     ]
 
 
-class _Entries(ctypes.Structure):
+class EntriesStructure(ctypes.Structure):
+    """Places of entries of a matrix as C reads them."""
+
     _fields_ = [("count", _I32), ("pad", _I32), ("row", _POINTER), ("column", _POINTER)]
 
 
@@ -205,7 +207,7 @@ class _System(ctypes.Structure):
         ("series", SeriesStructure),
         ("free", SeriesStructure),
         *[(name, ValuesStructure) for name in _VALUES],
-        *[(name, _Entries) for name in _ENTRIES],
+        *[(name, EntriesStructure) for name in _ENTRIES],
         *[
             (name, _POINTER)
             for name in (*_TABLES, "slope_output", "slope_moves", "slope_symmetric")
@@ -217,7 +219,7 @@ class _System(ctypes.Structure):
         *[(name, _POINTER) for name in ("degree", "lower_first", "power", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
-        ("derivatives", _Entries),
+        ("derivatives", EntriesStructure),
     ]
 
 
@@ -415,8 +417,8 @@ class TapeEngine:
         self._kept.append(array)
         return array.ctypes.data
 
-    def _entries(self, e: Entries) -> _Entries:
-        return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))
+    def _entries(self, e: Entries) -> EntriesStructure:
+        return EntriesStructure(len(e.row), 0, self._at(e.row), self._at(e.column))
 
     # one trajectory ----------------------------------------------------------------------------
 

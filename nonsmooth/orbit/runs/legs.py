@@ -168,8 +168,8 @@ def integrate_leg(
             at = AtEvent(found.end, np.eye(n), np.zeros((n, len(p))), 0.0, own[:n], own[n:])
         return LegFlow(found.end, found.by_start, found.by_parameters, found.end_rate, at)
     start = field.start(x, p)
-    whole = field.blocks.unpack(flow_for(field, start, p, duration))
-    n, end = field.blocks.starts, whole[:, 0]
+    whole = field.matrix(flow_for(field, start, p, duration))
+    n, end = field.by_start, whole[:, 0]
     return LegFlow(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], field.rate_at(end, p))
 
 

@@ -137,7 +137,7 @@ def _by_panels(
     cuts: tuple[float, ...],
 ) -> tuple[Array, Array, Array]:
     field = leg.field(run.system, chosen)
-    n, starts = field.blocks.starts, run.steps.starts
+    n, starts = field.by_start, run.steps.starts
     first = max(int(np.searchsorted(starts, t_start, side="right")) - 1, 0)
     last = max(int(np.searchsorted(starts, t_end, side="left")), first + 1)
     start = _polynomial(run, first, t_start - float(starts[first]), n)[0]

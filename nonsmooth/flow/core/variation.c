@@ -9,7 +9,7 @@
 
 /* A leg: columns, each a row of n derivatives of the state and one of its parameters. */
 typedef struct {
-  int32_t columns, hit, kind, index, side; /* the set that is reached at its end, or -1; the guard that ends it */
+  int32_t columns, hit, kind, index, side; /* hit: the first function of the set that is reached at its end, or -1; then the guard that ends it */
   double duration, tol, left; /* left: of the duration, where it is stuck */
   int64_t most_steps;
   const double *p, *dp;
@@ -31,7 +31,7 @@ enum { LEG_DONE, LEG_STUCK, LEG_NOT_UNIQUE };
 
 static int moving_size(const Run *r) {
   int size = r->n + r->width;
-  for (int i = 0; i < r->m; i++) size += r->s->scaled[i] != 0;
+  for (int i = 0; i < r->m; i++) size += is_scaled(r, i) != 0;
   return size;
 }
 
@@ -47,8 +47,8 @@ static int terms_of(const double *c, int count) {
 /* The unknown of an entry of what moves, after the states; -1 where the mode has it not. */
 static int unknown_at(const Run *r, int column) {
   int i = column - r->n, nu = i - r->width;
-  if (nu < 0) return i >= r->m || is_moving(r, i) || !r->s->scaled[i] ? i : -1;
-  for (i = 0; i < r->m; i++) if (r->s->scaled[i] && nu-- == 0) return is_moving(r, i) ? -1 : i;
+  if (nu < 0) return i >= r->m || is_moving(r, i) || !is_scaled(r, i) ? i : -1;
+  for (i = 0; i < r->m; i++) if (is_scaled(r, i) && nu-- == 0) return is_moving(r, i) ? -1 : i;
   return -1;
 }
 
@@ -106,13 +106,13 @@ static void derive_late(const Run *r, const Columns *c, int k) {
 }
 
 /* Coefficient k of the derivative of h/|h| from that of h. */
-static void turn_direction(Run *r, const Expansion *e, Expansion *d, int set, int k) {
-  int f = first_of(r, set), size = size_of(r, set), stride = r->stride;
-  const double *length = e->root + (int64_t)set * stride;
-  double *root = d->root + (int64_t)set * stride, sum = 0;
+static void turn_direction(Run *r, const Expansion *e, Expansion *d, int f, int k) {
+  int size = size_of(r, f), stride = r->stride;
+  const double *length = e->root + (int64_t)f * stride;
+  double *root = d->root + (int64_t)f * stride, sum = 0;
   for (int i = f; i < f + size; i++) {
     double *own = d->apart + (int64_t)i * stride;
-    own[k] = d->series[(int64_t)i * stride + k] * e->per_radius[set];
+    own[k] = d->series[(int64_t)i * stride + k] * e->per_radius[f];
     sum += convolve(e->apart + (int64_t)i * stride, own, k, 0, k);
   }
   root[k] = sum - convolve(length, root, k, 1, k);
@@ -129,10 +129,10 @@ static void turn_leaving(Run *r, const Expansion *e, Expansion *d, const Columns
   const int32_t *which = r->pending;
   double *a = r->work, *b = a + (int64_t)all * all;
   for (int i = 0; i < n; i++) b[i] = -c->sum[r->n + which[i]];
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s), size = size_of(r, s), last = k < r->order ? k + 1 : k;
+  EACH_SET(r, f) {
+    int size = size_of(r, f), last = k < r->order ? k + 1 : k;
     if (e->l.letter[f] != LEAVING) continue;
-    const double *radius = e->rates + (int64_t)s * (stride + 1), *change = d->rates + (int64_t)s * (stride + 1);
+    const double *radius = e->rates + (int64_t)f * (stride + 1), *change = d->rates + (int64_t)f * (stride + 1);
     b[column] = 0;
     for (int i = f; i < f + size; i++, at++) {
       const double *u = e->lambda + (int64_t)i * stride, *own = d->lambda + (int64_t)i * stride;
@@ -144,8 +144,8 @@ static void turn_leaving(Run *r, const Expansion *e, Expansion *d, const Columns
   if (!solve(a, b, all)) for (int i = 0; i < all; i++) b[i] = NAN;
   for (int i = 0; i < slides; i++) d->series[(int64_t)which[i] * stride + k] = b[i];
   for (int i = slides; i < n; i++) d->lambda[(int64_t)which[i] * stride + k] = b[i];
-  for (int s = 0, j = n; s < r->s->sets; s++)
-    if (e->l.letter[first_of(r, s)] == LEAVING) d->rates[(int64_t)s * (stride + 1) + k + 1] = b[j++];
+  EACH_SET(r, f)
+    if (e->l.letter[f] == LEAVING) d->rates[(int64_t)f * (stride + 1) + k + 1] = b[n++];
 }
 
 /* Coefficients k of the derivatives of multipliers of sliding. */
@@ -180,20 +180,19 @@ static void next_terms(const Run *r, const Expansion *e, Expansion *d, const Col
 /* Coefficients of a column to an order, from the first of states and of h; sums of the last order. */
 static void column_series(Run *r, const Expansion *e, Expansion *d, const double *dp, Columns *c, int order) {
   int leaving = 0, stride = r->stride;
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s);
+  EACH_SET(r, f) {
     if (e->l.letter[f] != LEAVING) continue;
-    double *change = d->rates + (int64_t)s * (stride + 1);
+    double *change = d->rates + (int64_t)f * (stride + 1);
     leaving = 1;
     change[0] = 0;
-    for (int i = f; i < f + size_of(r, s); i++)
+    for (int i = f; i < f + size_of(r, f); i++)
       change[0] += e->lambda[(int64_t)i * stride] * d->series[(int64_t)i * stride];
   }
   if (r->s->sets) memset(d->lambda, 0, sizeof(double) * r->m * stride);
   aim_column(r, e, d, dp, c, order == 0);
   for (int k = 0; k <= order; k++) {
-    for (int s = 0; s < r->s->sets; s++)
-      if (e->l.letter[first_of(r, s)] == LEFT_BEHIND) turn_direction(r, e, d, s, k);
+    EACH_SET(r, f)
+      if (e->l.letter[f] == LEFT_BEHIND) turn_direction(r, e, d, f, k);
     derive(r, c, k);
     if (leaving) turn_leaving(r, e, d, c, k); else turn_sliding(r, e, d, c, k);
     if (leaving || e->l.slides) derive_late(r, c, k);
@@ -269,17 +268,16 @@ static double event_slope(const Run *r, const Leg *l, const Expansion *d, const 
   int n = r->n, w = r->width, stride = r->stride, own = l->index;
   double sum = 0;
   if (l->hit >= 0) {
-    int f = first_of(r, l->hit);
-    for (int i = f; i < f + size_of(r, l->hit); i++) sum += e->lambda[(int64_t)i * stride] * c->sum[n + w + i];
+    for (int i = l->hit; i < l->hit + size_of(r, l->hit); i++) sum += e->lambda[(int64_t)i * stride] * c->sum[n + w + i];
     return sum;
   }
   const double *unknown = d->series + (int64_t)own * stride;
   double factor = c->sum[n + 2 * w + own];
-  if (l->kind == RELEASE_GUARD) return d->series[(int64_t)(r->m + own) * stride];
+  if (l->kind == RELEASE_GUARD) return unknown[0];
   if (l->kind == EXIT_GUARD && is_idle(r, e->l.letter, own)) return -l->side * c->sum[n + own];
   if (l->kind == EXIT_GUARD)
     return turn_of(r, own, row_of(r, n + 2 * w + own), r->order + 1) * (factor - l->side * unknown[0]);
-  for (int i = 0; i < size_of(r, set_of(r, own)); i++)
+  for (int i = 0; i < size_of(r, own); i++)
     sum -= 2 * e->series[(int64_t)(own + i) * stride] * unknown[(int64_t)i * stride];
   return sum + 2 * factor * row_of(r, n + 2 * w + own)[0];
 }
@@ -343,8 +341,8 @@ static void move_columns(Run *r, const Leg *l, const Columns *c, double dt) {
 }
 
 /* Whether a set is so close that nothing is left of the way to it. */
-static int has_arrived(const Run *r, int set, double *most) {
-  int f = first_of(r, set), k = size_of(r, set);
+static int has_arrived(const Run *r, int f, double *most) {
+  int k = size_of(r, f);
   double rate[3], radius = length_of(r->unknowns + f, k);
   for (int i = 0; i < k; i++) rate[i] = r->e.series[(int64_t)(f + i) * r->stride + 1];
   *most = larger(radius, *most);
@@ -352,10 +350,10 @@ static int has_arrived(const Run *r, int set, double *most) {
 }
 
 /* A step that is no longer than until |h| of a set has fallen tenfold. */
-static double near_step(const Run *r, int set, double h) {
+static double near_step(const Run *r, int f, double h) {
   const Expansion *e = &r->e;
   for (int row = 0; row < e->l.rows; row++) {
-    if (e->l.kind[row] != NEAR_GUARD || e->l.index[row] != first_of(r, set) || r->letter[first_of(r, set)] == LEAVING) continue;
+    if (e->l.kind[row] != NEAR_GUARD || e->l.index[row] != f || r->letter[f] == LEAVING) continue;
     double root = first_root(e->guards + (int64_t)row * r->stride, r->order, h);
     if (root > 0) return root;
   }

@@ -89,10 +89,11 @@ class Leg:
         if not system.sets or self.kind not in ("entry", "exit", "release"):
             return None
         if self.kind == "release":
-            return EndOfLeg(guard="release", number=self.element - len(system.entries))
+            own = self.element - len(system.entries) + system.surface_count
+            return EndOfLeg(guard="release", number=own)
         members = system.entries[self.element]
         if self.kind == "entry":
-            return EndOfLeg(hit=system.sets.index(members)) if len(members) > 1 else None
+            return EndOfLeg(hit=members[0]) if len(members) > 1 else None
         if self.mode[self.element] != "s":
             return None  # a surface is crossed
         if len(members) > 1:

@@ -20,6 +20,7 @@ from ...model import (
     PointError,
     read_function,
     real_array,
+    require_system,
 )
 from ...model.derivatives.event_maps import EventMap, function_map
 from .variation import Passage, Sensitivity, along, passages
@@ -79,7 +80,8 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
            [3.  , 1.  ]]), array([[0.25],
            [1.  ]]), array([0.5]), array([[1. , 0.5]]))
     """
-    _, result = along(_require_run(run), _names(run, wrt))
+    require_system(_require_run(run).system, sets=True)
+    _, result = along(run, _names(run, wrt))
     return result
 
 

@@ -350,7 +350,7 @@ def test_an_event_at_which_the_equations_are_singular_is_where_the_branch_is_los
     )
     orbit = ns.periodic_orbit(system, [1.0, 0.5])
     branch = ns.continue_orbit(orbit, "b", bounds=(-0.5, 1.0))
-    assert len(branch.events) == 1 and 0 < branch.events[0].parameter < 1e-7
+    assert len(branch.events) == 1 and 0 <= branch.events[0].parameter < 1e-7
     assert branch[1e-3].period == pytest.approx(orbit.period, rel=1e-11)
 
 

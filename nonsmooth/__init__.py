@@ -77,6 +77,7 @@ from .model import (
 )
 from .model.definition.elements import Relay
 from .model.definition.friction import Friction
+from .model.definition.table import table
 from .orbit import (
     basins,
     continue_bifurcation,
@@ -168,6 +169,7 @@ __all__ = [
     "sensitivity",
     "simulate",
     "sliding_field",
+    "table",
     "textbook",
     "two_folds",
     "vjp",

@@ -21,15 +21,15 @@ static void guard_rows(Run *r, const Layout *l, const double *series, int count,
 }
 
 /* Coefficients k of the multipliers that slide keep those of the layer's rates at zero. */
-static void follow_layer(Run *r, const Expansion *e, const Series *t, double *series, int k, const int32_t *start) {
+static void follow_layer(Run *r, Expansion *e, int k, const int32_t *start) {
   int slides = e->l.slides;
   for (int i = 0; i < slides; i++) {
     double sum = 0;
     for (int q = start[i]; q < start[i + 1]; q++) {
       int j = start[slides + 1 + q];
-      sum += e->inverse[i * slides + j] * r->series[(int64_t)t->output[r->n + e->l.sliding[j]] * r->stride + k];
+      sum += e->inverse[i * slides + j] * row_of(r, r->n + e->l.sliding[j])[k];
     }
-    series[(int64_t)e->l.sliding[i] * r->stride + k] = -sum;
+    e->series[(int64_t)e->l.sliding[i] * r->stride + k] = -sum;
   }
 }
 
@@ -97,7 +97,7 @@ static void mode_series(Run *r, Expansion *e, const int32_t *start) {
   for (int k = 0; k <= r->order; k++) {
     open_order(r, e, k);
     if (leaving) leave_sets(r, e, k);
-    else if (k && e->l.slides) follow_layer(r, e, e->l.is_free ? &r->s->free : &r->s->series, e->series, k, start);
+    else if (k && e->l.slides) follow_layer(r, e, k, start);
     if (k && (leaving || e->l.slides)) close_order(r, e, k);
     if (r->s->sets) close_sets(r, e, k);
     if (k < r->order) next_states(r, e, k);

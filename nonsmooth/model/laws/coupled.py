@@ -148,6 +148,8 @@ class Coupled:
         field, powers = gate_roots(field, d.surfaces, x, ca.vertsplit(gates))
         for i, factor in enumerate(factors):
             factors[i] = gate_roots(factor, d.surfaces, x, ca.vertsplit(gates))[0]
+        for i, power in gate_roots(d.surfaces, d.surfaces, x, ca.vertsplit(gates))[1].items():
+            powers[i] = min(power, powers.get(i, power))
         for i, power in powers.items():
             if i in self.system.set_of:
                 continue
@@ -228,32 +230,17 @@ class Coupled:
         return self.continuous[i] or idle
 
     def guards(self, mode: str) -> tuple[Guard, ...]:
-        """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""
+        """Guards of a mode: surfaces and exits, contacts, stops and resets."""
         result, contacts = list[Guard](), len(self.system.entries)
         for i, sign in enumerate(self.system.parse_letters(mode)):
             j = i - self._surfaces
             if j >= 0:
                 result.append(Guard("impact" if sign else "release", j, sign, contacts + j))
-            elif i in self.system.set_of:
-                result += self._guards_of_set(i, mode[i])
             elif sign:
                 result.append(Guard("surface", i, sign, self.system.entry_of(i)))
             else:
                 result += [Guard("exit", i, side, self.system.entry_of(i)) for side in (1, -1)]
-        result += event_guards(self.system)
-        sliding = self.sliding(mode)
-        first = next((i for i in sliding if i < self._surfaces), 0)
-        branches = len(self._changing(sliding))
-        of_first = self.system.entry_of(first) if self._surfaces else 0
-        return (*result, *[Guard("branch", first, 0, of_first)] * branches)
-
-    def _guards_of_set(self, i: int, letter: str) -> list[Guard]:
-        """Those of the set that begins with a switching function."""
-        if i != self.system.set_of[i][0] or letter == "i":
-            return []
-        k = self.system.entry_of(i)
-        near = [Guard("near", i, 0, k)]
-        return [Guard("slip", i, 0, k), *near * self.scaled[i]] if letter == "s" else near
+        return (*result, *event_guards(self.system))
 
     @cached_property
     def slope_moves(self) -> NDArray[np.bool_]:
@@ -287,12 +274,6 @@ class Coupled:
             bent = ca.jacobian(self.columns_of_field[:, j], self._every)
             mixed[j, bent.sparsity().get_col()] = True
         return mixed
-
-    def _changing(self, sliding: Sequence[int]) -> list[int]:
-        """Unknowns that the stability of sliding is read from."""
-        if len(sliding) == 2 and max(sliding) < self._surfaces:
-            return list(sliding) if self.slope_moves[np.ix_(sliding, sliding)].any() else []
-        return [i for i in sliding if self.slope_moves[i, i]]
 
     # expressions --------------------------------------------------------------------------------
 
@@ -359,15 +340,10 @@ class Coupled:
             held[n + i] = (*signs, 0.0) if self.scaled[i] else signs
         return held
 
-    def tangents(self) -> tuple[ca.SX, list[ca.SX]]:
-        """Symbols of ``moving``, of a direction of it and one of the parameters; ``outputs`` derived along them."""
-        moving, p = self._symbols
-        size, n = moving.numel(), self.system.extended_dimension
-        by_moving, by_p = ca.SX.sym("d", size), ca.SX.sym("dp", p.numel())
-        every = ca.vertcat(moving, by_moving, by_p)
-        outputs = [ca.jtimes(e, moving, by_moving) + ca.jtimes(e, p, by_p) for e in self.outputs]
-        held = {**self._values_held, **{size + i: (0.0,) for i in range(n, size)}}
-        return every, without_unused_terms([every, p], [ca.densify(e) for e in outputs], held)
+    @property
+    def derivatives(self) -> ca.SX:
+        """Of field, layer, surfaces and gaps, and factors by ``moving`` and the parameters, sparse."""
+        return ca.jacobian(ca.vertcat(*self.outputs[:4]), ca.vertcat(*self._symbols))
 
     # numbers -----------------------------------------------------------------------------------
 

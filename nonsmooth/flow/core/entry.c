@@ -332,8 +332,8 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
 /* Steps of runs that are lanes' between them ------------------------------------------------------- */
 
 /* Whether a set is reached, or far and has been so for a step. */
-static int is_apart(Run *r, int set) {
-  int f = first_of(r, set), k = size_of(r, set);
+static int is_apart(Run *r, int f) {
+  int k = size_of(r, f);
   double scale = 0;
   if (r->letter[f] == 0 || r->letter[f] > OFF) return r->letter[f] == 0;
   const double *h = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
@@ -346,7 +346,7 @@ static int is_apart(Run *r, int set) {
 static int is_plain(Run *r) {
   if (r->instant.running || r->due_impact >= 0 || r->hold < INFINITY) return 0;
   for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m || r->s->sets ? 0 : 2)) return 0;
-  for (int i = 0; i < r->s->sets; i++) if (!is_apart(r, i)) return 0;
+  EACH_SET(r, f) if (!is_apart(r, f)) return 0;
   for (int j = 0; j < r->s->stops; j++) if (!r->instant.side[j]) return 0;
   return 1;
 }

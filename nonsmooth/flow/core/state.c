@@ -86,9 +86,6 @@ typedef struct {
   double *lambda, *apart, *root, *rates, *slopes, *radius, *per_radius;
 } Expansion;
 
-/* Letters of a set: off it, h carried along after that, its first step away from it, and one without friction. */
-enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5, IDLE = 6 };
-
 /* A mode that can continue, and the zeros of its guards. */
 typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Continuation;
 

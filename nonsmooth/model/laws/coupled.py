@@ -148,6 +148,8 @@ class Coupled:
         field, powers = gate_roots(field, d.surfaces, x, ca.vertsplit(gates))
         for i, factor in enumerate(factors):
             factors[i] = gate_roots(factor, d.surfaces, x, ca.vertsplit(gates))[0]
+        for i, power in gate_roots(d.surfaces, d.surfaces, x, ca.vertsplit(gates))[1].items():
+            powers[i] = min(power, powers.get(i, power))
         for i, power in powers.items():
             if i in self.system.set_of:
                 continue

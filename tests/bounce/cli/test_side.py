@@ -84,7 +84,7 @@ def test_a_flight_curves_with_the_axis(command, tmp_path):
     assert report["heading"] == pytest.approx(path.landing.heading / DEG, rel=1e-9)
     assert report["total_side"] == pytest.approx(path.side + report["run"]["run_side"], rel=1e-12)
     code, out, _ = command(*argv, -10, "--turf", "natural")
-    assert code == 0 and f"{path.side:.2f} m to the left" in out and "total" in out
+    assert code == 0 and f"{path.side:.0f} m to the left" in out and "total" in out
     table = tmp_path / "launches.csv"
     table.write_text("speed,angle,spin\n70,11,2700\n", encoding="utf-8")
     assert "side [m]" in command("launch", "--input", table, "--axis-tilt", 10)[1]

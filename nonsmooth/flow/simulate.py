@@ -6,16 +6,16 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, OptionError, Parameters, require_system
 from .engine.convert import trajectory
 from .engine.tape import tape_for
 from .ensembles.starts import require_start, require_start_mode
+from .events import Event
 from .options import Options, tolerances
-from .section import Section, Times, read_sampling, sampled, sectioned
-from .trajectory import Event, Trajectory
+from .section import Section, read_sampling, sampled, sectioned
+from .trajectory import Trajectory
 
 
 def simulate(
@@ -37,6 +37,7 @@ def simulate(
     rest_below: float | None = None,
     t_eval: ArrayLike | None = None,
     at: Any = None,
+    dense: bool = True,
 ) -> Trajectory:
     """Integrate a Filippov system through crossings, sliding, stops and resets.
 
@@ -78,6 +79,10 @@ def simulate(
     at : Section, str, number or expression, optional
         Keep the states at a section: at a surface, stop, reset or impact of that name, at a kind of
         event, or after each period. See :class:`Section`.
+    dense : bool, optional
+        Keep the polynomials of the steps, so that the result can be read at any time. ``False`` keeps points,
+        events, segments and samples: a twentieth of the memory of a long run. Such a run can be continued
+        from its end, but not from its other events.
 
     Returns
     -------
@@ -135,6 +140,8 @@ def simulate(
         rest_below=rest_below,
         start_mode=start_mode,
     )
+    if not isinstance(dense, bool):
+        raise OptionError(f"dense is {dense!r}. Give True or False.")
     system, at = sectioned(system, at)
     x = system.extended_point(x0, options.t_start)
     p = system.parameter_vector(parameters)
@@ -143,6 +150,11 @@ def simulate(
         require_start(system, x, p)
     else:
         motion = (start.events[-1] if isinstance(start, Trajectory) else start).motion
+        if motion is not None and not len(motion):
+            raise OptionError(
+                "start is an event within a run with dense=False, which keeps what a restart needs at its end "
+                "only. Continue from the run, or simulate it with dense=True."
+            )
     require_start_mode(system, x, p, options)
     sampling = read_sampling(system, t_eval, at, options.t_start, options.t_end, p)
     times = sampling.times
@@ -150,7 +162,16 @@ def simulate(
         options = replace(options, hits=sampling.hits)
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
-    return _with_samples(_run(system, x, p, options, times, motion), options, times, p)
+    read_at = None if times is None else times.of(p)
+    run = tape_for(system, options).run(x, p, options, read_at, motion, dense)
+    made = trajectory(system, p, options, run)
+    if read_at is not None:
+        t, states = sampled(made, read_at, None if dense else run.sample_x)
+    elif options.hits is not None:
+        t, states = options.hits.samples(made.events)
+    else:
+        return made
+    return replace(made, sample_t=t, sample_x=states)
 
 
 def _continued(
@@ -166,29 +187,3 @@ def _continued(
     if isinstance(start, Event):
         return start.x_after, start.t, parameters
     return start.x[-1], float(start.t[-1]), start.parameters if parameters is None else parameters
-
-
-def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Array) -> Trajectory:
-    """Add the samples to a run."""
-    if times is not None:
-        t, x = sampled(run, times.of(p))
-        return replace(run, sample_t=t, sample_x=x)
-    if options.hits is None:
-        return run
-    kept = options.hits.select(run.events)
-    t, x = np.empty(len(kept)), np.empty((len(kept), run.x.shape[1]))
-    options.hits.fill(run.events, t, x)
-    return replace(run, sample_t=t, sample_x=x)
-
-
-def _run(
-    system: FilippovSystem,
-    x: Array,
-    p: Array,
-    options: Options,
-    times: Times | None,
-    motion: Array | None,
-) -> Trajectory:
-    read_at = None if times is None else times.of(p)
-    run = tape_for(system, options).run(x, p, options, read_at, motion)
-    return trajectory(system, p, options, run)

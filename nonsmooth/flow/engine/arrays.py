@@ -1,4 +1,4 @@
-"""What Python and the drivers in C share: structures of options and batches, a dense run as arrays."""
+"""What Python and the drivers in C share: structures of options and batches, a run as arrays."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class BatchStructure(ctypes.Structure):
 
 @dataclass
 class Run:
-    """One dense run as arrays.
+    """One run as arrays.
 
     Attributes
     ----------
@@ -70,7 +70,6 @@ class Run:
         Last mode.
     limit : float
         Accumulation time or NaN.
-    itinerary : str
     letters : sequence of str
         Modes by number.
     guards : callable
@@ -85,14 +84,28 @@ class Run:
         What was noted about the decisions, as bits.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
-    starts, coefficients, modes : ndarray (s,), (s, N, P+1), (s,)
-        Steps: start times, Taylor coefficients, numbers of modes.
-    event_kinds, event_t, event_x, event_after_x : ndarray (e,) or (e, n)
-    event_before, event_after, event_guards : ndarray (e,)
-        Events: kind (position in ``facts.KINDS``), modes before and after, row of the guard in
-        ``guards(mode_before)`` or -1. The final "end" is not among them.
-    event_motions, motion : ndarray (e, w), (w,)
-        What a restart needs besides the state, after each event and at the end.
+    segment_modes, segment_starts : ndarray (k,)
+        Segments: numbers of their modes, and times at which they begin.
+    event_t, event_rows, event_jumps : ndarray (e,)
+        Events but the final "end": time, row of the state in ``event_states``, whether the state after it is
+        the next row.
+    event_states : ndarray
+        The points ``x``, then what else is the state of an event.
+    event_codes, event_keys : ndarray (e,), sequence of tuple
+        What an event is, as a position in the keys: kind (position in ``facts.KINDS``), modes before and
+        after, row of the guard in ``guards(mode_before)`` or -1.
+    motion : ndarray (w,)
+        What a restart at the end needs besides the state.
+    dense : bool
+        Whether the following were kept.
+    starts, coefficients : ndarray (s,), (s, N, P+1)
+        Steps: start times, Taylor coefficients.
+    segment_firsts : ndarray (k,)
+        Numbers of the first steps of the segments.
+    event_motions : ndarray (e, w)
+        What a restart after each event needs.
+    sample_x : ndarray (K, n)
+        States at the times before the end at which the run was to be read, unless it is dense.
     labels : sequence of tuple
         Values of the discrete states by number of mode; empty without any.
     """
@@ -102,7 +115,6 @@ class Run:
     where: int
     mode: int
     limit: float
-    itinerary: str
     letters: Sequence[str]
     guards: Callable[[str], Sequence[Guard]]
     active: list[int]
@@ -111,66 +123,22 @@ class Run:
     facts: int
     t: Array
     x: Array
-    starts: Array
-    coefficients: Array
-    modes: NDArray[np.int32]
-    event_kinds: NDArray[np.int32]
+    segment_modes: NDArray[np.int32]
+    segment_starts: Array
     event_t: Array
-    event_x: Array
-    event_after_x: Array
-    event_before: NDArray[np.int32]
-    event_after: NDArray[np.int32]
-    event_guards: NDArray[np.int32]
-    event_motions: Array
+    event_rows: NDArray[np.int64]
+    event_jumps: NDArray[np.bool_]
+    event_states: Array
+    event_codes: NDArray[np.int32]
+    event_keys: Sequence[tuple[int, int, int, int]]
     motion: Array
     labels: Sequence[tuple[float, ...]]
-
-    @classmethod
-    def of(
-        cls,
-        whole: dict[str, NDArray[Any]],
-        n: int,
-        numbers: Sequence[float],
-        counts: Sequence[int],
-        itinerary: str,
-        letters: Sequence[str],
-        guards: Callable[[str], Sequence[Guard]],
-        active: list[int],
-        several: list[str],
-        rates: Array,
-        motion: Array,
-        labels: Sequence[tuple[float, ...]],
-    ) -> Run:
-        """Put together what a run wrote, and what the driver says of its end."""
-        return cls(
-            status=counts[0],
-            reason=counts[1],
-            where=counts[2],
-            mode=counts[3],
-            limit=numbers[1],
-            itinerary=itinerary,
-            letters=letters,
-            guards=guards,
-            active=active,
-            several=several,
-            rates=rates,
-            facts=counts[12],
-            t=whole["point_t"],
-            x=whole["point_x"][:, :n],
-            starts=whole["start"],
-            coefficients=whole["coefficients"],
-            modes=whole["step_mode"],
-            event_kinds=whole["event_kind"],
-            event_t=whole["event_t"],
-            event_x=whole["event_x"][:, :n],
-            event_after_x=whole["event_after_x"][:, :n],
-            event_before=whole["event_before"],
-            event_after=whole["event_after"],
-            event_guards=whole["event_guard"],
-            event_motions=whole["event_motion"],
-            motion=motion,
-            labels=labels,
-        )
+    dense: bool
+    starts: Array
+    coefficients: Array
+    segment_firsts: NDArray[np.int64]
+    event_motions: Array
+    sample_x: Array
 
 
 def require_size(size: Any, structure: type[ctypes.Structure]) -> None:

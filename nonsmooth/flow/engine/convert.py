@@ -4,40 +4,35 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from ...model import Array, FilippovSystem, Guard
 from .. import messages
 from ..constants import DEPENDS_ON_WIDTHS, KINDS, REASONS, UNPROVED
+from ..events import Events, Label
 from ..names import guard_name
 from ..options import Options
+from ..segments import Segment, Segments, ShownMode
 from ..status import ADVICE, Status
-from ..trajectory import Continuation, Event, Facts, Segment, Steps, Trajectory
+from ..trajectory import Continuation, Facts, Steps, Trajectory
 from ..warn import warn_of_facts
 from .arrays import Run
 
 
 def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> Trajectory:
-    """Convert a dense run."""
-    status, modes = Status(run.status), run.letters
+    """Convert a run."""
+    status = Status(run.status)
     limit = None if math.isnan(run.limit) else run.limit
     facts = Facts(bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED))
     warn_of_facts(facts.depends_on_widths, facts.unproved)
-    events = _events(system, run)
-    motion = run.motion if len(run.motion) else None
-    if status is not Status.STOPPED:
-        letters = system.spelled(modes[run.mode])
-        last = run.x[-1]
-        events.append(
-            Event("end", float(run.t[-1]), last, letters, letters, str(status), motion=motion)
-        )
-    elif motion is not None:
-        events[-1] = replace(events[-1], motion=motion)
     return Trajectory(
         system=system,
         parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),
         t=run.t,
         x=run.x,
-        events=events,
+        events=_events(system, run),
         segments=_segments(system, run),
         status=status,
         message=f"{message_of(system, options, run)} {ADVICE[status]}",
@@ -49,32 +44,38 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
             if status is Status.NON_UNIQUE
         ],
         facts=facts,
+        dense=run.dense,
     )
 
 
-def _events(system: FilippovSystem, run: Run) -> list[Event]:
-    modes, found = run.letters, []
-    known: dict[tuple[str, str, int], tuple[str, str, str, int, int]]
-    known = system.cached("events of compiled runs", dict)
-    numbers = (run.event_before, run.event_after, run.event_guards)
-    for k, (one, two, row) in enumerate(zip(*(a.tolist() for a in numbers), strict=True)):
-        key = (modes[one], modes[two], row)
+def _events(system: FilippovSystem, run: Run) -> Events:
+    """Events of a run, with its end unless a stop is the last of them."""
+    modes, known = run.letters, system.cached("labels of events", dict[Any, Label])
+    labels = []
+    for kind, one, two, row in run.event_keys:
+        key = (kind, modes[one], modes[two], row)
         if key not in known:
-            known[key] = _named(system, run, *key)
-        before, after, name, element, side = known[key]
-        t, kind = float(run.event_t[k]), KINDS[run.event_kinds[k]]
-        states = run.event_x[k].copy(), run.event_after_x[k].copy()
-        motion = run.event_motions[k].copy() if len(run.motion) else None
-        found.append(
-            Event(kind, t, states[0], before, after, name, states[1], element, side, motion)
-        )
-    return found
+            known[key] = _label(system, run, *key)
+        labels.append(known[key])
+    t, rows, jumps, codes = run.event_t, run.event_rows, run.event_jumps, run.event_codes
+    motions = run.event_motions
+    status, width = Status(run.status), motions.shape[1]
+    if status is not Status.STOPPED:
+        letters = system.spelled(modes[run.mode])
+        t, rows = np.append(t, run.t[-1]), np.append(rows, len(run.t) - 1)
+        jumps, codes = np.append(jumps, False), np.append(codes, np.int32(len(labels)))
+        labels.append(Label("end", letters, letters, str(status)))
+    elif width:
+        motions = motions[:-1]
+    if width:
+        motions = np.concatenate([motions, run.motion[None]])
+    return Events(t, run.event_states, rows, jumps, codes, tuple(labels), motions)
 
 
-def _named(
-    system: FilippovSystem, run: Run, before: str, after: str, row: int
-) -> tuple[str, str, str, int, int]:
-    """Modes, name, element and side of an event."""
+def _label(
+    system: FilippovSystem, run: Run, kind: int, before: str, after: str, row: int
+) -> Label:
+    """Kind, modes, name, element and side of an event."""
     if row >= len(run.guards(before)):  # of stability, of which the driver has more
         k = system.entry_of(before.index("s"))
         own = [Guard("branch", k, 0, k)]
@@ -89,24 +90,23 @@ def _named(
         own = [replace(g, kind="surface", side=0) if g.kind == "exit" else g for g in own]
         name = " and ".join([guard_name(system, guard) for guard in own])
     of = (own[0].element, own[0].side) if own else (-1, 0)
-    return system.spelled(before), system.spelled(after), name, *of
+    return Label(KINDS[kind], system.spelled(before), system.spelled(after), name, *of)
 
 
-def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
+def _segments(system: FilippovSystem, run: Run) -> Segments:
     """Stretches of steps in one mode; a run without a step has its one mode."""
-    t_last, shown = float(run.t[-1]), [system.spelled(letters) for letters in run.letters]
-    discrete = len(system.definition.discrete)
+    shown, t_last = [system.spelled(letters) for letters in run.letters], float(run.t[-1])
     labels = run.labels or [()] * len(shown)
-    if not len(run.modes):
-        own = tuple(run.x[-1][system.dimension - discrete :].tolist())
-        return [Segment(shown[run.mode], t_last, t_last, 0, 0, own)]
-    changes = (run.modes[1:] != run.modes[:-1]).nonzero()[0] + 1
-    bounds = [0, *changes.tolist(), len(run.modes)]
-    ends = [*(float(run.starts[k]) for k in changes), t_last]
-    return [
-        Segment(shown[run.modes[a]], float(run.starts[a]), end, a, b, labels[run.modes[a]])
-        for a, b, end in zip(bounds[:-1], bounds[1:], ends, strict=True)
-    ]
+    if not len(run.segment_modes):
+        own = run.x[-1][system.dimension - len(system.definition.discrete) :]
+        return Segments.of([Segment(shown[run.mode], t_last, t_last, 0, 0, tuple(own.tolist()))])
+    times = np.append(run.segment_starts, t_last)
+    first = last = run.segment_firsts
+    if run.dense:
+        bounds = np.append(first, len(run.starts))
+        first, last = bounds[:-1], bounds[1:]
+    modes = tuple(map(ShownMode, shown, labels))
+    return Segments(times[:-1], times[1:], first, last, run.segment_modes, modes)
 
 
 def message_of(system: FilippovSystem, options: Options, run: Run) -> str:
@@ -119,12 +119,13 @@ def message_of(system: FilippovSystem, options: Options, run: Run) -> str:
     if status is Status.STOPPED:
         return messages.stopped(system.stops[run.where][0], t)
     if status is Status.ENDLESS_JUMPS:
-        at_once = [e for e in _events(system, run) if e.t == t][-options.max_jumps // 2 :]
+        happened = _events(system, run)[: len(run.event_t)]
+        at_once = [e for e in happened[np.searchsorted(run.event_t, t) :]][-options.max_jumps // 2 :]
         return messages.endless_jumps(sorted({e.name for e in at_once}), t)
     if status is Status.ACCUMULATION and REASONS[run.reason] == "pressed":
         return messages.pressed(system.resets[run.where][0], t)
     if status is Status.ACCUMULATION:
-        return messages.accumulation(len(run.event_kinds), run.limit)
+        return messages.accumulation(len(run.event_t), run.limit)
     if status is Status.TOO_MANY_EVENTS:
         return messages.too_many("events", options.max_events)
     if status is Status.TOO_MANY_STEPS:

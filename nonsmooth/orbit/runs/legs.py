@@ -14,9 +14,10 @@ from itertools import product
 import numpy as np
 
 from ...flow.constants import TIE
+from ...flow.events import Event
 from ...flow.fixed import flow_for
 from ...flow.names import event_name, shown_mode
-from ...flow.trajectory import Event, Trajectory
+from ...flow.trajectory import Trajectory
 from ...model import Array, DegenerateError, FilippovSystem, coupled_of
 from ...model.derivatives.event_maps import (
     AtEvent,

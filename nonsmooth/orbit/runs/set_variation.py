@@ -23,7 +23,8 @@ from itertools import pairwise
 import numpy as np
 
 from ...flow.constants import TIE
-from ...flow.trajectory import Event, Trajectory
+from ...flow.events import Event
+from ...flow.trajectory import Trajectory
 from ...model import (
     Array,
     DegenerateError,

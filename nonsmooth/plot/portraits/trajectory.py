@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from ...flow import Event, Segment, Trajectory
-from ...model import DefinitionError, OptionError, whole
+from ...model import Array, DefinitionError, OptionError, whole
 from .. import style
 from .surfaces import draw_surfaces
 
@@ -120,7 +121,8 @@ def _draw(
         size = (7.0 if plane or columns > 1 else 5.0, max(1.3 * rows + 1.2, 3.4))
     with style.settings():
         figure = style.new_figure(size) if figure is None else figure
-        parts = [_Part(run, segment, samples) for segment in run.segments]
+        resets = run.events.t[run.events.column("kind") == "reset"]
+        parts = [_Part(run, segment, samples, resets) for segment in run.segments]
         looks = _looks([part.segment.mode for part in parts])
         grid = figure.add_gridspec(
             rows + 1,
@@ -141,7 +143,7 @@ def _draw(
 class _Part:
     """One segment with times and states at which it is drawn."""
 
-    def __init__(self, run: Trajectory, segment: Segment, samples: int):
+    def __init__(self, run: Trajectory, segment: Segment, samples: int, resets: Array):
         span = abs(run.t[-1] - run.t[0]) or 1.0
         low, high = sorted((segment.t_start, segment.t_end))
         count = max(int(samples * (high - low) / span), 8)
@@ -149,9 +151,9 @@ class _Part:
         # stay inside: at the ends, a reset would show the state after it
         inner = (high - low) * 1e-9
         times = np.union1d(np.linspace(low + inner, high - inner, count), steps)
-        resets = [e.t for e in run.events if e.kind == "reset" and low < e.t < high]
-        around = [t + shift for t in resets for shift in (-inner, inner)]
-        times = np.union1d(times, np.clip(around, low, high)) if resets else times
+        resets = resets[(low < resets) & (resets < high)]
+        around = np.concatenate([resets - inner, resets + inner])
+        times = np.union1d(times, np.clip(around, low, high)) if len(resets) else times
         x = run(times)
         # a jump is a gap in the curve
         k = np.searchsorted(times, resets)
@@ -266,7 +268,7 @@ def _strip(ax: Axes, run: Trajectory, looks: dict[str, tuple[str, Any, float, st
         ax.spines[side].set_visible(False)
 
 
-def _mark(ax: Axes, events: list[Event], where: Any) -> None:
+def _mark(ax: Axes, events: Sequence[Event], where: Any) -> None:
     if len(events) > _MANY:
         events = events[-1:]
     for kind, (marker, face, _) in MARKERS.items():
@@ -354,7 +356,7 @@ def _legend(
     handles: list[Line2D | Patch] = [
         style.line(color, text, width, dashes) for color, dashes, width, text in looks.values()
     ]
-    present = {event.kind for event in run.events}
+    present = {*run.events.column("kind").tolist()}
     if len(run.events) > _MANY:
         present = {run.events[-1].kind}
     for kind, (marker, face, text) in MARKERS.items():

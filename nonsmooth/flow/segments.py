@@ -1,0 +1,103 @@
+"""Segments of a run: arrays, from which a segment is made where one is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Array
+from .saving import savable
+from .sequences import LazySequence
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of motion in one mode, between two events.
+
+    Attributes
+    ----------
+    mode : str
+        One letter for each surface, and one for each impact.
+    t_start, t_end : float
+        Times at which it begins and ends.
+    first, last : int
+        Its steps are those with the numbers ``first`` to ``last - 1`` of ``Trajectory.steps``.
+    discrete : tuple of float
+        Values of the discrete states.
+    """
+
+    mode: str
+    t_start: float
+    t_end: float
+    first: int
+    last: int
+    discrete: tuple[float, ...] = ()
+
+
+@savable()
+@dataclass(frozen=True)
+class ShownMode:
+    """A mode with the values of the discrete states."""
+
+    mode: str
+    discrete: tuple[float, ...] = ()
+
+
+@savable(t_start="k", t_end="k", first="k", last="k", codes="k <modes")
+@dataclass(frozen=True, eq=False, repr=False)
+class Segments(LazySequence[Segment]):
+    """Segments in order of time: a sequence of :class:`Segment`, kept as arrays.
+
+    Attributes
+    ----------
+    t_start, t_end : ndarray (k,)
+        Times at which they begin and end.
+    first, last : ndarray (k,)
+        Numbers of their first steps, and those after their last ones.
+    codes : ndarray (k,)
+        Positions in ``modes``.
+    modes : tuple
+        The modes, with the values of the discrete states.
+    """
+
+    t_start: Array
+    t_end: Array
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    codes: NDArray[np.int32]
+    modes: tuple[ShownMode, ...]
+
+    @classmethod
+    def of(cls, segments: Sequence[Segment]) -> Segments:
+        """Return segments that were made one by one as arrays."""
+        if isinstance(segments, Segments):
+            return segments
+        known: dict[ShownMode, int] = {}
+        codes = [known.setdefault(ShownMode(s.mode, s.discrete), len(known)) for s in segments]
+        return cls(
+            np.array([s.t_start for s in segments], float),
+            np.array([s.t_end for s in segments], float),
+            np.array([s.first for s in segments], np.int64),
+            np.array([s.last for s in segments], np.int64),
+            np.array(codes, np.int32),
+            tuple(known),
+        )
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    def __iter__(self) -> Iterator[Segment]:
+        return map(self._made, range(len(self)))
+
+    def _made(self, k: int) -> Segment:
+        shown, ends = self.modes[self.codes[k]], (float(self.t_start[k]), float(self.t_end[k]))
+        return Segment(shown.mode, *ends, int(self.first[k]), int(self.last[k]), shown.discrete)
+
+    def _part(self, which: slice) -> Self:
+        t_start, t_end = self.t_start[which], self.t_end[which]
+        first, last = self.first[which], self.last[which]
+        return type(self)(t_start, t_end, first, last, self.codes[which], self.modes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..model import OptionError, real, whole
-from .constants import EPSILON, FAR, SAFETY
+from .constants import EPSILON, SAFETY
 from .section import Hits
 
 
@@ -84,10 +84,8 @@ class Options:
 
     @property
     def begins_late(self) -> bool:
-        """Whether one number rounds times by more than a run of this length from 0 and the tolerance allow."""
-        latest = max(abs(self.t_start), abs(self.t_end))
-        far = latest > FAR * (self.t_end - self.t_start)
-        return far and EPSILON * latest > SAFETY * (self.rtol + self.atol)
+        """Whether one number rounds times after the start by more than the tolerance."""
+        return EPSILON * abs(self.t_start) > SAFETY * (self.rtol + self.atol)
 
     @property
     def order(self) -> int:

@@ -3,7 +3,7 @@
 /* Add what impulses change to ``after``. */
 static void add_impulses(Run *r, const double *x, const int8_t *letter, const double *impulses, double *after) {
   set_inputs(r, x, held_of(r, letter), r->none);
-  values_run(&r->s->columns, r->input, r->p, r->columns);
+  values_at(&r->s->columns, r->input, r->p, r->columns);
   const Entries *column = &r->s->column;
   for (int q = 0; q < column->count; q++) {
     double impulse = impulses[column->column[q]];
@@ -57,7 +57,7 @@ static int impulses_fit(Run *r, const double *x, const int32_t *involved, int co
 
 /* One of some contacts whose restitution is not from 0 to 1, or -1. */
 static int improper(Run *r, const double *x, const int32_t *involved, int count) {
-  values_run(&r->s->restitution, x, r->p, r->restitution);
+  values_at(&r->s->restitution, x, r->p, r->restitution);
   for (int i = 0; i < count; i++) {
     double e = out_of(&r->s->restitution, r->restitution, involved[i]);
     if (!(e >= 0 && e <= 1)) return involved[i];
@@ -174,7 +174,7 @@ static int strike(Run *r, const int32_t *involved, int count, int plastic, doubl
   double *target = r->rates + 2 * r->kept_rows, *x = r->x;
   int32_t *group = r->decision->mark, *own = group + w;
   const double *h = surface_values(r, x);
-  if (!plastic) values_run(&r->s->restitution, x, r->p, r->restitution);
+  if (!plastic) values_at(&r->s->restitution, x, r->p, r->restitution);
   for (int j = 0; j < c; j++) {
     double rate = h[m + c + j], e = plastic ? 0 : out_of(&r->s->restitution, r->restitution, j);
     target[j] = plastic || !(rate < 0) ? -rate : -(1 + e) * rate;

@@ -576,22 +576,22 @@ static void open_order(Run *r, Expansion *e, int order) {
   for (int i = 0; i < r->active_count; i++) e->series[(int64_t)r->active[i] * r->stride + order] = 0;
   if (!r->s->sets) {
     inputs_of(r, e, order);
-    series_rules(t, order ? t->later : t->moving, order ? t->later_count : t->moving_count, order, r->stride, r->input, r->series);
+    series_at(t, order ? t->later : t->moving, order ? t->later_count : t->moving_count, order, r->stride, r->input, r->series);
     return;
   }
   inputs_of_sets(r, e, order);
-  if (!order) series_rules(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
-  else series_rules(t, r->s->early, r->s->early_count, order, r->stride, r->input, r->series);
+  if (!order) series_at(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
+  else series_at(t, r->s->early, r->s->early_count, order, r->stride, r->input, r->series);
   follow_sets(r, e, order);
   inputs_of_sets(r, e, order);
-  if (order) series_rules(t, t->late, t->late_count, order, r->stride, r->input, r->series);
+  if (order) series_at(t, t->late, t->late_count, order, r->stride, r->input, r->series);
 }
 
 /* The same with them, and the states of the next order. */
 static void close_order(Run *r, Expansion *e, int order) {
   const Series *t = &r->s->series;
   if (r->s->sets) inputs_of_sets(r, e, order); else inputs_of(r, e, order);
-  series_rules(t, order ? t->late : t->moving, order ? t->late_count : t->moving_count, order, r->stride, r->input, r->series);
+  series_at(t, order ? t->late : t->moving, order ? t->late_count : t->moving_count, order, r->stride, r->input, r->series);
   if (r->s->sets) close_sets(r, e, order);
   next_states(r, e, order);
 }
@@ -969,7 +969,7 @@ static int is_determined(Run *r, const Layout *l, const int8_t *letter) {
   for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) m[i * n + j] = r->slope[l->sliding[i] * w + l->sliding[j]];
   int count = null_space(m, n, n, z, rest, r->decision->pivot);
   set_inputs(r, r->x, held_of(r, letter), r->none);
-  values_run(&r->s->columns, r->input, r->p, r->columns);
+  values_at(&r->s->columns, r->input, r->p, r->columns);
   const Entries *column = &r->s->column;
   for (int q = 0; q < count; q++) {
     double *terms = change + r->n, most = 0;

@@ -344,7 +344,7 @@ static void step(Run *r) {
   if (last) {
     r->t = r->o.t_end;
     r->t_low = 0;
-    if (r->s->timed) r->x[r->n - 1] = r->t;
+    tell_time(r);
     if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
   }
   if (row >= 0 && is_atom(r->now.kind[row])) arrive(r, e, dt, r->instant.tied);

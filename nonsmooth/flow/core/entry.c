@@ -119,12 +119,12 @@ static size_t place_run(Run *r, char *base) {
   r->active = INTEGERS(w);
   r->involved = INTEGERS(3 * w + 2 * all + 1);
   r->p = DOUBLES(s->parameters);
-  r->series = DOUBLES((size_t)s->series.size * stride);
-  r->point = DOUBLES(s->point.size);
-  r->heights = DOUBLES(s->surfaces.size);
-  r->maps = DOUBLES(s->maps.size);
-  r->restitution = DOUBLES(s->restitution.size);
-  r->columns = DOUBLES(s->columns.size);
+  r->series = DOUBLES(pair_room(s->series.size, stride));
+  r->point = DOUBLES(pair_room(s->point.size, 1));
+  r->heights = DOUBLES(pair_room(s->surfaces.size, 1));
+  r->maps = DOUBLES(pair_room(s->maps.size, 1));
+  r->restitution = DOUBLES(pair_room(s->restitution.size, 1));
+  r->columns = DOUBLES(pair_room(s->columns.size, 1));
   r->input = DOUBLES(n + 2 * w);
   r->held = DOUBLES(w);
   r->none = DOUBLES(w);
@@ -137,8 +137,8 @@ static size_t place_run(Run *r, char *base) {
   r->lam = DOUBLES(2 * w);
   r->matrix = DOUBLES(square + 6 * w + all + 2 * c);
   r->small = DOUBLES(4 * w + s->rules.atoms);
-  r->atom_work = DOUBLES(s->atoms.size);
-  r->choice_work = DOUBLES(s->choices.size);
+  r->atom_work = DOUBLES(pair_room(s->atoms.size, 1));
+  r->choice_work = DOUBLES(pair_room(s->choices.size, 1));
   used = place_instant(&r->instant, base, used, s);
   r->pending = INTEGERS(6 * w + 2 * all);
   r->sparse = INTEGERS(square + 2 * w + 1);
@@ -192,19 +192,19 @@ void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = time
 
 static void set_parameters(Run *r, const double *p) {
   const System *s = r->s;
+  const Values *program[] = {&s->point, &s->surfaces, &s->maps, &s->restitution, &s->columns, &s->atoms, &s->choices};
+  double *work[] = {r->point, r->heights, r->maps, r->restitution, r->columns, r->atom_work, r->choice_work};
   memcpy(r->p, p, sizeof(double) * s->parameters);
   series_prepare(&s->series, r->stride, r->p, r->series);
-  values_prepare(&s->point, r->p, r->point);
-  values_prepare(&s->surfaces, r->p, r->heights);
-  values_prepare(&s->maps, r->p, r->maps);
-  values_prepare(&s->restitution, r->p, r->restitution);
-  values_prepare(&s->columns, r->p, r->columns);
-  values_prepare(&s->atoms, r->p, r->atom_work);
-  values_prepare(&s->choices, r->p, r->choice_work);
+  pairs_begin(s->series.size, r->stride, r->begun, r->series);
+  for (int k = 0; k < 7; k++) {
+    values_prepare(program[k], r->p, work[k]);
+    pairs_begin(program[k]->size, 1, r->begun, work[k]);
+  }
 }
 
 /* A run that has not begun. */
-static void clear(Run *r, const Options *o, double t) {
+static void clear(Run *r, const Options *o, Pair t) {
   const System *s = r->s;
   r->o = *o;
   r->size = o->atol / o->rtol;
@@ -217,8 +217,9 @@ static void clear(Run *r, const Options *o, double t) {
   r->step_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
-  r->t = r->begun = t;
-  r->t_low = 0;
+  r->begun = t;
+  r->t = t.high;
+  r->t_low = t.low;
   r->since = 0;
   for (int i = 0; i < r->m; i++) { r->speed[i] = INFINITY; r->has_roots |= s->power[i] > 0; }
   r->limit = r->at_t = NAN;
@@ -235,9 +236,10 @@ static void clear(Run *r, const Options *o, double t) {
 
 void run_begin(Run *r, const Options *o, const Output *out, const double *x, const double *p,
                const int8_t *start_mode, double t, const double *motion) {
-  clear(r, o, t);
+  clear(r, o, (Pair){t, motion ? *motion : 0});
   r->out = *out;
   memcpy(r->x, x, sizeof(double) * r->n);
+  tell_time(r);
   set_parameters(r, p);
   if (finite_all(r->x, r->n)) { begin(r, start_mode, motion); return; }
   memset(r->letter, 1, r->width);
@@ -275,7 +277,7 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
 }
 
 /* What a restart needs, besides the state. */
-void run_motion(const Run *r, double *to) { if (r->s->rules.width) write_motion(r, to); }
+void run_motion(const Run *r, double *to) { write_motion(r, to); }
 
 /* Go on with larger arrays of the same content. */
 void run_resume(Run *r, const Output *out) { r->out = *out; }
@@ -334,7 +336,7 @@ static int is_plain(const Run *r) {
 /* The number of a mode's letters in the driver's table is that of lanes. */
 static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Suspended *m) {
   static const Output none;
-  clear(r, o, b->t0);
+  clear(r, o, (Pair){b->t0, 0});
   r->out = none;
   if (b->p_stride || !r->prepared) set_parameters(r, b->p + i * b->p_stride);
   r->prepared = 1;
@@ -350,6 +352,7 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   memset(r->instant.pending, 0, r->s->rules.triggers);
   memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
   r->t = m->t;
+  tell_time(r);
   r->since = m->since;
   r->length = m->length;
   r->shortened = m->shortened;
@@ -376,6 +379,7 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
     memcpy(b->at_x + i * r->s->dimension, r->at_x, sizeof(double) * r->s->dimension);
   }
   memcpy(m->x, r->x, sizeof(double) * r->n);
+  if (r->s->timed) m->x[r->n - 1] = r->t;
   memcpy(m->letter, r->letter, r->width);
   m->drop = r->drop[0];
   memcpy(m->side, r->instant.side, r->s->stops);

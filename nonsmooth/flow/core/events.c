@@ -37,7 +37,7 @@ static void look(Run *r, const double *x) {
   const System *s = r->s;
   Instant *i = &r->instant;
   double *weight = r->vector;
-  values_run(&s->atoms, x, r->p, r->atom_work);
+  values_at(&s->atoms, x, r->p, r->atom_work);
   for (int k = 0; k < r->n; k++) weight[k] = r->size + fabs(x[k]);
   gradient_sums(r, &s->atoms, r->atom_work, s->rules.atoms, &s->atom_gradient, s->rules.atoms, weight, 1, i->noise);
   for (int a = 0; a < s->rules.atoms; a++) {
@@ -101,7 +101,7 @@ static int next_event(Run *r) {
   for (int k = 0; k < u->triggers; k++)
     if (i->pending[k] && !(u->flags[u->trigger_event[k]] & PERSISTENT) && !triggers(r, k, i->view)) i->pending[k] = 0;
   for (int a = 0; a < u->atoms; a++) i->now[a] = i->zero[a] ? 0 : sign_of(i->value[a]);
-  values_run(&r->s->choices, r->x, r->p, r->choice_work);
+  values_at(&r->s->choices, r->x, r->p, r->choice_work);
   for (int event = 0; event < events; event++) {
     int pending = 0;
     for (int k = 0; k < u->triggers; k++) pending |= u->trigger_event[k] == event && i->pending[k];
@@ -117,7 +117,7 @@ static int next_event(Run *r) {
 /* The state after a reset; the time is kept. */
 static void reset_map(Run *r, int index, const double *x, double *after) {
   int nd = r->s->dimension;
-  values_run(&r->s->maps, x, r->p, r->maps);
+  values_at(&r->s->maps, x, r->p, r->maps);
   for (int i = 0; i < nd; i++) after[i] = out_of(&r->s->maps, r->maps, index * nd + i);
   if (r->s->timed) after[nd] = x[nd];
 }
@@ -187,6 +187,8 @@ static void write_motion(const Run *r, double *to) {
   const Instant *i = &r->instant;
   const int8_t *sides[] = {i->side, i->view, i->passing};
   double head[] = {i->running, i->first, i->last, (double)i->jumps, i->settled};
+  *to++ = r->t_low;
+  if (!u->atoms) return;
   for (int k = 0; k < 5; k++) *to++ = head[k];
   for (int k = 0; k < 3; k++) for (int a = 0; a < u->atoms; a++) *to++ = sides[k][a];
   for (int a = 0; a < u->atoms; a++) *to++ = i->residual[a];
@@ -199,6 +201,7 @@ static void read_motion(Run *r, const double *from) {
   const Rules *u = &r->s->rules;
   Instant *i = &r->instant;
   int8_t *sides[] = {i->side, i->view, i->passing};
+  from++; /* of the time, read before */
   begin_instant(r, -1);
   i->running = (int)from[0];
   i->first = (int)from[1];
@@ -215,6 +218,7 @@ static void read_motion(Run *r, const double *from) {
     i->count[c] = (int64_t)*from++;
   }
   if (u->keeps) memcpy(i->trigger_x, from, sizeof(double) * u->triggers * r->n);
+  for (int k = 0; u->keeps && r->s->timed && k < u->triggers; k++) i->trigger_x[(k + 1) * r->n - 1] = 0; /* this time */
 }
 
 /* Serve an event: one jump, or the end of the run. */
@@ -383,7 +387,7 @@ static void arrive(Run *r, const Expansion *e, double dt, int tied) {
     if (i->passing[r->s->stops + u->clock_reset[c]]) {
       r->t = tick_of(r, c, &r->t_low);
       r->x[u->clock_state[c]] = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
-      if (r->s->timed) r->x[r->n - 1] = r->t;
+      tell_time(r);
       if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
       renote(r);
     }
@@ -428,7 +432,7 @@ static void begin_events(Run *r, const double *motion) {
   const Rules *u = &r->s->rules;
   Instant *i = &r->instant;
   if (!u->atoms || r->status != RUNNING) return;
-  values_run(&r->s->choices, r->x, r->p, r->choice_work);
+  values_at(&r->s->choices, r->x, r->p, r->choice_work);
   memset(i->residual, 0, sizeof(double) * u->atoms);
   memset(i->pending, 0, u->triggers);
   memset(i->passing, 0, u->atoms);

@@ -87,13 +87,13 @@ static void sliding_series(Run *r, Expansion *e, const int32_t *start) {
   int order = r->order, stride = r->stride;
   for (int k = 0; k <= order; k++) {
     inputs_of(r, e, k);
-    if (k == 0) series_rules(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
+    if (k == 0) series_at(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
     else {
-      series_rules(t, t->later, t->later_count, k, stride, r->input, r->series);
+      series_at(t, t->later, t->later_count, k, stride, r->input, r->series);
       if (e->l.slides) {
         follow_layer(r, e, k, start);
         inputs_of(r, e, k);
-        series_rules(t, t->late, t->late_count, k, stride, r->input, r->series);
+        series_at(t, t->late, t->late_count, k, stride, r->input, r->series);
       }
     }
     if (k < order) next_states(r, e, k);
@@ -105,12 +105,12 @@ static void free_series(Run *r, Expansion *e) {
   const Series *t = &r->s->free;
   int n = r->n, order = r->order, stride = r->stride;
   inputs_of(r, e, 0);
-  series_rules(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
+  series_at(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
   next_states(r, e, 0);
   memset(r->input + n, 0, sizeof(double) * 2 * r->width);
   for (int k = 1; k <= order; k++) {
     for (int i = 0; i < n; i++) r->input[i] = e->states[(int64_t)i * stride + k];
-    series_rules(t, t->later, t->later_count, k, stride, r->input, r->series);
+    series_at(t, t->later, t->later_count, k, stride, r->input, r->series);
     if (k < order) next_states(r, e, k);
   }
 }
@@ -118,7 +118,7 @@ static void free_series(Run *r, Expansion *e) {
 /* First coefficients, values, from r->input. */
 static void first_values(Run *r, int is_free) {
   const Series *t = is_free ? &r->s->free : &r->s->series;
-  series_rules(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
+  series_at(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
 }
 
 static void jets(Run *r, Expansion *e) {
@@ -180,7 +180,7 @@ static void allow_for_roots(Run *r, Expansion *e) {
   const double *x = r->vector, *h = r->rates;
   double *state = r->vector;
   for (int k = 0; k < r->n; k++) state[k] = e->states[(int64_t)k * r->stride];
-  values_run(&r->s->surfaces, x, r->p, r->heights);
+  values_at(&r->s->surfaces, x, r->p, r->heights);
   for (int i = 0; i < r->m; i++) r->rates[i] = out_of(&r->s->surfaces, r->heights, i);
   for (int q = 0; q < g->count; q++) {
     int i = g->row[q], k = g->column[q];

@@ -144,7 +144,7 @@ static void rate_along(Run *r, const Layout *l, const double *unknowns, int own,
     if (k == 0) memcpy(lam, unknowns, sizeof(double) * r->width);
     if (k == 1) lam[own] = 1;
     set_inputs(r, x, k ? r->none : r->held, lam);
-    series_rules(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
+    series_at(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
     g[k] = row_of(r, r->n + own)[k];
   }
 }
@@ -492,7 +492,7 @@ static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
 /* Whether a step would end at a root that a series has where a fold is: no series sees it, so it is come closer to. */
 static int is_before_fold(const Run *r, const Expansion *e, int row, double dt) {
   if (e->l.kind[row] != BRANCH_GUARD || !is_mixed(r, e->l.sliding, e->l.slides)) return 0;
-  return dt > FOLD_NEAR * larger(fabs(r->t), fabs(r->t - r->begun));
+  return dt > FOLD_NEAR * time_scale(r);
 }
 
 /* Rules of order k of all that a mode needs, with the multipliers' own coefficients. */
@@ -502,7 +502,7 @@ static void rules_of(Run *r, const Expansion *f, int k) {
   for (int i = 0; i < r->n; i++) x[i] = f->states[(int64_t)i * r->stride + k];
   for (int i = 0; i < r->width; i++) lam[i] = f->series[(int64_t)i * r->stride + k];
   set_inputs(r, x, k ? r->none : r->held, lam);
-  series_rules(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
+  series_at(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
 }
 
 /* Series in the multiplier of sliding[lead], which moves in a direction, of states, of the others and of the rate

@@ -103,7 +103,7 @@ static void error_scales(Run *r, const double *x, const double *held, const doub
   const Entries *slope = &r->s->slope;
   set_inputs(r, x, held, unknowns);
   r->stamp++;
-  values_run(&r->s->point, r->input, r->p, r->point);
+  values_at(&r->s->point, r->input, r->p, r->point);
   for (int k = 0; k < slope->count; k++)
     r->slope[slope->row[k] * r->width + slope->column[k]] = out_of(&r->s->point, r->point, 2 * r->width + k);
 }
@@ -182,7 +182,7 @@ static void weigh_point(Run *r, Expansion *e, const double *x, const double *unk
     r->stamp++;
     if (r->s->point.free_count) {
       set_inputs(r, x, held, unknowns);
-      values_free(&r->s->point, r->input, r->p, r->point);
+      values_free_at(&r->s->point, r->input, r->p, r->point);
     }
   } else error_scales(r, x, held_of(r, e->l.letter), unknowns);
   e->stamp = r->stamp;

@@ -5,10 +5,10 @@
  */
 
 /* Values of a graph: node j is op[j] of nodes a[j] and b[j]; inputs have a vector and a position there.
- * ``free`` suffice where nothing slides. */
+ * ``free`` suffice where nothing slides; ``paired`` are two numbers if the time is (pairs.h). */
 typedef struct {
-  int32_t size, still_count, moving_count, free_count, output_count, pad;
-  const int32_t *op, *a, *b, *still, *moving, *free, *output;
+  int32_t size, still_count, moving_count, free_count, output_count, timed;
+  const int32_t *op, *a, *b, *still, *moving, *free, *output, *paired;
   const double *constant;
 } Values;
 
@@ -16,8 +16,8 @@ typedef struct {
  * zero, those of ``later`` further ones; ``late`` are those of them that unknown multipliers enter, which
  * follow from the equations of the same order. */
 typedef struct {
-  int32_t size, still_count, moving_count, later_count, late_count, output_count;
-  const int32_t *rule, *a, *b, *c, *op, *still, *moving, *later, *late, *output;
+  int32_t size, still_count, moving_count, later_count, late_count, output_count, timed, pad;
+  const int32_t *rule, *a, *b, *c, *op, *still, *moving, *later, *late, *output, *paired;
   const double *first, *second;
 } Series;
 

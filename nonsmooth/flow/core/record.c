@@ -19,7 +19,7 @@ static void note_step(Run *r, const Expansion *e) {
   r->out.start[k] = r->t;
   r->out.step_mode[k] = shown_mode(r);
   memcpy(c, e->states, sizeof(double) * r->n * stride);
-  if (fabs(low) <= EPSILON * larger(1, fabs(r->t - r->begun))) return;
+  if (fabs(low) <= EPSILON * larger(1, time_scale(r))) return;
   for (int i = 0; i < r->s->dimension; i++, c += stride)
     for (int j = 0; j < r->order; j++)
       for (int q = r->order - 1; q >= j; q--) c[q] -= low * c[q + 1];
@@ -61,7 +61,7 @@ static void sample_step(Run *r, const Expansion *e, double dt) {
 static void count_hit(Run *r, int kind, int guard, int index, int side, const double *x) {
   const Options *o = &r->o;
   if (!(o->hit_kinds >> kind & 1) || !o->hit_named[guard * o->hit_width + index]) return;
-  if ((o->hit_side && side != o->hit_side) || r->t - r->begun + r->t_low <= AT_END * larger(1, time_scale(r))) return;
+  if ((o->hit_side && side != o->hit_side) || (r->t - r->begun.high) + (r->t_low - r->begun.low) <= AT_END * larger(1, time_scale(r))) return;
   r->hits++;
   if (r->hits <= o->hit_skip || (r->hits - o->hit_skip) % o->hit_every) return;
   /* Before the jumps of the instant, or after them. */
@@ -94,7 +94,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
     r->out.event_before[k] = before;
     r->out.event_after[k] = r->mode;
     r->out.event_guard[k] = guard;
-    if (r->s->rules.width) write_motion(r, r->out.event_motion + k * r->s->rules.width);
+    write_motion(r, r->out.event_motion + k * r->s->rules.width);
   }
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, r->met.index, r->met.side, x);
   if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, 0, 0, x); /* impacts that accumulated */

@@ -31,7 +31,7 @@ static void aim(Run *r, const int8_t *letter, const double *x, const double *unk
     if (letter[f] < OFF || letter[f] == IDLE) { for (int i = 0; i < k; i++) u[i] = 0; continue; }
     if (letter[f] != OFF) { unit_of(unknowns + f, k, u); continue; }
     if (!h) {
-      values_run(&r->s->surfaces, x, r->p, r->heights);
+      values_at(&r->s->surfaces, x, r->p, r->heights);
       h = r->heights_of;
       for (int i = 0; i < r->m; i++) r->heights_of[i] = out_of(&r->s->surfaces, r->heights, i);
     }
@@ -187,18 +187,18 @@ static void set_series(Run *r, Expansion *e, const int32_t *start) {
   for (int i = 0; i < r->m; i++) e->lambda[(int64_t)i * stride] = r->direction[i];
   for (int k = 0; k <= order; k++) {
     inputs_of_sets(r, e, k);
-    if (k == 0) series_rules(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
-    else series_rules(t, early, early_count, k, stride, r->input, r->series);
+    if (k == 0) series_at(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
+    else series_at(t, early, early_count, k, stride, r->input, r->series);
     follow_sets(r, e, k);
     if (k) {
       inputs_of_sets(r, e, k);
-      series_rules(t, t->late, t->late_count, k, stride, r->input, r->series);
+      series_at(t, t->late, t->late_count, k, stride, r->input, r->series);
     }
     if (leaving) leave_sets(r, e, k);
     else if (k && e->l.slides) follow_layer(r, e, k, start);
     if (k && (leaving || e->l.slides)) {
       inputs_of_sets(r, e, k);
-      series_rules(t, t->late, t->late_count, k, stride, r->input, r->series);
+      series_at(t, t->late, t->late_count, k, stride, r->input, r->series);
     }
     close_sets(r, e, k);
     if (k < order)

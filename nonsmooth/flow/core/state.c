@@ -1,6 +1,6 @@
 /* The driver: all that a run is. The system is data, not code.
  *
- * Read in the order of core_source.py: programs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c, decide.c,
+ * Read in the order of core_source.py: programs.h, pairs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c, decide.c,
  * events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
  */
 
@@ -121,7 +121,8 @@ typedef struct {
   double *p;
   int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
   /* The time is t + t_low: that of an event is no number of its own where times are large. */
-  double t, t_low, begun, since, limit, at_t, *x, *at_x, *unknowns;
+  Pair begun;
+  double t, t_low, since, limit, at_t, *x, *at_x, *unknowns;
   int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
   double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
   Layout now; /* of the present mode */

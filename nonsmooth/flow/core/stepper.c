@@ -23,25 +23,28 @@ static double bound_at(double part, int order) {
   return part > SMALLEST ? rough_exp2(rough_log2(smaller(part, LARGEST)) * (-1.0 / order)) : INFINITY;
 }
 
+/* The time since the start is a state of a system with an explicit time. */
+static void tell_time(Run *r) {
+  if (r->s->timed) r->x[r->n - 1] = (r->t - r->begun.high) + (r->t_low - r->begun.low);
+}
+
 /* Move the time on, in two numbers; it is kept to the rounding of the steps, not of their sum. */
 static void pass_time(Run *r, double dt) {
   double sum = r->t + dt, moved = sum - r->t, lost = (r->t - (sum - moved)) + (dt - moved) + r->t_low;
   r->t = sum + lost;
   r->t_low = lost - (r->t - sum);
-  if (r->s->timed) r->x[r->n - 1] = r->t;
+  tell_time(r);
 }
 
 /* A step's length in a run that begins late, changed so little that the time after it is one number. */
 static double to_number(const Run *r, double dt) {
-  if (fabs(r->t) <= FAR * (r->o.t_end - r->begun)) return dt;
+  if (fabs(r->t) <= FAR * (r->o.t_end - r->begun.high)) return dt;
   double to = (r->t + dt) - r->t - r->t_low;
   return fabs(to - dt) <= RESOLVED * dt ? to : dt;
 }
 
-/* Rounding of times is relative to this: where they enter no formula, to how long the run is. */
-static double time_scale(const Run *r) {
-  return r->s->timed ? larger(fabs(r->t), fabs(r->t - r->begun)) : fabs(r->t - r->begun);
-}
+/* Rounding of times is relative to this, how long the run is. */
+static double time_scale(const Run *r) { return fabs(r->t - r->begun.high); }
 
 /* Shorten a step until a guard's series converges within it. */
 static double resolve(const double *g, int order, double h) {

@@ -3,7 +3,7 @@
 /* Surfaces, gaps, their rates and lower derivatives at x; gradients stay among the program's values. */
 static const double *surface_values(Run *r, const double *x) {
   const Values *t = &r->s->surfaces;
-  values_run(t, x, r->p, r->heights);
+  values_at(t, x, r->p, r->heights);
   for (int i = 0; i < r->kept_rows; i++) r->rates[i] = out_of(t, r->heights, i);
   return r->rates;
 }

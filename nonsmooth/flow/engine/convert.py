@@ -58,8 +58,8 @@ def _events(system: FilippovSystem, run: Run) -> Events:
             known[key] = _label(system, run, *key)
         labels.append(known[key])
     t, rows, jumps, codes = run.event_t, run.event_rows, run.event_jumps, run.event_codes
-    motions = run.event_motions
-    status, width = Status(run.status), motions.shape[1]
+    status, width = Status(run.status), len(run.motion)
+    motions = run.event_motions if width else np.zeros((0, 0))
     if status is not Status.STOPPED:
         letters = system.spelled(modes[run.mode])
         t, rows = np.append(t, run.t[-1]), np.append(rows, len(run.t) - 1)

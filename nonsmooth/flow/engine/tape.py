@@ -40,8 +40,9 @@ class ValuesStructure(ctypes.Structure):
 
     _fields_ = [
         *[(name, _I32) for name in ("size", "still_count", "moving_count", "free_count")],
-        *[(name, _I32) for name in ("output_count", "pad")],
+        *[(name, _I32) for name in ("output_count", "timed")],
         *[(name, _POINTER) for name in ("op", "a", "b", "still", "moving", "free", "output")],
+        ("paired", _POINTER),
         ("constant", _POINTER),
     ]
 
@@ -51,9 +52,9 @@ class SeriesStructure(ctypes.Structure):
 
     _fields_ = [
         *[(name, _I32) for name in ("size", "still_count", "moving_count", "later_count")],
-        *[(name, _I32) for name in ("late_count", "output_count")],
+        *[(name, _I32) for name in ("late_count", "output_count", "timed", "pad")],
         *[(name, _POINTER) for name in ("rule", "a", "b", "c", "op", "still", "moving", "later")],
-        *[(name, _POINTER) for name in ("late", "output", "first", "second")],
+        *[(name, _POINTER) for name in ("late", "output", "paired", "first", "second")],
     ]
 
 
@@ -141,16 +142,17 @@ def tape_for(system: FilippovSystem, options: Options) -> TapeEngine:
 def series_structure(s: Series, kept: list[NDArray[Any]]) -> SeriesStructure:
     """Rules as C reads them; what it points to is added to ``kept``."""
     lists = (s.still, s.moving, s.later, s.late, s.outputs)
-    arrays = (s.rule, s.a, s.b, s.c, s.op, *lists, s.first, s.second)
+    arrays = (s.rule, s.a, s.b, s.c, s.op, *lists, s.paired, s.first, s.second)
     kept += arrays
-    return SeriesStructure(len(s.rule), *map(len, lists), *[a.ctypes.data for a in arrays])
+    sizes = (len(s.rule), *map(len, lists), int(s.paired.any()), 0)
+    return SeriesStructure(*sizes, *[a.ctypes.data for a in arrays])
 
 
 def values_structure(v: Values, kept: list[NDArray[Any]]) -> ValuesStructure:
     """A graph as C reads it; what it points to is added to ``kept``."""
-    arrays = (v.op, v.a, v.b, v.still, v.moving, v.free, v.outputs, v.constant)
+    arrays = (v.op, v.a, v.b, v.still, v.moving, v.free, v.outputs, v.paired, v.constant)
     kept += arrays
-    sizes = (len(v.op), len(v.still), len(v.moving), len(v.free), len(v.outputs), 0)
+    sizes = (*map(len, (v.op, v.still, v.moving, v.free, v.outputs)), int(v.paired.any()))
     return ValuesStructure(*sizes, *[a.ctypes.data for a in arrays])
 
 
@@ -265,7 +267,7 @@ class TapeEngine:
             "value_at": _ends(values),
         }
         atoms, keeps = d.guards.numel(), any(rule.at_trigger for rule in d.rules)
-        width = 5 + 4 * atoms + len(conditions) + 3 * len(d.clocks)
+        width = 1 + (5 + 4 * atoms + len(conditions) + 3 * len(d.clocks)) * (atoms > 0)
         width += len(conditions) * self.system.extended_dimension * keeps
         made = _Rules(
             atoms=atoms,
@@ -273,7 +275,7 @@ class TapeEngine:
             clocks=len(d.clocks),
             discrete=len(d.discrete),
             keeps=int(keeps),
-            width=width if atoms else 0,
+            width=width,
         )
         for name, table in tables.items():
             setattr(made, name, self._at(np.array([*table, 0], np.int32)))
@@ -329,8 +331,9 @@ class TapeEngine:
                 self._rooms = recorder.rooms  # of the next run, which is often a similar one
             modes, labels = self._modes(table), self._labels(table)
             final = np.zeros(width)
-            if width:
-                library().run_motion(state, address(final))
+            library().run_motion(state, address(final))
+            if width == 1 and options.t_start == 0:  # times of events are known to rounding
+                final = final[:0]
         return Run(
             status=counts[0],
             reason=counts[1],
@@ -352,9 +355,10 @@ class TapeEngine:
     def _checked(self, motion: Array) -> Array:
         """What a run or event keeps for a restart, if it is of this system."""
         rules, d = self._c.rules, self.system.definition
-        sides = motion[5 : 5 + 3 * rules.atoms]
+        sides = motion[6 : 6 + 3 * rules.atoms]
         fits = len(motion) == rules.width and bool(np.isfinite(motion).all())
-        if fits and (np.isin(sides, (-1, 0, 1)).all() and -1 <= motion[2] < len(d.rules)):
+        last = motion[3] if fits and rules.atoms else -1
+        if fits and (np.isin(sides, (-1, 0, 1)).all() and -1 <= last < len(d.rules)):
             return np.ascontiguousarray(motion)
         raise OptionError(
             "start is a run or event of another system, or with another section. Continue it with its own "

@@ -198,7 +198,7 @@ class Clock:
     >>> switched = ns.FilippovSystem(
     ...     [x], surface=clock.phase - 0.6, above=[-x], below=[1 - x], clocks=clock)
     >>> switched
-    FilippovSystem(2 states: x, clock_phase; 1 surface; reset 'clock')
+    FilippovSystem(2 states: x, clock_phase; 1 surface (velocity continuous); reset 'clock')
     >>> run = ns.simulate(switched, [0.0, 0.0], t_end=40.0, at=ns.Section("clock", skip=18))
     >>> duty = (ca.exp(0.6) - 1) / (ca.exp(2) - 1)  # periodic by now
     >>> bool(abs(run.sample_x[-1, 0] - duty) < 1e-9)

@@ -24,8 +24,13 @@ from ..values import Array, state_values
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .parse_definition import Definition, consistent_parameters, read_definition
+from .switching import Switching, class_of
 
 T = TypeVar("T")
+
+#: Classes of surfaces are shown for at most so many of them.
+_CLASSES_SHOWN = 8
+
 Discrete = Sequence[Expression] | Mapping[Any, Sequence[float] | None]
 
 
@@ -268,7 +273,7 @@ class FilippovSystem:
         names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
         surfaces = len(self.entries) - len(self.sets)
         if surfaces or not self.sets:
-            parts.append(f"{surfaces} surface{'s' * (surfaces != 1)}{names}")
+            parts.append(f"{surfaces} surface{'s' * (surfaces != 1)}{self._classes()}{names}")
         parts += [f"set of codimension {len(members)}" for members in self.sets]
         if self.parameter_names:
             parts.append(f"parameters: {', '.join(self.parameter_names)}")
@@ -277,6 +282,16 @@ class FilippovSystem:
         parts += [f"stop {n!r}" for n, _ in self.stops] + [f"reset {n!r}" for n, _ in self.resets]
         parts += [f"impact {n!r}" for n in self.impacts]
         return f"FilippovSystem({'; '.join(parts)})"
+
+    def _classes(self) -> str:
+        """The classes of surfaces, for people, where one is not generic."""
+        own = [members[0] for members in self.entries if len(members) == 1]
+        if len(own) > _CLASSES_SHOWN:
+            return ""
+        words = [self.switching(i).name for i in own]
+        if set(words) <= {"generic"}:
+            return ""
+        return f" ({', '.join(words if len(set(words)) > 1 else words[:1])})"
 
     # shape -------------------------------------------------------------------------------------
 
@@ -438,6 +453,59 @@ class FilippovSystem:
                 f"surface: expected an index below {self.surface_count}, received {surface}."
             )
         return int(surface)
+
+    def switching(
+        self, surface: int = 0, *, mode: str | None = None, parameters: Parameters | None = None
+    ) -> Switching:
+        """Say what of the field jumps on a surface: continuous, velocity continuous or generic.
+
+        Parameters
+        ----------
+        surface : int, optional
+            Index of the surface.
+        mode : str, optional
+            Letters of the other surfaces, ``+``, ``-`` or ``s``: the class in that mode. Otherwise the class
+            holds for all values of the other multipliers.
+        parameters : mapping, optional
+            Values of the parameters; the class of these values only. Otherwise it holds for all.
+
+        Returns
+        -------
+        Switching
+            The class, its order, and how it was decided.
+
+        Raises
+        ------
+        DefinitionError
+            No such surface or mode.
+        ParameterError
+            An unknown parameter, one without a value, or a value that is not a finite number.
+
+        Notes
+        -----
+        Source: di Bernardo et al. 2008, Piecewise-smooth Dynamical Systems, section 2.3.
+
+        Examples
+        --------
+        A soft stop is continuous; a preload in it is not, and only its velocity is:
+
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, v, force = (ca.SX.sym(s) for s in ("x", "v", "force"))
+        >>> s = ns.FilippovSystem([x, v], surface=x - 1, above=[v, -x - 5 * (x - 1) - force],
+        ...     below=[v, -x], parameters=[force])
+        >>> print(s.switching(parameters={"force": 0}))
+        continuous of order 1; nothing slides here (by exact arithmetic modulo a prime)
+        >>> s.switching().kind, s.switching().order
+        ('velocity continuous', 0)
+        """
+        i = self.surface_index(surface)
+        if mode is not None:
+            self.require_mode(mode)
+        if i in self.set_of:
+            return Switching("generic", None, None, "its definition as a set")
+        values = None if parameters is None else tuple(self.parameter_vector(parameters).tolist())
+        key = ("switching", i, mode, values)
+        return self.cached(key, lambda: class_of(self, i, mode, parameters))
 
     # expressions -----------------------------------------------------------------------------
 

@@ -1,8 +1,9 @@
 """Whether expressions vanish on a surface, decided by exact arithmetic modulo a prime.
 
 A nonzero expression vanishes at random integers modulo the prime with a probability of about 2^-60.
-Elementary functions are random functions of their argument there, so identities between them
-(exp(a) exp(b) = exp(a + b)) are not found; square roots are. Constants are the exact values of the
+Elementary functions are random functions of their argument there, but for their exact values at 0
+and 1, so identities between them (exp(a) exp(b) = exp(a + b)) are not found; square roots are.
+Constants are the exact values of the doubles. Where this leaves it open, ``decide_zero`` looks at
 doubles.
 
 Source: Schwartz 1980, "Fast probabilistic algorithms for verification of polynomial identities".
@@ -10,17 +11,32 @@ Source: Schwartz 1980, "Fast probabilistic algorithms for verification of polyno
 
 from __future__ import annotations
 
+import math
 import random
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
+from ..values import Array
+from .float_arithmetic import BINARY, UNARY
 from .graph import Node, evaluate, instructions
 
 PRIME = 2**61 - 1
 
 _TRIALS, _DRAWS = 6, 200
+
+#: Elementary functions at an argument where their value is exact.
+_AT_ZERO = {
+    **dict.fromkeys(
+        "sin tan asin atan sinh tanh asinh atanh expm1 log1p erf erfinv sqrt".split(), 0
+    ),
+    **dict.fromkeys(("exp", "cos", "cosh"), 1),
+}
+_AT_ONE = {"log": 0, "acos": 0, "acosh": 0}
 
 
 class _Undecided(Exception):
@@ -33,6 +49,7 @@ class _Modular:
     def __init__(self, values: Sequence[Sequence[int]], seed: int):
         self.values, self.seed = values, seed
         self._positive = set[int]()  # constants
+        self.guesses = False  # whether a value is that of no function
 
     def constant(self, value: float) -> int:
         exact = Fraction(value)
@@ -52,6 +69,10 @@ class _Modular:
             result = {"neg": -a, "sq": a * a, "twice": 2 * a, "assign": a}[op]
         elif op in ("div", "inv"):
             result = (a if op == "div" else 1) * _inverse(b)
+        elif a == 0 and op in _AT_ZERO:
+            result = _AT_ZERO[op]
+        elif a == 1 and op in _AT_ONE:
+            result = _AT_ONE[op]
         elif op == "sqrt":
             result = _root(a)
         elif op in ("pow", "constpow") and (n := _small(b)) is not None:
@@ -59,6 +80,7 @@ class _Modular:
         elif op in ("pow", "constpow") and a == 0 and b in self._positive:
             result = 0
         else:
+            self.guesses = True
             result = random.Random(f"{self.seed} {op} {list(args)}").randrange(1, PRIME)
         return result % PRIME
 
@@ -83,44 +105,79 @@ def _small(b: int) -> int | None:
     return signed if abs(signed) <= 1000 else None
 
 
-def vanish_on(
-    expressions: Sequence[ca.SX], surface: ca.SX, variables: ca.SX, others: ca.SX
-) -> bool:
+def vanish_on(expressions: Sequence[ca.SX], surface: ca.SX, variables: ca.SX) -> bool:
     """Whether all expressions are zero wherever ``surface`` is."""
-    every = ca.vertcat(surface, *expressions)
-    used = [(s, ca.depends_on(variables, s)) for s in ca.symvar(every)]
+    return _modular(expressions, [surface], variables) is True
+
+
+def decide_zero(
+    expressions: Sequence[ca.SX], surfaces: Sequence[ca.SX], variables: ca.SX
+) -> tuple[bool | None, str]:
+    """Whether all expressions are zero wherever all ``surfaces`` are, or None, and how it was decided."""
+    pieces = [e for e in expressions if not ca.SX(e).is_zero()]
+    if not pieces:
+        return True, EXACTLY
+    found = _modular(pieces, surfaces, variables)
+    if found is not None:
+        return found, EXACTLY
+    return _in_doubles(pieces, surfaces, variables), IN_DOUBLES
+
+
+def _modular(
+    expressions: Sequence[ca.SX], surfaces: Sequence[ca.SX], variables: ca.SX
+) -> bool | None:
+    """Zero, not zero, or None where elementary functions or a surface of high degree leave it open."""
+    used = [
+        (s, ca.depends_on(variables, s)) for s in ca.symvar(ca.vertcat(*surfaces, *expressions))
+    ]
     vectors = [ca.vertcat(*[s for s, moves in used if moves is kind]) for kind in (True, False)]
-    nodes, rows = instructions(vectors, [surface, ca.vertcat(*expressions)])
+    nodes, rows = instructions(vectors, [ca.vertcat(*surfaces), ca.vertcat(*expressions)])
     generator, trials = random.Random(0), 0
     for seed in range(_DRAWS):
         values = [[generator.randrange(PRIME) for _ in range(v.numel())] for v in vectors]
         try:
-            point = _on_surface(nodes, rows[0][0], values, seed)
+            point = _on_surfaces(nodes, rows[0], values, seed)
             if point is None:
-                return False
-            found = evaluate(nodes, _Modular(point, seed))
+                return None
+            algebra = _Modular(point, seed)
+            found = evaluate(nodes, algebra)
         except _Undecided:
             continue
         if any(found[k] for k in rows[1]):
-            return False
+            return None if algebra.guesses else False
         trials += 1
         if trials == _TRIALS:
             return True
-    return False
+    return None
+
+
+def _on_surfaces(
+    nodes: Sequence[Node], rows: Sequence[int], values: list[list[int]], seed: int
+) -> list[list[int]] | None:
+    """Move a variable for each surface so that its node becomes zero; None where none enters it simply."""
+    for k, row in enumerate(rows):
+        found = _on_surface(nodes, row, rows[:k], values, seed)
+        if found is None:
+            return None
+        values = found
+    return values
 
 
 def _on_surface(
-    nodes: Sequence[Node], row: int, values: list[list[int]], seed: int
+    nodes: Sequence[Node], row: int, kept: Sequence[int], values: list[list[int]], seed: int
 ) -> list[list[int]] | None:
-    """Move one variable so that a node becomes zero; None where none enters it simply."""
+    """Move a variable on which no ``kept`` node depends so that a node becomes zero."""
+    last = max(row, *kept, 0) + 1
 
-    def at(j: int, value: int) -> int:
+    def at(j: int, value: int) -> tuple[int, bool]:
         moved = [[*values[0][:j], value, *values[0][j + 1 :]], values[1]]
-        return evaluate(nodes[: row + 1], _Modular(moved, seed))[row]
+        found = evaluate(nodes[:last], _Modular(moved, seed))
+        return found[row], any(found[k] for k in kept)
 
     for j in range(len(values[0])):
-        h = [at(j, k) for k in range(4)]
-        if h[0] == h[1]:
+        tried = [at(j, k) for k in range(4)]
+        h = [value for value, _ in tried]
+        if h[0] == h[1] or any(lost for _, lost in tried):
             continue
         second, third = h[2] - 2 * h[1] + h[0], h[3] - 3 * h[2] + 3 * h[1] - h[0]
         if third % PRIME:
@@ -132,4 +189,87 @@ def _on_surface(
         else:
             root = (-b + _root(b * b - 4 * a * c)) * _inverse(2 * a)
         return [[*values[0][:j], root % PRIME, *values[0][j + 1 :]], values[1]]
+    return None
+
+
+# In doubles ---------------------------------------------------------------------------------------
+
+#: How it was decided: a nonzero value is a proof, zeros fail with a chance of about 2^-60.
+EXACTLY = "exact arithmetic modulo a prime"
+
+#: Numbers at some points are no proof.
+IN_DOUBLES = "doubles at random points"
+
+_EPSILON = sys.float_info.epsilon
+_POINTS, _NEWTON = 8, 30
+
+#: Rounding errors that a value of zero may be off by, and those from which on it is none.
+_ZERO, _CLEAR = 1e3, 1e6
+
+
+class _Rounded:
+    """The algebra of doubles with their rounding errors."""
+
+    def __init__(self, values: Sequence[Sequence[float]]):
+        self.values = values
+
+    def constant(self, value: float) -> tuple[float, float]:
+        return value, 0.0
+
+    def symbol(self, vector: int, position: int) -> tuple[float, float]:
+        value = self.values[vector][position]
+        return value, _EPSILON * abs(value)
+
+    def apply(self, op: str, args: Sequence[tuple[float, float]]) -> tuple[float, float]:
+        function: Callable[..., float] = UNARY[op] if op in UNARY else BINARY[op]
+        given = [value for value, _ in args]
+        value = function(*given)
+        error = _EPSILON * abs(value)
+        for k, (own, off) in enumerate(args):
+            if off:
+                error += abs(function(*given[:k], own + off, *given[k + 1 :]) - value)
+        return value, error
+
+
+def _in_doubles(
+    expressions: Sequence[ca.SX], surfaces: Sequence[ca.SX], variables: ca.SX
+) -> bool | None:
+    """The same by values at points on the surfaces, beside their rounding errors."""
+    every = ca.symvar(ca.vertcat(*surfaces, *expressions))
+    moves = np.array([bool(ca.depends_on(variables, s)) for s in every])
+    z, h = ca.vertcat(*every), ca.vertcat(*surfaces)
+    nodes, rows = instructions([z], [ca.vertcat(*expressions)])
+    read = ca.Function("surfaces", [z], [h, ca.jacobian(h, z)])
+    generator, zeros, seen = np.random.default_rng(0), 0, 0
+    for _ in range(5 * _POINTS):
+        point = _newton(read, generator.uniform(-2.0, 2.0, len(every)), moves)
+        if point is None:
+            continue
+        try:
+            values = evaluate(nodes, _Rounded([point.tolist()]))
+        except (ValueError, ZeroDivisionError, OverflowError):
+            continue
+        found = [values[k] for k in rows[0]]
+        if not all(math.isfinite(value) and math.isfinite(error) for value, error in found):
+            continue
+        if any(abs(value) > _CLEAR * error for value, error in found):
+            return False
+        zeros += all(abs(value) <= _ZERO * error for value, error in found)
+        seen += 1
+        if seen == _POINTS:
+            return True if zeros == seen else None
+    return None
+
+
+def _newton(read: ca.Function, point: Array, moves: NDArray[np.bool_]) -> Array | None:
+    """Least-norm Newton steps of the variables onto the surfaces."""
+    for _ in range(_NEWTON):
+        h, jacobian = (np.array(v, dtype=float) for v in read(point))
+        if not (np.all(np.isfinite(h)) and np.all(np.isfinite(jacobian))):
+            return None
+        if np.all(np.abs(h) <= 8 * _EPSILON * (np.abs(jacobian) @ np.abs(point)[:, None])):
+            return point
+        step = np.zeros_like(point)
+        step[moves] = np.linalg.lstsq(jacobian[:, moves], h.ravel(), rcond=None)[0]
+        point = point - step
     return None

@@ -60,8 +60,8 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
         if ca.depends_on(column, lam) or not ca.depends_on(column, variables):
             continue  # products of multipliers, or hidden dynamics; a constant
         if len(members) == 1:  # what vanishes with h has no part in sliding
-            h, others = system.definition.surfaces[members[0]], ca.vertcat(p, lam, reactions)
-            acts = [not vanish_on([e], h, x, others) for e in entries]
+            h = system.definition.surfaces[members[0]]
+            acts = [not vanish_on([e], h, x) for e in entries]
             places = [own for own, is_there in zip(places, acts, strict=True) if is_there]
             entries = [e for e, is_there in zip(entries, acts, strict=True) if is_there]
         if not entries:
@@ -131,8 +131,9 @@ class Coupled:
         d, x = self.system.definition, self.system.extended_states
         column = ca.jacobian(d.field, d.multipliers[surface])
         pieces = [e for e in ca.vertsplit(ca.densify(column)) if not e.is_zero()]
-        h, others = d.surfaces[surface], ca.vertcat(d.parameters, d.multipliers, d.reactions)
-        return all(ca.depends_on(e, x) for e in pieces) and vanish_on(pieces, h, x, others)
+        return all(ca.depends_on(e, x) for e in pieces) and vanish_on(
+            pieces, d.surfaces[surface], x
+        )
 
     def _without_roots(
         self, field: ca.SX, lam: ca.SX, factors: list[ca.SX], unknowns: list[ca.SX]

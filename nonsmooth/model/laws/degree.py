@@ -61,5 +61,4 @@ def _places(symbols: Sequence[ca.SX], place: dict[int, int]) -> set[int]:
 def _vanishes(column: ca.SX, h: ca.SX, x: ca.SX) -> bool:
     """Whether what an unknown is multiplied with is zero wherever ``h`` is."""
     pieces = [e for e in ca.vertsplit(ca.densify(column.T)) if not e.is_zero()]
-    rest = ca.vertcat(*[s for s in ca.symvar(ca.vertcat(h, *pieces)) if not ca.depends_on(x, s)])
-    return all(ca.depends_on(e, x) for e in pieces) and vanish_on(pieces, h, x, rest)
+    return all(ca.depends_on(e, x) for e in pieces) and vanish_on(pieces, h, x)

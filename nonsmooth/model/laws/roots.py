@@ -36,8 +36,7 @@ class _Gated:
         if power is None or not ca.depends_on(args[0], self._x):
             return result
         for i, h in enumerate(self._surfaces):
-            rest = [s for s in ca.symvar(ca.vertcat(h, args[0])) if not ca.depends_on(self._x, s)]
-            if vanish_on([args[0]], h, self._x, ca.vertcat(*rest)):
+            if vanish_on([args[0]], h, self._x):
                 self.powers[i] = min(power, self.powers.get(i, power))
                 gate = _side(args[0], h) * self._gates[i]
                 return gate * (1 + gate) / 2 * result

@@ -150,7 +150,7 @@ class Affine:
         if not pieces:
             return True
         reduced, _ = cancel_common_factor([*pieces, h], self.states, p)
-        return not ca.depends_on(reduced[-1], self.states) or vanish_on(pieces, h, self.states, p)
+        return not ca.depends_on(reduced[-1], self.states) or vanish_on(pieces, h, self.states)
 
 
 def _with_letter(mode: str, surface: int, letter: str) -> str:

@@ -40,6 +40,8 @@ class Values:
         Those of the latter that suffice where nothing slides.
     outputs : ndarray of int32
         Nodes of the outputs.
+    paired : ndarray of int32
+        Whether each node is evaluated in two numbers where the time is two; see ``flow/core/pairs.h``.
     """
 
     op: Integers
@@ -50,6 +52,7 @@ class Values:
     moving: Integers
     free: Integers
     outputs: Integers
+    paired: Integers
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,8 @@ class Series:
     #: Those of ``later`` that are not in ``late``.
     early: Integers
     outputs: Integers
+    #: Whether each is evaluated in two numbers where the time is two.
+    paired: Integers
 
 
 @dataclass(frozen=True)
@@ -127,16 +132,17 @@ def tape_of(coupled: Coupled) -> Tape:
     output, moves, slopes = _moving_slopes(coupled)
     point = [coupled.layer, coupled.factors, *[nonzeros for nonzeros, _ in matrices]]
     series, free = _series_of_modes(coupled, slopes)
+    time = _time_of(coupled)
     return Tape(
         series=series,
         free=free,
-        point=values_of([coupled.moving, p], coupled.awake(point), (4, 5)),
-        surfaces=values_of([x, p], [kept, surface_gradient[0]]),
-        maps=values_of([x, p], [d.maps]),
-        atoms=values_of([x, p], [atoms, gradient[0]]),
-        choices=values_of([x, p], [d.whens, d.priorities, d.periods]),
-        restitution=values_of([x, p], [d.restitutions]),
-        columns=values_of([coupled.moving, p], coupled.awake([column[0]])),
+        point=values_of([coupled.moving, p], coupled.awake(point), (4, 5), time),
+        surfaces=values_of([x, p], [kept, surface_gradient[0]], (), time),
+        maps=values_of([x, p], [d.maps], (), time),
+        atoms=values_of([x, p], [atoms, gradient[0]], (), time),
+        choices=values_of([x, p], [d.whens, d.priorities, d.periods], (), time),
+        restitution=values_of([x, p], [d.restitutions], (), time),
+        columns=values_of([coupled.moving, p], coupled.awake([column[0]]), (), time),
         slope=slope[1],
         layer_gradient=gradients[0][1],
         height_gradient=gradients[1][1],
@@ -153,8 +159,17 @@ def tape_of(coupled: Coupled) -> Tape:
     )
 
 
+def _time_of(coupled: Coupled) -> int | None:
+    """Position of the time among the states."""
+    system = coupled.system
+    return system.dimension if system.time_dependent else None
+
+
 def values_of(
-    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], free: Sequence[int] = ()
+    inputs: Sequence[ca.SX],
+    outputs: Sequence[ca.SX],
+    free: Sequence[int] = (),
+    time: int | None = None,
 ) -> Values:
     """Write expressions in two vectors of symbols, of which the first moves."""
     nodes, rows = instructions(inputs, outputs)
@@ -169,6 +184,7 @@ def values_of(
             args[j] = node.source
         else:
             args[j, : len(node.args)] = node.args
+    is_time = [node.op == "input" and node.source == (0, time) for node in nodes]
     return Values(
         op=_integers(op),
         a=_integers(args[:, 0]),
@@ -178,7 +194,26 @@ def values_of(
         moving=_where(moving, True),
         free=_reached([node.args for node in nodes], moving, [j for k in free for j in rows[k]]),
         outputs=_integers([j for row in rows for j in row]),
+        paired=_paired([node.op for node in nodes], [node.args for node in nodes], is_time),
     )
+
+
+#: Operations and rules with two numbers; others have one, of two arguments.
+_KEEP_PAIRS = frozenset(
+    "assign neg twice sq inv add sub mul div fabs fmin fmax fmod if_else_zero affine chosen".split()
+)
+
+
+def _paired(
+    names: Sequence[str], arguments: Sequence[Sequence[int]], is_time: Sequence[bool]
+) -> Integers:
+    """What is, or has an argument that is, the time or follows from it by arithmetic."""
+    kept = list(is_time)
+    found = list(is_time)
+    for j, (name, own) in enumerate(zip(names, arguments, strict=True)):
+        found[j] |= any(kept[a] for a in own)
+        kept[j] |= found[j] and name in _KEEP_PAIRS
+    return _integers(found)
 
 
 def series_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Series:
@@ -194,7 +229,7 @@ def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
     rules, rows = _rules_of(inputs, coupled.awake([*coupled.outputs, slopes]))
     of_sets = {n + i for i in coupled.system.set_of}
     held = {n + i for i in range(m) if coupled.scaled[i]} - of_sets
-    time = n - 1 if coupled.system.time_dependent else None
+    time = _time_of(coupled)
     every = _series(rules, rows, range(6), lambda k: k not in held, lambda k: k >= n, time)
     free = (0, 1, 2, 4) if of_sets else (0, 2, 4)
     follow = lambda k: k in of_sets
@@ -237,6 +272,7 @@ def _series(
     roots = [j for k in wanted for j in rows[k]]
     arguments = [rule.args if rule.rule != "input" else () for rule in rules]
     change = [not s for s in still]
+    is_time = [rule.rule == "input" and rule.source == (0, time) for rule in rules]
     reached = _reached(arguments, change, roots)
     # What does not move has later coefficients, zeros, only where they are read.
     read = [
@@ -250,7 +286,7 @@ def _series(
         a=_integers(args[:, 0]),
         b=_integers(args[:, 1]),
         c=_integers(args[:, 2]),
-        op=_integers([operations[rule.operation] if rule.operation else 0 for rule in rules]),
+        op=_integers([operations.get(_operation(rule), 0) for rule in rules]),
         first=np.array(first),
         second=np.array(second),
         still=_where(still, True),
@@ -259,7 +295,13 @@ def _series(
         late=_integers(sorted(j for j in needed if late[j])),
         early=_integers(sorted(j for j in needed if not late[j])),
         outputs=_integers([j for row in rows for j in row]),
+        paired=_paired([rule.rule for rule in rules], arguments, is_time),
     )
+
+
+def _operation(rule: Rule) -> str:
+    """The operation of a rule's first coefficient."""
+    return rule.operation or {"power": "pow", "chosen": "if_else_zero"}.get(rule.rule, rule.rule)
 
 
 def _reached(

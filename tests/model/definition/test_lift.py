@@ -240,7 +240,8 @@ def test_absolute_value_slides_where_it_should():
 
 def test_surfaces_are_reported_in_order():
     system = lift([x, y], [ca.sign(y) + ca.fabs(x), ca.if_else(y > 0, 1, 2)])
-    assert repr(system) == "FilippovSystem(2 states: x, y; 2 surfaces: x, y)"
+    surfaces = "2 surfaces (continuous of order 1, generic): x, y"
+    assert repr(system) == f"FilippovSystem(2 states: x, y; {surfaces})"
     assert [(s.surface, s.multiplier, s.function, s.origins) for s in system.lifted] == [
         ("h0", "lam1", "x", ("fabs",)),
         ("h1", "lam0", "y", ("comparison", "sign")),

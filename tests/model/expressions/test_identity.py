@@ -29,7 +29,7 @@ states = ca.vertcat(x, y, z)
     ],
 )
 def test_what_vanishes(expression, surface):
-    assert vanish_on([expression], surface, states, mu)
+    assert vanish_on([expression], surface, states)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_what_vanishes(expression, surface):
     ],
 )
 def test_what_does_not_vanish_or_is_not_seen(expression, surface):
-    assert not vanish_on([expression], surface, states, mu)
+    assert not vanish_on([expression], surface, states)
 
 
 small = st.integers(-3, 3)
@@ -57,8 +57,8 @@ small = st.integers(-3, 3)
 def test_a_multiple_of_the_surface_is_found_and_one_with_a_remainder_is_not(terms, a, b):
     h = y - a * x * z - b
     factor = sum((c * x ** abs(i) * z ** abs(j) * y ** abs(k) for c, i, j, k in terms), ca.SX(0))
-    assert vanish_on([factor * h], h, states, mu)
-    assert not vanish_on([factor * h + 1e-12 * (1 + x**2)], h, states, mu)
+    assert vanish_on([factor * h], h, states)
+    assert not vanish_on([factor * h + 1e-12 * (1 + x**2)], h, states)
 
 
 def test_fields_that_are_nearly_equal_near_the_origin():

@@ -22,6 +22,7 @@ MOST_ORDER = 48
 _FILES = (
     *(
         "programs.h",
+        "pairs.h",
         "linear.h",
         "state.c",
         "modes.c",

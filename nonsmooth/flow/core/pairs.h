@@ -1,0 +1,126 @@
+/* Programs where the run does not begin at time zero: what follows from the time by arithmetic is two numbers.
+ *
+ * The time of a state is that since the start. A formula's time is the sum with the start's, which is no number of its
+ * own where that is large: 1.7e9 has an error of 1e-7, and so has the argument of cos(omega t). Nodes that are
+ * ``paired`` are evaluated in two numbers, up to the first function that has one.
+ */
+typedef struct { double high, low; } Pair;
+
+static inline Pair pair_of(double high, double low) {
+  double sum = high + low;
+  return isfinite(sum) ? (Pair){sum, low - (sum - high)} : (Pair){high, 0};
+}
+static Pair pair_sum(Pair u, Pair v) {
+  double sum = u.high + v.high, moved = sum - u.high;
+  return pair_of(sum, (u.high - (sum - moved)) + (v.high - moved) + (u.low + v.low));
+}
+static Pair pair_minus(Pair u) { return (Pair){-u.high, -u.low}; }
+static Pair pair_product(Pair u, Pair v) {
+  double product = u.high * v.high;
+  return pair_of(product, fma(u.high, v.high, -product) + (u.high * v.low + u.low * v.high));
+}
+static Pair pair_quotient(Pair u, Pair v) {
+  double quotient = ratio(u.high, v.high);
+  if (!isfinite(quotient)) return (Pair){quotient, 0};
+  return pair_of(quotient, (fma(-quotient, v.high, u.high) + (u.low - quotient * v.low)) / v.high);
+}
+
+/* Of a pair whose first number is one: the largest integer below it. */
+static double pair_floor(Pair u) {
+  double low = floor(u.high);
+  return low == u.high && u.low < 0 ? low - 1 : low;
+}
+static Pair pair_remainder(Pair u, Pair v) {
+  Pair part = pair_sum((Pair){fmod(u.high, v.high), 0}, (Pair){u.low - trunc(u.high / v.high) * v.low, 0});
+  Pair period = u.high * v.high < 0 ? pair_minus(v) : v;
+  if (part.high * u.high < 0) return pair_sum(part, period);
+  return fabs(part.high) < fabs(v.high) ? part : pair_sum(part, pair_minus(period));
+}
+
+static Pair pair_operate(int op, Pair u, Pair v) {
+  switch (op) {
+    case OP_assign: return u;
+    case OP_neg: return pair_minus(u);
+    case OP_twice: return (Pair){2 * u.high, 2 * u.low};
+    case OP_sq: return pair_product(u, u);
+    case OP_inv: return pair_quotient((Pair){1, 0}, u);
+    case OP_add: return pair_sum(u, v);
+    case OP_sub: return pair_sum(u, pair_minus(v));
+    case OP_mul: return pair_product(u, v);
+    case OP_div: return pair_quotient(u, v);
+    case OP_fabs: return u.high < 0 ? pair_minus(u) : u;
+    case OP_if_else_zero: return u.high ? v : (Pair){0, 0};
+    case OP_fmod: return pair_remainder(u, v);
+    case OP_floor: return (Pair){pair_floor(u), 0};
+    case OP_ceil: return (Pair){-pair_floor(pair_minus(u)), 0};
+  }
+  double apart = pair_sum(u, pair_minus(v)).high;
+  switch (op) {
+    case OP_fmin: return apart < 0 ? u : v;
+    case OP_fmax: return apart > 0 ? u : v;
+    case OP_lt: return (Pair){apart < 0, 0};
+    case OP_le: return (Pair){apart <= 0, 0};
+    case OP_eq: return (Pair){apart == 0, 0};
+    case OP_ne: return (Pair){apart != 0, 0};
+    case OP_sin: return (Pair){sin(u.high) * cos(u.low) + cos(u.high) * sin(u.low), 0};
+    case OP_cos: return (Pair){cos(u.high) * cos(u.low) - sin(u.high) * sin(u.low), 0};
+    case OP_tan: return (Pair){(tan(u.high) + tan(u.low)) / (1 - tan(u.high) * tan(u.low)), 0};
+  }
+  return (Pair){operate(op, u.high, v.high), 0};
+}
+
+/* After the values of all nodes come their second numbers, then the time of the start. */
+static size_t pair_room(int32_t size, int stride) { return (size_t)size * (stride + 1) + 2; }
+static void pairs_begin(int32_t size, int stride, Pair start, double *w) {
+  w += (int64_t)size * (stride + 1);
+  w[0] = start.high;
+  w[1] = start.low;
+}
+static int has_pairs(int timed, int32_t size, int stride, const double *w) {
+  w += (int64_t)size * (stride + 1);
+  return timed && (w[0] != 0 || w[1] != 0);
+}
+
+static void values_pairs(const Values *t, const int32_t *which, int32_t count, const double *x, const double *p, double *w) {
+  double *low = w + t->size;
+  const double *start = low + t->size;
+  for (int32_t k = 0; k < count; k++) {
+    int32_t j = which[k], a = t->a[j], b = t->b[j];
+    if (!t->paired[j]) { values_nodes(t, which + k, 1, x, p, w); continue; }
+    Pair value = t->op[j] == OP_input ? pair_sum((Pair){start[0], start[1]}, (Pair){x[b], 0})
+                                      : pair_operate(t->op[j], (Pair){w[a], low[a]}, (Pair){w[b], low[b]});
+    w[j] = value.high;
+    low[j] = value.low;
+  }
+}
+
+/* Values of a program at a point of a run, and those that suffice where nothing slides. */
+static void values_at(const Values *t, const double *x, const double *p, double *w) {
+  if (has_pairs(t->timed, t->size, 1, w)) values_pairs(t, t->moving, t->moving_count, x, p, w);
+  else values_run(t, x, p, w);
+}
+static void values_free_at(const Values *t, const double *x, const double *p, double *w) {
+  if (has_pairs(t->timed, t->size, 1, w)) values_pairs(t, t->free, t->free_count, x, p, w);
+  else values_free(t, x, p, w);
+}
+
+static Pair pair_rule(const Series *t, int32_t j, Pair u, Pair v) {
+  if (t->rule[j] != RULE_affine) return pair_operate(t->op[j], u, v);
+  return pair_sum((Pair){t->first[j], 0}, pair_product((Pair){t->second[j], 0}, u));
+}
+
+/* Coefficient k of some rules in a run. */
+static void series_at(const Series *t, const int32_t *which, int32_t count, int k, int stride, const double *x, double *s) {
+  if (k || !has_pairs(t->timed, t->size, stride, s)) { series_rules(t, which, count, k, stride, x, s); return; }
+  double *low = s + (int64_t)t->size * stride;
+  const double *start = low + t->size;
+  for (int32_t l = 0; l < count; l++) {
+    int32_t j = which[l], a = t->a[j], b = t->b[j];
+    if (!t->paired[j]) { series_rules(t, which + l, 1, 0, stride, x, s); continue; }
+    Pair value;
+    if (t->rule[j] == RULE_input) value = pair_sum((Pair){start[0], start[1]}, (Pair){x[b], 0});
+    else value = pair_rule(t, j, (Pair){s[(int64_t)a * stride], low[a]}, (Pair){s[(int64_t)b * stride], low[b]});
+    s[(int64_t)j * stride] = value.high;
+    low[j] = value.low;
+  }
+}

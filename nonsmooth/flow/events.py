@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -14,7 +15,7 @@ from .saving import savable
 from .sequences import LazySequence
 
 #: The motion of an event within a run with dense=False, which keeps that of its end only.
-_NOT_KEPT = np.zeros(0)
+NOT_KEPT = np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +88,11 @@ class Label:
     element: int = -1
     side: int = 0
 
+    def event(self, t: float, x: Array, after: Array, motion: Array | None) -> Event:
+        """Make an event."""
+        modes = self.mode_before, self.mode_after
+        return Event(self.kind, t, x, *modes, self.name, after, self.element, self.side, motion)
+
 
 def _require_rows(events: Events) -> None:
     """Raise ValueError where a jump leads to no state, or there are more motions than events."""
@@ -150,9 +156,14 @@ class Events(LazySequence[Event]):
 
     @classmethod
     def of(cls, events: Sequence[Event]) -> Events:
-        """Return events that were made one by one as arrays."""
+        """Return events that were made one by one."""
         if isinstance(events, Events):
             return events
+        objects = list(events)
+        return cls.when_read(partial(cls._of, objects), lambda: objects)
+
+    @classmethod
+    def _of(cls, events: list[Event]) -> Events:
         known: dict[Label, int] = {}
         labels = [
             Label(e.kind, e.mode_before, e.mode_after, e.name, e.element, e.side) for e in events
@@ -195,36 +206,22 @@ class Events(LazySequence[Event]):
         kind = np.int64 if attribute in ("element", "side") else np.object_
         return np.array(values, kind)[self.codes]
 
-    def __len__(self) -> int:
+    def _size(self) -> int:
         return len(self.t)
 
     def _made(self, k: int) -> Event:
         row, label = int(self.rows[k]), self.labels[self.codes[k]]
         x = self.states[row].copy()
         after = self.states[row + 1].copy() if self.jumps[k] else x
-        return Event(
-            label.kind,
-            float(self.t[k]),
-            x,
-            label.mode_before,
-            label.mode_after,
-            label.name,
-            after,
-            label.element,
-            label.side,
-            self._motion(k),
-        )
+        return label.event(float(self.t[k]), x, after, self._motion(k))
 
     def _motion(self, k: int) -> Array | None:
         own = k - len(self) + len(self.motions)
         if not self.motions.shape[1]:
             return None
         if own < 0 or self.motions[own, 0] == np.inf:
-            return _NOT_KEPT
+            return NOT_KEPT
         return None if np.isnan(self.motions[own, 0]) else self.motions[own].copy()
-
-    def __iter__(self) -> Iterator[Event]:
-        return map(self._made, range(len(self)))
 
     def _part(self, which: slice) -> Self:
         chosen = np.arange(len(self))[which]

@@ -183,12 +183,13 @@ def _trajectory(
     coefficients = run.coefficients[:, rows] * flips
     coefficients[:, n:] *= sign  # the time of the flow is -t
     events = list[Event]()
-    for k, code in enumerate(run.event_codes.tolist()):
-        at = made.stops[run.event_keys[code][-1]]
-        guard, last = made.guards[at], status is Status.STOPPED and k == len(run.event_t) - 1
-        kind, x = "stop" if last else "zero", run.event_states[run.event_rows[k], :n].copy()
+    happened = run.each()
+    for k, (row, time, state) in enumerate(happened):
+        at = made.stops[row]
+        guard, last = made.guards[at], status is Status.STOPPED and k == len(happened) - 1
+        kind, x = "stop" if last else "zero", state[:n].copy()
         of = (guard.element, guard.side)
-        events.append(Event(kind, float(sign * run.event_t[k]), x, mode, mode, names[at], x, *of))
+        events.append(Event(kind, sign * time, x, mode, mode, names[at], x, *of))
     end, x_end = float(t[-1]), run.x[-1, :n].copy()
     if status is Status.REACHED_END:
         message = messages.reached_end(end)

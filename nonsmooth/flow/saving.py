@@ -141,7 +141,9 @@ class _Writer:
     def __init__(self) -> None:
         self.rows: dict[str, list[NDArray[Any]]] = {}
         self.sizes: dict[str, int] = {}
-        self.written: dict[int, tuple[NDArray[Any], Any]] = {}  # arrays by identity, as long as they live
+        self.written: dict[
+            int, tuple[NDArray[Any], Any]
+        ] = {}  # arrays by identity, as long as they live
         self.systems: list[FilippovSystem] = []
 
     def tree(self, value: Any) -> Any:

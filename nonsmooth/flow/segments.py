@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -73,9 +74,14 @@ class Segments(LazySequence[Segment]):
 
     @classmethod
     def of(cls, segments: Sequence[Segment]) -> Segments:
-        """Return segments that were made one by one as arrays."""
+        """Return segments that were made one by one."""
         if isinstance(segments, Segments):
             return segments
+        objects = list(segments)
+        return cls.when_read(partial(cls._of, objects), lambda: objects)
+
+    @classmethod
+    def _of(cls, segments: list[Segment]) -> Segments:
         known: dict[ShownMode, int] = {}
         codes = [known.setdefault(ShownMode(s.mode, s.discrete), len(known)) for s in segments]
         return cls(
@@ -87,11 +93,15 @@ class Segments(LazySequence[Segment]):
             tuple(known),
         )
 
-    def __len__(self) -> int:
-        return len(self.codes)
+    def shown(self, most: int) -> list[ShownMode]:
+        """Modes of the first segments."""
+        objects = self._objects
+        if objects is not None:
+            return [ShownMode(s.mode, s.discrete) for s in objects[:most]]
+        return [self.modes[k] for k in self.codes[:most].tolist()]
 
-    def __iter__(self) -> Iterator[Segment]:
-        return map(self._made, range(len(self)))
+    def _size(self) -> int:
+        return len(self.codes)
 
     def _made(self, k: int) -> Segment:
         shown, ends = self.modes[self.codes[k]], (float(self.t_start[k]), float(self.t_end[k]))

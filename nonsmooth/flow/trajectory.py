@@ -15,7 +15,7 @@ from . import tables
 from .events import Events
 from .names import shown_mode
 from .saving import Savable, savable
-from .segments import Segments
+from .segments import Segments, ShownMode
 from .status import Status
 
 #: Coefficients that are read at once, so that they stay in the cache.
@@ -196,8 +196,11 @@ class Trajectory(
 
     def _itinerary(self, most: int) -> str:
         """The first modes of the itinerary."""
-        modes = [shown_mode(self.system, m.mode, m.discrete) or "o" for m in self.segments.modes]
-        return " ".join([modes[k] for k in self.segments.codes[:most].tolist()])
+        shown: dict[ShownMode, str] = {}
+        for one in (modes := self.segments.shown(most)):
+            if one not in shown:
+                shown[one] = shown_mode(self.system, one.mode, one.discrete) or "o"
+        return " ".join([shown[one] for one in modes])
 
     def __call__(self, t: ArrayLike, side: str = "right") -> Array:
         """Evaluate the dense output.

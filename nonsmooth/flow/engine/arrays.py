@@ -5,7 +5,8 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,39 @@ class BatchStructure(ctypes.Structure):
     ]
 
 
+class Happened(NamedTuple):
+    """Events and segments of a run as arrays.
+
+    Attributes
+    ----------
+    event_t, event_rows, event_jumps : ndarray (e + 1,)
+        Events, and the end of the run: time, row of the state in ``states``, whether the state after it is the
+        next row.
+    event_codes, keys : ndarray (e + 1,), sequence of tuple
+        What an event is, as a position in the keys (the end is after them): kind (position in
+        ``facts.KINDS``), modes before and after, row of the guard in ``guards(mode_before)`` or -1.
+    states : ndarray
+        The points of the run, then what else is the state of an event.
+    event_motions : ndarray (e, w)
+        What a restart after each event needs; empty without dense output.
+    segment_modes, segment_starts : ndarray (k,), (k + 1,)
+        Segments: numbers of their modes, and times at which they begin, and the last one ends.
+    segment_firsts : ndarray (k,)
+        Numbers of the first steps of the segments; zero without dense output.
+    """
+
+    event_t: Array
+    event_rows: NDArray[np.int64]
+    event_jumps: NDArray[np.bool_]
+    event_codes: NDArray[np.int32]
+    event_motions: Array
+    segment_modes: NDArray[np.int32]
+    segment_starts: Array
+    segment_firsts: NDArray[np.int64]
+    states: Array
+    keys: Sequence[tuple[int, ...]]
+
+
 @dataclass
 class Run:
     """One run as arrays.
@@ -84,28 +118,20 @@ class Run:
         What was noted about the decisions, as bits.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
-    segment_modes, segment_starts : ndarray (k,)
-        Segments: numbers of their modes, and times at which they begin.
-    event_t, event_rows, event_jumps : ndarray (e,)
-        Events but the final "end": time, row of the state in ``event_states``, whether the state after it is
-        the next row.
-    event_states : ndarray
-        The points ``x``, then what else is the state of an event.
-    event_codes, event_keys : ndarray (e,), sequence of tuple
-        What an event is, as a position in the keys: kind (position in ``facts.KINDS``), modes before and
-        after, row of the guard in ``guards(mode_before)`` or -1.
     motion : ndarray (w,)
         What a restart at the end needs besides the state.
     dense : bool
         Whether the following were kept.
     starts, coefficients : ndarray (s,), (s, N, P+1)
         Steps: start times, Taylor coefficients.
-    segment_firsts : ndarray (k,)
-        Numbers of the first steps of the segments.
-    event_motions : ndarray (e, w)
-        What a restart after each event needs.
     sample_x : ndarray (K, n)
         States at the times before the end at which the run was to be read, unless it is dense.
+    event_count : int
+        Number of events but the end.
+    make_happened : callable
+        Makes events and segments, when they are first looked at.
+    few : mapping or None
+        What the driver wrote, by name, if events and steps are few.
     labels : sequence of tuple
         Values of the discrete states by number of mode; empty without any.
     """
@@ -123,22 +149,30 @@ class Run:
     facts: int
     t: Array
     x: Array
-    segment_modes: NDArray[np.int32]
-    segment_starts: Array
-    event_t: Array
-    event_rows: NDArray[np.int64]
-    event_jumps: NDArray[np.bool_]
-    event_states: Array
-    event_codes: NDArray[np.int32]
-    event_keys: Sequence[tuple[int, int, int, int]]
     motion: Array
     labels: Sequence[tuple[float, ...]]
     dense: bool
     starts: Array
     coefficients: Array
-    segment_firsts: NDArray[np.int64]
-    event_motions: Array
     sample_x: Array
+    event_count: int
+    make_happened: Callable[[], Happened]
+    few: Mapping[str, NDArray[Any]] | None
+
+    @cached_property
+    def happened(self) -> Happened:
+        """Events and segments."""
+        return self.make_happened()
+
+    def each(self) -> list[tuple[int, float, Array]]:
+        """Guard, time and state of each event but the end."""
+        if self.few is not None:
+            rows, t, x = (self.few[f"event_{name}"] for name in ("guard", "t", "x"))
+            return [*zip(rows.tolist(), t.tolist(), x, strict=True)]
+        found = self.happened
+        guards = [found.keys[code][-1] for code in found.event_codes[:-1]]
+        states = found.states[found.event_rows[:-1]]
+        return [*zip(guards, found.event_t.tolist()[:-1], states, strict=True)]
 
 
 def require_size(size: Any, structure: type[ctypes.Structure]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...model import Array
 from ..constants import KINDS
 from ..trajectory import Steps
-from .arrays import address
+from .arrays import Happened, address
 
 #: Arrays in the order of C's pointers: type, and what there is one of for each entry.
 _ARRAYS = {
@@ -40,6 +40,9 @@ _FIRST = {"step": 64, "point": 128, "event": 64}
 _GIVEN, _LARGEST = 1 << 26, 1 << 22
 #: How blocks grow: pages that are not written cost nothing.
 _MUCH = 16
+
+#: Events and points that are read one by one.
+_FEW = 200
 
 #: Rows of all arrays that C needs to be free before a step.
 _NEEDED = {"step": 2, "point": 4, "event": 4}
@@ -78,6 +81,7 @@ class Output:
         ]
 
     def __init__(self, n: int, order: int, rooms: Rooms = _FIRST, motion: int = 0):
+        self.motion = motion
         self._places, self._sizes = _layout(n, order, motion)
         self._rooms = {
             kind: max(least, min(rooms[kind], _GIVEN // self._sizes[kind]))
@@ -154,7 +158,7 @@ class Growing:
         """Append rows."""
         size = self._size + len(rows)
         if size > len(self._array):
-            self._array.resize((size + size // 8, *rows.shape[1:]), refcheck=False)
+            self._array.resize((size + size // 16, *rows.shape[1:]), refcheck=False)
         self._array[self._size : size] = rows
         self._size = size
 
@@ -168,7 +172,8 @@ class Recorder:
     """Points, events, changes of the mode and, if dense, steps of one run."""
 
     # What can no longer change, all before the instant of the last point, is taken out of the blocks whenever
-    # they are full. The state of an event is nearly always one of the points, so its row is kept.
+    # they are full. The state of an event is nearly always one of the points, so its row is kept. Events and
+    # segments of a run that fits into the blocks are read when they are looked at.
 
     def __init__(self, output: Output, dimension: int, dense: bool, read_at: Array | None):
         self.output, self._n, self._dense = output, dimension, dense
@@ -177,7 +182,7 @@ class Recorder:
         self._apart: list[Array] = []
         self._mode, self._counts = -1, np.zeros(3, np.int64)
         self._times = np.zeros(0) if read_at is None or dense else read_at
-        self._samples: list[Array] = [np.zeros((0, dimension))]
+        self._samples: list[Array] = []
         self._last = Steps()
 
     def make_room(self, counts: Sequence[int]) -> None:
@@ -193,8 +198,11 @@ class Recorder:
             "event": int(np.searchsorted(own["event_t"], now, side="left")),
         }
         taken = {name: own[name][: ends[kind]] for name, (_, kind) in _ARRAYS.items()}
-        self._keep(self._reduced(taken, now))
-        self.output.begin_with({name: own[name][ends[kind] :] for name, (_, kind) in _ARRAYS.items()})
+        found = self._steps(taken, now)
+        self._keep(found | self._happened(taken, found["x"]))
+        self.output.begin_with(
+            {name: own[name][ends[kind] :] for name, (_, kind) in _ARRAYS.items()}
+        )
 
     def _keep(self, found: dict[str, NDArray[Any]]) -> None:
         for name, array in found.items():
@@ -202,53 +210,82 @@ class Recorder:
 
     def finished(self, counts: Sequence[int]) -> dict[str, Any]:
         """Return the arrays of the whole run, as ``Run`` has them."""
-        own = self.output.written(counts)
-        if not self._kept:
-            own = self.output.own(own)
-        found = self._reduced(own, float(own["point_t"][-1]))
-        if self._kept:
-            self._keep(found)
+        own, before = self.output.written(counts), len(self._kept) > 0
+        total = [one + more for one, more in zip(self._counts.tolist(), counts, strict=True)]
+        self.rooms = rooms_of(total)
+        now = float(own["point_t"][-1])
+        own = own if before else self.output.own(own)
+        found = self._steps(own, now)
+        if not self._dense:
+            steps = ("start", "step_mode")
+            own |= {name: own[name].copy() for name in steps}
+            own["coefficients"] = own["coefficients"][:0].copy()
+        if before:
+            self._keep(found | self._happened(own, found["x"]))
+            self._keep(self._end(now))
             found = {name: growing.array() for name, growing in self._kept.items()}
+            whole = self._whole(found)
+        names = ("starts", "coefficients")
+        empty = {"starts": np.zeros(0), "coefficients": own["coefficients"]}
+        return {name: found.get(name, empty.get(name)) for name in ("t", "x", *names)} | {
+            "sample_x": np.vstack(self._samples) if self._samples else found["x"][:0],
+            "event_count": total[2],
+            "make_happened": (lambda: whole)
+            if before
+            else partial(self._read, own, found["x"], now),
+            "few": None if before or max(total[1:]) > _FEW else own,
+        }
+
+    def _read(self, own: dict[str, NDArray[Any]], x: Array, now: float) -> Happened:
+        """Events and segments of a run that fits into the blocks."""
+        found = {"x": x} | self._happened(own, x)
+        end = self._end(now)
+        return self._whole(found | {name: np.append(found[name], end[name]) for name in end})
+
+    def _end(self, now: float) -> dict[str, NDArray[Any]]:
+        """The row of the end of the run, after those of its events and segments."""
+        return {
+            "event_t": np.array([now]),
+            "event_rows": self._counts[1:2] - 1,
+            "event_jumps": np.zeros(1, np.bool_),
+            "event_codes": np.array([len(self._keys)], np.int32),
+            "segment_starts": np.array([now]),
+        }
+
+    def _whole(self, found: dict[str, NDArray[Any]]) -> Happened:
+        """Events and segments, with the states that are no points after those that are."""
         x, rows = found["x"], found["event_rows"]
-        apart = np.vstack(self._apart) if self._apart else x[:0]
         rows[rows < 0] = len(x) - 1 - rows[rows < 0]
         if not self._dense:
             found |= {
-                "starts": np.zeros(0),
-                "coefficients": own["coefficients"][:0].copy(),
+                "event_motions": np.zeros((0, self.output.motion)),
                 "segment_firsts": np.broadcast_to(np.int64(0), len(found["segment_modes"])),
-                "event_motions": own["event_motion"][:0].copy(),
             }
-        return found | {
-            "event_states": np.vstack([x, apart]) if len(apart) else x,
-            "event_keys": [*self._keys],
-            "sample_x": np.vstack(self._samples),
-        }
+        names = [name for name in Happened._fields if name in found]
+        states = np.vstack([x, *self._apart]) if self._apart else x
+        return Happened(states=states, keys=[*self._keys], **{name: found[name] for name in names})
 
-    @property
-    def rooms(self) -> Rooms:
-        """Rooms that the whole run needs."""
-        return rooms_of(self._counts.tolist())
-
-    def _reduced(self, own: dict[str, NDArray[Any]], now: float) -> dict[str, NDArray[Any]]:
-        """What is kept of steps, points and events before ``now``, which follow on those before."""
-        modes, starts, x = own["step_mode"], own["start"], own["point_x"][:, : self._n]
-        changes = np.flatnonzero(np.diff(modes, prepend=np.int32(self._mode)))
-        found = self._events(own, x)
-        found |= {
-            "t": own["point_t"],
-            "x": x,
-            "segment_modes": modes[changes],
-            "segment_starts": starts[changes],
-        }
+    def _steps(self, own: dict[str, NDArray[Any]], now: float) -> dict[str, NDArray[Any]]:
+        """Points and steps before ``now``; without dense output the samples there."""
+        found = {"t": own["point_t"], "x": own["point_x"][:, : self._n]}
         if self._dense:
-            found["starts"], found["coefficients"] = starts, own["coefficients"]
+            return found | {"starts": own["start"], "coefficients": own["coefficients"]}
+        self._sample(Steps(own["start"], own["coefficients"]), now)
+        return found
+
+    def _happened(self, own: dict[str, NDArray[Any]], x: Array) -> dict[str, NDArray[Any]]:
+        """Events and changes of the mode, which follow on those before."""
+        modes, found = own["step_mode"], self._events(own, x)
+        changes = np.flatnonzero(modes[1:] != modes[:-1]) + 1
+        if len(modes) and modes[0] != self._mode:
+            changes = np.append(0, changes)
+        found["segment_modes"] = modes[changes]
+        found["segment_starts"] = own["start"][changes]
+        if self._dense:
             found["segment_firsts"] = changes + self._counts[0]
             found["event_motions"] = own["event_motion"]
-        else:
-            self._sample(Steps(starts, own["coefficients"]), now)
         self._mode = int(modes[-1]) if len(modes) else self._mode
-        self._counts += len(starts), len(x), len(own["event_t"])
+        self._counts += len(modes), len(x), len(own["event_t"])
         return found
 
     def _events(self, own: dict[str, NDArray[Any]], x: Array) -> dict[str, NDArray[Any]]:
@@ -278,11 +315,11 @@ class Recorder:
 
     def _codes(self, own: dict[str, NDArray[Any]]) -> NDArray[np.int32]:
         """Numbers of the different kinds of events, with their modes and guards."""
-        kind, before, after, guard = (
-            own[f"event_{name}"].astype(np.int64) for name in ("kind", "before", "after", "guard")
-        )
-        if not len(kind):
-            return np.zeros(0, np.int32)
+        columns = [own[f"event_{name}"] for name in ("kind", "before", "after", "guard")]
+        if len(columns[0]) < _FEW:
+            each = zip(*(column.tolist() for column in columns), strict=True)
+            return np.array([self._keys.setdefault(k, len(self._keys)) for k in each], np.int32)
+        kind, before, after, guard = (column.astype(np.int64) for column in columns)
         sizes = (len(KINDS), int(before.max()) + 1, int(after.max()) + 1)
         packed = kind + sizes[0] * (before + sizes[1] * (after + sizes[2] * (guard + 1)))
         _, first, inverse = np.unique(packed, return_index=True, return_inverse=True)

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LIMIT_FALL, MOST_CODES, UNWATCHED
+from ..model.numbering import FALL, LAWS, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
+__all__ = ["FALL", "LAWS", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 
@@ -142,6 +142,8 @@ LAGS = (1, 2, 3, 4, 6)
 BLOCKS = 4
 SPREAD = 0.02
 SHRINKS = 0.9999
+#: Lanes let the driver see to events that may accumulate where the time left is this part of the last interval or more.
+SHRINKS_TO = 1e-4
 AT_ONCE = 40  # events at one instant
 
 #: A set h = 0 is reached in one step where the remaining rotation of friction is below this part of the
@@ -155,6 +157,9 @@ TENFOLD = 20.0
 #: Coefficients of a series grow as the inverse time to a set to their order: the set is reached before
 #: they are larger than this.
 OVERFLOW = 1e280
+
+#: Derivatives have reached a set where |h| is this part of what it was on the way.
+ARRIVED = 1e-13
 
 #: Motions that can continue from a point, at most so many are kept.
 SEVERAL = 16

@@ -120,7 +120,7 @@ def simulate(
     >>> run.itinerary, bool(abs(run.x[-1, 0] + 0.2) < 1e-9)
     ('- + - + s', True)
     """
-    require_system(system, sets=True)
+    require_system(system, sets=True, hysteresis=True)
     if start is not None:
         x0, t_start, parameters = _continued(start, x0, t_start, parameters)
     elif x0 is None:
@@ -145,11 +145,12 @@ def simulate(
     system, at = sectioned(system, at)
     x = system.extended_point(x0, options.t_start)
     p = system.parameter_vector(parameters)
-    motion = None
+    motion = mode = None
     if start is None:
         require_start(system, x, p)
     else:
-        motion = (start.events[-1] if isinstance(start, Trajectory) else start).motion
+        last = start.events[-1] if isinstance(start, Trajectory) else start
+        motion, mode = last.motion, last.mode_after if system.remembering else None
         if motion is not None and not len(motion):
             raise OptionError(
                 "start is an event within a run with dense=False, which keeps what a restart needs at its end "
@@ -163,7 +164,7 @@ def simulate(
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
     read_at = None if times is None else times.of(p)
-    run = tape_for(system, options).run(x, p, options, read_at, motion, dense)
+    run = tape_for(system, options).run(x, p, options, read_at, motion, mode, dense)
     made = trajectory(system, p, options, run)
     if read_at is not None:
         t, states = sampled(made, read_at, None if dense else run.sample_x)

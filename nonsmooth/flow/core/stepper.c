@@ -64,13 +64,13 @@ static int has_height(int kind) {
   return kind == SURFACE_GUARD || kind == IMPACT_GUARD || is_atom(kind);
 }
 static int is_curved(const Run *r, const Layout *l, int row) {
-  int kind = l->kind[row], index = kind == IMPACT_GUARD ? r->m + l->index[row] : l->index[row];
-  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : index];
+  int kind = l->kind[row];
+  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : l->index[row]];
 }
 
 /* Whether a guard is the end of sliding within a bound that depends on the states. */
 static int is_scaled_exit(const Run *r, const Layout *l, int row) {
-  return l->kind[row] == EXIT_GUARD && r->s->scaled[l->index[row]] && !is_idle(r, l->letter, l->index[row]);
+  return l->kind[row] == EXIT_GUARD && is_scaled(r, l->index[row]) && !is_idle(r, l->letter, l->index[row]);
 }
 
 /* The longest step in which term k of a guard is below ``allowed``, or below the tolerance's part of one of its
@@ -415,7 +415,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
   /* Guards whose times cannot be told apart: atoms are passed together, at the first time; others one by one. */
   int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;
-  double near = time[first] + TIE * larger(time_scale(r), 1)
+  double near = time[first] + TIE * (time_scale(r) + time[first])
                 + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
   for (int j = 0; j < rows && (found > 1 || passed_atoms); j++) {
     if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;

@@ -242,10 +242,9 @@ def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
         **dict.fromkeys(("surface", "near"), system.surface_names),
         "stop": [name for name, _ in system.stops],
         "reset": [name for name, _ in system.resets],
-        "impact": system.impacts,
-        "release": system.impacts,
+        **dict.fromkeys(("impact", "release"), [""] * system.surface_count + [*system.impacts]),
     }
-    width = max(1, *map(len, names.values()))
+    width = max(system.surface_count + 1, *map(len, names.values()))
     named = np.zeros((len(GUARDS), width), np.int8)
     for row, kind in zip(named, GUARDS, strict=True):
         if hits.names is None:

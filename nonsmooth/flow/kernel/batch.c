@@ -53,6 +53,7 @@ static int load(Lanes *s, Work *w, int l, I mine) {
   s->index[l] = i;
   s->base[l] = 0;
   s->past[l].count = s->past[l].steps = 0;
+  s->past[l].row = s->row;
   s->past[l].shortened = 0;
   w->alive++;
   return 1;
@@ -118,6 +119,7 @@ static void point_to(Packed *a, Past *past) {
 static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   Suspended *m = &a->m;
   const Past *past = &s->past[l];
+  recall(s, l);
   UNROLL for (int i = 0; i < N; i++) a->x[i] = LANE(s->x[i], l);
   for (int k = 0; k < LAST_KIND; k++) a->kinds[k] = LANE_I(s->kinds[k], l);
   for (int j = 0; j < STOPS; j++) a->side[j] = LANE_I(s->above_stop[j], l) ? 1 : -1;
@@ -151,6 +153,7 @@ static void unpack(Lanes *s, int l, const Packed *a) {
   LANE_I(s->events, l) = m->events;
   LANE_I(s->entered, l) = m->steps - m->segment_steps;
   past->count = m->history;
+  past->row = s->row;
   LANE_I(s->drop, l) = m->drop;
   s->base[l] = m->itinerary;
   LANE_I(s->code, l) = 0;
@@ -196,7 +199,7 @@ INLINE I by_chance(const Lanes *s, const Work *w) {
   return which;
 }
 
-typedef struct { Lanes lanes[GROUPS]; Step steps[GROUPS]; Past past[GROUPS][W]; Work work; int begun; } Many;
+typedef struct { Lanes lanes[GROUPS]; Step steps[GROUPS]; Past past[GROUPS][W]; Log log[GROUPS]; Work work; int begun; } Many;
 
 int64_t many_size(void) { return sizeof(Many); }
 
@@ -223,6 +226,7 @@ static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree, 
   for (int i = 0; i < GROUPS; i++) {
     many->lanes[i].size = o->atol / o->rtol;
     many->lanes[i].past = many->past[i];
+    many->lanes[i].log = &many->log[i];
     for (int k = 0; k < NQ; k++) many->lanes[i].q[k] = BC(q[k]);
   }
   many->begun = 1;

@@ -18,8 +18,15 @@
 #define LONG_CODE (1LL << 60)
 
 #if RARE_CASES_HERE
-/* Of a trajectory, what only the driver needs: the last events; halved steps, and up to which step that is so. */
-typedef struct { Recent event[HISTORY]; int64_t count, steps; double shortened; } Past;
+#define ROWS_KEPT 256 /* a power of two */
+
+/* The last events of all lanes in the order in which they came: the intervals before them, and patterns that are
+ * negative where a lane had none. */
+typedef struct { T interval[ROWS_KEPT]; I pattern[ROWS_KEPT]; } Log;
+
+/* Of a trajectory, what only the driver needs: the last events, and up to which row of the log; halved steps, and up to
+ * which step that is so. */
+typedef struct { Recent event[HISTORY]; int64_t count, row, steps; double shortened; } Past;
 #endif
 
 typedef struct {
@@ -35,6 +42,8 @@ typedef struct {
   int32_t base[W];
 #if RARE_CASES_HERE
   Past *past; /* of each lane */
+  Log *log;
+  int64_t row; /* next one of the log */
 #else
   T shortest;
   I shrinking;
@@ -448,6 +457,16 @@ INLINE void first_hits(int n, const Lanes *s, Step *e) {
 /* Events --------------------------------------------------------------------------------------- */
 
 #if RARE_CASES_HERE
+/* Bring a lane's last events up to date. */
+static void recall(const Lanes *s, int l) {
+  Past *p = &s->past[l];
+  if (s->row - p->row > ROWS_KEPT) { p->count = 0; p->row = s->row - ROWS_KEPT; }
+  for (; p->row < s->row; p->row++) {
+    int64_t row = p->row & (ROWS_KEPT - 1), pattern = LANE_I(s->log->pattern[row], l);
+    if (pattern >= 0) p->event[p->count++ % HISTORY] = (Recent){LANE(s->log->interval[row], l), pattern};
+  }
+}
+
 /* Sum of the last intervals but ``back``. */
 static double block(const Past *p, int64_t back, int lag) {
   double sum = 0;
@@ -456,7 +475,7 @@ static double block(const Past *p, int64_t back, int lag) {
 }
 
 /* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
-SELDOM int may_accumulate(const Past *p) {
+static int may_accumulate(const Past *p) {
   for (int l = 0; l < LAG_COUNT; l++) {
     int lag = LAGS[l];
     if (p->count < (BLOCKS + 1) * lag) return 0;
@@ -475,21 +494,28 @@ SELDOM int may_accumulate(const Past *p) {
   return 0;
 }
 
-/* Remember events of the lanes ``which`` by their kinds and those of their guards; those that may accumulate are
- * returned, and not clear. */
-SELDOM I remember(Lanes *s, I which, I kind, I guard) {
-  I unclear = NONE;
-  I pattern = (kind << 40) + (guard << 32);
-  for EACH(l, which) {
-    Past *p = &s->past[l];
-    p->event[(uint32_t)p->count++ % HISTORY] = (Recent){LANE(s->since, l), LANE_I(pattern, l)};
-    if (p->count > BLOCKS && may_accumulate(p)) {
-      LANE_I(unclear, l) = -1;
-      p->count--;
-    }
+/* Lanes whose last event, just before, may be one of those that accumulate, so that the run may end here: the driver
+ * acts where the states change by less than their tolerances up to the limit, and the time left is a part of the last
+ * interval, SHRINKS_TO or more. */
+SELDOM I watch_limit(const Lanes *s, T c[N][P + 1], const T *allowed, I which) {
+  T interval = s->log->interval[(s->row - 1) & (ROWS_KEPT - 1)], rate = BC(0);
+  UNROLL for (int i = 0; i < ND; i++)
+    rate = MAX(rate, ABS(c[i][1]) * ROUGH_INVERSE(allowed[i] + VANISHES * (s->size + ABS(s->x[i]))));
+  I may = which & ((interval * rate <= 2 / SHRINKS_TO) | (interval <= NEAR / SHRINKS_TO * MAX(BC(1), ABS(s->t))));
+  for EACH(l, may) {
+    recall(s, (int)l);
+    if (!may_accumulate(&s->past[l])) LANE_I(may, l) = 0;
   }
-  s->since = SELECT(which & ~unclear, BC(0), s->since);
-  return unclear;
+  return may;
+}
+
+/* Remember events of the lanes ``which`` by their kinds and those of their guards. */
+INLINE I remember(Lanes *s, I which, I kind, I guard) {
+  int64_t row = s->row++ & (ROWS_KEPT - 1);
+  s->log->interval[row] = s->since;
+  s->log->pattern[row] = ((kind << 40) + (guard << 32)) | ~which;
+  s->since = SELECT(which, BC(0), s->since);
+  return NONE;
 }
 #else
 /* Ever shorter intervals are left to the driver, which knows their limit. */
@@ -638,10 +664,14 @@ INLINE void expand_step(Lanes *s, Work *w, Step *e) {
   T h = MIN(e->by_series, BC(o->max_step)), left = o->t_end - s->t;
   e->last = h >= left;
   e->unclear = ~finite;
-  e->unclear |= ~e->last & ((h <= SHORTEST * MAX(BC(1), ABS(s->t))) | (h >= LONG));
+#if RARE_CASES_HERE
+  I after = (s->since == 0) & (s->events > BLOCKS);
+  if (any(after)) e->unclear |= watch_limit(s, e->c, e->allowed, after);
+#endif
+  e->unclear |= ~e->last & ((h <= SHORTEST * ABS(s->t)) | (h >= LONG));
   e->unclear |= (s->steps >= o->max_steps) | passed_between(s, e->g);
   /* What happens at the end, to rounding, happens. */
-  e->h = SELECT(e->last, left + AT_END * MAX(BC(1), ABS(s->t + left)), h);
+  e->h = SELECT(e->last, left + AT_END * MAX(ABS(s->t), ABS(s->t + left)), h);
   e->left = left;
 }
 

@@ -378,7 +378,7 @@ INLINE void take_step(Lanes *s, Work *w, Step *e, int mode) {
   last = time_of(e, h) >= left;
   unclear |= ~last & ((time_of(e, h) <= SHORTEST * MAX(ABS(s->t), ABS(s->t - w->b->t0))) | (h >= LONG));
   unclear |= (s->steps >= o->max_steps) | passed_between(s, e);
-  if (any(last)) h = SELECT(last, place_of(e, left + AT_END * MAX(BC(1), ABS(s->t + left))), h);
+  if (any(last)) h = SELECT(last, place_of(e, left + AT_END * MAX(ABS(s->t), ABS(s->t + left))), h);
   T whole = h;
   unclear |= first_hit(s, e, mode, &h, &dt, &slot, &slope);
   if (mode == ON && any(slot == 1)) polish_slip(e, slot == 1, h, &dt);

@@ -142,6 +142,10 @@ class VariationalField(PlainField):
         inputs = [self.motion.states, self.parameters]
         return Evaluator(ca.Function("rate", inputs, [ca.densify(self.motion.field)]))
 
+    def rate_at(self, y: Array, p: Array) -> Array:
+        """The mode's field at states of a leg (N + k,)."""
+        return self.rate.copied(y, p)[0][:, 0]
+
     @cached_property
     def linear(self) -> Evaluator:
         """(y, p) -> field, its derivatives by the states and by all parameters."""

@@ -110,8 +110,12 @@ class Coupled:
         if by_degree:
             for i, found in enumerate(self.degrees(field, lam, unknowns)):
                 self.lower[i], self.layer[i] = found.lower, found.row
+        h = ca.SX(d.surfaces)
+        for i in system.remembering:  # h at multiplier +1, the further function at -1
+            self.lower[i] = (h[i] - d.hysteresis[i],)
+            h[i] -= (1 - lam[i]) / 2 * d.hysteresis[i]
         stops = ca.densify(d.guards) if d.guards.numel() else ca.SX(0, 1)
-        heights = ca.densify(ca.vertcat(d.surfaces, d.gaps))
+        heights = ca.densify(ca.vertcat(h, d.gaps))
         factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
         self.outputs = [field, self.layer, heights, factor, stops]
         every = ca.vertcat(*unknowns, d.reactions)
@@ -126,7 +130,7 @@ class Coupled:
 
     def _is_continuous(self, surface: int) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""
-        if surface in self.system.set_of:
+        if surface in (*self.system.set_of, *self.system.remembering):
             return False
         d, x = self.system.definition, self.system.extended_states
         column = ca.jacobian(d.field, d.multipliers[surface])
@@ -164,6 +168,8 @@ class Coupled:
         for i in range(self._surfaces):
             found.append(Degree((), self.layer[i]))
             if self.continuous[i] or self.system.nonlinear[i] or i in self.system.set_of:
+                continue
+            if i in self.system.remembering:
                 continue
             own = ca.vertcat(lam[i], unknowns[i]) if self.scaled[i] else lam[i]
             others = ca.vertcat(*[e for e in every if not ca.depends_on(own, e)])
@@ -340,12 +346,28 @@ class Coupled:
 
     def awake(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Dense expressions in ``moving``, for numbers: terms that a mode leaves out are not evaluated."""
+        dense = [ca.densify(e) for e in expressions]
+        return without_unused_terms(self._symbols, dense, self._values_held)
+
+    @property
+    def _values_held(self) -> dict[int, tuple[float, ...]]:
+        """Values at which modes hold entries of ``moving``."""
         n, m, places = self.system.extended_dimension, self._surfaces, self.moving.numel()
         held: dict[int, tuple[float, ...]] = dict.fromkeys(range(n + m, places), (0.0,))
         for i in range(m):
             signs = () if i in self.system.set_of else (1.0, -1.0)
             held[n + i] = (*signs, 0.0) if self.scaled[i] else signs
-        return without_unused_terms(self._symbols, [ca.densify(e) for e in expressions], held)
+        return held
+
+    def tangents(self) -> tuple[ca.SX, list[ca.SX]]:
+        """Symbols of ``moving``, of a direction of it and one of the parameters; ``outputs`` derived along them."""
+        moving, p = self._symbols
+        size, n = moving.numel(), self.system.extended_dimension
+        by_moving, by_p = ca.SX.sym("d", size), ca.SX.sym("dp", p.numel())
+        every = ca.vertcat(moving, by_moving, by_p)
+        outputs = [ca.jtimes(e, moving, by_moving) + ca.jtimes(e, p, by_p) for e in self.outputs]
+        held = {**self._values_held, **{size + i: (0.0,) for i in range(n, size)}}
+        return every, without_unused_terms([every, p], [ca.densify(e) for e in outputs], held)
 
     # numbers -----------------------------------------------------------------------------------
 

@@ -246,6 +246,25 @@ def _rules_of(
     return rules, [[rule_of[j] for j in row] for row in rows]
 
 
+def tangent_series_of(coupled: Coupled) -> tuple[Series, Series]:
+    """Rules of all that any mode needs, and of its derivatives along a direction; they are numbered alike."""
+    n, size = coupled.system.extended_dimension, coupled.moving.numel()
+    every, tangents = coupled.tangents()
+    outputs = [*coupled.awake([*coupled.outputs, _moving_slopes(coupled)[2]]), *tangents]
+    rules, rows = _rules_of([every, coupled.system.parameter_symbols], outputs)
+    of_sets = {n + i for i in coupled.system.set_of}
+    held = {n + i for i, own in enumerate(coupled.scaled) if own} - of_sets
+    moves = lambda k: k >= 2 * size or k % size not in held
+    derived = entered(rules, lambda k: k >= size)
+    time = _time_of(coupled)
+    plain = [not own for own in derived]
+    every_row, split = range(len(rows)), len(rows) - len(tangents)
+    of_mode = _series(rules, rows, every_row, moves, lambda k: n <= k < size, time, plain)
+    along = lambda k: size + n <= k < 2 * size
+    of_tangent = _series(rules, rows[split:], range(len(tangents)), moves, along, time, derived)
+    return of_mode, of_tangent
+
+
 def _series(
     rules: Sequence[Rule],
     rows: Sequence[Sequence[int]],
@@ -253,8 +272,9 @@ def _series(
     moves: Callable[[int], bool],
     unknown: Callable[[int], bool],
     time: int | None = None,
+    listed: Sequence[bool] | None = None,
 ) -> Series:
-    """Rules as the interpreter reads them."""
+    """Rules as the interpreter reads them; ``listed`` are those that it computes, of all."""
     still = [_is_still(rule) for rule in rules]
     moving, late = entered(rules, moves), entered(rules, lambda k: unknown(k) and moves(k))
     operations = {op: k for k, op in enumerate(OPERATIONS)}
@@ -281,6 +301,8 @@ def _series(
     ]
     zeros = _reached(arguments, change, [j for j in read if not moving[j]])
     needed = {*zeros.tolist(), *(j for j in reached.tolist() if moving[j])}
+    if listed is not None:
+        reached, needed = reached[np.array(listed)[reached]], {j for j in needed if listed[j]}
     return Series(
         rule=_integers(names),
         a=_integers(args[:, 0]),
@@ -290,7 +312,7 @@ def _series(
         first=np.array(first),
         second=np.array(second),
         still=_where(still, True),
-        moving=reached,
+        moving=_integers(reached),
         later=_integers(sorted(needed)),
         late=_integers(sorted(j for j in needed if late[j])),
         early=_integers(sorted(j for j in needed if not late[j])),

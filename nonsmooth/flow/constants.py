@@ -133,6 +133,15 @@ SHORTEST = 4 * EPSILON
 #: A longer step of lanes is the driver's: theirs have a longest one, where all terms vanish.
 LONG = 1e15
 
+#: A guard is low where it is below this many roundings of its terms. Before zeros that are not told apart a step ends
+#: where it is above this many times as much, unless that is no progress: this part of the way to them, and closer
+#: than SEPARATE, relative to the time. A root is exact to LOCATED of the time.
+LOW = 8.0
+FAR_FROM_LOW = 64.0
+NEARER = 0.1
+SEPARATE = 1e-13
+LOCATED = 1e-12
+
 #: Halvings of an interval before two roots count as a touch without crossing.
 DEPTH = 52
 

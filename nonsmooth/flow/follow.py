@@ -27,7 +27,7 @@ from ..model import (
     sliding_multipliers,
 )
 from . import messages
-from .engine.arrays import Run
+from .engine.arrays import Run, guard_of
 from .engine.convert import message_of
 from .engine.tape import tape_for
 from .events import Event, Events
@@ -184,8 +184,8 @@ def _trajectory(
     coefficients[:, n:] *= sign  # the time of the flow is -t
     events = list[Event]()
     happened = run.each()
-    for k, (row, time, state) in enumerate(happened):
-        at = made.stops[row]
+    for k, (code, time, state) in enumerate(happened):
+        at = made.stops[guard_of(made.system, code).index]
         guard, last = made.guards[at], status is Status.STOPPED and k == len(happened) - 1
         kind, x = "stop" if last else "zero", state[:n].copy()
         of = (guard.element, guard.side)

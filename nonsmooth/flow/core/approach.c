@@ -185,6 +185,7 @@ static void near_set(Run *r, int row, int fell) {
   int f = r->now.index[row], k = size_of(r, f), n = r->n, before = r->mode;
   int32_t own[3];
   double h[3], a[3], m[9], u[3], b[3], mean[3], scale = 0, dt, c = 0;
+  r->met = (Met){NEAR_GUARD, f, 0};
   if (r->letter[f] == 0) return; /* friction's limit has fallen: the next step sees its digits */
   const double *height = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
   for (int i = 0; i < k; i++) {

@@ -338,6 +338,7 @@ static void step(Run *r) {
   int row = first_hit(r, e, last ? h + after : h, &dt);
   dt = row >= 0 ? smaller(dt, h) : last ? h : to_number(r, h);
   if (row >= 0 && is_before_fold(r, e, row, dt)) { dt = to_number(r, 0.5 * dt); row = -1; last = 0; }
+  if (r->hold < dt) { dt = r->hold; row = -1; last = 0; } else r->hold = INFINITY;
   double wanted = dt, safe = safe_length(r, e, by_series), good;
   while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
   int grows = r->mode == r->length_mode && dt > r->length / STEADY;
@@ -347,11 +348,8 @@ static void step(Run *r) {
   r->length = dt == wanted ? h : dt;
   int swallowed = dt < wanted && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
   if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
-  if (dt < wanted) {
-    row = -1;
-    last = 0;
-    memset(r->instant.passing, 0, r->s->rules.atoms);
-  }
+  if (dt < wanted) row = -1, last = 0;
+  if (row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
   if (dt > 0) note_sides(r, e, dt);
   r->falls = row >= 0 && is_steep(r, e, row, dt);
   last &= dt == h;

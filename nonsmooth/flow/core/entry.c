@@ -120,6 +120,7 @@ static size_t place_run(Run *r, char *base) {
   r->involved = INTEGERS(3 * w + 2 * all + 1);
   r->p = DOUBLES(s->parameters);
   r->series = DOUBLES(pair_room(s->series.size, stride));
+  r->rounding = DOUBLES(s->series.size);
   r->point = DOUBLES(pair_room(s->point.size, 1));
   r->heights = DOUBLES(pair_room(s->surfaces.size, 1));
   r->maps = DOUBLES(pair_room(s->maps.size, 1));
@@ -221,6 +222,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->step_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
+  r->hold = INFINITY;
   r->begun = t;
   r->t = t.high;
   r->t_low = t.low;
@@ -329,9 +331,10 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
 
 /* Steps of runs that are lanes' between them ------------------------------------------------------- */
 
-/* Whether lanes can go on from here: nothing is to be served, and only the first guard has known zeros. */
+/* Whether lanes can go on from here: nothing is to be served or told apart, and only the first guard has known
+ * zeros. */
 static int is_plain(const Run *r) {
-  if (r->instant.running || r->due_impact >= 0) return 0;
+  if (r->instant.running || r->due_impact >= 0 || r->hold < INFINITY) return 0;
   for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m ? 0 : 2)) return 0;
   for (int j = 0; j < r->s->stops; j++) if (!r->instant.side[j]) return 0;
   return 1;

@@ -108,6 +108,12 @@ static void first_values(Run *r, int is_free) {
   series_at(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
 }
 
+/* Rounding of the values that were computed last, in units of EPSILON. */
+static void weigh_rounding(Run *r, int is_free, double size) {
+  const Series *t = is_free ? &r->s->free : &r->s->series;
+  series_rounding(t, t->moving, t->moving_count, r->stride, size, r->series, r->rounding);
+}
+
 static void jets(Run *r, Expansion *e) {
   int slides = e->l.slides;
   int32_t *start = r->sparse, *column = start + slides + 1, count = 0;

@@ -93,7 +93,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
     memcpy(r->out.event_after_x + k * r->n, r->x, sizeof(double) * r->n);
     r->out.event_before[k] = before;
     r->out.event_after[k] = r->mode;
-    r->out.event_guard[k] = guard;
+    r->out.event_guard[k] = guard < 0 ? -1 : ((r->met.index << 2) + r->met.side + 1) * 16 + r->met.kind;
     write_motion(r, r->out.event_motion + k * r->s->rules.width);
   }
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, r->met.index, r->met.side, x);

@@ -1,7 +1,7 @@
 /* The driver: all that a run is. The system is data, not code.
  *
  * Read in the order of core_source.py: programs.h, pairs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c,
- * elements.c, decide.c, events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
+ * near_zeros.c, elements.c, decide.c, events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
  */
 
 
@@ -142,7 +142,7 @@ typedef struct {
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
-  double size, length, shortened;
+  double size, length, shortened, hold; /* the last: the step's end before zeros of a guard that are not told apart */
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
@@ -157,7 +157,8 @@ typedef struct {
   int64_t read_count;
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
-  double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *zeros, *slope, *vector, *sample;
+  double *series, *rounding, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *zeros, *slope;
+  double *vector, *sample;
   double *atom_work, *choice_work;
   double *met_at; /* root of each guard in the step, or -1 */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;

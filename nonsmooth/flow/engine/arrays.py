@@ -67,7 +67,7 @@ class Happened(NamedTuple):
         next row.
     event_codes, keys : ndarray (e + 1,), sequence of tuple
         What an event is, as a position in the keys (the end is after them): kind (position in
-        ``facts.KINDS``), modes before and after, row of the guard in ``guards(mode_before)`` or -1.
+        ``facts.KINDS``), modes before and after, guard (``guard_of``) or -1.
     states : ndarray
         The points of the run, then what else is the state of an event.
     event_motions : ndarray (e, w)
@@ -106,8 +106,6 @@ class Run:
         Accumulation time or NaN.
     letters : sequence of str
         Modes by number.
-    guards : callable
-        From a mode to its guards.
     active : list of int
         Surfaces and contacts at the last point that was decided.
     several : list of str
@@ -142,7 +140,6 @@ class Run:
     mode: int
     limit: float
     letters: Sequence[str]
-    guards: Callable[[str], Sequence[Guard]]
     active: list[int]
     several: list[str]
     rates: Array
@@ -173,6 +170,16 @@ class Run:
         guards = [found.keys[code][-1] for code in found.event_codes[:-1]]
         states = found.states[found.event_rows[:-1]]
         return [*zip(guards, found.event_t.tolist()[:-1], states, strict=True)]
+
+
+def guard_of(system: FilippovSystem, code: int) -> Guard:
+    """Read a guard as C writes it: its index, its side plus one in two bits, its kind in four."""
+    kind, side, i, m = GUARDS[code & 15], (code >> 4 & 3) - 1, code >> 6, system.surface_count
+    if kind in ("stop", "reset"):
+        return Guard(kind, i, (system.stops if kind == "stop" else system.resets)[i][1], i)
+    if kind in ("impact", "release"):
+        return Guard(kind, i - m, side, len(system.entries) + i - m)
+    return Guard(kind, i, 0 if kind == "branch" else side, system.entry_of(i))
 
 
 def require_size(size: Any, structure: type[ctypes.Structure]) -> None:

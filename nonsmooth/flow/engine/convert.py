@@ -20,7 +20,7 @@ from ..segments import Segment, Segments, ShownMode
 from ..status import ADVICE, Status
 from ..trajectory import Continuation, Facts, Steps, Trajectory
 from ..warn import warn_of_facts
-from .arrays import Run
+from .arrays import Run, guard_of
 
 
 def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> Trajectory:
@@ -78,7 +78,7 @@ def _labels(system: FilippovSystem, run: Run, keys: Sequence[tuple[int, ...]]) -
     for kind, one, two, row in keys:
         key = (kind, modes[one], modes[two], row)
         if key not in known:
-            known[key] = _label(system, run, *key)
+            known[key] = _label(system, *key)
         labels.append(known[key])
     return labels
 
@@ -103,21 +103,19 @@ def _end_label(system: FilippovSystem, run: Run) -> Label:
     return Label("end", letters, letters, str(Status(run.status)))
 
 
-def _label(system: FilippovSystem, run: Run, kind: int, before: str, after: str, row: int) -> Label:
+def _label(system: FilippovSystem, kind: int, before: str, after: str, code: int) -> Label:
     """Kind, modes, name, element and side of an event."""
-    if row >= len(run.guards(before)):  # of stability, of which the driver has more
-        k = system.entry_of(before.index("s"))
-        own = [Guard("branch", k, 0, k)]
-        name = guard_name(system, own[0])
-    elif row >= 0:
-        own = [run.guards(before)[row]]
-        name = guard_name(system, own[0])
+    if code >= 0:
+        own = [guard_of(system, code)]
     else:  # what comes to rest together where events accumulate
-        held = run.guards(before)
-        own = [g for g in run.guards(after) if g not in held]
-        own = [g for g in own if g.kind == "release" or (g.kind == "exit" and g.side > 0)]
-        own = [replace(g, kind="surface", side=0) if g.kind == "exit" else g for g in own]
-        name = " and ".join([guard_name(system, guard) for guard in own])
+        m, pairs = system.surface_count, enumerate(zip(before, after, strict=True))
+        rests = [
+            i for i, (one, two) in pairs if two in "sc" and one != two and i not in system.set_of
+        ]
+        surfaces = [Guard("surface", i, 0, system.entry_of(i)) for i in rests if i < m]
+        first = len(system.entries) - m
+        own = [*surfaces, *[Guard("release", i - m, 0, first + i) for i in rests if i >= m]]
+    name = " and ".join([guard_name(system, guard) for guard in own])
     of = (own[0].element, own[0].side) if own else (-1, 0)
     return Label(KINDS[kind], system.spelled(before), system.spelled(after), name, *of)
 

@@ -196,7 +196,6 @@ class TapeEngine:
         self.system, self.order = system, order
         self.coupled = raised_of(system)
         tape = system.cached("tape", lambda: tape_of(self.coupled))
-        self.guards = lru_cache(maxsize=4096)(self.coupled.guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         tangent = None
         if tangents:
@@ -358,7 +357,6 @@ class TapeEngine:
             mode=counts[3],
             limit=numbers[1],
             letters=modes,
-            guards=self.guards,
             active=active,
             several=[modes[k] for k in several],
             rates=rates[:, : self.system.dimension],

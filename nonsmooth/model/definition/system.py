@@ -58,7 +58,8 @@ class FilippovSystem:
         One for each surface; a vector for each set.
     surfaces : sequence of expressions, optional
         Switching functions, one for each multiplier (``surface`` also takes one). A vector h of two or
-        three is one set $h = 0$: its multiplier is $h/|h|$ off it and $|lambda| <= 1$ on it.
+        three is one set $h = 0$: its multiplier is $h/|h|$ off it and $|lambda| <= 1$ on it. A
+        :class:`Relay` is one with hysteresis.
     parameters : mapping or sequence, optional
         Symbols with their default values; None, or a bare sequence of symbols, means no default.
     time : SX symbol, optional
@@ -525,8 +526,9 @@ class FilippovSystem:
         i = self.surface_index(surface)
         if mode is not None:
             self.require_mode(mode)
-        if i in self.set_of:
-            return Switching("generic", None, None, "its definition as a set")
+        if i in (*self.set_of, *self.remembering):
+            what = "as a set" if i in self.set_of else "with hysteresis"
+            return Switching("generic", None, None, f"its definition {what}")
         values = None if parameters is None else tuple(self.parameter_vector(parameters).tolist())
         key = ("switching", i, mode, values)
         return self.cached(key, lambda: class_of(self, i, mode, parameters))

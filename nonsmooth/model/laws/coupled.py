@@ -228,32 +228,17 @@ class Coupled:
         return self.continuous[i] or idle
 
     def guards(self, mode: str) -> tuple[Guard, ...]:
-        """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""
+        """Guards of a mode: surfaces and exits, contacts, stops and resets."""
         result, contacts = list[Guard](), len(self.system.entries)
         for i, sign in enumerate(self.system.parse_letters(mode)):
             j = i - self._surfaces
             if j >= 0:
                 result.append(Guard("impact" if sign else "release", j, sign, contacts + j))
-            elif i in self.system.set_of:
-                result += self._guards_of_set(i, mode[i])
             elif sign:
                 result.append(Guard("surface", i, sign, self.system.entry_of(i)))
             else:
                 result += [Guard("exit", i, side, self.system.entry_of(i)) for side in (1, -1)]
-        result += event_guards(self.system)
-        sliding = self.sliding(mode)
-        first = next((i for i in sliding if i < self._surfaces), 0)
-        branches = len(self._changing(sliding))
-        of_first = self.system.entry_of(first) if self._surfaces else 0
-        return (*result, *[Guard("branch", first, 0, of_first)] * branches)
-
-    def _guards_of_set(self, i: int, letter: str) -> list[Guard]:
-        """Those of the set that begins with a switching function."""
-        if i != self.system.set_of[i][0] or letter == "i":
-            return []
-        k = self.system.entry_of(i)
-        near = [Guard("near", i, 0, k)]
-        return [Guard("slip", i, 0, k), *near * self.scaled[i]] if letter == "s" else near
+        return (*result, *event_guards(self.system))
 
     @cached_property
     def slope_moves(self) -> NDArray[np.bool_]:
@@ -287,12 +272,6 @@ class Coupled:
             bent = ca.jacobian(self.columns_of_field[:, j], self._every)
             mixed[j, bent.sparsity().get_col()] = True
         return mixed
-
-    def _changing(self, sliding: Sequence[int]) -> list[int]:
-        """Unknowns that the stability of sliding is read from."""
-        if len(sliding) == 2 and max(sliding) < self._surfaces:
-            return list(sliding) if self.slope_moves[np.ix_(sliding, sliding)].any() else []
-        return [i for i in sliding if self.slope_moves[i, i]]
 
     # expressions --------------------------------------------------------------------------------
 

@@ -81,8 +81,8 @@ def simulate(
         event, or after each period. See :class:`Section`.
     dense : bool, optional
         Keep the polynomials of the steps, so that the result can be read at any time. ``False`` keeps points,
-        events, segments and samples: a twentieth of the memory of a long run. Such a run can be continued
-        from its end, but not from its other events.
+        events, segments and samples, which need an eighth of the memory or less. Such a run can be continued
+        from its end, but not from its other events if the system has stops, resets or impacts.
 
     Returns
     -------

@@ -196,6 +196,7 @@ class Events(LazySequence[Event]):
         Parameters
         ----------
         attribute : {"kind", "mode_before", "mode_after", "name", "element", "side"}
+            Name of the attribute.
 
         Returns
         -------

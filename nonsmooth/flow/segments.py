@@ -94,7 +94,18 @@ class Segments(LazySequence[Segment]):
         )
 
     def shown(self, most: int) -> list[ShownMode]:
-        """Modes of the first segments."""
+        """Return the modes of the first segments.
+
+        Parameters
+        ----------
+        most : int
+            Number of segments at most.
+
+        Returns
+        -------
+        list
+            Modes with the values of the discrete states.
+        """
         objects = self._objects
         if objects is not None:
             return [ShownMode(s.mode, s.discrete) for s in objects[:most]]

@@ -121,12 +121,10 @@ def simulate(
     ('- + - + s', True)
     """
     require_system(system, sets=True, hysteresis=True)
-    if start is not None:
-        x0, t_start, parameters = _continued(start, x0, t_start, parameters)
-    elif x0 is None:
-        raise OptionError("x0 is missing. Give a start, or start= with a run or event to continue.")
+    x0, t_start, parameters = _begun(start, x0, t_start, parameters)
     if t_end is None:
         raise OptionError("t_end is missing. Give the time at which the run ends.")
+    _require_flag(dense)
     rtol, atol = tolerances(tol, rtol, atol)
     options = Options(
         t_end=t_end,
@@ -140,8 +138,6 @@ def simulate(
         rest_below=rest_below,
         start_mode=start_mode,
     )
-    if not isinstance(dense, bool):
-        raise OptionError(f"dense is {dense!r}. Give True or False.")
     system, at = sectioned(system, at)
     x = system.extended_point(x0, options.t_start)
     p = system.parameter_vector(parameters)
@@ -151,11 +147,6 @@ def simulate(
     else:
         last = start.events[-1] if isinstance(start, Trajectory) else start
         motion, mode = last.motion, last.mode_after if system.remembering else None
-        if motion is not None and not len(motion):
-            raise OptionError(
-                "start is an event within a run with dense=False, which keeps what a restart needs at its end "
-                "only. Continue from the run, or simulate it with dense=True."
-            )
     require_start_mode(system, x, p, options)
     sampling = read_sampling(system, t_eval, at, options.t_start, options.t_end, p)
     times = sampling.times
@@ -165,9 +156,20 @@ def simulate(
         options = replace(options, t_end=float(times.of(p)[-1]))
     read_at = None if times is None else times.of(p)
     run = tape_for(system, options).run(x, p, options, read_at, motion, mode, dense)
-    made = trajectory(system, p, options, run)
+    return _with_samples(trajectory(system, p, options, run), options, read_at, run.sample_x)
+
+
+def _require_flag(dense: object) -> None:
+    if not isinstance(dense, bool):
+        raise OptionError(f"dense is {dense!r}. Give True or False.")
+
+
+def _with_samples(
+    made: Trajectory, options: Options, read_at: Array | None, read: Array
+) -> Trajectory:
+    """Add the samples to a run; ``read`` are those at times if it is not dense."""
     if read_at is not None:
-        t, states = sampled(made, read_at, None if dense else run.sample_x)
+        t, states = sampled(made, read_at, None if made.dense else read)
     elif options.hits is not None:
         t, states = options.hits.samples(made.events)
     else:
@@ -175,16 +177,27 @@ def simulate(
     return replace(made, sample_t=t, sample_x=states)
 
 
-def _continued(
-    start: Trajectory | Event, x0: Any, t_start: float, parameters: Any
-) -> tuple[Array, float, Any]:
-    """State, time and parameters at which a run or event is continued."""
+def _begun(
+    start: Trajectory | Event | None, x0: Any, t_start: float, parameters: Any
+) -> tuple[Any, float, Any]:
+    """State, time and parameters at the start, or where a run or event is continued."""
+    if start is None:
+        if x0 is None:
+            raise OptionError(
+                "x0 is missing. Give a start, or start= with a run or event to continue."
+            )
+        return x0, t_start, parameters
     if not isinstance(start, (Trajectory, Event)):
         raise OptionError(
             f"start is {start!r}. Give a run of nonsmooth.simulate or one of its events."
         )
     if x0 is not None or t_start != 0.0:
         raise OptionError("start= has a state and a time. Leave out x0 and t_start.")
+    if isinstance(start, Event) and start.motion is not None and not len(start.motion):
+        raise OptionError(
+            "start is an event within a run with dense=False, which keeps what a restart needs at its end "
+            "only. Continue from the run, or simulate it with dense=True."
+        )
     if isinstance(start, Event):
         return start.x_after, start.t, parameters
     return start.x[-1], float(start.t[-1]), start.parameters if parameters is None else parameters

@@ -256,7 +256,18 @@ class Trajectory(
         return self.x[k]
 
     def require_dense(self, what: str) -> None:
-        """Raise OptionError, with what needs the polynomials, if the run has none."""
+        """Raise an error if the run has no polynomials.
+
+        Parameters
+        ----------
+        what : str
+            What needs them, for the message.
+
+        Raises
+        ------
+        OptionError
+            The run was simulated with ``dense=False``.
+        """
         if not self.dense:
             raise OptionError(
                 f"dense=False kept no polynomials of this run, which {what} needs. Simulate with dense=True."

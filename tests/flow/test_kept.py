@@ -118,12 +118,14 @@ def test_events_are_equal_where_all_of_their_numbers_are():
     assert one != "event"
 
 
-def test_an_event_that_is_changed_leaves_the_run_as_it_is():
-    run = ns.simulate(*RUNS["ball"])
-    points = run.x.copy()
-    event = run.events[1]
-    event.x[:], event.x_after[:], event.motion[:] = 9.0, 9.0, 9.0
-    assert np.array_equal(run.x, points) and run.events[1] != event
+@pytest.mark.parametrize("t_end", [0.5, 6.0])
+def test_an_event_that_is_changed_leaves_points_and_arrays_as_they_are(t_end):
+    run, again = (ns.simulate(*RUNS["ball"][:2], t_end, max_step=0.02) for _ in range(2))
+    for event in run.events:
+        event.x[:], event.x_after[:], event.motion[:] = 9.0, 9.0, 9.0
+    assert np.array_equal(run.x, again.x) and np.array_equal(run(run.t), again(again.t))
+    assert np.array_equal(run.events.x, again.events.x)
+    assert np.array_equal(run.events.x_after, again.events.x_after)
 
 
 def test_columns_of_events():

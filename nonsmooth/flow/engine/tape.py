@@ -343,8 +343,7 @@ class TapeEngine:
                 recorder.make_room(counts[7:10])
                 library().run_resume(state, output.pointer)
             recorded = recorder.finished(counts[7:10])
-            if dense:
-                self._rooms = recorder.rooms  # of the next run, which is often a similar one
+            self._rooms = recorder.rooms if dense else self._rooms  # the next run is often similar
             modes, labels = self._modes(table), self._labels(table)
             final = np.zeros(width)
             library().run_motion(state, address(final))

@@ -126,10 +126,9 @@ static size_t place_run(Run *r, char *base) {
   r->maps = DOUBLES(pair_room(s->maps.size, 1));
   r->restitution = DOUBLES(pair_room(s->restitution.size, 1));
   r->columns = DOUBLES(pair_room(s->columns.size, 1));
-  r->input = DOUBLES(2 * (n + 2 * w) + s->parameters);
+  r->input = DOUBLES(n + 2 * w);
   r->held = DOUBLES(w);
   r->none = DOUBLES(w);
-  r->zeros = DOUBLES(s->parameters);
   r->slope = DOUBLES(square);
   r->vector = DOUBLES(3 * n + 2 * w);
   r->sample = DOUBLES(3 * ((size_t)n + w + g));

@@ -33,7 +33,6 @@ typedef struct {
   int32_t n, dimension, timed, m, c, parameters, stops, resets, order, slope_outputs;
   Series series;      /* field, layer, surfaces and gaps, factors, stops and resets, slope_outputs slopes */
   Series free;        /* the same rules where nothing slides: field, surfaces and gaps, stops and resets */
-  Series tangent;     /* the same rules: derivatives of series' outputs, but slopes, along a direction; see variation.c */
   Values point;       /* layer, factors, entries of slope, gradients of layer, surfaces and gaps, stops, factors */
   Values surfaces;    /* surfaces, gaps, rates of gaps; entries of their gradients */
   Values maps;        /* states after each reset */
@@ -56,6 +55,7 @@ typedef struct {
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
   int32_t early_count, early_free_count;
   Rules rules;
+  Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
 } System;
 
 enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
@@ -157,7 +157,7 @@ typedef struct {
   int64_t read_count;
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
-  double *series, *rounding, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *zeros, *slope;
+  double *series, *rounding, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope;
   double *vector, *sample;
   double *atom_work, *choice_work;
   double *met_at; /* root of each guard in the step, or -1 */

@@ -114,6 +114,8 @@ class Run:
         Rates of the states in them.
     facts : int
         What was noted about the decisions, as bits.
+    unmet : int
+        A stop or reset, in this order, that was true at the start and did not happen, or -1.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
     motion : ndarray (w,)
@@ -144,6 +146,7 @@ class Run:
     several: list[str]
     rates: Array
     facts: int
+    unmet: int
     t: Array
     x: Array
     motion: Array

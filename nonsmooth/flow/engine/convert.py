@@ -41,7 +41,7 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
             partial(_segments, system, run), few and partial(_few_segments, system, run)
         ),
         status=status,
-        message=f"{message_of(system, options, run)} {ADVICE[status]}",
+        message=f"{message_of(system, options, run)} {ADVICE[status]}{_unmet(system, run)}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
         steps=Steps(run.starts, run.coefficients),
         continuations=[
@@ -159,6 +159,12 @@ def _segments(system: FilippovSystem, run: Run) -> Segments:
     last = np.append(first[1:], len(run.starts)) if run.dense else first
     modes = tuple(map(ShownMode, shown, labels))
     return Segments(times[:-1], times[1:], first, last, found.segment_modes, modes)
+
+
+def _unmet(system: FilippovSystem, run: Run) -> str:
+    """What is said of an event that was true at the start and silent."""
+    names = [name for name, *_ in (*system.stops, *system.resets)]
+    return "" if run.unmet < 0 else f" {messages.unmet(names[run.unmet])}"
 
 
 def message_of(system: FilippovSystem, options: Options, run: Run) -> str:

@@ -148,7 +148,7 @@ GOLF = {
         "From launch to rest",
         "Flight, bounces and roll of a golf ball in SI units.",
         "bounce.golf",
-        "flight Flight Air rebound Rebound play Run Bounce Glide landing_map SideState axis_spin AxisSpin",
+        "flight Flight Air TourAverage tour_differences rebound Rebound play Run Bounce Glide landing_map SideState axis_spin AxisSpin",
     ),
     "bounce_fits": _task(
         "Fit measured bounces",

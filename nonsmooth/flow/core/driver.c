@@ -217,9 +217,11 @@ static int only_sliding(const Run *r) {
   return found;
 }
 
+static int nears_root(Run *r);
+
 static void watch_two_fold(Run *r) {
   int s = only_sliding(r);
-  if (s >= 0 && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
+  if (s >= 0 && !(r->has_roots && nears_root(r)) && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
 }
 
 static int rest_at_limit(Run *r, int before);

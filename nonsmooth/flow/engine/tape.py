@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
-from ...model.printing.tape import Entries, Series, Tape, Values, tangent_series_of, tape_of
+from ...model.printing.tape import Entries, Series, Tape, Values, derived_series_of, tape_of
 from ..constants import FULL, LAWS, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
@@ -180,7 +180,9 @@ class SeriesStructure(ctypes.Structure):
     ]
 
 
-class _Entries(ctypes.Structure):
+class EntriesStructure(ctypes.Structure):
+    """Places of entries of a matrix as C reads them."""
+
     _fields_ = [("count", _I32), ("pad", _I32), ("row", _POINTER), ("column", _POINTER)]
 
 
@@ -210,9 +212,8 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("stops", "resets", "order", "slope_outputs")],
         ("series", SeriesStructure),
         ("free", SeriesStructure),
-        ("tangent", SeriesStructure),
         *[(name, ValuesStructure) for name in _VALUES],
-        *[(name, _Entries) for name in _ENTRIES],
+        *[(name, EntriesStructure) for name in _ENTRIES],
         *[(name, _POINTER) for name in ("element", "carries", "component")],
         *[(name, _POINTER) for name in ("slope_output", "slope_moves", "slope_symmetric")],
         *[(name, _I32) for name in ("linear", "linear_free")],
@@ -221,6 +222,7 @@ class _System(ctypes.Structure):
         *[(name, _POINTER) for name in ("mixed", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
+        ("derivatives", EntriesStructure),
     ]
 
 
@@ -312,20 +314,20 @@ def _ends(parts: Sequence[Sequence[Any]]) -> list[int]:
 
 
 class TapeEngine:
-    """The driver in C with one system at one order, with ``tangents`` for derivatives."""
+    """The driver in C with one system at one order, with ``derived`` for derivatives."""
 
-    def __init__(self, system: FilippovSystem, order: int, tangents: bool = False):
+    def __init__(self, system: FilippovSystem, order: int, derived: bool = False):
         self.system, self.order = system, order
         self.coupled = raised_of(system)
         tape = system.cached("tape", lambda: tape_of(self.coupled))
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
-        tangent = None
-        if tangents:
-            series, tangent = tangent_series_of(self.coupled)
+        entries = None
+        if derived:
+            series, entries = derived_series_of(self.coupled)
             tape = replace(tape, series=series, free=series)
         self._c = self._structure(self.coupled, tape)
-        if tangent is not None:
-            self._c.tangent = series_structure(tangent, self._kept)
+        if entries is not None:
+            self._c.derivatives = self._entries(entries)
         self._rooms = rooms_of((0, 0, 0))
 
     def _structure(self, coupled: Coupled, tape: Tape) -> _System:
@@ -422,8 +424,8 @@ class TapeEngine:
         self._kept.append(array)
         return array.ctypes.data
 
-    def _entries(self, e: Entries) -> _Entries:
-        return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))
+    def _entries(self, e: Entries) -> EntriesStructure:
+        return EntriesStructure(len(e.row), 0, self._at(e.row), self._at(e.column))
 
     # one trajectory ----------------------------------------------------------------------------
 
@@ -516,7 +518,7 @@ class TapeEngine:
         return _Held(state, made.run_free)
 
     def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
-        numbers, counts = (_D * 3)(), (_I64 * 13)()
+        numbers, counts = (_D * 3)(), (_I64 * 14)()
         width = self.system.surface_count + len(self.system.impacts)
         active, several = (_I32 * (width + 1))(), (_I32 * SEVERAL)()
         rates = np.empty((SEVERAL, self.system.extended_dimension))

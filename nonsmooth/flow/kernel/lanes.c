@@ -16,6 +16,8 @@
 #define FIRST_STOP (SLOTS - STOPS)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 60)
+#define LETTERS 1
+#define OF_POOLS int alive;
 
 #if RARE_CASES_HERE
 #define ROWS_KEPT 256 /* a power of two */
@@ -24,9 +26,6 @@
  * negative where a lane had none. */
 typedef struct { T interval[ROWS_KEPT]; I pattern[ROWS_KEPT]; } Log;
 
-/* Of a trajectory, what only the driver needs: the last events, and up to which row of the log; halved steps, and up to
- * which step that is so. */
-typedef struct { Recent event[HISTORY]; int64_t count, row, steps; double shortened; } Past;
 #endif
 
 typedef struct {
@@ -38,8 +37,7 @@ typedef struct {
   I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
   I above_stop[STOPS > 0 ? STOPS : 1]; /* where the guard of a stop was at the start of the step before */
   double size; /* of states at which both tolerances are as large */
-  int64_t index[W];
-  int32_t base[W];
+  I index, base;
 #if RARE_CASES_HERE
   Past *past; /* of each lane */
   Log *log;
@@ -57,7 +55,7 @@ static void store(Lanes *s, Work *w, int l, int status);
 static void shorten_codes(Lanes *s, Work *w);
 static void begin_elsewhere(Lanes *s, Work *w, I which);
 INLINE I by_chance(const Lanes *s, const Work *w);
-INLINE void keep_event(const Lanes *s, Work *w, int kind, I which);
+INLINE void count(Lanes *s, Work *w, int kind, I which);
 
 /* Number of the mode: 0 above, 1 below, 2 sliding. */
 INLINE I mode_of(const Lanes *s) { return (s->slides & 2) | (~s->slides & ~s->above & (M > 0)); }
@@ -470,33 +468,6 @@ static void recall(const Lanes *s, int l) {
   }
 }
 
-/* Sum of the last intervals but ``back``. */
-static double block(const Past *p, int64_t back, int lag) {
-  double sum = 0;
-  for (int k = 0; k < lag; k++) sum += p->event[(p->count - 1 - back - k) % HISTORY].interval;
-  return sum;
-}
-
-/* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
-static int may_accumulate(const Past *p) {
-  for (int l = 0; l < LAG_COUNT; l++) {
-    int lag = LAGS[l];
-    if (p->count < (BLOCKS + 1) * lag) return 0;
-    double later = block(p, 0, lag), low = INFINITY, high = 0, last = 0;
-    if (!(later > 0)) return 1;
-    for (int b = 1; b < BLOCKS; b++) {
-      double earlier = block(p, b * lag, lag), ratio = later / earlier;
-      low = smaller(ratio, low);
-      high = larger(ratio, high);
-      if (b == 1) last = ratio;
-      if (!(high < SHRINKS && high - low <= SPREAD * (1 - last))) break;
-      if (b == BLOCKS - 1) return 1;
-      later = earlier;
-    }
-  }
-  return 0;
-}
-
 /* Lanes whose last event, just before, may be one of those that accumulate, so that the run may end here: the driver
  * acts where the states change by less than their tolerances up to the limit, and the time left is a part of the last
  * interval, SHRINKS_TO or more. */
@@ -530,12 +501,6 @@ INLINE I remember(Lanes *s, I which, I, I) {
   return which & (s->shrinking >= 3);
 }
 #endif
-
-INLINE void count(Lanes *s, Work *w, int kind, I which) {
-  s->kinds[kind] -= which;
-  s->events -= which;
-  keep_event(s, w, kind, which);
-}
 
 #if M > 0
 /* Lanes that met the surface or an end of sliding change their mode; ``slope`` is that of the guard

@@ -148,6 +148,8 @@ class Coupled:
         field, powers = gate_roots(field, d.surfaces, x, ca.vertsplit(gates))
         for i, factor in enumerate(factors):
             factors[i] = gate_roots(factor, d.surfaces, x, ca.vertsplit(gates))[0]
+        for i, power in gate_roots(d.surfaces, d.surfaces, x, ca.vertsplit(gates))[1].items():
+            powers[i] = min(power, powers.get(i, power))
         for i, power in powers.items():
             if i in self.system.set_of:
                 continue
@@ -338,15 +340,10 @@ class Coupled:
             held[n + i] = (*signs, 0.0) if self.scaled[i] else signs
         return held
 
-    def tangents(self) -> tuple[ca.SX, list[ca.SX]]:
-        """Symbols of ``moving``, of a direction of it and one of the parameters; ``outputs`` derived along them."""
-        moving, p = self._symbols
-        size, n = moving.numel(), self.system.extended_dimension
-        by_moving, by_p = ca.SX.sym("d", size), ca.SX.sym("dp", p.numel())
-        every = ca.vertcat(moving, by_moving, by_p)
-        outputs = [ca.jtimes(e, moving, by_moving) + ca.jtimes(e, p, by_p) for e in self.outputs]
-        held = {**self._values_held, **{size + i: (0.0,) for i in range(n, size)}}
-        return every, without_unused_terms([every, p], [ca.densify(e) for e in outputs], held)
+    @property
+    def derivatives(self) -> ca.SX:
+        """Of field, layer, surfaces and gaps, and factors by ``moving`` and the parameters, sparse."""
+        return ca.jacobian(ca.vertcat(*self.outputs[:4]), ca.vertcat(*self._symbols))
 
     # numbers -----------------------------------------------------------------------------------
 

@@ -7,10 +7,8 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ..expressions.graph import evaluate, instructions, operation
+from ..expressions.graph import POWERS, evaluate, instructions, operation, power_of
 from ..expressions.identity import vanish_on
-
-_POWERS = ("sqrt", "pow", "constpow")
 
 #: Random points at which signs are compared.
 _DRAWS = 21
@@ -32,24 +30,16 @@ class _Gated:
         return self._symbols[position]
 
     def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
-        result, power = operation(op, list(args)), self._power(op, args)
+        result, power = operation(op, list(args)), power_of(op, args)
         if power is None or not ca.depends_on(args[0], self._x):
             return result
+        base, times = (args[0].dep(0), 2) if args[0].op() == ca.OP_SQ else (args[0], 1)
         for i, h in enumerate(self._surfaces):
-            if vanish_on([args[0]], h, self._x):
-                self.powers[i] = min(power, self.powers.get(i, power))
+            if vanish_on([base], h, self._x):
+                self.powers[i] = min(times * power, self.powers.get(i, times * power))
                 gate = _side(args[0], h) * self._gates[i]
                 return gate * (1 + gate) / 2 * result
         return result
-
-    def _power(self, op: str, args: Sequence[ca.SX]) -> float | None:
-        """The exponent of a positive power that is not a whole number."""
-        if op == "sqrt":
-            return 0.5
-        if op not in _POWERS or not args[1].is_constant():
-            return None
-        power = float(args[1])
-        return power if power > 0.0 and power != int(power) else None
 
 
 def _side(e: ca.SX, h: ca.SX) -> int:
@@ -68,7 +58,7 @@ def gate_roots(
     # A gate is 1 or -1, the side, or 0; a root is multiplied by 1 on the side where it is defined, else by 0.
     symbols = ca.vertcat(*ca.symvar(field)) if field.numel() else ca.SX(0, 1)
     nodes, rows = instructions([symbols], [field])
-    if not any(node.op in _POWERS for node in nodes):
+    if not any(node.op in POWERS for node in nodes):
         return field, {}
     algebra = _Gated(symbols, ca.vertsplit(surfaces), x, gates)
     values = evaluate(nodes, algebra)

@@ -92,3 +92,28 @@ def test_a_root_that_drives_away_from_where_the_rate_is_inward_does_not(rate):
     system = ns.FilippovSystem([x], surface=x, above=[ca.sqrt(x) - rate], below=[1])
     run = ns.simulate(system, [0.0], 1.0)
     assert run.itinerary == "s" and run.x[-1, 0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("start", "enters", "rests"),
+    [([1.0, -2.0], 0.0, 1.0), ([1.0, 0.0], 0.516397779494, 1.290994448736)],
+)
+def test_terminal_sliding_rests(start, enters, rests):
+    """On v + 2 |x|^(1/2) sgn x = 0 the root of x falls at rate 1; v' = -3 before, so 15 t^2 = 4 from rest."""
+    surface = v + 2 * ca.sqrt(ca.fabs(x)) * ca.sign(x)
+    run = ns.simulate(
+        ns.FilippovSystem.from_expression([x, v], [v, -3 * ca.sign(surface)]), start, 4.0
+    )
+    assert run.status is ns.Status.REACHED_END and run.x[-1].tolist() == [0, 0]
+    assert run.events[-2].t == pytest.approx(rests, abs=1e-9)
+    middle = (enters + rests) / 2
+    assert run(middle)[0] == pytest.approx((rests - middle) ** 2, abs=1e-9)
+
+
+@pytest.mark.parametrize(("push", "rests"), [(0.0, True), (1.5, True), (-1.5, True), (2.5, False)])
+def test_powers_in_a_switching_function_hold_what_is_below_the_gain(push, rests):
+    surface = x + ca.sign(v) * ca.fabs(v) ** (5 / 3)
+    rhs = [v, push - ca.sign(v) * ca.fabs(v) ** (1 / 3) - 2 * ca.sign(surface)]
+    run = ns.simulate(ns.FilippovSystem.from_expression([x, v], rhs), [0.0, 0.0], 1.0)
+    assert (run.status is ns.Status.REACHED_END) == rests
+    assert not rests or run.x[-1].tolist() == [0, 0]

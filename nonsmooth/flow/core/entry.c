@@ -58,6 +58,7 @@ static size_t place_instant(Instant *i, char *base, size_t used, const System *s
   for (int k = 0; k < 5; k++) *flags[k] = LETTERS(atoms);
   i->pending = LETTERS(triggers);
   i->was = LETTERS(triggers);
+  i->unmet = LETTERS(triggers);
   i->value = DOUBLES(atoms);
   i->noise = DOUBLES(atoms);
   i->residual = DOUBLES(atoms);
@@ -217,6 +218,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->instant.running = 0;
   r->instant.tied = -1;
   memset(r->instant.passing, 0, s->rules.atoms);
+  memset(r->instant.unmet, 0, s->rules.triggers);
   memset(r->kinds, 0, sizeof r->kinds);
   r->step_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
   r->itinerary = r->active_count = r->several_count = 0;
@@ -268,13 +270,20 @@ static int go_on(Run *r, int64_t *budget) {
 
 int run_continue(Run *r, int64_t budget) { return go_on(r, &budget); }
 
+/* The first stop or reset whose condition was true at the start and that has not happened; -1 if there is none. */
+static int unmet_event(const Run *r) {
+  for (int k = 0; k < r->s->rules.triggers; k++) if (r->instant.unmet[k]) return r->s->rules.trigger_event[k];
+  return -1;
+}
+
 void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, int32_t *several,
               double *rates) {
   numbers[0] = r->t;
   numbers[1] = r->limit;
   numbers[2] = r->at_t;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
-                    r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts};
+                    r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts,
+                    unmet_event(r)};
   memcpy(counts, head, sizeof head);
   memcpy(active, r->active, sizeof(int32_t) * r->active_count);
   memcpy(several, r->several, sizeof(int32_t) * r->several_count);

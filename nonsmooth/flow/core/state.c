@@ -61,11 +61,12 @@ typedef struct {
 enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
 
 /* What happens at one time (events.c). Of atoms: sides, as the jumps have made them, as evaluated now; those that are
- * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before. */
+ * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before,
+ * whether true at the start and not met since. */
 typedef struct {
   int32_t running, first, settled, unsettled, last, tied, is_last;
   int64_t jumps, counted, sampled, *count;
-  int8_t *side, *view, *now, *passing, *zero, *pending, *was;
+  int8_t *side, *view, *now, *passing, *zero, *pending, *was, *unmet;
   double *value, *noise, *residual, *germ, *trigger_x, *arrived, *tick; /* two numbers each; germ: first coefficients on arrival */
 } Instant;
 

@@ -81,6 +81,8 @@ class Run:
         Rates of the states in them.
     facts : int
         What was noted about the decisions, as bits.
+    unmet : int
+        A stop or reset, in this order, that was true at the start and did not happen, or -1.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
     starts, coefficients, modes : ndarray (s,), (s, N, P+1), (s,)
@@ -106,6 +108,7 @@ class Run:
     several: list[str]
     rates: Array
     facts: int
+    unmet: int
     t: Array
     x: Array
     starts: Array
@@ -150,6 +153,7 @@ class Run:
             several=several,
             rates=rates,
             facts=counts[12],
+            unmet=counts[13],
             t=whole["point_t"],
             x=whole["point_x"][:, :n],
             starts=whole["start"],

@@ -40,7 +40,7 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         events=events,
         segments=_segments(system, run),
         status=status,
-        message=f"{message_of(system, options, run)} {ADVICE[status]}",
+        message=f"{message_of(system, options, run)} {ADVICE[status]}{_unmet(system, run)}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
         steps=Steps(run.starts, run.coefficients),
         continuations=[
@@ -105,6 +105,12 @@ def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
         Segment(shown[run.modes[a]], float(run.starts[a]), end, a, b, labels[run.modes[a]])
         for a, b, end in zip(bounds[:-1], bounds[1:], ends, strict=True)
     ]
+
+
+def _unmet(system: FilippovSystem, run: Run) -> str:
+    """What is said of an event that was true at the start and silent."""
+    names = [name for name, *_ in (*system.stops, *system.resets)]
+    return "" if run.unmet < 0 else f" {messages.unmet(names[run.unmet])}"
 
 
 def message_of(system: FilippovSystem, options: Options, run: Run) -> str:

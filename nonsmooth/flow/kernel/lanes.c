@@ -257,13 +257,7 @@ static __attribute__((noinline)) void resolve_steps(const Lanes *s, T g[S1][P + 
   for (int j = 0; j < SLOTS; j++) {
     I active = which;
     if (M > 0 && j == 1) active &= s->slides;
-    while (any(active)) {
-      T power = BC(1), sum = BC(0), step = *h;
-      for (int k = P - 2; k >= 0; k--) { sum = sum * step + ABS(g[j][k]); power *= step; }
-      T last = MAX(ABS(g[j][P]) * step, ABS(g[j][P - 1])) * power, rest = RESOLVED * sum;
-      active &= (last > rest) & (rest > 0) & (rest < INFINITY);
-      *h = SELECT(active, step * 0.99 * EXP2(LOG2(rest / last) * (1.0 / (P - 1))), step);
-    }
+    resolve_step(g[j], active, h);
   }
 }
 #endif
@@ -321,14 +315,7 @@ SELDOM I resolve(Guards *v) {
     UNROLL for (int k = 0; k <= P; k++) b[k] = v->a[SLOTS - 1][k];
     for (int j = 0; j < SLOTS - 1; j++)
       if (any(mine[j])) UNROLL for (int k = 0; k <= P; k++) b[k] = SELECT(mine[j], v->a[j][k], b[k]);
-    UNROLL for (int k = 0; k <= P; k++) b[k] += ROUNDING * ABS(b[k]);
-    to_bernstein(b, P);
-    I changes = {0}, positive = b[0] > 0, first = positive;
-    UNROLL for (int k = 1; k <= P; k++) {
-      I next = b[k] > 0;
-      changes -= positive ^ next;
-      positive = next;
-    }
+    I first, changes = sign_changes(b, &first);
     UNROLL for (int j = 0; j < SLOTS; j++) {
       I one = mine[j] & first & (changes == 1) & ~v->wrong_way[j];
       I deep = mine[j] & ~one & ~(first & (changes == 0));

@@ -168,29 +168,13 @@ static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, i
   return stops && s > 0 && met > s ? NAN : met;
 }
 
-/* Shorten steps until a guard's series converges within them, as in the interpreter. */
-static __attribute__((noinline)) void resolve_step(const T *g, I active, T *h) {
-  while (any(active)) {
-    T power = BC(1), sum = BC(0), step = *h;
-    for (int k = P - 2; k >= 0; k--) { sum = sum * step + ABS(g[k]); power *= step; }
-    T last = MAX(ABS(g[P]) * step, ABS(g[P - 1])) * power, rest = RESOLVED * sum;
-    active &= (last > rest) & (rest > 0) & (rest < INFINITY);
-    *h = SELECT(active, step * 0.99 * EXP2(LOG2(rest / last) * (1.0 / (P - 1))), step);
-  }
-}
-
 /* Hard cases by sign changes of all Bernstein coefficients: those with one become ``one``, those without are
  * none, the others stay. */
 static __attribute__((noinline)) void count_changes(const T *a, I wrong_way, I *one, I *hard) {
   T b[P + 1];
-  UNROLL for (int k = 0; k <= P; k++) b[k] = a[k] + ROUNDING * ABS(a[k]);
-  to_bernstein(b, P);
-  I changes = {0}, positive = b[0] > 0, first = positive;
-  UNROLL for (int k = 1; k <= P; k++) {
-    I next = b[k] > 0;
-    changes -= positive ^ next;
-    positive = next;
-  }
+  I first, changes;
+  UNROLL for (int k = 0; k <= P; k++) b[k] = a[k];
+  changes = sign_changes(b, &first);
   *one |= *hard & first & (changes == 1) & ~wrong_way;
   *hard &= ~(*one | (first & (changes == 0)));
 }

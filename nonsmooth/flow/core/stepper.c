@@ -205,7 +205,7 @@ static void rounding_of(Run *r, const Expansion *e, double *noise) {
 static int agrees(Run *r, const Expansion *e, double time, double dt) {
   int n = r->n, order = r->order, stride = r->stride, slides = e->l.slides;
   int guards = e->l.bent_count, all = n + slides + guards;
-  double *x = r->vector, *lam = x + n, ignored;
+  double *x = r->vector, *lam = x + n;
   double *found = r->sample, *noise = found + all, *moved = noise + all;
   const int32_t *bent = e->l.is_free ? r->s->bent_free : r->s->bent;
   at_time(r, e, time, x, lam);

@@ -275,7 +275,7 @@ static int advance(Run *r, const Expansion *e, double dt) {
   double *x = r->at_work;
   for (int i = 0; i < r->s->dimension; i++) x[i] = value_at(e->states + (int64_t)i * stride, r->order, dt);
   if (!finite_all(x, r->s->dimension)) { finish(r, NOT_FINITE, STATE, 0); return 0; }
-  note_step(r, e);
+  if (dt > 0) note_step(r, e);
   if (r->times) sample_step(r, e, dt);
   memcpy(r->x, x, sizeof(double) * r->s->dimension);
   pass_time(r, dt);

@@ -130,9 +130,6 @@ TANGENT = 2e-14
 #: Shortest step, relative to the time and to that of the run, that rounding does not cancel.
 SHORTEST = 4 * EPSILON
 
-#: A longer step of lanes is the driver's: theirs have a longest one, where all terms vanish.
-LONG = 1e15
-
 #: Halvings of an interval before two roots count as a touch without crossing.
 DEPTH = 52
 

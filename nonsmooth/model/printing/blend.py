@@ -46,7 +46,8 @@ def blended_jet(system: FilippovSystem, order: int) -> Blend:
         sliding = motion(system, "s")
         h = system.surface_function(0)
         plus, minus = system.lie_derivative("+"), system.lie_derivative("-")
-        fields = [*sides, sliding.field]
+        field = sliding.field if sliding.regular else _kept_alone(system, h, sliding.field)
+        fields = [*sides, field]
         functions = ca.vertcat(lam * h, -plus, minus, stops)
     else:
         fields, functions = [system.field("")], stops
@@ -67,6 +68,17 @@ def blended_jet(system: FilippovSystem, order: int) -> Blend:
     guards = ca.horzcat(*columns) if columns[0].numel() else ca.SX(0, order + 1)
     checked = _checked(system, fields)
     return Blend(extra, states, guards, _affine(system), checked)
+
+
+def _kept_alone(system: FilippovSystem, h: ca.SX, sliding: ca.SX) -> ca.SX:
+    """A sliding field with the rate of h written out, where h is a function of one state and the time."""
+    # Rounding in it would move what rests for as long as it rests.
+    n, gradient, field = system.dimension, ca.jacobian(h, system.extended_states), ca.SX(sliding)
+    own = [i for i in range(n) if not gradient[i].is_zero()]
+    if len(own) == 1:
+        by_time = gradient[n] if system.time_dependent else ca.SX(0)
+        field[own[0]] = -by_time / gradient[own[0]]
+    return field
 
 
 def _checked(

@@ -376,9 +376,9 @@ def _specialised(rule: Rule, moving: Sequence[bool]) -> tuple[str, tuple[int, ..
 
 
 def _sparse(matrix: ca.SX) -> tuple[ca.SX, Entries]:
-    """Nonzero entries of a matrix as a column, and their places."""
-    rows, columns = matrix.sparsity().row(), matrix.sparsity().get_col()
-    nonzeros = ca.vertcat(*matrix.nonzeros()) if rows else ca.SX(0, 1)
+    """Nonzero entries of a matrix as a column, row by row, and their places."""
+    columns, rows = matrix.T.sparsity().row(), matrix.T.sparsity().get_col()
+    nonzeros = ca.vertcat(*matrix.T.nonzeros()) if rows else ca.SX(0, 1)
     return nonzeros, Entries(_integers(rows), _integers(columns))
 
 

@@ -128,11 +128,13 @@ def _affine_modes(system: FilippovSystem) -> list[int]:
 
 
 def _sizes(system: FilippovSystem, order: int) -> str:
-    sizes = {
+    # Steps of lanes have a longest one, where all terms vanish; one as long is the driver's.
+    sizes: dict[str, float] = {
+        "LONGEST": 0.5 * 10 ** (300 / (order + 2)),
         "N": system.extended_dimension,
         "ND": system.dimension,
         "P": order,
         "M": system.surface_count,
         "TIMED": int(system.time_dependent),
     }
-    return "".join(f"#define {name} {value}\n" for name, value in sizes.items())
+    return "".join(f"#define {name} {value!r}\n" for name, value in sizes.items())

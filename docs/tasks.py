@@ -31,13 +31,13 @@ TASKS = {
         "else happens to the state: stops, jumps, impacts, clocks. "
         "[Surfaces and sliding](../theory.md) explains the words.",
         "nonsmooth",
-        "FilippovSystem model.Switching Stop Reset Impact Clock regularise call",
+        "FilippovSystem table model.Switching Friction Relay Stop Reset Impact Clock regularise call",
     ),
     "runs": _task(
         "Follow an orbit",
         "From a point and for a time: events, modes, dense output, and the reason why a run ended.",
         "nonsmooth",
-        "simulate Trajectory flow.Segment flow.Event Status Section flow.follow flow.first_crossing flow.first_root load",
+        "simulate Trajectory flow.Segments flow.Segment flow.Events flow.Event Status Section flow.follow flow.first_crossing flow.first_root load",
     ),
     "many": _task(
         "Run many starts",
@@ -148,7 +148,7 @@ GOLF = {
         "From launch to rest",
         "Flight, bounces and roll of a golf ball in SI units.",
         "bounce.golf",
-        "flight Flight Air rebound Rebound play Run Bounce Glide landing_map SideState axis_spin AxisSpin",
+        "flight Flight Air TourAverage tour_differences rebound Rebound play Run Bounce Glide landing_map SideState axis_spin AxisSpin",
     ),
     "bounce_fits": _task(
         "Fit measured bounces",

@@ -22,27 +22,32 @@ The contract of events (``tests/flow/events/test_contract.py`` and ``test_event_
    ``max_jumps`` jumps at one instant end the run: ENDLESS_JUMPS.
 """
 
+from ..notebook import add_cards
 from .ensembles.ensemble import ensemble
 from .ensembles.lazy_starts import Grid, RandomStarts
 from .ensembles.outcomes import Outcomes, outcomes
 from .ensembles.work import Work
+from .events import Event, Events
 from .follow import follow
 from .polynomial import first_crossing, first_root
 from .results import Ensemble
 from .saving import load
 from .section import Section
+from .segments import Segment, Segments
 from .simulate import simulate
 from .status import Status
-from .trajectory import Event, Segment, Trajectory
+from .trajectory import Trajectory
 
 __all__ = [
     "Ensemble",
     "Event",
+    "Events",
     "Grid",
     "Outcomes",
     "RandomStarts",
     "Section",
     "Segment",
+    "Segments",
     "Status",
     "Trajectory",
     "Work",
@@ -54,3 +59,5 @@ __all__ = [
     "outcomes",
     "simulate",
 ]
+
+add_cards(globals(), __all__)

@@ -52,6 +52,9 @@ TIE = 8 * EPSILON
 #: this part of it.
 ROOT_SHARE = 1e-3
 
+#: Terms of the series of a power of the time differ by this part from those of the first ones.
+SHARE_SPREAD = 0.05
+
 #: Close to rest on a surface with a root steps are shorter than flights by the inverse of this, and below rounding.
 ROOT_REST = 1e-7
 
@@ -129,6 +132,15 @@ TANGENT = 2e-14
 
 #: Shortest step, relative to the time and to that of the run, that rounding does not cancel.
 SHORTEST = 4 * EPSILON
+
+#: A guard is low where it is below this many roundings of its terms. Before zeros that are not told apart a step ends
+#: where it is above this many times as much, unless that is no progress: this part of the way to them, and closer
+#: than SEPARATE, relative to the time. A root is exact to LOCATED of the time.
+LOW = 8.0
+FAR_FROM_LOW = 64.0
+NEARER = 0.1
+SEPARATE = 1e-13
+LOCATED = 1e-12
 
 #: Halvings of an interval before two roots count as a touch without crossing.
 DEPTH = 52

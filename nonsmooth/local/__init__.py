@@ -1,6 +1,7 @@
 """Analysis at points of surfaces, without time stepping: regions, folds, two-folds, equilibria."""
 
 from ..model import mode_field
+from ..notebook import add_cards
 from . import two_folds
 from .classify import LocalObject, classify
 from .point.higher_codimension import LimitDirection, limit_directions
@@ -57,3 +58,5 @@ __all__ = [
     "two_fold",
     "two_folds",
 ]
+
+add_cards(globals(), __all__)

@@ -35,6 +35,8 @@ MARKERS = {
     "switching-sliding": (">", style.GREEN),
     "adding-sliding": ("<", style.PURPLE),
     "impact grazing": ("v", style.VERMILLION),
+    "grazing of a soft switch": ("v", "white"),
+    "grazing of a jumping force": ("v", style.YELLOW),
     "corner": ("d", "white"),
     "homoclinic": ("*", style.BLACK),
 }

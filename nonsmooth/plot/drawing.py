@@ -330,7 +330,7 @@ def _recolor(artist: Any, on_paper: Any) -> None:
             if len(several):
                 getattr(artist, f"set_{name}")([on_paper(color) for color in several])
     halo = artist.get_path_effects()
-    if isinstance(halo, style._Halo):
+    if isinstance(halo, style.Halo):
         artist.set_path_effects(style.halo(halo.width, on_paper("white")))
 
 

@@ -277,8 +277,16 @@ def luminance(color: Any) -> float:
     return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
-class _Halo(list[Any]):
-    """Path effects of a halo, with what it takes to make them in another colour."""
+class Halo(list[Any]):
+    """Path effects of a halo, with what it takes to make them in another colour.
+
+    Parameters
+    ----------
+    width : float
+        In points.
+    color : optional
+        Any colour that matplotlib knows.
+    """
 
     def __init__(self, width: float, color: Any):
         whole: Any = {"dash_offset": 0, "dash_list": None}  # nothing shows through gaps of dashes
@@ -302,7 +310,7 @@ def halo(width: float = 2.5, color: Any = "white") -> list[Any]:
     list
         For ``path_effects=``.
     """
-    return _Halo(width, color)
+    return Halo(width, color)
 
 
 def arrow(ax: Axes, start: ArrayLike, end: ArrayLike, color: str = BLACK, **options: Any) -> None:

@@ -3,39 +3,6 @@
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int change_kind(const Run *r, int before, int after);
 
-/* A solution of a x = b, whose rows may depend on one another, in place of b. ``a`` is lost. */
-static int solve_consistent(double *a, double *b, int n) {
-  double first = 0;
-  int32_t *place = (int32_t *)(b + n), rank = 0;
-  for (int i = 0; i < n; i++) place[i] = i;
-  for (; rank < n; rank++) {
-    int row = rank, column = rank;
-    for (int i = rank; i < n; i++)
-      for (int j = rank; j < n; j++)
-        if (fabs(a[i * n + j]) > fabs(a[row * n + column])) { row = i; column = j; }
-    double most = fabs(a[row * n + column]);
-    if (!(most < INFINITY)) return 0;
-    if (rank == 0) first = most;
-    if (!(most > VANISHES * n * first)) break;
-    for (int j = 0; j < n; j++) { double t = a[row * n + j]; a[row * n + j] = a[rank * n + j]; a[rank * n + j] = t; }
-    for (int i = 0; i < n; i++) { double t = a[i * n + column]; a[i * n + column] = a[i * n + rank]; a[i * n + rank] = t; }
-    double t = b[row]; b[row] = b[rank]; b[rank] = t;
-    int32_t p = place[column]; place[column] = place[rank]; place[rank] = p;
-    for (int i = 0; i < n; i++) {
-      double f = i == rank ? 0 : a[i * n + rank] / a[rank * n + rank];
-      if (f == 0) continue;
-      for (int j = rank; j < n; j++) a[i * n + j] -= f * a[rank * n + j];
-      b[i] -= f * b[rank];
-    }
-  }
-  double *x = a; /* the first row's place is free once all quotients are known */
-  for (int i = 0; i < rank; i++) b[i] /= a[i * n + i];
-  for (int i = rank; i < n; i++) b[i] = 0;
-  for (int i = 0; i < n; i++) x[place[i]] = b[i];
-  memcpy(b, x, sizeof(double) * n);
-  return finite_all(b, n);
-}
-
 /* h' = a - M lambda of the functions ``own``, with what else slides eliminated; 0 where that is impossible. */
 static int freeze(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
                   double *a, double *m) {
@@ -60,7 +27,7 @@ static int freeze(Run *r, const int8_t *letter, const double *x, const double *u
       for (int j = 0; j < count; j++) d[i * count + j] = r->slope[others[i] * w + others[j]];
       b[i] = column == k ? layer_of(r, others[i]) : r->slope[others[i] * w + own[column]] * factor_of(r, own[column]);
     }
-    if (!solve_consistent(d, b, count)) return 0;
+    if (!solve_any(d, b, count, INFINITY, b + count, r->decision->pivot)) return 0;
     for (int i = 0; i < k; i++) {
       double through = 0;
       for (int j = 0; j < count; j++) through += r->slope[own[i] * w + others[j]] * b[j];
@@ -90,7 +57,7 @@ static int field_with(Run *r, const int8_t *letter, const double *x, const doubl
       for (int j = 0; j < count; j++) d[i * count + j] = r->slope[others[i] * w + others[j]];
       b[i] = -layer_of(r, others[i]);
     }
-    if (!solve_consistent(d, b, count)) return 0;
+    if (!solve_any(d, b, count, INFINITY, b + count, r->decision->pivot)) return 0;
     for (int i = 0; i < count; i++) acting[others[i]] = b[i];
   }
   set_inputs(r, x, r->held, acting);
@@ -185,6 +152,7 @@ static void near_set(Run *r, int row, int fell) {
   int f = r->now.index[row], k = size_of(r, f), n = r->n, before = r->mode;
   int32_t own[3];
   double h[3], a[3], m[9], u[3], b[3], mean[3], scale = 0, dt, c = 0;
+  r->met = (Met){NEAR_GUARD, f, 0};
   if (r->letter[f] == 0) return; /* friction's limit has fallen: the next step sees its digits */
   const double *height = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
   for (int i = 0; i < k; i++) {

@@ -164,7 +164,7 @@ static int place_unknowns(const Block *k, const int8_t *position, double *nu, do
     nu[i] = k->is_contact[i] ? 0 : side * k->b[i];
     if (k->is_coupled && !k->is_contact[i]) for (int j = 0; j < n; j++) row[j] -= side * k->share[i * n + j];
   }
-  return solve_any(m, nu, n, work + (int64_t)n * n, pivot);
+  return solve_any(m, nu, n, TIED, work + (int64_t)n * n, pivot);
 }
 
 /* The position that an element takes next: its own where that is consistent. */

@@ -217,9 +217,11 @@ static int only_sliding(const Run *r) {
   return found;
 }
 
+static int nears_root(Run *r);
+
 static void watch_two_fold(Run *r) {
   int s = only_sliding(r);
-  if (s >= 0 && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
+  if (s >= 0 && !(r->has_roots && nears_root(r)) && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
 }
 
 static int rest_at_limit(Run *r, int before);
@@ -269,7 +271,7 @@ static void serve(Run *r, int row) {
 
 /* 0 where the state after the step is not finite; the run then ends before it. */
 static int advance(Run *r, const Expansion *e, double dt) {
-  int n = r->n, stride = r->stride, kept = 0;
+  int stride = r->stride, kept = 0;
   double *x = r->at_work;
   for (int i = 0; i < r->s->dimension; i++) x[i] = value_at(e->states + (int64_t)i * stride, r->order, dt);
   if (!finite_all(x, r->s->dimension)) { finish(r, NOT_FINITE, STATE, 0); return 0; }
@@ -338,6 +340,7 @@ static void step(Run *r) {
   int row = first_hit(r, e, last ? h + after : h, &dt);
   dt = row >= 0 ? smaller(dt, h) : last ? h : to_number(r, h);
   if (row >= 0 && is_before_fold(r, e, row, dt)) { dt = to_number(r, 0.5 * dt); row = -1; last = 0; }
+  if (r->hold < dt) { dt = r->hold; row = -1; last = 0; } else r->hold = INFINITY;
   double wanted = dt, safe = safe_length(r, e, by_series), good;
   while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
   int grows = r->mode == r->length_mode && dt > r->length / STEADY;
@@ -347,11 +350,8 @@ static void step(Run *r) {
   r->length = dt == wanted ? h : dt;
   int swallowed = dt < wanted && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
   if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
-  if (dt < wanted) {
-    row = -1;
-    last = 0;
-    memset(r->instant.passing, 0, r->s->rules.atoms);
-  }
+  if (dt < wanted) row = -1, last = 0;
+  if (row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
   if (dt > 0) note_sides(r, e, dt);
   r->falls = row >= 0 && is_steep(r, e, row, dt);
   last &= dt == h;

@@ -186,6 +186,7 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
   int met = 0;
   for (int i = 0; i < r->width; i++) {
     int rests = fabs(h[i]) <= ON_SURFACE * scale[i], s = set_of(r, i), sure = i == certain;
+    if (has_law(r, i, RELAY_LAW)) continue; /* it switches, nothing is decided */
     if (s >= 0) {
       if (i == s) met = letter[s] <= OFF && is_met(r, letter, s, h, scale);
       rests = met;
@@ -202,6 +203,9 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
 static void serve_surface(Run *r, int row);
 static void serve_contact(Run *r, int row);
 static void serve_set(Run *r, int row);
+static void settle_in(Run *r);
+static int change_kind(const Run *r, int before, int after);
+static void event(Run *r, int kind, int before, int guard, const double *x);
 
 /* The sign of a bound's first coefficient that is not zero; one that rounding has left before it passes zero is. */
 static double turn_of(const Run *r, int i, const double *factor, int count) {
@@ -271,10 +275,35 @@ static int8_t side_of_contact(const Run *r, int i, double h) {
   return 1;
 }
 
+/* A relay that is at its threshold, or beyond by rounding, is just before it: the motion switches it or leaves. */
+static void guard_of_relay(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
+  (void)series;
+  guard_of_height(r, l, row, count, g);
+  if (count > 1 && !(g[0] > 0)) g[0] = SMALLEST;
+}
+
+/* On above the upper threshold, off below the lower one, and as it is between them. */
+static int8_t side_of_relay(const Run *r, int i, double h) {
+  return r->rates[element(r, i)->lower] > 0 ? 1 : h < 0 ? -1 : r->letter[i] > 0 ? 1 : -1;
+}
+
+/* Relays whose times cannot be told apart switch together. */
+static void serve_relay(Run *r, int row) {
+  int before = r->mode;
+  double last = r->met_at[row] + TIE * time_scale(r);
+  for (int k = 0; k < r->now.atoms; k++) {
+    int i = r->now.index[k];
+    if (has_law(r, i, RELAY_LAW) && r->met_at[k] >= 0 && r->met_at[k] <= last) r->letter[i] = (int8_t)-r->letter[i];
+  }
+  settle_in(r);
+  if (r->status == RUNNING) event(r, change_kind(r, before, r->mode), before, row, r->x);
+}
+
 static const Law LAWS[] = {
   [SURFACE_LAW] = {lay_out_surface, guard_of_surface, rounding_of_element, side_of_surface, serve_surface},
   [CONTACT_LAW] = {lay_out_contact, guard_of_contact, rounding_of_element, side_of_contact, serve_contact},
   [SET_LAW] = {lay_out_set, guard_of_set, rounding_of_set, side_of_set, serve_set},
+  [RELAY_LAW] = {lay_out_surface, guard_of_relay, rounding_of_element, side_of_relay, serve_relay},
 };
 
 static const Law *law_of(const Run *r, int i) { return LAWS + element(r, i)->law; }

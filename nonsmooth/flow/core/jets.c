@@ -21,15 +21,15 @@ static void guard_rows(Run *r, const Layout *l, const double *series, int count,
 }
 
 /* Coefficients k of the multipliers that slide keep those of the layer's rates at zero. */
-static void follow_layer(Run *r, const Expansion *e, const Series *t, double *series, int k, const int32_t *start) {
+static void follow_layer(Run *r, Expansion *e, int k, const int32_t *start) {
   int slides = e->l.slides;
   for (int i = 0; i < slides; i++) {
     double sum = 0;
     for (int q = start[i]; q < start[i + 1]; q++) {
       int j = start[slides + 1 + q];
-      sum += e->inverse[i * slides + j] * r->series[(int64_t)t->output[r->n + e->l.sliding[j]] * r->stride + k];
+      sum += e->inverse[i * slides + j] * row_of(r, r->n + e->l.sliding[j])[k];
     }
-    series[(int64_t)e->l.sliding[i] * r->stride + k] = -sum;
+    e->series[(int64_t)e->l.sliding[i] * r->stride + k] = -sum;
   }
 }
 
@@ -46,9 +46,26 @@ static void inputs_of(Run *r, const Expansion *e, int k) {
   set_inputs(r, x, held, lam);
 }
 
+/* The state that alone a surface is a function of, or -1. */
+static int only_state(const Run *r, int surface) {
+  const Entries *g = &r->s->surface_gradient;
+  int found = -1;
+  for (int q = 0; q < g->count; q++) {
+    if (g->row[q] != surface) continue;
+    if (found >= 0 || g->column[q] >= r->s->dimension) return -1;
+    found = g->column[q];
+  }
+  return found;
+}
+
+/* States of which a root is taken do not move at all where that is zero. */
 static void next_states(Run *r, Expansion *e, int k) {
   double part = 1.0 / (k + 1);
   for (int i = 0; i < r->n; i++) e->states[(int64_t)i * r->stride + k + 1] = row_of(r, i)[k] * part;
+  for (int j = 0; r->has_roots && j < e->l.slides; j++) {
+    int i = e->l.sliding[j], state = i < r->m && element(r, i)->power > 0 && degree_of(r, i) == 1 ? only_state(r, i) : -1;
+    if (state >= 0) e->states[(int64_t)state * r->stride + k + 1] = 0;
+  }
 }
 
 /* Coefficients k of all that is known without unknowns of that order, directions of sets with them. */
@@ -103,7 +120,7 @@ static void mode_series(Run *r, Expansion *e, const int32_t *start) {
   for (int k = 0; k <= r->order; k++) {
     open_order(r, e, k);
     if (leaving) leave_sets(r, e, k);
-    else if (k && e->l.slides) follow_layer(r, e, e->l.is_free ? &r->s->free : &r->s->series, e->series, k, start);
+    else if (k && e->l.slides) follow_layer(r, e, k, start);
     if (k && (leaving || e->l.slides)) close_order(r, e, k);
     if (r->s->sets) close_sets(r, e, k);
     if (k < r->order) next_states(r, e, k);
@@ -130,6 +147,12 @@ static void free_series(Run *r, Expansion *e) {
 static void first_values(Run *r, int is_free) {
   const Series *t = is_free ? &r->s->free : &r->s->series;
   series_at(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
+}
+
+/* Rounding of the values that were computed last, in units of EPSILON. */
+static void weigh_rounding(Run *r, int is_free, double size) {
+  const Series *t = is_free ? &r->s->free : &r->s->series;
+  series_rounding(t, t->moving, t->moving_count, r->stride, size, r->series, r->rounding);
 }
 
 static void jets(Run *r, Expansion *e) {

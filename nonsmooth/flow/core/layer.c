@@ -591,7 +591,7 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   row = first_hit(r, f, s, &ds);
   memset(r->instant.passing, 0, r->s->rules.atoms);
   for (int k = 0; k < f->l.rows; k++) if (f->l.kind[k] == BRANCH_GUARD && (last < 0 || k == row)) last = k;
-  if (last < 0 || (row >= 0 && row != last && ds < s)) return -1;
+  if (last < 0 || (row >= 0 && row != last && ds < s) || r->hold < s) return -1;
   note_sides(r, f, s);
   for (int i = 0; i < r->width; i++) end[i] = value_at(f->series + (int64_t)i * stride, order, s);
   for (int i = 0; i < r->n; i++) r->before[i] = value_at(f->states + (int64_t)i * stride, order, s);

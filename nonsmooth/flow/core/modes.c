@@ -92,17 +92,14 @@ static const double *held_of(Run *r, const int8_t *letter) {
 static int is_moving(const Run *r, int i) { return r->s->sets && r->moving[i]; } /* a contact never is */
 
 /* The moving inputs: states, lambda and reactions, then nu. */
-static void inputs_at(const Run *r, double *in, const double *x, const double *held, const double *unknowns) {
+static void set_inputs(Run *r, const double *x, const double *held, const double *unknowns) {
+  double *in = r->input;
   memcpy(in, x, sizeof(double) * r->n);
   in += r->n;
   for (int i = 0; i < r->width; i++)
     in[i] = held[i] + (is_scaled(r, i) || is_moving(r, i) ? 0 : unknowns[i]);
   in += r->width;
   for (int i = 0; i < r->m; i++) if (is_scaled(r, i)) *in++ = is_moving(r, i) ? 0 : unknowns[i];
-}
-
-static void set_inputs(Run *r, const double *x, const double *held, const double *unknowns) {
-  inputs_at(r, r->input, x, held, unknowns);
 }
 
 static double out_of(const Values *t, const double *w, int k) { return w[t->output[k]]; }
@@ -120,13 +117,13 @@ static double layer_of(const Run *r, int i) { return out_of(&r->s->point, r->poi
 static double factor_of(const Run *r, int i) { return out_of(&r->s->point, r->point, r->width + i); }
 
 /* Sums over the states of |gradient| times a vector, for each row; infinite slopes, those of a square root
- * at zero, are left out with ``finite_only``. */
+ * at zero, are left out with ``finite_only``, and those of no value, of higher powers there, always. */
 static void gradient_sums(const Run *r, const Values *t, const double *w, int first, const Entries *g, int rows,
                           const double *vector, int finite_only, double *sum) {
   for (int i = 0; i < rows; i++) sum[i] = 0;
   for (int k = 0; k < g->count; k++) {
     double slope = fabs(out_of(t, w, first + k));
-    if (!finite_only || slope < INFINITY) sum[g->row[k]] += slope * vector[g->column[k]];
+    if (slope < INFINITY || (!finite_only && slope == slope)) sum[g->row[k]] += slope * vector[g->column[k]];
   }
 }
 

@@ -33,6 +33,7 @@ static void renote(Run *r) {
 static void enter_segment(Run *r, int mode) {
   Tree *tree = &r->table->tree;
   if (mode == r->segment_mode) return;
+  if (r->o.dense) { r->segment_mode = mode; return; } /* that of its steps is written */
   if (r->segment_steps == 0) r->itinerary = tree->node[r->itinerary].parent;
   if (r->itinerary < 0) r->itinerary = 0;
   r->itinerary = tree_child(tree, r->itinerary, mode);
@@ -92,7 +93,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
     memcpy(r->out.event_after_x + k * r->n, r->x, sizeof(double) * r->n);
     r->out.event_before[k] = before;
     r->out.event_after[k] = r->mode;
-    r->out.event_guard[k] = guard;
+    r->out.event_guard[k] = guard < 0 ? -1 : ((r->met.index << 2) + r->met.side + 1) * 16 + r->met.kind;
     write_motion(r, r->out.event_motion + k * r->s->rules.width);
   }
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, r->met.index, r->met.side, x);

@@ -1,7 +1,7 @@
 /* The driver: all that a run is. The system is data, not code.
  *
  * Read in the order of core_source.py: programs.h, pairs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c,
- * elements.c, decide.c, events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
+ * near_zeros.c, elements.c, decide.c, events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
  */
 
 
@@ -33,7 +33,6 @@ typedef struct {
   int32_t n, dimension, timed, m, c, parameters, stops, resets, order, slope_outputs;
   Series series;      /* field, layer, surfaces and gaps, factors, stops and resets, slope_outputs slopes */
   Series free;        /* the same rules where nothing slides: field, surfaces and gaps, stops and resets */
-  Series tangent;     /* the same rules: derivatives of series' outputs, but slopes, along a direction; see variation.c */
   Values point;       /* layer, factors, entries of slope, gradients of layer, surfaces and gaps, stops, factors */
   Values surfaces;    /* surfaces, gaps, rates of gaps; entries of their gradients */
   Values maps;        /* states after each reset */
@@ -56,16 +55,18 @@ typedef struct {
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
   int32_t early_count, early_free_count;
   Rules rules;
+  Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
 } System;
 
 enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
 
 /* What happens at one time (events.c). Of atoms: sides, as the jumps have made them, as evaluated now; those that are
- * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before. */
+ * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before,
+ * whether true at the start and not met since. */
 typedef struct {
   int32_t running, first, settled, unsettled, last, tied, is_last;
   int64_t jumps, counted, sampled, *count;
-  int8_t *side, *view, *now, *passing, *zero, *pending, *was;
+  int8_t *side, *view, *now, *passing, *zero, *pending, *was, *unmet;
   double *value, *noise, *residual, *germ, *trigger_x, *arrived, *tick; /* two numbers each; germ: first coefficients on arrival */
 } Instant;
 
@@ -84,9 +85,6 @@ typedef struct {
   /* of sets: multipliers, h in units of |h|, its root, distances when leaving, slopes then, |h| at the start */
   double *lambda, *apart, *root, *rates, *slopes, *radius, *per_radius;
 } Expansion;
-
-/* Letters of a set: off it, h carried along after that, its first step away from it, and one without friction. */
-enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5, IDLE = 6 };
 
 /* A mode that can continue, and the zeros of its guards. */
 typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Continuation;
@@ -142,7 +140,7 @@ typedef struct {
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
-  double size, length, shortened;
+  double size, length, shortened, hold; /* the last: the step's end before zeros of a guard that are not told apart */
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
@@ -157,7 +155,8 @@ typedef struct {
   int64_t read_count;
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
-  double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *zeros, *slope, *vector, *sample;
+  double *series, *rounding, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope;
+  double *vector, *sample;
   double *atom_work, *choice_work;
   double *met_at; /* root of each guard in the step, or -1 */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
@@ -249,10 +248,10 @@ Table *table_new(int32_t width) {
 int32_t table_modes(const Table *t) { return t->count; }
 int32_t table_size(const Table *t) { return t->tree.size; }
 void table_read(const Table *t, int32_t *parent, int32_t *mode, int8_t *letter) {
-  for (int32_t k = 0; k < t->tree.size; k++) {
+  for (int32_t k = 0; parent && k < t->tree.size; k++) {
     parent[k] = t->tree.node[k].parent;
     mode[k] = t->tree.node[k].mode;
   }
-  memcpy(letter, t->letter, (size_t)t->count * t->width);
+  if (letter) memcpy(letter, t->letter, (size_t)t->count * t->width);
 }
 void table_free(Table *t) { free(t->tree.node); free(t->letter); free(t->bucket); free(t); }

@@ -179,11 +179,33 @@ static void sampled(Run *r, const Expansion *e, const double *x, const double *l
   for (int q = 0; q < e->l.bent_count; q++) *found++ = g[(int64_t)e->l.bent[q] * r->stride];
 }
 
+/* Rounding of an output, after its value; none where it has no bound. */
+static double output_rounding(const Run *r, int output) {
+  double error = EPSILON * r->rounding[r->s->series.output[output]];
+  return error < INFINITY ? error : 0;
+}
+
+/* The same of a guard that is a function of states and time. */
+static double guard_rounding(const Run *r, const Expansion *e, int row) {
+  int kind = e->l.kind[row];
+  if (!has_height(kind)) return 0;
+  return output_rounding(r, r->n + (is_atom(kind) ? 3 * r->width + row - e->l.atoms : r->width + e->l.index[row]));
+}
+
+/* Rounding of what is ``sampled``. */
+static void rounding_of(Run *r, const Expansion *e, double *noise) {
+  int slides = e->l.slides;
+  weigh_rounding(r, e->l.is_free, 0);
+  for (int i = 0; i < r->n; i++) *noise++ = output_rounding(r, i);
+  for (int i = 0; i < slides; i++) *noise++ = 0;
+  for (int q = 0; q < e->l.bent_count; q++) *noise++ = guard_rounding(r, e, e->l.bent[q]);
+}
+
 /* Whether field and guards at a time of the step are those of the polynomials. */
 static int agrees(Run *r, const Expansion *e, double time, double dt) {
   int n = r->n, order = r->order, stride = r->stride, slides = e->l.slides;
   int guards = e->l.bent_count, all = n + slides + guards;
-  double *x = r->vector, *lam = x + n, ignored;
+  double *x = r->vector, *lam = x + n;
   double *found = r->sample, *noise = found + all, *moved = noise + all;
   const int32_t *bent = e->l.is_free ? r->s->bent_free : r->s->bent;
   at_time(r, e, time, x, lam);
@@ -207,7 +229,7 @@ static int agrees(Run *r, const Expansion *e, double time, double dt) {
     }
     if (near) return 1;
     /* What rounding in the states, and in the time, makes of it: far from zero more than a tolerance. */
-    if (!again) memset(noise, 0, sizeof(double) * all);
+    if (!again) rounding_of(r, e, noise);
     for (int k = 0; k < n && !again; k++) {
       double kept = x[k];
       if (kept == 0) continue;
@@ -256,11 +278,15 @@ static int leading(Run *r, Expansion *e, int row, int zeros, double *value) {
   return r->order + 1;
 }
 
+static double sure_root(Run *r, const Expansion *e, int row, const double *c, int n, double h, double from, int drop,
+                        int known);
+static double sure_crossing(Run *r, const Expansion *e, int row, int drop, double h, int direction);
+
 static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   const double *g = e->guards + (int64_t)row * r->stride, *c = g + drop;
   int kind = e->l.kind[row];
   if (drop > r->order) return -1;
-  if (is_atom(kind)) return first_crossing(c, r->order - drop, h, e->l.side[row]);
+  if (is_atom(kind)) return sure_crossing(r, e, row, drop, h, e->l.side[row]);
   if (c[0] <= 0) {
     double value;
     drop = leading(r, e, row, drop, &value);
@@ -269,6 +295,7 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   }
   /* Most guards have no root, and all their terms: that is seen here, with the length known. */
   if (!drop && c[0] > rest_of(c, r->order, h)) return -1;
+  if (has_height(kind)) return sure_root(r, e, row, c, r->order - drop, h, 0, drop, 0);
   double dt = first_root(c, r->order - drop, h);
   return kind == SLIP_GUARD && dt > 0 ? slip_root(r, e, row, dt, h) : dt; /* squares lose digits */
 }
@@ -400,6 +427,7 @@ static double atom_root(Run *r, Expansion *e, int atom, double h) {
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->met_at;
   int first = -1, found = 0, rows = e->l.rows;
+  r->hold = INFINITY;
   if (r->repelling) turn_exits(r, e);
   for (int j = 0; j < rows; j++) {
     time[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);

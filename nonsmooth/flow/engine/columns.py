@@ -22,7 +22,7 @@ DONE, STUCK, NOT_UNIQUE = range(3)
 LEAVING = 4
 
 
-_ARRAYS = ("p", "dp", "letter", "x", "y", "start_rate", "end_rate", "time_row")
+_ARRAYS = ("p", "dp", "letter", "x", "y", "start_rate", "end_rate", "gradient")
 
 
 class _Leg(ctypes.Structure):
@@ -37,7 +37,7 @@ class _Leg(ctypes.Structure):
 
 
 class EndOfLeg(NamedTuple):
-    """What ends a leg, where its time follows from the law of its mode: a set that is reached, or a guard."""
+    """What ends a leg by the law of its mode: a set that is reached, or a guard of sliding or of a contact."""
 
     hit: int = -1
     guard: str = "stop"
@@ -46,7 +46,8 @@ class EndOfLeg(NamedTuple):
 
 
 class CarriedLeg(NamedTuple):
-    """End of a leg and its derivatives, fields at start and end; derivatives of the time of its event there."""
+    """End of a leg and its derivatives, fields at start and end; gradient of its event's function by states and
+    parameters there."""
 
     status: int
     left: float
@@ -55,14 +56,14 @@ class CarriedLeg(NamedTuple):
     by_parameters: Array
     start_rate: Array
     end_rate: Array
-    time_row: Array
+    gradient: Array
 
 
 class ColumnsEngine(TapeEngine):
-    """The driver with one system and its tangent program."""
+    """The driver with one system and the series of its derivatives."""
 
     def __init__(self, system: FilippovSystem, order: int):
-        super().__init__(system, order, tangents=True)
+        super().__init__(system, order, derived=True)
         require_size(library().leg_size, _Leg)
         library().carry_columns.argtypes = [_POINTER, _POINTER]
 

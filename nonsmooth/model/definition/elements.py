@@ -17,11 +17,16 @@ LARGEST = 3
 
 @dataclass(frozen=True)
 class Entry:
-    """An element: its law (``flow/constants.py``), its functions, how much lower each is at multiplier -1."""
+    """An element: its law (``flow/constants.py``), its functions, how much lower each is at multiplier -1.
+
+    Also its multiplier, if it brings one, and whether that enters the field nonlinearly.
+    """
 
     law: str
     functions: tuple[ca.SX, ...]
     hysteresis: tuple[ca.SX, ...]
+    multiplier: ca.SX | None = None
+    hidden: bool = False
 
 
 class Element:
@@ -30,6 +35,55 @@ class Element:
     def entry(self, what: str) -> Entry:
         """Read what was given; ``what`` is its name in messages."""
         raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Relay(Element):
+    """A relay with hysteresis: its multiplier is +1 or -1 and keeps its value between two thresholds.
+
+    Given in place of a switching function in ``surfaces=``. The multiplier becomes +1 where the signal
+    rises to ``on`` and -1 where it falls to ``off``; its letters are ``+`` and ``-``. A start between the
+    thresholds is off unless ``start_mode`` says ``+``; ``start=`` a run or an event goes on as that was.
+
+    Parameters
+    ----------
+    signal : expression
+        Of states, parameters and time.
+    on, off : expressions or numbers
+        Thresholds, ``on`` above ``off``; their difference may depend on parameters only.
+
+    Raises
+    ------
+    DefinitionError
+        Thresholds in the wrong order, or whose distance changes along a motion.
+
+    Examples
+    --------
+    A room that is cooled from 22 degrees down to 18:
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    >>> room = ns.FilippovSystem(
+    ...     [x], field=[20 - x - 4 * u], surfaces=[ns.Relay(x, on=22, off=18)], multipliers=[u])
+    >>> run = ns.simulate(room, [20.0], t_end=4.0)
+    >>> run.itinerary, bool(abs(run.events[1].t - run.events[0].t - ca.log(3)) < 1e-9)
+    ('- + - + -', True)
+    """
+
+    signal: Expression
+    on: Expression
+    off: Expression
+
+    def entry(self, what: str) -> Entry:
+        """Read the signal and the thresholds: h is above the lower one while the relay is on."""
+        signal, on = scalar(self.signal, f"signal of {what}"), scalar(self.on, f"on of {what}")
+        off = scalar(self.off, f"off of {what}")
+        if (width := on - off).is_constant() and not float(width) > 0.0:
+            raise DefinitionError(
+                f"{what}: on is {on} and off is {off}. Give a relay on= above off=; with equal thresholds "
+                "it is a surface."
+            )
+        return Entry("relay", (signal - off,), (width,))
 
 
 def read_entries(surface: Expression | None, surfaces: Sequence[Expression] | None) -> list[Entry]:
@@ -41,6 +95,24 @@ def read_entries(surface: Expression | None, surfaces: Sequence[Expression] | No
         )
     given = [surface] if surface is not None else listed(surfaces)
     return [_read_entry(v, f"surface {i}") for i, v in enumerate(given)]
+
+
+def multipliers_of(entries: Sequence[Entry], given: Any) -> list[Any]:
+    """Multipliers of all entries: those that were given, between those that elements bring."""
+    rest = listed(given)
+    if len(rest) == len(entries):
+        return rest
+    brought = [entry.multiplier for entry in entries]
+    missing = sum(own is None for own in brought)
+    if len(rest) != missing and any(own is not None for own in brought):
+        raise DefinitionError(
+            f"multipliers: expected {missing}, for what brings none of its own, received {len(rest)}. A friction "
+            "has its own."
+        )
+    if len(rest) != missing:
+        return rest
+    following = iter(rest)
+    return [next(following) if own is None else own for own in brought]
 
 
 def functions_of(entries: Sequence[Entry]) -> ca.SX:

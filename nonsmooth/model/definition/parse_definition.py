@@ -32,7 +32,7 @@ from ..reading import (
 )
 from ..values import Array, parameter_values
 from .conditions import Atoms, Rule, located, passages
-from .elements import functions_of, hysteresis_of, laws_of, read_entries
+from .elements import functions_of, hysteresis_of, laws_of, multipliers_of, read_entries
 from .events import Clock, Impact, Reset, Stop
 from .read_events import direction_of, read_maps, read_rules, read_when, require_no_endless_level
 
@@ -193,6 +193,7 @@ def read_definition(
     if above is not None or below is not None:
         lam, f = _two_fields(above, below, field, multipliers, h, x.numel())
     else:
+        multipliers = multipliers_of(entries, multipliers)
         _require_alike(sizes, multipliers)
         lam = symbols([s for entry in listed(multipliers) for s in listed(entry)], "multipliers")
         f = column(field, "field", x.numel())
@@ -212,7 +213,7 @@ def read_definition(
         field=f,
         surfaces=h,
         defaults=defaults,
-        hidden=hidden,
+        hidden=hidden or any(entry.hidden for entry in entries),
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
         layer_widths=_widths(layer_widths, h.numel()),

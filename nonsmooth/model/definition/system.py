@@ -14,22 +14,26 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...notebook import card
+from ...notebook import Markup, card
 from ..cache import Cache, Content
 from ..calls import call
 from ..checks import real
 from ..errors import DefinitionError, PointError
+from ..expressions.mathml import equation, rate, symbol
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .parse_definition import Definition, consistent_parameters, read_definition
+from .roots import roots_of
 from .switching import Switching, class_of
 
 T = TypeVar("T")
 
 #: Classes of surfaces are shown for at most so many of them.
 _CLASSES_SHOWN = 8
+_EQUATIONS_SHOWN = 12
+_SIDES = (("+", "above"), ("-", "below"))
 
 Discrete = Sequence[Expression] | Mapping[Any, Sequence[float] | None]
 
@@ -55,7 +59,8 @@ class FilippovSystem:
         One for each surface; a vector for each set.
     surfaces : sequence of expressions, optional
         Switching functions, one for each multiplier (``surface`` also takes one). A vector h of two or
-        three is one set $h = 0$: its multiplier is $h/|h|$ off it and $|lambda| <= 1$ on it.
+        three is one set $h = 0$: its multiplier is $h/|h|$ off it and $|lambda| <= 1$ on it. A
+        :class:`Relay` is one with hysteresis.
     parameters : mapping or sequence, optional
         Symbols with their default values; None, or a bare sequence of symbols, means no default.
     time : SX symbol, optional
@@ -253,13 +258,21 @@ class FilippovSystem:
     # notebook and print ------------------------------------------------------------------------
 
     def _repr_html_(self) -> str:
-        """How a notebook shows the system: states, fields of one surface, surfaces, parameters."""
+        """How a notebook shows the system: states, fields, surfaces and parameters, typeset."""
         rows: list[tuple[str, object]] = [("states", ", ".join(self.state_names))]
-        single = len(self.entries) == 1 and not self.sets
-        for mode, where in (("+", "above"), ("-", "below")) if single else ():
-            rows.append((f"field {where}", self.field(mode)))
-        surfaces = listed(self.definition.surfaces)
-        rows += [(f"surface h{k}", function) for k, function in enumerate(surfaces)]
+        own = self.definition
+        parts = (own.extended_states, own.parameters, own.multipliers, own.reactions)
+        known = [one for part in parts for one in listed(part)]
+        single = len(self.entries) == 1 and not self.sets and not self.hidden
+        fields = {f"field {where}": self.field(mode) for mode, where in _SIDES} if single else {}
+        for where, field in (fields or {"field": self.definition.field}).items():
+            pairs = list(zip(self.state_names, listed(field), strict=False))[:_EQUATIONS_SHOWN]
+            written = [equation(rate(name), rhs, known) for name, rhs in pairs]
+            more = len(self.state_names) - len(pairs)
+            written += [f"and {more} more"] * (more > 0)
+            rows.append((where, Markup("<br>".join(written))))
+        for k, function in enumerate(listed(own.surfaces)[:_EQUATIONS_SHOWN]):
+            rows.append((f"surface h{k}", Markup(equation(symbol(f"h{k}"), function, known))))
         rows += [("parameters", ", ".join(self.parameter_names))]
         rows += [("stops", ", ".join(n for n, _ in self.stops))]
         rows += [("resets", ", ".join(n for n, _ in self.resets))]
@@ -274,6 +287,7 @@ class FilippovSystem:
         surfaces = len(self.entries) - len(self.sets)
         if surfaces or not self.sets:
             parts.append(f"{surfaces} surface{'s' * (surfaces != 1)}{self._classes()}{names}")
+        parts += [f"root |{name}|^{power:g}" for name, power in self.roots.items()]
         parts += [f"set of codimension {len(members)}" for members in self.sets]
         if self.parameter_names:
             parts.append(f"parameters: {', '.join(self.parameter_names)}")
@@ -299,6 +313,24 @@ class FilippovSystem:
     def dimension(self) -> int:
         """Number n of states."""
         return int(self.definition.states.numel())
+
+    @cached_property
+    def roots(self) -> dict[str, float]:
+        """Roots of switching functions by name of the surface: the smallest exponent that was found.
+
+        A run goes through the zero of such a root; that of another function ends it.
+
+        Examples
+        --------
+        >>> import casadi as ca
+        >>> import nonsmooth as ns
+        >>> x = ca.SX.sym("x")
+        >>> ns.FilippovSystem([x], surface=x, above=[-ca.sqrt(x)], below=[0]).roots
+        {'h0': 0.5}
+        """
+        d = self.definition
+        found = roots_of(d.field, d.surfaces, self.extended_states)
+        return {f"h{self.entry_of(i)}": power for i, power in sorted(found.items())}
 
     @cached_property
     def surface_count(self) -> int:
@@ -514,8 +546,9 @@ class FilippovSystem:
         i = self.surface_index(surface)
         if mode is not None:
             self.require_mode(mode)
-        if i in self.set_of:
-            return Switching("generic", None, None, "its definition as a set")
+        if i in (*self.set_of, *self.remembering):
+            what = "as a set" if i in self.set_of else "with hysteresis"
+            return Switching("generic", None, None, f"its definition {what}")
         values = None if parameters is None else tuple(self.parameter_vector(parameters).tolist())
         key = ("switching", i, mode, values)
         return self.cached(key, lambda: class_of(self, i, mode, parameters))

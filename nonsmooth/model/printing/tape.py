@@ -122,13 +122,15 @@ def tape_of(coupled: Coupled) -> Tape:
     """Write a system as a tape."""
     system, d = coupled.system, coupled.system.definition
     x, p = system.extended_states, system.parameter_symbols
-    slope, gradients = _sparse(coupled.slope), [_sparse(g) for g in coupled.gradients]
+    slope, gradients = sparse_entries(coupled.slope), [_by_rows(g) for g in coupled.gradients]
     matrices = [slope, *gradients]
     kept = coupled.kept
-    surface_gradient = _sparse(ca.jacobian(kept, x)) if kept.numel() else _sparse(ca.SX(0, 1))
-    column = _sparse(coupled.columns_of_field)
+    surface_gradient = (
+        sparse_entries(ca.jacobian(kept, x)) if kept.numel() else sparse_entries(ca.SX(0, 1))
+    )
+    column = sparse_entries(coupled.columns_of_field)
     atoms = d.guards if d.guards.numel() else ca.SX(0, 1)
-    gradient = _sparse(ca.jacobian(atoms, x) if d.guards.numel() else ca.SX(0, x.numel()))
+    gradient = sparse_entries(ca.jacobian(atoms, x) if d.guards.numel() else ca.SX(0, x.numel()))
     output, moves, slopes = _moving_slopes(coupled)
     point = [coupled.layer, coupled.factors, *[nonzeros for nonzeros, _ in matrices]]
     series, free = _series_of_modes(coupled, slopes)
@@ -246,23 +248,18 @@ def _rules_of(
     return rules, [[rule_of[j] for j in row] for row in rows]
 
 
-def tangent_series_of(coupled: Coupled) -> tuple[Series, Series]:
-    """Rules of all that any mode needs, and of its derivatives along a direction; they are numbered alike."""
+def derived_series_of(coupled: Coupled) -> tuple[Series, Entries]:
+    """Rules of all that any mode needs and of its derivatives, and the places of these in their matrix."""
     n, size = coupled.system.extended_dimension, coupled.moving.numel()
-    every, tangents = coupled.tangents()
-    outputs = [*coupled.awake([*coupled.outputs, _moving_slopes(coupled)[2]]), *tangents]
-    rules, rows = _rules_of([every, coupled.system.parameter_symbols], outputs)
-    of_sets = {n + i for i in coupled.system.set_of}
-    held = {n + i for i, own in enumerate(coupled.scaled) if own} - of_sets
-    moves = lambda k: k >= 2 * size or k % size not in held
-    derived = entered(rules, lambda k: k >= size)
-    time = _time_of(coupled)
-    plain = [not own for own in derived]
-    every_row, split = range(len(rows)), len(rows) - len(tangents)
-    of_mode = _series(rules, rows, every_row, moves, lambda k: n <= k < size, time, plain)
-    along = lambda k: size + n <= k < 2 * size
-    of_tangent = _series(rules, rows[split:], range(len(tangents)), moves, along, time, derived)
-    return of_mode, of_tangent
+    derivatives, entries = sparse_entries(coupled.derivatives)
+    outputs = [*coupled.outputs, _moving_slopes(coupled)[2], derivatives]
+    inputs = [coupled.moving, coupled.system.parameter_symbols]
+    rules, rows = _rules_of(inputs, coupled.awake(outputs))
+    held = {n + i for i, own in enumerate(coupled.scaled) if own} - {
+        n + i for i in coupled.system.set_of
+    }
+    moves, unknown = lambda k: k not in held, lambda k: n <= k < size
+    return _series(rules, rows, range(len(rows)), moves, unknown, _time_of(coupled)), entries
 
 
 def _series(
@@ -272,9 +269,8 @@ def _series(
     moves: Callable[[int], bool],
     unknown: Callable[[int], bool],
     time: int | None = None,
-    listed: Sequence[bool] | None = None,
 ) -> Series:
-    """Rules as the interpreter reads them; ``listed`` are those that it computes, of all."""
+    """Rules as the interpreter reads them."""
     still = [_is_still(rule) for rule in rules]
     moving, late = entered(rules, moves), entered(rules, lambda k: unknown(k) and moves(k))
     operations = {op: k for k, op in enumerate(OPERATIONS)}
@@ -301,8 +297,6 @@ def _series(
     ]
     zeros = _reached(arguments, change, [j for j in read if not moving[j]])
     needed = {*zeros.tolist(), *(j for j in reached.tolist() if moving[j])}
-    if listed is not None:
-        reached, needed = reached[np.array(listed)[reached]], {j for j in needed if listed[j]}
     return Series(
         rule=_integers(names),
         a=_integers(args[:, 0]),
@@ -312,7 +306,7 @@ def _series(
         first=np.array(first),
         second=np.array(second),
         still=_where(still, True),
-        moving=_integers(reached),
+        moving=reached,
         later=_integers(sorted(needed)),
         late=_integers(sorted(j for j in needed if late[j])),
         early=_integers(sorted(j for j in needed if not late[j])),
@@ -375,11 +369,17 @@ def _specialised(rule: Rule, moving: Sequence[bool]) -> tuple[str, tuple[int, ..
     return rule.rule, rule.args
 
 
-def _sparse(matrix: ca.SX) -> tuple[ca.SX, Entries]:
-    """Nonzero entries of a matrix as a column, row by row, and their places."""
-    columns, rows = matrix.T.sparsity().row(), matrix.T.sparsity().get_col()
-    nonzeros = ca.vertcat(*matrix.T.nonzeros()) if rows else ca.SX(0, 1)
+def sparse_entries(matrix: ca.SX) -> tuple[ca.SX, Entries]:
+    """Nonzero entries of a matrix as a column, and their places."""
+    rows, columns = matrix.sparsity().row(), matrix.sparsity().get_col()
+    nonzeros = ca.vertcat(*matrix.nonzeros()) if rows else ca.SX(0, 1)
     return nonzeros, Entries(_integers(rows), _integers(columns))
+
+
+def _by_rows(matrix: ca.SX) -> tuple[ca.SX, Entries]:
+    """The same, row after row."""
+    nonzeros, places = sparse_entries(matrix.T)
+    return nonzeros, Entries(places.column, places.row)
 
 
 def _moving_slopes(coupled: Coupled) -> tuple[Integers, Integers, ca.SX]:

@@ -15,9 +15,10 @@ import numpy as np
 
 from ...flow.constants import TIE
 from ...flow.engine.columns import EndOfLeg
+from ...flow.events import Event
 from ...flow.fixed import flow_for
 from ...flow.names import event_name, shown_mode
-from ...flow.trajectory import Event, Trajectory
+from ...flow.trajectory import Trajectory
 from ...flow.variation import CarriedField
 from ...model import Array, DegenerateError, FilippovSystem, coupled_of, multiplier_enters
 from ...model.derivatives.event_maps import (
@@ -147,8 +148,8 @@ class LegFlow:
     by_parameters: Array
     #: (N + k,): The field there.
     rate: Array
-    #: (N + np,): Of the time of its event by that state and all parameters, where the field is continuous.
-    time: Array | None = None
+    #: Its event, where that is one of the law of the mode.
+    at: AtEvent | None = None
 
 
 def integrate_leg(
@@ -164,11 +165,13 @@ def integrate_leg(
     if isinstance(field, CarriedField):
         ends = leg.ends(system)
         found = field.flow(x, p, duration, ends)
-        time = found.time_row if ends else None
-        return LegFlow(found.end, found.by_start, found.by_parameters, found.end_rate, time)
+        n, own, at = len(x), found.gradient, None
+        if ends:
+            at = AtEvent(found.end, np.eye(n), np.zeros((n, len(p))), 0.0, own[:n], own[n:])
+        return LegFlow(found.end, found.by_start, found.by_parameters, found.end_rate, at)
     start = field.start(x, p)
-    whole = field.blocks.unpack(flow_for(field, start, p, duration))
-    n, end = field.blocks.starts, whole[:, 0]
+    whole = field.matrix(flow_for(field, start, p, duration))
+    n, end = field.by_start, whole[:, 0]
     return LegFlow(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], field.rate_at(end, p))
 
 

@@ -50,7 +50,11 @@ _INSTANT = 1e-5
 
 def _require_certain(system: FilippovSystem, parts: Sequence[Passage], p: Array) -> None:
     """Raise for a run with a grazing that is within its own error."""
-    flat = [k for k, part in enumerate(parts) if part.event and part.event.angle < _STEEP]
+    flat = [
+        k
+        for k, part in enumerate(parts)
+        if part.event and part.flow.at is None and part.event.angle < _STEEP
+    ]
     if not flat:
         return
     n = system.extended_dimension
@@ -133,7 +137,7 @@ def _by_panels(
     cuts: tuple[float, ...],
 ) -> tuple[Array, Array, Array]:
     field = leg.field(run.system, chosen)
-    n, starts = field.blocks.starts, run.steps.starts
+    n, starts = field.by_start, run.steps.starts
     first = max(int(np.searchsorted(starts, t_start, side="right")) - 1, 0)
     last = max(int(np.searchsorted(starts, t_end, side="left")), first + 1)
     start = _polynomial(run, first, t_start - float(starts[first]), n)[0]
@@ -344,9 +348,12 @@ def saltation_after(
     if leg is None and ends.kind == "end":
         left = sets_left(system, part.leg.mode, ends.mode_before, part.after, p)
         leg = Leg(ends.mode_before, left=left)
-    if flow.time is not None:
-        return _continuous(system, flow.time, leg if following is None else None, flow.end, p)
-    at = part.leg.at_end(system, flow.end, p)
+    at = flow.at or part.leg.at_end(system, flow.end, p)
+    if system.sets and following is None and leg is not None:  # the run ends at the event
+        every = tuple(range(len(p)))
+        landed = integrate_leg(system, leg, at.after, 0.0, p, every)
+        by_state, by_p = landed.by_start @ at.after_state, landed.by_start @ at.after_parameters
+        at = replace(at, after_state=by_state, after_parameters=by_p + landed.by_parameters)
     if part.leg.kind == "stop" or leg is None:
         return saltation(at, flow.rate, at.after_state @ flow.rate, _at(system, part))
     after = _rate_after(system, part, leg, at, p)
@@ -358,17 +365,6 @@ def saltation_after(
             "Start or end the run on one side of it."
         )
     return saltation(at, flow.rate, after, _at(system, part))
-
-
-def _continuous(
-    system: FilippovSystem, time: Array, last: Leg | None, x: Array, p: Array
-) -> Saltation:
-    """The saltation of an event at which the field is continuous or a set is reached, as the leg after it begins."""
-    n, own = len(x), (np.eye(len(x)), np.zeros((len(x), len(p))))
-    if last is not None:  # the run ends there
-        landed = integrate_leg(system, last, x, 0.0, p, tuple(range(len(p))))
-        own = landed.by_start, landed.by_parameters
-    return Saltation(*own, time[:n], time[n:], 1.0)
 
 
 def _rate_after(

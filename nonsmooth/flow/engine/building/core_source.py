@@ -30,6 +30,7 @@ _FILES = (
         "stability.c",
         "sets.c",
         "stepper.c",
+        "near_zeros.c",
     ),
     *("elements.c", "record.c", "spiral.c", "decide.c", "layer.c", "contacts.c"),
     *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c", "variation.c"),

@@ -67,6 +67,10 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
         if not entries:
             continue
         reduced, factor = cancel_common_factor(entries, variables, known)
+        for e, part in zip(entries, reduced, strict=True):
+            if part.is_constant():  # the factor as the field has it, so that one series serves both
+                reduced, factor = [own / part for own in reduced], e
+                break
         if ca.depends_on(factor, variables):
             field = ca.SX(field)
             for i in members:

@@ -1,8 +1,7 @@
 """Expressions printed as C: one statement per instruction, value-numbered over a whole program.
 
-A :class:`Program` collects named functions of one system (jets of its modes, guards, surfaces,
-maps) in one graph, so that equal subexpressions are found once. What depends on parameters alone is
-moved to a function ``prepare`` that runs once per trajectory and fills an array ``q``; what remains
+A :class:`Program` collects named functions of one system (jets of its modes, guards, surfaces) in
+one graph, so that equal terms are found once. What depends on parameters alone is moved to a function ``prepare`` that runs once per trajectory and fills an array ``q``; what remains
 is printed on a type ``T`` that is ``double`` or a vector of doubles.
 """
 
@@ -11,11 +10,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import casadi as ca
-
-from ..expressions.graph import Node, instructions
+from ..expressions.graph import Node
+from .terms import MASKS, Graph, Terms
 
 #: C for operations on T; ``{0}`` and ``{1}`` are the arguments.
 _ARITHMETIC = {
@@ -40,8 +38,8 @@ _LIBRARY = {
 #: Compilers take more than proportional time for long functions: statements of one that is not
 #: split, and of a part.
 _WHOLE, _PART = 5000, 250
-_NAME = re.compile(r"\b[vr]\d+\b")
-_DEFINED = re.compile(r"  const T ([vr]\d+) =")
+_NAME = re.compile(r"\b[vrm]\d+\b")
+_DEFINED = re.compile(r"  const [TI] ([vrm]\d+) =")
 
 #: What only parameters may go through; always on doubles.
 _PARAMETERS_ONLY = {
@@ -75,37 +73,41 @@ class _Function:
 class Program:
     """C functions ``void name(const T *x, const T *q, [extra,] T *a, ...)`` of one system."""
 
-    # ``x`` are the states; ``q`` is prepared from the parameters. Symbols of ``extra`` (multipliers, masks) differ
-    # between lanes and steps, and have the types "T" or "I", a mask of all or no bits.
-    def __init__(
-        self,
-        states: ca.SX,
-        parameters: ca.SX,
-        extra: ca.SX | None = None,
-        extra_types: Sequence[str] = (),
-    ):
-        self._inputs = [states, parameters, ca.SX(0, 1) if extra is None else extra]
-        self._types = tuple(extra_types)
+    # ``x`` are the states; ``q`` is prepared from the parameters. What differs between lanes and steps besides has
+    # the types "T" or "I", a mask of all or no bits.
+    def __init__(self, graph: Graph, types: Sequence[str]):
+        self._graph, self._types = graph, tuple(types)
         self._functions: list[_Function] = []
-        self._outputs: list[ca.SX] = []
+        self._rows: list[list[int]] = []
 
-    def add(self, name: str, **outputs: ca.SX) -> None:
-        """Add a function that stores each output, row by row, in the array of its name."""
-        self._functions.append(_Function(name, tuple(outputs), len(self._outputs)))
-        self._outputs += [ca.densify(ca.SX(e)).T for e in outputs.values()]
+    def add(self, name: str, **outputs: Terms) -> None:
+        """Add a function that stores each output in the array of its name."""
+        self._functions.append(_Function(name, tuple(outputs), len(self._rows)))
+        self._rows += [[self._graph.whole(e).number for e in row] for row in outputs.values()]
 
     def text(self) -> str:
         """Return the C text: ``NQ``, ``prepare`` and all functions."""
-        nodes, rows = instructions(self._inputs, self._outputs)
-        graph = _Graph(nodes, rows, self._types)
-        parts = [graph.prepare()]
+        nodes, roots = self._graph.nodes, [j for row in self._rows for j in row]
+        number: dict[int, int] = {}
+        pending = roots[::-1]
+        while pending:  # what an output needs comes before it, the first output first
+            missing = [a for a in nodes[pending[-1]].args if a not in number]
+            if missing:
+                pending += missing[::-1]
+            else:
+                number.setdefault(pending.pop(), len(number))
+        kept = list(number)
+        own = [replace(nodes[j], args=tuple(number[a] for a in nodes[j].args)) for j in kept]
+        rows = [[number[j] for j in row] for row in self._rows]
+        printed = _Printed(own, rows, self._types)
+        parts = [printed.prepare()]
         for function in self._functions:
             outputs = rows[function.first : function.first + len(function.arrays)]
-            parts.append(graph.function(function, outputs))
+            parts.append(printed.function(function, outputs))
         return "\n".join(parts)
 
 
-class _Graph:
+class _Printed:
     """A value-numbered program: which nodes are constants, prepared, or computed each time."""
 
     def __init__(self, nodes: Sequence[Node], rows: Sequence[Sequence[int]], types: Sequence[str]):
@@ -116,7 +118,7 @@ class _Graph:
                 self.moving.append(_place(node)[0] != 1)
                 self.constant.append(False)
             else:
-                self.moving.append(any(self.moving[a] for a in node.args))
+                self.moving.append(node.op in MASKS or any(self.moving[a] for a in node.args))
                 self.constant.append(node.op == "const")
         self.prepared: dict[int, int] = {}
         self._find_divisors()
@@ -150,11 +152,7 @@ class _Graph:
         depth = [0] * len(self.nodes)  # operations one after the other until a node is known
         for j, node in enumerate(self.nodes):
             depth[j] = 1 + max((depth[a] for a in node.args), default=-1)
-            if (
-                node.op not in ("add", "sub")
-                or not self.moving[j]
-                or self._choice(node) is not None
-            ):
+            if node.op not in ("add", "sub") or not self.moving[j]:
                 continue
             if node.op == "sub" and node.args[1] in terms:
                 continue
@@ -207,7 +205,7 @@ class _Graph:
         if node.op == "input":
             vector, position = _place(node)
             return f"x[{position}]" if vector == 0 else f"e{position}"
-        return f"v{j}"
+        return f"m{j}" if node.op in MASKS else f"v{j}"
 
     def prepare(self) -> str:
         """C of the function from parameters to q."""
@@ -246,8 +244,9 @@ class _Graph:
             self.nodes[j].args[1] for j in reachable if self.nodes[j].op == "div"
         }
         for j in reachable:
-            if self.nodes[j].op not in ("input", "not"):
-                lines.append(f"  const T {self.name(j)} = {self._value(j)};")
+            if self.nodes[j].op != "input":
+                kind = "I" if self.nodes[j].op in MASKS else "T"
+                lines.append(f"  const {kind} {self.name(j)} = {self._value(j)};")
             if j in divisors:
                 lines.append(f"  const T r{j} = 1.0 / {self.name(j)};")
             lines += [f"  {target} = {self.name(j)};" for target in stores.pop(j, [])]
@@ -290,28 +289,11 @@ class _Graph:
         return sorted(key, key=lambda j: (key[j], j))
 
     def _arguments(self, j: int) -> list[int]:
-        """Arguments of the statement that a node is printed as: a choice skips its halves."""
-        node = self.nodes[j]
-        if node.op == "add" and self.moving[j] and self._choice(node) is not None:
-            return [a for half in node.args for a in self.nodes[half].args]
-        return [k for k, _ in self.sums[j]] if j in self.sums else list(node.args)
-
-    def _mask(self, j: int) -> tuple[str, bool]:
-        node = self.nodes[j]
-        if node.op == "not":
-            name, negated = self._mask(node.args[0])
-            return name, not negated
-        return self.name(j), False
+        """Arguments of the statement that a node is printed as."""
+        return [k for k, _ in self.sums[j]] if j in self.sums else list(self.nodes[j].args)
 
     def _value(self, j: int) -> str:
         node = self.nodes[j]
-        if node.op == "if_else_zero":
-            mask, negated = self._mask(node.args[0])
-            chosen = self._broadcast(node.args[1])
-            pair = ("BC(0.0)", chosen) if negated else (chosen, "BC(0.0)")
-            return f"SELECT({mask}, {pair[0]}, {pair[1]})"
-        if node.op == "add" and (choice := self._choice(node)) is not None:
-            return choice
         if j in self.sums:
             return self._sum(self.sums[j])
         if node.op == "div" and node.args[1] in self.divisors:
@@ -319,21 +301,12 @@ class _Graph:
         args = [self.name(a) for a in node.args]
         if node.op in _ARITHMETIC:
             return _ARITHMETIC[node.op].format(*args)
+        if node.op == "select":
+            return f"SELECT({args[0]}, {', '.join(map(self._broadcast, node.args[1:]))})"
+        if node.op in MASKS:
+            return f"(I)({args[0]} != 0)" if node.op == "nonzero" else " | ".join(args)
         call = _LIBRARY[node.op].upper().replace("NS_", "") + "_"
-        return f"{call}({', '.join(self._broadcast(a) for a in node.args)})"
-
-    def _choice(self, node: Node) -> str | None:
-        """``if_else`` is written by CasADi as a sum of two halves of which one is zero."""
-        halves = [self.nodes[a] for a in node.args]
-        if any(half.op != "if_else_zero" for half in halves):
-            return None
-        (one, first), (two, second) = (self._mask(half.args[0]) for half in halves)
-        if one != two or first == second:
-            return None
-        values = [self._broadcast(half.args[1]) for half in halves]
-        if first:
-            values.reverse()
-        return f"SELECT({one}, {values[0]}, {values[1]})"
+        return f"{call}({', '.join(map(self._broadcast, node.args))})"
 
     def _broadcast(self, j: int) -> str:
         return f"BC({self.name(j)})" if self.constant[j] else self.name(j)
@@ -351,12 +324,13 @@ def _parts(lines: Sequence[str]) -> tuple[list[list[str]], int]:
         for name in _NAME.findall(line):
             if home[name] != k // _PART:
                 shared.setdefault(name, len(shared))
+    read = lambda name: f"{'(I)' * (name[0] == 'm')}w[{shared[name]}]"
     parts: list[list[str]] = [[] for _ in range(0, len(lines), _PART)]
     for k, line in enumerate(lines):
-        here = lambda m, k=k: m[0] if home[m[0]] == k // _PART else f"w[{shared[m[0]]}]"
+        here = lambda m, k=k: m[0] if home[m[0]] == k // _PART else read(m[0])
         parts[k // _PART].append(_NAME.sub(here, line))
         if (m := _DEFINED.match(line)) and m[1] in shared:
-            parts[k // _PART].append(f"  w[{shared[m[1]]}] = {m[1]};")
+            parts[k // _PART].append(f"  w[{shared[m[1]]}] = (T){m[1]};")
     return parts, len(shared)
 
 

@@ -69,8 +69,8 @@ def device_source(system: FilippovSystem, order: int, threads: int, resident: in
 
 def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
     """Definitions that the lanes' text needs before it, and the functions of a system."""
-    program, blend = lanes_program(system, order)
-    (rows, checked), affine = blend.checked, blend.affine
+    program, shape = lanes_program(system, order)
+    (rows, checked), affine = shape.checked, shape.affine
     slots = 2 * system.surface_count + len(system.stops)
     cancelled = system.surface_count == 0 or motion(system, "s").regular
     directions = ", ".join(str(d) for _, d in system.stops) or "0"

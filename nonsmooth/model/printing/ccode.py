@@ -1,8 +1,9 @@
 """Expressions printed as C: one statement per instruction, value-numbered over a whole program.
 
 A :class:`Program` collects named functions of one system (jets of its modes, guards, surfaces) in
-one graph, so that equal terms are found once. What depends on parameters alone is moved to a function ``prepare`` that runs once per trajectory and fills an array ``q``; what remains
-is printed on a type ``T`` that is ``double`` or a vector of doubles.
+one graph, so that equal terms are found once. What depends on parameters alone is moved to a function
+``prepare`` that runs once per trajectory and fills an array ``q``; what remains is printed on a type ``T``
+that is ``double`` or a vector of doubles.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..expressions.graph import Node
+from ..expressions.graph import Node, reached
 from .terms import MASKS, Graph, Terms
 
 #: C for operations on T; ``{0}`` and ``{1}`` are the arguments.
@@ -21,10 +22,9 @@ _ARITHMETIC = {
     "add": "{0} + {1}",
     "sub": "{0} - {1}",
     "mul": "{0} * {1}",
-    "div": "{0} / {1}",
     "neg": "-{0}",
     "sq": "{0} * {0}",
-    "twice": "{0} + {0}",
+    "twice": "2.0 * {0}",
     "inv": "1.0 / {0}",
 }
 
@@ -38,8 +38,8 @@ _LIBRARY = {
 #: Compilers take more than proportional time for long functions: statements of one that is not
 #: split, and of a part.
 _WHOLE, _PART = 5000, 250
-_NAME = re.compile(r"\b[vrm]\d+\b")
-_DEFINED = re.compile(r"  const [TI] ([vrm]\d+) =")
+_NAME = re.compile(r"\b[vm]\d+\b")
+_DEFINED = re.compile(r"  const [TI] ([vm]\d+) =")
 
 #: What only parameters may go through; always on doubles.
 _PARAMETERS_ONLY = {
@@ -88,15 +88,8 @@ class Program:
     def text(self) -> str:
         """Return the C text: ``NQ``, ``prepare`` and all functions."""
         nodes, roots = self._graph.nodes, [j for row in self._rows for j in row]
-        number: dict[int, int] = {}
-        pending = roots[::-1]
-        while pending:  # what an output needs comes before it, the first output first
-            missing = [a for a in nodes[pending[-1]].args if a not in number]
-            if missing:
-                pending += missing[::-1]
-            else:
-                number.setdefault(pending.pop(), len(number))
-        kept = list(number)
+        kept = reached([node.args for node in nodes], [True] * len(nodes), roots)
+        number = {j: k for k, j in enumerate(kept)}
         own = [replace(nodes[j], args=tuple(number[a] for a in nodes[j].args)) for j in kept]
         rows = [[number[j] for j in row] for row in self._rows]
         printed = _Printed(own, rows, self._types)
@@ -112,34 +105,16 @@ class _Printed:
 
     def __init__(self, nodes: Sequence[Node], rows: Sequence[Sequence[int]], types: Sequence[str]):
         self.nodes, self.types = nodes, types
-        self.moving, self.constant = [], []
+        self.moving: list[bool] = []
         for node in nodes:
-            if node.op == "input":
-                self.moving.append(_place(node)[0] != 1)
-                self.constant.append(False)
-            else:
-                self.moving.append(node.op in MASKS or any(self.moving[a] for a in node.args))
-                self.constant.append(node.op == "const")
-        self.prepared: dict[int, int] = {}
-        self._find_divisors()
+            own = node.op in MASKS or (node.op == "input" and node.source[0] != 1)
+            self.moving.append(own or any(self.moving[a] for a in node.args))
+        self.constant = [node.op == "const" for node in nodes]
         self._find_sums(rows)
         used = {j for row in rows for j in row}
-        for j, node in enumerate(nodes):
-            if self.moving[j]:
-                divisor = node.op == "div" and node.args[1] in self.divisors
-                used.update(node.args[:1] if divisor else node.args)
+        used.update(a for j, node in enumerate(nodes) if self.moving[j] for a in node.args)
         frontier = sorted(j for j in used if not self.moving[j] and not self.constant[j])
         self.prepared = {j: k for k, j in enumerate(frontier)}
-        inverted = sorted(j for j in self.divisors if not self.moving[j] and not self.constant[j])
-        self.inverted = {j: len(frontier) + k for k, j in enumerate(inverted)}
-
-    def _find_divisors(self) -> None:
-        """Nodes whose reciprocal is taken once: a division costs as much as twenty products."""
-        count: dict[int, int] = {}
-        for j, node in enumerate(self.nodes):
-            if self.moving[j] and node.op == "div":
-                count[node.args[1]] = count.get(node.args[1], 0) + 1
-        self.divisors = {j for j, k in count.items() if k > 1 or not self.moving[j]}
 
     def _find_sums(self, rows: Sequence[Sequence[int]]) -> None:
         """Terms, with signs, of sums whose partial sums have no other use, in the order in which they are known."""
@@ -189,12 +164,6 @@ class _Printed:
             text = f"({text}) {'-' if minus else '+'} {self.name(k)}"
         return text
 
-    def _reciprocal(self, j: int) -> str:
-        if self.constant[j]:
-            value = _value(self.nodes[j])
-            return _literal(1.0 / value) if value else "INFINITY"
-        return f"q[{self.inverted[j]}]" if j in self.inverted else f"r{j}"
-
     def name(self, j: int) -> str:
         """C of a node's value."""
         node = self.nodes[j]
@@ -203,19 +172,19 @@ class _Printed:
         if j in self.prepared:
             return f"q[{self.prepared[j]}]"
         if node.op == "input":
-            vector, position = _place(node)
+            vector, position = node.source
             return f"x[{position}]" if vector == 0 else f"e{position}"
         return f"m{j}" if node.op in MASKS else f"v{j}"
 
     def prepare(self) -> str:
         """C of the function from parameters to q."""
         lines = []
-        for j in self._reachable([*self.prepared, *self.inverted], moving=False):
+        for j in self._reachable(list(self.prepared), moving=False):
             node = self.nodes[j]
             if node.op == "const":
                 continue
             if node.op == "input":
-                value = f"p[{_place(node)[1]}]"
+                value = f"p[{node.source[1]}]"
             else:
                 args = [
                     _literal(_value(self.nodes[a])) if self.constant[a] else f"v{a}"
@@ -224,9 +193,8 @@ class _Printed:
                 value = _scalar(node.op, args)
             lines.append(f"  const double v{j} = {value};")
         lines += [f"  q[{k}] = v{j};" for j, k in self.prepared.items()]
-        lines += [f"  q[{k}] = 1.0 / v{j};" for j, k in self.inverted.items()]
         return (
-            f"#define NQ {max(1, len(self.prepared) + len(self.inverted))}\n"
+            f"#define NQ {max(1, len(self.prepared))}\n"
             "static void prepare(const double *p, double *q) {\n  (void)p; (void)q;\n"
             + "\n".join(lines)
             + "\n}\n"
@@ -240,15 +208,10 @@ class _Printed:
                 stores.setdefault(j, []).append(f"{array}[{k}]")
         lines = []
         reachable = self._early(outputs)
-        divisors = self.divisors & {
-            self.nodes[j].args[1] for j in reachable if self.nodes[j].op == "div"
-        }
         for j in reachable:
             if self.nodes[j].op != "input":
                 kind = "I" if self.nodes[j].op in MASKS else "T"
                 lines.append(f"  const {kind} {self.name(j)} = {self._value(j)};")
-            if j in divisors:
-                lines.append(f"  const T r{j} = 1.0 / {self.name(j)};")
             lines += [f"  {target} = {self.name(j)};" for target in stores.pop(j, [])]
         for j, targets in stores.items():
             value = f"BC({self.name(j)})" if self.constant[j] else self.name(j)
@@ -296,8 +259,6 @@ class _Printed:
         node = self.nodes[j]
         if j in self.sums:
             return self._sum(self.sums[j])
-        if node.op == "div" and node.args[1] in self.divisors:
-            return f"{self.name(node.args[0])} * {self._reciprocal(node.args[1])}"
         args = [self.name(a) for a in node.args]
         if node.op in _ARITHMETIC:
             return _ARITHMETIC[node.op].format(*args)
@@ -332,12 +293,6 @@ def _parts(lines: Sequence[str]) -> tuple[list[list[str]], int]:
         if (m := _DEFINED.match(line)) and m[1] in shared:
             parts[k // _PART].append(f"  w[{shared[m[1]]}] = (T){m[1]};")
     return parts, len(shared)
-
-
-def _place(node: Node) -> tuple[int, int]:
-    """Vector and position of an input."""
-    assert isinstance(node.payload, tuple)
-    return node.payload
 
 
 def _value(node: Node) -> float:

@@ -16,24 +16,37 @@ import casadi as ca
 from ..definition.system import FilippovSystem
 from ..expressions.dependent_rows import in_span
 from ..expressions.jets import Expansion
+from ..expressions.linearity import bent
+from ..expressions.simplification import simplified
 from ..laws.coupled import Coupled, coupled_of
-from ..laws.motion import motion
 from .ccode import Program
 from .terms import OfTape, Term, Terms
 
 
 @dataclass(frozen=True)
 class Shape:
-    """What the lanes' text needs to know of the functions: affine guards; rows and guards that are checked."""
+    """What the lanes' text needs to know of the functions.
 
+    Attributes
+    ----------
+    rows, slots : list of int
+        Of the field and of the guards what a step has to be checked with.
+    affine : list of bool
+        Which guards are affine in the states.
+    affine_modes : list of bool
+        Whether all is affine in them, sines of the time added, above, below and on the surface.
+    """
+
+    rows: list[int]
+    slots: list[int]
     affine: list[bool]
-    checked: tuple[tuple[int, ...], tuple[int, ...]]
+    affine_modes: list[bool]
 
 
-def lanes_program(system: FilippovSystem, order: int) -> tuple[str, Shape]:
-    """C of ``jet``, ``surface_values``, ``lie_values``, ``stop_values``, ``check_values``."""
-    shape = Shape(_affine(system), _checked(system))
-    writer = _Writer(coupled_of(system))
+def lanes_program(system: FilippovSystem, order: int, joined: bool) -> tuple[str, Shape]:
+    """C of ``jet``, ``surface_values``, ``lie_values``, ``stop_values``, ``check_values`` (``joined``: see ``Graph``)."""
+    writer = _Writer(coupled_of(system), joined)
+    shape = writer.shape()
     jet, guards = writer.expanded(order)
     program = Program(writer.graph, ("I", "I", "T"))
     program.add("jet", c=[c for row in jet for c in row], g=[c for row in guards for c in row])
@@ -41,17 +54,17 @@ def lanes_program(system: FilippovSystem, order: int) -> tuple[str, Shape]:
         program.add(
             f"{name}_values", **{"h" if name == "surface" else "value": values}, gradient=gradient
         )
-    if shape.checked != ((), ()):
-        rows, slots = shape.checked
-        program.add("check_values", f=[jet[i][1] for i in rows], g=[guards[j][0] for j in slots])
+    if shape.rows or shape.slots:
+        rows, slots = [jet[i][1] for i in shape.rows], [guards[j][0] for j in shape.slots]
+        program.add("check_values", f=rows, g=slots)
     return program.text(), shape
 
 
 class _Writer(OfTape):
     """The modes of a system with one surface or none."""
 
-    def __init__(self, coupled: Coupled):
-        super().__init__(coupled)
+    def __init__(self, coupled: Coupled, joined: bool):
+        super().__init__(coupled, joined)
         self.slides, _, self.lam = self.graph.inputs(2, 3)
 
     def expanded(self, order: int) -> tuple[list[list[Term | None]], list[list[Term | None]]]:
@@ -131,48 +144,36 @@ class _Writer(OfTape):
         rates = ("lie", [above.layer[0], below.layer[0]], gradients)
         return [("surface", *self.surfaces()), rates, stops]
 
-
-def _checked(system: FilippovSystem) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Rows of the field that are not affine in every mode, and guards that are no combination of them."""
-    # Rows that are combinations of the others are left out.
-    x, p = system.extended_states, system.parameter_symbols
-    modes = [motion(system, mode).field for mode in ("+-s" if system.surface_count else ("",))]
-    rows = [i for i in range(x.numel()) if not all(ca.is_linear(f[i], x) for f in modes)]
-    for i in reversed(rows):
-        others = [j for j in rows if j != i]
-        if all(in_span([f[i]], [f[j] for j in others], x, p)[0] for f in modes):
-            rows = others
-    stops = ca.vertsplit(system.definition.guards) if system.definition.guards.numel() else []
-    if not system.surface_count:
-        wanted = [(k, stop, "") for k, stop in enumerate(stops)]
-    else:
-        lie = [system.lie_derivative(side) for side in "+-"]
-        wanted = [(0, system.surface_function(0), "+"), (0, system.surface_function(0), "-")]
-        wanted += [(0, lie[0], "s"), (1, lie[1], "s")]
-        wanted += [(2 + k, stop, mode) for k, stop in enumerate(stops) for mode in "+-s"]
-    slots = set()
-    for slot, function, mode in wanted:
-        field = motion(system, mode).field
-        bent = [field[i] for i in range(x.numel()) if not ca.is_linear(field[i], x)]
-        if not ca.is_linear(function, x) and not in_span([function], bent, x, p)[0]:
-            slots.add(slot)
-    return tuple(rows), tuple(sorted(slots))
-
-
-def _affine(system: FilippovSystem) -> list[bool]:
-    x = system.extended_states
-    stops = (
-        ca.densify(system.definition.guards) if system.definition.guards.numel() else ca.SX(0, 1)
-    )
-    flags = [bool(ca.is_linear(stops[k], x)) for k in range(stops.numel())]
-    if not system.surface_count:
-        return flags
-    h = system.surface_function(0)
-    plus, minus = system.lie_derivative("+"), system.lie_derivative("-")
-    first = bool(ca.is_linear(h, x)) and bool(ca.is_linear(plus, x))
-    return [first, bool(ca.is_linear(minus, x)), *flags]
-
-
-def is_flat(system: FilippovSystem) -> bool:
-    """Whether the surface is a plane: one Newton step then projects onto it exactly."""
-    return not any(coupled_of(system).linearity.curved_guards[: system.surface_count])
+    def shape(self) -> Shape:
+        """Return what is affine; a function that is a combination of rows of the field is checked with them."""
+        of, system = self.coupled, self.coupled.system
+        x, p, unknowns = (
+            system.extended_states,
+            system.parameter_symbols,
+            of.symbols_of(range(self.m)),
+        )
+        every = [ca.vertcat(of.field, of.layer, of.factors)]
+        every = simplified([of.moving, p], every, [True, False])
+        beyond = bent(every[0], ca.vertcat(x, unknowns), system.definition.time)
+        rows, others = [i for i in range(self.n) if beyond[i]], ca.vertcat(p, of.moving[self.n :])
+        for i in reversed(rows):
+            rest = [j for j in rows if j != i]
+            if in_span([of.field[i]], [of.field[j] for j in rest], x, others)[0]:
+                rows = rest
+        guards = [(2 * self.m + k, e) for k, e in enumerate(ca.vertsplit(of.stops)) if e.numel()]
+        if self.m:
+            sides = [(j, system.lie_derivative(side)) for j, side in enumerate("+-")]
+            guards = [(0, system.surface_function(0)), *sides, *guards]
+        functions = [e for _, e in guards]
+        known = in_span(functions, [of.field[i] for i in rows], x, others)
+        curved = [not ca.is_linear(e, x) for e in functions]
+        slots = {
+            j
+            for (j, _), is_known, c in zip(guards, known, curved, strict=True)
+            if c and not is_known
+        }
+        affine = [True] * (2 * self.m + of.stops.numel())
+        for (j, _), is_curved in zip(guards, curved, strict=True):
+            affine[j] &= not is_curved
+        sliding = not any(beyond) and not any(of.linearity.bent_guards)
+        return Shape(rows, sorted(slots), affine, [of.linearity.free] * 2 + [sliding])

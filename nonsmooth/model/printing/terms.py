@@ -62,9 +62,14 @@ class Term:
 
 
 class Graph:
-    """The nodes, in an order in which each can be computed."""
+    """The nodes, in an order in which each can be computed.
 
-    def __init__(self) -> None:
+    ``joined``: numbers that one term is multiplied with in turn become one. A term is then known sooner, and more
+    of them are kept for long: too many for the registers of a GPU's thread.
+    """
+
+    def __init__(self, joined: bool) -> None:
+        self._joined = joined
         self.nodes: list[Node] = []
         self._known: dict[Node, int] = {}
 
@@ -139,14 +144,16 @@ class Graph:
         for one, two in ((a, b), (b, a)):
             if (other := self._of("neg", one)) is not None:
                 return -(two * other) if two.value is None else -two.value * other
-        if a.value == 2.0 and b.node.op == "mul":
+        if self._joined and a.value is not None and b.node.op == "mul":
             one, two = (Term(self, k) for k in b.node.args)
-            if one.value == 2.0 or two.value == 2.0:
-                return 4.0 * (two if one.value == 2.0 else one)
+            factor, other = (one, two) if one.value is not None else (two, one)
+            if factor.value is not None and 1e-100 < abs(a.value * factor.value) < 1e100:
+                return (a.value * factor.value) * other
         return None
 
-    def _div(self, a: Term, b: Term) -> Term | None:
-        return a if b.value == 1.0 or a.value == 0.0 else None
+    def _div(self, a: Term, b: Term) -> Term:
+        """A product with a reciprocal, which is taken once: it costs as much as twenty products."""
+        return a * (self.constant(math.inf) if b.value == 0.0 else self.operation("inv", b))
 
     def select(self, mask: Term, a: Term | None, b: Term | None) -> Term | None:
         """Return ``a`` in lanes of a mask and ``b`` in the others."""
@@ -268,9 +275,9 @@ class Point:
 class OfTape:
     """The tape of a system without contacts, in terms of states and parameters."""
 
-    def __init__(self, coupled: Coupled):
+    def __init__(self, coupled: Coupled, joined: bool = True):
         system = coupled.system
-        self.coupled, self.tape, self.graph = coupled, tape_of(coupled), Graph()
+        self.coupled, self.tape, self.graph = coupled, tape_of(coupled), Graph(joined)
         self.n, self.m = system.extended_dimension, system.surface_count
         self.x = self.graph.inputs(0, self.n)
         self.p = self.graph.inputs(1, len(system.parameter_names))

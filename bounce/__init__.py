@@ -29,6 +29,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+import nonsmooth as ns
+
 from . import contact, golf, laws, maps, shot
 from .contact.generalised import GeneralisedContact
 from .contact.model import ContactModel
@@ -79,6 +81,9 @@ __all__ = [
     "simulate",
     "slip_map",
 ]
+
+
+ns.notebook.add_cards(globals(), __all__)
 
 
 def __getattr__(name: str) -> Any:

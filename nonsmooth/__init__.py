@@ -75,6 +75,9 @@ from .model import (
     call,
     regularise,
 )
+from .model.definition.elements import Relay
+from .model.definition.friction import Friction
+from .model.definition.table import table
 from .orbit import (
     basins,
     continue_bifurcation,
@@ -114,6 +117,7 @@ __all__ = [
     "DegenerateError",
     "Ensemble",
     "FilippovSystem",
+    "Friction",
     "Grid",
     "Impact",
     "NonsmoothError",
@@ -123,6 +127,7 @@ __all__ = [
     "PointError",
     "RandomStarts",
     "Region",
+    "Relay",
     "Reset",
     "Section",
     "Status",
@@ -164,6 +169,7 @@ __all__ = [
     "sensitivity",
     "simulate",
     "sliding_field",
+    "table",
     "textbook",
     "two_folds",
     "vjp",

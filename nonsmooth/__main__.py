@@ -52,6 +52,7 @@ def _explore(path: Path, show: bool) -> int:
 
 def _draw(problem: Problem, path: Path) -> None:
     plot = importlib.import_module("nonsmooth.plot")  # matplotlib is slow to import
+    importlib.import_module("matplotlib").use("Agg")  # a file, no window
     plot.trajectory(problem.run()).savefig(path)
 
 

@@ -1,12 +1,14 @@
 """HTML representations of results for notebooks: a title, rows, and a small picture as SVG.
 
-All text is escaped. Pictures need no other package.
+Results without a representation of their own show their fields (:func:`add_cards`). All text is escaped. Pictures need no other package.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +21,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _WIDTH, _HEIGHT = 260, 88
 _MOST = 300  # points of a drawn line
 _LONGEST = 240  # characters of a cell
+_MANY = 12  # numbers of an array, or entries of a list, that are written out
 _NUMBER = "{:.4g}"
 
 
@@ -31,7 +34,47 @@ def card(title: str, rows: Iterable[tuple[str, object]], picture: str = "") -> s
     return f"<div><b>{html.escape(title)}</b><table>{body}</table>{picture}</div>"
 
 
+class Markup(str):
+    """HTML that a card shows as it is."""
+
+
+def add_cards(names: Mapping[str, object], exported: Iterable[str]) -> None:
+    """Let exported results that have no notebook representation show their fields."""
+    for name in exported:
+        kind = names.get(name)
+        if isinstance(kind, type) and dataclasses.is_dataclass(kind):
+            if not hasattr(kind, "_repr_html_"):
+                kind._repr_html_ = _fields  # type: ignore[attr-defined]
+
+
+def _fields(result: Any) -> str:
+    """The card of a result: its public fields."""
+    shown = [field.name for field in dataclasses.fields(result) if not field.name.startswith("_")]
+    return card(type(result).__name__, [(name, _short(getattr(result, name))) for name in shown])
+
+
+def _short(value: Any) -> object:
+    """A value of a field in a few words."""
+    if callable(value) or value is None:
+        return ""
+    if isinstance(value, (bool, str, int)) or not isinstance(value, (float, complex, np.ndarray)):
+        own = getattr(type(value), "_repr_html_", _fields)
+        if own is not _fields:
+            return Markup(own(value))
+        if isinstance(value, (list, tuple, dict)) and len(value) > _MANY:
+            return f"{len(value)} entries"
+        return value if len(str(value)) > 0 and value != () and value != [] else ""
+    array = np.asarray(value)
+    if array.size > _MANY:
+        return f"array {array.shape}"
+    if array.dtype.kind not in "fc":
+        return np.array2string(array, separator=", ")
+    return np.array2string(array, precision=6, separator=", ") if array.ndim else f"{value:.6g}"
+
+
 def _cell(value: object) -> str:
+    if isinstance(value, Markup):
+        return value
     text = str(value)
     cut = text if len(text) <= _LONGEST else text[: _LONGEST - 4] + " ..."
     return html.escape(cut).replace("\n", "<br>")

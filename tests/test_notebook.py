@@ -1,5 +1,6 @@
 """Results show themselves in notebooks: escaped text, a well-formed picture, nothing drawn by matplotlib."""
 
+import dataclasses
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -10,6 +11,7 @@ import pytest
 
 import bounce
 import nonsmooth as ns
+from nonsmooth.model.expressions.mathml import equation, symbol
 from nonsmooth.notebook import card, circle, lines, quadrants
 
 
@@ -78,11 +80,74 @@ def test_multipliers_are_beside_the_unit_circle():
 
 
 def test_a_system_shows_its_fields_and_surface():
-    cells = [e.text for e in parsed(RELAY._repr_html_()).iter("td")]
-    assert cells[cells.index("surface h0") + 1] == "v"
-    assert cells[cells.index("field above") + 1] == str(RELAY.field("+"))
-    two = ns.textbook.glass_loop().system._repr_html_()
-    assert "surface h1" in two and "field above" not in two
+    written = rows(RELAY)
+    assert written["surface h0"] == "h0=v"
+    assert written["field above"] == "x˙=v" + "v˙=−(x+0.4)"
+    two = rows(ns.textbook.glass_loop().system)
+    assert "surface h1" in two and "field above" not in two and two["field"].endswith("−y")
+
+
+def rows(thing):
+    """The text of each row of a card by its name."""
+    table = parsed(thing._repr_html_()).iter("tr")
+    return {one[0].text: "".join(one[1].itertext()).replace("\u2062", "") for one in table}
+
+
+@pytest.mark.parametrize(
+    ("expression", "written"),
+    [
+        (X - (V - 1), "x−(v−1)"),
+        (-(X + V) * 2, "2(−(x+v))"),
+        (X / (1 + V) ** 2, "x(1+v)2"),
+        (ca.sqrt(X) * ca.sin(V), "xsin(v)"),
+        (1e-7 * X, "1·10-7x"),
+        (X + (-0.5), "x−0.5"),
+        (ca.fabs(ca.SX.sym("omega_1") * X), "|ω1x|"),
+        (sum(ca.sin(k * X) ** k for k in range(60)), "…"),
+    ],
+)
+def test_expressions_are_typeset_with_the_parentheses_they_need(expression, written):
+    text = equation(symbol("y"), ca.SX(expression), ca.symvar(ca.vertcat(expression, X, V)))
+    said = "".join(parsed(text).itertext()).replace("\u2062", "")
+    assert said == f"y={written}"
+
+
+def doors():
+    """The modules whose names users import."""
+    return [ns.local, ns.orbit, ns.flow, ns.proofs, ns.two_folds, ns.textbook, bounce,
+            bounce.golf, bounce.maps, bounce.shot]  # fmt: skip
+
+
+def test_every_result_shows_itself():
+    """Every exported dataclass has a card; a new one gets that of its fields."""
+    public = [getattr(door, name) for door in doors() for name in door.__all__]
+    kinds = [one for one in public if isinstance(one, type) and dataclasses.is_dataclass(one)]
+    assert len(kinds) > 50
+    assert {kind.__name__ for kind in kinds if not hasattr(kind, "_repr_html_")} == set()
+
+
+def results():
+    """Results of the functions that users call most, besides those of ``shown``."""
+    belt = ns.textbook.leine_stick_slip()
+    run = ns.simulate(RELAY, [3.0, 0.0], t_end=20.0)
+    turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    yield belt
+    yield run.events[0]
+    yield ns.classify(RELAY, [0.2, 0.0])
+    yield ns.basins(belt.system, {"x": [0.2, 0.5], "v": [0.0, 0.1]}, t_end=100.0)
+    yield ns.gradient(run, X**2)
+    yield ns.sensitivity(run)
+    yield ns.two_folds.classify_two_fold((1, -1), (2.0, 1.0))
+    yield bounce.Landing(20.0, -10.0, 200.0)
+    yield bounce.golf.flight(bounce.Landing(60.0, 12.0, 280.0))
+    yield bounce.lift_off(turf, 0.3, -1.0, [0.1, 0.2])
+    yield bounce.dividing_curve(turf, step=0.4)
+
+
+def test_results_are_well_formed_and_short():
+    for one in results():
+        assert rows(one), type(one)
+        assert len(one._repr_html_()) < 20_000, type(one)
 
 
 def test_a_run_of_no_length_shows_itself():

@@ -51,7 +51,10 @@ def run(args: argparse.Namespace) -> int:
         for name, (low, high) in profile.items():
             print(f"  {name}: as far as the data allow, 95 % in [{low:.6g}, {high:.6g}]")
     if args.residuals:
+        import matplotlib
+
         from ..plot import residuals
 
+        matplotlib.use("Agg")  # a file, no window
         residuals(found).savefig(args.residuals, dpi=150)
     return UNDETERMINED if found.undetermined else 0

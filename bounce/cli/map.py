@@ -69,7 +69,11 @@ def run(args: argparse.Namespace) -> int:
     if kind == "npz":
         _save(args.output, result)
     else:
+        import matplotlib
+
         from ..plot import outcome_map as draw
+
+        matplotlib.use("Agg")  # a file, no window
 
         curve = _curve(result) if args.show == "region" else None
         speeds = SYSTEMS[args.units]["speed"]

@@ -17,6 +17,8 @@ Examples
 'carry 215 m, then 19 m in 12 bounces'
 """
 
+import nonsmooth as ns
+
 from ..units import GOLF
 from .air import AIRS, QUINTAVALLA, SMITS_SMITH, Air
 from .fits.columns import DataError
@@ -61,3 +63,5 @@ __all__ = [
     "read_measurements",
     "rebound",
 ]
+
+ns.notebook.add_cards(globals(), __all__)

@@ -1,5 +1,7 @@
 """Many bounces: results of maps, the dividing surface, vortices of the slip, and proven maps."""
 
+import nonsmooth as ns
+
 from .dividing import Arc, DividingCurve, DividingSurface, critical_eta, dividing_surface
 from .outcomes import OutcomeMap
 from .proven import ProvenMap, proven_map
@@ -23,3 +25,5 @@ __all__ = [
     "slip_turn",
     "winding_number",
 ]
+
+ns.notebook.add_cards(globals(), __all__)

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import nonsmooth as ns
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+style = ns.plot.style
 
 _NARROW = 4.6  # inches: figures as wide as a column of a journal
 _UNDER = 36.0  # points from the axes to the key: the numbers of the axis and its name are between
@@ -30,7 +34,7 @@ def below(ax: Axes, handles: Sequence[Any], labels: Sequence[str], columns: int 
     down = ScaledTranslation(0.0, -_UNDER / 72, figure.dpi_scale_trans)
     look: dict[str, Any] = dict(
         loc="upper center", bbox_to_anchor=(0.5, 0.0), bbox_transform=ax.transAxes + down,
-        borderaxespad=0.0, ncols=columns, frameon=False, fontsize=8.0, columnspacing=1.2,
+        borderaxespad=0.0, ncols=columns, frameon=False, fontsize=style.points(8.0), columnspacing=1.2,
     )  # fmt: skip
     if ax.get_legend() is None:
         ax.legend(handles, labels, **look)
@@ -50,6 +54,6 @@ def keys(ax: Axes, patches: Sequence[Any], lines: dict[str, Any], title: str) ->
     if patches:
         ax.legend(
             handles=patches, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0,
-            frameon=False, fontsize=8, title=title, title_fontsize=8,
+            frameon=False, fontsize=style.points(8), title=title, title_fontsize=style.points(8),
         )  # fmt: skip
     below(ax, list(lines.values()), list(lines))

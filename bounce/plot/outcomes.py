@@ -21,12 +21,13 @@ from .keys import is_narrow, keys
 from .regions import LISTED, regions
 
 style = ns.plot.style
+Canvas = ns.plot.Canvas
+canvas = ns.plot.canvas
 Array = NDArray[np.float64]
 Units = Mapping[str, tuple[str, str, float]]
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
 #: Axes of landings in SI units as golfers read them: name, unit, and the unit in SI.
@@ -49,7 +50,7 @@ _LABELS = {
 }
 _TITLE = 9.0  # points
 _JOINED = "\N{NO-BREAK SPACE}"
-_NO_YES = ("#00224E", "#FEE838")  # the ends of cividis
+_NO_YES = {"no": "#00224E", "yes": "#FEE838"}  # the ends of cividis
 _QUANTITIES = ("itinerary", "slip", "omega", "spin_reversal", "lift_off_angle")
 
 
@@ -60,7 +61,12 @@ def outcome_map(
     curve: DividingCurve | None = None,
     speeds: str = "m/s",
     ax: Axes | None = None,
-) -> Figure:
+    size: tuple[float, float] | None = None,
+    legend: bool = True,
+    title: str | None = None,
+    colors: Mapping[str, Any] | None = None,
+    **look: Any,
+) -> Any:
     """Draw a map of outcomes: regions by name, or a quantity at lift-off.
 
     Parameters
@@ -75,11 +81,21 @@ def outcome_map(
         Unit of speeds on a map of golfers' landings.
     ax : matplotlib Axes, optional
         Draw here instead of in a new figure.
+    size : (width, height), optional
+        Of a new figure, in inches.
+    legend : bool, optional
+        Whether a legend is drawn.
+    title : str, optional
+        Title of the picture.
+    colors : mapping, optional
+        Colours by the names of regions, such as ``{"S+": "tab:red"}``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the dividing curve.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -104,43 +120,46 @@ def outcome_map(
         )
     units = _golfers(speeds)
     x, y = _axes(outcomes, units)
-    with style.settings():
-        figure, ax = style.axes_for(ax, (7.0, 5.4))
-        size = _TITLE * (0.6 if is_narrow(ax) else 0.53)  # of a letter, on average
-        letters = int(ax.bbox.width * 72 / figure.dpi / size)
+    with canvas(ax, size, (7.0, 5.4), colors=colors, look=look, title=title) as page:
+        ax = page.ax
+        if title is None:
+            size_ = style.points(_TITLE)
+            width = size_ * (0.6 if is_narrow(ax) else 0.53)  # of a letter, on average
+            letters = int(ax.bbox.width * 72 / page.figure.dpi / width)
+            text = textwrap.fill(_title(outcomes, units), letters)
+            ax.set_title(text.replace(_JOINED, " "), fontsize=size_, loc="left")
         if quantity != "itinerary":
-            _field(figure, ax, outcomes, quantity, x, y, units)
+            _field(page, outcomes, quantity, x, y, units)
         lines = (
-            _contour(ax, outcomes, x, y)
+            _contour(page, outcomes, x, y)
             if curve is None
-            else draw_curve(ax, outcomes.names, curve, (_ends(x), _ends(y)))
+            else draw_curve(page, outcomes.names, curve, (_ends(x), _ends(y)))
         )
-        lines |= _without_lift_off(ax, outcomes)
+        lines |= _without_lift_off(page, outcomes)
         patches: list[Patch] = []
         if quantity == "itinerary":
             room = LISTED - len(lines) if is_narrow(ax) else LISTED
-            patches = regions(ax, outcomes, x, y, room)
+            patches = regions(page, outcomes, x, y, room)
             lines |= _cases(ax, outcomes)
-        keys(ax, patches, lines, "narrow regions")
+        if legend:
+            keys(ax, patches, lines, "narrow regions")
         for axis, name in zip((ax.xaxis, ax.yaxis), outcomes.names, strict=True):
             what, unit, _ = units.get(name, (_LABELS.get(name, name), "", 1.0))
             axis.set_label_text(f"{what} ({unit})" if unit else what)
         ax.set_xlim(*_ends(x))
         ax.set_ylim(*_ends(y))
-        title = textwrap.fill(_title(outcomes, units), letters)
-        ax.set_title(title.replace(_JOINED, " "), fontsize=_TITLE, loc="left", color="0.3")
-    return figure
+    return page.drawn
 
 
-def _without_lift_off(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
+def _without_lift_off(page: Canvas, outcomes: OutcomeMap) -> dict[str, Any]:
     """Hatch what lies behind the map, where landings without lift-off leave it open; its entry of the key."""
     from matplotlib.patches import Patch
 
     if outcomes.lift_offs.complete.all():
         return {}
-    look: dict[str, Any] = dict(facecolor="white", edgecolor="0.45", hatch="////", linewidth=0.0)
-    ax.patch.set(**look)
-    return {"no lift-off": Patch(**look)}
+    hatched: Any = {"hatch": "////", "linewidth": 0.0}
+    page.ax.patch.set(facecolor=page.paper, edgecolor=page.on_paper("0.45"), **hatched)
+    return {"no lift-off": Patch(facecolor="white", edgecolor="0.45", **hatched)}
 
 
 def _cases(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
@@ -156,8 +175,7 @@ def _cases(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
 
 
 def _field(
-    figure: Figure,
-    ax: Axes,
+    page: Canvas,
     outcomes: OutcomeMap,
     quantity: str,
     x: Array,
@@ -183,17 +201,17 @@ def _field(
         bound = float(np.abs(np.nan_to_num(values)).max()) or 1.0
         options = dict(cmap="PuOr_r", vmin=-bound, vmax=bound)
     elif quantity == "spin_reversal":
-        from matplotlib.colors import ListedColormap
-
-        options = dict(cmap=ListedColormap(_NO_YES), vmin=-0.5, vmax=1.5)
+        options = dict(
+            cmap=page.palette(page.color(*pair) for pair in _NO_YES.items()), vmin=-0.5, vmax=1.5
+        )
         label = "spin reverses"
-    mesh = ax.pcolormesh(x, y, values, shading="nearest", rasterized=True, **options)
-    bar = figure.colorbar(mesh, ax=ax, label=label)
+    mesh = page.ax.pcolormesh(x, y, values, shading="nearest", rasterized=True, **options)
+    bar = page.figure.colorbar(mesh, ax=page.ax, label=label)
     if quantity == "spin_reversal":
         bar.set_ticks([0, 1], labels=["no", "yes"])
 
 
-def _contour(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> dict[str, Any]:
+def _contour(page: Canvas, outcomes: OutcomeMap, x: Array, y: Array) -> dict[str, Any]:
     """Where the slip at lift-off changes its sign; what rolls at lift-off has none."""
     slip = np.where(outcomes.lift_offs.complete, outcomes.slip, np.nan)
     rolls = np.array([*(name.endswith("R") for name in outcomes.regions), False])[outcomes.code]
@@ -201,13 +219,18 @@ def _contour(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> dict[str, An
     slip = np.where(rolls | (np.abs(slip) < 1e-12 * size), 0.0, slip)
     if not (np.any(slip < 0) and np.any(slip > 0)):
         return {}
-    lines = ax.contour(x, y, slip, levels=[0.0], colors="black", linewidths=1.6)
-    lines.set(path_effects=style.halo(3.0))
-    return {"slip at lift-off $H_F=0$": lines.legend_elements()[0][0]}
+    from contourpy import contour_generator
+    from matplotlib.lines import Line2D
+
+    look = page.look("dividing curve", color="black", linewidth=1.6)
+    curves: Any = contour_generator(x, y, np.ma.masked_invalid(slip)).lines(0.0)
+    for curve in curves:
+        page.ax.plot(*curve.T, path_effects=style.halo(3.0), **look)
+    return {"slip at lift-off $H_F=0$": Line2D([], [], **look)}
 
 
 def draw_curve(
-    ax: Axes, names: Sequence[str], curve: DividingCurve, view: Sequence[Sequence[float]]
+    page: Canvas, names: Sequence[str], curve: DividingCurve, view: Sequence[Sequence[float]]
 ) -> dict[str, Any]:
     """Draw a dividing curve within ``view``, and return a label and an artist for each kind of line."""
     order = [("xdot", "omega").index(name) for name in names]
@@ -216,14 +239,15 @@ def draw_curve(
     for arc in (*curve.arcs, *curve.reverse):
         for sign in (1, -1) if curve.mirrored else (1,):
             u, v = sign * arc.points[:, order].T
-            (line,) = ax.plot(u, v, color="black", linewidth=2.0, linestyle=styles[arc.kind])
+            look = page.look(arc.kind, color="black", linewidth=2.0, linestyle=styles[arc.kind])
+            (line,) = page.ax.plot(u, v, **look)
             if _in_view(u, v, view):
                 key[f"$H_F=0$, {arc.kind}"] = line
     if curve.junction is not None:
-        look: dict[str, Any] = dict(color="white", markeredgecolor="black", markersize=6, zorder=8)
+        mark: dict[str, Any] = dict(color="white", markeredgecolor="black", markersize=6, zorder=8)
         for sign in (1, -1) if curve.mirrored else (1,):
             point = sign * curve.junction[order]
-            (dot,) = ax.plot(*point, "o", **look)
+            (dot,) = page.ax.plot(*point, "o", **mark)
             if _in_view(point[0], point[1], view):
                 key["their junction"] = dot
     return key

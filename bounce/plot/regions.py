@@ -14,6 +14,7 @@ from ..maps.outcomes import OutcomeMap
 from .keys import is_narrow
 
 style = ns.plot.style
+Canvas = ns.plot.Canvas
 Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
@@ -57,11 +58,11 @@ _LEFT, _LEFT_COLUMN = np.array([1.0, 0.8]), np.array([0.8, 1.0])
 _POINTS = 9.0  # of the names of regions
 
 
-def regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array, room: int) -> list[Patch]:
+def regions(page: Canvas, outcomes: OutcomeMap, x: Array, y: Array, room: int) -> list[Patch]:
     """Colour the regions and name them; return a key of the ``room`` largest without room for a name."""
-    from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
+    ax = page.ax
     clear = ~_turns(outcomes.slip)
     inside = [outcomes.code == code for code in range(len(outcomes.regions))]
     places = [
@@ -73,25 +74,26 @@ def regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array, room: int) -> li
     narrow.sort(key=lambda code: -np.count_nonzero(inside[code]))
     listed = narrow if len(narrow) <= room + 1 else narrow[:room]  # not "and 1 more"
     spare = iter(MORE)
-    colours = [_REST] * len(outcomes.regions)
+    colours: list[Any] = [_REST] * len(outcomes.regions)
     for code in (*listed, *named):
-        colours[code] = COLOURS.get(outcomes.regions[code]) or next(spare, _REST)
+        name = outcomes.regions[code]
+        colours[code] = page.color(name, COLOURS.get(name) or next(spare, _REST))
     look: dict[str, Any] = dict(
-        cmap=ListedColormap(colours or [_REST]), vmin=-0.5, vmax=max(len(colours), 1) - 0.5
+        cmap=page.palette(colours or [_REST]), vmin=-0.5, vmax=max(len(colours), 1) - 0.5
     )
     cells = np.ma.masked_less(outcomes.code, 0)  # without lift-off
     ax.pcolormesh(x, y, cells, shading="nearest", rasterized=True, **look)
     for code in named:
         place = places[code]
         assert place is not None
-        ink = "white" if _luminance(colours[code]) < 0.2 else "black"
+        ink = "white" if style.luminance(colours[code]) < 0.2 else "black"
         style.write(
             ax,
             place,
             outcomes.regions[code],
             zorder=6,
             color=ink,
-            fontsize=_POINTS,
+            fontsize=style.points(_POINTS),
             fontweight="bold",
         )
     column = is_narrow(ax)
@@ -143,7 +145,9 @@ def _place(
     from scipy.ndimage import distance_transform_edt, minimum_filter
 
     room = distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
-    letters = np.array([1.3, 0.72 * len(name)]) * _POINTS  # height and width of the name
+    letters = np.array([1.3, 0.72 * len(name)]) * style.points(
+        _POINTS
+    )  # height and width of the name
     left = _LEFT_COLUMN if is_narrow(ax) else _LEFT
     frame = np.array([ax.bbox.height, ax.bbox.width]) * left * 72 / ax.figure.dpi
     cells = np.ceil(letters / frame * inside.shape).astype(int)
@@ -153,10 +157,3 @@ def _place(
     if room.max() < 0.03 * min(inside.shape):
         return None
     return float(x[column]), float(y[row])
-
-
-def _luminance(colour: str) -> float:
-    """Relative luminance of WCAG 2.1."""
-    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    r, g, b = (c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b

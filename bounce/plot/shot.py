@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +16,10 @@ from .keys import below, is_narrow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 style = ns.plot.style
+Canvas = ns.plot.Canvas
+canvas = ns.plot.canvas
 
 #: Colours that differ in grey too, line styles and names of the phases.
 STYLES: dict[str, dict[str, Any]] = {
@@ -32,7 +34,16 @@ _SEEN = 0.04  # of the width of the picture: a shorter jump has no name
 _LONG = 0.33  # of a column: over a shorter jump its name takes two lines
 
 
-def friction_cone(shot: Shot[ContactModel, float], ax: Axes | None = None) -> Figure:
+def friction_cone(
+    shot: Shot[ContactModel, float],
+    *,
+    ax: Axes | None = None,
+    size: tuple[float, float] | None = None,
+    legend: bool = True,
+    title: str | None = None,
+    colors: Mapping[str, Any] | None = None,
+    **look: Any,
+) -> Any:
     """Draw the friction force against the load, with the cone that bounds it.
 
     Parameters
@@ -41,11 +52,21 @@ def friction_cone(shot: Shot[ContactModel, float], ax: Axes | None = None) -> Fi
         The bounce, from :func:`bounce.simulate`.
     ax : matplotlib Axes, optional
         Draw here instead of in a new figure.
+    size : (width, height), optional
+        Of a new figure, in inches.
+    legend : bool, optional
+        Whether a legend is drawn.
+    title : str, optional
+        Title of the picture.
+    colors : mapping, optional
+        Colours by phases, such as ``{"s": "tab:red"}``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the force.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -64,17 +85,18 @@ def friction_cone(shot: Shot[ContactModel, float], ax: Axes | None = None) -> Fi
         raise ns.OptionError(
             f"shot: expected a bounce in the plane, received {shot!r}. In 3-D draw the components of shot.forces(t)."
         )
-    with style.settings():
-        figure, ax = style.axes_for(ax, (6.4, 5.2))
+    with canvas(ax, size, (6.4, 5.2), colors=colors, look=look, title=title) as page:
+        ax = page.ax
         names = ns.plot.labels.Labels(ax)
         _cone(ax, shot, names)
-        _phases(ax, shot, names)
+        _phases(page, shot, names)
         _markers(ax, shot)
         ax.axhline(0.0, color="0.3", linewidth=0.8, zorder=1)
         ax.set_xlabel(r"friction force $\Lambda_T$")
         ax.set_ylabel(r"load $\Lambda_N$")
-        below(ax, *ax.get_legend_handles_labels())
-    return figure
+        if legend:
+            below(ax, *ax.get_legend_handles_labels())
+    return page.drawn
 
 
 def _cone(ax: Axes, shot: Shot[ContactModel, float], names: Any) -> None:
@@ -93,7 +115,7 @@ def _cone(ax: Axes, shot: Shot[ContactModel, float], names: Any) -> None:
             np.column_stack([side * mu * height, height]),
             "0.3",
             keep=lambda p, side=side: side * p[:, 0] > mu * p[:, 1],
-            fontsize=9.0,
+            fontsize=style.points(9.0),
         )
     half = (1.45 * mu or 0.5) * top  # without friction the cone is a line
     ax.set_xlim(-half, half)
@@ -112,8 +134,9 @@ def _static_coefficient(shot: Shot[ContactModel, float]) -> float:
     return float(eq.function([rest])(x, p))
 
 
-def _phases(ax: Axes, shot: Shot[ContactModel, float], names: Any) -> None:
+def _phases(page: Canvas, shot: Shot[ContactModel, float], names: Any) -> None:
     """One line per phase, with an arrow in the direction of time, and a thin one where friction jumps."""
+    ax = page.ax
     labelled: set[str] = set()
     jumps: list[np.ndarray] = []
     before = np.zeros(2)
@@ -127,15 +150,15 @@ def _phases(ax: Axes, shot: Shot[ContactModel, float], names: Any) -> None:
             jumps.append(np.linspace(before, points[0], 12))
             ax.plot(*jumps[-1].T, color="0.6", linewidth=0.9, zorder=2)
         before = points[-1]
-        look = dict(STYLES[phase.mode])
-        label = None if phase.mode in labelled else look.pop("label")
-        look.pop("label", None)
+        look = page.look(phase.mode, linewidth=_WIDTH[phase.mode], zorder=3, **STYLES[phase.mode])
+        text = look.pop("label")
+        label = None if phase.mode in labelled else text
         labelled.add(phase.mode)
         if phase.mode == "F" and label:
             names.name(label, points, "0.3")
             label = None
-        ax.plot(*points.T, label=label, linewidth=_WIDTH[phase.mode], zorder=3, **look)
-        _arrow(ax, points, STYLES[phase.mode]["color"])
+        ax.plot(*points.T, label=label, **look)
+        _arrow(ax, points, look["color"])
     longest = max(jumps, key=lambda jump: abs(jump[-1, 0] - jump[0, 0]), default=np.zeros((2, 2)))
     share = abs(longest[-1, 0] - longest[0, 0]) / np.ptp(ax.get_xlim())
     if share > _SEEN:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,11 +17,12 @@ from ..parameters import numbers
 from .keys import is_narrow
 
 style = ns.plot.style
+Canvas = ns.plot.Canvas
+canvas = ns.plot.canvas
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import ListedColormap
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -79,7 +81,16 @@ def _palette() -> ListedColormap:
     return ListedColormap(direction_colours(np.linspace(-math.pi, math.pi, _COLOURS)))
 
 
-def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
+def slip_map(
+    directions: SlipMap,
+    *,
+    ax: Axes | None = None,
+    size: tuple[float, float] | None = None,
+    legend: bool = True,
+    title: str | None = None,
+    colors: Mapping[str, Any] | None = None,
+    **look: Any,
+) -> Any:
     """Draw the direction of the slip at lift-off over the spins, with a colour wheel.
 
     Light is forward, dark reverse, yellow to the right, blue to the left; arrows say the same (up is
@@ -92,11 +103,21 @@ def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
         The map, from :func:`bounce.slip_map`.
     ax : matplotlib Axes, optional
         Draw here instead of in a new figure.
+    size : (width, height), optional
+        Of a new figure, in inches.
+    legend : bool, optional
+        Whether a legend is drawn.
+    title : str, optional
+        Title of the picture.
+    colors : mapping, optional
+        Colours by ``"arrows"`` and ``"vortices"``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the vortices.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Examples
     --------
@@ -108,35 +129,31 @@ def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
     ['forward', 'right', 'reverse', 'left']
     """
     require(directions, SlipMap, "directions", "bounce.slip_map returns one.")
-    with style.settings():
-        figure, ax = style.axes_for(ax, (7.0, 5.4))
+    with canvas(ax, size, (7.0, 5.4), colors=colors, look=look, title=title) as page:
+        ax = page.ax
         lateral, axial = directions.omega
         angle = np.where(directions.lift_offs.complete, directions.angle, np.nan)
         ax.pcolormesh(
             lateral, axial, angle, cmap=_palette(), vmin=-math.pi, vmax=math.pi,
             shading="nearest", rasterized=True,
         )  # fmt: skip
-        _arrows(ax, directions, angle)
+        _arrows(page, directions, angle)
         for vortex in directions.vortices:
-            ax.plot(
-                *vortex.omega,
-                "o",
-                color="white",
-                markeredgecolor="black",
-                markersize=_DOT,
-                zorder=6,
-            )
+            dot: Any = {"marker": "o", "markeredgecolor": "black", "markersize": _DOT}
+            ax.plot(*vortex.omega, **page.look("vortices", color="white", zorder=6, **dot))
             turns = f"{vortex.winding:+d}"
-            style.write(ax, vortex.omega, turns, zorder=7, fontsize=8.5, fontweight="bold")
+            style.write(
+                ax, vortex.omega, turns, zorder=7, fontsize=style.points(8.5), fontweight="bold"
+            )
         ax.set_xlabel(r"lateral spin, $\omega_z$ (backspin)")
         ax.set_ylabel(r"axial spin, $-\omega_x$ (slips to the right)")
         v = directions.xdot
-        ax.set_title(
-            f"slip at lift-off: xdot = ({v[0]:g}, {v[1]:g}), ydot = {directions.ydot:g}",
-            fontsize=9, loc="left", color="0.3",
-        )  # fmt: skip
-        _wheel(ax)
-    return figure
+        if title is None:
+            text = f"slip at lift-off: xdot = ({v[0]:g}, {v[1]:g}), ydot = {directions.ydot:g}"
+            ax.set_title(text, fontsize=style.points(9), loc="left")
+        if legend:
+            _wheel(ax)
+    return page.drawn
 
 
 def _spread(count: int, most: int) -> NDArray[np.intp]:
@@ -145,7 +162,8 @@ def _spread(count: int, most: int) -> NDArray[np.intp]:
     return np.unique(np.round((np.arange(shown) + 0.5) * count / shown - 0.5).astype(np.intp))
 
 
-def _arrows(ax: Axes, directions: SlipMap, angle: Array) -> None:
+def _arrows(page: Canvas, directions: SlipMap, angle: Array) -> None:
+    ax, ink = page.ax, page.named("arrows", color="black")["color"]
     lateral, axial = directions.omega
     most = _ARROWS_COLUMN if is_narrow(ax) else _ARROWS
     rows, columns = _spread(axial.size, most), _spread(lateral.size, most)
@@ -162,7 +180,7 @@ def _arrows(ax: Axes, directions: SlipMap, angle: Array) -> None:
         )
     # Up is forward: the second component of an arrow is that along the direction of travel.
     ax.quiver(
-        lateral[columns], axial[rows], np.sin(shown), np.cos(shown), color="black", edgecolor="white",
+        lateral[columns], axial[rows], np.sin(shown), np.cos(shown), color=ink, edgecolor="white",
         linewidth=0.5, width=0.0045 * larger, scale=26 / larger, headwidth=4, headlength=4.5, headaxislength=4,
         pivot="middle", angles="uv", zorder=4,
     )  # fmt: skip
@@ -194,7 +212,7 @@ def _wheel(ax: Axes) -> None:
     ring.set_xticks(
         [0.0, math.pi / 2, math.pi, 3 * math.pi / 2], labels=["forward", "right", "reverse", "left"]
     )
-    ring.tick_params(pad=0, labelsize=8)
+    ring.tick_params(pad=0, labelsize=style.points(8))
     # Beside the ring: the sides of a polar axis have their labels on it without a distance.
     for label, side in zip(
         ring.get_xticklabels(), ("center", "left", "center", "right"), strict=True

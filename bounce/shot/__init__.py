@@ -1,8 +1,12 @@
 """One bounce from touch-down to lift-off: its states, phases, forces, derivatives and proof."""
 
+import nonsmooth as ns
+
 from .certify import BounceProof
 from .sensitivity import Sensitivity
 from .shot import Forces, Phase
 from .state import State
 
 __all__ = ["BounceProof", "Forces", "Phase", "Sensitivity", "State"]
+
+ns.notebook.add_cards(globals(), __all__)

@@ -40,7 +40,7 @@ figure = ns.plot.style.new_figure((6.6, 4.2))
 ax = figure.subplots()
 for nu, cloud in zip(values, clouds, strict=True):
     ax.plot(np.full(len(cloud), nu), cloud, **ns.plot.style.CLOUD)
-ns.plot.branch(branch, against=start, ax=ax, legend=False)
+ns.plot.branch(branch, against=start, ax=ax)
 ax.set(xlabel="forcing frequency ν", ylabel="displacement u every four periods")
 ax.set(xlim=(float(values[0]), float(branch.values.max())))
 ax.annotate(

@@ -40,13 +40,10 @@ for E in [*np.linspace(22.0, 32.0, 41), *np.linspace(32.02, 33.5, 75)]:
     ax.plot(np.full(len(long.sample_x), E), long.sample_x[:, 0], **ns.plot.style.CLOUD)
 for rounds, branch in zip((1, 2, 4), branches, strict=True):
     for k in range(rounds):
-        ns.plot.branch(branch, against=tick(k), ax=ax, legend=False)
+        ns.plot.branch(branch, against=tick(k), ax=ax)
 ax.set_xlabel("input voltage E in V")
 ax.set_ylabel("v at the ticks of the clock, in V")
 ax.set_xlim(22.0, 33.5)
-for line in ax.lines:
-    if str(line.get_gid()).startswith("event"):
-        line.set_markersize(5)
 ax.text(24.4, 12.06, "period doubling", ha="right")
 ax.text(32.35, 12.55, "chaos", ha="right")
 ax.set_title("Buck converter: doublings and chaos")

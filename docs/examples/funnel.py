@@ -26,9 +26,10 @@ before = np.linspace(0.0, futures.t, 100)
 after = np.linspace(futures.t, futures.t + 1.0, 200)
 height.plot(before, run(before)[:, 0], **STYLE["s"])
 plane.plot(*run(before)[:, 1:].T, **STYLE["s"])
-for states, departure in zip(futures(after), futures.departures, strict=True):
+for k, (states, departure) in enumerate(zip(futures(after), futures.departures, strict=True)):
     height.plot(after, states[:, 0], **STYLE[departure.side])
-    plane.plot(*states[:, 1:].T, **STYLE[departure.side])
+    if k % 4 == 0:  # seen from above they are close to each other
+        plane.plot(*states[:, 1:].T, **STYLE[departure.side])
 for side, label in (("+", "leaves up"), ("-", "leaves down"), ("s", "slides")):
     height.plot([], [], label=label, **STYLE[side])
 ns.plot.style.arrowhead(plane, run(before)[:, 1:], 0.5, "black", mutation_scale=16, zorder=4)

@@ -66,14 +66,11 @@ def strobed(k):
     return displacement
 
 
-ns.plot.branch(single, against=strobed(0), ax=ax, legend=False)
+ns.plot.branch(single, against=strobed(0), ax=ax)
 for k in range(2):
-    ns.plot.branch(double, against=strobed(k), ax=ax, legend=False)
+    ns.plot.branch(double, against=strobed(k), ax=ax)
 for k in range(4):
-    ns.plot.branch(several, against=strobed(k), ax=ax, legend=False)
-for line in ax.lines:
-    if str(line.get_gid()).startswith("event"):
-        line.set_markersize(5)
+    ns.plot.branch(several, against=strobed(k), ax=ax)
 ax.text(3.75, -1.32, "never hits", ha="center")
 ax.text(4.55, -2.1, "hits once a period")
 ax.text(3.845, 0.75, "four periods", ha="center")

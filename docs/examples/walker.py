@@ -50,10 +50,7 @@ for ax in (whole, close):
         ax.plot(np.full(len(angles), slope), angles, **ns.plot.style.CLOUD)
     for rounds, gait in zip((1, 1, 2, 4, 8), gaits, strict=True):
         for k in range(rounds):
-            ns.plot.branch(gait, against=stance(k), ax=ax, legend=False)
-    for line in ax.lines:
-        if str(line.get_gid()).startswith("event"):
-            line.set_markersize(4.5)
+            ns.plot.branch(gait, against=stance(k), events=ax is close, ax=ax)
     ax.set(xlabel="slope γ in radians", ylabel="stance angle after heelstrike")
 whole.set_title("two gaits")
 whole.text(0.0088, 0.21, "long steps", ha="right")

@@ -22,6 +22,7 @@ The contract of events (``tests/flow/events/test_contract.py`` and ``test_event_
    ``max_jumps`` jumps at one instant end the run: ENDLESS_JUMPS.
 """
 
+from ..notebook import add_cards
 from .ensembles.ensemble import ensemble
 from .ensembles.lazy_starts import Grid, RandomStarts
 from .ensembles.outcomes import Outcomes, outcomes
@@ -54,3 +55,5 @@ __all__ = [
     "outcomes",
     "simulate",
 ]
+
+add_cards(globals(), __all__)

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LIMIT_FALL, MOST_CODES, UNWATCHED
+from ..model.numbering import FALL, LAWS, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
+__all__ = ["FALL", "LAWS", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 
@@ -133,6 +133,15 @@ SHORTEST = 4 * EPSILON
 #: A longer step of lanes is the driver's: theirs have a longest one, where all terms vanish.
 LONG = 1e15
 
+#: A guard is low where it is below this many roundings of its terms. Before zeros that are not told apart a step ends
+#: where it is above this many times as much, unless that is no progress: this part of the way to them, and closer
+#: than SEPARATE, relative to the time. A root is exact to LOCATED of the time.
+LOW = 8.0
+FAR_FROM_LOW = 64.0
+NEARER = 0.1
+SEPARATE = 1e-13
+LOCATED = 1e-12
+
 #: Halvings of an interval before two roots count as a touch without crossing.
 DEPTH = 52
 
@@ -157,6 +166,9 @@ TENFOLD = 20.0
 #: Coefficients of a series grow as the inverse time to a set to their order: the set is reached before
 #: they are larger than this.
 OVERFLOW = 1e280
+
+#: Derivatives have reached a set where |h| is this part of what it was on the way.
+ARRIVED = 1e-13
 
 #: Motions that can continue from a point, at most so many are kept.
 SEVERAL = 16

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..model import Array, ConvergenceError
 from ..model.derivatives.variational import ORDER, GuardedField
-from ..model.printing.tape import Series, Values
+from ..model.printing.tape import Entries, Series, Values
 from .engine.smooth import LegsProgram, SmoothProgram, ValuesProgram, WatchProgram
 
 #: Part of the size of a group of states that the last terms of a step may reach.
@@ -26,7 +26,7 @@ MOST_STEPS = 20_000
 
 
 class SmoothField(Protocol):
-    """A smooth field as Taylor rules, with groups of states that share an error scale."""
+    """A smooth field as Taylor rules, with groups of states that share an error scale, and columns of derivatives."""
 
     @property
     def series(self) -> Series:
@@ -35,12 +35,27 @@ class SmoothField(Protocol):
 
     @property
     def entries(self) -> int:
-        """Number of entries of z."""
+        """Number of states."""
         ...
 
     @property
     def groups(self) -> Sequence[NDArray[np.intp]]:
-        """Entries of z whose errors have one scale; what is exact is in none."""
+        """States whose errors have one scale; what is exact is in none."""
+        ...
+
+    @property
+    def derivatives(self) -> Entries:
+        """Places of the last outputs of ``series``, by states and by parameters."""
+        ...
+
+    @property
+    def by_start(self) -> int:
+        """Number of columns by the start, before those by parameters."""
+        ...
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
         ...
 
 
@@ -67,7 +82,8 @@ def program_of(field: SmoothField) -> SmoothProgram:
         group = np.full(field.entries, -1, np.int32)
         for k, entries in enumerate(field.groups):
             group[entries] = k
-        made = _PROGRAMS.setdefault(field, SmoothProgram(field.series, group, ORDER))
+        of_columns = field.derivatives, field.by_start, field.columns
+        made = _PROGRAMS.setdefault(field, SmoothProgram(field.series, group, ORDER, *of_columns))
     return made
 
 

@@ -27,7 +27,7 @@ from ..model import (
     sliding_multipliers,
 )
 from . import messages
-from .engine.arrays import Run
+from .engine.arrays import Run, guard_of
 from .engine.convert import message_of
 from .engine.tape import tape_for
 from .names import guard_name
@@ -181,8 +181,8 @@ def _trajectory(
     coefficients = run.coefficients[:, rows] * flips
     coefficients[:, n:] *= sign  # the time of the flow is -t
     events = list[Event]()
-    for k, row in enumerate(run.event_guards.tolist()):
-        at = made.stops[row]
+    for k, code in enumerate(run.event_guards.tolist()):
+        at = made.stops[guard_of(made.system, code).index]
         guard, last = made.guards[at], status is Status.STOPPED and k == len(run.event_kinds) - 1
         kind, x = "stop" if last else "zero", run.event_x[k, :n].copy()
         of = (guard.element, guard.side)

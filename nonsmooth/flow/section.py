@@ -24,7 +24,7 @@ from ..model import (
     whole,
     with_section,
 )
-from .constants import AT_END, KINDS
+from .constants import KINDS
 from .saving import savable
 from .trajectory import Event, Trajectory
 
@@ -256,7 +256,7 @@ def _hits(system: FilippovSystem, section: Section, t_start: float) -> Hits:
             f"kinds {list(KINDS_OF_SECTIONS)}, or an expression in states, for example at=x - 1."
         )
     rest = section.every, section.skip, section.count, section.after
-    return Hits(kinds, names, letter, *rest, begin=t_start + AT_END * max(1.0, abs(t_start)))
+    return Hits(kinds, names, letter, *rest, begin=t_start)
 
 
 def _side_before(system: FilippovSystem, name: str, direction: int) -> tuple[int, str]:

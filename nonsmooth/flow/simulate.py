@@ -115,7 +115,7 @@ def simulate(
     >>> run.itinerary, bool(abs(run.x[-1, 0] + 0.2) < 1e-9)
     ('- + - + s', True)
     """
-    require_system(system, sets=True)
+    require_system(system, sets=True, hysteresis=True)
     if start is not None:
         x0, t_start, parameters = _continued(start, x0, t_start, parameters)
     elif x0 is None:
@@ -138,11 +138,12 @@ def simulate(
     system, at = sectioned(system, at)
     x = system.extended_point(x0, options.t_start)
     p = system.parameter_vector(parameters)
-    motion = None
+    motion = mode = None
     if start is None:
         require_start(system, x, p)
     else:
-        motion = (start.events[-1] if isinstance(start, Trajectory) else start).motion
+        last = start.events[-1] if isinstance(start, Trajectory) else start
+        motion, mode = last.motion, last.mode_after if system.remembering else None
     require_start_mode(system, x, p, options)
     sampling = read_sampling(system, t_eval, at, options.t_start, options.t_end, p)
     times = sampling.times
@@ -150,7 +151,7 @@ def simulate(
         options = replace(options, hits=sampling.hits)
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
-    return _with_samples(_run(system, x, p, options, times, motion), options, times, p)
+    return _with_samples(_run(system, x, p, options, times, motion, mode), options, times, p)
 
 
 def _continued(
@@ -188,7 +189,8 @@ def _run(
     options: Options,
     times: Times | None,
     motion: Array | None,
+    mode: str | None,
 ) -> Trajectory:
     read_at = None if times is None else times.of(p)
-    run = tape_for(system, options).run(x, p, options, read_at, motion)
+    run = tape_for(system, options).run(x, p, options, read_at, motion, mode)
     return trajectory(system, p, options, run)

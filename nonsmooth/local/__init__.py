@@ -1,12 +1,14 @@
 """Analysis at points of surfaces, without time stepping: regions, folds, two-folds, equilibria."""
 
 from ..model import mode_field
+from ..notebook import add_cards
 from . import two_folds
 from .classify import LocalObject, classify
 from .point.higher_codimension import LimitDirection, limit_directions
 from .point.intersections import Continuation, Intersection, intersection, intersection_range
 from .point.regions import Region, alpha, region, sliding_field
 from .point.sliding_branches import SlidingBranch, sliding_branches
+from .searches.boundary_cycles import BoundaryCycle
 from .searches.boundary_equilibria import (
     BoundaryBifurcation,
     BoundaryEquilibrium,
@@ -22,6 +24,7 @@ from .searches.search import find_all
 
 __all__ = [
     "BoundaryBifurcation",
+    "BoundaryCycle",
     "BoundaryEquilibrium",
     "Continuation",
     "Equilibrium",
@@ -55,3 +58,5 @@ __all__ = [
     "two_fold",
     "two_folds",
 ]
+
+add_cards(globals(), __all__)

@@ -37,6 +37,19 @@ def require_linear(system: FilippovSystem, surface: int, what: str) -> None:
         )
 
 
+def require_generic(
+    system: FilippovSystem, surface: int, mode: str | None, what: str, force: bool = False
+) -> None:
+    """Refuse a surface on which nothing slides, but not, if ``force``, one where a force jumps."""
+    found = system.switching(surface, mode=mode if system.surface_count > 1 else None)
+    if not found.slides and not (force and found.kind == "velocity continuous"):
+        raise DefinitionError(
+            f"{what}: expected a surface on which orbits can slide, received surface {surface}, which is "
+            f"{found.name}: both fields have the same L on it, and where L = 0 an orbit only touches it. classify "
+            "names touches, points of rest between two forces, and equilibria on it."
+        )
+
+
 def parameter_index(
     system: FilippovSystem, name: str, what: str = "parameter", advice: str = "Give its name."
 ) -> int:

@@ -7,6 +7,7 @@ distances are dimensionless and unchanged when h or a field is multiplied by a p
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -29,7 +30,7 @@ from .point.intersections import Intersection, Meeting
 from .point.regions import region_of
 from .point.surface_point import FIELDS, SIDES, LocalSurface, Numbers, surface_at
 from .read_only import ReadOnly
-from .searches.boundary_equilibria import boundary_equilibrium_of
+from .searches.boundary_equilibria import boundary_equilibrium_at
 from .searches.equilibria import equilibrium_distance, kind_of
 from .searches.find_two_fold import independence, two_fold
 from .searches.fold_folds import fold_fold_of
@@ -53,7 +54,8 @@ class LocalObject:
     ----------
     kind : str
         ``"crossing"``, ``"sliding"``, ``"fold"``, ``"cusp"``, ``"fold-fold"`` (plane),
-        ``"two-fold"``, ``"equilibrium"``, ``"pseudo-equilibrium"``, ``"boundary equilibrium"``,
+        ``"two-fold"``, ``"touch"`` (of a surface on which nothing slides), ``"rest"`` (between the two
+        forces there), ``"equilibrium"``, ``"pseudo-equilibrium"``, ``"boundary equilibrium"``,
         ``"intersection"`` (of surfaces, where no mode or several can go on) or ``"degenerate"``.
     label : str
         Its class: ``"crossing up"``, ``"attracting sliding"``, ``"visible"``, ``"II2"``,
@@ -261,12 +263,15 @@ class _Classifier:
 
     def on_surface(self) -> LocalObject:
         """Zero of a field, tangency of both or one, sliding or crossing, in this order."""
+        found = self.where.switching
+        if not found.slides:
+            return self._without_sliding(found.kind == "continuous")
         vanish = [self.is_zero(self.to_zero[k], f"F{k + 1} = 0") for k in (0, 1)]
         if all(vanish):
             self.margins["F1 = F2 = 0"] = 0.0
             return self.result("degenerate", "")
         if any(vanish):
-            return self._boundary_equilibrium(vanish.index(True))
+            return self._boundary_equilibrium(vanish.index(True), SIDES[vanish.index(True)])
         angles = np.abs(self.numbers.angles)
         tangent = [self.is_zero(float(angles[k]), f"L{k + 1} = 0") for k in (0, 1)]
         if all(tangent):
@@ -282,14 +287,36 @@ class _Classifier:
     def _planar(self) -> bool:
         return self.where.system.extended_dimension == 2
 
-    def _boundary_equilibrium(self, k: int) -> LocalObject:
-        numbers = self.numbers
-        found = boundary_equilibrium_of(
-            numbers.x, k, numbers.gradient, numbers.fields[1 - k], self.derivatives[k], 1e-300
-        )
+    def _boundary_equilibrium(self, k: int, side: str) -> LocalObject:
+        found = boundary_equilibrium_at(self.where, self.numbers, k, self.derivatives, 1e-300)
         self.margins.update(found.margins)
         self.evidence.update(found.numbers, **spectrum(found.eigenvalues))
-        return self.result("boundary equilibrium", found.label, SIDES[k], found)
+        return self.result("boundary equilibrium", found.label, side, found)
+
+    def _without_sliding(self, is_continuous: bool) -> LocalObject:
+        """Crossing, touch or equilibrium where the speed of h is the same on both sides."""
+        vanish = [self.is_zero(self.to_zero[k], f"F{k + 1} = 0") for k in (0, 1)]
+        if all(vanish) if is_continuous else any(vanish):
+            k = vanish.index(True)
+            return self._boundary_equilibrium(k, "" if is_continuous else SIDES[k])
+        numbers = self.numbers
+        angle = float(np.abs(numbers.angles).min())
+        if not self.is_zero(angle, "L = 0"):
+            return self.result("crossing", str(region_of(numbers, self.tol)))
+        bends = [numbers.second[name] for name in ("L11", "L22")]
+        for k, second in enumerate(bends):
+            self.evidence[f"L{k + 1}{k + 1}"] = second
+            self.margins[f"L{k + 1}{k + 1} = 0"] = bend(numbers, k, second)
+        if is_continuous or bends[0] * bends[1] > 0:
+            return self.result("touch", "from above" if bends[0] > 0 else "from below")
+        label = f"{'visible' if bends[0] > 0 else 'invisible'} on both sides"
+        f1, f2 = numbers.fields
+        lengths = float(np.linalg.norm(f1) * np.linalg.norm(f2))
+        away = math.sqrt(max(1.0 - (float(f1 @ f2) / lengths) ** 2, 0.0)) if lengths else 0.0
+        if f1 @ f2 < 0 and self.is_zero(away, "rest"):
+            self.evidence["nu"] = float(np.linalg.norm(f1) / np.linalg.norm(f1 - f2))
+            return self.result("rest", label)
+        return self.result("touch", label)
 
     def _fold_fold(self) -> LocalObject:
         found = fold_fold_of(self.where, self.numbers, 1e-300)

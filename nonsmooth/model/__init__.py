@@ -8,6 +8,7 @@ from .definition.events import Clock, Impact, Reset, Stop
 from .definition.lift import LiftedSwitch
 from .definition.parse_definition import read_function
 from .definition.regularise import regularise
+from .definition.switching import Switching
 from .definition.system import FilippovSystem, multiplier_enters, require_plain, require_system
 from .derivatives.forcing import clock_periods, is_function, periods, read_period
 from .derivatives.start_maps import StartMap
@@ -61,6 +62,7 @@ __all__ = [
     "StartMap",
     "Stop",
     "Surfaces",
+    "Switching",
     "call",
     "clock_periods",
     "complementarity",

@@ -18,6 +18,9 @@ TAPE_RULES = tuple(
     "shift lower below scale over under turn gated".split()
 )
 
+#: Laws of elements, by number in C.
+LAWS = ("surface", "contact", "set", "relay")
+
 #: Most numbers in a condition of an event, and how a function in it is located that is not watched.
 MOST_CODES, UNWATCHED = 256, 2
 

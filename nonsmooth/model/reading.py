@@ -106,8 +106,8 @@ def refuse_call(function: ca.Function, what: str) -> NoReturn:
     advice = (
         "Make it of SX symbols, or without never_inline=True."
         if function.class_name() == "MXFunction"
-        else "Write it with SX operations; a table in a right-hand side is casadi.pw_lin(x, xs, ys), "
-        "or casadi.if_else of polynomials, in FilippovSystem.from_expression."
+        else "Write it with SX operations; a table (casadi.interpolant) is nonsmooth.table(x, xs, ys), "
+        "in FilippovSystem.from_expression."
     )
     raise DefinitionError(
         f"{what}: the expression calls the CasADi Function {function.name()!r} "

@@ -1,5 +1,6 @@
 """Derivatives of runs, periodic and homoclinic orbits, their branches, manifolds and basins."""
 
+from ..notebook import add_cards
 from ..solvers import continuation
 from .basins import Basins, basins
 from .branches.bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifurcation
@@ -79,3 +80,5 @@ __all__ = [
     "trace_two_folds",
     "vjp",
 ]
+
+add_cards(globals(), __all__)

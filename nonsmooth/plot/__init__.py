@@ -1,13 +1,15 @@
 """Pictures (matplotlib): two-folds, trajectories, phase portraits, branches, basins.
 
-Every function that draws returns a matplotlib Figure and leaves matplotlib's global settings alone.
-Colours, dashes and arrows are in ``style``, also for your own pictures.
+Every function that draws takes ``ax=`` (``figure=``, if it makes several axes) and returns it; without it,
+a new matplotlib Figure that pyplot knows. It follows your ``rcParams`` and takes ``colors=`` and properties
+of lines. Colours, dashes and arrows are in ``style``, and ``canvas`` makes your own pictures in this way.
 ``two_fold_explorer`` is a page for the browser, and ``offline_page`` puts such pages together.
 """
 
 from . import style
 from .basin_map import basins
 from .branches import bifurcation_curves, branch
+from .drawing import Canvas, canvas
 from .offline_page import offline_page
 from .orbits import multipliers, periodic_orbit
 from .portraits.dividing_curves import dividing_curves
@@ -23,9 +25,11 @@ from .two_folds.flow_in_space import two_fold_3d
 from .two_folds.sliding_flow import two_fold
 
 __all__ = [
+    "Canvas",
     "basins",
     "bifurcation_curves",
     "branch",
+    "canvas",
     "dividing_curves",
     "manifold",
     "multipliers",

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap, to_rgb
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from ..model import OptionError
 from ..orbit import Basins
 from . import style
+from .drawing import Canvas, Colors, Drawn, canvas
 from .labels import Labels
 from .legends import beside
 
@@ -27,10 +26,12 @@ def basins(
     found: Basins,
     *,
     ax: Axes | None = None,
-    size: tuple[float, float] = (6.4, 5.0),
+    size: tuple[float, float] | None = None,
     legend: bool = True,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw which attractor each start of a grid of two axes goes to.
 
     Attractors are marked where they are in the plane of the grid's axes; the other states of the
@@ -48,11 +49,15 @@ def basins(
         Whether a legend is drawn.
     title : str, optional
         Title of the picture; the default says what is shown.
+    colors : mapping, optional
+        Colours by the names of the outcomes: ``"attractor 1"``, ``"undecided"``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the marks of attractors.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -74,38 +79,36 @@ def basins(
             f"found is {found!r}, not Basins of a grid with two axes. Give the grid as a mapping: two "
             "states with axes, numbers for the others."
         )
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
-        _fill(axes, found)
+    with canvas(ax, size, (6.4, 5.0), colors=colors, look=look, title=title) as page:
+        axes = page.ax
+        _fill(page, found)
         first, second = (found.state_names.index(name) for name in found.axes)
         for attractor in found.attractors:
             points = attractor.points
-            axes.plot(
-                points[:, first],
-                points[:, second],
-                linestyle="",
-                marker="o",
-                markersize=5.0 if len(points) < 8 else 2.0,
-                color=style.BLACK,
-                markeredgewidth=0.0,
-                zorder=3,
-            )
+            size_ = 5.0 if len(points) < 8 else 2.0
+            mark: Any = {
+                "linestyle": "",
+                "marker": "o",
+                "markersize": size_,
+                "markeredgewidth": 0.0,
+            }
+            mark = page.look("attractor", color=style.BLACK, zorder=3, **mark)
+            axes.plot(points[:, first], points[:, second], **mark)
         across, up = found.axes
         axes.set_xlabel(across)
         axes.set_ylabel(up)
-        if title:
-            axes.set_title(title)
         if legend:
             _names(axes, found) if sum(k > 0 for k in found.fractions) > _LISTED else None
-            _legend(axes, found)
-    return figure
+            _legend(page, found)
+    return page.drawn
 
 
-def _fill(axes: Axes, found: Basins) -> None:
+def _fill(page: Canvas, found: Basins) -> None:
     """Cells around the starts, in the colours of their labels."""
+    axes = page.ax
     present = np.unique(found.labels)
     index = np.searchsorted(present, found.labels)
-    colors = ListedColormap([to_rgb(_color(int(label))) for label in present])
+    colors = page.palette(_color(page, found, int(label)) for label in present)
     x, y = (_edges(axis) for axis in found.axes.values())
     axes.pcolormesh(x, y, index.T, cmap=colors, vmin=-0.5, vmax=len(present) - 0.5, rasterized=True)
     axes.set_xlim(x[0], x[-1])
@@ -120,18 +123,19 @@ def _edges(axis: Any) -> Any:
     return np.concatenate([[2 * axis[0] - middle[0]], middle, [2 * axis[-1] - middle[-1]]])
 
 
-def _color(label: int) -> str:
-    return COLORS[(label - 1) % len(COLORS)] if label > 0 else _OTHERS[label]
+def _color(page: Canvas, found: Basins, label: int) -> Any:
+    usual = COLORS[(label - 1) % len(COLORS)] if label > 0 else _OTHERS[label]
+    return page.color(found.name(label), usual)
 
 
-def _legend(axes: Axes, found: Basins) -> None:
+def _legend(page: Canvas, found: Basins) -> None:
     parts = found.fractions
     attractors = [k for k in parts if k > 0]
     order = [k for k in parts if k <= 0]
     order = order if len(attractors) > _LISTED else [*attractors, *order]
     handles: list[Any] = [
         Patch(
-            facecolor=_color(k),
+            facecolor=_color(page, found, k),
             edgecolor=style.GREY,
             label=f"{found.name(k)}: {100 * parts[k]:.1f} %",
         )
@@ -140,7 +144,7 @@ def _legend(axes: Axes, found: Basins) -> None:
     if attractors and len(handles) < _ENTRIES:
         handles.append(style.marker("o", "attractor", size=5.0, markeredgewidth=0.0))
     if handles:
-        beside(axes, handles[:_ENTRIES], bbox_to_anchor=(1.01, 1.0))
+        beside(page.ax, handles[:_ENTRIES], bbox_to_anchor=(1.01, 1.0))
 
 
 def _names(axes: Axes, found: Basins) -> None:

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ..local import Equilibrium
 from ..model import Array, DefinitionError, NonsmoothError, OptionError
 from ..orbit import BifurcationCurve, Branch, BranchEvent, Connection, PeriodicOrbit
 from . import style
 from .arguments import results, same
+from .drawing import Colors, Drawn, canvas, key
 from .labels import Labels
 
 #: Marker and fill of each kind of event; shapes differ without colour.
@@ -34,6 +35,8 @@ MARKERS = {
     "switching-sliding": (">", style.GREEN),
     "adding-sliding": ("<", style.PURPLE),
     "impact grazing": ("v", style.VERMILLION),
+    "grazing of a soft switch": ("v", "white"),
+    "grazing of a jumping force": ("v", style.YELLOW),
     "corner": ("d", "white"),
     "homoclinic": ("*", style.BLACK),
 }
@@ -58,11 +61,14 @@ def branch(
     found: Branch | Sequence[Branch],
     *,
     against: Measure | None = None,
+    events: bool = True,
     ax: Axes | None = None,
-    size: tuple[float, float] = (6.4, 4.4),
+    size: tuple[float, float] | None = None,
     legend: bool = True,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw a bifurcation diagram: stable solutions as full lines, unstable ones dashed, events marked.
 
     Parameters
@@ -73,6 +79,8 @@ def branch(
         What is drawn over the parameter: ``"period"``, the name of a state (of an orbit its largest
         value), or a function of a solution. By default the period of autonomous orbits, otherwise
         the first state.
+    events : bool, optional
+        Whether events are marked.
     ax : matplotlib Axes, optional
         A new figure is made without it.
     size : (width, height), optional
@@ -81,11 +89,15 @@ def branch(
         Whether a legend is drawn.
     title : str, optional
         Title of the picture; the default says what is shown.
+    colors : mapping, optional
+        Colours by the names in the legend, such as ``{"stable orbit": "black"}``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the branches.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -109,19 +121,21 @@ def branch(
     several = results(found, Branch, advice, DefinitionError)
     parameter = same(several, "parameter")
     measure, label = _measure(several[0], against)
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
+    with canvas(ax, size, (6.4, 4.4), colors=colors, look=look, title=title) as page:
+        axes = page.ax
         looks: dict[str, Any] = {}
         marks: dict[str, Any] = {}
         labels = list[tuple[str, Any]]()
         for one in several:
             samples = line_of(one, measure, (axes.bbox.width, axes.bbox.height))
             points = np.array([[sample.value, sample.height] for sample in samples])
-            for (name, look), part in _parts(samples):
-                axes.plot(*points[part].T, zorder=3, gid=name, **look)
-                looks[name] = style.line(look["color"], name, look["linewidth"], look["linestyle"])
-            for event in one.events:
+            for (name, usual), part in _parts(samples):
+                line = page.look(name, zorder=3, **usual)
+                axes.plot(*points[part].T, gid=name, **line)
+                looks[name] = Line2D([], [], label=name, **line)
+            for event in one.events if events else ():
                 shape, fill = MARKERS.get(event.kind, _OTHER)
+                fill = page.color(event.kind, fill)
                 height = measure(_beside(one, event))
                 axes.plot(
                     event.parameter,
@@ -129,22 +143,22 @@ def branch(
                     shape,
                     markerfacecolor=fill,
                     markeredgecolor=style.BLACK,
-                    markersize=7,
+                    markersize=6,
                     zorder=5,
                     gid=f"event {event.kind}",
                 )
                 marks[event.kind] = style.marker(shape, event.kind, fill)
                 labels.append((event.kind, (event.parameter, height)))
-        axes.set(xlabel=parameter, ylabel=label, title=title or "")
+        axes.set(xlabel=parameter, ylabel=label)
         axes.margins(0.05)
         if legend:
             together = {**looks, **marks}
             many = len(together) > _LISTED
-            axes.legend(handles=list((looks if many else together).values()), loc="best")
+            key(axes, list((looks if many else together).values()))
             names = Labels(axes)
             for kind, point in labels if many else ():
                 names.name(kind, point)
-    return figure
+    return page.drawn
 
 
 def _beside(one: Branch, event: BranchEvent) -> Any:
@@ -217,10 +231,12 @@ def bifurcation_curves(
     found: BifurcationCurve | Sequence[BifurcationCurve],
     *,
     ax: Axes | None = None,
-    size: tuple[float, float] = (6.0, 4.8),
+    size: tuple[float, float] | None = None,
     legend: bool = True,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw curves of bifurcations in the plane of two parameters, with points of codimension two.
 
     Parameters
@@ -235,11 +251,15 @@ def bifurcation_curves(
         Whether a legend is drawn.
     title : str, optional
         Title of the picture; the default says what is shown.
+    colors : mapping, optional
+        Colours by the kinds of bifurcations, such as ``{"fold": "black"}``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the curves.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -261,28 +281,29 @@ def bifurcation_curves(
     advice = "continue_bifurcation returns them."
     several = results(found, BifurcationCurve, advice, DefinitionError)
     parameters = same(several, "parameters")
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
+    with canvas(ax, size, (6.0, 4.8), colors=colors, look=look, title=title) as page:
+        axes = page.ax
         kinds = list(dict.fromkeys(one.kind for one in several))
         handles: dict[str, Any] = {}
         labels = Labels(axes)
         for one in several:
             k = kinds.index(one.kind)
             color, dashes = _CURVES[k % len(_CURVES)], _DASHES[k % len(_DASHES)]
-            axes.plot(*one.values.T, color=color, linestyle=dashes, linewidth=1.8, gid=one.kind)
-            handles[one.kind] = style.line(color, one.kind, 1.8, dashes)
+            line = page.look(one.kind, color=color, linestyle=dashes, linewidth=1.8)
+            axes.plot(*one.values.T, gid=one.kind, **line)
+            handles[one.kind] = Line2D([], [], label=one.kind, **line)
             if len(kinds) > _LISTED and legend:
-                labels.name(one.kind, one.values, color)
+                labels.name(one.kind, one.values, line["color"])
             for point in one.special:
                 axes.plot(
                     *point.values, "o", color=style.BLACK, markersize=5.5, zorder=5, gid=point.kind
                 )
                 labels.name(point.kind, point.values)
-        axes.set(xlabel=parameters[0], ylabel=parameters[1], title=title or "")
+        axes.set(xlabel=parameters[0], ylabel=parameters[1])
         axes.margins(0.06)
         if legend and len(kinds) <= _LISTED:
-            axes.legend(handles=list(handles.values()), loc="best")
-    return figure
+            key(axes, list(handles.values()))
+    return page.drawn
 
 
 # A branch as a smooth line: solutions are added between nodes where chords would show corners -----

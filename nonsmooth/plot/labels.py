@@ -85,7 +85,7 @@ class Labels(Artist):
         self,
         text: str,
         anchors: ArrayLike,
-        color: str = style.BLACK,
+        color: Any = style.BLACK,
         *,
         inside: bool = False,
         keep: Keep | None = None,
@@ -94,9 +94,15 @@ class Labels(Artist):
         """Name a thing."""
         points = np.atleast_2d(np.asarray(anchors, dtype=float))
         step = max(1, -(-len(points) // _ANCHORS))
-        look = {"fontsize": 8.0, "ha": "center", "va": "center", "color": color, "linespacing": 1.0}
+        look = {
+            "fontsize": style.points(8.0),
+            "ha": "center",
+            "va": "center",
+            "color": color,
+            "linespacing": 1.0,
+        }
         artist = Text(0, 0, text, **{**look, **options})
-        leader = Line2D([], [], color=color, linewidth=0.6, path_effects=style.halo(1.6))
+        leader = Line2D([], [], linewidth=0.6)
         for part in (artist, leader):
             part.axes = self.home
             part.set_figure(self.home.figure)
@@ -113,10 +119,13 @@ class Labels(Artist):
         if not self.get_visible() or not self.names:
             return
         self._arrange(renderer)
+        paper = style.paper_of(self.home)
+        halo = style.halo(2.5, paper)[:1]
         for name in self.names:
+            name.leader.set(color=name.text.get_color(), path_effects=style.halo(1.6, paper))
             name.leader.draw(renderer)
         for name in self.names:  # a line of text over the halo of the next one, not under it
-            for effects in ([style.halo(2.5)[0]], []):
+            for effects in (halo, []):
                 name.text.set_path_effects(effects)
                 name.text.draw(renderer)
         self.stale = False

@@ -7,18 +7,19 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ..model import DefinitionError, OptionError
 from ..orbit import Branch, PeriodicOrbit
 from . import style
+from .drawing import Colors, Drawn, canvas, key
 from .labels import Labels
 from .portraits.surfaces import draw_surfaces
 
-_MODES: dict[str, tuple[str, Any, float]] = {
-    "+": (style.ABOVE, "-", 1.8),
-    "-": (style.BELOW, (0, (5, 1.5)), 1.8),
-    "s": (style.BLACK, "-", 3.2),
+_MODES: dict[str, dict[str, Any]] = {
+    "+": {"color": style.ABOVE, "linewidth": 1.8},
+    "-": {"color": style.BELOW, "linestyle": (0, (5, 1.5)), "linewidth": 1.8},
+    "s": {"color": style.BLACK, "linewidth": 3.2},
 }
 _CYCLE = (style.GREEN, style.PURPLE, style.ORANGE, style.SKY, style.BLUE)
 _POINTS = 120  # of a leg
@@ -30,10 +31,12 @@ def periodic_orbit(
     *,
     states: Sequence[str] | None = None,
     ax: Axes | None = None,
-    size: tuple[float, float] = (5.4, 4.6),
+    size: tuple[float, float] | None = None,
     legend: bool = True,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw a periodic orbit in a plane of two states, with its modes and events.
 
     Parameters
@@ -51,11 +54,15 @@ def periodic_orbit(
         Whether a legend is drawn.
     title : str, optional
         By default period and stability.
+    colors : mapping, optional
+        Colours by modes, such as ``{"s": "tab:red"}``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the orbit.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -85,36 +92,35 @@ def periodic_orbit(
         )
     i, j = (system.state_names.index(name) for name in names)
     run = orbit.trajectory
-    with style.settings():
-        own = ax is None
-        figure, axes = style.axes_for(ax, size)
+    title = f"period {orbit.period:.6g}, {orbit.stability}" if title is None else title
+    with canvas(ax, size, (5.4, 4.6), colors=colors, look=look, title=title) as page:
+        axes = page.ax
         modes = list(dict.fromkeys(segment.mode for segment in run.segments))
-        looks = {mode: _look(mode, k) for k, mode in enumerate(modes)}
+        looks = {mode: page.look(mode, **_look(mode, k)) for k, mode in enumerate(modes)}
         for segment in run.segments:
-            color, dashes, width = looks[segment.mode]
+            line = {"zorder": 6, **looks[segment.mode]}
             x = run(np.linspace(segment.t_start, segment.t_end, _POINTS))
-            axes.plot(x[:, i], x[:, j], color=color, linestyle=dashes, linewidth=width, zorder=6)
+            axes.plot(x[:, i], x[:, j], **line)
             if segment.mode.count("s") == 0 and np.ptp(x[:, [i, j]], axis=0).max() > 0:
-                style.arrowhead(axes, x[:, [i, j]], 0.5, color, mutation_scale=11, zorder=7)
+                style.arrowhead(axes, x[:, [i, j]], 0.5, line["color"], mutation_scale=11, zorder=7)
         starts = np.array([leg.start[[i, j]] for leg in orbit.legs])
         axes.plot(
             *starts.T, "o", color="white", markeredgecolor=style.BLACK, markersize=4.5, zorder=8
         )
         axes.margins(0.08)
         box = (*axes.get_xlim(), *axes.get_ylim())
-        surfaces = own and system.dimension == 2 and not system.time_dependent
+        surfaces = ax is None and system.dimension == 2 and not system.time_dependent
         if surfaces:
             draw_surfaces(axes, system, orbit.parameter_vector, box)
             axes.set(xlim=box[:2], ylim=box[2:])
         axes.set(xlabel=names[0], ylabel=names[1])
-        axes.set_title(f"period {orbit.period:.6g}, {orbit.stability}" if title is None else title)
         if legend:
-            handles = [style.line(c, _words(m), w, d) for m, (c, d, w) in looks.items()]
+            handles = [Line2D([], [], label=_words(m), **line) for m, line in looks.items()]
             handles.append(style.marker("o", "event", fill="white", size=4.5))
             if surfaces:
                 handles.append(style.line(style.GREY, "surface", 2.2))
-            axes.legend(handles=handles[:_ENTRIES], loc="best")
-    return figure
+            key(axes, handles[:_ENTRIES])
+    return page.drawn
 
 
 def _words(mode: str) -> str:
@@ -122,19 +128,20 @@ def _words(mode: str) -> str:
     return f"mode {mode}".replace("-", "\N{MINUS SIGN}") if mode else "smooth"
 
 
-def _look(mode: str, k: int) -> tuple[str, Any, float]:
-    if mode in _MODES:
-        return _MODES[mode]
-    return _CYCLE[k % len(_CYCLE)], "-", 3.2 if "s" in mode else 1.8
+def _look(mode: str, k: int) -> dict[str, Any]:
+    width = 3.2 if "s" in mode else 1.8
+    return _MODES.get(mode) or {"color": _CYCLE[k % len(_CYCLE)], "linewidth": width}
 
 
 def multipliers(
     found: PeriodicOrbit | Branch,
     *,
     ax: Axes | None = None,
-    size: tuple[float, float] = (4.8, 4.6),
+    size: tuple[float, float] | None = None,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw Floquet multipliers beside the unit circle; along a branch coloured by its parameter.
 
     Parameters
@@ -147,11 +154,15 @@ def multipliers(
         Of a new figure, in inches.
     title : str, optional
         Title of the picture; the default says what is shown.
+    colors : mapping, optional
+        Colours by ``"multipliers"`` and ``"unit circle"``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the circle.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -174,23 +185,24 @@ def multipliers(
             f"found is {repr(found)[:60]}, not a PeriodicOrbit or a Branch of them. periodic_orbit and "
             "continue_orbit return them."
         )
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
+    with canvas(ax, size, (4.8, 4.6), colors=colors, look=look, title=title) as page:
+        axes = page.ax
         circle = np.exp(1j * np.linspace(0, 2 * np.pi, 361))
-        axes.plot(circle.real, circle.imag, color=style.GREY, linewidth=1.2, zorder=1)
+        line = page.look("unit circle", color=style.GREY, linewidth=1.2, zorder=1)
+        axes.plot(circle.real, circle.imag, **line)
         axes.axhline(0, color=style.GREY, linewidth=0.6, zorder=0)
         axes.axvline(0, color=style.GREY, linewidth=0.6, zorder=0)
-        free, colors = [], []
+        free, along = [], []
         for k, orbit in enumerate(orbits):
             values = orbit.floquet.values
             free.append(values[np.abs(values) > 0])
             value = found.values[k] if isinstance(found, Branch) else 0.0
-            colors.append(np.full(free[-1].size, value))
-        points, shade = np.concatenate(free), np.concatenate(colors)
+            along.append(np.full(free[-1].size, value))
+        points, shade = np.concatenate(free), np.concatenate(along)
         drawn = axes.scatter(
             points.real,
             points.imag,
-            c=shade if isinstance(found, Branch) else style.BLUE,
+            c=shade if isinstance(found, Branch) else page.color("multipliers", style.BLUE),
             cmap="viridis" if isinstance(found, Branch) else None,
             s=26,
             edgecolors=style.BLACK,
@@ -205,8 +217,8 @@ def multipliers(
         for value in structural:
             labels.name("of the flow" if value else "of sliding", (value, 0.0))
         if isinstance(found, Branch):
-            figure.colorbar(drawn, ax=axes, label=found.parameter)
-        axes.set(xlabel="Re μ", ylabel="Im μ", title=title or "")
+            page.figure.colorbar(drawn, ax=axes, label=found.parameter)
+        axes.set(xlabel="Re μ", ylabel="Im μ")
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.08)
-    return figure
+    return page.drawn

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from ..model import OptionError
 from . import style
 from .basin_map import COLORS
+from .drawing import Colors, Drawn, canvas, key
 
 #: Pieces where only existence is proven, and where nothing is.
 _EXISTS, _NOTHING = "#bdbdbd", "#ffffff"
@@ -20,10 +20,12 @@ def proof_map(
     proof: Any,
     *,
     ax: Axes | None = None,
-    size: tuple[float, float] = (6.4, 4.4),
+    size: tuple[float, float] | None = None,
     legend: bool = True,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw a map of what is proven over one range of parameters or two.
 
     Pieces have the colour of the class that is proven for all of them; grey where there is a point with an
@@ -41,11 +43,15 @@ def proof_map(
         Whether a legend is drawn.
     title : str, optional
         Title of the picture.
+    colors : mapping, optional
+        Colours by the names in the legend.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the edges of pieces.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -72,17 +78,18 @@ def proof_map(
     names, pieces = list(ranges), sorted(proof.pieces or (proof,), key=_corner(list(ranges)))
     labels = list(dict.fromkeys(_label(p) for p in pieces))
     shown = [v for v in labels if v not in (_UNDECIDED, _OPEN)]
-    colors = {v: COLORS[k % len(COLORS)] for k, v in enumerate(shown)}
-    colors |= {_UNDECIDED: _EXISTS, _OPEN: _NOTHING}
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
+    usual = {v: COLORS[k % len(COLORS)] for k, v in enumerate(shown)}
+    usual |= {_UNDECIDED: _EXISTS, _OPEN: _NOTHING}
+    with canvas(ax, size, (6.4, 4.4), colors=colors, look=look, title=title) as page:
+        axes = page.ax
+        fills = {name: page.color(name, color) for name, color in usual.items()}
         for piece in pieces:
             (a, b), (c, d) = [_ends(piece.parameters[k]) for k in names] + [(0.0, 1.0)] * (
                 2 - len(names)
             )
-            patch = Rectangle((a, c), b - a, d - c, facecolor=colors[_label(piece)])
-            patch.set(edgecolor=style.GREY, linewidth=0.4)
-            axes.add_patch(patch)
+            edge = page.look("edges", color=style.GREY, linewidth=0.4)
+            edge = {"edgecolor": edge.pop("color"), **edge}
+            axes.add_patch(Rectangle((a, c), b - a, d - c, facecolor=fills[_label(piece)], **edge))
         axes.set_xlim(*_ends(ranges[names[0]]))
         axes.set_ylim(*(_ends(ranges[names[1]]) if len(names) == 2 else (0.0, 1.0)))
         axes.set_xlabel(names[0])
@@ -90,15 +97,13 @@ def proof_map(
             axes.set_ylabel(names[1])
         else:
             axes.set_yticks([])
-        if title:
-            axes.set_title(title)
         if legend:
             handles = [
-                Patch(facecolor=colors[v], edgecolor=style.GREY, label=v)
+                Patch(facecolor=fills[v], edgecolor=style.GREY, label=v)
                 for v in [*shown, *(v for v in (_UNDECIDED, _OPEN) if v in labels)]
             ]
-            axes.legend(handles=handles, title="proven", fontsize=8, title_fontsize=8)
-    return figure
+            key(axes, handles, title="proven")
+    return page.drawn
 
 
 _UNDECIDED, _OPEN = "class undecided", "nothing"

@@ -7,8 +7,8 @@ of the side), ``ATTRACTING`` and ``REPELLING`` for sliding orbits, ``TINT_ATTRAC
 ``TINT_REPELLING`` and ``TINT_CROSSING`` for regions, ``CANARD`` and ``FAUX_CANARD``. Dashes:
 ``DASHED`` (invisible folds), ``LONG_DASH``, ``DASH_DOT``, ``DOTS``. ``CLOUD``: points of long runs.
 
-Nothing here touches matplotlib's global settings: pictures are built inside ``settings()`` on
-figures that pyplot does not manage. To see one in a window, pass ``ax=`` from ``pyplot.subplots()``.
+Pictures are built inside ``settings()``, which fills in what your ``rcParams`` leave at matplotlib's
+defaults and restores them afterwards. On a dark background lightness is inverted and hues stay.
 
 Examples
 --------
@@ -22,6 +22,7 @@ Examples
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -30,6 +31,7 @@ import matplotlib as mpl
 import matplotlib.patheffects as effects
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
@@ -63,37 +65,60 @@ LONG_DASH: Any = (0, (6, 1.4))
 #: Points of long runs: as large on paper as on a screen, where "," is a pixel of either.
 CLOUD: Any = dict(color="0.35", linestyle="none", marker=".", markersize=1.3, mew=0.0, zorder=0)
 
+_SIZE = 9.0  # points, of a font where the user has not chosen another
+_SMALLEST = 8.0  # points, of text in print
 _SETTINGS: Any = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 9.0,
-    "mathtext.fontset": "dejavusans",
-    "axes.titlesize": 10.0,
-    "axes.labelsize": 11.0,
-    "axes.linewidth": 0.8,
-    "axes.spines.top": True,
-    "axes.spines.right": True,
-    "axes.grid": False,
-    "axes.facecolor": "white",
+    "font.size": _SIZE,
     "axes.edgecolor": "#333333",
-    "figure.facecolor": "white",
     "hatch.linewidth": 0.5,
-    "legend.fontsize": 8.5,
     "legend.frameon": False,
     "legend.handlelength": 2.6,  # room for two dashes
     "lines.solid_capstyle": "round",
-    "lines.dash_capstyle": "butt",
-    "text.usetex": False,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
     "xtick.direction": "in",
     "ytick.direction": "in",
 }
+#: Points at a font size of _SIZE.
+_TEXTS = {
+    "axes.titlesize": 10.0,
+    "figure.titlesize": 10.0,
+    "axes.labelsize": 11.0,
+    "legend.fontsize": 8.5,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+}
+
+
+def chosen(name: Any) -> bool:
+    """Return whether the user has changed a setting of matplotlib.
+
+    Parameters
+    ----------
+    name : str
+        Key of ``rcParams``.
+    """
+    return bool(mpl.rcParams[name] != mpl.rcParamsDefault[name])
+
+
+def points(size: float) -> float:
+    """Return a font size that follows ``rcParams["font.size"]``.
+
+    Parameters
+    ----------
+    size : float
+        Points, where ``rcParams["font.size"]`` is 9.
+
+    Returns
+    -------
+    float
+        Points.
+    """
+    base = float(mpl.rcParams["font.size"])
+    return max(size * base / _SIZE, min(base, _SMALLEST))
 
 
 @contextmanager
 def settings(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
-    """Apply the look inside a ``with`` block; the user's settings come back after it.
+    """Fill in the look inside a ``with`` block where the user has chosen no other.
 
     Parameters
     ----------
@@ -109,8 +134,11 @@ def settings(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
     >>> matplotlib.rcParams["font.size"] == before
     True
     """
-    chosen: Any = {**_SETTINGS, **(changes or {})}
-    with mpl.rc_context(chosen):
+    look: Any = {name: value for name, value in _SETTINGS.items() if not chosen(name)}
+    look |= changes or {}
+    with mpl.rc_context(look):
+        texts: Any = {name: points(size) for name, size in _TEXTS.items() if not chosen(name)}
+        mpl.rcParams.update(texts)
         yield
 
 
@@ -168,6 +196,13 @@ class PrintFigure(Figure):
             self._settle()
             super().savefig(fname, **options)
 
+    def _ipython_display_(self) -> None:
+        """Leave it to pyplot to show the figure in a notebook, which would show it twice otherwise."""
+        pyplot: Any = sys.modules.get("matplotlib.pyplot")
+        shows = pyplot is not None and "inline" in str(mpl.get_backend())
+        if not (shows and getattr(self, "number", None) in pyplot.get_fignums()):
+            raise NotImplementedError  # then the figure is shown as any other
+
     def _settle(self) -> None:
         """Lay out until nothing moves, as heights of titles and square axes depend on the drawing."""
         before = list[tuple[int, ...]]()
@@ -205,45 +240,62 @@ def new_figure(size: object) -> Figure:
     return PrintFigure(figsize=check_size(size), layout="constrained")
 
 
-def axes_for(ax: Axes | None, size: object) -> tuple[Figure, Axes]:
-    """Return the axes to draw on, with their figure: the given ones, or those of a new figure.
+def paper_of(place: Any) -> tuple[float, float, float, float]:
+    """Return the colour behind axes or a figure.
 
     Parameters
     ----------
-    ax : matplotlib Axes or None
-        Axes to draw into; None for a new figure.
-    size : (float, float)
-        Width and height in inches, of a new figure.
+    place : matplotlib Axes or Figure
+        Where.
 
     Returns
     -------
-    (matplotlib Figure, matplotlib Axes)
-        The figure and the axes to draw on.
-
-    Raises
-    ------
-    OptionError
-        ``ax`` is not matplotlib axes.
-
-    Examples
-    --------
-    >>> figure, ax = axes_for(None, (6, 4))
-    >>> axes_for(ax, None)[0] is figure
-    True
+    (float, float, float, float)
+        Red, green, blue and opacity.
     """
-    if ax is None:
-        figure = new_figure(size)
-        return figure, figure.add_subplot()
-    if not isinstance(ax, Axes):
-        raise OptionError(
-            f"ax is a {type(ax).__name__}, not matplotlib axes. For example ax=pyplot.subplots()[1]."
-        )
-    parent = ax.get_figure(root=True)
-    assert parent is not None
-    return parent, ax
+    own = to_rgba(place.get_facecolor())
+    if own[3] == 1.0 or not isinstance(place, Axes):
+        return own if own[3] else (1.0, 1.0, 1.0, 1.0)
+    return paper_of(place.get_figure(root=True))
 
 
-def halo(width: float = 2.5, color: str = "white") -> list[Any]:
+def luminance(color: Any) -> float:
+    """Return the relative luminance (WCAG 2.1) of a colour.
+
+    Parameters
+    ----------
+    color : optional
+        Any colour that matplotlib knows.
+
+    Returns
+    -------
+    float
+        From 0, black, to 1, white.
+    """
+    parts = np.array(to_rgba(color)[:3])
+    linear = np.where(parts <= 0.03928, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+class Halo(list[Any]):
+    """Path effects of a halo, with what it takes to make them in another colour.
+
+    Parameters
+    ----------
+    width : float
+        In points.
+    color : optional
+        Any colour that matplotlib knows.
+    """
+
+    def __init__(self, width: float, color: Any):
+        whole: Any = {"dash_offset": 0, "dash_list": None}  # nothing shows through gaps of dashes
+        stroke = effects.Stroke(linewidth=width, foreground=color, dashes=whole)
+        super().__init__([stroke, effects.Normal()])
+        self.width = width
+
+
+def halo(width: float = 2.5, color: Any = "white") -> list[Any]:
     """Return path effects that keep a line or a text legible on top of others.
 
     Parameters
@@ -258,8 +310,7 @@ def halo(width: float = 2.5, color: str = "white") -> list[Any]:
     list
         For ``path_effects=``.
     """
-    whole: Any = {"dash_offset": 0, "dash_list": None}  # nothing shows through the gaps of dashes
-    return [effects.Stroke(linewidth=width, foreground=color, dashes=whole), effects.Normal()]
+    return Halo(width, color)
 
 
 def arrow(ax: Axes, start: ArrayLike, end: ArrayLike, color: str = BLACK, **options: Any) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..model.errors import MissingError
+from ..notebook import add_cards
 from .arithmetic.enclosure import Enclosure
 from .orbits.orbit_proof import OrbitProof, ProvenEvent
 from .points.census import Census, Undecided
@@ -40,3 +41,5 @@ __all__ = [
     "certify_orbit",
     "prove_all",
 ]
+
+add_cards(globals(), __all__)

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from types import MappingProxyType
 
 from ..model import OptionError
+from ..notebook import add_cards
 from .friction import dry_friction, leine_stick_slip, stick_slip_exponential
 from .impacts import bouncing_ball, impact_oscillator, kelvin_voigt_bounce
 from .models import harvested_prey_predator, state_dependent_jump, welander_box
@@ -87,6 +88,8 @@ __all__ = [
     "two_relay_spiral",
     "welander_box",
 ]
+
+add_cards(globals(), __all__)
 
 _FUNCTIONS: tuple[Callable[[], Problem], ...] = (
     dry_friction,

@@ -1,7 +1,6 @@
 """Every picture is fit for print: at most as wide as a page, text of 8 points, none cut off or
 overlapping, and no legend of more than six entries."""
 
-import dataclasses
 import io
 
 import casadi as ca
@@ -9,184 +8,10 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-import bounce
 import nonsmooth as ns
-from nonsmooth.orbit import Basins
 from nonsmooth.plot.style import PrintFigure
 from papers.pictures import faults
-
-x, v, mu = (ca.SX.sym(name) for name in ("x", "v", "mu"))
-BLOCK = ns.FilippovSystem(
-    [x, v],
-    surface=v - 0.5,
-    above=[v, -x - 1 + 0.2 * (v - 0.5)],
-    below=[v, -x + 1 + 0.2 * (v - 0.5)],
-)
-TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
-
-
-def run():
-    return ns.simulate(BLOCK, [0.3, 0.4], 30)
-
-
-def fold_branch():
-    system = ns.FilippovSystem(
-        [x, v], surface=v, above=[mu - x**2, 1 - v], below=[1, 1], parameters={mu: 0.5}
-    )
-    return ns.continue_equilibrium(system, [0.7, 1.0], "mu", bounds=(-1, 1))
-
-
-def many_events():
-    """A branch with an event of every kind that has a marker, at places of its own."""
-    from nonsmooth.plot.branches import MARKERS
-
-    branch = fold_branch()
-    (event,) = branch.events
-    chosen = np.linspace(1, len(branch.solutions) - 2, len(MARKERS)).astype(int)
-    events = [
-        dataclasses.replace(
-            event, kind=kind, parameter=float(branch.values[k]), solution=branch.solutions[k]
-        )
-        for kind, k in zip(MARKERS, chosen, strict=True)
-    ]
-    return dataclasses.replace(branch, events=events)
-
-
-def basins(count):
-    """Basins of as many attractors, in columns."""
-    axis = np.linspace(-3.0, 3.0, 42)
-    labels = np.broadcast_to(1 + np.arange(42)[:, None] * count // 42, (42, 42)).astype(np.int32)
-    starts = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1)
-    well = ns.FilippovSystem(
-        [x, v], surface=x, above=[v, 1 - x - 0.3 * v], below=[v, -1 - x - 0.3 * v]
-    )
-    (one, *_) = ns.basins(well, {"x": [1.0, 2.0], "v": [0.0, 0.5]}, t_end=100.0).attractors
-    return Basins(labels, [one] * count, starts, {"x": axis, "v": axis}, ("x", "v"))
-
-
-def cut():
-    """What divides starts at a height above a two-fold: arcs of both kinds, on either side."""
-    y, z = ca.SX.sym("y"), ca.SX.sym("z")
-    system = ns.FilippovSystem([x, y, z], surface=x, above=[y, 1, 0.5], below=[z, 0.3, -1])
-    fold = ns.find_two_fold(system, near=[0, 0, 0])
-    plane = lambda a, b: [a, b, 0.6 - 0.3 * b]
-    box = [(-0.8, 0.83), (-2.1, 1.07)]
-    return ns.manifold(system, fold, starts=plane, box=box, duration=6.0, spacing=0.1)
-
-
-def bifurcations():
-    a, b = ca.SX.sym("a"), ca.SX.sym("b")
-    system = ns.FilippovSystem(
-        [x, v],
-        surface=v,
-        above=[a + b * x - x**3, 1 - v],
-        below=[1, 1],
-        parameters={a: -1.0, b: 0.75},
-    )
-    found = ns.continue_equilibrium(system, [-1.5, 1.0], "a", bounds=(-2, 2))
-    cusp = ns.continue_bifurcation(found.events[0], ("a", "b"), bounds=[(-1, 1), (-1, 1)])
-    kinds = [f"kind {k}" for k in range(8)]
-    return [
-        dataclasses.replace(cusp, kind=kind, values=cusp.values * (1 + 0.3 * k), special=[])
-        for k, kind in enumerate(kinds)
-    ]
-
-
-def saddle_manifold():
-    system = ns.FilippovSystem([x, v], surface=v, above=[x + v, -1], below=[x, 1])
-    saddle = ns.find_pseudo_equilibrium(system, [0.1, 0.0])
-    return ns.manifold(system, saddle, stable=True, length=1.0)
-
-
-def proof():
-    pytest.importorskip("flint")
-    y, z = ca.SX.sym("y"), ca.SX.sym("z")
-    above, below = [-y, 1, -mu], [z, -1, 1 + 0.1 * y]
-    system = ns.FilippovSystem([x, y, z], surface=x, above=above, below=below, parameters={mu: 2})
-    fold = ns.find_two_fold(system, near=[0.0, 0.1, -0.1])
-    return ns.certify(fold, parameters={"mu": (0.5, 3)}, max_pieces=32)
-
-
-def harvest():
-    return ns.textbook.harvested_prey_predator().system
-
-
-def relays():
-    a, b = ca.SX.sym("a"), ca.SX.sym("b")
-    system = ns.FilippovSystem(
-        [x, v], field=[-a + 2 * b, -2 * a - b], multipliers=[a, b], surfaces=[x, v]
-    )
-    return ns.simulate(system, [1.0, 0.5], t_end=0.7)
-
-
-DRAWN = {
-    "basins": [lambda: ns.plot.basins(basins(2)), lambda: ns.plot.basins(basins(7))],
-    "bifurcation_curves": [lambda: ns.plot.bifurcation_curves(bifurcations())],
-    "branch": [lambda: ns.plot.branch(fold_branch()), lambda: ns.plot.branch(many_events())],
-    "dividing_curves": [lambda: ns.plot.dividing_curves(cut(), names=["y", "z"])],
-    "manifold": [lambda: ns.plot.manifold(saddle_manifold(), names=["x", "v"])],
-    "multipliers": [lambda: ns.plot.multipliers(ns.periodic_orbit(BLOCK, run()))],
-    "periodic_orbit": [lambda: ns.plot.periodic_orbit(ns.periodic_orbit(BLOCK, run()))],
-    "phase_portrait": [lambda: ns.plot.phase_portrait(harvest(), (0.0, 1.1, 0.5, 1.5))],
-    "proof_map": [lambda: ns.plot.proof_map(proof())],
-    "sliding_portrait": [
-        lambda: ns.plot.sliding_portrait(ns.textbook.two_fold("mix-S").system, (-1, 1, -1, 1))
-    ],
-    "trajectory": [lambda: ns.plot.trajectory(run()), lambda: ns.plot.trajectory(relays())],
-    "two_fold": [
-        lambda k=k: ns.plot.two_fold(ns.textbook.TWO_FOLDS[k]) for k in ("II-C", "mix-F", "VV-C1")
-    ],
-    "two_fold_3d": [
-        lambda k=k: ns.plot.two_fold_3d(ns.textbook.TWO_FOLDS[k]) for k in ("II-C", "mix-C")
-    ],
-    "two_fold_atlas": [lambda: ns.plot.two_fold_atlas(["II-C", "mix-S"], maps=False)],
-    "two_fold_atlas_pages": [lambda: ns.plot.two_fold_atlas_pages(["VV-C1"])[-1]],
-    "two_fold_map": [lambda k=k: ns.plot.two_fold_map(k) for k in ("VV", "II", "VI", "IV")],
-}
-GRID = {"xdot": np.linspace(-0.6, 0.6, 31), "omega": np.linspace(-0.6, 0.6, 31)}
-
-
-def residuals():
-    law, u = bounce.laws.RigidBounce(mu=0.3, restitution=0.5), np.linspace(1, 2, 5)
-    data = dict(
-        xdot=u, ydot=-u, omega=0 * u, lift_off_ydot=0.5 * u + np.array([0.01, 0, -0.01, 0, 0])
-    )
-    return bounce.golf.fit(law, data, parameters=["restitution"], starts=0)
-
-
-BALLS = {
-    "friction_cone": [
-        lambda: bounce.plot.friction_cone(bounce.simulate(TURF, xdot=0.3, ydot=-1.0, omega=0.1))
-    ],
-    "outcome_map": [lambda: bounce.plot.outcome_map(bounce.outcome_map(TURF, over=GRID, tol=1e-6))],
-    "proven_map": [
-        lambda: bounce.plot.proven_map(
-            bounce.maps.proven_map(TURF, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
-        )
-    ],
-    "residuals": [lambda: bounce.plot.residuals(residuals())],
-    "slip_map": [
-        lambda: bounce.plot.slip_map(
-            bounce.slip_map(
-                TURF, [0.2, 0.0], (np.linspace(0.3, 0.8, 3), np.linspace(-0.25, 0.2, 2)), tol=1e-6
-            )
-        )
-    ],
-}
-
-
-def drawing(module):
-    """Names of the functions of a module that return figures."""
-    return {
-        name
-        for name in module.__all__
-        if "Figure" in str(getattr(getattr(module, name), "__annotations__", {}).get("return", ""))
-    }
-
-
-def test_every_function_that_draws_is_here():
-    assert set(DRAWN) == drawing(ns.plot)
-    assert set(BALLS) == drawing(bounce.plot)
+from tests.plot.examples import EXAMPLES, basins, cut, harvest, run
 
 
 @pytest.mark.slow_cases(
@@ -206,11 +31,12 @@ def test_every_function_that_draws_is_here():
     "proven_map",
 )
 @pytest.mark.parametrize(
-    "draw",
-    [pytest.param(d, id=name) for name, cases in {**DRAWN, **BALLS}.items() for d in cases],
+    ("name", "example"),
+    [pytest.param(name, one, id=name) for name, several in EXAMPLES.items() for one in several],
 )
-def test_picture_is_fit_for_print(draw):
-    figure = draw()
+def test_picture_is_fit_for_print(name, example):
+    drawn = example.draw(name)
+    figure = drawn[-1] if isinstance(drawn, list) else drawn
     assert isinstance(figure, PrintFigure)  # whose fonts are TrueType (test_palette.py)
     assert faults(figure) == []
 

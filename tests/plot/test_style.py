@@ -1,6 +1,7 @@
 """The style of pictures works for other figures, and leaves matplotlib's settings alone."""
 
 import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -58,20 +59,13 @@ def test_a_curve_without_length_gets_no_arrowhead():
     assert arrowheads(ax) == []
 
 
-def test_axes_are_those_given_or_new_ones_that_pyplot_does_not_know():
-    figure, ax = style.axes_for(None, (5, 4))
-    assert_allclose(figure.get_size_inches(), (5, 4))
-    assert style.axes_for(ax, (9, 9)) == (figure, ax)
-    part = Figure().subfigures(1, 2)[1].add_subplot()
-    assert style.axes_for(part, None)[0] is part.get_figure(root=True)
-
-
 @pytest.mark.parametrize("size", [None, 3, (1,), (1, -1), (1, np.inf), "ab"])
 def test_wrong_sizes_and_axes_are_refused(size):
     with pytest.raises(ns.OptionError, match="size"):
         style.new_figure(size)
-    with pytest.raises(ns.OptionError, match=r"\bax\b"):
-        style.axes_for("ax", (1, 1))
+    with pytest.raises(ns.OptionError, match="size"):
+        ns.plot.two_fold_map("VV", size=size or "x")
+    assert plt.get_fignums() == []
 
 
 def test_entries_of_a_legend():

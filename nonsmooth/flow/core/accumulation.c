@@ -87,7 +87,7 @@ static int gathered(Run *r, int block, int32_t *which, double *speed) {
   int count = 0;
   *speed = 0;
   for (int j = 0; j < r->c; j++)
-    if (gap[j] == 0 || (is_repeated(r, block, IMPACT_GUARD, j) && gap[j] <= r->o.atol)) {
+    if (gap[j] == 0 || (is_repeated(r, block, IMPACT_GUARD, r->m + j) && gap[j] <= r->o.atol)) {
       which[count++] = j;
       *speed = larger(fabs(rate[j]), *speed);
     }
@@ -165,8 +165,8 @@ static int vanishing(Run *r, const double *near, int32_t *which) {
   for (int i = 0; i < r->n; i++) own[i] = 4 * near[i] + ON_SURFACE * (r->size + fabs(r->x[i])); /* rates may jump */
   gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, own, 1, change);
   for (int i = 0; i < r->m; i++) {
-    int small = set_of(r, i) < 0 && fabs(r->rates[i]) <= change[i], first = r->s->lower_first[i];
-    for (int k = first; k < first + r->s->degree[i] - 1; k++) small &= fabs(r->rates[k]) <= change[k];
+    int small = has_law(r, i, SURFACE_LAW) && fabs(r->rates[i]) <= change[i], first = element(r, i)->lower;
+    for (int k = first; k < first + degree_of(r, i) - 1; k++) small &= fabs(r->rates[k]) <= change[k];
     if (small) which[count++] = i;
   }
   return count;
@@ -211,7 +211,7 @@ static int rest_at_limit(Run *r, int before) {
   const int8_t *letter = r->table->letter + (int64_t)before * r->width;
   double left, error, *near = r->before;
   int rests = 0, block = block_of(r, &left, &error);
-  for (int i = 0; i < r->m; i++) rests |= r->letter[i] == 0 && letter[i] != 0 && r->s->degree[i] > 1;
+  for (int i = 0; i < r->m; i++) rests |= r->letter[i] == 0 && letter[i] != 0 && degree_of(r, i) > 1;
   left -= r->since;
   if (!block || !rests || left < 0) return 0;
   memset(near, 0, sizeof(double) * r->n);
@@ -245,9 +245,9 @@ static void rest_if_slow(Run *r) {
     int32_t one = i;
     double speed, *last = r->speed + i;
     surface_values(r, r->x);
-    if (r->s->degree[i] != 2 || r->letter[i] == 0) continue;
+    if (degree_of(r, i) != 2 || r->letter[i] == 0) continue;
     if (!(fabs(r->rates[i]) <= VANISHES * surface_scales(r, r->x)[i])) continue;
-    speed = fabs(r->rates[r->s->lower_first[i]]);
+    speed = fabs(r->rates[element(r, i)->lower]);
     int slow = speed < r->o.rest_below && *last < r->o.rest_below && speed < (1 - VANISHES) * *last;
     *last = speed;
     if (!slow || !choose_rest(r, &one, 1, 0)) continue;

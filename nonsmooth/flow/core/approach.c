@@ -3,39 +3,6 @@
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int change_kind(const Run *r, int before, int after);
 
-/* A solution of a x = b, whose rows may depend on one another, in place of b. ``a`` is lost. */
-static int solve_consistent(double *a, double *b, int n) {
-  double first = 0;
-  int32_t *place = (int32_t *)(b + n), rank = 0;
-  for (int i = 0; i < n; i++) place[i] = i;
-  for (; rank < n; rank++) {
-    int row = rank, column = rank;
-    for (int i = rank; i < n; i++)
-      for (int j = rank; j < n; j++)
-        if (fabs(a[i * n + j]) > fabs(a[row * n + column])) { row = i; column = j; }
-    double most = fabs(a[row * n + column]);
-    if (!(most < INFINITY)) return 0;
-    if (rank == 0) first = most;
-    if (!(most > VANISHES * n * first)) break;
-    for (int j = 0; j < n; j++) { double t = a[row * n + j]; a[row * n + j] = a[rank * n + j]; a[rank * n + j] = t; }
-    for (int i = 0; i < n; i++) { double t = a[i * n + column]; a[i * n + column] = a[i * n + rank]; a[i * n + rank] = t; }
-    double t = b[row]; b[row] = b[rank]; b[rank] = t;
-    int32_t p = place[column]; place[column] = place[rank]; place[rank] = p;
-    for (int i = 0; i < n; i++) {
-      double f = i == rank ? 0 : a[i * n + rank] / a[rank * n + rank];
-      if (f == 0) continue;
-      for (int j = rank; j < n; j++) a[i * n + j] -= f * a[rank * n + j];
-      b[i] -= f * b[rank];
-    }
-  }
-  double *x = a; /* the first row's place is free once all quotients are known */
-  for (int i = 0; i < rank; i++) b[i] /= a[i * n + i];
-  for (int i = rank; i < n; i++) b[i] = 0;
-  for (int i = 0; i < n; i++) x[place[i]] = b[i];
-  memcpy(b, x, sizeof(double) * n);
-  return finite_all(b, n);
-}
-
 /* h' = a - M lambda of the functions ``own``, with what else slides eliminated; 0 where that is impossible. */
 static int freeze(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
                   double *a, double *m) {
@@ -60,7 +27,7 @@ static int freeze(Run *r, const int8_t *letter, const double *x, const double *u
       for (int j = 0; j < count; j++) d[i * count + j] = r->slope[others[i] * w + others[j]];
       b[i] = column == k ? layer_of(r, others[i]) : r->slope[others[i] * w + own[column]] * factor_of(r, own[column]);
     }
-    if (!solve_consistent(d, b, count)) return 0;
+    if (!solve_any(d, b, count, INFINITY, b + count, r->decision->pivot)) return 0;
     for (int i = 0; i < k; i++) {
       double through = 0;
       for (int j = 0; j < count; j++) through += r->slope[own[i] * w + others[j]] * b[j];
@@ -90,7 +57,7 @@ static int field_with(Run *r, const int8_t *letter, const double *x, const doubl
       for (int j = 0; j < count; j++) d[i * count + j] = r->slope[others[i] * w + others[j]];
       b[i] = -layer_of(r, others[i]);
     }
-    if (!solve_consistent(d, b, count)) return 0;
+    if (!solve_any(d, b, count, INFINITY, b + count, r->decision->pivot)) return 0;
     for (int i = 0; i < count; i++) acting[others[i]] = b[i];
   }
   set_inputs(r, x, r->held, acting);
@@ -168,8 +135,8 @@ static void jump(Run *r, const double *rate, double dt) {
 static double shortest(const Run *r) { return pow(OVERFLOW, -1.0 / r->order); }
 
 /* Whether the state is on a set, or as close as no series can begin; after surface_values. */
-static int is_met(Run *r, const int8_t *letter, int set, const double *h, const double *scales_of) {
-  int f = first_of(r, set), k = size_of(r, set);
+static int is_met(Run *r, const int8_t *letter, int f, const double *h, const double *scales_of) {
+  int k = size_of(r, f);
   int32_t own[3];
   double a[3], m[9], scale = 0, radius = length_of(h + f, k), speed = 0;
   for (int i = 0; i < k; i++) { own[i] = f + i; scale = larger(scales_of[f + i], scale); }
@@ -182,9 +149,10 @@ static int is_met(Run *r, const int8_t *letter, int set, const double *h, const 
 /* |h| has fallen tenfold, or is small: the set is reached or passed now, or the test is repeated nearer. What has
  * fallen to rounding is zero, whatever its direction says. */
 static void near_set(Run *r, int row, int fell) {
-  int f = r->now.index[row], s = set_of(r, f), k = size_of(r, s), n = r->n, before = r->mode;
+  int f = r->now.index[row], k = size_of(r, f), n = r->n, before = r->mode;
   int32_t own[3];
   double h[3], a[3], m[9], u[3], b[3], mean[3], scale = 0, dt, c = 0;
+  r->met = (Met){NEAR_GUARD, f, 0};
   if (r->letter[f] == 0) return; /* friction's limit has fallen: the next step sees its digits */
   const double *height = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
   for (int i = 0; i < k; i++) {
@@ -259,8 +227,8 @@ static void after_step(Run *r) {
   int changed = 0, carried = 0;
   double *level = r->later;
   const double *scales_of = 0;
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s), k = size_of(r, s), letter = r->letter[f];
+  EACH_SET(r, f) {
+    int k = size_of(r, f), letter = r->letter[f];
     if (letter != LEAVING && letter != LEFT_BEHIND) continue;
     if (!scales_of) { surface_values(r, r->x); scales_of = surface_scales(r, r->x); }
     double scale = 0;
@@ -377,7 +345,7 @@ static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found) {
   double *a = r->laws, *lam = a + w, *m = lam + w, u[6][3], *unknowns = r->tried;
   for (int i = 0; i < r->m; i++) {
     if (l->letter[i] != LEAVING) continue;
-    if (i == first_of(r, set_of(r, i))) first[sets++] = n;
+    if (i == set_of(r, i)) first[sets++] = n;
     own[n++] = i;
     unknowns[i] = 1; /* some direction, until it is known */
   }
@@ -424,7 +392,7 @@ static int sets_by_rates(Run *r, const int8_t *letter, const Known *known, int k
     int which = r->active[i], s = set_of(r, which);
     possible[i] = s < 0 && which < r->m ? 7 : 5;
     if (s < 0) continue;
-    if (which == first_of(r, s)) first[sets++] = n;
+    if (which == s) first[sets++] = n;
     own[n++] = which;
   }
   first[sets] = n;
@@ -459,7 +427,7 @@ static int decide_sets(Run *r, const int8_t *letter, const Known *known, int kno
   if (!sets_by_rates(r, letter, known, known_count, possible)) return 0;
   for (int i = 0; i < r->active_count; i++) { /* a set has one letter, that of its first function */
     int s = set_of(r, r->active[i]);
-    each[i] = s < 0 || r->active[i] == first_of(r, s) ? possible[i] : 4;
+    each[i] = s < 0 || r->active[i] == s ? possible[i] : 4;
   }
   int total = choices_of(each, r->active_count);
   if (total > TRIED) { many_may_hold(r); return 0; }
@@ -468,7 +436,7 @@ static int decide_sets(Run *r, const int8_t *letter, const Known *known, int kno
     spell_choice(r, letter, each, number, trial);
     for (int i = 0; i < r->active_count; i++) {
       int s = set_of(r, r->active[i]);
-      if (s >= 0) trial[r->active[i]] = trial[first_of(r, s)] ? LEAVING : 0;
+      if (s >= 0) trial[r->active[i]] = trial[s] ? LEAVING : 0;
     }
     lay_out(r, trial, &r->trial.l);
     mode_solutions(r, &r->trial.l, &all);
@@ -506,23 +474,21 @@ static void find_zeros(const Values *t, const double *w, int8_t *zero) {
 static void find_idle(Run *r) {
   const Entries *column = &r->s->column;
   if (!r->s->sets) return;
-  memset(r->idle, 1, r->s->sets);
+  memset(r->idle, 1, r->m);
   find_zeros(&r->s->columns, r->columns, r->vanishes);
   for (int q = 0; q < column->count; q++) {
     int s = set_of(r, column->column[q]);
     if (s >= 0 && !r->vanishes[r->s->columns.output[q]]) r->idle[s] = 0;
   }
   find_zeros(&r->s->point, r->point, r->vanishes);
-  for (int s = 0; s < r->s->sets; s++) r->idle[s] |= r->vanishes[r->s->point.output[r->width + first_of(r, s)]];
+  EACH_SET(r, s) r->idle[s] |= r->vanishes[r->s->point.output[r->width + s]];
 }
 
 /* After a step that ended with no guard: sets that are close may be reached to rounding. */
 static void look_at_sets(Run *r) {
   for (int row = 0; row < r->now.rows; row++) {
-    int f = r->now.index[row], s, k;
+    int f = r->now.index[row], k = size_of(r, f);
     if (r->now.kind[row] != NEAR_GUARD || r->letter[f] < OFF || r->drop[row]) continue;
-    s = set_of(r, f);
-    k = size_of(r, s);
     const double *h = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
     double scale = 0, radius = length_of(r->letter[f] == LEFT_BEHIND ? r->unknowns + f : h + f, k);
     for (int i = f; i < f + k; i++) scale = larger(scales_of[i], scale);

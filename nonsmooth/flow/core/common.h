@@ -226,20 +226,59 @@ static inline int stays_positive(const double *c, int n, double h) {
   return low > rest * power;
 }
 
+/* Whether a polynomial positive at 0 clearly stays so on [0, h]. */
+static inline int is_far(const double *c, int n, double h) {
+  double rest = rest_of(c, n, h);
+  return c[0] > rest || (rest < LARGEST && stays_positive(c, n, h));
+}
+
+/* Bernstein coefficients of a polynomial that is not far from zero on [0, h], where h is shortened to what matters;
+ * how often their sign changes. */
+static int isolate(const double *c, int n, double *h, double *b) {
+  double power = 1;
+  int changes = 0;
+  /* More halvings than there are would be needed, or an overflow. */
+  if (!(rest_of(c, n, *h) < ldexp(c[0], DEPTH))) *h = smaller(*h, largest_root(c, n));
+  b[0] = c[0];
+  for (int k = 1; k <= n; k++) { power *= *h; b[k] = c[k] * power; }
+  /* A touch that reaches zero by rounding is no root; rounding at t is ROUNDING sum |c_k| t^k. */
+  for (int k = 0; k <= n; k++) b[k] += ROUNDING * fabs(b[k]);
+  bernstein(b, n);
+  for (int k = 0; k < n; k++) changes += (b[k] > 0) != (b[k + 1] > 0);
+  return changes;
+}
+
 /* First t in (0, h] at which a polynomial positive at 0 stops being positive; 0 if it is not; -1 if
  * it stays positive. */
 static double first_root(const double *c, int n, double h) {
+  double b[P + 1];
   if (c[0] <= 0) return 0;
-  double a[P + 1], power = 1, rest = rest_of(c, n, h);
-  if (c[0] > rest || (rest < LARGEST && stays_positive(c, n, h))) return -1;
-  /* More halvings than there are would be needed, or an overflow. */
-  if (!(rest < ldexp(c[0], DEPTH))) h = smaller(h, largest_root(c, n));
-  a[0] = c[0];
-  for (int k = 1; k <= n; k++) { power *= h; a[k] = c[k] * power; }
-  /* A touch that reaches zero by rounding is no root; rounding at t is ROUNDING sum |c_k| t^k. */
-  for (int k = 0; k <= n; k++) a[k] += ROUNDING * fabs(a[k]);
-  bernstein(a, n);
-  return first_in(c, n, a, 0, h, 0);
+  return is_far(c, n, h) || !isolate(c, n, &h, b) ? -1 : first_in(c, n, b, 0, h, 0);
+}
+
+/* First t in (0, h] at which a polynomial is below some of its errors and ``floor``: 0 at once, -1 nowhere. */
+static double first_low(const double *c, int n, double h, double errors, double floor) {
+  double b[P + 1];
+  for (int k = 0; k <= n; k++) b[k] = c[k] - (k < n - 1 || n < 2 ? errors * ROUNDING : 1) * fabs(c[k]);
+  b[0] -= errors * floor;
+  return first_root(b, n, h);
+}
+
+/* Whether a polynomial passes zero once near a root that is not hidden by its errors, which is where it is low. */
+static int passes_once(const double *c, int n, double root, double low, double floor, double exact) {
+  double d[P + 1], noise = fabs(c[n]), spread = 0, width;
+  memcpy(d, c, sizeof(double) * (n + 1));
+  for (int k = n - 1; k >= 0; k--) noise = noise * root + (k < n - 1 ? LOW * ROUNDING : 1) * fabs(c[k]);
+  for (int i = 0; i < n; i++) for (int k = n - 1; k >= i; k--) d[k] += root * d[k + 1];
+  width = (noise + LOW * floor) / fabs(d[1]);
+  for (int k = n; k > 1; k--) spread = (spread + k * fabs(d[k])) * width;
+  return spread <= 0.25 * fabs(d[1]) && width <= exact && fabs(low - root) <= 2 * width;
+}
+
+/* Whether a polynomial's errors hide which root on (0, h] is its first, as ``root`` or, with -1, none is. */
+static inline int hides_roots(const double *c, int n, double h, double root) {
+  double end = root < 0 ? h : root, low = first_low(c, n, end, LOW, 0);
+  return low > 0 && !passes_once(c, n, end, low, 0, LOCATED);
 }
 
 /* First t in (0, h] at which a polynomial passes zero falling (-1), rising (1) or either way (0).

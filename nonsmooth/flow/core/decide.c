@@ -29,8 +29,6 @@ typedef struct {
 /* Of a guard that ended the mode before so many coefficients vanish. */
 typedef struct { int kind, index, side, zeros; } Known;
 
-static int degree_of(const Run *r, int i) { return i < r->m ? r->s->degree[i] : 2; }
-
 /* Lemke's method ------------------------------------------------------------------------------------ */
 
 /* Whether row i leaves before row j: the least ratio, ties by the rows of the inverse. */
@@ -166,7 +164,7 @@ static int place_unknowns(const Block *k, const int8_t *position, double *nu, do
     nu[i] = k->is_contact[i] ? 0 : side * k->b[i];
     if (k->is_coupled && !k->is_contact[i]) for (int j = 0; j < n; j++) row[j] -= side * k->share[i * n + j];
   }
-  return solve_any(m, nu, n, work + (int64_t)n * n, pivot);
+  return solve_any(m, nu, n, TIED, work + (int64_t)n * n, pivot);
 }
 
 /* The position that an element takes next: its own where that is consistent. */
@@ -426,10 +424,6 @@ static int solve_single(const Block *k, double *found) {
 
 /* The law at a point --------------------------------------------------------------------------------- */
 
-static int element_of(const Run *r, const Known *known) {
-  return known->index + (known->kind == IMPACT_GUARD || known->kind == RELEASE_GUARD ? r->m : 0);
-}
-
 /* Bounds that are negative turn the law around: the unknown changes its sign. */
 static void turn_bound(Decision *d, int i, double *b) {
   int k = d->count;
@@ -504,9 +498,9 @@ static int read_law(Run *r, Decision *d) {
   memset(d->share, 0, sizeof(double) * k * k);
   for (int i = 0; i < k; i++) {
     int own = d->own[i] = r->active[i];
-    d->is_contact[i] = own >= r->m;
+    d->is_contact[i] = has_law(r, own, CONTACT_LAW);
     d->turn[i] = d->is_contact[i] ? -1 : 1;
-    d->is_idle[i] = own < r->m && r->s->continuous[own];
+    d->is_idle[i] = element(r, own)->flags & CONTINUOUS;
     for (int j = 0; j < r->c && own < r->m; j++) carried |= r->s->carries[own * r->c + j];
   }
   if (!read_rows(r, d, r->x, d->a, d->b, d->floor, d->work)) return 0;
@@ -530,7 +524,7 @@ static void read_old(const Run *r, Decision *d, const int8_t *letter, const Know
   int k = d->count;
   for (int i = 0; i < k; i++) {
     d->is_known[i] = 0;
-    for (int q = 0; q < known_count; q++) if (element_of(r, known + q) == d->own[i]) d->is_known[i] = 1;
+    for (int q = 0; q < known_count; q++) if (known[q].index == d->own[i]) d->is_known[i] = 1;
   }
   for (int contacts = 1; contacts >= 0; contacts--)
     for (int i = 0; i < k; i++) {
@@ -538,7 +532,7 @@ static void read_old(const Run *r, Decision *d, const int8_t *letter, const Know
       double bound = d->b[i];
       if (d->is_contact[i] != contacts) continue;
       for (int j = 0; j < k; j++) bound += d->share[i * k + j] * d->old[j];
-      for (int q = 0; q < known_count; q++) if (element_of(r, known + q) == own && known[q].kind == EXIT_GUARD) side = known[q].side;
+      for (int q = 0; q < known_count; q++) if (known[q].index == own && known[q].kind == EXIT_GUARD) side = known[q].side;
       d->old[i] = side == 0 && !d->is_known[i] ? d->sign[i] * r->unknowns[own] : d->is_contact[i] ? 0 : side * bound;
     }
 }
@@ -570,30 +564,10 @@ static void find_touched(Decision *d, const int8_t *letter) {
 
 /* Orders ------------------------------------------------------------------------------------------------- */
 
-/* Coefficients ``order`` of all that is known without the unknowns of that order. */
-static void open_order(Run *r, Expansion *e, int order) {
-  const Series *t = &r->s->series;
+/* Coefficients of an order without its unknowns. */
+static void begin_order(Run *r, Expansion *e, int order) {
   for (int i = 0; i < r->active_count; i++) e->series[(int64_t)r->active[i] * r->stride + order] = 0;
-  if (!r->s->sets) {
-    inputs_of(r, e, order);
-    series_at(t, order ? t->later : t->moving, order ? t->later_count : t->moving_count, order, r->stride, r->input, r->series);
-    return;
-  }
-  inputs_of_sets(r, e, order);
-  if (!order) series_at(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
-  else series_at(t, r->s->early, r->s->early_count, order, r->stride, r->input, r->series);
-  follow_sets(r, e, order);
-  inputs_of_sets(r, e, order);
-  if (order) series_at(t, t->late, t->late_count, order, r->stride, r->input, r->series);
-}
-
-/* The same with them, and the states of the next order. */
-static void close_order(Run *r, Expansion *e, int order) {
-  const Series *t = &r->s->series;
-  if (r->s->sets) inputs_of_sets(r, e, order); else inputs_of(r, e, order);
-  series_at(t, order ? t->late : t->moving, order ? t->late_count : t->moving_count, order, r->stride, r->input, r->series);
-  if (r->s->sets) close_sets(r, e, order);
-  next_states(r, e, order);
+  open_order(r, e, order);
 }
 
 static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
@@ -612,6 +586,7 @@ static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
   }
   memcpy(e->l.letter, letter, w);
   e->l.mode = -1;
+  e->l.is_free = 0;
 }
 
 /* Rounding of the states' coefficients, and of the rows of each order: what is zero at rest is not compared with
@@ -627,7 +602,7 @@ static void read_noise(Run *r, Decision *d) {
   gradient_sums(r, &r->s->surfaces, r->heights, all, &r->s->surface_gradient, all, ones, 1, height);
   for (int i = 0; i < k; i++) {
     int own = d->own[i];
-    double of = height[own >= r->m ? own + r->c : degree_of(r, own) > 1 ? r->s->lower_first[own + 1] - 1 : own];
+    double of = height[degree_of(r, own) > 1 ? element(r, own)->lower + degree_of(r, own) - 2 : own];
     d->steep[i] = steep[own];
     if (!(of > 0)) continue;
     d->field = larger(d->field, d->yard[i] / of);
@@ -817,7 +792,7 @@ static int layer_matrix(const Run *r, const Decision *d, int which, int orders, 
   for (int i = 0; i < n; i++) {
     double bound = d->b[own[i]];
     for (int j = 0; j < k; j++) bound += d->share[own[i] * k + j] * d->nu[j];
-    weight[i] = (bound > 0 ? bound : 1) / r->s->layer_width[d->own[own[i]]];
+    weight[i] = (bound > 0 ? bound : 1) / element(r, d->own[own[i]])->width;
     for (int j = 0; j < n; j++) a[i * n + j] = d->matrix[own[i] * k + own[j]];
   }
   return n;
@@ -883,10 +858,12 @@ static void add_motion(Run *r, Decision *d, int orders) {
 /* Close an order with the unknowns that were found. */
 static void close_with(Run *r, Decision *d, int order) {
   Expansion *e = &r->trial;
-  if (order == 0) { begin_orders(r, d, d->letter); open_order(r, e, 0); }
+  if (order == 0) { begin_orders(r, d, d->letter); begin_order(r, e, 0); }
   for (int i = 0; i < d->count; i++)
     e->series[(int64_t)d->own[i] * r->stride + order] = d->sign[i] * d->nu[order * d->count + i];
   close_order(r, e, order);
+  if (r->s->sets) close_sets(r, e, order);
+  next_states(r, e, order);
 }
 
 /* Follow all solutions from a block of an order on. */
@@ -907,7 +884,7 @@ static void explore(Run *r, Decision *d, int order, int which) {
       }
       close_with(r, d, order);
       if (++order == 1) read_noise(r, d);
-      open_order(r, e, order);
+      begin_order(r, e, order);
       read_order(r, d, order);
       d->last = is_finite_order(d, order) ? ORDERS : order;
       if (d->last == order && !open) { add_motion(r, d, order); return; }
@@ -1006,12 +983,12 @@ static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   if (l->slides) improve(r, l, r->x, to->unknowns, 1); /* bounds that were reached to a tolerance are exact now */
   memset(to->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < l->rows; row++) {
-    int kind = l->kind[row], of = l->index[row] + (kind == IMPACT_GUARD || kind == RELEASE_GUARD ? r->m : 0);
+    int kind = l->kind[row], of = l->index[row], is_off = kind == SURFACE_GUARD || kind == IMPACT_GUARD;
     for (int i = 0; i < d->count; i++) {
-      if (d->own[i] != of || !(kind == SURFACE_GUARD || kind == IMPACT_GUARD || kind == EXIT_GUARD || kind == RELEASE_GUARD)) continue;
+      if (row >= l->atoms || d->own[i] != of) continue;
       int both = kind == RELEASE_GUARD || own->before[i] == UNDECIDED || is_idle(r, to->letter, of);
       int near = both || own->before[i] == (l->side[row] > 0 ? AT_TOP : AT_BOTTOM);
-      to->drop[row] = kind == SURFACE_GUARD || kind == IMPACT_GUARD ? own->order[i] + degree_of(r, of) : near ? own->order[i] : 0;
+      to->drop[row] = is_off ? own->order[i] + degree_of(r, of) : near ? own->order[i] : 0;
     }
   }
 }
@@ -1047,7 +1024,7 @@ static int holds_its_own(const Run *r, int surface) {
 
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
-  if (r->s->continuous[surface] || r->s->degree[surface] > 1 || !holds_its_own(r, surface)) return 0;
+  if (element(r, surface)->flags & CONTINUOUS || degree_of(r, surface) > 1 || !holds_its_own(r, surface)) return 0;
   double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
   for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
@@ -1055,7 +1032,7 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
     held_of(r, letter);
     r->held[surface] = side;
     error_scales(r, r->x, r->held, r->none);
-    if (r->s->scaled[surface] && r->slope[surface * r->width + surface] != 0) return 0;
+    if (is_scaled(r, surface) && r->slope[surface * r->width + surface] != 0) return 0;
     gradient_sums(r, &r->s->point, r->point, 2 * r->width + r->s->slope.count, &r->s->layer_gradient, r->width, near,
                   1, r->small);
     double scale = r->small[surface];
@@ -1069,7 +1046,7 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
 static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int own = r->active[0], w = r->width, exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
   double rate[2], *near = r->vector + r->n + w; /* not where inputs are put together */
-  if (own >= r->m || !r->s->affine || r->s->scaled[own] || is_idle(r, letter, own)) return 0;
+  if (!has_law(r, own, SURFACE_LAW) || !r->s->affine || is_scaled(r, own) || is_idle(r, letter, own)) return 0;
   if (known_count && !(exits && r->falls)) return 0;
   aim(r, letter, r->x, r->unknowns);
   for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);

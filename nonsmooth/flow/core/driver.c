@@ -5,7 +5,8 @@ static int change_kind(const Run *r, int before, int after) {
   const int8_t *two = r->table->letter + (int64_t)after * r->width;
   int closed = 0, slides = 0;
   for (int i = 0; i < r->width; i++)
-    if (i < r->m) slides += (two[i] == 0) - (one[i] == 0); else closed += (two[i] == 0) - (one[i] == 0);
+    if (has_law(r, i, CONTACT_LAW)) closed += (two[i] == 0) - (one[i] == 0);
+    else slides += (two[i] == 0) - (one[i] == 0);
   if (closed) return closed > 0 ? CONTACT : RELEASE;
   return slides > 0 ? ENTRY : slides < 0 ? EXIT : CROSSING;
 }
@@ -40,7 +41,7 @@ static void adopt(Run *r, const Continuation *c) {
 /* A surface that would come to rest though its multiplier enters only its third derivative or a later one: motions
  * leave such a point by infinitely many switchings. -1 if there is none. */
 static int rests_unstably(const Run *r, const int8_t *letter) {
-  for (int i = 0; i < r->m; i++) if (r->s->degree[i] > 2 && letter[i] == 0 && r->letter[i] != 0) return i;
+  for (int i = 0; i < r->m; i++) if (degree_of(r, i) > 2 && letter[i] == 0 && r->letter[i] != 0) return i;
   return -1;
 }
 
@@ -62,12 +63,12 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
   return 1;
 }
 
-/* Sides of all surfaces; what is on one counts as below until it is decided. Contacts are open. */
+/* Letters of all elements off their zeros. */
 static int letters_of(Run *r, int8_t *letter) {
   if (!r->width) return 1;
   const double *h = surface_values(r, r->x);
   int finite = finite_all(h, r->m + 2 * r->c);
-  for (int i = 0; i < r->width; i++) letter[i] = set_of(r, i) >= 0 ? off_letter(r, i) : i >= r->m || h[i] > 0 ? 1 : -1;
+  for (int i = 0; i < r->width; i++) letter[i] = law_of(r, i)->side(r, i, h[i]);
   take_sides(r, letter, -1);
   return finite;
 }
@@ -78,9 +79,10 @@ static void strike_due(Run *r) {
   const double *gap = gaps(r, r->x), *rate = gap + r->c;
   r->due_impact = -1;
   for (int row = 0; row < r->now.rows; row++) {
-    if (r->now.kind[row] != IMPACT_GUARD || gap[r->now.index[row]] != 0) continue;
-    if (rate[r->now.index[row]] < 0) r->due_impact = row;
-    else if (rate[r->now.index[row]] > 0) r->drop[row] = 1;
+    int j = r->now.index[row] - r->m;
+    if (r->now.kind[row] != IMPACT_GUARD || gap[j] != 0) continue;
+    if (rate[j] < 0) r->due_impact = row;
+    else if (rate[j] > 0) r->drop[row] = 1;
   }
 }
 
@@ -142,6 +144,8 @@ static void start_in(Run *r, const int8_t *asked) {
 static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   note(r);
   find_idle(r);
+  if (start_mode || r->remembered) memcpy(r->letter, start_mode ? start_mode : r->remembered, r->width);
+  else memset(r->letter, -1, r->width);
   int finite = letters_of(r, r->letter);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
@@ -178,7 +182,7 @@ static int with_touched(Run *r, int32_t *onto, int kept) {
 
 /* The impulses of a gap that closes, and of the contacts that are closed there. */
 static void impact(Run *r, int row) {
-  int before = r->mode, contact = r->now.index[row], count = 0;
+  int before = r->mode, contact = r->now.index[row] - r->m, count = 0;
   int32_t *involved = r->involved, *onto = involved, kept = kept_by(r, r->letter, onto);
   double *x = r->before;
   onto[kept++] = r->m + contact; /* what is closed stays so to rounding */
@@ -199,9 +203,9 @@ static void impact(Run *r, int row) {
 }
 
 static void release(Run *r, int row) {
-  int before = r->mode, j = r->now.index[row];
-  Known known[] = {{RELEASE_GUARD, j, 0, 1}, {IMPACT_GUARD, j, 1, 3}};
-  active_surfaces(r, r->m + j, r->letter);
+  int before = r->mode, i = r->now.index[row];
+  Known known[] = {{RELEASE_GUARD, i, 0, 1}, {IMPACT_GUARD, i, 1, 3}};
+  active_surfaces(r, i, r->letter);
   if (r->status != RUNNING) return;
   memcpy(r->start, r->letter, r->width);
   if (choose(r, r->start, known, 2) && r->mode != before) event(r, change_kind(r, before, r->mode), before, row, r->x);
@@ -220,35 +224,46 @@ static void watch_two_fold(Run *r) {
 
 static int rest_at_limit(Run *r, int before);
 
+/* The motion from a guard of a surface or set, where the first coefficients of some guards are known to vanish. */
+static void pass(Run *r, int row, const Known *known, int known_count) {
+  int kind = r->now.kind[row], index = r->now.index[row], before = r->mode;
+  active_surfaces(r, index, r->letter);
+  if (r->status != RUNNING) return;
+  project(r, r->involved, gather(r, index, r->width, r->involved));
+  renote(r);
+  if (kind == EXIT_GUARD || kind == BRANCH_GUARD) watch_two_fold(r);
+  else if (kind == SURFACE_GUARD && !is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
+  if (r->status != RUNNING) return;
+  memcpy(r->start, r->letter, r->width);
+  take_sides(r, r->start, index);
+  if (choose(r, r->start, known, known_count) && r->mode != before && !rest_at_limit(r, before))
+    event(r, change_kind(r, before, r->mode), before, row, r->x);
+}
+
+static void serve_surface(Run *r, int row) {
+  int kind = r->now.kind[row], i = r->now.index[row], side = r->now.side[row];
+  Known known[] = {{EXIT_GUARD, i, side, 1}, {SURFACE_GUARD, i, side, degree_of(r, i) + 1}};
+  pass(r, row, known, kind == EXIT_GUARD ? 2 : 0);
+}
+
+static void serve_set(Run *r, int row) {
+  int i = r->now.index[row];
+  Known known[] = {{SLIP_GUARD, i, 0, 1}, {NEAR_GUARD, i, 0, 2}};
+  if (r->now.kind[row] == NEAR_GUARD) near_set(r, row, 1); else pass(r, row, known, 2);
+}
+
+static void serve_contact(Run *r, int row) {
+  if (r->now.kind[row] == IMPACT_GUARD) impact(r, row); else release(r, row);
+}
+
 static void serve(Run *r, int row) {
-  int kind = r->now.kind[row], index = r->now.index[row], side = r->now.side[row], before = r->mode;
+  int kind = r->now.kind[row], index = r->now.index[row], side = r->now.side[row];
   r->met = (Met){kind, index, side};
-  if (kind == IMPACT_GUARD) impact(r, row);
-  else if (kind == RELEASE_GUARD) release(r, row);
-  else if (kind == NEAR_GUARD) near_set(r, row, 1);
-  else if (kind == BRANCH_GUARD && side != OF_ONE && !is_mixed(r, r->now.sliding, r->now.slides)) {
+  if (kind != BRANCH_GUARD) law_of(r, index)->serve(r, row);
+  else if (side == OF_ONE || is_mixed(r, r->now.sliding, r->now.slides)) pass(r, row, 0, 0);
+  else {
     event(r, STABILITY, r->mode, row, r->x);
     finish(r, INTERSECTION, STABILITY_LOST, index);
-  }
-  else {
-    Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, kind == EXIT_GUARD ? r->s->degree[index] + 1 : 2}};
-    if (kind == SLIP_GUARD) {
-      known[0] = (Known){SLIP_GUARD, index, 0, 1};
-      known[1] = (Known){NEAR_GUARD, index, 0, 2};
-    }
-    active_surfaces(r, index, r->letter);
-    if (r->status != RUNNING) return;
-    project(r, r->involved, gather(r, index, r->width, r->involved));
-    renote(r);
-    if (kind == SLIP_GUARD) {}
-    else if (kind != SURFACE_GUARD) watch_two_fold(r);
-    else if (!is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
-    if (r->status != RUNNING) return;
-    memcpy(r->start, r->letter, r->width);
-    take_sides(r, r->start, index);
-    if (choose(r, r->start, known, kind == EXIT_GUARD || kind == SLIP_GUARD ? 2 : 0) && r->mode != before
-        && !rest_at_limit(r, before))
-      event(r, change_kind(r, before, r->mode), before, row, r->x);
   }
 }
 
@@ -319,10 +334,11 @@ static void step(Run *r) {
   int last = h >= left;
   if (last) h = left;
   /* What happens at the end, to rounding, happens. */
-  double after = AT_END * larger(1, time_scale(r) + h);
+  double after = AT_END * (time_scale(r) + h);
   int row = first_hit(r, e, last ? h + after : h, &dt);
   dt = row >= 0 ? smaller(dt, h) : last ? h : to_number(r, h);
   if (row >= 0 && is_before_fold(r, e, row, dt)) { dt = to_number(r, 0.5 * dt); row = -1; last = 0; }
+  if (r->hold < dt) { dt = r->hold; row = -1; last = 0; } else r->hold = INFINITY;
   double wanted = dt, safe = safe_length(r, e, by_series), good;
   while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
   int grows = r->mode == r->length_mode && dt > r->length / STEADY;
@@ -332,11 +348,8 @@ static void step(Run *r) {
   r->length = dt == wanted ? h : dt;
   int swallowed = dt < wanted && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
   if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
-  if (dt < wanted) {
-    row = -1;
-    last = 0;
-    memset(r->instant.passing, 0, r->s->rules.atoms);
-  }
+  if (dt < wanted) row = -1, last = 0;
+  if (row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
   if (dt > 0) note_sides(r, e, dt);
   r->falls = row >= 0 && is_steep(r, e, row, dt);
   last &= dt == h;

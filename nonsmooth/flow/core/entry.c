@@ -97,8 +97,8 @@ static size_t place_run(Run *r, char *base) {
   int n = r->n, w = r->width, c = r->c, all = r->kept_rows, g = r->guards, stride = r->stride;
   size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
   used = place_layout(&r->now, base, used, w, g);
-  used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets);
-  used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets);
+  used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets ? r->m : 0);
+  used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets ? r->m : 0);
   Continuation *each[] = {&r->chosen, &r->one, &r->first, &r->rest, &r->found};
   for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, w, g);
   used = place_decision(r, base, used);
@@ -120,6 +120,7 @@ static size_t place_run(Run *r, char *base) {
   r->involved = INTEGERS(3 * w + 2 * all + 1);
   r->p = DOUBLES(s->parameters);
   r->series = DOUBLES(pair_room(s->series.size, stride));
+  r->rounding = DOUBLES(s->series.size);
   r->point = DOUBLES(pair_room(s->point.size, 1));
   r->heights = DOUBLES(pair_room(s->surfaces.size, 1));
   r->maps = DOUBLES(pair_room(s->maps.size, 1));
@@ -151,7 +152,7 @@ static size_t place_run(Run *r, char *base) {
   r->rates_of_several = DOUBLES(SEVERAL * n);
   size_t q = r->m < MOST_ENUMERATED ? r->m : MOST_ENUMERATED, sums = q * (q - (q > 0)) / 2;
   r->layer_series = DOUBLES(s->slope_outputs ? (q * q + sums * sums) * stride : 0);
-  r->idle = LETTERS(s->sets);
+  r->idle = LETTERS(s->m);
   r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
   r->of_defect = DOUBLES(g);
   r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
@@ -177,7 +178,7 @@ Run *run_new(const System *s, Table *table) {
   r->table = table;
   r->n = s->n; r->m = s->m; r->c = s->c; r->width = s->m + s->c;
   r->order = s->order; r->stride = s->order + 1;
-  r->kept_rows = s->lower_first[s->m];
+  r->kept_rows = s->kept_rows;
   r->guards = 3 * s->m + 2 * s->c + s->rules.atoms + 2;
   r->arena = calloc(1, place_run(r, 0));
   if (!r->arena) { free(r); return 0; }
@@ -189,6 +190,9 @@ void run_free(Run *r) { free(r->arena); free(r); }
 
 /* Times at which the run is read: no approximation of the motion may span one of them. */
 void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = times; r->read_count = count; }
+
+/* Letters from which elements with hysteresis go on, or none. */
+void run_remember(Run *r, const int8_t *letter) { r->remembered = letter; }
 
 static void set_parameters(Run *r, const double *p) {
   const System *s = r->s;
@@ -217,11 +221,12 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->step_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
+  r->hold = INFINITY;
   r->begun = t;
   r->t = t.high;
   r->t_low = t.low;
   r->since = 0;
-  for (int i = 0; i < r->m; i++) { r->speed[i] = INFINITY; r->has_roots |= s->power[i] > 0; }
+  for (int i = 0; i < r->m; i++) { r->speed[i] = INFINITY; r->has_roots |= element(r, i)->power > 0; }
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
@@ -325,9 +330,10 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
 
 /* Steps of runs that are lanes' between them ------------------------------------------------------- */
 
-/* Whether lanes can go on from here: nothing is to be served, and only the first guard has known zeros. */
+/* Whether lanes can go on from here: nothing is to be served or told apart, and only the first guard has known
+ * zeros. */
 static int is_plain(const Run *r) {
-  if (r->instant.running || r->due_impact >= 0) return 0;
+  if (r->instant.running || r->due_impact >= 0 || r->hold < INFINITY) return 0;
   for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m ? 0 : 2)) return 0;
   for (int j = 0; j < r->s->stops; j++) if (!r->instant.side[j]) return 0;
   return 1;

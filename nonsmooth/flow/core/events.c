@@ -348,7 +348,8 @@ static void settle_instant(Run *r) {
   i->tied = -1;
   if (kind == IMPACT_GUARD) {
     const double *gap = gaps(r, r->x);
-    if (jumped && !(fabs(gap[r->now.index[row]]) <= r->o.atol && gap[r->c + r->now.index[row]] < 0)) row = -1;
+    int j = r->now.index[row] - r->m;
+    if (jumped && !(fabs(gap[j]) <= r->o.atol && gap[r->c + j] < 0)) row = -1;
   } else if (jumped) row = -1;
   if (row >= 0) {
     keep_truths(r);

@@ -5,7 +5,8 @@ int64_t field_size(void) { return sizeof(Field); }
 /* Numbers that the work of a field needs. */
 int64_t field_work(const Field *f) {
   int64_t stride = f->order + 1;
-  return f->series.size * stride + (f->n + f->watched) * stride + f->n;
+  int64_t numbers = f->columns * f->n + 2 * f->derivatives.count;
+  return f->series.size * stride + (f->n * (1 + f->columns) + f->watched) * stride + f->n + numbers / 2 + 1;
 }
 
 /* Move z (n) along a smooth field by a duration of either sign. The time that is left where the field is not

@@ -1,17 +1,22 @@
 /* Steps of a flow without events: nonsmooth/flow/fixed.py -------------------------------------------------- */
 
 /* A smooth field of n states and functions that are watched along it, as the outputs of one program; errors of
- * states of one group have one scale, those of group -1 are exact. */
+ * states of one group have one scale, those of group -1 are exact. After the states come columns of derivatives, by
+ * the start and by parameters; the program's last outputs are entries of the field's derivatives, row after row, by
+ * the states and by those parameters. */
 typedef struct {
-  int32_t n, watched, order, groups;
+  int32_t n, watched, order, groups, starts, columns;
   const int32_t *group;
   Series series;
+  Entries derivatives;
 } Field;
 
-/* A flow on its way: series of the rules, of the states and of what is watched, and what is left. */
+/* A flow on its way: series of the rules, of the states, of what is watched and of columns, and what is left. Of the
+ * columns and of the field's derivatives: terms up to the last that is not zero. */
 typedef struct {
   const Field *field;
-  double *rules, *states, *watched, *input;
+  double *rules, *states, *watched, *input, *columns;
+  int32_t *terms, *bend;
   double whole, left, sign, tol;
 } Flow;
 
@@ -23,6 +28,9 @@ static Flow flow_of(const Field *f, const double *p, double duration, double tol
   w.states = work + f->series.size * stride;
   w.watched = w.states + f->n * stride;
   w.input = w.watched + f->watched * stride;
+  w.columns = w.input + f->n;
+  w.terms = (int32_t *)(w.columns + (int64_t)f->columns * f->n * stride);
+  w.bend = w.terms + f->columns * f->n;
   memset(w.rules, 0, sizeof(double) * f->series.size * stride);
   series_prepare(&f->series, stride, p, w.rules);
   return w;
@@ -34,6 +42,45 @@ static void field_at(Flow *w, const double *z, double *rate) {
   int64_t stride = w->field->order + 1;
   series_rules(t, t->moving, t->moving_count, 0, stride, z, w->rules);
   for (int i = 0; i < w->field->n; i++) rate[i] = w->rules[t->output[i] * stride];
+}
+
+/* Series of a column of derivatives: sums of products with those of the field. */
+static void expand_column(Flow *w, int column, const double *z) {
+  const Field *f = w->field;
+  const Entries *g = &f->derivatives;
+  int n = f->n, order = f->order, moves = 0, count = 0;
+  int64_t stride = order + 1;
+  double *own = w->columns + column * n * stride;
+  int32_t *terms = w->terms + column * n, *active = w->bend + g->count;
+  memset(own, 0, sizeof(double) * n * stride);
+  for (int i = 0; i < n; i++) {
+    own[i * stride] = z[(column + 1) * n + i];
+    moves |= terms[i] = own[i * stride] != 0;
+  }
+  for (int q = 0; q < g->count; q++) {
+    int of_p = g->column[q] - n == column - f->starts;
+    moves |= of_p;
+    if (w->bend[q] && (g->column[q] < n || of_p)) active[count++] = q;
+  }
+  for (int k = 0; moves && k < order; k++) {
+    double part = 1;
+    part /= k + 1;
+    for (int a = 0; a < count;) {
+      int row = g->row[active[a]];
+      double sum = 0;
+      for (; a < count && g->row[active[a]] == row; a++) {
+        int q = active[a], j = g->column[q], bend = w->bend[q], first = k < bend ? 0 : k + 1 - bend;
+        const double *c = w->rules + f->series.output[n + f->watched + q] * stride, *d = own + j * stride;
+        int last = j >= n ? -1 : terms[j] <= k ? terms[j] - 1 : k;
+        if (j >= n) sum += c[k];
+        else if (first == last) sum += d[first] * c[k - first];
+        else if (first < last) sum += convolve(d, c, k, first, last);
+      }
+      if (sum == 0) continue;
+      own[row * stride + k + 1] = sum * part;
+      terms[row] = k + 2;
+    }
+  }
 }
 
 /* Series of states and of what is watched at a state; whether they are finite. */
@@ -50,8 +97,15 @@ static int expand_flow(Flow *w, const double *z) {
       for (int i = 0; i < n; i++) w->states[i * stride + k + 1] = w->rules[t->output[i] * stride + k] / (k + 1);
     for (int j = 0; j < f->watched; j++) w->watched[j * stride + k] = w->rules[t->output[n + j] * stride + k];
   }
+  for (int q = 0; q < f->derivatives.count; q++) {
+    const double *c = w->rules + t->output[n + f->watched + q] * stride;
+    w->bend[q] = order;
+    while (w->bend[q] && c[w->bend[q] - 1] == 0) w->bend[q]--;
+  }
+  for (int column = 0; column < f->columns; column++) expand_column(w, column, z);
   double zero = 0;
   for (int64_t i = 0; i < n * stride; i++) zero += 0 * w->states[i];
+  for (int64_t i = 0; i < f->columns * n * stride; i++) zero += 0 * w->columns[i];
   return zero == 0;
 }
 
@@ -63,6 +117,21 @@ static double scaled_step(const Flow *w, double size, double rate, double before
   if (final > 0) h = pow(allowed / final, 1.0 / order);
   if (before > 0) h = smaller(pow(allowed / before, 1.0 / (order - 1)), h);
   return h;
+}
+
+/* Step for columns from one to another, of which what moves has one scale. */
+static double column_steps(const Flow *w, int from, int to) {
+  int order = w->field->order;
+  double size = 0, rate = 0, before = 0, final = 0;
+  for (int64_t i = (int64_t)from * w->field->n; i < (int64_t)to * w->field->n; i++) {
+    const double *own = w->columns + i * (order + 1);
+    if (w->terms[i] < 2) continue;
+    size = larger(fabs(own[0]), size);
+    rate = larger(fabs(own[1]), rate);
+    before = larger(fabs(own[order - 1]), before);
+    final = larger(fabs(own[order]), final);
+  }
+  return scaled_step(w, size, rate, before, final);
 }
 
 /* Length of the next step; not above zero where it is too small. */
@@ -86,6 +155,7 @@ static double flow_step(const Flow *w) {
     const double *own = w->watched + (int64_t)j * (order + 1);
     h = smaller(scaled_step(w, fabs(own[0]), fabs(own[1]), fabs(own[order - 1]), fabs(own[order])), h);
   }
+  h = smaller(column_steps(w, 0, f->starts), smaller(column_steps(w, f->starts, f->columns), h));
   if (!(h > FIXED_SHORTEST * w->whole)) return 0;
   /* Two equal steps rather than a long one and the rest of it. */
   if (h >= w->left) return w->left;
@@ -94,11 +164,14 @@ static double flow_step(const Flow *w) {
 
 /* Move z by a step. */
 static void advance_flow(Flow *w, double h, double *z) {
-  int order = w->field->order;
-  for (int i = 0; i < w->field->n; i++) {
-    const double *c = w->states + (int64_t)i * (order + 1);
-    double x = w->sign * h, sum = c[order];
-    for (int k = order - 1; k >= 0; k--) sum = sum * x + c[k];
+  const Field *f = w->field;
+  int order = f->order;
+  for (int64_t i = 0; i < (int64_t)f->n * (1 + f->columns); i++) {
+    const double *c = i < f->n ? w->states + i * (order + 1) : w->columns + (i - f->n) * (order + 1);
+    double x = w->sign * h;
+    int k = i < f->n ? order : w->terms[i - f->n] - 1;
+    double sum = k < 0 ? 0 : c[k];
+    for (k--; k >= 0; k--) sum = sum * x + c[k];
     z[i] = sum;
   }
   w->left -= h;

@@ -10,48 +10,13 @@ static const double *slope_row(const Run *r, int i, int j) {
   return output < 0 ? zero : row_of(r, r->n + 3 * r->width + r->s->rules.atoms + output);
 }
 
-/* The sign of a bound's first coefficient that is not zero; one that rounding has left before it passes zero is. */
-static double turn_of(const Run *r, int i, const double *factor, int count) {
-  const Entries *g = &r->s->factor_gradient;
-  int k = 0;
-  while (k < count && factor[k] == 0) k++;
-  if (k == 0 && count > 1 && factor[0] * factor[1] < 0) {
-    double rounding = 0;
-    for (int e = 0; e < g->count; e++) {
-      double slope = fabs(out_of(&r->s->point, r->point, first_of_factors(r) + e));
-      if (g->row[e] == i && slope < INFINITY) rounding += slope * fabs(r->expansion->states[(int64_t)g->column[e] * r->stride]);
-    }
-    k = fabs(factor[0]) <= VANISHES * rounding;
-  }
-  return k < count ? ns_sign(factor[k]) : 1;
-}
-
 /* Guards from the series (or, with count 1, values) of what they are made of. */
 static void guard_rows(Run *r, const Layout *l, const double *series, int count, double *guards) {
-  int w = r->width, n = r->n, stride = r->stride;
   for (int row = 0; row < l->rows; row++) {
-    int kind = l->kind[row], i = l->index[row], side = l->side[row];
-    double *g = guards + (int64_t)row * stride;
-    if (kind == SURFACE_GUARD || kind == IMPACT_GUARD) {
-      const double *h = row_of(r, n + w + i + (kind == IMPACT_GUARD ? r->m : 0));
-      for (int k = 0; k < count; k++) g[k] = side * h[k];
-    } else if (kind == RELEASE_GUARD) {
-      memcpy(g, series + (int64_t)(r->m + i) * stride, sizeof(double) * count);
-    } else if (kind == EXIT_GUARD && is_idle(r, l->letter, i)) {
-      const double *layer = row_of(r, n + i);
-      for (int k = 0; k < count; k++) g[k] = -side * layer[k];
-    } else if (kind == EXIT_GUARD) {
-      const double *factor = row_of(r, n + 2 * w + i), *lam = series + (int64_t)i * stride;
-      double turn = turn_of(r, i, factor, count);
-      for (int k = 0; k < count; k++) g[k] = turn * (factor[k] - side * lam[k]);
-    } else if (kind == NEAR_GUARD || kind == SLIP_GUARD) {
-      set_row(r, l, row, series, count, g);
-    } else if (kind == BRANCH_GUARD) {
-      branch_row(r, l, row, count, g);
-    } else {
-      const double *stop = row_of(r, n + 3 * w + row - l->atoms);
-      memcpy(g, stop, sizeof(double) * count);
-    }
+    double *g = guards + (int64_t)row * r->stride;
+    if (row < l->atoms) law_of(r, l->index[row])->guard(r, l, row, series, count, g);
+    else if (l->kind[row] == BRANCH_GUARD) branch_row(r, l, row, count, g);
+    else memcpy(g, row_of(r, r->n + 3 * r->width + row - l->atoms), sizeof(double) * count);
   }
 }
 
@@ -68,12 +33,17 @@ static void follow_layer(Run *r, Expansion *e, int k, const int32_t *start) {
   }
 }
 
-/* Coefficient k of states and multipliers as the inputs of the series. */
+/* Coefficient k of states and multipliers as the inputs of the series; multipliers of sets move. */
 static void inputs_of(Run *r, const Expansion *e, int k) {
   double *x = r->vector, *lam = x + r->n;
+  const double *held = k ? r->none : r->held;
   for (int i = 0; i < r->n; i++) x[i] = e->states[(int64_t)i * r->stride + k];
   for (int i = 0; i < r->width; i++) lam[i] = e->series[(int64_t)i * r->stride + k];
-  set_inputs(r, x, k ? r->none : r->held, lam);
+  if (k && r->s->sets) {
+    for (int i = 0; i < r->width; i++) r->later[i] = r->moving[i] ? e->lambda[(int64_t)i * r->stride + k] : 0;
+    held = r->later;
+  }
+  set_inputs(r, x, held, lam);
 }
 
 static void next_states(Run *r, Expansion *e, int k) {
@@ -81,22 +51,39 @@ static void next_states(Run *r, Expansion *e, int k) {
   for (int i = 0; i < r->n; i++) e->states[(int64_t)i * r->stride + k + 1] = row_of(r, i)[k] * part;
 }
 
-/* Coefficients of all that a mode needs in which something slides; ``start`` are places in the inverse. */
-static void sliding_series(Run *r, Expansion *e, const int32_t *start) {
-  const Series *t = &r->s->series;
-  int order = r->order, stride = r->stride;
-  for (int k = 0; k <= order; k++) {
-    inputs_of(r, e, k);
-    if (k == 0) series_at(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
-    else {
-      series_at(t, t->later, t->later_count, k, stride, r->input, r->series);
-      if (e->l.slides) {
-        follow_layer(r, e, k, start);
-        inputs_of(r, e, k);
-        series_at(t, t->late, t->late_count, k, stride, r->input, r->series);
-      }
-    }
-    if (k < order) next_states(r, e, k);
+/* Coefficients k of all that is known without unknowns of that order, directions of sets with them. */
+static void open_order(Run *r, Expansion *e, int k) {
+  const Series *t = r->s->sets && e->l.is_free ? &r->s->free : &r->s->series;
+  int stride = r->stride;
+  inputs_of(r, e, k);
+  if (k == 0 || !r->s->sets) {
+    series_at(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, stride, r->input, r->series);
+    if (!r->s->sets) return;
+  } else if (e->l.is_free) series_at(t, r->s->early_free, r->s->early_free_count, k, stride, r->input, r->series);
+  else series_at(t, r->s->early, r->s->early_count, k, stride, r->input, r->series);
+  follow_sets(r, e, k);
+  if (k == 0) return;
+  inputs_of(r, e, k);
+  series_at(t, t->late, t->late_count, k, stride, r->input, r->series);
+}
+
+/* What the unknowns of order k add. */
+static void close_order(Run *r, Expansion *e, int k) {
+  const Series *t = r->s->sets && e->l.is_free ? &r->s->free : &r->s->series;
+  inputs_of(r, e, k);
+  series_at(t, k ? t->late : t->moving, k ? t->late_count : t->moving_count, k, r->stride, r->input, r->series);
+}
+
+/* Coefficients of all that a mode needs in which something slides, or with sets; ``start`` are places in the inverse. */
+static void mode_series(Run *r, Expansion *e, const int32_t *start) {
+  int leaving = begin_directions(r, e);
+  for (int k = 0; k <= r->order; k++) {
+    open_order(r, e, k);
+    if (leaving) leave_sets(r, e, k);
+    else if (k && e->l.slides) follow_layer(r, e, k, start);
+    if (k && (leaving || e->l.slides)) close_order(r, e, k);
+    if (r->s->sets) close_sets(r, e, k);
+    if (k < r->order) next_states(r, e, k);
   }
 }
 
@@ -121,6 +108,12 @@ static void first_values(Run *r, int is_free) {
   series_at(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
 }
 
+/* Rounding of the values that were computed last, in units of EPSILON. */
+static void weigh_rounding(Run *r, int is_free, double size) {
+  const Series *t = is_free ? &r->s->free : &r->s->series;
+  series_rounding(t, t->moving, t->moving_count, r->stride, size, r->series, r->rounding);
+}
+
 static void jets(Run *r, Expansion *e) {
   int slides = e->l.slides;
   int32_t *start = r->sparse, *column = start + slides + 1, count = 0;
@@ -132,7 +125,7 @@ static void jets(Run *r, Expansion *e) {
       for (int j = 0; j < slides; j++) if (e->inverse[i * slides + j] != 0) column[count++] = j;
     }
     start[slides] = count;
-    if (r->s->sets) set_series(r, e, start); else sliding_series(r, e, start);
+    mode_series(r, e, start);
     if (r->s->sets) measure_limits(r, e);
   }
   guard_rows(r, &e->l, e->series, r->order + 1, e->guards);
@@ -184,7 +177,7 @@ static void allow_for_roots(Run *r, Expansion *e) {
   for (int i = 0; i < r->m; i++) r->rates[i] = out_of(&r->s->surfaces, r->heights, i);
   for (int q = 0; q < g->count; q++) {
     int i = g->row[q], k = g->column[q];
-    if (i >= r->m || r->s->power[i] == 0 || e->l.letter[i] == 0 || k >= r->s->dimension) continue;
+    if (i >= r->m || element(r, i)->power == 0 || e->l.letter[i] == 0 || k >= r->s->dimension) continue;
     double slope = fabs(out_of(&r->s->surfaces, r->heights, r->kept_rows + q));
     double allowed = slope > 0 ? larger(SAFETY * r->o.rtol * fabs(h[i]) / slope, EPSILON * EPSILON) : INFINITY;
     e->allowed[k] = smaller(e->allowed[k], larger(allowed, EPSILON * fabs(state[k])));

@@ -54,17 +54,15 @@ static int continues(Run *r, const int8_t *letter, const Known *known, int known
   result->strict = 1;
   memset(result->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < e->l.rows; row++) {
-    int kind = e->l.kind[row], index = e->l.index[row], of = index, active = 0, zeros = 0;
+    int kind = e->l.kind[row], index = e->l.index[row], active = 0, zeros = 0;
     if (is_atom(kind)) continue;
     if (kind == NEAR_GUARD && letter[index] == 0) continue; /* ends steps only */
-    if (kind == IMPACT_GUARD || kind == RELEASE_GUARD) of += r->m;
-    for (int i = 0; i < r->active_count; i++) active |= r->active[i] == of;
+    for (int i = 0; i < r->active_count; i++) active |= r->active[i] == index;
     if (!active) continue;
     for (int i = 0; i < known_count; i++)
       if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row]) zeros = known[i].zeros;
-    if (kind == SURFACE_GUARD && zeros < r->s->degree[index]) zeros = r->s->degree[index];
-    if (kind == NEAR_GUARD && zeros < 1) zeros = 1;
-    if (kind == IMPACT_GUARD && zeros < 2) zeros = 2;
+    int least = kind == SURFACE_GUARD || kind == NEAR_GUARD || kind == IMPACT_GUARD ? degree_of(r, index) : 0;
+    if (zeros < least) zeros = least;
     double value;
     int k = leading(r, e, row, zeros, &value);
     if (value < 0) return 0;
@@ -593,7 +591,7 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   row = first_hit(r, f, s, &ds);
   memset(r->instant.passing, 0, r->s->rules.atoms);
   for (int k = 0; k < f->l.rows; k++) if (f->l.kind[k] == BRANCH_GUARD && (last < 0 || k == row)) last = k;
-  if (last < 0 || (row >= 0 && row != last && ds < s)) return -1;
+  if (last < 0 || (row >= 0 && row != last && ds < s) || r->hold < s) return -1;
   note_sides(r, f, s);
   for (int i = 0; i < r->width; i++) end[i] = value_at(f->series + (int64_t)i * stride, order, s);
   for (int i = 0; i < r->n; i++) r->before[i] = value_at(f->states + (int64_t)i * stride, order, s);

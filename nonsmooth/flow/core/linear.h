@@ -98,12 +98,14 @@ static int eliminate(double *a, int rows, int columns, int more, int32_t *pivot,
   return rank;
 }
 
-/* Solve a x = b, in place of b, unknowns that are not determined being zero; 0 where there is no solution. */
-static int solve_any(double *a, double *b, int n, double *work, int32_t *pivot) {
+/* Solve a x = b, in place of b, unknowns that are not determined being zero; 0 where rows that depend on others differ
+ * from them by more than the part ``tie``. */
+static int solve_any(double *a, double *b, int n, double tie, double *work, int32_t *pivot) {
   double *unit = work, *all = work + n, most = 0, rest = 0;
   if (n == 1) {
-    if (a[0] != 0) { b[0] /= a[0]; return isfinite(b[0]); }
-    return b[0] == 0;
+    int fits = a[0] != 0 || b[0] == 0 || tie == INFINITY;
+    b[0] = a[0] != 0 ? b[0] / a[0] : 0;
+    return fits && isfinite(b[0]);
   }
   for (int i = 0; i < n; i++) {
     double *row = all + (int64_t)i * (n + 1);
@@ -117,7 +119,7 @@ static int solve_any(double *a, double *b, int n, double *work, int32_t *pivot) 
   }
   for (int i = 0; i < n; i++) b[i] = 0;
   for (int i = 0; i < rank; i++) b[pivot[i]] = all[(int64_t)i * (n + 1) + n] / unit[pivot[i]];
-  return rest <= TIED * most && finite_all(b, n);
+  return !(rest > tie * most) && finite_all(b, n);
 }
 
 /* Vectors z with E z = 0 for E (rows, columns), one after the other; their number. */

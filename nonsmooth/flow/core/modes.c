@@ -1,11 +1,21 @@
 /* Modes: nonsmooth/model/laws/coupled.py --------------------------------------------------------------------- */
 
+static const Element *element(const Run *r, int i) { return r->s->element + i; }
+static int degree_of(const Run *r, int i) { return element(r, i)->degree; }
+static int is_scaled(const Run *r, int i) { return element(r, i)->flags & SCALED; }
+static int size_of(const Run *r, int i) { return element(r, i)->k; }
+
+/* The set of a function, as its first one, or -1; all sets. */
+static int set_of(const Run *r, int i) { return element(r, i)->law == SET_LAW ? element(r, i)->first : -1; }
+#define EACH_SET(run, set) \
+  for (int set = 0; set < ((run)->s->sets ? (run)->m : 0); set++) if (set_of(run, set) == set)
+
 /* Whether a multiplier makes no difference: on its surface, or where all contacts are open that carry it. */
 static int is_idle(const Run *r, const int8_t *letter, int i) {
   const System *s = r->s;
   int carried = 0;
   if (i >= r->m) return 0;
-  if (s->continuous[i]) return 1;
+  if (element(r, i)->flags & CONTINUOUS) return 1;
   for (int j = 0; j < r->c; j++) {
     if (!s->carries[i * r->c + j]) continue;
     if (!letter[r->m + j]) return 0;
@@ -25,8 +35,7 @@ static int is_atom(int kind) { return kind == STOP_GUARD || kind == RESET_GUARD 
 /* Whether a guard is more than an affine function of the states, whose polynomial needs no check. */
 static int is_bent(const Run *r, int kind, int index) {
   const int32_t *bent = r->s->bent_guards;
-  if (kind == SURFACE_GUARD) return bent[index];
-  if (kind == IMPACT_GUARD) return bent[r->m + index];
+  if (kind == SURFACE_GUARD || kind == IMPACT_GUARD) return bent[index];
   if (kind == STOP_GUARD) return bent[r->width + index];
   if (kind == RESET_GUARD) return bent[r->width + r->s->stops + index];
   if (kind == ATOM_GUARD) return bent[r->width + r->s->stops + r->s->resets + index];
@@ -60,10 +69,7 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
   for (int i = 0; i < r->width; i++) {
     l->is_free &= letter[i] != 0 && letter[i] != LEAVING;
     if (letter[i] == 0 && !is_idle(r, letter, i)) l->sliding[l->slides++] = i;
-    if (i >= r->m) add_row(l, letter[i] ? IMPACT_GUARD : RELEASE_GUARD, i - r->m, letter[i]);
-    else if (set_of(r, i) >= 0) lay_out_set(r, l, i);
-    else if (letter[i]) add_row(l, SURFACE_GUARD, i, letter[i]);
-    else { add_row(l, EXIT_GUARD, i, 1); add_row(l, EXIT_GUARD, i, -1); }
+    if (i == element(r, i)->first) law_of(r, i)->lay_out(r, l, i);
   }
   l->atoms = l->rows;
   for (int a = 0; a < s->rules.atoms; a++) {
@@ -83,7 +89,7 @@ static const double *held_of(Run *r, const int8_t *letter) {
 }
 
 /* Whether a switching function is of a set off which the mode is. */
-static int is_moving(const Run *r, int i) { return r->s->sets && r->moving[i]; }
+static int is_moving(const Run *r, int i) { return r->s->sets && r->moving[i]; } /* a contact never is */
 
 /* The moving inputs: states, lambda and reactions, then nu. */
 static void set_inputs(Run *r, const double *x, const double *held, const double *unknowns) {
@@ -91,9 +97,9 @@ static void set_inputs(Run *r, const double *x, const double *held, const double
   memcpy(in, x, sizeof(double) * r->n);
   in += r->n;
   for (int i = 0; i < r->width; i++)
-    in[i] = held[i] + (i < r->m && (r->s->scaled[i] || is_moving(r, i)) ? 0 : unknowns[i]);
+    in[i] = held[i] + (is_scaled(r, i) || is_moving(r, i) ? 0 : unknowns[i]);
   in += r->width;
-  for (int i = 0; i < r->m; i++) if (r->s->scaled[i]) *in++ = is_moving(r, i) ? 0 : unknowns[i];
+  for (int i = 0; i < r->m; i++) if (is_scaled(r, i)) *in++ = is_moving(r, i) ? 0 : unknowns[i];
 }
 
 static double out_of(const Values *t, const double *w, int k) { return w[t->output[k]]; }
@@ -121,10 +127,6 @@ static void gradient_sums(const Run *r, const Values *t, const double *w, int fi
   }
 }
 
-/* Sums over the states of |gradient| times a vector: of layer, surfaces and gaps, stops and resets, factors; of
- * surfaces, gaps, stops and resets only where nothing slides. */
-typedef struct { double *layer, *height, *stop, *factor; } Sums;
-
 static int first_of_factors(const Run *r) {
   const System *s = r->s;
   return 2 * r->width + s->slope.count + s->layer_gradient.count + s->height_gradient.count + s->stop_gradient.count;
@@ -148,7 +150,8 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
   int w = r->width, slides = l->slides, stops = r->s->rules.atoms;
   double *layer = r->small, *height = layer + w, *stop = height + w, *through = stop + stops, *factor = through + w;
   double worst = 0;
-  point_sums(r, l->is_free, vector, finite_only, &(Sums){layer, height, stop, factor});
+  Sums of = {layer, height, stop, factor};
+  point_sums(r, l->is_free, vector, finite_only, &of);
   if (!l->is_free) {
     for (int i = 0; i < slides; i++) {
       through[i] = 0;
@@ -162,16 +165,8 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
     for (int i = 0; i < w; i++) worst = larger(layer[i], worst);
   }
   for (int row = 0; row < l->rows; row++) {
-    int kind = l->kind[row], index = l->index[row];
-    if (kind == SURFACE_GUARD) result[row] = height[index];
-    else if (kind == IMPACT_GUARD) result[row] = height[r->m + index];
-    else if (kind == EXIT_GUARD) result[row] = layer[index];
-    else if (kind == RELEASE_GUARD) result[row] = layer[r->m + index];
-    else if (kind == STOP_GUARD) result[row] = stop[index];
-    else if (kind == RESET_GUARD) result[row] = stop[r->s->stops + index];
-    else if (kind == ATOM_GUARD) result[row] = stop[r->s->stops + r->s->resets + index];
-    else if (kind == NEAR_GUARD || kind == SLIP_GUARD) result[row] = set_sum(r, e, row, height, layer, factor);
-    else result[row] = worst;
+    int atom = row - l->atoms;
+    result[row] = atom < 0 ? law_of(r, l->index[row])->rounding(r, e, row, &of) : atom < stops ? stop[atom] : worst;
   }
 }
 

@@ -245,6 +245,34 @@ static void series_rules(const Series *t, const int32_t *which, int32_t count, i
   }
 }
 
+/* Rounding of the values of some rules, in units of EPSILON, from that of their inputs, of the ``size`` that
+ * these have at least: 0 for none. */
+static void series_rounding(const Series *t, const int32_t *which, int32_t count, int stride, double size,
+                            const double *s, double *error) {
+  for (int32_t l = 0; l < count; l++) {
+    int32_t j = which[l];
+    double u = s[(int64_t)t->a[j] * stride], v = s[(int64_t)t->b[j] * stride], w = s[(int64_t)j * stride];
+    double of_u = error[t->a[j]], of_v = error[t->b[j]], sum = 0;
+    switch (t->rule[j]) {
+      case RULE_input: error[j] = size > 0 ? size + fabs(w) : 0; continue;
+      case RULE_add: case RULE_shift: case RULE_sub: case RULE_lower: case RULE_below: sum = of_u + of_v; break;
+      case RULE_neg: error[j] = of_u; continue;
+      case RULE_twice: error[j] = 2 * of_u; continue;
+      case RULE_scale: case RULE_mul: sum = fabs(u) * of_v + fabs(v) * of_u; break;
+      case RULE_over: case RULE_div: case RULE_under: sum = over(of_u + fabs(w) * of_v, fabs(v)); break;
+      case RULE_sq: sum = 2 * fabs(u) * of_u; break;
+      case RULE_sqrt: sum = over(0.5 * of_u, w); break;
+      case RULE_power: sum = over(fabs(w * v) * of_u, fabs(u)); break;
+      case RULE_affine: sum = fabs(t->second[j]) * of_u + fabs(t->first[j]); break;
+      case RULE_integral: case RULE_turn: sum = fabs(t->first[j] * v) * of_u; break;
+      case RULE_quotient: sum = over(fabs(t->first[j]) * of_u, fabs(v)); break;
+      case RULE_atan2: sum = over(fabs(u) * of_v + fabs(v) * of_u, s[(int64_t)t->c[j] * stride]); break;
+      case RULE_gated: case RULE_chosen: error[j] = of_v; continue;
+    }
+    error[j] = sum + fabs(w);
+  }
+}
+
 /* What does not move: constants, parameters and operations of them; later coefficients stay zero. */
 static void series_prepare(const Series *t, int stride, const double *p, double *s) {
   for (int32_t l = 0; l < t->still_count; l++) {

@@ -60,7 +60,7 @@ static void sample_step(Run *r, const Expansion *e, double dt) {
 static void count_hit(Run *r, int kind, int guard, int index, int side, const double *x) {
   const Options *o = &r->o;
   if (!(o->hit_kinds >> kind & 1) || !o->hit_named[guard * o->hit_width + index]) return;
-  if ((o->hit_side && side != o->hit_side) || (r->t - r->begun.high) + (r->t_low - r->begun.low) <= AT_END * larger(1, time_scale(r))) return;
+  if ((o->hit_side && side != o->hit_side) || r->t <= r->begun.high) return; /* the start is no hit */
   r->hits++;
   if (r->hits <= o->hit_skip || (r->hits - o->hit_skip) % o->hit_every) return;
   /* Before the jumps of the instant, or after them. */
@@ -92,11 +92,11 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
     memcpy(r->out.event_after_x + k * r->n, r->x, sizeof(double) * r->n);
     r->out.event_before[k] = before;
     r->out.event_after[k] = r->mode;
-    r->out.event_guard[k] = guard;
+    r->out.event_guard[k] = guard < 0 ? -1 : ((r->met.index << 2) + r->met.side + 1) * 16 + r->met.kind;
     write_motion(r, r->out.event_motion + k * r->s->rules.width);
   }
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, r->met.index, r->met.side, x);
-  if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, 0, 0, x); /* impacts that accumulated */
+  if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, r->m, 0, x); /* impacts that accumulated */
   if (kind == END || kind == STOP) return;
   remember(r, kind, guard);
   if (r->instant.running) return; /* at the end of the instant */

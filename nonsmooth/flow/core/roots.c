@@ -81,11 +81,11 @@ static int grow_off_root(Run *r, int i, double rate, const double *bare, double 
 
 /* Go to a surface with a root that is near; whether it is reached. */
 static int approach_root(Run *r, int i, double h, double level, double left) {
-  double p = r->s->power[i], *with = r->before, *mean = r->at_root, own, bare, share = 0, dt;
+  double p = element(r, i)->power, *with = r->before, *mean = r->at_root, own, bare, share = 0, dt;
   own = field_at_root(r, i, r->x, 1, with);
   bare = field_at_root(r, i, r->x, 0, mean);
   int side = r->letter[i];
-  if (bare * side > 0 && r->s->degree[i] == 1 && fabs(h) <= level) {
+  if (bare * side > 0 && degree_of(r, i) == 1 && fabs(h) <= level) {
     if (pass_balance(r, i, bare, with, left)) return 1;
     if (h * side <= 0 && r->t < r->o.t_end) { /* rounding has put it beyond */
       int32_t which = i;
@@ -99,7 +99,7 @@ static int approach_root(Run *r, int i, double h, double level, double left) {
   if (!(own * h < 0) || bare * h > 0) return 0;
   if (fabs(own - bare) <= ROOT_SHARE * fabs(bare)) share = 1 / (1 + p); /* the root is a power p of the time */
   else if (fabs(bare) <= ROOT_SHARE * fabs(own)) share = 1 - p; /* h' = -k h^p */
-  else if (fabs(h) <= level && r->s->degree[i] == 1) share = 1;
+  else if (fabs(h) <= level && degree_of(r, i) == 1) share = 1;
   if (share == 0) return 0;
   for (int k = 0; k < r->n; k++) mean[k] += share * (with[k] - mean[k]);
   dt = -h / (bare + share * (own - bare));
@@ -109,14 +109,14 @@ static int approach_root(Run *r, int i, double h, double level, double left) {
 
 /* Leave a surface with a root on which the run is; 0 where the motion does not lead away from it. */
 static int leave_root(Run *r, int i, double near, double level, double left) {
-  double p = r->s->power[i], *bare = r->before, *mean = r->at_root, *x = mean + r->n, *with = x + r->n;
+  double p = element(r, i)->power, *bare = r->before, *mean = r->at_root, *x = mean + r->n, *with = x + r->n;
   double rate = field_at_root(r, i, r->x, 0, bare), dt = near / fabs(rate);
   if (!(rate * r->letter[i] > 0)) return grow_off_root(r, i, rate, bare, level, left);
   for (int count = 0; count < DEPTH; count++, dt *= FALL) { /* the root changes the rate by a small part */
     for (int k = 0; k < r->n; k++) x[k] = r->x[k] + dt * bare[k];
     if (fabs(field_at_root(r, i, x, 1, with) - rate) <= ROOT_SHARE * fabs(rate)) break;
   }
-  if (r->s->degree[i] == 1 && dt * fabs(rate) < level && grow_off_root(r, i, rate, bare, level, left)) return 1;
+  if (degree_of(r, i) == 1 && dt * fabs(rate) < level && grow_off_root(r, i, rate, bare, level, left)) return 1;
   for (int k = 0; k < r->n; k++) mean[k] = bare[k] + (with[k] - bare[k]) / (1 + p);
   move_by(r, mean, smaller(dt, left));
   return 1;
@@ -125,12 +125,12 @@ static int leave_root(Run *r, int i, double near, double level, double left) {
 /* Rest on a surface with a root and its lower derivatives where they are below the tolerance: there may be no crossings
  * that accumulate. */
 static int rest_near_root(Run *r, int i) {
-  int before = r->mode, first = r->s->lower_first[i];
+  int before = r->mode, first = element(r, i)->lower;
   int32_t own = i;
   double allowed, left, error;
-  if (r->s->degree[i] == 1) return 0;
+  if (degree_of(r, i) == 1) return 0;
   allowed = KNOWN_TO / SAFETY * r->small[first];
-  for (int k = first; k < first + r->s->degree[i] - 1; k++) if (fabs(r->rates[k]) > KNOWN_TO / SAFETY * r->small[k]) return 0;
+  for (int k = first; k < first + degree_of(r, i) - 1; k++) if (fabs(r->rates[k]) > KNOWN_TO / SAFETY * r->small[k]) return 0;
   if (fabs(field_at_root(r, i, r->x, 1, r->before)) > allowed || is_awaited(r, 0) || !choose_rest(r, &own, 1, 0)) return 0;
   adopt(r, &r->chosen);
   note(r);
@@ -162,7 +162,7 @@ static int is_driven_away(Run *r, int i, int side) {
 static int leaves_by_root(Run *r) {
   for (int q = 0; r->has_roots && q < r->active_count; q++) {
     int i = r->active[q];
-    if (i >= r->m || r->s->power[i] == 0 || r->s->degree[i] != 1) continue;
+    if (i >= r->m || element(r, i)->power == 0 || degree_of(r, i) != 1) continue;
     int8_t kept = r->letter[i];
     for (int side = 1; side >= -1; side -= 2) {
       int is_free = r->chosen.letter[i] != side && is_driven_away(r, i, side);
@@ -182,7 +182,7 @@ static int leaves_by_root(Run *r) {
 /* Pass a surface with a root, where no series converges; whether the run has moved. */
 static int pass_root(Run *r, double left) {
   for (int i = 0; i < r->m; i++) {
-    if (r->s->power[i] == 0 || r->letter[i] == 0) continue;
+    if (element(r, i)->power == 0 || r->letter[i] == 0) continue;
     double h = surface_values(r, r->x)[i], near = near_root(r, i);
     if (!(fabs(h) <= near)) continue;
     if (rest_near_root(r, i)) return 1;

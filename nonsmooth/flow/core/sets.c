@@ -15,17 +15,12 @@ static double unit_of(const double *h, int k, double *u) {
   return r;
 }
 
-static int first_of(const Run *r, int set) { return r->s->set_first[set]; }
-static int size_of(const Run *r, int set) { return r->s->set_size[set]; }
-static int off_letter(const Run *r, int i) { return r->idle[r->s->set_of[i]] ? IDLE : OFF; }
-static int set_of(const Run *r, int i) { return r->s->sets && i < r->m ? r->s->set_of[i] : -1; }
-
 /* Multipliers of the sets at a state; ``unknowns`` are h of those left behind, and directions of those that are
  * being left. */
 static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns) {
   const double *h = 0;
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s), k = size_of(r, s);
+  EACH_SET(r, f) {
+    int k = size_of(r, f);
     double *u = r->direction + f;
     for (int i = f; i < f + k; i++) r->moving[i] = letter[f] > 1 && letter[f] != IDLE;
     if (letter[f] < OFF || letter[f] == IDLE) { for (int i = 0; i < k; i++) u[i] = 0; continue; }
@@ -50,18 +45,18 @@ static void aim_again(Run *r, const Expansion *e) {
 /* Series ------------------------------------------------------------------------------------------- */
 
 /* Coefficient k of h/|h| from that of h, both in units of |h| at the start. */
-static void push_direction(Run *r, Expansion *e, int set, int k, const double *h, int apart) {
-  int f = first_of(r, set), size = size_of(r, set), stride = r->stride;
-  double *root = e->root + (int64_t)set * stride, square = 0, curved = 0;
+static void push_direction(Run *r, Expansion *e, int f, int k, const double *h, int apart) {
+  int size = size_of(r, f), stride = r->stride;
+  double *root = e->root + (int64_t)f * stride, square = 0, curved = 0;
   if (k == 0) {
     double first[3];
     for (int i = 0; i < size; i++) first[i] = h[(int64_t)i * apart];
-    e->radius[set] = length_of(first, size);
-    e->per_radius[set] = 1 / e->radius[set];
+    e->radius[f] = length_of(first, size);
+    e->per_radius[f] = 1 / e->radius[f];
   }
   for (int i = 0; i < size; i++) {
     double *own = e->apart + (int64_t)(f + i) * stride;
-    own[k] = h[(int64_t)i * apart] * e->per_radius[set];
+    own[k] = h[(int64_t)i * apart] * e->per_radius[f];
     square += own[0] * own[k];
     if (k > 1) curved += convolve(own, own, k, 1, k - 1);
   }
@@ -76,85 +71,107 @@ static void push_direction(Run *r, Expansion *e, int set, int k, const double *h
 /* Coefficients k of the sets off which the mode is. */
 static void follow_sets(Run *r, Expansion *e, int k) {
   int stride = r->stride;
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s), size = size_of(r, s), letter = e->l.letter[f];
-    if (letter == LEFT_BEHIND) push_direction(r, e, s, k, e->series + (int64_t)f * stride + k, stride);
+  EACH_SET(r, f) {
+    int size = size_of(r, f), letter = e->l.letter[f];
+    if (letter == LEFT_BEHIND) push_direction(r, e, f, k, e->series + (int64_t)f * stride + k, stride);
     else if (letter == OFF) {
       double h[3];
       for (int i = 0; i < size; i++) h[i] = row_of(r, r->n + r->width + f + i)[k];
-      push_direction(r, e, s, k, h, 1);
+      push_direction(r, e, f, k, h, 1);
     }
   }
 }
 
-/* Coefficients k of directions in which sets are left and k + 1 of the distances, with those of what slides. */
-static void leave_sets(Run *r, Expansion *e, int k) {
-  int slides = e->l.slides, n = 0, sets = 0, stride = r->stride, w = r->width;
+/* Rates at which sets are left, in the directions in which they are. */
+static void leave_at_rates(Run *r, Expansion *e) {
+  int w = r->width, stride = r->stride;
+  EACH_SET(r, f) {
+    int size = size_of(r, f);
+    if (e->l.letter[f] != LEAVING) continue;
+    double *radius = e->rates + (int64_t)f * (stride + 1), rate = 0, terms = 0;
+    for (int i = 0; i < size; i++) {
+      double u = e->lambda[(int64_t)(f + i) * stride], g = row_of(r, r->n + f + i)[0], sum = fabs(g);
+      for (int j = f; j < f + size; j++) sum += fabs(e->slopes[(f + i) * w + j]);
+      rate += u * g;
+      terms += fabs(u) * sum;
+    }
+    radius[0] = 0;
+    radius[1] = fabs(rate) > VANISHES * terms ? rate : 0;
+    e->radius[f] = 0;
+  }
+}
+
+/* The matrix, r->work, of coefficients k of what slides and of directions in which sets are left, listed as r->pending,
+ * and of coefficients k + 1 of the distances; its rows. ``count``: without the distances. */
+static int leaving_matrix(Run *r, const Expansion *e, int k, int *count) {
+  int slides = e->l.slides, n = 0, sets = 0, stride = r->stride, w = r->width, at = slides;
   int32_t *which = r->pending;
   for (int i = 0; i < slides; i++) which[n++] = e->l.sliding[i];
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s), size = size_of(r, s);
+  EACH_SET(r, f) {
     if (e->l.letter[f] != LEAVING) continue;
-    double *radius = e->rates + (int64_t)s * (stride + 1);
-    if (k == 0) {
-      double rate = 0, terms = 0;
-      for (int i = 0; i < size; i++) {
-        double u = e->lambda[(int64_t)(f + i) * stride], g = row_of(r, r->n + f + i)[0], sum = fabs(g);
-        for (int j = f; j < f + size; j++) sum += fabs(e->slopes[(f + i) * w + j]);
-        rate += u * g;
-        terms += fabs(u) * sum;
-      }
-      radius[0] = 0;
-      radius[1] = fabs(rate) > VANISHES * terms ? rate : 0;
-      e->radius[s] = 0;
-      continue;
-    }
-    for (int i = f; i < f + size; i++) which[n++] = i;
+    for (int i = f; i < f + size_of(r, f); i++) which[n++] = i;
     sets++;
   }
-  if (k == 0) return;
-  int all = n + sets, at = slides, column = n;
-  double *a = r->work, *b = a + (int64_t)all * all;
+  int all = n + sets, column = n;
+  double *a = r->work;
   memset(a, 0, sizeof(double) * all * all);
-  for (int i = 0; i < n; i++) {
-    b[i] = -row_of(r, r->n + which[i])[k];
+  for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) a[i * all + j] = e->slopes[which[i] * w + which[j]];
-  }
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s), size = size_of(r, s);
+  EACH_SET(r, f) {
+    int size = size_of(r, f);
     if (e->l.letter[f] != LEAVING) continue;
-    const double *radius = e->rates + (int64_t)s * (stride + 1);
+    for (int i = f; i < f + size; i++, at++) {
+      double u = e->lambda[(int64_t)i * stride];
+      a[at * all + at] -= (k + 1) * e->rates[(int64_t)f * (stride + 1) + 1];
+      a[at * all + column] = -(k + 1) * u;
+      a[column * all + at] = u;
+    }
+    column++;
+  }
+  *count = n;
+  return all;
+}
+
+/* Coefficients k of directions in which sets are left and k + 1 of the distances, with those of what slides. */
+static void leave_sets(Run *r, Expansion *e, int k) {
+  if (k == 0) { leave_at_rates(r, e); return; }
+  int slides = e->l.slides, stride = r->stride, n, all = leaving_matrix(r, e, k, &n), at = slides, column = n;
+  const int32_t *which = r->pending;
+  double *a = r->work, *b = a + (int64_t)all * all;
+  for (int i = 0; i < n; i++) b[i] = -row_of(r, r->n + which[i])[k];
+  EACH_SET(r, f) {
+    int size = size_of(r, f);
+    if (e->l.letter[f] != LEAVING) continue;
+    const double *radius = e->rates + (int64_t)f * (stride + 1);
     b[column] = 0;
-    for (int i = 0; i < size; i++) {
-      const double *u = e->lambda + (int64_t)(f + i) * stride;
+    for (int i = f; i < f + size; i++, at++) {
+      const double *u = e->lambda + (int64_t)i * stride;
       double sum = 0;
       for (int j = 1; j < k; j++) sum += u[j] * radius[k + 1 - j];
-      b[at + i] += (k + 1) * sum;
-      a[(at + i) * all + at + i] -= (k + 1) * radius[1];
-      a[(at + i) * all + column] = -(k + 1) * u[0];
-      a[column * all + at + i] = u[0];
+      b[at] += (k + 1) * sum;
       b[column] -= 0.5 * (k > 1 ? convolve(u, u, k, 1, k - 1) : 0);
     }
-    at += size;
     column++;
   }
   if (!solve(a, b, all)) for (int i = 0; i < all; i++) b[i] = NAN;
   for (int i = 0; i < slides; i++) e->series[(int64_t)which[i] * stride + k] = b[i];
   for (int i = slides; i < n; i++) e->lambda[(int64_t)which[i] * stride + k] = b[i];
-  for (int s = 0, j = n; s < r->s->sets; s++)
-    if (e->l.letter[first_of(r, s)] == LEAVING) e->rates[(int64_t)s * (stride + 1) + k + 1] = b[j++];
+  at = n;
+  EACH_SET(r, s)
+    if (e->l.letter[s] == LEAVING) e->rates[(int64_t)s * (stride + 1) + k + 1] = b[at++];
 }
 
 /* Coefficients k + 1 of h that is carried along. */
 static void close_sets(Run *r, Expansion *e, int k) {
   int stride = r->stride;
-  for (int s = 0; k < r->order && s < r->s->sets; s++) {
-    int f = first_of(r, s), letter = e->l.letter[f];
+  EACH_SET(r, f) {
+    if (k == r->order) break;
+    int letter = e->l.letter[f];
     if (letter != LEFT_BEHIND && letter != LEAVING) continue;
-    for (int i = f; i < f + size_of(r, s); i++) {
+    for (int i = f; i < f + size_of(r, f); i++) {
       double *h = e->series + (int64_t)i * stride;
       if (letter == LEFT_BEHIND) { h[k + 1] = row_of(r, r->n + i)[k] / (k + 1); continue; }
-      const double *radius = e->rates + (int64_t)s * (stride + 1), *u = e->lambda + (int64_t)i * stride;
+      const double *radius = e->rates + (int64_t)f * (stride + 1), *u = e->lambda + (int64_t)i * stride;
       double sum = 0;
       for (int j = 0; j <= k; j++) sum += u[j] * radius[k + 1 - j];
       h[k + 1] = sum;
@@ -162,48 +179,16 @@ static void close_sets(Run *r, Expansion *e, int k) {
   }
 }
 
-/* Coefficients k of states and multipliers as the inputs of the series. */
-static void inputs_of_sets(Run *r, const Expansion *e, int k) {
-  double *x = r->vector, *lam = x + r->n;
-  for (int i = 0; i < r->n; i++) x[i] = e->states[(int64_t)i * r->stride + k];
-  for (int i = 0; i < r->width; i++) lam[i] = e->series[(int64_t)i * r->stride + k];
-  const double *held = r->held;
-  if (k) {
-    for (int i = 0; i < r->width; i++) r->later[i] = 0;
-    for (int i = 0; i < r->m; i++) if (r->moving[i]) r->later[i] = e->lambda[(int64_t)i * r->stride + k];
-    held = r->later;
+/* Multipliers of sets at the start of the series; whether sets are left. */
+static int begin_directions(Run *r, Expansion *e) {
+  int leaving = 0;
+  if (!r->s->sets) return 0;
+  memset(e->lambda, 0, sizeof(double) * r->width * r->stride); /* the first guess of each order is zero */
+  for (int i = 0; i < r->m; i++) {
+    e->lambda[(int64_t)i * r->stride] = r->direction[i];
+    leaving |= e->l.letter[i] == LEAVING;
   }
-  set_inputs(r, x, held, lam);
-}
-
-/* Coefficients of all that a mode needs. */
-static void set_series(Run *r, Expansion *e, const int32_t *start) {
-  const Series *t = e->l.is_free ? &r->s->free : &r->s->series;
-  const int32_t *early = e->l.is_free ? r->s->early_free : r->s->early;
-  int early_count = e->l.is_free ? r->s->early_free_count : r->s->early_count;
-  int order = r->order, stride = r->stride, leaving = 0;
-  for (int s = 0; s < r->s->sets; s++) leaving |= e->l.letter[first_of(r, s)] == LEAVING;
-  memset(e->lambda, 0, sizeof(double) * r->width * stride); /* the first guess of each order is zero */
-  for (int i = 0; i < r->m; i++) e->lambda[(int64_t)i * stride] = r->direction[i];
-  for (int k = 0; k <= order; k++) {
-    inputs_of_sets(r, e, k);
-    if (k == 0) series_at(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
-    else series_at(t, early, early_count, k, stride, r->input, r->series);
-    follow_sets(r, e, k);
-    if (k) {
-      inputs_of_sets(r, e, k);
-      series_at(t, t->late, t->late_count, k, stride, r->input, r->series);
-    }
-    if (leaving) leave_sets(r, e, k);
-    else if (k && e->l.slides) follow_layer(r, e, k, start);
-    if (k && (leaving || e->l.slides)) {
-      inputs_of_sets(r, e, k);
-      series_at(t, t->late, t->late_count, k, stride, r->input, r->series);
-    }
-    close_sets(r, e, k);
-    if (k < order)
-      for (int i = 0; i < r->n; i++) e->states[(int64_t)i * stride + k + 1] = row_of(r, i)[k] * (1.0 / (k + 1));
-  }
+  return leaving;
 }
 
 /* What the expansion of a mode begins with, besides the states: h that is carried, derivatives of the rates by
@@ -221,11 +206,11 @@ static void begin_sets(Run *r, Expansion *e, const double *unknowns) {
 }
 
 /* Guards: NEAR, how far |h| (or on a set friction's limit) has fallen; SLIP, how far friction can rise. */
-static void set_row(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
-  int i = l->index[row], s = set_of(r, i), size = size_of(r, s), stride = r->stride, letter = l->letter[i];
+static void guard_of_set(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
+  int i = l->index[row], size = size_of(r, i), stride = r->stride, letter = l->letter[i];
   const double *factor = row_of(r, r->n + 2 * r->width + i), *radius = r->expansion->radius;
   if (letter == LEAVING) {
-    if (count > 1) memcpy(g, r->expansion->rates + (int64_t)s * (stride + 1), sizeof(double) * count);
+    if (count > 1) memcpy(g, r->expansion->rates + (int64_t)i * (stride + 1), sizeof(double) * count);
     else {
       double h[3];
       for (int j = 0; j < size; j++) h[j] = series[(int64_t)(i + j) * stride];
@@ -233,7 +218,7 @@ static void set_row(Run *r, const Layout *l, int row, const double *series, int 
     }
     return;
   }
-  double per = radius[s] > 0 ? 1 / radius[s] : 0;
+  double per = radius[i] > 0 ? 1 / radius[i] : 0;
   for (int k = 0; k < count; k++) {
     double sum = 0;
     if (l->kind[row] == SLIP_GUARD) {
@@ -258,28 +243,29 @@ static void set_row(Run *r, const Layout *l, int row, const double *series, int 
 }
 
 /* Error scales of these guards, from those of switching functions, multipliers and factors. */
-static double set_sum(Run *r, const Expansion *e, int row, const double *height, const double *layer,
-                      const double *factor) {
-  int i = e->l.index[row], size = size_of(r, set_of(r, i)), letter = e->l.letter[i];
-  double sum = 0, radius = e->radius[set_of(r, i)];
-  for (int j = i; j < i + size; j++) sum += height[j];
+static double rounding_of_set(Run *r, const Expansion *e, int row, const Sums *of) {
+  int i = e->l.index[row], size = size_of(r, i), letter = e->l.letter[i];
+  double sum = 0, radius = e->radius[i];
+  for (int j = i; j < i + size; j++) sum += of->height[j];
   if (letter == LEAVING) return sum;
   if (letter != 0) return radius > 0 ? 2 * sum / radius : INFINITY;
   double n = fabs(factor_of(r, i));
-  if (e->l.kind[row] == NEAR_GUARD) return n > 0 ? 2 * factor[i] / n : INFINITY;
+  if (e->l.kind[row] == NEAR_GUARD) return n > 0 ? 2 * of->factor[i] / n : INFINITY;
   sum = 0;
-  for (int j = i; j < i + size; j++) sum += (fabs(e->series[(int64_t)j * r->stride]) + n) * layer[j];
+  for (int j = i; j < i + size; j++) sum += (fabs(e->series[(int64_t)j * r->stride]) + n) * of->layer[j];
   return 2 * sum;
 }
 
-/* The rows of a set in a layout. */
+/* Guards of a set in a mode. */
 static void lay_out_set(const Run *r, Layout *l, int i) {
-  if (i != r->s->set_first[r->s->set_of[i]] || l->letter[i] == IDLE) return;
-  l->kind[l->rows] = l->letter[i] ? NEAR_GUARD : SLIP_GUARD;
-  l->index[l->rows] = i; l->side[l->rows++] = 0;
-  if (l->letter[i] || !r->s->scaled[i]) return;
-  l->kind[l->rows] = NEAR_GUARD;
-  l->index[l->rows] = i; l->side[l->rows++] = 0;
+  if (l->letter[i] == IDLE) return;
+  add_row(l, l->letter[i] ? NEAR_GUARD : SLIP_GUARD, i, 0);
+  if (l->letter[i] == 0 && is_scaled(r, i)) add_row(l, NEAR_GUARD, i, 0);
+}
+
+static int8_t side_of_set(const Run *r, int i, double h) {
+  (void)h;
+  return r->idle[set_of(r, i)] ? IDLE : OFF;
 }
 
 /* Largest coefficients, in units of the tolerance, of what has to be known to a relative tolerance. */
@@ -300,7 +286,7 @@ static void direction_bounds(const Run *r, const Expansion *e, double *last, dou
 
 /* Time at which |nu| = |n|, from that at which their squares are equal to rounding. */
 static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h) {
-  int i = e->l.index[row], size = size_of(r, set_of(r, i)), order = r->order;
+  int i = e->l.index[row], size = size_of(r, i), order = r->order;
   double root = dt;
   for (int again = 0; again < 3; again++) {
     double nu[3], rate[3], of_n, n = horner(row_of(r, r->n + 2 * r->width + i), order, root, &of_n), along = 0;
@@ -317,9 +303,8 @@ static double slip_root(const Run *r, const Expansion *e, int row, double dt, do
 
 /* Friction's limit at the start of a step on a set. */
 static void measure_limits(Run *r, Expansion *e) {
-  for (int s = 0; s < r->s->sets; s++) {
-    int f = first_of(r, s);
-    if (e->l.letter[f] == 0) e->radius[s] = fabs(row_of(r, r->n + 2 * r->width + f)[0]);
+  EACH_SET(r, f) {
+    if (e->l.letter[f] == 0) e->radius[f] = fabs(row_of(r, r->n + 2 * r->width + f)[0]);
   }
 }
 

@@ -44,8 +44,8 @@ static void add_branches(const Run *r, Layout *l) {
     int n = 0, moves = 0, is_plain = 1, is_weighted = 0, is_symmetric = 1;
     for (int i = 0; i < l->slides; i++) if (l->group[i] == g) own[n++] = l->sliding[i];
     for (int i = 0; i < n; i++) {
-      is_plain &= own[i] < r->m && set_of(r, own[i]) < 0;
-      is_weighted |= own[i] < r->m && r->s->scaled[own[i]];
+      is_plain &= element(r, own[i])->law == SURFACE_LAW;
+      is_weighted |= is_scaled(r, own[i]) != 0;
       for (int j = 0; j < n; j++) {
         moves |= r->s->slope_moves[own[i] * w + own[j]];
         is_symmetric &= r->s->slope_symmetric[own[i] * w + own[j]];
@@ -116,7 +116,7 @@ static void group_matrix(const Run *r, const int32_t *own, int n, int count, int
       const double *slope = slope_row(r, own[i], own[j]);
       double *entry = to + (i * n + j) * stride;
       for (int q = 0; q < count; q++)
-        entry[q] = weighted ? -turn * convolve(factor, slope, q, 0, q) / r->s->layer_width[own[i]] : -turn * slope[q];
+        entry[q] = weighted ? -turn * convolve(factor, slope, q, 0, q) / element(r, own[i])->width : -turn * slope[q];
     }
   }
 }

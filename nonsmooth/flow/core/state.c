@@ -1,7 +1,7 @@
 /* The driver: all that a run is. The system is data, not code.
  *
- * Read in the order of core_source.py: programs.h, pairs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c, decide.c,
- * events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
+ * Read in the order of core_source.py: programs.h, pairs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c,
+ * near_zeros.c, elements.c, decide.c, events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
  */
 
 
@@ -17,6 +17,18 @@ typedef struct {
   const double *value; /* of discrete states */
 } Rules;
 
+/* An element: k functions that stand side by side from ``first``, with a multiplier each, and the law between them
+ * (elements.c); each function has the entry of its element. The multiplier enters derivative ``degree`` of h; those
+ * between are rows from ``lower`` on of what is kept: all functions, then these. With hysteresis h is that of the
+ * multiplier +1, and the row ``lower`` that of -1. */
+typedef struct {
+  int32_t law, first, k, degree, lower, flags;
+  double width, power; /* of the layer; the smallest power of h in the field, or 0 */
+} Element;
+
+/* Flags: the multiplier makes no difference on h = 0; its unknown is a product with a factor. */
+enum { CONTINUOUS = 1, SCALED = 2 };
+
 typedef struct {
   int32_t n, dimension, timed, m, c, parameters, stops, resets, order, slope_outputs;
   Series series;      /* field, layer, surfaces and gaps, factors, stops and resets, slope_outputs slopes */
@@ -29,7 +41,8 @@ typedef struct {
   Values restitution; /* of each impact */
   Values columns;     /* entries of the field's derivatives by the unknowns */
   Entries slope, layer_gradient, height_gradient, stop_gradient, factor_gradient, surface_gradient, atom_gradient, column;
-  const int32_t *continuous, *scaled, *carries, *component;
+  const Element *element; /* of each function: of m surfaces and sets, c contacts */
+  const int32_t *carries, *component; /* (m, c): contacts whose reaction scales a surface's multiplier */
   /* (m + c, m + c): output of the series or -1; whether it moves; whether the matrix is symmetric */
   const int32_t *slope_output, *slope_moves, *slope_symmetric;
   int32_t linear, linear_free; /* whether field and guards are affine: in any mode, where nothing slides */
@@ -37,16 +50,12 @@ typedef struct {
    * the time, nothing to be checked; the latter: 0 if affine in states and time, polynomials are exact. */
   const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
-  int32_t sets; /* of codimension two and more */
+  int32_t sets, kept_rows; /* sets: of codimension two and more; kept_rows: see Element */
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
-  const int32_t *set_first, *set_size, *set_of; /* by set; the set of each switching function or -1 */
-  const double *layer_width; /* of the surfaces */
-  /* Of each surface the derivative of h that its multiplier enters; where those between are among what is kept. */
-  const int32_t *degree, *lower_first;
-  const double *power; /* of each surface the smallest power of its function in the field, or 0 */
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
   int32_t early_count, early_free_count;
   Rules rules;
+  Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
 } System;
 
 enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
@@ -62,7 +71,7 @@ typedef struct {
 
 /* The guards of a mode, and what slides in it. */
 typedef struct {
-  int8_t *letter; /* +1, -1, 0 for each surface; +1, 0 for open and closed contacts; see sets.c */
+  int8_t *letter; /* +1, -1, 0 for each surface; +1, 0 for open and closed contacts; see below */
   int32_t rows, atoms, slides, mode, branches, is_free; /* atoms: first row of stops and resets; free: no letter is 0 */
   int32_t *sliding, *group, *kind, *index, *side, *bent, bent_count; /* bent: guards that a step is checked with */
 } Layout;
@@ -123,6 +132,7 @@ typedef struct {
   /* The time is t + t_low: that of an event is no number of its own where times are large. */
   Pair begun;
   double t, t_low, since, limit, at_t, *x, *at_x, *unknowns;
+  const int8_t *remembered; /* letters from which elements with hysteresis go on, or none */
   int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
   double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
   Layout now; /* of the present mode */
@@ -132,7 +142,7 @@ typedef struct {
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
-  double size, length, shortened;
+  double size, length, shortened, hold; /* the last: the step's end before zeros of a guard that are not told apart */
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
@@ -147,7 +157,8 @@ typedef struct {
   int64_t read_count;
   double *sample_t, *sample_x;
   /* programs' values, inputs, error scales */
-  double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
+  double *series, *rounding, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope;
+  double *vector, *sample;
   double *atom_work, *choice_work;
   double *met_at; /* root of each guard in the step, or -1 */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
@@ -161,17 +172,29 @@ typedef struct {
   void *arena;
 } Run;
 
+/* Sums over the states of |gradient| times a vector: of layer, surfaces and gaps, stops and resets, factors; of
+ * surfaces, gaps, stops and resets only where nothing slides. */
+typedef struct { double *layer, *height, *stop, *factor; } Sums;
+
+/* What a law says of its elements. ``i`` is the first function of an element, rows are those of its own guards. */
+typedef struct {
+  void (*lay_out)(const Run *r, Layout *l, int i); /* guards of a mode */
+  void (*guard)(Run *r, const Layout *l, int row, const double *series, int count, double *g); /* their series */
+  double (*rounding)(Run *r, const Expansion *e, int row, const Sums *of); /* in the guard of a row */
+  int8_t (*side)(const Run *r, int i, double h); /* letter off its zero, where it has two by the present one */
+  void (*serve)(Run *r, int row); /* at the zero of a guard */
+} Law;
+
+static const Law *law_of(const Run *r, int i);
 static void add_branches(const Run *r, Layout *l);
 static void branch_row(const Run *r, const Layout *l, int row, int count, double *g);
-static int set_of(const Run *r, int i);
 static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns);
 static void aim_again(Run *r, const Expansion *e);
-static void lay_out_set(const Run *r, Layout *l, int i);
-static double set_sum(Run *r, const Expansion *e, int row, const double *height, const double *layer,
-                      const double *factor);
-static void set_row(Run *r, const Layout *l, int row, const double *series, int count, double *g);
-static void set_series(Run *r, Expansion *e, const int32_t *start);
 static void begin_sets(Run *r, Expansion *e, const double *unknowns);
+static int begin_directions(Run *r, Expansion *e);
+static void follow_sets(Run *r, Expansion *e, int k);
+static void leave_sets(Run *r, Expansion *e, int k);
+static void close_sets(Run *r, Expansion *e, int k);
 static void direction_bounds(const Run *r, const Expansion *e, double *last, double *before);
 static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h);
 static int meets_sets(const Run *r);

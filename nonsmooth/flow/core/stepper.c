@@ -64,13 +64,13 @@ static int has_height(int kind) {
   return kind == SURFACE_GUARD || kind == IMPACT_GUARD || is_atom(kind);
 }
 static int is_curved(const Run *r, const Layout *l, int row) {
-  int kind = l->kind[row], index = kind == IMPACT_GUARD ? r->m + l->index[row] : l->index[row];
-  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : index];
+  int kind = l->kind[row];
+  return has_height(kind) && r->s->curved[is_atom(kind) ? r->width + row - l->atoms : l->index[row]];
 }
 
 /* Whether a guard is the end of sliding within a bound that depends on the states. */
 static int is_scaled_exit(const Run *r, const Layout *l, int row) {
-  return l->kind[row] == EXIT_GUARD && r->s->scaled[l->index[row]] && !is_idle(r, l->letter, l->index[row]);
+  return l->kind[row] == EXIT_GUARD && is_scaled(r, l->index[row]) && !is_idle(r, l->letter, l->index[row]);
 }
 
 /* The longest step in which term k of a guard is below ``allowed``, or below the tolerance's part of one of its
@@ -179,6 +179,28 @@ static void sampled(Run *r, const Expansion *e, const double *x, const double *l
   for (int q = 0; q < e->l.bent_count; q++) *found++ = g[(int64_t)e->l.bent[q] * r->stride];
 }
 
+/* Rounding of an output, after its value; none where it has no bound. */
+static double output_rounding(const Run *r, int output) {
+  double error = EPSILON * r->rounding[r->s->series.output[output]];
+  return error < INFINITY ? error : 0;
+}
+
+/* The same of a guard that is a function of states and time. */
+static double guard_rounding(const Run *r, const Expansion *e, int row) {
+  int kind = e->l.kind[row];
+  if (!has_height(kind)) return 0;
+  return output_rounding(r, r->n + (is_atom(kind) ? 3 * r->width + row - e->l.atoms : r->width + e->l.index[row]));
+}
+
+/* Rounding of what is ``sampled``. */
+static void rounding_of(Run *r, const Expansion *e, double *noise) {
+  int slides = e->l.slides;
+  weigh_rounding(r, e->l.is_free, 0);
+  for (int i = 0; i < r->n; i++) *noise++ = output_rounding(r, i);
+  for (int i = 0; i < slides; i++) *noise++ = 0;
+  for (int q = 0; q < e->l.bent_count; q++) *noise++ = guard_rounding(r, e, e->l.bent[q]);
+}
+
 /* Whether field and guards at a time of the step are those of the polynomials. */
 static int agrees(Run *r, const Expansion *e, double time, double dt) {
   int n = r->n, order = r->order, stride = r->stride, slides = e->l.slides;
@@ -207,7 +229,7 @@ static int agrees(Run *r, const Expansion *e, double time, double dt) {
     }
     if (near) return 1;
     /* What rounding in the states, and in the time, makes of it: far from zero more than a tolerance. */
-    if (!again) memset(noise, 0, sizeof(double) * all);
+    if (!again) rounding_of(r, e, noise);
     for (int k = 0; k < n && !again; k++) {
       double kept = x[k];
       if (kept == 0) continue;
@@ -256,11 +278,15 @@ static int leading(Run *r, Expansion *e, int row, int zeros, double *value) {
   return r->order + 1;
 }
 
+static double sure_root(Run *r, const Expansion *e, int row, const double *c, int n, double h, double from, int drop,
+                        int known);
+static double sure_crossing(Run *r, const Expansion *e, int row, int drop, double h, int direction);
+
 static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   const double *g = e->guards + (int64_t)row * r->stride, *c = g + drop;
   int kind = e->l.kind[row];
   if (drop > r->order) return -1;
-  if (is_atom(kind)) return first_crossing(c, r->order - drop, h, e->l.side[row]);
+  if (is_atom(kind)) return sure_crossing(r, e, row, drop, h, e->l.side[row]);
   if (c[0] <= 0) {
     double value;
     drop = leading(r, e, row, drop, &value);
@@ -269,6 +295,8 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   }
   /* Most guards have no root, and all their terms: that is seen here, with the length known. */
   if (!drop && c[0] > rest_of(c, r->order, h)) return -1;
+  int is_root = kind == SURFACE_GUARD && element(r, e->l.index[row])->power > 0; /* its series are those of no point beyond */
+  if (has_height(kind) && !is_root) return sure_root(r, e, row, c, r->order - drop, h, 0, drop, 0);
   double dt = first_root(c, r->order - drop, h);
   return kind == SLIP_GUARD && dt > 0 ? slip_root(r, e, row, dt, h) : dt; /* squares lose digits */
 }
@@ -400,6 +428,7 @@ static double atom_root(Run *r, Expansion *e, int atom, double h) {
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->met_at;
   int first = -1, found = 0, rows = e->l.rows;
+  r->hold = INFINITY;
   if (r->repelling) turn_exits(r, e);
   for (int j = 0; j < rows; j++) {
     time[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);
@@ -415,7 +444,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
   /* Guards whose times cannot be told apart: atoms are passed together, at the first time; others one by one. */
   int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;
-  double near = time[first] + TIE * larger(time_scale(r), 1)
+  double near = time[first] + TIE * (time_scale(r) + time[first])
                 + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
   for (int j = 0; j < rows && (found > 1 || passed_atoms); j++) {
     if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,8 +73,6 @@ class Run:
     itinerary : str
     letters : sequence of str
         Modes by number.
-    guards : callable
-        From a mode to its guards.
     active : list of int
         Surfaces and contacts at the last point that was decided.
     several : list of str
@@ -89,8 +87,8 @@ class Run:
         Steps: start times, Taylor coefficients, numbers of modes.
     event_kinds, event_t, event_x, event_after_x : ndarray (e,) or (e, n)
     event_before, event_after, event_guards : ndarray (e,)
-        Events: kind (position in ``facts.KINDS``), modes before and after, row of the guard in
-        ``guards(mode_before)`` or -1. The final "end" is not among them.
+        Events: kind (position in ``facts.KINDS``), modes before and after, guard (``guard_of``) or -1.
+        The final "end" is not among them.
     event_motions, motion : ndarray (e, w), (w,)
         What a restart needs besides the state, after each event and at the end.
     labels : sequence of tuple
@@ -104,7 +102,6 @@ class Run:
     limit: float
     itinerary: str
     letters: Sequence[str]
-    guards: Callable[[str], Sequence[Guard]]
     active: list[int]
     several: list[str]
     rates: Array
@@ -134,7 +131,6 @@ class Run:
         counts: Sequence[int],
         itinerary: str,
         letters: Sequence[str],
-        guards: Callable[[str], Sequence[Guard]],
         active: list[int],
         several: list[str],
         rates: Array,
@@ -150,7 +146,6 @@ class Run:
             limit=numbers[1],
             itinerary=itinerary,
             letters=letters,
-            guards=guards,
             active=active,
             several=several,
             rates=rates,
@@ -171,6 +166,16 @@ class Run:
             motion=motion,
             labels=labels,
         )
+
+
+def guard_of(system: FilippovSystem, code: int) -> Guard:
+    """Read a guard as C writes it: its index, its side plus one in two bits, its kind in four."""
+    kind, side, i, m = GUARDS[code & 15], (code >> 4 & 3) - 1, code >> 6, system.surface_count
+    if kind in ("stop", "reset"):
+        return Guard(kind, i, (system.stops if kind == "stop" else system.resets)[i][1], i)
+    if kind in ("impact", "release"):
+        return Guard(kind, i - m, side, len(system.entries) + i - m)
+    return Guard(kind, i, 0 if kind == "branch" else side, system.entry_of(i))
 
 
 def require_size(size: Any, structure: type[ctypes.Structure]) -> None:
@@ -240,10 +245,9 @@ def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
         **dict.fromkeys(("surface", "near"), system.surface_names),
         "stop": [name for name, _ in system.stops],
         "reset": [name for name, _ in system.resets],
-        "impact": system.impacts,
-        "release": system.impacts,
+        **dict.fromkeys(("impact", "release"), [""] * system.surface_count + [*system.impacts]),
     }
-    width = max(1, *map(len, names.values()))
+    width = max(system.surface_count + 1, *map(len, names.values()))
     named = np.zeros((len(GUARDS), width), np.int8)
     for row, kind in zip(named, GUARDS, strict=True):
         if hits.names is None:

@@ -13,7 +13,7 @@ from ..options import Options
 from ..status import ADVICE, Status
 from ..trajectory import Continuation, Event, Facts, Segment, Steps, Trajectory
 from ..warn import warn_of_facts
-from .arrays import Run
+from .arrays import Run, guard_of
 
 
 def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> Trajectory:
@@ -57,10 +57,10 @@ def _events(system: FilippovSystem, run: Run) -> list[Event]:
     known: dict[tuple[str, str, int], tuple[str, str, str, int, int]]
     known = system.cached("events of compiled runs", dict)
     numbers = (run.event_before, run.event_after, run.event_guards)
-    for k, (one, two, row) in enumerate(zip(*(a.tolist() for a in numbers), strict=True)):
-        key = (modes[one], modes[two], row)
+    for k, (one, two, code) in enumerate(zip(*(a.tolist() for a in numbers), strict=True)):
+        key = (modes[one], modes[two], code)
         if key not in known:
-            known[key] = _named(system, run, *key)
+            known[key] = _named(system, *key)
         before, after, name, element, side = known[key]
         t, kind = float(run.event_t[k]), KINDS[run.event_kinds[k]]
         states = run.event_x[k].copy(), run.event_after_x[k].copy()
@@ -72,22 +72,20 @@ def _events(system: FilippovSystem, run: Run) -> list[Event]:
 
 
 def _named(
-    system: FilippovSystem, run: Run, before: str, after: str, row: int
+    system: FilippovSystem, before: str, after: str, code: int
 ) -> tuple[str, str, str, int, int]:
     """Modes, name, element and side of an event."""
-    if row >= len(run.guards(before)):  # of stability, of which the driver has more
-        k = system.entry_of(before.index("s"))
-        own = [Guard("branch", k, 0, k)]
-        name = guard_name(system, own[0])
-    elif row >= 0:
-        own = [run.guards(before)[row]]
-        name = guard_name(system, own[0])
+    if code >= 0:
+        own = [guard_of(system, code)]
     else:  # what comes to rest together where events accumulate
-        held = run.guards(before)
-        own = [g for g in run.guards(after) if g not in held]
-        own = [g for g in own if g.kind == "release" or (g.kind == "exit" and g.side > 0)]
-        own = [replace(g, kind="surface", side=0) if g.kind == "exit" else g for g in own]
-        name = " and ".join([guard_name(system, guard) for guard in own])
+        m, pairs = system.surface_count, enumerate(zip(before, after, strict=True))
+        rests = [
+            i for i, (one, two) in pairs if two in "sc" and one != two and i not in system.set_of
+        ]
+        surfaces = [Guard("surface", i, 0, system.entry_of(i)) for i in rests if i < m]
+        first = len(system.entries) - m
+        own = [*surfaces, *[Guard("release", i - m, 0, first + i) for i in rests if i >= m]]
+    name = " and ".join([guard_name(system, guard) for guard in own])
     of = (own[0].element, own[0].side) if own else (-1, 0)
     return system.spelled(before), system.spelled(after), name, *of
 

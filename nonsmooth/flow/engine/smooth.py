@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array
-from ...model.printing.tape import Series, Values
+from ...model.printing.tape import Entries, Series, Values
 from .arrays import address, require_size
-from .tape import SeriesStructure, library, series_structure, values_structure
+from .tape import EntriesStructure, SeriesStructure, library, series_structure, values_structure
 
 _I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
@@ -23,9 +23,10 @@ _ROOM = 64
 
 class _Field(ctypes.Structure):
     _fields_ = [
-        *[(name, _I32) for name in ("n", "watched", "order", "groups")],
+        *[(name, _I32) for name in ("n", "watched", "order", "groups", "starts", "columns")],
         ("group", _POINTER),
         ("series", SeriesStructure),
+        ("derivatives", EntriesStructure),
     ]
 
 
@@ -59,14 +60,26 @@ def _library() -> ctypes.CDLL:
 
 
 class SmoothProgram:
-    """A smooth field, and functions that are watched along it."""
+    """A smooth field with columns of derivatives, or functions that are watched along it."""
 
-    def __init__(self, series: Series, group: NDArray[np.int32], order: int):
+    def __init__(
+        self,
+        series: Series,
+        group: NDArray[np.int32],
+        order: int,
+        derivatives: Entries,
+        starts: int,
+        columns: int,
+    ):
         self._kept: list[NDArray[Any]] = [np.ascontiguousarray(group, np.int32)]
-        self.size, groups = len(group), int(group.max(initial=-1)) + 1
-        self.watched = watched = len(series.outputs) - self.size
+        n, groups = len(group), int(group.max(initial=-1)) + 1
+        self.size, count = n * (1 + columns), len(derivatives.row)
+        self.watched = watched = len(series.outputs) - n - count
         rules = series_structure(series, self._kept)
-        self._c = _Field(self.size, watched, order, groups, address(self._kept[0]), rules)
+        self._kept += [derivatives.row, derivatives.column]
+        places = EntriesStructure(count, 0, *[a.ctypes.data for a in self._kept[-2:]])
+        sizes = (n, watched, order, groups, starts, columns)
+        self._c = _Field(*sizes, address(self._kept[0]), rules, places)
         self.pointer = ctypes.addressof(self._c)
         self.work = int(_library().field_work(self.pointer))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
 
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
-from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
-from ..constants import FULL, RUNNING, SEVERAL
+from ...model.printing.tape import Entries, Series, Tape, Values, derived_series_of, tape_of
+from ..constants import FULL, LAWS, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
@@ -180,13 +180,21 @@ class SeriesStructure(ctypes.Structure):
     ]
 
 
-class _Entries(ctypes.Structure):
+class EntriesStructure(ctypes.Structure):
+    """Places of entries of a matrix as C reads them."""
+
     _fields_ = [("count", _I32), ("pad", _I32), ("row", _POINTER), ("column", _POINTER)]
 
 
 _VALUES = ("point", "surfaces", "maps", "atoms", "choices", "restitution", "columns")
 _ENTRIES = tuple(field.name for field in fields(Tape) if field.type == "Entries")
-_TABLES = ("continuous", "scaled", "carries", "component")
+
+
+class _Element(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I32) for name in ("law", "first", "k", "degree", "lower", "flags")],
+        *[(name, _D) for name in ("width", "power")],
+    ]
 
 
 class _Rules(ctypes.Structure):
@@ -205,18 +213,16 @@ class _System(ctypes.Structure):
         ("series", SeriesStructure),
         ("free", SeriesStructure),
         *[(name, ValuesStructure) for name in _VALUES],
-        *[(name, _Entries) for name in _ENTRIES],
-        *[
-            (name, _POINTER)
-            for name in (*_TABLES, "slope_output", "slope_moves", "slope_symmetric")
-        ],
+        *[(name, EntriesStructure) for name in _ENTRIES],
+        *[(name, _POINTER) for name in ("element", "carries", "component")],
+        *[(name, _POINTER) for name in ("slope_output", "slope_moves", "slope_symmetric")],
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
-        *[(name, _I32) for name in ("affine", "sets")],
-        *[(name, _POINTER) for name in ("mixed", "set_first", "set_size", "set_of", "layer_width")],
-        *[(name, _POINTER) for name in ("degree", "lower_first", "power", "early", "early_free")],
+        *[(name, _I32) for name in ("affine", "sets", "kept_rows")],
+        *[(name, _POINTER) for name in ("mixed", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
+        ("derivatives", EntriesStructure),
     ]
 
 
@@ -241,6 +247,7 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     made.table_read.argtypes = [_POINTER] * 4
     made.run_new.argtypes = [_POINTER] * 2
     made.run_read_at.argtypes = [_POINTER, _POINTER, _I64]
+    made.run_remember.argtypes = [_POINTER, _POINTER]
     made.run_begin.argtypes = [*[_POINTER] * 6, _D, _POINTER]
     made.run_motion.argtypes = [_POINTER] * 2
     made.run_continue.argtypes = [_POINTER, _I64]
@@ -250,9 +257,19 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     return made
 
 
-def _place(system: FilippovSystem, i: int) -> int:
-    """Number of the set of a switching function, -1 for a surface."""
-    return system.sets.index(system.set_of[i]) if i in system.set_of else -1
+def _elements(coupled: Coupled) -> list[_Element]:
+    """The element of each function: of surfaces and sets, then of contacts."""
+    system, m, c = coupled.system, coupled.system.surface_count, len(coupled.system.impacts)
+    made, lower = list[_Element](), m + 2 * c
+    for name, members in zip(system.laws, system.entries, strict=True):
+        i, k, further = members[0], len(members), len(coupled.lower[members[0]])
+        flags = coupled.continuous[i] + 2 * coupled.scaled[i]
+        law, degree = LAWS.index(name), 1 if i in system.remembering else further + 1
+        size = (system.layer_widths[i], coupled.powers[i])
+        made += [_Element(law, i, k, degree, lower, flags, *size)] * k
+        lower += further
+    law = LAWS.index("contact")
+    return [*made, *[_Element(law, m + j, 1, 2, m + c + j, 0, 1.0, 0.0) for j in range(c)]]
 
 
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine:
@@ -297,15 +314,20 @@ def _ends(parts: Sequence[Sequence[Any]]) -> list[int]:
 
 
 class TapeEngine:
-    """The driver in C with one system at one order."""
+    """The driver in C with one system at one order, with ``derived`` for derivatives."""
 
-    def __init__(self, system: FilippovSystem, order: int):
+    def __init__(self, system: FilippovSystem, order: int, derived: bool = False):
         self.system, self.order = system, order
         self.coupled = raised_of(system)
         tape = system.cached("tape", lambda: tape_of(self.coupled))
-        self.guards = lru_cache(maxsize=4096)(self.coupled.guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
+        entries = None
+        if derived:
+            series, entries = derived_series_of(self.coupled)
+            tape = replace(tape, series=series, free=series)
         self._c = self._structure(self.coupled, tape)
+        if entries is not None:
+            self._c.derivatives = self._entries(entries)
         self._rooms = rooms_of((0, 0, 0))
 
     def _structure(self, coupled: Coupled, tape: Tape) -> _System:
@@ -334,9 +356,8 @@ class TapeEngine:
         carries = np.zeros((m, c))
         for i, carried in enumerate(coupled.carriers):
             carries[i, carried] = 1
+        elements = _elements(coupled)
         tables: dict[str, Any] = {
-            "continuous": coupled.continuous,
-            "scaled": coupled.scaled,
             "carries": carries.ravel(),
             "component": tape.component,
             "slope_output": tape.slope_output,
@@ -347,17 +368,12 @@ class TapeEngine:
             "bent_free": coupled.linearity.bent_free_rows,
             "bent_guards": coupled.linearity.bent_guards,
             "curved": coupled.linearity.curved_guards,
-            "set_first": [members[0] for members in system.sets],
-            "set_size": [len(members) for members in system.sets],
-            "set_of": [_place(system, i) for i in range(m)],
-            "degree": [len(own) + 1 for own in coupled.lower],
-            "lower_first": m + 2 * c + np.cumsum([0, *map(len, coupled.lower)]),
             "early": tape.series.early,
             "early_free": tape.free.early,
         }
-        made.sets = len(system.sets)
-        made.power = self._at(np.array([*coupled.powers, 0.0]))
-        made.layer_width = self._at(np.array([*system.layer_widths, 0.0]))
+        made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
+        table = (_Element * (len(elements) + 1))(*elements)
+        made.element = self._at(np.frombuffer(bytes(table), np.uint8))
         made.early_count, made.early_free_count = len(tape.series.early), len(tape.free.early)
         for name, values in tables.items():
             setattr(made, name, self._at(np.array([*values, 0], np.int32)))
@@ -408,8 +424,8 @@ class TapeEngine:
         self._kept.append(array)
         return array.ctypes.data
 
-    def _entries(self, e: Entries) -> _Entries:
-        return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))
+    def _entries(self, e: Entries) -> EntriesStructure:
+        return EntriesStructure(len(e.row), 0, self._at(e.row), self._at(e.column))
 
     # one trajectory ----------------------------------------------------------------------------
 
@@ -420,19 +436,21 @@ class TapeEngine:
         options: Options,
         read_at: Array | None = None,
         motion: Array | None = None,
+        mode: str | None = None,
     ) -> Run:
         """Run one trajectory from an extended start, dense output kept, to be read at ``read_at`` times."""
-        # ``motion`` is that of a run or event that is continued.
+        # ``motion`` and ``mode`` are those of a run or event that is continued.
         width = self._c.rules.width
         if motion is not None:
             motion = self._checked(motion)
         output = Output(self.system.extended_dimension, self.order, self._rooms, width)
         x, p = np.array(x, float), np.array([*p, 0.0], float)
-        start = self._start_mode(options)
+        start, known = self._letters(options.start_mode), self._letters(mode)
         with self.held_table() as table, self.held_run(table) as state:
             c_options = ctypes.byref(options_of(self.system, options, dense=True))
             given = (address(x), address(p), address(start))
             library().run_read_at(state, address(read_at), 0 if read_at is None else len(read_at))
+            library().run_remember(state, address(known))
             library().run_begin(
                 state, c_options, output.pointer, *given, options.t_start, address(motion)
             )
@@ -459,7 +477,6 @@ class TapeEngine:
             counts=counts,
             itinerary=words[counts[4]],
             letters=modes,
-            guards=self.guards,
             active=active,
             several=[modes[k] for k in several],
             rates=rates[:, : self.system.dimension],
@@ -480,10 +497,8 @@ class TapeEngine:
             "system and at=, or give its state as x0 and its time as t_start."
         )
 
-    def _start_mode(self, options: Options) -> NDArray[np.int8] | None:
-        if options.start_mode is None:
-            return None
-        return np.array([*self.system.parse_letters(options.start_mode), 0], np.int8)
+    def _letters(self, mode: str | None) -> NDArray[np.int8] | None:
+        return None if mode is None else np.array([*self.system.parse_letters(mode), 0], np.int8)
 
     @property
     def _width(self) -> int:
@@ -543,7 +558,7 @@ class TapeEngine:
         return [tuple(row) for row in rows.tolist()]
 
     def _spelled(self, signs: list[int]) -> str:
-        """Letters of all switching functions and contacts; see ``core/sets.c`` for those of sets."""
+        """Letters of all switching functions and contacts; see ``core/state.c`` for those of sets."""
         m = self.system.surface_count
         surfaces = ("-s+*blli"[sign + 1] for sign in signs[:m])
         return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
@@ -567,7 +582,7 @@ class TapeEngine:
         x = np.ascontiguousarray(x, float)
         p = np.ascontiguousarray(np.append(p, np.zeros((*p.shape[:-1], 1)), axis=-1), float)
         batch = batch_of(x, p, options.t_start, chunk, times, None)
-        start, done = self._start_mode(options), np.zeros(1, np.int64)
+        start, done = self._letters(options.start_mode), np.zeros(1, np.int64)
         c_options = options_of(self.system, options, dense=False, at=at)
         with self.held_table() as table, self.held_run(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))

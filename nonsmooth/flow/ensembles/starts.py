@@ -139,7 +139,8 @@ def require_start_mode(system: FilippovSystem, x: Array, p: Array, options: Opti
     for k, members in enumerate(system.entries):
         own = list(members)
         letter = "*" if len(own) > 1 else "+" if sides[own[0]] > 0 else "-"
-        if np.any(sides[own]) and mode[k] != letter:
+        is_free = own[0] in system.remembering  # between its thresholds, as C finds
+        if np.any(sides[own]) and mode[k] != letter and not is_free:
             value = ", ".join(f"{v:.6g}" for v in h[own])
             wrong.append(f"h{k} = {value if len(own) == 1 else f'[{value}]'} ({letter!r})")
     if wrong:

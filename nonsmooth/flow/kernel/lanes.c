@@ -225,19 +225,21 @@ INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 
 /* Roots: polynomials.h --------------------------------------------------------------------------- */
 
 #if RARE_CASES_HERE
-/* The root of one lane of any polynomial: isolation by subdivision. */
+/* The root of one lane of any polynomial: isolation by subdivision. NAN where errors hide which is the first. */
 static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, int flipped,
                                                   double *slope) {
-  double c[P + 1];
+  double c[P + 1], d = 0;
   for (int k = 0; k <= P; k++) c[k] = LANE(a[k], l);
+  double s = c[0] > 0 ? first_root(c, P, 1) : 0;
+  if (s != 0 && hides_roots(c, P, 1, s)) return NAN;
   if (slot < FIRST_STOP) {
-    double s = first_root(c, P, 1), d = 0;
     for (int k = P; k > 0; k--) d = d * s + k * c[k];
     *slope = d;
     return s;
   }
   int direction = DIRECTION[slot - FIRST_STOP];
-  return first_crossing(c, P, 1, flipped ? -direction : direction);
+  double met = first_crossing(c, P, 1, flipped ? -direction : direction);
+  return s > 0 && met > s ? NAN : met;
 }
 #endif
 
@@ -337,6 +339,7 @@ SELDOM I resolve(Guards *v) {
       for EACH(l, deep) {
         double r = hard_root(v->a[j], l, j, LANE_I(v->flipped[j], l) != 0, &LANE(v->slope[j], l));
         if (r >= 0) LANE(v->root[j], l) = r;
+        else if (r != r) LANE_I(lost, l) = ~(int64_t)0;
       }
 #else
       lost |= deep;
@@ -668,10 +671,10 @@ INLINE void expand_step(Lanes *s, Work *w, Step *e) {
   I after = (s->since == 0) & (s->events > BLOCKS);
   if (any(after)) e->unclear |= watch_limit(s, e->c, e->allowed, after);
 #endif
-  e->unclear |= ~e->last & ((h <= SHORTEST * MAX(BC(1), ABS(s->t))) | (h >= LONG));
+  e->unclear |= ~e->last & ((h <= SHORTEST * ABS(s->t)) | (h >= LONG));
   e->unclear |= (s->steps >= o->max_steps) | passed_between(s, e->g);
   /* What happens at the end, to rounding, happens. */
-  e->h = SELECT(e->last, left + AT_END * MAX(BC(1), ABS(s->t + left)), h);
+  e->h = SELECT(e->last, left + AT_END * MAX(ABS(s->t), ABS(s->t + left)), h);
   e->left = left;
 }
 

@@ -155,14 +155,17 @@ INLINE T series_size(const Lanes *s, const Work *w, Step *e, int mode, I *finite
 
 /* Roots ------------------------------------------------------------------------------------------ */
 
+/* NAN where errors hide which root of a stop is the first. */
 static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, int flipped, double *slope) {
-  double c[P + 1];
+  double c[P + 1], d = 0;
   for (int k = 0; k <= P; k++) c[k] = LANE(a[k], l);
   int stops = slot > 0 && slot <= STOPS, direction = stops ? DIRECTION[slot - 1] : 0;
-  double s = stops ? first_crossing(c, P, 1, flipped ? -direction : direction) : first_root(c, P, 1), d = 0;
-  for (int k = P; k > 0; k--) d = d * s + k * c[k];
+  double s = c[0] > 0 ? first_root(c, P, 1) : 0, met = s;
+  if (stops && s != 0 && hides_roots(c, P, 1, s)) return NAN;
+  if (stops) met = first_crossing(c, P, 1, flipped ? -direction : direction);
+  for (int k = P; k > 0; k--) d = d * met + k * c[k];
   *slope = d;
-  return s;
+  return stops && s > 0 && met > s ? NAN : met;
 }
 
 /* Shorten steps until a guard's series converges within them, as in the interpreter. */
@@ -235,6 +238,7 @@ INLINE I first_hit(const Lanes *s, Step *e, int mode, T *steps, T *dt, I *slot, 
     for EACH(l, hard[j]) {
       double at = hard_root(a[j], l, j, LANE_I(flipped[j], l) != 0, &LANE(d, l));
       if (at >= 0) LANE(root, l) = at;
+      else if (at != at) LANE_I(unclear, l) = ~(int64_t)0;
     }
     if (any(one[j])) {
       const T *series = a[j];
@@ -378,7 +382,7 @@ INLINE void take_step(Lanes *s, Work *w, Step *e, int mode) {
   last = time_of(e, h) >= left;
   unclear |= ~last & ((time_of(e, h) <= SHORTEST * MAX(ABS(s->t), ABS(s->t - w->b->t0))) | (h >= LONG));
   unclear |= (s->steps >= o->max_steps) | passed_between(s, e);
-  if (any(last)) h = SELECT(last, place_of(e, left + AT_END * MAX(BC(1), ABS(s->t + left))), h);
+  if (any(last)) h = SELECT(last, place_of(e, left + AT_END * MAX(ABS(s->t), ABS(s->t + left))), h);
   T whole = h;
   unclear |= first_hit(s, e, mode, &h, &dt, &slot, &slope);
   if (mode == ON && any(slot == 1)) polish_slip(e, slot == 1, h, &dt);

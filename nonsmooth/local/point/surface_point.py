@@ -19,6 +19,7 @@ from ...model import (
     FilippovSystem,
     Parameters,
     PointError,
+    Switching,
     call,
     evaluator,
     motion,
@@ -158,6 +159,15 @@ class LocalSurface:
         """Names and values of the parameters."""
         names = self.system.parameter_names
         return dict(zip(names, map(float, self.parameters), strict=True))
+
+    @property
+    def switching(self) -> Switching:
+        """The class of the surface at these values of the parameters, the other surfaces on their sides."""
+        system, mode = self.system, self.mode if self.system.surface_count > 1 else None
+        for_all = system.switching(self.surface, mode=mode)
+        if not for_all.slides:
+            return for_all
+        return system.switching(self.surface, mode=mode, parameters=self.values)
 
     def _expressions(self) -> tuple[Any, list[Any], list[Any]]:
         """h, (L1, L2) and (F1, F2); of a smooth system h = 1 and both fields are the one."""

@@ -19,7 +19,7 @@ from ...model import Array, FilippovSystem
 from ...solvers.newton import solve_many
 from ..point.surface_point import SIDES, LocalSurface, ManyNumbers, Side
 from ..searches.equilibria import Equilibrium, find_equilibrium
-from ..searches.folds import Fold, find_fold
+from ..searches.folds import Fold, tangency_near
 from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
 from ..searches.search import find_all
 from .box import Box, inserted, middle_of_sign_changes, refined, sign_changes, zero_lines
@@ -103,7 +103,7 @@ class PlaneScan:
         where = self.where
 
         def look(x: Array) -> Fold:
-            return find_fold(where.system, x, side=side, parameters=where.values, max_order=3)
+            return tangency_near(where, x, side, (0, 1), 3)
 
         return self._from_curves(lambda numbers: numbers.lie[:, k], look)
 
@@ -128,8 +128,9 @@ class PlaneScan:
 
     @cached_property
     def folds(self) -> list[Fold]:
-        """Folds of both fields."""
-        return self._apart(self.tangencies)
+        """Folds of both fields, those in one point where a force jumps; none of a continuous surface."""
+        soft = self.where.switching.kind == "continuous"
+        return [] if soft else self._apart(self.tangencies)
 
     @cached_property
     def pseudo_equilibria(self) -> list[PseudoEquilibrium]:
@@ -180,7 +181,7 @@ def _pieces(scan: PlaneScan, curve: Array) -> list[Piece]:
     ]
     full = inserted(curve, np.reshape(near, (-1, 2)))
     lie = scan.at((full[1:] + full[:-1]) / 2).lie
-    slides = lie[:, 0] * lie[:, 1] < 0
+    slides = (lie[:, 0] * lie[:, 1] < 0) & scan.where.switching.slides
     kinds = np.where(slides, np.where(lie[:, 0] < 0, "attracting", "repelling"), "crossing")
     cuts = [0, *(np.flatnonzero(kinds[1:] != kinds[:-1]) + 1), len(kinds)]
     return [Piece(str(kinds[a]), full[a : b + 1]) for a, b in pairwise(cuts)]

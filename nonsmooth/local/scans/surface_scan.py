@@ -128,6 +128,8 @@ class SurfaceScan:
     def regions(self) -> NDArray[np.int64]:
         """Per grid point the index in ``REGIONS``, -1 where there is no surface."""
         l1, l2 = (self._on_grid(self._numbers.lie[:, k]) for k in (0, 1))
+        if not self.where.switching.slides:  # but for rounding both are the same
+            l2 = l1
         kinds = np.where(l1 <= 0, np.where(l2 > 0, 0, 3), np.where(l2 > 0, 2, 1))
         return np.where(np.isfinite(l1), kinds, -1)
 
@@ -135,8 +137,10 @@ class SurfaceScan:
 
     @cached_property
     def folds(self) -> list[FoldCurve]:
-        """Fold curves of both fields."""
-        found = []
+        """Fold curves of both fields; none where nothing slides."""
+        found = list[FoldCurve]()
+        if not self.where.switching.slides:
+            return found
         for k, side in enumerate(SIDES):
             lie = self._on_grid(self._numbers.lie[:, k])
             found += [self._fold(line, side) for line in zero_lines(self.mesh, lie)]
@@ -212,7 +216,9 @@ class SurfaceScan:
 
     @cached_property
     def two_folds(self) -> list[TwoFold]:
-        """Generic two-folds in the box."""
+        """Generic two-folds in the box; none where nothing slides."""
+        if not self.where.switching.slides:
+            return []
         where, lie = self.where, self._numbers.lie
 
         def look(x: Array) -> TwoFold:

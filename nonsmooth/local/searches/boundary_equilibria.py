@@ -6,6 +6,10 @@ dimension). In the plane the equilibrium's type splits these into BF1 to BF5 (fo
 (stable node), BS1 to BS3 (saddle) after Kuznetsov, Rinaldi & Gragnani 2003, and UN1, UN2 (unstable
 node, Hogan, Homer, Jeffrey & Szalai 2016). The table is for d > 0; d < 0 is its time reversal
 (A, E -> -A, -E). The margins of a class are dimensionless distances from where it changes.
+
+On a continuous surface both fields vanish. With A1 - A2 = K grad h the equilibria of the sides are at heights
+h_i proportional to 1/det A_i: det A1 det A2 > 0 is persistence, < 0 a nonsmooth fold. Where only a force jumps,
+F2 is tangent, and between the two sides the equilibrium is at rest at h = L = 0.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,12 +35,14 @@ from ..point.surface_point import (
     FIELDS,
     SIDES,
     LocalSurface,
+    Numbers,
     Side,
     on_surface,
     side_index,
     surface_at,
 )
 from ..read_only import ReadOnly
+from .boundary_cycles import BoundaryCycle, born_cycle
 from .equilibria import equilibrium_distance
 from .search import search
 
@@ -49,35 +55,46 @@ class BoundaryEquilibrium:
     ----------
     point : ndarray (n,)
         The point, in the order of the states.
-    side : {"+", "-"}
-        Whose equilibrium: of $F1$ or $F2$.
+    side : {"+", "-", ""}
+        Whose equilibrium: of $F1$ or $F2$; empty on a continuous surface, where it is that of both.
     label : str
-        In the plane ``"BF1"`` ... ``"BF5"``, ``"BN1"``, ``"BN2"``, ``"UN1"``, ``"UN2"``,
+        On a generic surface in the plane ``"BF1"`` ... ``"BF5"``, ``"BN1"``, ``"BN2"``, ``"UN1"``, ``"UN2"``,
         ``"BS1"`` ... ``"BS3"``; otherwise ``"persistence"`` or ``"nonsmooth fold"``;
         ``"degenerate"`` if the margin is below the tolerance.
     unfolding : {"persistence", "nonsmooth fold"}
-        Whether the equilibrium turns into a pseudo-equilibrium, or they annihilate.
+        Whether the equilibrium turns into the other one, or they annihilate: a pseudo-equilibrium, the
+        equilibrium beyond a continuous surface, or rest on a surface where a force jumps.
     time_reversed : bool
         The other field points away from the equilibrium's side $(d < 0)$: the class is that of the
         system with time reversed.
     eigenvalues : ndarray (n,)
-        Of the field's linear part A.
+        Of the field's linear part A; on a continuous surface of $F1$.
     numbers : mapping
+        On a continuous surface ``det A1``, ``det A2``, and in the plane ``trace A1``, ``trace A2``.
         ``d`` and ``s``; in the plane ``trace``, ``determinant``; ``landing`` (BF2, BF3) or
         ``unstable`` (BS1, BS2) and ``pseudo``, all in units of $L_i$ along the surface for a unit
         shift of the equilibrium.
     margins : mapping
         Distance from each boundary of the class.
+    switching : str
+        The kind of the surface: ``"generic"``, ``"continuous"`` or ``"velocity continuous"``.
+    other_eigenvalues : ndarray (n,) or None
+        On a continuous surface those of $F2$.
+    cycle : BoundaryCycle or None
+        The cycle that is born there; of planar continuous systems.
     """
 
     point: Array
-    side: Side
+    side: Side | Literal[""]
     label: str
     unfolding: str
     time_reversed: bool
     eigenvalues: NDArray[Any]
     numbers: Mapping[str, float]
     margins: Mapping[str, float]
+    switching: str = "generic"
+    other_eigenvalues: NDArray[Any] | None = None
+    cycle: BoundaryCycle | None = None
 
     @property
     def margin(self) -> float:
@@ -192,8 +209,69 @@ def boundary_equilibrium(
             f"is about {found[k]:.3g} away. find_boundary_equilibrium(system, near, "
             "vary=parameter) finds one."
         )
-    return boundary_equilibrium_of(
-        x, k, numbers.gradient, numbers.fields[1 - k], derivatives[k], margin
+    return boundary_equilibrium_at(where, numbers, k, derivatives, margin)
+
+
+def boundary_equilibrium_at(
+    where: LocalSurface, numbers: Numbers, k: int, derivatives: Array, margin: float = MARGIN
+) -> BoundaryEquilibrium:
+    """Class of the equilibrium of field ``k`` by the class of the surface."""
+    x, gradient, other = numbers.x, numbers.gradient, numbers.fields[1 - k]
+    kind = where.switching.kind
+    if kind == "continuous":
+        return _continuous(x, derivatives, margin)
+    if kind == "velocity continuous":
+        return _with_a_jumping_force(x, k, gradient, other, derivatives[k], margin)
+    return boundary_equilibrium_of(x, k, gradient, other, derivatives[k], margin)
+
+
+def _continuous(x: Array, derivatives: Array, margin: float) -> BoundaryEquilibrium:
+    """The equilibrium of both fields, which differ by a rank one."""
+    margins, numbers = dict[str, float](), dict[str, float]()
+    determinants = [float(np.linalg.det(a)) for a in derivatives]
+    for i, (a, det) in enumerate(zip(derivatives, determinants, strict=True), 1):
+        singular = np.linalg.svd(a, compute_uv=False)
+        margins[f"det A{i} = 0"] = float(singular[-1] / singular[0]) if singular[0] else 0.0
+        numbers[f"det A{i}"] = det
+    unfolding = "persistence" if determinants[0] * determinants[1] > 0 else "nonsmooth fold"
+    cycle = None
+    if x.size == 2:
+        traces = [float(np.trace(a)) for a in derivatives]
+        numbers |= {f"trace A{i}": t for i, t in enumerate(traces, 1)}
+        cycle = born_cycle((traces[0], traces[1]), (determinants[0], determinants[1]))
+    label = unfolding if min(margins.values()) >= margin else "degenerate"
+    own, other = (np.linalg.eigvals(a) for a in derivatives)
+    values = ReadOnly(numbers), ReadOnly(margins)
+    return BoundaryEquilibrium(
+        x, "", label, unfolding, False, own, *values, "continuous", other, cycle
+    )
+
+
+def _with_a_jumping_force(
+    x: Array, k: int, gradient: Array, other: Array, a: Array, margin: float
+) -> BoundaryEquilibrium:
+    """The equilibrium of field ``k`` where the other one, not zero, is tangent to the surface too."""
+    c = gradient if k == 0 else -gradient
+    singular = np.linalg.svd(a, compute_uv=False)
+    margins = {"determinant": float(singular[-1] / singular[0]) if singular[0] else 0.0}
+    values, unfolding = {"s": math.nan}, "degenerate"
+    if margins["determinant"] > 1e-14:
+        inverse: Array = np.asarray(np.linalg.solve(a, other), dtype=np.float64)
+        values["s"], margins["s"] = float(c @ inverse), _sine(c, inverse)
+        unfolding = "nonsmooth fold" if values["s"] > 0 else "persistence"
+    values["bend of h"] = float(c @ a @ other)
+    margins["bend of h"] = _sine(c @ a, other)
+    label = unfolding if min(margins.values()) >= margin else "degenerate"
+    return BoundaryEquilibrium(
+        x,
+        SIDES[k],
+        label,
+        unfolding,
+        False,
+        np.linalg.eigvals(a),
+        ReadOnly(values),
+        ReadOnly(margins),
+        "velocity continuous",
     )
 
 

@@ -19,6 +19,7 @@ from ...model import Array, DegenerateError, FilippovSystem, Parameters, PointEr
 from ...model.checks import positive
 from ...notebook import card, quadrants
 from ...solvers.newton import solve_many
+from ..checks import require_generic
 from ..point.regions import coincide
 from ..point.surface_point import FIELDS, SIDES, LocalSurface, Numbers, on_surface, surface_at
 from ..read_only import ReadOnly
@@ -541,6 +542,7 @@ def two_fold(
     where, x = surface_at(system, point, parameters, t, surface, mode)
     if system.dimension < 3:
         unknowns(system, (), 3, "two-fold")
+    require_generic(system, surface, where.mode, "two-fold")
     numbers = on_surface(where, x, positive(tol, "tol"))
     lengths = np.linalg.norm(numbers.lie_gradients, axis=1)
     allowed = tol * (1 + np.linalg.norm(x)) * np.where(lengths > 0, lengths, 1.0)
@@ -620,6 +622,7 @@ def find_two_fold(
     """
     where, x = surface_at(system, near, parameters, t, surface, mode)
     free = unknowns(system, hold, 3, "two-fold")
+    require_generic(system, surface, where.mode, "two-fold")
     return search_two_fold(where, x, free, tol, max_iterations)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, require_system
 from ...model.checks import positive
-from ..checks import MARGIN, relative_difference
+from ..checks import MARGIN, relative_difference, require_generic
 from ..point.surface_point import LocalSurface, Numbers, on_surface, surface_at
 from ..read_only import ReadOnly
 from .folds import bend
@@ -107,6 +107,7 @@ def fold_fold(
     positive(tol, "tol"), positive(margin, "margin")
     require_planar(system, "fold-fold")
     where, x = surface_at(system, point, parameters, 0.0, surface, mode)
+    require_generic(system, surface, where.mode, "fold-fold", force=True)
     numbers = on_surface(where, x, tol)
     if np.any(np.abs(numbers.angles) > tol):
         raise PointError(

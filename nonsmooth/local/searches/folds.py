@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
+from ..checks import require_generic
 from ..point.surface_point import (
     FIELDS,
     TOLERANCE,
@@ -174,7 +175,7 @@ def fold(
     PointError
         The field is not tangent there (angle above ``tol``), and as in :func:`region`.
     DefinitionError
-        As in :func:`region`; a ``side`` that is none; ``max_order`` below 2.
+        As in :func:`region`; a surface on which nothing slides; a ``side`` that is none; ``max_order`` below 2.
     ParameterError, OptionError
         As in :func:`region`.
 
@@ -189,6 +190,7 @@ def fold(
     k = side_index(side)
     _check_order(max_order)
     where, x = surface_at(system, point, parameters, t, surface, mode)
+    require_generic(system, surface, where.mode, "fold")
     numbers = on_surface(where, x, positive(tol, "tol"))
     if abs(numbers.angles[k]) > tol:
         raise PointError(
@@ -248,8 +250,8 @@ def find_fold(
     ConvergenceError
         Newton's method does not converge from this start; ``residual`` and ``point`` are the last ones.
     DefinitionError
-        Vector multipliers; no surface; a ``mode``, ``surface``, ``side`` or state to ``hold`` that the
-        system does not have; ``max_order`` below 2.
+        Vector multipliers; no surface, or one on which nothing slides; a ``mode``, ``surface``, ``side`` or
+        state to ``hold`` that the system does not have; ``max_order`` below 2.
     PointError
         A start of a wrong shape or not finite.
     ParameterError
@@ -265,10 +267,24 @@ def find_fold(
     >>> print(find_fold(s, [3.0, 0.1]).kind, find_fold(s, [0.2, 0.1]).kind)
     invisible visible
     """
-    k = side_index(side)
     _check_order(max_order)
     where, x = surface_at(system, near, parameters, t, surface, mode)
     free = unknowns(system, hold, 2, "fold")
+    require_generic(system, surface, where.mode, "fold")
+    return tangency_near(where, x, side, free, max_order, tol, max_iterations)
+
+
+def tangency_near(
+    where: LocalSurface,
+    x: Array,
+    side: Side,
+    free: Sequence[int],
+    max_order: int,
+    tol: float = 1e-12,
+    max_iterations: int = 50,
+) -> Fold:
+    """Find where one field is tangent to the surface, changing the states ``free`` only."""
+    k = side_index(side)
 
     def equations(u: Array) -> tuple[Array, Array]:
         numbers = where.at(u)

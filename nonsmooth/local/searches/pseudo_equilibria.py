@@ -24,7 +24,7 @@ from ...model import (
     layer_of,
     require_system,
 )
-from ..checks import require_autonomous, require_linear
+from ..checks import require_autonomous, require_generic, require_linear
 from ..point.intersections import Meeting
 from ..point.regions import Region, region_of
 from ..point.surface_point import TOLERANCE, LocalSurface, Numbers, surface_at
@@ -172,6 +172,7 @@ def find_pseudo_equilibrium(
         )
     where, x = surface_at(system, near, parameters, 0.0, surface, mode)
     require_linear(system, surface, "pseudo-equilibrium")
+    require_generic(system, surface, where.mode, "pseudo-equilibrium")
     numbers = where.finite_at(x)
     n, (l1, l2) = x.size, numbers.lie
     alpha = float(np.clip(l1 / (l1 - l2), 0.0, 1.0)) if l1 != l2 else 0.5

@@ -11,6 +11,7 @@ Examples
 [0.585786, 3.414214]
 """
 
+from ...notebook import add_cards
 from .classification import Boundary, Classification, Slopes, classify_two_fold
 from .flights import (
     accumulation_time,
@@ -38,3 +39,5 @@ __all__ = [
     "normal_form",
     "return_matrix",
 ]
+
+add_cards(globals(), __all__)

@@ -17,12 +17,13 @@ from ..checks import is_real
 from ..errors import DefinitionError
 from ..expressions.float_arithmetic import BINARY
 from ..expressions.graph import Node, evaluate, instructions, operation
-from ..numbering import MOST_CODES, OPERATIONS
+from ..numbering import LAWS, MOST_CODES, OPERATIONS
 from ..reading import listed
 from ..values import Array
 from .conditions import OR, Rule
+from .elements import LARGEST
 from .lift import LiftedSwitch
-from .parse_definition import LARGEST, OUTPUTS, Definition, require_consistent
+from .parse_definition import OUTPUTS, Definition, require_consistent
 from .system import FilippovSystem
 
 #: Most instructions, and entries, of a system in a file, and most that are nested: CasADi prints nested ones
@@ -35,7 +36,7 @@ _INPUTS = ("states", "time", "parameters", "multipliers", "reactions")
 def written(system: FilippovSystem) -> dict[str, Any]:
     """Return plain values from which ``read_system`` makes an equal system."""
     d = system.definition
-    inputs, outputs = ([getattr(d, name) for name in names] for names in (_INPUTS, OUTPUTS))
+    inputs, outputs = ([getattr(d, name) for name in names] for names in (_INPUTS, d.outputs))
     nodes, rows = instructions(inputs, outputs, merged=False)
     operations = sorted({node.op for node in nodes})
     size, depth = max(len(nodes), sum(map(len, rows))), _depth(nodes)
@@ -69,6 +70,7 @@ def written(system: FilippovSystem) -> dict[str, Any]:
         "sizes": list(d.sizes),
         "renamed": [list(pair) for pair in d.renamed],
         "layer_widths": list(d.layer_widths),
+        "laws": list(d.laws),
         "lifted": system.lifted,
     }
 
@@ -85,7 +87,7 @@ def read_system(plain: Any) -> FilippovSystem:
     _require(all(is_real(v) and v > 0 for v in widths), "layer_widths that are positive numbers")
     definition = Definition(
         **dict(zip(_INPUTS, vectors, strict=True)),
-        **dict(zip(OUTPUTS, expressions, strict=True)),
+        **dict(zip(OUTPUTS, expressions, strict=False)),
         stops=_directed(stops),
         resets=_directed(resets),
         impacts=tuple(_texts(impacts, "impacts")),
@@ -97,6 +99,7 @@ def read_system(plain: Any) -> FilippovSystem:
         sizes=tuple(sizes),
         renamed=tuple((a, b) for a, b in map(_pair, _list(plain, "renamed"))),
         layer_widths=tuple(map(float, widths)),
+        laws=tuple(_texts(plain.get("laws", []), "laws")),
     )
     _require_shapes(definition)
     require_consistent(definition, given=False)
@@ -135,7 +138,8 @@ def _depth(nodes: Sequence[Node]) -> int:
 def _expressions(plain: Mapping[str, Any], vectors: Sequence[ca.SX]) -> list[ca.SX]:
     nodes = _nodes(plain, [v.numel() for v in vectors])
     outputs = _array(plain, "outputs", np.int32)
-    shapes = [_shape(s) for s in _list(plain, "shapes", len(OUTPUTS))]
+    shapes = [_shape(s) for s in _list(plain, "shapes")]
+    _require(len(OUTPUTS) - 1 <= len(shapes) <= len(OUTPUTS), "a shape of each output")
     _require(outputs.size <= MOST, f"at most {MOST} outputs")
     _require(sum(r * c for r, c in shapes) == outputs.size, "as many outputs as shapes have")
     _require(_within(outputs, len(nodes)), "outputs among the instructions")
@@ -360,5 +364,8 @@ def _require_shapes(d: Definition) -> None:
     sizes = sum(d.sizes) == d.multipliers.numel() and max(d.sizes, default=1) > 1
     _require(not d.sizes or sizes, "sizes of the sets")
     _require(len(d.layer_widths) in (0, d.surfaces.numel()), "one layer width for each surface")
+    known = [law in LAWS and law != "contact" for law in d.laws]
+    _require(len(known) in (0, len(d.sizes or range(d.surfaces.numel()))) and all(known), "laws")
+    _require(d.hysteresis.numel() in (0, d.surfaces.numel()), "a hysteresis of each surface")
     names = [*(n for n, _ in (*d.stops, *d.resets)), *d.impacts]
     _require(len({*names}) == len(names), "events of different names")

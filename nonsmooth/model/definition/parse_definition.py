@@ -32,6 +32,7 @@ from ..reading import (
 )
 from ..values import Array, parameter_values
 from .conditions import Atoms, Rule, located, passages
+from .elements import functions_of, hysteresis_of, laws_of, multipliers_of, read_entries
 from .events import Clock, Impact, Reset, Stop
 from .read_events import direction_of, read_maps, read_rules, read_when, require_no_endless_level
 
@@ -41,7 +42,7 @@ _NONE = ca.SX(0, 1)
 #: Expressions of a definition, in the order in which they are written down.
 OUTPUTS = (
     *("field", "surfaces", "guards", "maps", "gaps", "restitutions"),
-    *("whens", "priorities", "periods"),
+    *("whens", "priorities", "periods", "hysteresis"),
 )
 
 
@@ -74,6 +75,8 @@ class Definition:
     sizes: tuple[int, ...] = ()
     renamed: tuple[tuple[str, str], ...] = ()
     layer_widths: tuple[float, ...] = ()
+    laws: tuple[str, ...] = ()  # of the entries, where not all are surfaces and sets
+    hysteresis: ca.SX = _NONE  # how much lower each function is where its multiplier is -1
 
     @cached_property
     def plain(self) -> bool:
@@ -119,13 +122,18 @@ class Definition:
             "parameters": [s.name() for s in listed(self.parameters)],
         }
 
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the expressions that are written down: the last only where it has entries."""
+        return OUTPUTS if self.hysteresis.numel() else OUTPUTS[:-1]
+
     def state(self) -> dict[str, Any]:
         """Plain values from which ``from_state`` makes an equal definition."""
         inputs = [self.states, self.time, self.parameters, self.multipliers, self.reactions]
-        outputs = [getattr(self, name) for name in OUTPUTS]
+        outputs = [getattr(self, name) for name in self.outputs]
         some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed, "rules": self.rules}
         some |= {"clocks": self.clocks, "discrete": self.discrete}
-        some |= {"layer_widths": self.layer_widths}
+        some |= {"layer_widths": self.layer_widths, "laws": self.laws}
         return {
             **{name: value for name, value in some.items() if value},
             "definition": ca.Function("definition", inputs, outputs).serialize(),
@@ -146,8 +154,8 @@ class Definition:
         expressions = [ca.SX(e) for e in function.call(vectors)]
         inputs = ("states", "time", "parameters", "multipliers", "reactions")
         rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
-        parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=True))
-        some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths")
+        parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=False))
+        some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths", "laws")
         tuples: dict[str, Any] = {name: tuple(state.get(name, ())) for name in some}
         return cls(**parts, **rest, **tuples)
 
@@ -180,10 +188,12 @@ def read_definition(
         raise DefinitionError("states: expected at least one symbol, received none.")
     t = symbols([time], "time") if time is not None else ca.SX(0, 1)
     p, defaults = _parameters(parameters)
-    h, sizes = _surfaces(surface, surfaces)
+    entries = read_entries(surface, surfaces)
+    h, sizes = functions_of(entries), tuple(len(entry.functions) for entry in entries)
     if above is not None or below is not None:
         lam, f = _two_fields(above, below, field, multipliers, h, x.numel())
     else:
+        multipliers = multipliers_of(entries, multipliers)
         _require_alike(sizes, multipliers)
         lam = symbols([s for entry in listed(multipliers) for s in listed(entry)], "multipliers")
         f = column(field, "field", x.numel())
@@ -203,10 +213,12 @@ def read_definition(
         field=f,
         surfaces=h,
         defaults=defaults,
-        hidden=hidden,
+        hidden=hidden or any(entry.hidden for entry in entries),
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
         layer_widths=_widths(layer_widths, h.numel()),
+        laws=laws_of(entries),
+        hysteresis=hysteresis_of(entries),
         **_events(stops, resets, clocks, discrete, x, t, p),
     )
     require_consistent(definition)
@@ -299,22 +311,6 @@ def _parameters(
         for s, v in zip(given, values, strict=True)
     }
     return p, defaults
-
-
-def _surfaces(
-    surface: Expression | None, surfaces: Sequence[Expression] | None
-) -> tuple[ca.SX, tuple[int, ...]]:
-    """All switching functions, and how many of them belong to each surface or set."""
-    if surface is not None and surfaces is not None:
-        raise DefinitionError(
-            "surface: expected either surface= or surfaces=, received both. One switching "
-            "function goes to surface=, several to surfaces=."
-        )
-    given = [surface] if surface is not None else listed(surfaces)
-    entries = [_read_entry(v, f"surface {i}") for i, v in enumerate(given)]
-    expressions = [e for entry in entries for e in entry]
-    sizes = tuple(len(entry) for entry in entries)
-    return ca.vertcat(*expressions) if expressions else ca.SX(0, 1), sizes
 
 
 def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
@@ -420,29 +416,6 @@ def _reactions(impacts: Sequence[Impact], x: ca.SX, t: ca.SX, field: ca.SX) -> t
 
 # sets of codimension two and three --------------------------------------------------------------
 
-#: Largest codimension of a set: slip has two components, three with drilling.
-LARGEST = 3
-
-
-def _read_entry(value: Any, what: str) -> list[ca.SX]:
-    """Read a surface (a scalar) or a set (a vector of two or three) as a list of expressions."""
-    if not isinstance(value, (list, tuple)) and not (
-        isinstance(value, (ca.SX, ca.DM)) and ca.SX(value).numel() > 1
-    ):
-        return [scalar(value, what)]
-    entries = listed(value)
-    if isinstance(value, (ca.SX, ca.DM)) and 1 not in value.shape:
-        raise DefinitionError(
-            f"{what}: expected a scalar or a column, received a matrix of shape {value.shape}."
-        )
-    if not 1 <= len(entries) <= LARGEST:
-        raise DefinitionError(
-            f"{what}: expected a scalar or a vector of at most {LARGEST} switching functions, "
-            f"received {len(entries)} of them. A vector is one set, on which all its components "
-            "vanish; give surfaces that do not belong together as separate entries."
-        )
-    return [scalar(e, f"{what}[{i}]") for i, e in enumerate(entries)]
-
 
 def _require_alike(sizes: Sequence[int], multipliers: Any) -> None:
     """Refuse multipliers whose shapes differ from those of the surfaces."""
@@ -525,6 +498,7 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     if not d.hidden:
         _require_linear(d)
     _require_linear_sets(d)
+    _require_hysteresis(d)
 
 
 def _check_impact(d: Definition, j: int) -> None:
@@ -550,6 +524,12 @@ def _check_impact(d: Definition, j: int) -> None:
         )
 
 
+def _require_hysteresis(d: Definition) -> None:
+    """Refuse elements whose two thresholds are not a fixed distance apart."""
+    for width in listed(d.hysteresis):
+        require_known(width, d.parameters, "thresholds of an element", **d.names)
+
+
 def consistent_parameters(
     d: Definition, names: Sequence[str], parameters: Parameters | None
 ) -> Array:
@@ -563,6 +543,13 @@ def consistent_parameters(
         if not 0.0 <= value <= 1.0:
             raise ParameterError(
                 f"restitution of {name!r}: expected a number from 0 to 1, received {value:g} (= {e})."
+            )
+    for width in listed(d.hysteresis):
+        value = float(ca.evalf(ca.substitute(width, d.parameters, ca.DM(p))))
+        if not (width.is_zero() or value > 0.0):
+            raise ParameterError(
+                f"thresholds of an element: the upper one is {value:g} (= {width}) above the lower one. "
+                "Give values with a positive difference."
             )
     return p
 

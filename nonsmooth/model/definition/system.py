@@ -14,11 +14,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...notebook import card
+from ...notebook import Markup, card
 from ..cache import Cache, Content
 from ..calls import call
 from ..checks import real
 from ..errors import DefinitionError, PointError
+from ..expressions.mathml import equation, rate, symbol
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
 from .events import Clock, Impact, Reset, Stop, with_added_states
@@ -30,6 +31,8 @@ T = TypeVar("T")
 
 #: Classes of surfaces are shown for at most so many of them.
 _CLASSES_SHOWN = 8
+_EQUATIONS_SHOWN = 12
+_SIDES = (("+", "above"), ("-", "below"))
 
 Discrete = Sequence[Expression] | Mapping[Any, Sequence[float] | None]
 
@@ -55,7 +58,8 @@ class FilippovSystem:
         One for each surface; a vector for each set.
     surfaces : sequence of expressions, optional
         Switching functions, one for each multiplier (``surface`` also takes one). A vector h of two or
-        three is one set $h = 0$: its multiplier is $h/|h|$ off it and $|lambda| <= 1$ on it.
+        three is one set $h = 0$: its multiplier is $h/|h|$ off it and $|lambda| <= 1$ on it. A
+        :class:`Relay` is one with hysteresis.
     parameters : mapping or sequence, optional
         Symbols with their default values; None, or a bare sequence of symbols, means no default.
     time : SX symbol, optional
@@ -253,13 +257,21 @@ class FilippovSystem:
     # notebook and print ------------------------------------------------------------------------
 
     def _repr_html_(self) -> str:
-        """How a notebook shows the system: states, fields of one surface, surfaces, parameters."""
+        """How a notebook shows the system: states, fields, surfaces and parameters, typeset."""
         rows: list[tuple[str, object]] = [("states", ", ".join(self.state_names))]
-        single = len(self.entries) == 1 and not self.sets
-        for mode, where in (("+", "above"), ("-", "below")) if single else ():
-            rows.append((f"field {where}", self.field(mode)))
-        surfaces = listed(self.definition.surfaces)
-        rows += [(f"surface h{k}", function) for k, function in enumerate(surfaces)]
+        own = self.definition
+        parts = (own.extended_states, own.parameters, own.multipliers, own.reactions)
+        known = [one for part in parts for one in listed(part)]
+        single = len(self.entries) == 1 and not self.sets and not self.hidden
+        fields = {f"field {where}": self.field(mode) for mode, where in _SIDES} if single else {}
+        for where, field in (fields or {"field": self.definition.field}).items():
+            pairs = list(zip(self.state_names, listed(field), strict=False))[:_EQUATIONS_SHOWN]
+            written = [equation(rate(name), rhs, known) for name, rhs in pairs]
+            more = len(self.state_names) - len(pairs)
+            written += [f"and {more} more"] * (more > 0)
+            rows.append((where, Markup("<br>".join(written))))
+        for k, function in enumerate(listed(own.surfaces)[:_EQUATIONS_SHOWN]):
+            rows.append((f"surface h{k}", Markup(equation(symbol(f"h{k}"), function, known))))
         rows += [("parameters", ", ".join(self.parameter_names))]
         rows += [("stops", ", ".join(n for n, _ in self.stops))]
         rows += [("resets", ", ".join(n for n, _ in self.resets))]
@@ -326,6 +338,19 @@ class FilippovSystem:
     def set_of(self) -> dict[int, tuple[int, ...]]:
         """The set to which a switching function belongs; surfaces are not in it."""
         return {i: members for members in self.sets for i in members}
+
+    @cached_property
+    def laws(self) -> tuple[str, ...]:
+        """Name of the law of each surface, set or other element, in the order of ``entries``."""
+        return self.definition.laws or tuple(
+            "surface" if len(e) == 1 else "set" for e in self.entries
+        )
+
+    @cached_property
+    def remembering(self) -> tuple[int, ...]:
+        """Switching functions of elements with hysteresis, whose state follows from the past."""
+        widths = listed(self.definition.hysteresis)
+        return tuple(i for i, width in enumerate(widths) if not width.is_zero())
 
     @cached_property
     def surface_names(self) -> tuple[str, ...]:
@@ -501,8 +526,9 @@ class FilippovSystem:
         i = self.surface_index(surface)
         if mode is not None:
             self.require_mode(mode)
-        if i in self.set_of:
-            return Switching("generic", None, None, "its definition as a set")
+        if i in (*self.set_of, *self.remembering):
+            what = "as a set" if i in self.set_of else "with hysteresis"
+            return Switching("generic", None, None, f"its definition {what}")
         values = None if parameters is None else tuple(self.parameter_vector(parameters).tolist())
         key = ("switching", i, mode, values)
         return self.cached(key, lambda: class_of(self, i, mode, parameters))
@@ -698,8 +724,8 @@ class FilippovSystem:
         return np.array([*values, moment]) if self.time_dependent else values
 
 
-def require_system(value: Any, sets: bool = False) -> None:
-    """Refuse all but a FilippovSystem; ``sets`` allows vector multipliers."""
+def require_system(value: Any, sets: bool = False, hysteresis: bool = False) -> None:
+    """Refuse all but a FilippovSystem; ``sets`` allows vector multipliers, ``hysteresis`` relays with it."""
     if not isinstance(value, FilippovSystem):
         raise DefinitionError(
             f"system: expected a FilippovSystem, received {value!r} ({type(value).__name__}). "
@@ -711,6 +737,11 @@ def require_system(value: Any, sets: bool = False) -> None:
             f"system: {value!r} has vector multipliers, which this function does not support. Sets of "
             "codimension two and three work in simulate, ensemble, sensitivity, region and "
             "limit_directions."
+        )
+    if value.remembering and not hysteresis:
+        raise DefinitionError(
+            f"system: {value!r} has elements with hysteresis, which this function does not support. They "
+            "work in simulate, ensemble and outcomes."
         )
 
 

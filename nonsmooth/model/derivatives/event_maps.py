@@ -86,6 +86,8 @@ def event_map(
     system: FilippovSystem, mode: str, kind: str, element: int, side: int, letters: str = ""
 ) -> EventMap:
     """The map of an event of a mode; built once."""
+    if system.sets:
+        return instant_map(system, system.widened(mode), kind, element, letters)
 
     def build() -> EventMap:
         of_mode = explicit(system, mode)
@@ -129,7 +131,8 @@ def function_map(system: FilippovSystem, mode: str, function: ca.SX) -> EventMap
 
     def build() -> EventMap:
         guard = Guard("zero", 0, 0, 0)
-        return EventMap(system, explicit(system, mode).states, function, guard)
+        states = symbols[0] if system.sets else explicit(system, mode).states
+        return EventMap(system, states, function, guard)
 
     return system.cached(("function map", mode, Content(symbols, function)), build)
 

@@ -1,12 +1,10 @@
 """The variational equations of a mode: X' = Df X and P' = Df P + f_p beside the state.
 
-X and P are the derivatives by the start and by parameters. Together with the state they form one
-smooth field, without the entries that are constant (structural zeros, the row of time).
+X and P are the derivatives by the start and by parameters; ``flow/core/flow.c`` carries their columns.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -20,32 +18,11 @@ from ..laws.evaluators import Evaluator
 from ..laws.explicit import explicit, solved
 from ..laws.motion import Motion
 from ..laws.multipliers import newton_multipliers, sliding_multipliers
-from ..printing.tape import Series, series_of
+from ..printing.tape import Entries, Series, series_of, sparse_entries
 from ..values import Array
 
 #: Order of the series of a leg: for the rounding of doubles about -ln(eps)/2 + 2 (Jorba & Zou 2005).
 ORDER = 20
-
-
-@dataclass(frozen=True)
-class Blocks:
-    """The pattern of the entries of x, X and P in the state of a variational field."""
-
-    states: int
-    starts: int
-    parameters: int
-    moving: NDArray[np.bool_]
-    fixed: Array
-
-    def pack(self, matrix: Array) -> Array:
-        """Take the moving entries of (x, X, P)."""
-        return np.asarray(matrix.T[self.moving.T])
-
-    def unpack(self, z: Array) -> Array:
-        """Return the matrix (x, X, P), (N + k, 1 + N + q)."""
-        whole = self.fixed.T.copy()
-        whole[self.moving.T] = z
-        return whole.T
 
 
 class PlainField:
@@ -59,10 +36,18 @@ class PlainField:
         """Symbols of the parameters."""
         return self.motion.system.parameter_symbols
 
+    #: Columns of derivatives, those by the start first.
+    by_start = columns = 0
+
     @property
     def entries(self) -> int:
         """Number of states."""
         return int(self.states.numel())
+
+    @property
+    def derivatives(self) -> Entries:
+        """Places of the last outputs of ``series`` among derivatives by states and parameters: none."""
+        return sparse_entries(ca.SX(0, 0))[1]
 
     @cached_property
     def groups(self) -> tuple[NDArray[np.intp], ...]:
@@ -87,60 +72,36 @@ class VariationalField(PlainField):
 
     def __init__(self, of_mode: Motion, chosen: tuple[int, ...] = ()):
         super().__init__(of_mode)
-        self.chosen = chosen
-        system = of_mode.system
-        y, f, p = of_mode.states, of_mode.field, system.parameter_symbols
-        size, n, q = y.numel(), system.extended_dimension, len(chosen)
-        by_state = ca.jacobian(f, y)
-        by_parameters = ca.jacobian(f, p)[:, list(chosen)] if q else ca.SX(size, 0)
-        moving, fixed = _pattern(by_state, by_parameters, n)
-        self.blocks = Blocks(size, n, q, moving, fixed)
-        symbols = [
-            [y[i] for i in range(size)],
-            *[
-                [
-                    ca.SX.sym(f"d{i}_{j}") if moving[i, j] else ca.SX(float(fixed[i, j]))
-                    for i in range(size)
-                ]
-                for j in range(1, 1 + n + q)
-            ],
-        ]
-        matrix = ca.sparsify(ca.horzcat(*[ca.vertcat(*column) for column in symbols[1:]]))
-        rates = ca.mtimes(by_state, matrix)
-        if q:
-            rates[:, n:] += by_parameters
-        chosen_rates = [f[i] for i in range(size)]
-        kept = [y[i] for i in range(size)]
-        for j in range(1, 1 + n + q):
-            for i in range(size):
-                if moving[i, j]:
-                    chosen_rates.append(ca.densify(rates[i, j - 1]))
-                    kept.append(symbols[j][i])
-        self.states, self.field = ca.vertcat(*kept), ca.vertcat(*chosen_rates)
+        self.chosen, self.by_start = chosen, of_mode.system.extended_dimension
+        self.columns = self.by_start + len(chosen)
 
     @cached_property
-    def groups(self) -> tuple[NDArray[np.intp], ...]:
-        """Entries of z whose errors are measured together: of x without time, of X, of P."""
-        of_column = np.repeat(
-            np.arange(self.blocks.moving.shape[1]), self.blocks.moving.sum(axis=0)
-        )
-        states = np.flatnonzero(of_column == 0)
-        system = self.motion.system
-        if system.time_dependent:
-            states = np.delete(states, system.dimension)
-        n = self.blocks.starts
-        groups = (
-            states,
-            np.flatnonzero((of_column > 0) & (of_column <= n)),
-            np.flatnonzero(of_column > n),
-        )
-        return tuple(g for g in groups if g.size)
+    def _derived(self) -> tuple[ca.SX, Entries]:
+        by_state = ca.jacobian(self.field, self.states)
+        by_parameters = ca.jacobian(self.field, self.parameters)
+        chosen = [by_parameters[:, j] for j in self.chosen]
+        nonzeros, places = sparse_entries(ca.horzcat(by_state, *chosen).T)  # row after row
+        return nonzeros, Entries(places.column, places.row)
+
+    @property
+    def derivatives(self) -> Entries:
+        """Places of the field's derivatives by states and chosen parameters, which follow it in ``series``."""
+        return self._derived[1]
+
+    @cached_property
+    def series(self) -> Series:
+        """The Taylor rules of the field and of its derivatives."""
+        return series_of([self.states, self.parameters], [self.field, self._derived[0]])
 
     @cached_property
     def rate(self) -> Evaluator:
         """(y, p) -> the mode's field (N + k, 1)."""
         inputs = [self.motion.states, self.parameters]
         return Evaluator(ca.Function("rate", inputs, [ca.densify(self.motion.field)]))
+
+    def rate_at(self, y: Array, p: Array) -> Array:
+        """The mode's field at states of a leg (N + k,)."""
+        return self.rate.copied(y, p)[0][:, 0]
 
     @cached_property
     def linear(self) -> Evaluator:
@@ -153,7 +114,7 @@ class VariationalField(PlainField):
     def _multipliers(self) -> Evaluator:
         """(y, p) -> derivatives of the multipliers that are states, by states and parameters."""
         law, p = self.motion.law, self.parameters
-        x, u = self.motion.states[: self.blocks.starts], self.motion.states[self.blocks.starts :]
+        x, u = self.motion.states[: self.by_start], self.motion.states[self.by_start :]
         (layer,) = coupled_of(self.motion.system).held_at(self.motion.mode, [law.coupled.layer])  # type: ignore[attr-defined]
         residual = layer[list(law.unknowns)]  # type: ignore[attr-defined]
         right = ca.horzcat(ca.jacobian(residual, x), ca.jacobian(residual, p)[:, list(self.chosen)])
@@ -161,28 +122,26 @@ class VariationalField(PlainField):
         return Evaluator(ca.Function("multipliers", [self.motion.states, p], outputs))
 
     def start(self, x: Array, p: Array, unknowns: Array | None = None) -> Array:
-        """The state z at the start of a leg, X = 1 and P = 0; ``unknowns`` is a guess of multipliers."""
-        return self.blocks.pack(self.initial(x, p, unknowns))
+        """States and columns at the start of a leg, as one row; ``unknowns`` is a guess of multipliers."""
+        return self.initial(x, p, unknowns).T.ravel()
+
+    def matrix(self, z: Array) -> Array:
+        """The matrix (x, X, P) of states and columns, (N + k, 1 + N + q)."""
+        return z.reshape(1 + self.columns, self.entries).T
 
     def initial(self, x: Array, p: Array, unknowns: Array | None = None) -> Array:
         """The matrix (x, X, P) at the start of a leg, (N + k, 1 + N + q)."""
-        b, matrix = self.blocks, self._identity.copy()
-        matrix[: b.starts, 0] = x
-        if b.states > b.starts:
-            matrix[b.starts :, 0] = self._unknowns(x, p, unknowns)
-            matrix[b.starts :, 1:] = self._multipliers.copied(matrix[:, 0], p)[0]
-        return matrix
-
-    @cached_property
-    def _identity(self) -> Array:
-        b = self.blocks
-        matrix = np.zeros((b.states, 1 + b.starts + b.parameters))
-        matrix[: b.starts, 1 : 1 + b.starts] = np.eye(b.starts)
+        n, matrix = self.by_start, np.eye(self.entries, 1 + self.columns, 1)
+        matrix[n:] = matrix[:, 1 + n :] = 0.0
+        matrix[:n, 0] = x
+        if self.entries > n:
+            matrix[n:, 0] = self._unknowns(x, p, unknowns)
+            matrix[n:, 1:] = self._multipliers.copied(matrix[:, 0], p)[0]
         return matrix
 
     def states_at(self, x: Array, p: Array) -> Array:
         """Extended states (N,) and the multipliers that are states of the leg; (N + k,)."""
-        if self.blocks.states == self.blocks.starts:
+        if self.entries == self.by_start:
             return x
         return np.concatenate([x, self._unknowns(x, p, None)])
 
@@ -203,30 +162,6 @@ class VariationalField(PlainField):
                 "another itinerary."
             )
         return np.asarray(solutions[0][which])
-
-
-def _pattern(by_state: ca.SX, by_parameters: ca.SX, n: int) -> tuple[NDArray[np.bool_], Array]:
-    """Entries of (x, X, P) that move, and the values of those that do not."""
-    size, q = by_state.shape[0], by_parameters.shape[1]
-    a = _nonzero(by_state)
-    direct = np.hstack([np.zeros((size, n), bool), _nonzero(by_parameters)])
-    fixed = np.zeros((size, 1 + n + q))
-    fixed[:n, 1 : 1 + n] = np.eye(n)
-    reached = fixed[:, 1:] != 0
-    reached[n:] = True  # multipliers depend on everything
-    for _ in range(size + 1):
-        reached = reached | direct | (a @ reached)
-    moving = np.hstack([np.ones((size, 1), bool), (a @ reached) | direct])
-    moving[n:] = True
-    fixed[moving] = 0.0
-    return moving, fixed
-
-
-def _nonzero(matrix: ca.SX) -> NDArray[np.bool_]:
-    result = np.zeros(matrix.shape, bool)
-    rows, columns = ca.sparsify(matrix).sparsity().get_triplet()
-    result[rows, columns] = True
-    return result
 
 
 def variational_field(

@@ -114,8 +114,12 @@ class Coupled:
         if by_degree:
             for i, found in enumerate(self.degrees(field, lam, unknowns)):
                 self.lower[i], self.layer[i] = found.lower, found.row
+        h = ca.SX(d.surfaces)
+        for i in system.remembering:  # h at multiplier +1, the further function at -1
+            self.lower[i] = (h[i] - d.hysteresis[i],)
+            h[i] -= (1 - lam[i]) / 2 * d.hysteresis[i]
         stops = ca.densify(d.guards) if d.guards.numel() else ca.SX(0, 1)
-        heights = ca.densify(ca.vertcat(d.surfaces, d.gaps))
+        heights = ca.densify(ca.vertcat(h, d.gaps))
         factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
         self.outputs = [field, self.layer, heights, factor, stops]
         every = ca.vertcat(*unknowns, d.reactions)
@@ -130,7 +134,7 @@ class Coupled:
 
     def _is_continuous(self, surface: int) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""
-        if surface in self.system.set_of:
+        if surface in (*self.system.set_of, *self.system.remembering):
             return False
         d, x = self.system.definition, self.system.extended_states
         column = ca.jacobian(d.field, d.multipliers[surface])
@@ -168,6 +172,8 @@ class Coupled:
         for i in range(self._surfaces):
             found.append(Degree((), self.layer[i]))
             if self.continuous[i] or self.system.nonlinear[i] or i in self.system.set_of:
+                continue
+            if i in self.system.remembering:
                 continue
             own = ca.vertcat(lam[i], unknowns[i]) if self.scaled[i] else lam[i]
             others = ca.vertcat(*[e for e in every if not ca.depends_on(own, e)])
@@ -226,32 +232,17 @@ class Coupled:
         return self.continuous[i] or idle
 
     def guards(self, mode: str) -> tuple[Guard, ...]:
-        """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""
+        """Guards of a mode: surfaces and exits, contacts, stops and resets."""
         result, contacts = list[Guard](), len(self.system.entries)
         for i, sign in enumerate(self.system.parse_letters(mode)):
             j = i - self._surfaces
             if j >= 0:
                 result.append(Guard("impact" if sign else "release", j, sign, contacts + j))
-            elif i in self.system.set_of:
-                result += self._guards_of_set(i, mode[i])
             elif sign:
                 result.append(Guard("surface", i, sign, self.system.entry_of(i)))
             else:
                 result += [Guard("exit", i, side, self.system.entry_of(i)) for side in (1, -1)]
-        result += event_guards(self.system)
-        sliding = self.sliding(mode)
-        first = next((i for i in sliding if i < self._surfaces), 0)
-        branches = len(self._changing(sliding))
-        of_first = self.system.entry_of(first) if self._surfaces else 0
-        return (*result, *[Guard("branch", first, 0, of_first)] * branches)
-
-    def _guards_of_set(self, i: int, letter: str) -> list[Guard]:
-        """Those of the set that begins with a switching function."""
-        if i != self.system.set_of[i][0] or letter == "i":
-            return []
-        k = self.system.entry_of(i)
-        near = [Guard("near", i, 0, k)]
-        return [Guard("slip", i, 0, k), *near * self.scaled[i]] if letter == "s" else near
+        return (*result, *event_guards(self.system))
 
     @cached_property
     def slope_moves(self) -> NDArray[np.bool_]:
@@ -285,12 +276,6 @@ class Coupled:
             bent = ca.jacobian(self.columns_of_field[:, j], self._every)
             mixed[j, bent.sparsity().get_col()] = True
         return mixed
-
-    def _changing(self, sliding: Sequence[int]) -> list[int]:
-        """Unknowns that the stability of sliding is read from."""
-        if len(sliding) == 2 and max(sliding) < self._surfaces:
-            return list(sliding) if self.slope_moves[np.ix_(sliding, sliding)].any() else []
-        return [i for i in sliding if self.slope_moves[i, i]]
 
     # expressions --------------------------------------------------------------------------------
 
@@ -344,12 +329,23 @@ class Coupled:
 
     def awake(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Dense expressions in ``moving``, for numbers: terms that a mode leaves out are not evaluated."""
+        dense = [ca.densify(e) for e in expressions]
+        return without_unused_terms(self._symbols, dense, self._values_held)
+
+    @property
+    def _values_held(self) -> dict[int, tuple[float, ...]]:
+        """Values at which modes hold entries of ``moving``."""
         n, m, places = self.system.extended_dimension, self._surfaces, self.moving.numel()
         held: dict[int, tuple[float, ...]] = dict.fromkeys(range(n + m, places), (0.0,))
         for i in range(m):
             signs = () if i in self.system.set_of else (1.0, -1.0)
             held[n + i] = (*signs, 0.0) if self.scaled[i] else signs
-        return without_unused_terms(self._symbols, [ca.densify(e) for e in expressions], held)
+        return held
+
+    @property
+    def derivatives(self) -> ca.SX:
+        """Of field, layer, surfaces and gaps, and factors by ``moving`` and the parameters, sparse."""
+        return ca.jacobian(ca.vertcat(*self.outputs[:4]), ca.vertcat(*self._symbols))
 
     # numbers -----------------------------------------------------------------------------------
 

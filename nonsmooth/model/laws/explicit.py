@@ -74,7 +74,7 @@ class Solved:
                 turn = 1 if n.is_one() else n  # n^2 (1 -+ lambda) has the sign of 1 -+ lambda
                 functions += [turn * (n - u), turn * (n + u)]
         functions += ca.vertsplit(stops)[: stops.numel()]
-        guards = [g for g in coupled.guards(self.mode) if g.kind != "branch"]
+        guards = coupled.guards(self.mode)
         own = coupled.symbols_of(sliding)
         if own.numel() and not self.unknowns:
             functions = [ca.substitute(f, own, self.values) for f in functions]

@@ -127,13 +127,15 @@ def tape_of(coupled: Coupled) -> Tape:
     """Write a system as a tape."""
     system, d = coupled.system, coupled.system.definition
     x, p = system.extended_states, system.parameter_symbols
-    slope, gradients = _sparse(coupled.slope), [_sparse(g) for g in coupled.gradients]
+    slope, gradients = sparse_entries(coupled.slope), [sparse_entries(g) for g in coupled.gradients]
     matrices = [slope, *gradients]
     kept = coupled.kept
-    surface_gradient = _sparse(ca.jacobian(kept, x)) if kept.numel() else _sparse(ca.SX(0, 1))
-    column = _sparse(coupled.columns_of_field)
+    surface_gradient = (
+        sparse_entries(ca.jacobian(kept, x)) if kept.numel() else sparse_entries(ca.SX(0, 1))
+    )
+    column = sparse_entries(coupled.columns_of_field)
     atoms = d.guards if d.guards.numel() else ca.SX(0, 1)
-    gradient = _sparse(ca.jacobian(atoms, x) if d.guards.numel() else ca.SX(0, x.numel()))
+    gradient = sparse_entries(ca.jacobian(atoms, x) if d.guards.numel() else ca.SX(0, x.numel()))
     output, moves, slopes = _moving_slopes(coupled)
     point = [coupled.layer, coupled.factors, *[nonzeros for nonzeros, _ in matrices]]
     series, free = _series_of_modes(coupled, slopes)
@@ -252,6 +254,20 @@ def _rules_of(
     return rules, [[rule_of[j] for j in row] for row in rows]
 
 
+def derived_series_of(coupled: Coupled) -> tuple[Series, Entries]:
+    """Rules of all that any mode needs and of its derivatives, and the places of these in their matrix."""
+    n, size = coupled.system.extended_dimension, coupled.moving.numel()
+    derivatives, entries = sparse_entries(coupled.derivatives)
+    outputs = [*coupled.outputs, _moving_slopes(coupled)[2], derivatives]
+    inputs = [coupled.moving, coupled.system.parameter_symbols]
+    rules, rows = _rules_of(inputs, coupled.awake(outputs))
+    held = {n + i for i, own in enumerate(coupled.scaled) if own} - {
+        n + i for i in coupled.system.set_of
+    }
+    moves, unknown = lambda k: k not in held, lambda k: n <= k < size
+    return _series(rules, rows, range(len(rows)), moves, unknown, _time_of(coupled)), entries
+
+
 def _series(
     rules: Sequence[Rule],
     rows: Sequence[Sequence[int]],
@@ -353,7 +369,7 @@ def _specialised(rule: Rule, moving: Sequence[bool]) -> tuple[str, tuple[int, ..
     return rule.rule, rule.args
 
 
-def _sparse(matrix: ca.SX) -> tuple[ca.SX, Entries]:
+def sparse_entries(matrix: ca.SX) -> tuple[ca.SX, Entries]:
     """Nonzero entries of a matrix as a column, and their places."""
     rows, columns = matrix.sparsity().row(), matrix.sparsity().get_col()
     nonzeros = ca.vertcat(*matrix.nonzeros()) if rows else ca.SX(0, 1)

@@ -7,6 +7,7 @@
 | switching-sliding | a s | a b s |
 | adding-sliding | s | s b s |
 | impact grazing | a | a impact a |
+| grazing of a soft switch | a | a b a |
 | corner | two events at one time, in the other order | |
 | corner that adds legs | a b | a c d b, past a second surface and back |
 
@@ -109,6 +110,8 @@ def rotated(before: ChangedItinerary, k: int, p: Array) -> ChangedItinerary:
 #: Sine of the angle at which a field is tangent to a surface.
 _TANGENT = 1e-7
 
+SOFT, FORCE = "grazing of a soft switch", "grazing of a jumping force"
+
 
 def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array) -> str:
     """The bifurcation that the zero of a test is."""
@@ -134,6 +137,9 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     if before.kind == "entry" and leg.kind == "exit":
         came, left = before.mode, mode_after(leg)
         return "grazing-sliding" if came == left else "crossing-sliding"
+    if before.kind == leg.kind == "crossing" and before.mode == after.mode:
+        if surface_of(problem.system, before) == surface_of(problem.system, leg):
+            return _soft(problem, leg, surface_of(problem.system, leg)) or "corner"
     if leg.kind == "entry" and before.kind == "exit":
         return "adding-sliding" if after.mode == before.mode or len(legs) == 2 else "corner"
     if leg.kind == "entry" and before.kind == "crossing":
@@ -160,12 +166,37 @@ def _grazed(
     )
     field = leg_between(problem.system, leg.mode, other).map(problem.system)
     assert field is not None
+    soft = _soft(problem, leg, guard.element)
+    if soft == SOFT:
+        return soft
     gradient = field(y, p).gradient[: problem.dimension]
     rate = Leg(other).field(problem.system).rate.copied(y, p)[0][: problem.dimension, 0]
     across = float(gradient @ rate)
     if abs(across) <= _TANGENT * float(np.linalg.norm(gradient) * np.linalg.norm(rate)):
-        return "two-fold"  # both fields touch there: always so where a force jumps with a position
+        if soft == FORCE and _leads_away(problem, other, guard.element, y, p):
+            return "grazing, escaping"
+        return soft or "two-fold"  # both fields touch there
     return "grazing-sliding" if across > 0.0 else "grazing, escaping"
+
+
+def _leads_away(problem: BoundaryProblem, mode: str, surface: int, y: Array, p: Array) -> bool:
+    """Whether the field beyond a surface, tangent to it too, bends away from it."""
+    field = guarded_field(problem.system, mode)
+    own = [g.kind == "surface" and g.element == surface for g in field.motion.guards].index(True)
+    return (
+        float(field.starts.copied(Leg(mode).field(problem.system).states_at(y, p), p)[1][own, 2])
+        > 0.0
+    )
+
+
+def _soft(problem: BoundaryProblem, leg: Leg, surface: int) -> str:
+    """The grazing of a surface on which nothing slides; empty where something may."""
+    known = {i for i, letter in enumerate(leg.mode) if letter in "+-s"}
+    mode = leg.mode[: len(problem.system.entries)] if len(known) == len(leg.mode) else None
+    found = problem.system.switching(surface, mode=mode)
+    if found.slides:
+        return ""
+    return FORCE if found.kind == "velocity continuous" and found.order == 0 else SOFT
 
 
 def changed_itinerary(
@@ -249,6 +280,9 @@ def _added(
     if kind == "grazing-sliding":
         slide = with_letter(leg.mode, guard.element, "s")
         return [leg_between(system, leg.mode, slide), leg_between(system, slide, leg.mode)], [y, y]
+    if kind == SOFT:
+        far = with_letter(leg.mode, guard.element, leg.mode[guard.element].translate(TURNED))
+        return [leg_between(system, leg.mode, far), leg_between(system, far, leg.mode)], [y, y]
     if kind == "adding-sliding":
         free = with_letter(leg.mode, guard.element, "+" if guard.side > 0 else "-")
         return [leg_between(system, leg.mode, free), leg_between(system, free, leg.mode)], [y, y]
@@ -282,7 +316,7 @@ def _shorter(
         legs[i - 1] = replace(legs[i - 1], kind=became)
         editor.remove(i)
         return editor.done(test=Condition("start", i % len(legs), guard))
-    if kind in ("grazing-sliding", "adding-sliding") and at.what == "duration":
+    if kind in ("grazing-sliding", "adding-sliding", SOFT) and at.what == "duration":
         if len(legs) == 2:
             return _smooth(editor, p)
         if i + 1 == len(legs):
@@ -426,13 +460,14 @@ def grown(problem: BoundaryProblem, u: Array, p: Array, fresh: Sequence[int], by
     """Unknowns near an orbit whose legs ``fresh`` last for ``by``."""
     # A leg that is added inside a slide begins before the point where the slide touched its boundary
     # and ends after it: h = L11 t^2/2 + L111 t^3/6 with an exit at -t/3 of a leg of the duration t.
-    # A slide that begins at a graze ends where the graze was.
+    # A slide that begins at a graze ends where the graze was; a visit beyond a soft switch is around it.
     starts, durations = (np.array(part) for part in problem.split(u))
     legs = problem.legs
     for i in fresh:
         durations[i] = by
         kinds = (legs[i - 1].kind, legs[i].kind) if 0 < i < len(legs) - 1 else ("", "")
-        before = {("exit", "entry"): by / 3, ("entry", "exit"): by}.get(kinds, 0.0)
+        ahead = {("exit", "entry"): by / 3, ("entry", "exit"): by, ("crossing", "crossing"): by / 2}
+        before = ahead.get(kinds, 0.0)
         through = kinds == ("exit", "entry") or legs[i - 1].mode == mode_after(legs[i])
         if not before or not through or durations[i - 1] < by or durations[i + 1] < by:
             continue

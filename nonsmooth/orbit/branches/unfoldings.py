@@ -37,6 +37,8 @@ _VERDICTS = {
     "impact grazing": "the return map has a square root: stability is lost at once",
     "grazing of a reset": "the return map changes at once",
     "grazing of a stop": "the orbit ends at the stop",
+    "grazing of a soft switch": _SMOOTH,
+    "grazing of a jumping force": "the return map has a square root: stability is lost at once",
     "grazing, escaping": "the orbit leaves along the other field: nothing continues it",
     "two-fold": "the orbit passes a two-fold, where its future may not be unique",
     "corner": "two events at one time, {one} and {other}; the itinerary beyond is not known here: "

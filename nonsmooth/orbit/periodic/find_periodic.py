@@ -210,7 +210,8 @@ class _Solver:
             last.append(v)
             self.last = u, at
             self.iterations += 1
-            return at.residual, at.jacobian * scales
+            with np.errstate(over="ignore"):  # of a trial that is no step
+                return at.residual, at.jacobian * scales
 
         reason = ""
         root: Array | None

@@ -10,10 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...flow.engine.smooth import LegsProgram
 from ...flow.fixed import MOST_STEPS, TOLERANCE, legs_program, stuck
@@ -85,7 +83,7 @@ class LegIntegrator:
         self.system, self.legs, self.chosen = system, tuple(legs), chosen
         distinct = {leg: leg.field(system, chosen) for leg in set(self.legs)}
         self.fields = [distinct[leg] for leg in self.legs]
-        self.sizes = tuple(field.blocks.states for field in self.fields)
+        self.sizes = tuple(field.entries for field in self.fields)
         self._most = max(self.sizes)
         # events at one instant follow from each other: composed in Python
         self._composed = [i for i, leg in enumerate(self.legs) if leg.further and not leg.timed]
@@ -103,7 +101,7 @@ class LegIntegrator:
         if self._plain or self._composed:
             return None
         maps = {leg: leg.map(self.system) for leg in set(self.legs)}
-        if any(field.blocks.states > field.blocks.starts for field in self.fields):
+        if any(field.entries > field.by_start for field in self.fields):
             return None
         fields = {leg.mode: plain_field(self.system, leg.mode) for leg in set(self.legs)}
         events = [at.plain for leg in self.legs if (at := maps[leg]) is not None]
@@ -131,25 +129,6 @@ class LegIntegrator:
             return None
         return flow.results[:, :n], None, flow.results[:, n]
 
-    @cached_property
-    def _template(self) -> tuple[Array, Array, NDArray[Any], NDArray[Any]]:
-        """States of all legs at a start 0, and matrices (x, X, P)^T of entries that do not move."""
-        # Then indices of the entries that move: in these matrices, and in the states.
-        width, columns = self._program.width, self.fields[0].blocks.moving.shape[1]
-        count, most = len(self.legs), self._most
-        start, fixed = np.zeros((count, width)), np.zeros((count, columns, most))
-        ours, theirs = list[NDArray[Any]](), list[NDArray[Any]]()
-        for i, field in enumerate(self.fields):
-            b = field.blocks
-            fixed[i, :, : b.states] = b.fixed.T
-            moving = np.zeros((columns, most), bool)
-            moving[:, : b.states] = b.moving.T
-            ours.append(np.flatnonzero(moving) + i * columns * most)
-            theirs.append(i * width + np.arange(len(ours[-1])))
-            if b.states == b.starts:
-                start[i, : len(ours[-1])] = b.pack(np.eye(b.states, columns, 1))
-        return start, fixed, np.concatenate(ours), np.concatenate(theirs)
-
     def __call__(
         self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE
     ) -> LegFlows:
@@ -157,22 +136,18 @@ class LegIntegrator:
         if len(set(self.sizes)) > 1:
             return self._one_by_one(starts, durations, p)
         n, most = starts.shape[1], self._most
-        template, fixed, ours, theirs = self._template
-        z = template.copy()
+        columns = 1 + n + len(self.chosen)
         if most == n:
-            z[:, :n] = starts
+            z = np.tile(np.eye(columns, n, -1), (len(starts), 1, 1))
+            z[:, 0], z[:, 1 + n :] = starts, 0.0
         else:
-            for i, field in enumerate(self.fields):
-                own = field.start(starts[i], p)
-                z[i, : own.size] = own
+            z = np.array([f.initial(x, p).T for f, x in zip(self.fields, starts, strict=True)])
         flow = self._program(z, p, durations, tol, MOST_STEPS)
         if flow.failed >= 0:
             i = flow.failed
             error = stuck(float(durations[i]), flow.left, flow.ends[i, : self.sizes[i]])
             raise ConvergenceError(f"{self._named(i)}: {error}", point=error.point)
-        whole = fixed.copy()
-        whole.ravel()[ours] = flow.ends.ravel()[theirs]
-        whole = whole.swapaxes(1, 2)
+        whole = flow.ends.reshape(len(starts), columns, most).swapaxes(1, 2)
         end, x, by_p = whole[:, :, 0], whole[:, :, 1 : 1 + n], whole[:, :, 1 + n :]
         result = LegFlows(
             self.sizes,

@@ -14,10 +14,12 @@ from itertools import product
 import numpy as np
 
 from ...flow.constants import TIE
+from ...flow.engine.columns import EndOfLeg
 from ...flow.fixed import flow_for
 from ...flow.names import event_name, shown_mode
 from ...flow.trajectory import Event, Trajectory
-from ...model import Array, DegenerateError, FilippovSystem, coupled_of
+from ...flow.variation import CarriedField
+from ...model import Array, DegenerateError, FilippovSystem, coupled_of, multiplier_enters
 from ...model.derivatives.event_maps import (
     AtEvent,
     EventMap,
@@ -25,11 +27,15 @@ from ...model.derivatives.event_maps import (
     choices_at,
     event_map,
     instant_map,
+    surface_map,
 )
 from ...model.derivatives.variational import VariationalField, variational_field
 
 #: Errors of located events, relative to the size of the states.
 _LOCATED = 1e-7
+
+#: Switching functions of a set that was held are zero at this part of what they are made of.
+_ON_SET = 1e-14
 
 #: Directions that differ by less than this are one: the gradients of events at one instant.
 _PARALLEL = 1e-7
@@ -51,6 +57,8 @@ class Leg:
     further: tuple[Leg, ...] = ()
     #: Values of the discrete states in it.
     discrete: tuple[float, ...] = ()
+    #: Switching functions of the sets on which it begins, and which it leaves.
+    left: tuple[int, ...] = ()
 
     @property
     def timed(self) -> bool:
@@ -66,6 +74,31 @@ class Leg:
     def field(self, system: FilippovSystem, chosen: tuple[int, ...] = ()) -> VariationalField:
         """The variational field of the mode."""
         return variational_field(system, self.mode, chosen)
+
+    def along(
+        self, system: FilippovSystem, chosen: tuple[int, ...] = ()
+    ) -> VariationalField | CarriedField:
+        """What carries states and derivatives along the leg."""
+        if not system.sets:
+            return self.field(system, chosen)
+        given = self.mode, chosen, self.left
+        return system.cached(("carried field", *given), lambda: CarriedField(system, *given))
+
+    def ends(self, system: FilippovSystem) -> EndOfLeg | None:
+        """The end of a leg at a set, or of sliding or of a contact beside one, where the field is continuous."""
+        if not system.sets or self.kind not in ("entry", "exit", "release"):
+            return None
+        if self.kind == "release":
+            own = self.element - len(system.entries) + system.surface_count
+            return EndOfLeg(guard="release", number=own)
+        members = system.entries[self.element]
+        if self.kind == "entry":
+            return EndOfLeg(hit=members[0]) if len(members) > 1 else None
+        if self.mode[self.element] != "s":
+            return None  # a surface is crossed
+        if len(members) > 1:
+            return EndOfLeg(guard="slip", number=members[0])
+        return EndOfLeg(guard="exit", number=members[0], side=self.side)
 
     def map(self, system: FilippovSystem) -> EventMap | None:
         """The event's function and what it does to the state; None where a time ends the leg."""
@@ -114,6 +147,8 @@ class LegFlow:
     by_parameters: Array
     #: (N + k,): The field there.
     rate: Array
+    #: Its event, where that is one of the law of the mode.
+    at: AtEvent | None = None
 
 
 def integrate_leg(
@@ -125,12 +160,18 @@ def integrate_leg(
     chosen: tuple[int, ...] = (),
 ) -> LegFlow:
     """The flow of a leg's mode from ``x`` (N,) over a duration, with derivatives."""
-    field = leg.field(system, chosen)
+    field = leg.along(system, chosen)
+    if isinstance(field, CarriedField):
+        ends = leg.ends(system)
+        found = field.flow(x, p, duration, ends)
+        n, own, at = len(x), found.gradient, None
+        if ends:
+            at = AtEvent(found.end, np.eye(n), np.zeros((n, len(p))), 0.0, own[:n], own[n:])
+        return LegFlow(found.end, found.by_start, found.by_parameters, found.end_rate, at)
     start = field.start(x, p)
-    whole = field.blocks.unpack(flow_for(field, start, p, duration))
-    n, end = field.blocks.starts, whole[:, 0]
-    rate = field.rate.copied(end, p)[0][:, 0]
-    return LegFlow(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], rate)
+    whole = field.matrix(flow_for(field, start, p, duration))
+    n, end = field.by_start, whole[:, 0]
+    return LegFlow(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], field.rate_at(end, p))
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +193,8 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
     system, p = run.system, run.system.parameter_vector(run.parameters)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
+    if system.sets:
+        _require_held(system, run.events[0].mode_before, x, p)
     known: dict[tuple[object, ...], Leg] = {}
     discrete = len(system.definition.discrete)
     for group in _instants(run.events):
@@ -176,6 +219,8 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
         if discrete:
             own = x[system.dimension - discrete : system.dimension]
             leg = replace(leg, discrete=tuple(own.tolist()))
+        if result:
+            leg = replace(leg, left=sets_left(system, result[-1].leg.mode, leg.mode, x, p))
         result.append(Stretch(leg, t, first.t - t, x, x_end, after))
         t, x = last.t, after
     return result
@@ -187,6 +232,31 @@ def _extended(system: FilippovSystem, x: Array, t: float) -> Array:
     extended = np.empty(len(x) + 1)
     extended[:-1], extended[-1] = x, t
     return extended
+
+
+def sets_left(
+    system: FilippovSystem, before: str, after: str, x: Array, p: Array
+) -> tuple[int, ...]:
+    """Switching functions of the sets that one mode is on and another leaves at a state (N,)."""
+    letters = zip(before, after, system.entries, strict=False) if system.sets else ()
+    found = list[int]()
+    for members in (s for a, b, s in letters if len(s) > 1 and a == "s" != b):
+        at = [surface_map(system, i)(x, p) for i in members]
+        if all(abs(h.value) <= _ON_SET * float(np.abs(h.gradient) @ np.abs(x)) for h in at):
+            found += members
+    return tuple(found)
+
+
+def _require_held(system: FilippovSystem, mode: str, x: Array, p: Array) -> None:
+    """Refuse a start (N,) on a set off which the mode is, which neighbours leave from elsewhere."""
+    h, letters = coupled_of(system).heights_at(x, p), system.parse_letters(mode)
+    for members in system.sets:
+        leaves = letters[members[0]] and not h[list(members)].any()
+        if leaves and multiplier_enters(system, members, p):
+            raise DegenerateError(
+                "run: expected a start off the sets that it leaves, received one on h = 0. "
+                "Neighbours leave from elsewhere: start a little later."
+            )
 
 
 def _instants(events: Sequence[Event]) -> list[list[Event]]:
@@ -235,7 +305,7 @@ def _require_located(system: FilippovSystem, event: Event, x: Array, p: Array, l
     """Refuse an event whose time another function than its own guard determines."""
     if event.kind not in ("stop", "reset"):
         return
-    y = leg.field(system).states_at(x, p)
+    y = leg.along(system).states_at(x, p)
     size = 1.0 + float(np.abs(x).max())
     values = atoms_at(system, event.kind, event.element, x, p)
     vanishing = [value for value in values if abs(value) <= _LOCATED * size]
@@ -286,10 +356,15 @@ def _require_present_state(system: FilippovSystem, group: Sequence[Event]) -> No
 
 def _require_one_surface(system: FilippovSystem, event: Event) -> None:
     """Refuse an event on two surfaces at once."""
-    if event.kind not in ("crossing", "entry", "exit"):
+    if event.kind not in ("crossing", "entry", "exit", *["release"] * bool(system.sets)):
         return
     letters = zip(event.mode_before, event.mode_after, strict=False)
-    changed = [k for k, (a, b) in enumerate(letters) if a != b and a in "+-"]
+    changed = [k for k, (a, b) in enumerate(letters) if a != b and a in "+-*"]
+    if event.kind == "crossing" and len(system.entries[event.element]) > 1:
+        raise DegenerateError(
+            f"run: expected hits of sets and ends of sliding only, received {event.kind!r} at "
+            f"t = {event.t:.10g}. A set that is crossed exactly is a corner: perturb the start."
+        )
     others = [k for k in changed if k != event.element]
     if others:
         other = event_name(system, event.mode_before, event.kind, others[0])
@@ -309,7 +384,7 @@ def _letters(system: FilippovSystem, event: Event, p: Array) -> str:
     """The sides with which friction acted at an impact: those that give the state after it."""
     x = _extended(system, event.x, event.t)
     mode = event.mode_before
-    y = variational_field(system, mode).states_at(x, p)
+    y = Leg(mode).along(system).states_at(x, p)
     after = _extended(system, event.x_after, event.t)
     own = event.kind, event.element, event.side
     choice = lambda letters: event_map(system, mode, *own, letters)(y, p)
@@ -337,11 +412,13 @@ def _caused(
     system: FilippovSystem, leg: Leg, further: Sequence[Leg], x: Array, p: Array, t: float
 ) -> tuple[Leg, ...]:
     """The resets among events that follow at once, each of which the ones before must cause."""
-    y = leg.field(system).states_at(x, p)
+    y = leg.along(system).states_at(x, p)
     kept: tuple[Leg, ...] = ()
     for then in further:
+        if leg.ends(system) or then.ends(system):
+            raise DegenerateError(corner(t, leg.name(system), then.name(system)))
         at = replace(leg, further=kept).at_end(system, y, p)
-        start = then.field(system).initial(at.after, p)
+        start = then.along(system).initial(at.after, p)
         other = then.at_end(system, start[:, 0], p)
         n = len(at.after)
         if then.kind in ("reset", "stop") and not _is_zero(other, start[:, 0]):

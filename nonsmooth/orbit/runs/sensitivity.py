@@ -20,9 +20,9 @@ from ...model import (
     PointError,
     read_function,
     real_array,
+    require_system,
 )
 from ...model.derivatives.event_maps import EventMap, function_map
-from .set_variation import set_sensitivity
 from .variation import Passage, Sensitivity, along, passages
 
 
@@ -80,8 +80,7 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
            [3.  , 1.  ]]), array([[0.25],
            [1.  ]]), array([0.5]), array([[1. , 0.5]]))
     """
-    if _require_run(run).system.sets:
-        return set_sensitivity(run, _names(run, wrt))
+    require_system(_require_run(run).system, sets=True)
     _, result = along(run, _names(run, wrt))
     return result
 
@@ -151,8 +150,6 @@ def gradient(
     """
     system, n = _require_run(run).system, run.system.dimension
     names = _names(run, wrt)
-    if system.sets:
-        return _gradient_of_sets(run, read_function(system.definition, cost, "cost"), names)
     chosen = tuple(system.parameter_names.index(name) for name in names)
     parts = passages(run, chosen)
     p = system.parameter_vector(run.parameters)
@@ -162,20 +159,6 @@ def gradient(
     by_parameters = by_parameters + at.by_parameters[list(chosen)]
     numbers = dict(zip(names, by_parameters.tolist(), strict=True))
     return _finite(Gradient(at.value, row[:n] + 0.0, numbers), run)
-
-
-def _gradient_of_sets(run: Trajectory, cost: Any, names: Sequence[str]) -> Gradient:
-    """Gradient of a cost by the derivatives of a run through sets."""
-    system, found, t = run.system, set_sensitivity(run, names), float(run.t[-1])
-    here = lambda e: system.evaluate(e, run.x[-1], run.parameters, t).ravel()
-    slope, own = here(system.gradient(cost)), here(system.parameter_gradient(cost))
-    n = system.dimension
-    by_time = float(slope[n]) if system.time_dependent else 0.0
-    x0 = slope[:n] @ found.dx_dx0 + by_time * found.dt_end_dx0
-    by_p = slope[:n] @ found.dx_dp + by_time * found.dt_end_dp
-    by_p = by_p + own[[system.parameter_names.index(name) for name in names]]
-    value = float(here(cost)[0])
-    return _finite(Gradient(value, x0, dict(zip(names, by_p.tolist(), strict=True))), run)
 
 
 def _finite(found: Gradient, run: Trajectory) -> Gradient:
@@ -240,9 +223,6 @@ def vjp(
         raise PointError(
             f"cotangent {shown}, but the system has {n} states. Give one finite number for each."
         )
-    if system.sets:
-        found = set_sensitivity(run, _names(run, wrt))
-        return row @ found.dx_dx0, row @ found.dx_dp
     chosen = tuple(system.parameter_names.index(name) for name in _names(run, wrt))
     parts = passages(run, chosen)
     whole = np.zeros(len(parts[-1].flow.end))

@@ -20,11 +20,17 @@ from numpy.typing import NDArray
 
 from ...flow.names import described
 from ...flow.trajectory import Trajectory
-from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
+from ...model import (
+    Array,
+    ConvergenceError,
+    DegenerateError,
+    FilippovSystem,
+    require_plain,
+)
 from ...model.derivatives.event_maps import AtEvent
 from .guards import watch
 from .leg_integration import LegFlows, LegIntegrator
-from .legs import Leg, LegFlow, Stretch, integrate_leg, leg_name, stretches
+from .legs import Leg, LegFlow, Stretch, integrate_leg, leg_name, sets_left, stretches
 from .saltation import Saltation, saltation, saltations
 
 # Grazings within the error of a run ---------------------------------------------------------------
@@ -44,7 +50,11 @@ _INSTANT = 1e-5
 
 def _require_certain(system: FilippovSystem, parts: Sequence[Passage], p: Array) -> None:
     """Raise for a run with a grazing that is within its own error."""
-    flat = [k for k, part in enumerate(parts) if part.event and part.event.angle < _STEEP]
+    flat = [
+        k
+        for k, part in enumerate(parts)
+        if part.event and part.flow.at is None and part.event.angle < _STEEP
+    ]
     if not flat:
         return
     n = system.extended_dimension
@@ -70,7 +80,7 @@ def _require_deep(system: FilippovSystem, part: Passage, error: Array, p: Array)
     size, length = math.hypot(*flow.end), math.hypot(*flow.rate)
     step = _INSTANT * min(part.stretch.duration, size / length if size and length else math.inf)
     before = flow.end - step * flow.rate
-    rate = leg.field(system).rate.copied(before, p)[0][:, 0]
+    rate = leg.along(system).rate_at(before, p)
     turning = (speed - _speed(leg.at_end(system, before, p), rate)) / step if step else 0.0
     if not turning * speed < 0.0:
         return  # it does not turn back
@@ -127,7 +137,7 @@ def _by_panels(
     cuts: tuple[float, ...],
 ) -> tuple[Array, Array, Array]:
     field = leg.field(run.system, chosen)
-    n, starts = field.blocks.starts, run.steps.starts
+    n, starts = field.by_start, run.steps.starts
     first = max(int(np.searchsorted(starts, t_start, side="right")) - 1, 0)
     last = max(int(np.searchsorted(starts, t_end, side="left")), first + 1)
     start = _polynomial(run, first, t_start - float(starts[first]), n)[0]
@@ -251,6 +261,9 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     system = run.system
     p = system.parameter_vector(run.parameters)
     parts = stretches(run)
+    if system.sets:
+        require_plain(system, "sensitivity with sets")
+        return _one_by_one(run, parts, p, chosen)
     try:
         flows = LegIntegrator(system, [part.leg for part in parts], chosen)(
             np.array([part.start for part in parts]), np.array([part.duration for part in parts]), p
@@ -316,6 +329,9 @@ def _flow(run: Trajectory, part: Stretch, p: Array, chosen: tuple[int, ...]) -> 
     try:
         return integrate_leg(run.system, part.leg, part.start, part.duration, p, chosen)
     except ConvergenceError:
+        if run.system.sets:
+            what = leg_name(run.system, part.leg)
+            raise DegenerateError(_without_derivative(what, part.t + part.duration)) from None
         # A field such as a power law has a derivative, but no Taylor series at zero.
         return _collocated(run, part.leg, part.t, part.t + part.duration, p, chosen)
 
@@ -327,10 +343,17 @@ def saltation_after(
     # At the end of a run the field after it is that of the mode reached.
     if part.leg.timed:
         return None
-    system = run.system
-    at = part.leg.at_end(system, flow.end, p)
-    ends = run.events[-1]
-    leg = following.leg if following else Leg(ends.mode_before) if ends.kind == "end" else None
+    system, ends = run.system, run.events[-1]
+    leg = following.leg if following else None
+    if leg is None and ends.kind == "end":
+        left = sets_left(system, part.leg.mode, ends.mode_before, part.after, p)
+        leg = Leg(ends.mode_before, left=left)
+    at = flow.at or part.leg.at_end(system, flow.end, p)
+    if system.sets and following is None and leg is not None:  # the run ends at the event
+        every = tuple(range(len(p)))
+        landed = integrate_leg(system, leg, at.after, 0.0, p, every)
+        by_state, by_p = landed.by_start @ at.after_state, landed.by_start @ at.after_parameters
+        at = replace(at, after_state=by_state, after_parameters=by_p + landed.by_parameters)
     if part.leg.kind == "stop" or leg is None:
         return saltation(at, flow.rate, at.after_state @ flow.rate, _at(system, part))
     after = _rate_after(system, part, leg, at, p)
@@ -348,12 +371,12 @@ def _rate_after(
     system: FilippovSystem, part: Stretch, leg: Leg, at: AtEvent, p: Array
 ) -> Array | None:
     """The field after an event, also where a root of its function has rounding as its argument."""
-    n, field = len(part.start), leg.field(system)
+    n, field = len(part.start), leg.along(system)
     e = at.gradient[:n]
     shift = _ROUNDING * float(np.abs(e) @ np.abs(part.after)) * e / max(float(e @ e), 1e-300)
     with np.errstate(all="ignore"):
         for x in (at.after, part.after, part.after + shift, part.after - shift):
-            rate = field.rate.copied(field.states_at(x, p), p)[0][:n, 0]
+            rate = field.rate_at(field.states_at(x, p), p)[:n]
             if np.all(np.isfinite(rate)):
                 return rate
     return None

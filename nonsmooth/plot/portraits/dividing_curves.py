@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ...model import Array, OptionError
 from ...orbit import DividingCurves
 from .. import style
 from ..arguments import results
+from ..drawing import Canvas, Colors, Drawn, canvas
 from ..labels import Labels
 
 #: Description and dashes of each kind of arc.
@@ -31,10 +31,12 @@ def dividing_curves(
     *,
     names: Sequence[str] = (),
     ax: Axes | None = None,
-    size: tuple[float, float] = (5.0, 3.9),
+    size: tuple[float, float] | None = None,
     labels: bool = True,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw the curves in which a plane of starts cuts the dividing surfaces of two-folds.
 
     Starts that slide into a two-fold are full lines, starts that graze the surface are dashed, and dots
@@ -55,11 +57,15 @@ def dividing_curves(
         Whether arcs have their names beside them.
     title : str, optional
         Title of the picture; none by default.
+    colors : mapping, optional
+        Colours by the kinds of arcs, ``"two-fold"`` and ``"grazing"``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the arcs.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -79,32 +85,31 @@ def dividing_curves(
     'y at the start'
     """
     several = results(found, DividingCurves, "manifold returns them with starts=.")
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
+    with canvas(ax, size, (5.0, 3.9), colors=colors, look=look, title=title) as page:
+        axes = page.ax
         if hasattr(axes, "get_zlim"):
             raise OptionError(
                 f"ax is {type(axes).__name__}, not axes of a plane. Leave projection out."
             )
         named = Labels(axes) if labels else None
         for one in several:
-            _draw(axes, named, one)
+            _draw(page, named, one)
         for axis, name in zip("xy", names, strict=False):
             getattr(axes, f"set_{axis}label")(name)
         axes.margins(0.06)
-        if title:
-            axes.set_title(title)
-    return figure
+    return page.drawn
 
 
-def _draw(axes: Any, named: Labels | None, one: DividingCurves) -> None:
-    color = style.BLUE if one.stable else style.VERMILLION
+def _draw(page: Canvas, named: Labels | None, one: DividingCurves) -> None:
+    axes, color = page.ax, style.BLUE if one.stable else style.VERMILLION
     for arc in one.arcs:
         description, dashes = _KINDS[arc.kind]
-        axes.plot(*arc.points.T, color=color, linewidth=1.8, linestyle=dashes)
+        line = page.look(arc.kind, color=color, linewidth=1.8, linestyle=dashes)
+        axes.plot(*arc.points.T, **line)
         if named is not None:
             back = "" if one.stable else ", backward"
             modes = arc.itinerary.replace("-", "\N{MINUS SIGN}")
-            named.name(f"{modes} {description}{back}", _middle(arc.points), color)
+            named.name(f"{modes} {description}{back}", _middle(arc.points), line["color"])
     changes = _changes(one)
     if len(changes):
         look: Any = {"markersize": 4.5, "zorder": 5}

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from ...model import OptionError
 from ...orbit import Manifold
 from .. import style
 from ..arguments import results
+from ..drawing import Canvas, Colors, Drawn, canvas, key
 
 _STABLE, _UNSTABLE = style.BLUE, style.VERMILLION
 
@@ -23,10 +24,12 @@ def manifold(
     *,
     names: Sequence[str] = (),
     ax: Axes | None = None,
-    size: tuple[float, float] = (6.0, 4.6),
+    size: tuple[float, float] | None = None,
     legend: bool = True,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw manifolds, stable ones in blue and unstable ones in red.
 
     Parameters
@@ -44,11 +47,15 @@ def manifold(
         Whether a legend is drawn.
     title : str, optional
         Title of the picture; the default says what is shown.
+    colors : mapping, optional
+        Colours by ``"stable"`` and ``"unstable"``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the curves.
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -66,28 +73,23 @@ def manifold(
     """
     several = results(found, Manifold, "dividing_curves draws curves in a plane of starts.")
     spatial = _dimension(several) == 3
-    with style.settings():
-        if ax is None and spatial:
-            figure = style.new_figure(size)
-            axes: Any = figure.add_subplot(projection="3d")
-            ax = axes
-        figure, axes = style.axes_for(ax, size)
+    options: Any = {"colors": colors, "look": look, "title": title}
+    with canvas(ax, size, (6.0, 4.6), projection="3d" if spatial else None, **options) as page:
+        axes = page.ax
         if spatial != hasattr(axes, "get_zlim"):
             raise OptionError(
                 f"ax is {type(axes).__name__}, which does not have the dimension of the manifolds. "
                 "Make them with projection='3d' for three states."
             )
         for one in several:
-            _draw(axes, one)
+            _draw(page, one)
         for axis, name in zip("xyz", names, strict=False):
             getattr(axes, f"set_{axis}label")(name)
         if spatial:
             _fit(axes, several)
-        if title:
-            axes.set_title(title)
         if legend:
-            _legend(axes, several)
-    return figure
+            _legend(page, several)
+    return page.drawn
 
 
 def _dimension(several: list[Manifold]) -> int:
@@ -99,20 +101,30 @@ def _dimension(several: list[Manifold]) -> int:
     return sizes.pop()
 
 
-def _draw(axes: Any, one: Manifold) -> None:
-    color = _STABLE if one.stable else _UNSTABLE
+def _line(page: Canvas, stable: bool, width: float = 1.4) -> dict[str, Any]:
+    color = _STABLE if stable else _UNSTABLE
+    return page.look("stable" if stable else "unstable", color=color, linewidth=width)
+
+
+def _draw(page: Canvas, one: Manifold) -> None:
+    axes, line = page.ax, _line(page, one.stable)
     if one.dimension == 2 and len(one.triangles):
         faces = one.points[one.triangles]
         axes.add_collection3d(
             Poly3DCollection(
-                faces, facecolors=color, alpha=0.35, linewidths=0.0, shade=True, rasterized=True
+                faces,
+                facecolors=line["color"],
+                alpha=0.35,
+                linewidths=0.0,
+                shade=True,
+                rasterized=True,
             )
         )
         for arc in one.arcs[:: max(1, len(one.arcs) // 24)]:
-            axes.plot(*arc.points.T, color=color, linewidth=0.5)
+            axes.plot(*arc.points.T, **_line(page, one.stable, 0.5))
     else:
         for arc in one.arcs:
-            axes.plot(*arc.points.T, color=color, linewidth=1.4)
+            axes.plot(*arc.points.T, **line)
     axes.plot(*one.point[:, None], marker="X", color=style.BLACK, markersize=5.0, linestyle="")
 
 
@@ -124,14 +136,14 @@ def _fit(axes: Any, several: list[Manifold]) -> None:
         getattr(axes, f"set_{axis}lim")(low - pad, high + pad)
 
 
-def _legend(axes: Any, several: list[Manifold]) -> None:
+def _legend(page: Canvas, several: list[Manifold]) -> None:
     labels = {True: "stable manifold", False: "unstable manifold"}
     handles = [
-        style.Line2D([], [], color=_STABLE if s else _UNSTABLE, label=labels[s])
+        Line2D([], [], label=labels[s], **_line(page, s))
         for s in (True, False)
         if any(m.stable == s for m in several)
     ]
     handles.append(
         style.marker("X", "its point" if len(several) == 1 else "their points", size=5.0)
     )
-    axes.legend(handles=handles, loc="upper left" if axes.name == "3d" else "best")
+    key(page.ax, handles, loc="upper left" if page.ax.name == "3d" else "best")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from ...local import Equilibrium, Fold, PseudoEquilibrium
@@ -18,11 +18,16 @@ from ...model import Array, FilippovSystem, Parameters, PointError
 from ...orbit.manifolds.plane_orbits import PlaneOrbits
 from .. import style
 from ..arguments import require_one_surface
+from ..drawing import Canvas, Colors, Drawn, canvas
 from ..labels import Labels
 from ..legends import beside
 from .tapered_ends import draw_orbit
 
-_ORBIT, _SEPARATRIX, _FOLD_ORBIT = "#444444", style.CANARD, style.GREEN
+_ORBITS: dict[str, tuple[str, float, str]] = {
+    "orbit": ("#444444", 0.9, "orbits"),
+    "separatrix": (style.CANARD, 1.8, "separatrices"),
+    "fold orbit": (style.GREEN, 1.5, "orbits through visible folds"),
+}
 _PIECES: dict[str, tuple[str, float, Any, str]] = {
     "attracting": (style.BLACK, 3.4, "-", "sliding, attracting"),
     "repelling": (style.ORANGE, 3.4, (0, (2.2, 1.0)), "sliding, repelling"),
@@ -54,11 +59,13 @@ def phase_portrait(
     starts: ArrayLike | None = None,
     separatrices: bool = True,
     ax: Axes | None = None,
-    size: tuple[float, float] = (7.0, 4.8),
+    size: tuple[float, float] | None = None,
     legend: bool = True,
     labels: bool | None = None,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw the phase portrait of a planar system with one surface.
 
     The directions of both fields, orbits through crossing and sliding, the surface in its
@@ -90,11 +97,15 @@ def phase_portrait(
         Whether special points are named beside them; by default where there is a legend.
     title : str, optional
         Title of the picture; the default says what is shown.
+    colors : mapping, optional
+        Colours by ``"attracting"``, ``"repelling"``, ``"crossing"``, ``"orbit"``, ``"separatrix"``, ``"fold orbit"``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the orbits.
 
     Returns
     -------
-    matplotlib Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -125,19 +136,17 @@ def phase_portrait(
     )
     values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
     scan = PlaneScan.of(system, values, Box.read(box))
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
-        portrait = _Portrait(axes, scan, t_end)
+    with canvas(ax, size, (7.0, 4.8), colors=colors, look=look, title=title) as page:
+        axes = page.ax
+        portrait = _Portrait(page, scan, t_end)
         portrait.draw(None if starts is None else _points(system, starts), separatrices)
         names, limits = system.state_names, scan.box.limits
         axes.set(xlim=limits[:2], ylim=limits[2:], xlabel=names[0], ylabel=names[1])
-        if title is not None:
-            axes.set_title(title)
         if legend:
             portrait.legend()
         if legend if labels is None else labels:
             portrait.names()
-    return figure
+    return page.drawn
 
 
 def _points(system: FilippovSystem, starts: ArrayLike) -> Array:
@@ -156,8 +165,8 @@ def _points(system: FilippovSystem, starts: ArrayLike) -> Array:
 class _Portrait:
     """Draws one portrait: the results of a scan, and orbits."""
 
-    def __init__(self, ax: Axes, scan: PlaneScan, t_end: float | None):
-        self.ax, self.scan = ax, scan
+    def __init__(self, page: Canvas, scan: PlaneScan, t_end: float | None):
+        self.page, self.ax, self.scan = page, page.ax, scan
         self.flow = PlaneOrbits(scan, t_end)
         self.special: list[Special] = [*scan.equilibria, *scan.folds, *scan.pseudo_equilibria]
         self.special += scan.boundary_equilibria
@@ -169,8 +178,7 @@ class _Portrait:
         special = list(self.flow.separatrices()) if separatrices else []
         self.orbits(starts, [curve for _, curve in special])
         for name, curve in special:
-            color, width = (_SEPARATRIX, 1.8) if name == "separatrix" else (_FOLD_ORBIT, 1.5)
-            self._draw(curve, color, width, name)
+            self._draw(curve, name)
         self.surface()
         self.marks()
 
@@ -203,28 +211,29 @@ class _Portrait:
         """Orbits from given starts, or evenly spaced ones through the box."""
         if starts is None:
             for orbit in self.flow.spaced(avoid=avoid):
-                self._draw(orbit.curve, _ORBIT, 0.9, "orbit", orbit.thins)
+                self._draw(orbit.curve, "orbit", orbit.thins)
             return
         for start in starts:
-            self._draw(self.flow.follow(start), style.BLACK, 1.0, "orbit")
+            self._draw(self.flow.follow(start), "orbit")
             self.ax.plot(*start, ".", color=style.BLACK, markersize=5, zorder=2.2, gid="start")
             self.drawn.add("start")
 
     def surface(self) -> None:
         """The surface in its pieces, with the direction of sliding."""
         for piece in self.scan.pieces:
-            color, width, dashes, _ = _PIECES[piece.kind]
-            self.ax.plot(
-                *piece.points.T,
-                color=color,
-                linewidth=width,
-                linestyle=dashes,
-                zorder=4,
-                solid_capstyle="butt",
-                gid=piece.kind,
-            )
+            line = {**self._piece(piece.kind), "solid_capstyle": "butt", "zorder": 4}
+            self.ax.plot(*piece.points.T, gid=piece.kind, **line)
             if piece.kind != "crossing":
                 self._sliding_arrows(piece)
+
+    def _piece(self, kind: str) -> dict[str, Any]:
+        color, width, dashes, _ = _PIECES[kind]
+        return self.page.named(kind, color=color, linewidth=width, linestyle=dashes)
+
+    def _orbit(self, name: str) -> dict[str, Any]:
+        color, width, _ = _ORBITS[name]
+        look = self.page.look if name == "orbit" else self.page.named
+        return look(name, color=color, linewidth=width)
 
     def _sliding_arrows(self, piece: Piece) -> None:
         """One arrow between neighbouring pseudo-equilibria and ends."""
@@ -237,7 +246,7 @@ class _Portrait:
             if self.scan.box.length(part) < 0.04:
                 continue
             part = part if ahead[(a + b) // 2] else part[::-1]
-            color = _PIECES[piece.kind][0]
+            color = self._piece(piece.kind)["color"]
             style.arrowhead(self.ax, part, 0.55, color, mutation_scale=17, zorder=5)
 
     def marks(self) -> None:
@@ -264,17 +273,17 @@ class _Portrait:
     def legend(self) -> None:
         """Explain lines and marks beside the axes."""
         handles = [
-            style.line(_PIECES[kind][0], text, width, dashes)
-            for kind, (_, width, dashes, text) in _PIECES.items()
+            Line2D([], [], label=text, **self._piece(kind))
+            for kind, (*_, text) in _PIECES.items()
             if any(piece.kind == kind for piece in self.scan.pieces)
         ]
-        handles.append(style.line(_ORBIT, "orbits", 0.9))
+        handles += [
+            Line2D([], [], label=text, **self._orbit(name))
+            for name, (*_, text) in _ORBITS.items()
+            if name in self.drawn or name == "orbit"
+        ]
         if "start" in self.drawn:
             handles.append(style.marker(".", "where they start", size=5))
-        if "separatrix" in self.drawn:
-            handles.append(style.line(_SEPARATRIX, "separatrices", 1.8))
-        if "fold orbit" in self.drawn:
-            handles.append(style.line(_FOLD_ORBIT, "orbits through visible folds", 1.5))
         beside(self.ax, handles)
 
     def names(self) -> None:
@@ -286,25 +295,19 @@ class _Portrait:
             chosen = mesh[h > 0 if side == "+" else h < 0]
             if len(chosen):
                 text = f"$h {'>' if side == '+' else '<'} 0$"
-                labels.name(text, chosen, color, inside=True, fontsize=10)
+                labels.name(text, chosen, color, inside=True, fontsize=style.points(10))
         for name, points in _together(self.special, self.scan.box.size).items():
             for point in points:
                 labels.name(name, point)
 
-    def _draw(
-        self,
-        curve: Array,
-        color: str,
-        width: float,
-        name: str,
-        thins: tuple[bool, bool] = (False, False),
-    ) -> None:
+    def _draw(self, curve: Array, name: str, thins: tuple[bool, bool] = (False, False)) -> None:
         if len(curve) < 2:
             return
         self.drawn.add(name)
         order = 2.0 if name == "orbit" else 3.0
-        look: Any = {"color": color, "zorder": order, "gid": name}
-        draw_orbit(self.ax, curve, thins, self.scan.box, width, **look)
+        line = {"zorder": order, "gid": name, **self._orbit(name)}
+        color, width = line["color"], line.pop("linewidth")
+        draw_orbit(self.ax, curve, thins, self.scan.box, width, **line)
         for piece in style.inside(curve, self.scan.box.limits):
             if self.scan.box.length(piece) > 0.1:
                 style.arrowhead(

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
@@ -20,6 +18,7 @@ from ...model import Array, FilippovSystem, Parameters, real, whole
 from ...orbit.manifolds.sliding_orbits import SlidingOrbits
 from .. import style
 from ..arguments import require_one_surface
+from ..drawing import Canvas, Colors, Drawn, canvas
 from ..labels import Labels
 from ..legends import beside
 from .tapered_ends import draw_orbit
@@ -53,11 +52,13 @@ def sliding_portrait(
     parameters: Parameters | None = None,
     orbits: int = 12,
     ax: Axes | None = None,
-    size: tuple[float, float] = (7.0, 4.8),
+    size: tuple[float, float] | None = None,
     legend: bool = True,
     labels: bool | None = None,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw the switching surface of a system of three states over two of them.
 
     The regions of sliding and crossing, the fold curves (visible: solid, invisible: dashed),
@@ -92,11 +93,15 @@ def sliding_portrait(
         legend.
     title : str, optional
         Title of the picture; the default says what is shown.
+    colors : mapping, optional
+        Colours by ``"orbit"``, ``"canard"``, ``"faux canard"`` and the names in the legend.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the sliding orbits.
 
     Returns
     -------
-    matplotlib Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -125,28 +130,26 @@ def sliding_portrait(
     whole(orbits, "orbits", least=0)
     values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
     scan = SurfaceScan.of(system, values, Box.read(box), coordinates, real(guess, "guess"))
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
-        portrait = _Portrait(axes, scan)
+    with canvas(ax, size, (7.0, 4.8), colors=colors, look=look, title=title) as page:
+        axes = page.ax
+        portrait = _Portrait(page, scan)
         portrait.draw(orbits)
         names, limits = [system.state_names[i] for i in scan.shown], scan.box.limits
         axes.set(xlim=limits[:2], ylim=limits[2:], xlabel=names[0], ylabel=names[1])
-        if title is not None:
-            axes.set_title(title)
         if legend:
             portrait.legend()
         if legend if labels is None else labels:
             portrait.line_names()
-    return figure
+    return page.drawn
 
 
 class _Portrait:
     """Draws one portrait."""
 
-    def __init__(self, ax: Axes, scan: SurfaceScan):
-        self.ax, self.scan = ax, scan
+    def __init__(self, page: Canvas, scan: SurfaceScan):
+        self.page, self.ax, self.scan = page, page.ax, scan
         self.flow = SlidingOrbits(scan)
-        self.labels = Labels(ax)
+        self.labels = Labels(self.ax)
         self.named: dict[str, Array] = {}
         self.separated: list[Array] = []
 
@@ -178,13 +181,20 @@ class _Portrait:
             u,
             v,
             shown,
-            cmap=ListedColormap(list(_TINTS)),
+            cmap=self.page.palette(self._tint(kind) for kind in range(4)),
             vmin=-0.5,
             vmax=3.5,
             shading="nearest",
             rasterized=True,
             zorder=0,
         )
+
+    def _tint(self, kind: int) -> Any:
+        return self.page.color(_TEXTS[kind], _TINTS[kind])
+
+    def _orbit(self, attracting: bool) -> dict[str, Any]:
+        color = style.ATTRACTING if attracting else style.REPELLING
+        return self.page.look("orbit", color=color, linewidth=0.9)
 
     def separatrices(self) -> None:
         """Eigenlines of two-folds and manifolds of pseudo-saddles."""
@@ -200,25 +210,18 @@ class _Portrait:
         if len(curve) < 3:
             return
         color, dashes = _SPECIAL[name]
-        self.ax.plot(
-            *curve.T,
-            color=color,
-            linewidth=2.4,
-            linestyle=dashes,
-            zorder=3,
-            gid=name,
-            path_effects=style.halo(3.6),
-        )
-        style.arrowhead(self.ax, curve, 0.5, color, mutation_scale=15, zorder=3.1)
+        line = self.page.named(name, color=color, linewidth=2.4, linestyle=dashes)
+        self.ax.plot(*curve.T, zorder=3, gid=name, path_effects=style.halo(3.6), **line)
+        style.arrowhead(self.ax, curve, 0.5, line["color"], mutation_scale=15, zorder=3.1)
         self.named.setdefault(name, curve)
         self.separated.append(curve)
 
     def orbits(self, count: int) -> None:
         """Sliding orbits, about evenly spaced."""
         for orbit, attracting in self.flow.spaced(count, self.separated):
-            color = style.ATTRACTING if attracting else style.REPELLING
-            look: Any = {"color": color, "zorder": 2, "gid": "orbit"}
-            draw_orbit(self.ax, orbit.curve, orbit.thins, self.scan.box, 0.9, **look)
+            line: Any = {"zorder": 2, "gid": "orbit", **self._orbit(attracting)}
+            color, width = line["color"], line.pop("linewidth")
+            draw_orbit(self.ax, orbit.curve, orbit.thins, self.scan.box, width, **line)
             if self.scan.box.length(orbit.curve) > 0.1:
                 style.arrowhead(self.ax, orbit.curve, 0.55, color, mutation_scale=10, zorder=2.1)
 
@@ -232,7 +235,7 @@ class _Portrait:
             self._mark(point, "o", style.BLACK, gid="two-fold")
             name = found.label.removeprefix("boundary ")
             name = name.replace("Delta", "Δ").replace("nu", "ν")
-            self.labels.name(name, point, fontsize=9)
+            self.labels.name(name, point, fontsize=style.points(9))
         for rest in self.scan.pseudo_equilibria:
             marker = _MARKERS.get(rest.kind.rpartition("-")[2], "P")
             fill = style.BLACK if rest.stable or "saddle" in rest.kind else "white"
@@ -273,19 +276,27 @@ class _Portrait:
                 deep = distance_transform_edt(np.pad(room, 1))[1:-1, 1:-1]
                 i, j = np.unravel_index(int(np.argmax(deep)), deep.shape)
                 point = (float(u[j]), float(v[i]))
-                style.write(self.ax, point, name, fontsize=13, zorder=7.5, bbox=box, gid="region")
+                style.write(
+                    self.ax,
+                    point,
+                    name,
+                    fontsize=style.points(13),
+                    zorder=7.5,
+                    bbox=box,
+                    gid="region",
+                )
 
     def legend(self) -> None:
         """Explain colours, lines and marks beside the axes."""
         handles: list[Line2D | Patch] = [
-            Patch(facecolor=_TINTS[k], edgecolor="#BBBBBB", label=_TEXTS[k])
+            Patch(facecolor=self._tint(k), edgecolor="#BBBBBB", label=_TEXTS[k])
             for k in range(4)
             if np.any(self.scan.regions == k)
         ]
         if np.any(self.scan.regions == _ATTRACTING):
-            handles.append(style.line(style.ATTRACTING, "sliding orbits in $D_a$", 0.9))
+            handles.append(Line2D([], [], label="sliding orbits in $D_a$", **self._orbit(True)))
         if np.any(self.scan.regions == _REPELLING):
-            handles.append(style.line(style.REPELLING, "sliding orbits in $D_r$", 0.9))
+            handles.append(Line2D([], [], label="sliding orbits in $D_r$", **self._orbit(False)))
         beside(self.ax, handles)
 
     def line_names(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from contourpy import contour_generator
 from matplotlib.axes import Axes
 
 from ...model import Array, FilippovSystem, call
@@ -24,6 +25,7 @@ def draw_surfaces(
     values = call(function, points, parameters) if count else []
     for value in values:
         h = value.reshape(x.shape)
-        if np.nanmin(h) < 0 < np.nanmax(h):
-            look: Any = {"colors": [style.GREY], "linewidths": 2.2, "alpha": 0.7, "zorder": 1}
-            ax.contour(x, y, h, levels=[0.0], **look)
+        look: Any = {"color": style.GREY, "linewidth": 2.2, "alpha": 0.7, "zorder": 1}
+        curves: Any = contour_generator(x, y, h).lines(0.0)
+        for curve in curves:
+            ax.plot(*curve.T, gid="surface", **look)

@@ -13,6 +13,7 @@ from ...model import Array
 
 _OVER = 0.2  # length over which a line thins out, in units of the box
 _PARTS = 24  # of that length, each of one width
+_OF_COLLECTIONS = ("alpha", "color", "gid", "path_effects", "zorder")
 _FEW, _DRAWN = 4, 0.7  # parts of a dashed line, and how much of each is drawn
 
 
@@ -21,7 +22,7 @@ def draw_orbit(
 ) -> None:
     """Draw an orbit, tapered at ends beyond which it continues."""
     dashed = options.get("linestyle", "-") != "-"
-    look = {name: value for name, value in options.items() if name != "linestyle"}
+    look = {name: value for name, value in options.items() if name in _OF_COLLECTIONS}
     for thin, step in zip(thins, (1, -1), strict=True):
         if thin:
             curve, end = _parted(curve[::step], box, _FEW if dashed else _PARTS, dashed)

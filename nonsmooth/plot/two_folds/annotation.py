@@ -120,7 +120,7 @@ def line_names(ax: Axes, portrait: Portrait, passages: bool = True) -> None:
         if lines:
             ends = np.vstack([line.get_xydata() for line in lines])
             points = np.vstack([end * along[:, None] for end in ends if np.any(end)])
-            labels.name(text, points, str(lines[0].get_color()), keep=_crossing)
+            labels.name(text, points, lines[0].get_color(), keep=_crossing)
     if not passages:
         return
     before, after = (
@@ -128,7 +128,7 @@ def line_names(ax: Axes, portrait: Portrait, passages: bool = True) -> None:
     )
     for lines, text in ((before, "below"), (after, "above")):  # those of C1
         middles = [np.mean(np.asarray(line.get_xydata()), axis=0) for line in lines]
-        labels.name(text, middles, str(lines[0].get_color()), keep=_crossing)
+        labels.name(text, middles, lines[0].get_color(), keep=_crossing)
 
 
 def _crossing(points: Array) -> Array:

@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ...model import OptionError, whole
 from .. import style
-from .annotation import line_names, portrait_of
+from ..drawing import Colors, Drawn, canvas
 from .class_map import two_fold_map
 from .flow_in_space import two_fold_3d
 from .sliding_flow import two_fold
@@ -46,8 +46,15 @@ _ON_PAGE = 2  # two-folds on a page
 
 
 def two_fold_atlas(
-    cases: Sequence[str] | None = None, *, maps: bool = True, columns: int = 1
-) -> Figure:
+    cases: Sequence[str] | None = None,
+    *,
+    maps: bool = True,
+    columns: int = 1,
+    figure: FigureBase | None = None,
+    size: tuple[float, float] | None = None,
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw two-folds of every class and boundary: sliding portrait, flow in space, class maps.
 
     On one sheet, as tall as it takes: :func:`two_fold_atlas_pages` divides it for print.
@@ -60,11 +67,19 @@ def two_fold_atlas(
         Whether to draw the class maps of the three kinds at the bottom.
     columns : int, optional
         Two-folds side by side; each takes two panels and 7 inches, the width of a page.
+    figure : matplotlib Figure, optional
+        Where to draw; a new one by default.
+    size : (float, float), optional
+        Of a new figure, in inches.
+    colors : mapping, optional
+        Colours as of :func:`two_fold`, :func:`two_fold_3d` and :func:`two_fold_map`.
+    **look
+        Properties of ``matplotlib.lines.Line2D`` for the orbits of the portraits.
 
     Returns
     -------
     matplotlib Figure
-        Tall: save it as PDF or SVG, or name a few cases.
+        The figure; a new one is known to pyplot. Tall: save it as PDF or SVG, or name a few cases.
 
     Raises
     ------
@@ -81,27 +96,28 @@ def two_fold_atlas(
     chosen = _chosen(cases)
     columns = min(whole(columns, "columns"), len(chosen))
     rows = math.ceil(len(chosen) / columns)
-    with style.settings():
-        below = {1: 8.6, 2: 5.2}.get(columns, 4.6)
-        height = 3.1 * rows + below * maps + 1.2
-        figure = style.new_figure((7.0 * columns, height))
+    below = {1: 8.6, 2: 5.2}.get(columns, 4.6)
+    usual = (7.0 * columns, 3.1 * rows + below * maps + 1.2)
+    with canvas(figure, size, usual, panels=True) as page:
         ratios = [3.1 * rows + 1.2, below]
-        parts: Any = figure.subfigures(2, 1, height_ratios=ratios) if maps else [figure]
+        parts: Any = page.figure.subfigures(2, 1, height_ratios=ratios) if maps else [page.figure]
         grid = parts[0].add_gridspec(rows, 2 * columns, width_ratios=[1.0, 1.35] * columns)
         for k, name in enumerate(chosen):
             row, column = divmod(k, columns)
             flat = parts[0].add_subplot(grid[row, 2 * column])
             space = parts[0].add_subplot(grid[row, 2 * column + 1])
-            two_fold(CASES[name], ax=flat, legend=False, orbits=6)
-            line_names(flat, portrait_of(CASES[name], "two_fold_atlas"), passages=False)
-            two_fold_3d(CASES[name], ax=space, legend=False, labels=True, title="")
+            own: Any = {"legend": False, "colors": colors, **look}
+            two_fold(CASES[name], ax=flat, orbits=6, labels="lines", **own)
+            two_fold_3d(CASES[name], ax=space, labels=True, title="", **own)
         parts[0].legend(handles=_legend(), loc="outside upper center", ncols=3 * columns)
         if maps:
-            _maps(parts[1], columns == 1)
-    return figure
+            _maps(parts[1], columns == 1, colors)
+    return page.drawn
 
 
-def two_fold_atlas_pages(cases: Sequence[str] | None = None, *, maps: bool = True) -> list[Figure]:
+def two_fold_atlas_pages(
+    cases: Sequence[str] | None = None, *, maps: bool = True, colors: Colors = None, **look: Any
+) -> list[Figure]:
     """Draw the atlas in parts that fit a page: two two-folds on each, and the class maps on the last.
 
     Parameters
@@ -110,6 +126,10 @@ def two_fold_atlas_pages(cases: Sequence[str] | None = None, *, maps: bool = Tru
         Names among the keys of ``CASES``; all by default.
     maps : bool, optional
         Whether to draw the class maps of the three kinds.
+    colors : mapping, optional
+        Colours as of :func:`two_fold`, :func:`two_fold_3d` and :func:`two_fold_map`.
+    **look
+        Properties of ``matplotlib.lines.Line2D`` for the orbits of the portraits.
 
     Returns
     -------
@@ -130,11 +150,11 @@ def two_fold_atlas_pages(cases: Sequence[str] | None = None, *, maps: bool = Tru
     """
     chosen = _chosen(cases)
     pairs = [chosen[k : k + _ON_PAGE] for k in range(0, len(chosen), _ON_PAGE)]
-    pages = [two_fold_atlas(pair, maps=False) for pair in pairs]
+    pages = [two_fold_atlas(pair, maps=False, colors=colors, **look) for pair in pairs]
     if maps:
-        with style.settings():
-            pages.append(style.new_figure((7.0, 8.6)))
-            _maps(pages[-1], True)
+        with canvas(None, None, (7.0, 8.6), panels=True) as page:
+            _maps(page.figure, True, colors)
+        pages.append(page.drawn)
     return pages
 
 
@@ -148,11 +168,11 @@ def _chosen(cases: Sequence[str] | None) -> list[str]:
     return chosen
 
 
-def _maps(figure: Any, narrow: bool) -> None:
+def _maps(figure: Any, narrow: bool, colors: Colors) -> None:
     """The class maps, two in a row or all."""
     panels = figure.subplots(2, 2).flat if narrow else figure.subplots(1, 3)
     for ax, kind in zip(panels, ("VV", "II", "VI"), strict=False):
-        two_fold_map(kind, ax=ax)
+        two_fold_map(kind, ax=ax, colors=colors)
     for ax in figure.axes[3:]:
         ax.remove()
 

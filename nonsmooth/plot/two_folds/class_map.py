@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
 from ...model import Array, OptionError
 from .. import style
+from ..drawing import Canvas, Colors, Drawn, canvas, key
 
 #: Signs of L11 and L22 by the kind of the folds.
 SIGMA: dict[str, tuple[int, int]] = {"VV": (1, -1), "II": (-1, 1), "VI": (1, 1), "IV": (-1, -1)}
@@ -59,9 +59,11 @@ def two_fold_map(
     kind: str,
     *,
     ax: Axes | None = None,
-    size: tuple[float, float] = (4.8, 6.2),
+    size: tuple[float, float] | None = None,
     legend: bool = True,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw the classes of one kind of two-fold over the $(nu1, nu2)$ plane, with every boundary.
 
     Parameters
@@ -74,11 +76,15 @@ def two_fold_map(
         Inches, of a new figure.
     legend : bool, optional
         Whether a legend is drawn.
+    colors : mapping, optional
+        Colours by the names of the classes.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the boundaries.
 
     Returns
     -------
-    matplotlib Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -93,14 +99,21 @@ def two_fold_map(
     """
     if kind not in SIGMA:
         raise OptionError(f"kind={kind!r} is not one of {list(SIGMA)}.")
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
-        _fill(axes, kind)
-        handles = _boundaries(axes, kind)
+    with canvas(ax, size, (4.8, 6.2), colors=colors, look=look, title=_TITLES[kind]) as page:
+        axes = page.ax
+        _fill(page, kind)
+        handles = _boundaries(page, kind)
         for name, point in label_points(kind).items():
             box = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"}
             size_ = 8 if name in ("mix-C", "mix-F") else 9  # whose areas are small
-            style.write(axes, point, name, fontsize=size_, bbox=box | {"alpha": 0.85}, zorder=6)
+            style.write(
+                axes,
+                point,
+                name,
+                fontsize=style.points(size_),
+                bbox=box | {"alpha": 0.85},
+                zorder=6,
+            )
         for x, y in (([-REACH, REACH], [0, 0]), ([0, 0], [-REACH, REACH])):
             axes.plot(x, y, color=style.GREY, linewidth=0.5, zorder=1)
         axes.set(
@@ -108,12 +121,11 @@ def two_fold_map(
             ylim=(-REACH, REACH),
             xlabel=r"$\nu_1$",
             ylabel=r"$\nu_2$",
-            title=_TITLES[kind],
         )
         axes.set_aspect("equal")
         if legend:
-            axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13))
-    return figure
+            key(axes, handles, loc="upper center", bbox_to_anchor=(0.5, -0.13))
+    return page.drawn
 
 
 def label_points(kind: str) -> dict[str, tuple[float, float]]:
@@ -145,14 +157,12 @@ def areas(kind: str) -> list[tuple[str, Array]]:
     return [(label, polygon[:, ::step]) for label, polygon in found.items()]
 
 
-def _fill(ax: Axes, kind: str) -> None:
+def _fill(page: Canvas, kind: str) -> None:
     """Tint each class."""
     for label, polygon in areas(kind):
         tint, hatch = FILLS[label]
-        patch = Polygon(
-            polygon, facecolor=tint, edgecolor="#6A6A6A", hatch=hatch, linewidth=0, zorder=0
-        )
-        ax.add_patch(patch)
+        look: Any = {"edgecolor": "#6A6A6A", "hatch": hatch, "linewidth": 0, "zorder": 0}
+        page.ax.add_patch(Polygon(polygon, facecolor=page.color(label, tint), **look))
 
 
 def _hyperbola(product: float, branch: int) -> Array:
@@ -162,39 +172,45 @@ def _hyperbola(product: float, branch: int) -> Array:
     return np.column_stack([x, product / x])
 
 
-def _boundaries(ax: Axes, kind: str) -> list[Line2D]:
+def _boundaries(page: Canvas, kind: str) -> list[Line2D]:
     if kind in ("VV", "II"):
-        return _hyperbolas(ax, kind)
-    return _mixed_boundaries(ax, kind)
+        return _hyperbolas(page, kind)
+    return _mixed_boundaries(page, kind)
 
 
-def _hyperbolas(ax: Axes, kind: str) -> list[Line2D]:
+def _hyperbolas(page: Canvas, kind: str) -> list[Line2D]:
     decisive = 1 if kind == "VV" else -1
     rest = r"$\nu_1\nu_2=1$ ($\Delta=0$): pseudo-equilibria"
     same = r"$\Delta=0$, same class; coincident fields"
     handles = [
-        _stroke(ax, _hyperbola(1.0, decisive), style.BLACK, 2.2, "-", rest),
-        _stroke(ax, _hyperbola(1.0, -decisive), style.BLACK, 1.4, (0, (5, 2)), same),
+        _stroke(page, _hyperbola(1.0, decisive), style.BLACK, 2.2, "-", rest),
+        _stroke(page, _hyperbola(1.0, -decisive), style.BLACK, 1.4, (0, (5, 2)), same),
     ]
     if kind == "II":
         for k, n in enumerate(_FLIGHTS):
             curve = _hyperbola(math.cos(math.pi / n) ** 2, -1)
             text = r"$\nu_1\nu_2=\cos^2(\pi/n)$: $n-1$ | $n$ flights"
-            handle = _stroke(ax, curve, style.BLUE, 0.9, "-", text)
+            handle = _stroke(page, curve, style.BLUE, 0.9, "-", text)
             handles += [handle] if k == 0 else []
             at = curve[np.argmin(np.abs(curve[:, 0] - curve[:, 1] - (0.9 - 0.45 * k)))]
             style.write(
-                ax, at, f"{n}", fontsize=8, color=style.BLUE, zorder=3, path_effects=style.halo(2.5)
+                page.ax,
+                at,
+                f"{n}",
+                fontsize=style.points(8),
+                color=style.BLUE,
+                zorder=3,
+                path_effects=style.halo(2.5),
             )
         for line in ([[0, -REACH], [0, REACH]], [[-REACH, 0], [REACH, 0]]):
             handle = _stroke(
-                ax, np.array(line), style.VERMILLION, 1.2, ":", r"$\nu_i=0$: itinerary changes"
+                page, np.array(line), style.VERMILLION, 1.2, ":", r"$\nu_i=0$: itinerary changes"
             )
         handles.append(handle)
     return handles
 
 
-def _mixed_boundaries(ax: Axes, kind: str) -> list[Line2D]:
+def _mixed_boundaries(page: Canvas, kind: str) -> list[Line2D]:
     swap = -1 if kind == "IV" else 1  # (nu1, nu2) -> (nu2, nu1)
     line = np.linspace(-REACH, REACH, 3)
     jordan = np.column_stack([line, line + 2.0])[:, ::swap]
@@ -206,22 +222,15 @@ def _mixed_boundaries(ax: Axes, kind: str) -> list[Line2D]:
     fold = 2 if kind == "VI" else 1
     same = r"$\Delta=0$, same class; coincident fields"
     return [
-        _stroke(ax, jordan, style.BLACK, 2.2, "-", f"${name}=2$ (disc = 0)"),
-        _stroke(ax, rank, style.CANARD, 2.2, "-.", r"$\nu_1\nu_2=-1$ ($\Delta=0$)"),
-        _stroke(ax, outside, style.BLACK, 1.2, (0, (5, 2)), f"${name}=-2$, same class"),
-        _stroke(ax, harmless, style.CANARD, 1.2, (0, (5, 2)), same),
-        _stroke(ax, itinerary, style.VERMILLION, 1.2, ":", rf"$\nu_{fold}=0$: itinerary changes"),
+        _stroke(page, jordan, style.BLACK, 2.2, "-", f"${name}=2$ (disc = 0)"),
+        _stroke(page, rank, style.CANARD, 2.2, "-.", r"$\nu_1\nu_2=-1$ ($\Delta=0$)"),
+        _stroke(page, outside, style.BLACK, 1.2, (0, (5, 2)), f"${name}=-2$, same class"),
+        _stroke(page, harmless, style.CANARD, 1.2, (0, (5, 2)), same),
+        _stroke(page, itinerary, style.VERMILLION, 1.2, ":", rf"$\nu_{fold}=0$: itinerary changes"),
     ]
 
 
-def _stroke(ax: Axes, curve: Array, color: str, width: float, dashes: Any, text: str) -> Line2D:
-    (line,) = ax.plot(
-        *curve.T,
-        color=color,
-        linewidth=width,
-        linestyle=dashes,
-        label=text,
-        zorder=2,
-        gid="boundary",
-    )
-    return line
+def _stroke(page: Canvas, curve: Array, color: str, width: float, dashes: Any, text: str) -> Line2D:
+    look = page.look("boundary", color=color, linewidth=width, linestyle=dashes, zorder=2)
+    page.ax.plot(*curve.T, label=text, gid="boundary", **look)
+    return Line2D([], [], label=text, **look)

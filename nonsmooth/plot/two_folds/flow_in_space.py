@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
@@ -25,6 +25,7 @@ from ...local.two_folds.parabolas import arc, flight, passage
 from ...local.two_folds.reduced_flow import eigenlines, sectors
 from ...model import Array, OptionError
 from .. import style
+from ..drawing import Canvas, Colors, Drawn, canvas
 from ..labels import Labels
 from ..legends import beside
 from ..portraits.tapered_ends import draw_orbit
@@ -85,13 +86,15 @@ def two_fold_3d(
     fold: object,
     *,
     ax: Axes | None = None,
-    size: tuple[float, float] = (7.0, 4.2),
+    size: tuple[float, float] | None = None,
     azimuth: float | None = None,
     elevation: float = 37.0,
     legend: bool = True,
     labels: bool | None = None,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw the flow around a two-fold in three dimensions, in normal-form coordinates.
 
     Tangent orbits at visible folds, flights over invisible ones with their crossings, orbits that
@@ -114,11 +117,15 @@ def two_fold_3d(
         Whether to name folds, canards and the diabolo beside them; by default where there is a legend.
     title : str, optional
         Instead of the class and the numbers of the normal form.
+    colors : mapping, optional
+        Colours by ``"+"`` (above), ``"-"`` (below), ``"s"`` (sliding).
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the orbits.
 
     Returns
     -------
-    matplotlib Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -141,16 +148,16 @@ def two_fold_3d(
         )
     direction = azimuth_of(portrait.flow) if azimuth is None else math.radians(azimuth)
     camera = Camera(direction, math.radians(elevation), stretch_of(portrait.flow))
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
-        scene = _Scene(axes, camera, portrait)
+    with canvas(ax, size, (7.0, 4.2), colors=colors, look=look, title=title) as page:
+        axes = page.ax
+        scene = _Scene(page, camera, portrait)
         scene.draw()
         axes.set_title(title if title is not None else title_of(portrait))
         if legend:
             scene.legend()
         if legend if labels is None else labels:
             scene.line_names()
-    return figure
+    return page.drawn
 
 
 class _Scene:
@@ -158,11 +165,11 @@ class _Scene:
 
     BELOW, SURFACE, SLIDING, ABOVE, TEXT = 1.0, 2.0, 3.0, 4.0, 6.0
 
-    def __init__(self, ax: Axes, camera: Camera, portrait: Portrait):
-        self.ax, self.camera, self.flow = ax, camera, portrait.flow
+    def __init__(self, page: Canvas, camera: Camera, portrait: Portrait):
+        self.page, self.ax, self.camera, self.flow = page, page.ax, camera, portrait.flow
         self.portrait = portrait
-        ax.set_aspect("equal")
-        ax.set_axis_off()
+        self.ax.set_aspect("equal")
+        self.ax.set_axis_off()
 
     def draw(self) -> None:
         """Draw every part."""
@@ -211,7 +218,7 @@ class _Scene:
                 for sign, color in ((1, style.ATTRACTING), (-1, style.REPELLING)):
                     points = part.orbit.points if sign > 0 else -part.orbit.points[::-1]
                     for piece in style.inside(scale * points, (-1.0, 1.0, -1.0, 1.0)):
-                        self._curve(self._flat(piece), color, 0.9, self.SLIDING, at=0.5)
+                        self._curve(self._flat(piece), color, 0.9, self.SLIDING, at=0.5, mode="s")
         for value, m in eigenlines(self.flow):
             color, _, dashes = line_style(value, self.flow)
             end = np.array([1.0, m]) / max(1.0, m)
@@ -282,7 +289,7 @@ class _Scene:
                 self.ax,
                 self.camera([0.0, a, b]),
                 name,
-                fontsize=12,
+                fontsize=style.points(12),
                 zorder=self.TEXT,
                 bbox={**box, "alpha": 0.75},
             )
@@ -301,12 +308,17 @@ class _Scene:
                 self.ax,
                 (end + 0.06 * (end - start) / np.linalg.norm(end - start)),
                 name,
-                fontsize=11,
+                fontsize=style.points(11),
                 zorder=self.TEXT,
             )
         style.arrow(self.ax, top[0], top[1], style.BLACK, linewidth=0.9, zorder=self.ABOVE - 0.5)
         style.write(
-            self.ax, (top[1] + [0.05, 0.0]), "$z_1$", fontsize=11, ha="left", zorder=self.TEXT
+            self.ax,
+            (top[1] + [0.05, 0.0]),
+            "$z_1$",
+            fontsize=style.points(11),
+            ha="left",
+            zorder=self.TEXT,
         )
 
     def frame(self) -> None:
@@ -320,14 +332,18 @@ class _Scene:
     def legend(self) -> None:
         """Explain the lines beside the picture."""
         handles = [
-            style.line(style.ABOVE, "orbits above, $F_1$", 1.3),
-            style.line(style.BELOW, "orbits below, $F_2$", 1.3, (0, (3.5, 1.3))),
-            style.line(style.ATTRACTING, "sliding, attracting", 0.9),
-            style.line(style.REPELLING, "sliding, repelling", 0.9),
+            self._handle("+", "orbits above, $F_1$", style.ABOVE, 1.3),
+            self._handle("-", "orbits below, $F_2$", style.BELOW, 1.3, (0, (3.5, 1.3))),
+            self._handle("s", "sliding, attracting", style.ATTRACTING, 0.9),
+            self._handle("s", "sliding, repelling", style.REPELLING, 0.9),
         ]
         if any(line.get_gid() == "shadow" for line in self.ax.lines):
             handles.append(style.line(_SHADOW, "shadows on the surface", 1.0))
         beside(self.ax, handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+    def _handle(self, mode: str, text: str, color: str, width: float, dashes: Any = "-") -> Line2D:
+        line = self.page.look(mode, color=color, linewidth=width, linestyle=dashes)
+        return Line2D([], [], label=text, **line)
 
     def line_names(self) -> None:
         """Name folds, eigenlines and the diabolo beside them."""
@@ -384,7 +400,9 @@ class _Scene:
         order = self.ABOVE if side == "+" else self.BELOW
         begin, end = np.abs(curve[[0, -1], 0]) > 1e-9  # it goes on above or below what is drawn
         thins = (bool(begin), bool(end))
-        self._curve(curve, color, 1.2, order, dashes=dashes, at=0.62, gid=gid, thins=thins)
+        mode = side if gid == "arc" else ""
+        looks: Any = {"dashes": dashes, "gid": gid, "thins": thins, "mode": mode}
+        self._curve(curve, color, 1.2, order, at=0.62, **looks)
 
     def _curve(
         self,
@@ -397,6 +415,7 @@ class _Scene:
         at: float | None = None,
         gid: str | None = None,
         thins: tuple[bool, bool] = (False, False),
+        mode: str = "",
     ) -> None:
         points = self.camera(curve)
         bed = 2.2 if order == self.ABOVE else 3.6 if width > 2.0 else None
@@ -406,8 +425,10 @@ class _Scene:
                 shadow = self.camera(self._flat(piece))
                 look: Any = {"color": _SHADOW, "lw": 1.0, "zorder": self.SURFACE + 0.2}
                 self.ax.plot(*shadow.T, gid="shadow", **look)
-        drawn: Any = {"color": color, "linestyle": dashes, "zorder": order, "gid": gid}
-        draw_orbit(self.ax, points, thins, _UNIT, width, **drawn, path_effects=effects)
+        look = self.page.look if mode else self.page.named
+        line = look(mode, color=color, linestyle=dashes, linewidth=width, zorder=order, gid=gid)
+        color, width = line["color"], line.pop("linewidth")
+        draw_orbit(self.ax, points, thins, _UNIT, width, **line, path_effects=effects)
         length = np.hypot(*np.diff(points, axis=0).T).sum()
         if at is not None and length > 0.15:
             style.arrowhead(self.ax, points, at, color, mutation_scale=9, zorder=order + 0.05)

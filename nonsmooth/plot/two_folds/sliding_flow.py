@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
@@ -20,6 +19,7 @@ from ...local.two_folds.flights import has_diabolo
 from ...local.two_folds.reduced_flow import Sector, eigenlines, sectors
 from ...model import Array, whole
 from .. import style
+from ..drawing import Canvas, Colors, Drawn, canvas
 from ..legends import beside, is_narrow
 from .annotation import (
     TINTS,
@@ -45,12 +45,14 @@ def two_fold(
     fold: object,
     *,
     ax: Axes | None = None,
-    size: tuple[float, float] = (7.0, 5.0),
+    size: tuple[float, float] | None = None,
     orbits: int = 7,
     legend: bool = True,
-    labels: bool | None = None,
+    labels: bool | str | None = None,
     title: str | None = None,
-) -> Figure:
+    colors: Colors = None,
+    **look: Any,
+) -> Drawn:
     """Draw the sliding portrait of a two-fold in normal-form coordinates.
 
     The regions are attracting sliding (Da), repelling sliding (Dr) and crossing up (C1) and down
@@ -70,15 +72,20 @@ def two_fold(
         About how many orbits to draw in each sliding region.
     legend : bool, optional
         Whether to explain the regions beside the axes.
-    labels : bool, optional
-        Whether to name the lines beside them; by default where there is a legend.
+    labels : bool or "lines", optional
+        Whether to name the lines beside them, ``"lines"`` without the orbits that cross; by default
+        where there is a legend.
     title : str, optional
         Instead of the class and the numbers of the normal form.
+    colors : mapping, optional
+        Colours by ``"orbit"``, ``"canard"``, ``"faux canard"``, ``"F1"`` and ``"F2"``.
+    **look
+        Properties of ``matplotlib.lines.Line2D``, such as ``linestyle``, for the sliding orbits.
 
     Returns
     -------
-    matplotlib Figure
-        The figure, with ``savefig``; notebooks show it.
+    matplotlib Figure or Axes
+        The new figure, which pyplot knows; the axes if they were given.
 
     Raises
     ------
@@ -96,25 +103,25 @@ def two_fold(
     """
     portrait = portrait_of(fold, "two_fold")
     whole(orbits, "orbits", least=0)
-    with style.settings():
-        figure, axes = style.axes_for(ax, size)
+    with canvas(ax, size, (7.0, 5.0), colors=colors, look=look, title=title) as page:
+        axes = page.ax
         parts = sectors(portrait.flow)
         _regions(axes)
         _shade_sectors(axes, parts)
         _crossing_arrows(axes, portrait.flow)
         _diabolo(axes, portrait.flow)
         for part in parts:
-            _orbits(axes, part, orbits)
-        _folds(axes, portrait.flow)
+            _orbits(page, part, orbits)
+        _folds(page, portrait.flow)
         wide = not is_narrow(axes)
-        _eigenlines(axes, portrait, legend and wide)
+        _eigenlines(page, portrait, legend and wide)
         _names(axes, parts)
         _frame(axes, title if title is not None else title_of(portrait))
         if legend:
             _legend(axes, parts)
         if legend if labels is None else labels:
-            line_names(axes, portrait, passages=wide)
-    return figure
+            line_names(axes, portrait, passages=wide and labels != "lines")
+    return page.drawn
 
 
 def _regions(ax: Axes) -> None:
@@ -143,8 +150,9 @@ def _shade_sectors(ax: Axes, parts: list[Sector]) -> None:
             )
 
 
-def _orbits(ax: Axes, part: Sector, count: int) -> None:
+def _orbits(page: Canvas, part: Sector, count: int) -> None:
     """Draw scaled copies of a sector's orbit, evenly spaced across the flow, and their images."""
+    ax = page.ax
     if part.high - part.low < 0.02 or not count:
         return
     points, middle = part.orbit.points, part.middle
@@ -154,14 +162,15 @@ def _orbits(ax: Axes, part: Sector, count: int) -> None:
     spacing = 1.15 / max(count, 1) / max(across, 0.25)
     number = int(min(np.ceil(3.0 / spacing), 4 * count))
     for scale in spacing * (0.5 + np.arange(number)):
-        for sign, color in ((1, style.ATTRACTING), (-1, style.REPELLING)):
+        for sign, usual in ((1, style.ATTRACTING), (-1, style.REPELLING)):
+            line = page.look("orbit", color=usual, linewidth=0.9, zorder=2)
             curve = scale * points if sign > 0 else -scale * points[::-1]
             for piece in style.inside(curve, _WIDER_BOX):
-                ax.plot(*piece.T, color=color, linewidth=0.9, zorder=2, gid="orbit")
+                ax.plot(*piece.T, gid="orbit", **line)
             for piece in style.inside(curve, _BOX):
                 if np.hypot(*np.diff(piece, axis=0).T).sum() > 0.16:
                     at = _fraction(piece, sign * scale * middle)
-                    style.arrowhead(ax, piece, at, color, mutation_scale=11, zorder=2.1)
+                    style.arrowhead(ax, piece, at, line["color"], mutation_scale=11, zorder=2.1)
 
 
 def _fraction(piece: Array, point: Array) -> float:
@@ -171,30 +180,24 @@ def _fraction(piece: Array, point: Array) -> float:
     return float(np.clip(length[k] / length[-1], 0.3, 0.8))
 
 
-def _folds(ax: Axes, flow: ReducedFlow) -> None:
+def _folds(page: Canvas, flow: ReducedFlow) -> None:
     for k, (x, y) in enumerate((([0, 0], [-1, 1]), ([-1, 1], [0, 0]))):
         visible = flow.folds[k] == "V"
         color = (style.ABOVE, style.BELOW)[k]
         dashes = "-" if visible else style.DASHED
-        ax.plot(x, y, color=color, linewidth=2.2, linestyle=dashes, zorder=3, gid="fold")
+        line = page.named(f"F{k + 1}", color=color, linewidth=2.2, linestyle=dashes, zorder=3)
+        page.ax.plot(x, y, gid="fold", **line)
 
 
-def _eigenlines(ax: Axes, portrait: Portrait, numbers: bool) -> None:
-    sliding = eigenlines(portrait.flow)
+def _eigenlines(page: Canvas, portrait: Portrait, numbers: bool) -> None:
+    ax, sliding = page.ax, eigenlines(portrait.flow)
     for value, m in sliding:
         end = to_box(math.atan(m))
         color, name, dashes = line_style(value, portrait.flow)
         name = name.removeprefix("strong ").removeprefix("weak ")
-        ax.plot(
-            [-end[0], end[0]],
-            [-end[1], end[1]],
-            color=color,
-            linewidth=2.6,
-            linestyle=dashes,
-            zorder=4,
-            gid="eigenline",
-            path_effects=style.halo(4.0),
-        )
+        line = page.named(name, color=color, linewidth=2.6, linestyle=dashes, zorder=4)
+        ax.plot(*np.array([-end, end]).T, gid="eigenline", path_effects=style.halo(4.0), **line)
+        color = line["color"]
         if abs(value) < ZERO:
             _along(ax, m, end, name, color, away=0.54)  # longer than others: off the frame
             continue
@@ -225,7 +228,7 @@ def _along(ax: Axes, m: float, end: Array, name: str, color: str, away: float = 
         color=color,
         rotation=math.degrees(angle),
         rotation_mode="anchor",
-        fontsize=9,
+        fontsize=style.points(9),
         zorder=6,
         path_effects=style.halo(3.0),
     )
@@ -281,14 +284,14 @@ def _diabolo(ax: Axes, flow: ReducedFlow) -> None:
 def _names(ax: Axes, parts: list[Sector]) -> None:
     box = {"boxstyle": "round,pad=0.18", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
     for name, point in label_points(parts).items():
-        style.write(ax, point, name, fontsize=14, zorder=7, bbox=box)
+        style.write(ax, point, name, fontsize=style.points(14), zorder=7, bbox=box)
     ax.plot(0, 0, "o", color=style.BLACK, markersize=5, zorder=8)
     ax.annotate(
         "$s$",
         (0, 0),
         xytext=(7, -12),
         textcoords="offset points",
-        fontsize=12,
+        fontsize=style.points(12),
         zorder=8,
         path_effects=style.halo(3.0),
     )

@@ -71,7 +71,7 @@ def test_on_given_axes():
     figure = Figure()
     left, _ = figure.subplots(1, 2)
     shot = bounce.simulate(TURF, 0.3, -1.0, 0.2)
-    assert bounce.plot.friction_cone(shot, ax=left) is figure
+    assert bounce.plot.friction_cone(shot, ax=left) is left
     assert left.get_lines()
 
 

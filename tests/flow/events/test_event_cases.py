@@ -146,16 +146,6 @@ def whole(written, case):
     return ns.simulate(written.system, written.start, float(case["t_end"]), tol=TOL)
 
 
-#: Tests that are not yet answered so, with the reason.
-OPEN = {
-    f"{test}[passage-three-roots]": "two roots at a distance of 2^-30 are no passages of one polynomial"
-    for test in (
-        "test_a_run_has_the_events_of_its_case",
-        "test_a_run_split_at_random_times_is_the_same",
-        "test_a_run_split_after_each_event_is_the_same",
-        "test_an_ensemble_counts_the_same_events",
-    )
-}
 cases = pytest.mark.parametrize("name", CASES)
 
 

@@ -193,3 +193,25 @@ def test_a_pulse_that_breaks_friction_late():
     stops = next(e.t for e in run.events if e.kind == "entry")
     impulse = 3 * sqrt(pi) / 2 * (erf(stops - 30) - erf(starts - 30)) - 0.4 * (stops - starts)
     assert abs(impulse) < 1e-8
+
+
+FAST = 1e15  # in a unit of time of a femtosecond
+
+
+def test_what_happens_soon_after_the_end_does_not_happen():
+    system = ns.FilippovSystem([x], field=[FAST], stops=ns.Stop(x - 1.5))
+    starts = np.linspace(-0.1, 0.1, 80)[:, None]
+    found = ns.ensemble(system, starts, 1 / FAST, work=ns.Work(progress=False))
+    assert (found.status == ns.Status.REACHED_END).all()
+    np.testing.assert_allclose(found.x, starts + 1, rtol=0, atol=1e-12)
+    assert ns.simulate(system, [0.0], 1 / FAST).status is ns.Status.REACHED_END
+    assert ns.simulate(system, [0.0], 1.5 / FAST).status is ns.Status.STOPPED
+
+
+def test_events_that_a_short_time_divides_are_two():
+    resets = [ns.Reset(x - 1, {y: y + 1}), ns.Reset(x - 1.5, {y: 2 * y})]
+    system = ns.FilippovSystem([x, y], field=[FAST, -0.5 * FAST], resets=resets)
+    run = ns.simulate(system, [0.0, 0.0], 2 / FAST, at=ns.Section("reset"))
+    np.testing.assert_allclose([e.t * FAST for e in run.events], [1, 1.5, 2], rtol=1e-12)
+    np.testing.assert_allclose(run.x[-1], [2, 2 * (0.5 - 0.25) - 0.25], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(run.sample_t * FAST, [1, 1.5], rtol=1e-12)

@@ -18,7 +18,7 @@ def flown(system, start, duration):
     """The matrix (x, X, P) after a duration."""
     field, p = variational_field(system, "", (0,)), system.parameter_vector()
     end = fixed.flow_for(field, field.start(np.array(start), p), p, duration)
-    return field.blocks.unpack(end)
+    return field.matrix(end)
 
 
 @pytest.mark.parametrize("duration", [0.0, 1e-9, 0.7, -0.7, 25.0])

@@ -54,7 +54,7 @@ def test_what_leaves_two_folds_has_another_colour(found):
 
 def test_on_axes_of_ones_own_without_names(found):
     axes = Figure().add_subplot()
-    assert ns.plot.dividing_curves(found, ax=axes, labels=False) is axes.figure
+    assert ns.plot.dividing_curves(found, ax=axes, labels=False) is axes
     assert len(axes.lines) == 3 and not any(isinstance(a, Labels) for a in axes.get_children())
 
 

@@ -30,9 +30,10 @@ _FILES = (
         "stability.c",
         "sets.c",
         "stepper.c",
+        "near_zeros.c",
     ),
-    *("surfaces.c", "record.c", "spiral.c", "decide.c", "layer.c", "contacts.c"),
-    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c"),
+    *("elements.c", "record.c", "spiral.c", "decide.c", "layer.c", "contacts.c"),
+    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c", "variation.c"),
 )
 
 
@@ -89,7 +90,8 @@ def facts_header() -> str:
     statuses = ", ".join(f"{s.name} = {s.value}" for s in Status)
     lines.append(f"enum {{ {statuses}, {', '.join(f'{n} = {numbers[n]}' for n in states)} }};")
     lines.append(f"enum {{ {', '.join(k.upper() for k in constants.KINDS)}, KINDS }};")
-    lines.append(f"enum {{ {', '.join(k.upper() + '_GUARD' for k in constants.GUARDS)} }};")
+    for ending, names in (("GUARD", constants.GUARDS), ("LAW", constants.LAWS)):
+        lines.append(f"enum {{ {', '.join(f'{k.upper()}_{ending}' for k in names)} }};")
     lines.append(f"enum {{ {', '.join(r.upper() or 'NO_REASON' for r in constants.REASONS)} }};")
     lines.append(_table("PRIORITY", [constants.PRIORITY[k] for k in constants.GUARDS]))
     lines.append(f"enum {{ LAG_COUNT = {len(constants.LAGS)} }};\n{_table('LAGS', constants.LAGS)}")

@@ -1,4 +1,9 @@
-/* Surfaces: nonsmooth/model/laws/evaluators.py ---------------------------------------------------------- */
+/* Elements: which of them the state is on, what they keep at zero, and their laws. The unknown nu is in [-n, n] for a
+ * surface, in [0, inf) for a contact, |nu| <= n for vectors of a set (sets.c), and h^(degree) in its normal cone. What
+ * differs between the laws stands in LAWS; bounds and signs where they are solved, in decide.c.
+ */
+
+static int has_law(const Run *r, int i, int law) { return element(r, i)->law == law; }
 
 /* Surfaces, gaps, their rates and lower derivatives at x; gradients stay among the program's values. */
 static const double *surface_values(Run *r, const double *x) {
@@ -61,18 +66,18 @@ static void project_to(Run *r, const int32_t *which, int count, const double *le
 
 static void project(Run *r, const int32_t *which, int count) { project_to(r, which, count, 0); }
 
-/* Where the lower derivatives of a surface are; their number. */
+/* Where the derivatives are that an element keeps at zero too; their number. */
 static int lower_rows(const Run *r, int i, int32_t *which) {
-  int first = r->s->lower_first[i], count = r->s->degree[i] - 1;
-  for (int k = 0; k < count; k++) which[k] = first + k;
-  return count;
+  const Element *e = element(r, i);
+  for (int k = 0; k < e->degree - 1; k++) which[k] = e->lower + k;
+  return e->degree - 1;
 }
 
-/* The side to which a motion on a surface passes by the first lower derivative that is not zero to rounding; 0
- * where all are. After surface_values and surface_scales. */
+/* The side to which a motion on h = 0 passes by the first lower derivative that is not zero to rounding; 0 where all
+ * are. After surface_values and surface_scales. */
 static int passes_to(const Run *r, int i, const double *scale) {
-  int first = r->s->lower_first[i];
-  for (int k = first; k < first + r->s->degree[i] - 1; k++)
+  const Element *e = element(r, i);
+  for (int k = e->lower; k < e->lower + e->degree - 1; k++)
     if (!(fabs(r->rates[k]) <= ON_SURFACE * scale[k])) return r->rates[k] > 0 ? 1 : -1;
   return 0;
 }
@@ -81,12 +86,12 @@ static int passes_to(const Run *r, int i, const double *scale) {
  * it is to rounding. */
 static void take_sides(Run *r, int8_t *letter, int certain) {
   int needed = 0;
-  for (int i = 0; i < r->m; i++) needed |= r->s->degree[i] > 1;
+  for (int i = 0; i < r->m; i++) needed |= degree_of(r, i) > 1;
   if (!needed) return;
   surface_values(r, r->x);
   const double *scale = surface_scales(r, r->x);
   for (int i = 0; i < r->m; i++) {
-    if (r->s->degree[i] == 1 || letter[i] == 0 || !(i == certain || fabs(r->rates[i]) <= ON_SURFACE * scale[i])) continue;
+    if (degree_of(r, i) == 1 || letter[i] == 0 || !(i == certain || fabs(r->rates[i]) <= ON_SURFACE * scale[i])) continue;
     int side = passes_to(r, i, scale);
     if (side) letter[i] = (int8_t)side;
   }
@@ -95,7 +100,7 @@ static void take_sides(Run *r, int8_t *letter, int certain) {
 /* What the active elements below ``width`` keep at zero, contacts their gaps, and the ``certain`` one (or -1), also if
  * it is passed. */
 static int gather(const Run *r, int certain, int width, int32_t *which) {
-  int count = 0, found = certain < 0 || r->s->degree[certain] == 1;
+  int count = 0, found = certain < 0 || degree_of(r, certain) == 1;
   for (int i = 0; i < r->active_count && r->active[i] < width; i++) {
     which[count++] = r->active[i];
     found |= r->active[i] == certain;
@@ -106,12 +111,11 @@ static int gather(const Run *r, int certain, int width, int32_t *which) {
   return count;
 }
 
-/* Functions that a mode keeps at zero: surfaces with their lower derivatives, gaps and their rates. */
+/* Functions that a mode keeps at zero, and derivatives. */
 static int kept_by(const Run *r, const int8_t *letter, int32_t *which) {
   int count = 0;
   for (int i = 0; i < r->width; i++) if (letter[i] == 0) which[count++] = i;
-  for (int i = r->m; i < r->width; i++) if (letter[i] == 0) which[count++] = i + r->c;
-  for (int i = 0; i < r->m; i++) if (letter[i] == 0) count += lower_rows(r, i, which + count);
+  for (int i = 0; i < r->width; i++) if (letter[i] == 0) count += lower_rows(r, i, which + count);
   return count;
 }
 
@@ -149,7 +153,7 @@ static void leave_parallel(Run *r, int certain, const int8_t *letter) {
   int count = 0, kept = 0;
   for (int i = 0; i < r->active_count; i++) {
     int own = r->active[i];
-    if (letter[own] == 0 || own == certain) onto[kept++] = own; else count += own < r->m && set_of(r, own) < 0;
+    if (letter[own] == 0 || own == certain) onto[kept++] = own; else count += has_law(r, own, SURFACE_LAW);
   }
   if (!count) return;
   memcpy(x, r->x, sizeof(double) * r->n);
@@ -158,7 +162,7 @@ static void leave_parallel(Run *r, int certain, const int8_t *letter) {
   count = 0;
   for (int i = 0; i < r->active_count; i++) {
     int own = r->active[i], is_near = 1;
-    if (own < r->m && set_of(r, own) < 0 && letter[own] != 0 && own != certain) {
+    if (has_law(r, own, SURFACE_LAW) && letter[own] != 0 && own != certain) {
       memcpy(r->x, first, sizeof(double) * r->n);
       onto[kept] = own;
       project(r, onto, kept + 1);
@@ -181,17 +185,125 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
   }
   int met = 0;
   for (int i = 0; i < r->width; i++) {
-    int rests = fabs(h[i]) <= ON_SURFACE * scale[i];
-    if (i >= r->m) rests &= fabs(h[i + r->c]) <= ON_SURFACE * scale[i + r->c];
-    int s = set_of(r, i), sure = i == certain;
+    int rests = fabs(h[i]) <= ON_SURFACE * scale[i], s = set_of(r, i), sure = i == certain;
+    if (has_law(r, i, RELAY_LAW)) continue; /* it switches, nothing is decided */
     if (s >= 0) {
-      int f = r->s->set_first[s];
-      if (i == f) met = letter[f] <= OFF && is_met(r, letter, s, h, scale);
+      if (i == s) met = letter[s] <= OFF && is_met(r, letter, s, h, scale);
       rests = met;
-      sure = certain >= f && certain < f + r->s->set_size[s];
+      sure = certain >= s && certain < s + size_of(r, s);
     }
-    if (i < r->m && letter[i] != 0 && passes_to(r, i, scale)) continue; /* its letter follows from a lower derivative */
+    if (letter[i] != 0 && passes_to(r, i, scale)) continue; /* its letter follows from a lower derivative */
     if (rests || letter[i] == 0 || sure) r->active[r->active_count++] = i;
   }
-  if (certain >= 0 && certain < r->m && set_of(r, certain) < 0) leave_parallel(r, certain, letter);
+  if (certain >= 0 && has_law(r, certain, SURFACE_LAW)) leave_parallel(r, certain, letter);
 }
+
+/* Laws -------------------------------------------------------------------------------------------------- */
+
+static void serve_surface(Run *r, int row);
+static void serve_contact(Run *r, int row);
+static void serve_set(Run *r, int row);
+static void settle_in(Run *r);
+static int change_kind(const Run *r, int before, int after);
+static void event(Run *r, int kind, int before, int guard, const double *x);
+
+/* The sign of a bound's first coefficient that is not zero; one that rounding has left before it passes zero is. */
+static double turn_of(const Run *r, int i, const double *factor, int count) {
+  const Entries *g = &r->s->factor_gradient;
+  int k = 0;
+  while (k < count && factor[k] == 0) k++;
+  if (k == 0 && count > 1 && factor[0] * factor[1] < 0) {
+    double rounding = 0;
+    for (int e = 0; e < g->count; e++) {
+      double slope = fabs(out_of(&r->s->point, r->point, first_of_factors(r) + e));
+      if (g->row[e] == i && slope < INFINITY) rounding += slope * fabs(r->expansion->states[(int64_t)g->column[e] * r->stride]);
+    }
+    k = fabs(factor[0]) <= VANISHES * rounding;
+  }
+  return k < count ? ns_sign(factor[k]) : 1;
+}
+
+static void lay_out_surface(const Run *r, Layout *l, int i) {
+  (void)r;
+  if (l->letter[i]) add_row(l, SURFACE_GUARD, i, l->letter[i]);
+  else { add_row(l, EXIT_GUARD, i, 1); add_row(l, EXIT_GUARD, i, -1); }
+}
+
+static void lay_out_contact(const Run *r, Layout *l, int i) {
+  (void)r;
+  add_row(l, l->letter[i] ? IMPACT_GUARD : RELEASE_GUARD, i, l->letter[i]);
+}
+
+/* A function on its side, also a gap. */
+static void guard_of_height(Run *r, const Layout *l, int row, int count, double *g) {
+  const double *h = row_of(r, r->n + r->width + l->index[row]);
+  for (int k = 0; k < count; k++) g[k] = l->side[row] * h[k];
+}
+
+static void guard_of_surface(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
+  int i = l->index[row], side = l->side[row];
+  if (l->kind[row] == SURFACE_GUARD) { guard_of_height(r, l, row, count, g); return; }
+  if (is_idle(r, l->letter, i)) {
+    const double *layer = row_of(r, r->n + i);
+    for (int k = 0; k < count; k++) g[k] = -side * layer[k];
+    return;
+  }
+  const double *factor = row_of(r, r->n + 2 * r->width + i), *lam = series + (int64_t)i * r->stride;
+  double turn = turn_of(r, i, factor, count);
+  for (int k = 0; k < count; k++) g[k] = turn * (factor[k] - side * lam[k]);
+}
+
+static void guard_of_contact(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
+  if (l->kind[row] == IMPACT_GUARD) guard_of_height(r, l, row, count, g);
+  else memcpy(g, series + (int64_t)l->index[row] * r->stride, sizeof(double) * count);
+}
+
+/* Rounding of h off its zero, of the rate of h or of the reaction on it. */
+static double rounding_of_element(Run *r, const Expansion *e, int row, const Sums *of) {
+  (void)r;
+  int i = e->l.index[row];
+  return e->l.letter[i] ? of->height[i] : of->layer[i];
+}
+
+static int8_t side_of_surface(const Run *r, int i, double h) {
+  (void)r, (void)i;
+  return h > 0 ? 1 : -1; /* what is on it counts as below until it is decided */
+}
+
+static int8_t side_of_contact(const Run *r, int i, double h) {
+  (void)r, (void)i, (void)h;
+  return 1;
+}
+
+/* A relay that is at its threshold, or beyond by rounding, is just before it: the motion switches it or leaves. */
+static void guard_of_relay(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
+  (void)series;
+  guard_of_height(r, l, row, count, g);
+  if (count > 1 && !(g[0] > 0)) g[0] = SMALLEST;
+}
+
+/* On above the upper threshold, off below the lower one, and as it is between them. */
+static int8_t side_of_relay(const Run *r, int i, double h) {
+  return r->rates[element(r, i)->lower] > 0 ? 1 : h < 0 ? -1 : r->letter[i] > 0 ? 1 : -1;
+}
+
+/* Relays whose times cannot be told apart switch together. */
+static void serve_relay(Run *r, int row) {
+  int before = r->mode;
+  double last = r->met_at[row] + TIE * time_scale(r);
+  for (int k = 0; k < r->now.atoms; k++) {
+    int i = r->now.index[k];
+    if (has_law(r, i, RELAY_LAW) && r->met_at[k] >= 0 && r->met_at[k] <= last) r->letter[i] = (int8_t)-r->letter[i];
+  }
+  settle_in(r);
+  if (r->status == RUNNING) event(r, change_kind(r, before, r->mode), before, row, r->x);
+}
+
+static const Law LAWS[] = {
+  [SURFACE_LAW] = {lay_out_surface, guard_of_surface, rounding_of_element, side_of_surface, serve_surface},
+  [CONTACT_LAW] = {lay_out_contact, guard_of_contact, rounding_of_element, side_of_contact, serve_contact},
+  [SET_LAW] = {lay_out_set, guard_of_set, rounding_of_set, side_of_set, serve_set},
+  [RELAY_LAW] = {lay_out_surface, guard_of_relay, rounding_of_element, side_of_relay, serve_relay},
+};
+
+static const Law *law_of(const Run *r, int i) { return LAWS + element(r, i)->law; }

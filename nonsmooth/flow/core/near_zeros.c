@@ -1,0 +1,82 @@
+/* Zeros of guards that are close together -------------------------------------------------------------
+ *
+ * Rounding and truncation of a guard's polynomial hide whether it touches zero, passes once or passes several times
+ * near a point. Coefficients at a point that is closer have smaller terms, and errors as much smaller. So a step ends
+ * before such a point, as often as that helps: what is then left is rounding of the guard's own formula.
+ */
+
+/* Rounding of a guard at a time of the step: of the states, and of its own formula. */
+static double guard_noise(Run *r, const Expansion *e, int row, double time) {
+  double *x = r->vector, *lam = x + r->n;
+  at_time(r, e, time, x, lam);
+  evaluate(r, e, x, lam);
+  weigh_rounding(r, e->l.is_free, r->size);
+  return guard_rounding(r, e, row);
+}
+
+/* Terms before those of a polynomial, which are known to be zero: what errors have left of them. */
+static double left_out(const double *c, int count, double time) {
+  double sum = 0;
+  for (int k = -1; k >= -count; k--) sum = sum * time + fabs(c[k]);
+  return sum;
+}
+
+/* First root of c, positive at 0, within h. The guard is c, times powers of the time since ``from`` that have left
+ * ``drop`` terms before c, times ``known`` powers of the time. Where errors hide whether it is the first, r->hold is
+ * a time before it. */
+static double sure_root(Run *r, const Expansion *e, int row, const double *c, int n, double h, double from, int drop,
+                        int known) {
+  if (!(c[0] > 0)) return 0;
+  if (is_far(c, n, h)) return -1;
+  const double *g = e->guards + (int64_t)row * r->stride;
+  double b[P + 1], within = h, exact = LOCATED * larger(time_scale(r), h), slope, floor = 0;
+  int changes = isolate(c, n, &within, b);
+  if (!changes) return -1;
+  double root = first_in(c, n, b, 0, within, 0), end = root < 0 ? h : root;
+  if (changes == 1 && root > 0) {
+    horner(c, n, root, &slope);
+    if (LOW * ROUNDING * (c[0] + rest_of(c, n, root)) <= exact * fabs(slope)) return root;
+  }
+  double low = first_low(c, n, end, LOW, 0);
+  if (low > 0) {
+    floor = guard_noise(r, e, row, from + low);
+    if (from > 0) floor += ROUNDING * (fabs(g[0]) + rest_of(g, r->order, from + low)); /* of the shift by ``from`` */
+    floor = (floor / pow(from + low, known) + left_out(c, drop, low)) / pow(low, drop);
+    if (floor > 0) low = first_low(c, n, end, LOW, floor);
+  }
+  if (low < 0 || passes_once(c, n, end, low, floor, exact)) return root;
+  double before = first_low(c, n, low, FAR_FROM_LOW * LOW, floor);
+  if (before > NEARER * low && low - before > SEPARATE / LOCATED * exact) {
+    r->hold = smaller(r->hold, from + before);
+    return -1;
+  }
+  if (floor > 0) { /* a touch that reaches zero by rounding is no root */
+    memcpy(b, c, sizeof(double) * (n + 1));
+    b[0] += LOW * floor;
+    root = first_root(b, n, h);
+    if (root > 0) root = polish_late(c, n, root, h);
+  }
+  return root;
+}
+
+/* First time within h at which a guard passes zero falling (-1), rising (1) or either way (0), after ``drop`` terms
+ * that are zero; as first_crossing. */
+static double sure_crossing(Run *r, const Expansion *e, int row, int drop, double h, int direction) {
+  const double *g = e->guards + (int64_t)row * r->stride;
+  double all[P + 1], *c = all, s = direction > 0 ? -1 : 1;
+  int n = r->order - drop;
+  for (; n >= 0 && g[drop] == 0; drop++) n--;
+  if (n < 0) return -1;
+  for (int k = 0; k <= r->order; k++) all[k] = s * g[k];
+  c += drop;
+  if (c[0] > 0) return sure_root(r, e, row, c, n, h, 0, drop, 0);
+  for (int k = 0; k <= n; k++) c[k] = -c[k];
+  double rise = sure_root(r, e, row, c, n, h, 0, drop, 0);
+  if (rise < 0 || direction == 0) return rise;
+  if (n == 0 || rise >= h) return -1;
+  for (int i = 0; i < n; i++)
+    for (int k = n - 1; k >= i; k--) c[k] += rise * c[k + 1];
+  for (int k = 0; k <= n; k++) c[k] = -c[k];
+  double fall = sure_root(r, e, row, c + 1, n - 1, h - rise, rise, 1, drop);
+  return fall < 0 ? -1 : rise + fall;
+}

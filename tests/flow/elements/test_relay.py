@@ -1,0 +1,252 @@
+"""A relay with hysteresis is an element: its state is a letter, it has a memory, and all that runs a system runs it."""
+
+import pickle
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, y, v, u, w, lam, q, a = (ca.SX.sym(s) for s in ("x", "y", "v", "u", "w", "lam", "q", "a"))
+
+
+def thermostat(on=1.0, off=-1.0, **options):
+    """x' = -x - 2u: x falls towards -2 while the relay is on, rises towards 2 while it is off."""
+    options = {"surfaces": [ns.Relay(x, on=on, off=off)], "multipliers": [u], **options}
+    return ns.FilippovSystem([x], field=[-x - 2 * u], **options)
+
+
+def switches(run):
+    return [e for e in run.events if e.kind == "crossing"]
+
+
+def test_a_relay_switches_at_the_times_of_the_closed_form():
+    run = ns.simulate(thermostat(), [0.0], 10.0, tol=1e-13)
+    first, period = np.log(2.0), 2 * np.log(3.0)
+    times = first + period / 2 * np.arange(len(switches(run)))
+    np.testing.assert_allclose([e.t for e in switches(run)], times, atol=1e-12)
+    np.testing.assert_allclose(
+        [e.x[0] for e in switches(run)], np.resize([1, -1], len(times)), atol=1e-13
+    )
+    assert len(times) == 1 + int((10.0 - first) // (period / 2))
+    assert run.itinerary.startswith("- + - +")
+    assert {e.name for e in switches(run)} == {"h0"} and run.segments[0].mode == "-"
+
+
+@pytest.mark.parametrize("half", [0.1, 0.5, 0.9])
+def test_a_period_depends_on_the_width_as_the_closed_form_says(half):
+    system = thermostat(2 * half, -2 * half)
+    last = switches(ns.simulate(system, [0.0], 20.0, tol=1e-13))[-3:]
+    assert last[2].t - last[0].t == pytest.approx(2 * np.log((1 + half) / (1 - half)), abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("start", "mode", "word"),
+    [
+        (0.5, None, "-"),
+        (0.5, "-", "-"),
+        (0.5, "+", "+"),
+        (-1.5, None, "-"),
+        (1.5, None, "+"),
+        (1.0, None, "+"),
+        (1.0, "+", "+"),
+        (-1.0, "+", "-"),
+        (-1.0, None, "-"),
+    ],
+)
+def test_a_start_between_the_thresholds_is_off_unless_its_mode_is_given(start, mode, word):
+    """On a threshold to which the motion goes the relay switches at once."""
+    run = ns.simulate(thermostat(), [start], 0.01, start_mode=mode)
+    assert run.segments[-1].mode == word and run.status is ns.Status.REACHED_END
+    sign = 1 if word == "+" else -1
+    expected = -2 * sign + (start + 2 * sign) * np.exp(-0.01)
+    assert run.x[-1, 0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_start_beyond_a_threshold_has_its_letter():
+    assert ns.simulate(thermostat(), [1.5], 0.1, start_mode="-").status is ns.Status.NON_UNIQUE
+    many = ns.ensemble(thermostat(), [[1.5], [0.5]], 0.1, start_mode="+")
+    assert many.itinerary.tolist() == ["+", "+"]
+
+
+def test_an_ensemble_runs_as_simulate_does():
+    system, times = thermostat(a, -a, parameters={a: 1.0}), np.linspace(0.0, 7.0, 15)
+    starts, widths = np.linspace(-1.6, 1.6, 100)[:, None], np.linspace(0.2, 1.4, 100)
+    many = ns.ensemble(system, starts, 7.0, parameters={"a": widths}, t_eval=times)
+    for k in range(0, 100, 9):
+        run = ns.simulate(system, starts[k], 7.0, parameters={a: widths[k]}, t_eval=times)
+        assert many.itinerary[k] == run.itinerary
+        np.testing.assert_allclose(many.sample_x[k], run.sample_x, atol=1e-9)
+        np.testing.assert_allclose(many.x[k], run.x[-1], atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_run_that_is_split_anywhere_is_the_same_run(seed):
+    rng = np.random.default_rng(seed)
+    system, t_end = two_relays(rng.uniform(0.2, 0.6)), 12.0
+    whole = ns.simulate(system, [1.0, 0.0], t_end, tol=1e-12)
+    cuts, run, events = np.sort(rng.uniform(0.0, t_end, 2)), None, []
+    for cut in (*cuts, t_end):
+        first = {"x0": [1.0, 0.0]} if run is None else {"start": run}
+        run = ns.simulate(system, t_end=cut, tol=1e-12, **first)
+        events += [(e.kind, e.name, e.t) for e in run.events[:-1]]
+    assert [e[:2] for e in events] == [(e.kind, e.name) for e in whole.events[:-1]]
+    np.testing.assert_allclose([e[2] for e in events], [e.t for e in whole.events[:-1]], atol=1e-9)
+    np.testing.assert_allclose(run.x[-1], whole.x[-1], atol=1e-9)
+    again = ns.simulate(system, start=whole.events[3], t_end=t_end, tol=1e-12)
+    assert [e.name for e in again.events] == [e.name for e in whole.events[4:]]
+
+
+def two_relays(width):
+    """An oscillator with dry friction that two relays push, of which one waits for the speed."""
+    return ns.FilippovSystem(
+        [x, v],
+        field=[v, -x - 0.5 * u - 0.2 * w - 0.15 * lam],
+        surfaces=[ns.Relay(x, on=width, off=-width), v, ns.Relay(v + 0.3 * x, on=0.3, off=-0.2)],
+        multipliers=[u, lam, w],
+    )
+
+
+def discrete_relays(width):
+    """The same with a discrete state and two level resets for each relay."""
+    r = ca.SX.sym("r")
+    level = lambda s, h, state, to: ns.Reset(
+        s - h, {state: to}, to, level=True, when=state == -to, name=f"{state}{to}"
+    )
+    resets = [level(x, width, q, 1), level(x, -width, q, -1)]
+    resets += [level(v + 0.3 * x, 0.3, r, 1), level(v + 0.3 * x, -0.2, r, -1)]
+    return ns.FilippovSystem(
+        [x, v],
+        field=[v, -x - 0.5 * q - 0.2 * r - 0.15 * lam],
+        surface=v,
+        multipliers=lam,
+        discrete={q: (-1, 1), r: (-1, 1)},
+        resets=resets,
+    )
+
+
+@pytest.mark.parametrize("width", [0.15, 0.3, 0.45, 0.7])
+def test_relays_are_what_discrete_states_and_resets_are(width):
+    one = ns.simulate(two_relays(width), [1.0, 0.0], 15.0, tol=1e-12)
+    two = ns.simulate(discrete_relays(width), [1.0, 0.0, -1, -1], 15.0, tol=1e-12)
+    assert one.status is two.status
+    times = [e.t for e in one.events if e.name in ("h0", "h2") and e.t > 0]
+    expected = [e.t for e in two.events if e.kind == "reset" and e.t > 0]
+    assert len(times) > 5
+    np.testing.assert_allclose(times, expected, atol=1e-9)
+    np.testing.assert_allclose(one.x[-1], two.x[-1][:2], atol=1e-9)
+
+
+def test_two_relays_with_one_signal_switch_together():
+    system = ns.FilippovSystem(
+        [x],
+        field=[-x - u - w],
+        surfaces=[ns.Relay(x, on=1.0, off=-1.0), ns.Relay(2 * x, on=2.0, off=-2.0)],
+        multipliers=[u, w],
+    )
+    run = ns.simulate(system, [0.0], 10.0, tol=1e-13)
+    one = ns.simulate(thermostat(), [0.0], 10.0, tol=1e-13)
+    times = [e.t for e in switches(one)]
+    np.testing.assert_allclose([e.t for e in switches(run)], times, atol=1e-12)
+    assert run.segments[-1].mode == 2 * one.segments[-1].mode
+
+
+def test_a_relay_may_follow_the_time():
+    """u switches where sin(y) passes 1/2 and -1/2, y' = 1; x is the integral of u."""
+    system = ns.FilippovSystem(
+        [x, y], field=[u, 1], surfaces=[ns.Relay(ca.sin(y), on=0.5, off=-0.5)], multipliers=[u]
+    )
+    run = ns.simulate(system, [0.0, 0.0], 10.0, tol=1e-13)
+    times = np.array([1, 7, 13, 19]) * np.pi / 6
+    np.testing.assert_allclose([e.t for e in switches(run)], times[times < 10], atol=1e-12)
+    turns = [0.0, *times[times < 10], 10.0]
+    expected = sum((-1) ** (k + 1) * (b - a) for k, (a, b) in enumerate(pairwise(turns)))
+    assert run.x[-1, 0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_jump_takes_the_relay_with_it():
+    """A jump beyond a threshold gives the letter there, one between them keeps it."""
+    jump = ns.Reset(y - 0.1, {x: a, y: 0}, 1, name="kick")
+    system = ns.FilippovSystem(
+        [x, y],
+        field=[0, 1],
+        surfaces=[ns.Relay(x, on=1.0, off=-1.0)],
+        multipliers=[u],
+        resets=jump,
+        parameters={a: 0.0},
+    )
+    word = lambda to: ns.simulate(system, [0.0, 0.0], 0.15, start_mode="+", parameters={a: to})
+    assert word(0.5).itinerary == "+" and word(2.0).itinerary == "+"
+    assert word(-2.0).itinerary == "+ -"
+
+
+def test_a_relay_acts_on_a_closed_contact():
+    """A body on a table that a magnet pulls while x > 1 at first, until x < -1: it lifts off when let go."""
+    gap = ca.SX.sym("gap")
+    system = ns.FilippovSystem(
+        [x, y, gap, v],
+        field=[y, -x, v, -0.5 - u],
+        surfaces=[ns.Relay(x, on=0.5, off=-0.5)],
+        multipliers=[u],
+        impacts=ns.Impact(gap),
+    )
+    run = ns.simulate(system, [1.0, 0.0, 0.0, 0.0], 3.0, tol=1e-12)
+    assert [e.kind for e in run.events[:1]] == ["release"] and run.itinerary == "+c -o"
+    assert run.events[0].t == pytest.approx(2 * np.pi / 3, abs=1e-11)
+    fall = 3.0 - 2 * np.pi / 3
+    assert run.x[-1, 2] == pytest.approx(0.25 * fall**2, abs=1e-10)
+
+
+def test_a_section_and_stops_see_the_relay():
+    run = ns.simulate(thermostat(), [0.0], 30.0, at=ns.Section("h0", skip=4, count=3))
+    np.testing.assert_allclose(np.diff(run.sample_t), np.log(3.0), atol=1e-9)
+    counts = ns.ensemble(thermostat(), [[0.0]], 30.0, at_event=("crossing", 3))
+    assert counts.event_t[0] == pytest.approx(np.log(2.0) + 2 * np.log(3.0), abs=1e-9)
+
+
+def test_a_relay_that_is_continuous_at_one_threshold_is_generic():
+    system = ns.FilippovSystem(
+        [x], field=[-x - u * (x + 1)], surfaces=[ns.Relay(x, on=1.0, off=-1.0)], multipliers=[u]
+    )
+    assert system.switching().kind == "generic" and repr(system).endswith("1 surface)")
+
+
+def test_thresholds_that_do_not_fit_are_refused():
+    with pytest.raises(ns.DefinitionError, match=r"on.*off"):
+        thermostat(-1.0, 1.0)
+    with pytest.raises(ns.ParameterError, match="thresholds"):
+        ns.simulate(thermostat(a, 0.0, parameters={a: 1.0}), [0.0], 1.0, parameters={a: -1.0})
+    with pytest.raises(ns.DefinitionError, match="thresholds"):
+        thermostat(1 + x**2, 0.0)
+    with pytest.raises(ns.DefinitionError):
+        ns.FilippovSystem([x], field=[u], surfaces=[ns.Relay(2.0, on=1, off=0)], multipliers=[u])
+
+
+def test_what_does_not_know_relays_refuses_them():
+    system = thermostat()
+    run = ns.simulate(system, [0.0], 3.0)
+    for verb in (
+        lambda: ns.classify(system, [0.0]),
+        lambda: ns.sensitivity(run),
+        lambda: ns.region(system, [0.0]),
+        lambda: ns.flow.follow(system, [0.0], 1.0, mode="+"),
+        lambda: ns.regularise(system, 0.1),
+    ):
+        with pytest.raises(ns.DefinitionError, match="hysteresis"):
+            verb()
+
+
+def test_a_relay_is_kept_in_files_and_processes(tmp_path):
+    system = thermostat(a, -1.0, parameters={a: 1.0})
+    again = pickle.loads(pickle.dumps(system))
+    assert again == system and again != thermostat(a, -2.0, parameters={a: 1.0})
+    run = ns.simulate(system, [0.0], 3.0)
+    run.save(tmp_path / "run.npz")
+    loaded = ns.load(tmp_path / "run.npz")
+    assert loaded.system == system
+    more = ns.simulate(loaded.system, start=loaded, t_end=5.0)
+    np.testing.assert_allclose(more.x[-1], ns.simulate(system, [0.0], 5.0).x[-1], atol=1e-9)
+    many = ns.ensemble(again, [[0.0], [0.3]], 5.0, work=ns.Work(chunk=1))
+    assert many.itinerary[0] == ns.simulate(system, [0.0], 5.0).itinerary

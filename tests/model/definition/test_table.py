@@ -1,0 +1,121 @@
+"""Tables beside scipy's interpolation, their surfaces, and runs beside those of the formula."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+import nonsmooth as ns
+
+x, v, t = (ca.SX.sym(s) for s in ("x", "v", "t"))
+
+
+def random_table(seed, count=9):
+    generator = np.random.default_rng(seed)
+    return np.sort(generator.uniform(-2, 2, count)), generator.uniform(-1, 1, count)
+
+
+def beside(xs, ys, order, outside, at):
+    if order == 1:
+        inner = np.interp(at, xs, ys)
+        slopes = np.diff(ys)[[0, -1]] / np.diff(xs)[[0, -1]]
+    else:
+        spline = CubicSpline(xs, ys, bc_type="clamped" if outside == "constant" else "natural")
+        inner, slopes = spline(np.clip(at, xs[0], xs[-1])), spline(xs[[0, -1]], 1)
+    if outside == "linear":
+        inner = (
+            inner + slopes[0] * np.minimum(at - xs[0], 0) + slopes[1] * np.maximum(at - xs[-1], 0)
+        )
+    return inner
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("outside", ["constant", "linear"])
+@pytest.mark.parametrize("order", [1, 3])
+def test_values_are_those_of_scipy(order, outside, seed):
+    xs, ys = random_table(seed)
+    curve = ca.Function("curve", [x], [ns.table(x, xs, ys, order=order, outside=outside)])
+    at = np.linspace(-3, 3, 401)
+    found = np.array(curve(at[None, :])).ravel()
+    np.testing.assert_allclose(found, beside(xs, ys, order, outside, at), atol=1e-11)
+
+
+@pytest.mark.parametrize(("order", "outside"), [(1, "constant"), (1, "linear"), (3, "linear")])
+def test_breakpoints_have_the_class_that_they_have(order, outside):
+    xs, ys = random_table(0, 5)
+    system = ns.FilippovSystem.from_expression([x, v], [v, -ns.table(x, xs, ys, order, outside)])
+    kinds = [system.switching(i) for i in range(system.surface_count)]
+    assert {(k.kind, k.order) for k in kinds} == {("continuous", order)}
+    kinks = {("constant", 1): 5, ("linear", 1): 3, ("linear", 3): 5}
+    assert len(kinds) == kinks[outside, order]
+
+
+@pytest.mark.parametrize("order", [1, 3])
+def test_a_run_through_a_table_beside_scipy(order):
+    xs, ys = np.linspace(-2, 2, 9), np.tanh(2 * np.linspace(-2, 2, 9))
+    curve = ns.table(x, xs, ys, order=order)
+    system = ns.FilippovSystem.from_expression([x, v], [v, -curve - 0.1 * v])
+    run = ns.simulate(system, [1.7, 0.0], 20.0, tol=1e-12)
+
+    spline = CubicSpline(xs, ys, bc_type="clamped")
+
+    def smooth(s, u):
+        y = np.interp(u[0], xs, ys) if order == 1 else spline(min(max(u[0], -2.0), 2.0))
+        return [u[1], -float(y) - 0.1 * u[1]]
+
+    other = solve_ivp(
+        smooth, (0, 20), [1.7, 0.0], rtol=1e-10, atol=1e-12, method="DOP853", max_step=0.02
+    )
+    np.testing.assert_allclose(run.x[-1], other.y[:, -1], atol=1e-7)
+    assert {e.kind for e in run.events} <= {"crossing", "end"}
+
+
+def test_what_the_argument_cannot_pass_is_no_surface():
+    xs, ys = [-1.0, 0.0, 0.5, 2.0], [5.0, 0.6, 0.4, 0.3]
+
+    def count(argument):
+        system = ns.FilippovSystem.from_expression([x, v], [v, -ns.table(argument, xs, ys)])
+        return system.surface_count
+
+    assert count(x) == 4
+    assert count(x**2) == 2  # at 0.5 and 2
+    assert count(ca.fabs(x)) == 1 + 2 * 2  # and where the absolute value has its kink
+    assert count(1 + ca.tanh(x)) == 1  # at 0.5; it comes to 0 and 2 at infinity only
+    assert count(3 + x**2) == 0
+    at = ca.Function("at", [x], [ns.table(3 + x**2, xs, ys)])
+    assert float(at(1.0)) == pytest.approx(0.3)
+
+
+def test_the_measured_friction_of_the_examples():
+    slip = np.array([0.0, 0.05, 0.1, 0.3, 1.0])
+    measured = np.array([0.60, 0.45, 0.40, 0.36, 0.35])
+    relative = v - 0.3
+    friction = ns.table(ca.fabs(relative), slip, measured)
+    system = ns.FilippovSystem.from_expression([x, v], [v, -x - friction * ca.sign(relative)])
+    run = ns.simulate(system, [0.0, 0.0], t_end=50.0, tol=1e-11)
+    exits = [event for event in run.events if event.kind == "exit"]
+    # it sticks to the belt until the spring pulls with 0.6
+    assert exits and exits[-1].x[0] == pytest.approx(
+        -0.6 + 2 * 0.6 * (exits[-1].x[0] > 0), abs=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        ((x, [0.0], [1.0]), "at least two"),
+        ((x, [0.0, 1.0], [1.0]), "as many xs as ys"),
+        ((x, [1.0, 0.0], [1.0, 2.0]), "increase"),
+        ((x, [0.0, 0.0], [1.0, 2.0]), "increase"),
+        ((x, [0.0, np.nan], [1.0, 2.0]), "finite"),
+        ((x, ["a", "b"], [1.0, 2.0]), "two lists of numbers"),
+        ((x, [0.0, 1.0], [1.0, 2.0], 2), "straight lines"),
+        ((x, [0.0, 1.0], [1.0, 2.0], 1, "error"), "A Stop"),
+        ((x, np.arange(501.0), np.arange(501.0)), "at most 500"),
+        (("x", [0.0, 1.0], [1.0, 2.0]), "argument of the table"),
+    ],
+)
+def test_what_is_no_table_is_refused(args, words):
+    with pytest.raises(ns.DefinitionError, match=words):
+        ns.table(*args)

@@ -154,7 +154,7 @@ class _Reader:
             mean, half = c + d, c - d
             if ca.is_equal(c, d, _DEPTH):
                 mean, half = 2.0 * c, ca.SX(0)
-            elif ca.is_equal(c, -d, _DEPTH):
+            elif ca.simplify(mean).is_zero():
                 mean, half = ca.SX(0), 2.0 * c
             elif (_number(mean + half), _number(mean - half)) != (2 * _number(c), 2 * _number(d)):
                 continue  # rounding would make others of the sides

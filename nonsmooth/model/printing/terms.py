@@ -186,7 +186,7 @@ class Graph:
 
     def apply(self, op: str, args: Terms) -> Term:
         """Return an operation of values."""
-        if op == "if_else_zero" and args[0] is not None and not self.is_still(args[0]):
+        if op == "if_else_zero" and not all(a is None or self.is_still(a) for a in args):
             return self.whole(self.chosen(args[:1], args[1]))
         return self.operation(op, *map(self.whole, args))
 

@@ -43,9 +43,9 @@ class Shape:
     affine_modes: list[bool]
 
 
-def lanes_program(system: FilippovSystem, order: int, joined: bool) -> tuple[str, Shape]:
-    """C of ``jet``, ``surface_values``, ``lie_values``, ``stop_values``, ``check_values`` (``joined``: see ``Graph``)."""
-    writer = _Writer(coupled_of(system), joined)
+def lanes_program(system: FilippovSystem, order: int) -> tuple[str, Shape]:
+    """C of ``jet``, ``surface_values``, ``lie_values``, ``stop_values``, ``check_values``."""
+    writer = _Writer(coupled_of(system))
     shape = writer.shape()
     jet, guards = writer.expanded(order)
     program = Program(writer.graph, ("I", "I", "T"))
@@ -63,8 +63,8 @@ def lanes_program(system: FilippovSystem, order: int, joined: bool) -> tuple[str
 class _Writer(OfTape):
     """The modes of a system with one surface or none."""
 
-    def __init__(self, coupled: Coupled, joined: bool):
-        super().__init__(coupled, joined)
+    def __init__(self, coupled: Coupled):
+        super().__init__(coupled)
         self.slides, _, self.lam = self.graph.inputs(2, 3)
 
     def expanded(self, order: int) -> tuple[list[list[Term | None]], list[list[Term | None]]]:

@@ -62,14 +62,9 @@ class Term:
 
 
 class Graph:
-    """The nodes, in an order in which each can be computed.
+    """The nodes, in an order in which each can be computed."""
 
-    ``joined``: numbers that one term is multiplied with in turn become one. A term is then known sooner, and more
-    of them are kept for long: too many for the registers of a GPU's thread.
-    """
-
-    def __init__(self, joined: bool) -> None:
-        self._joined = joined
+    def __init__(self) -> None:
         self.nodes: list[Node] = []
         self._known: dict[Node, int] = {}
 
@@ -144,11 +139,6 @@ class Graph:
         for one, two in ((a, b), (b, a)):
             if (other := self._of("neg", one)) is not None:
                 return -(two * other) if two.value is None else -two.value * other
-        if self._joined and a.value is not None and b.node.op == "mul":
-            one, two = (Term(self, k) for k in b.node.args)
-            factor, other = (one, two) if one.value is not None else (two, one)
-            if factor.value is not None and 1e-100 < abs(a.value * factor.value) < 1e100:
-                return (a.value * factor.value) * other
         return None
 
     def _div(self, a: Term, b: Term) -> Term:
@@ -275,9 +265,9 @@ class Point:
 class OfTape:
     """The tape of a system without contacts, in terms of states and parameters."""
 
-    def __init__(self, coupled: Coupled, joined: bool = True):
+    def __init__(self, coupled: Coupled):
         system = coupled.system
-        self.coupled, self.tape, self.graph = coupled, tape_of(coupled), Graph(joined)
+        self.coupled, self.tape, self.graph = coupled, tape_of(coupled), Graph()
         self.n, self.m = system.extended_dimension, system.surface_count
         self.x = self.graph.inputs(0, self.n)
         self.p = self.graph.inputs(1, len(system.parameter_names))

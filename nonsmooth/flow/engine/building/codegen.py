@@ -41,7 +41,7 @@ def tape_order(system: FilippovSystem, options: Options) -> int:
 
 def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
     """C source of the engine for ``width`` trajectories in step."""
-    head, program = _lanes_head(system, order, joined=True)
+    head, program = _lanes_head(system, order)
     texts = map(
         driver_text, ("core/common.h", "kernel/vector.h", "kernel/sines.h", "kernel/polynomials.h")
     )
@@ -58,7 +58,7 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
 
 def device_source(system: FilippovSystem, order: int, threads: int, resident: int = 1) -> str:
     """C++ source of the same engine with a trajectory for each thread, for CUDA or any compiler."""
-    head, program = _lanes_head(system, order, joined=False)
+    head, program = _lanes_head(system, order)
     sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n"
     texts = map(
         driver_text, ("core/common.h", "kernel/lane.h", "kernel/sines.h", "kernel/polynomials.h")
@@ -67,9 +67,9 @@ def device_source(system: FilippovSystem, order: int, threads: int, resident: in
     return "".join([*parts, driver_text("kernel/lanes.c"), driver_text("kernel/cuda.c")])
 
 
-def _lanes_head(system: FilippovSystem, order: int, joined: bool) -> tuple[str, str]:
+def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
     """Definitions that the lanes' text needs before it, and the functions of a system."""
-    program, shape = lanes_program(system, order, joined)
+    program, shape = lanes_program(system, order)
     of = coupled_of(system)
     m, directions = system.surface_count, listed(d for _, d in system.stops) or 0
     # The sliding field has no 0/0 where both fields are tangent.

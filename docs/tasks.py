@@ -37,7 +37,7 @@ TASKS = {
         "Follow an orbit",
         "From a point and for a time: events, modes, dense output, and the reason why a run ended.",
         "nonsmooth",
-        "simulate Trajectory flow.Segment flow.Event Status Section flow.follow flow.first_crossing flow.first_root load",
+        "simulate Trajectory flow.Segments flow.Segment flow.Events flow.Event Status Section flow.follow flow.first_crossing flow.first_root load",
     ),
     "many": _task(
         "Run many starts",
@@ -148,7 +148,7 @@ GOLF = {
         "From launch to rest",
         "Flight, bounces and roll of a golf ball in SI units.",
         "bounce.golf",
-        "flight Flight Air rebound Rebound play Run Bounce Glide landing_map SideState axis_spin AxisSpin",
+        "flight Flight Air TourAverage tour_differences rebound Rebound play Run Bounce Glide landing_map SideState axis_spin AxisSpin",
     ),
     "bounce_fits": _task(
         "Fit measured bounces",

@@ -68,8 +68,9 @@ class _Kept(NamedTuple):
 def _as_json(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> int:
     units, count, rows = Units(args.units), _Count(len(starts)), list[dict[str, Any]]()
     try:
-        for row in _rows(starts, report, 0):
-            rows.append(units.report(row))
+        for start, row in _rows(starts, report, 0):
+            kept = {"others": dict(start.others)} if start.others else {}
+            rows.append({**units.report(row), **kept})
             count.add(row)
     except KeyboardInterrupt:
         count.interrupted = True
@@ -86,9 +87,9 @@ def _as_csv(
         count.add(old)
     waiting: list[dict[str, Any]] = []
     try:
-        for row in _rows(starts, report, len(kept.rows)):
-            waiting.append(units.row(row))
-            if not names and len(waiting[-1]) > len(_BARE):
+        for start, row in _rows(starts, report, len(kept.rows)):
+            waiting.append(_flat(units, start, row))
+            if not names and not row["error"]:
                 names = list(waiting[-1])
                 file.write(_line(names, dict(zip(names, names, strict=True))))
             if names:
@@ -99,26 +100,37 @@ def _as_csv(
     except KeyboardInterrupt:
         count.interrupted = True
     if waiting and not names:  # nothing but errors
+        bare = _bare(starts)
         file.write(
-            "".join(_line(_BARE, one) for one in [dict(zip(_BARE, _BARE, strict=True)), *waiting])
+            "".join(_line(bare, one) for one in [dict(zip(bare, bare, strict=True)), *waiting])
         )
     if args.output is None:
         return count.finish("they are printed. With --output FILE the next time --resume goes on")
     return count.finish(f"they are in {args.output}. To go on, add --resume to the same command")
 
 
-#: The names of a row that has no results.
-_BARE = ["row", "error"]
+def _bare(starts: Sequence[Start]) -> list[str]:
+    """The names of a row that has no results."""
+    return ["row", *starts[0].others, "error"]
 
 
-def _rows(starts: Sequence[Start], report: Report, done: int) -> Iterator[dict[str, Any]]:
+def _flat(units: Units, start: Start, row: dict[str, Any]) -> dict[str, Any]:
+    """A row of a table: its number, the columns that were kept, and the results."""
+    flat = units.row(row)
+    kept = {name if name not in flat else f"given {name}": v for name, v in start.others.items()}
+    return {"row": flat.pop("row"), **kept, **flat}
+
+
+def _rows(
+    starts: Sequence[Start], report: Report, done: int
+) -> Iterator[tuple[Start, dict[str, Any]]]:
     """The rows behind those that are done, with a bar on a terminal where they take long."""
     bar = tqdm(
         total=len(starts), initial=done, disable=None, delay=1.0, unit="row", unit_scale=True
     )
     with bar:
         for k, start in enumerate(starts[done:], start=done + 1):
-            yield _row(k, start, report)
+            yield start, _row(k, start, report)
             bar.update()
 
 
@@ -154,7 +166,9 @@ def _kept(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> 
     if len(text) > LARGEST or any(len(line) != len(lines[0]) for line in lines):
         raise _others(args, f"more than {LARGEST} characters, or rows of different lengths")
     names = lines[0] if lines else []
-    if not lines or names == _BARE:  # nothing, or nothing but errors: the names were not known
+    if not lines or names == _bare(
+        starts
+    ):  # nothing, or nothing but errors: the names were not known
         return _Kept([], [], 0)
     rows = [dict(zip(names, line, strict=False)) for line in lines[1:]]
     units = Units(args.units)
@@ -166,7 +180,7 @@ def _kept(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> 
         if not _begins(old, starts[k], units):
             raise _others(args, f"another start in row {k + 1}")
         if k in again:
-            row = units.row(_row(k + 1, starts[k], report))
+            row = _flat(units, starts[k], _row(k + 1, starts[k], report))
             if not {*row} <= {*names} or _line(names, row) != _line(names, old):
                 raise _others(args, f"other results in row {k + 1}")
     return _Kept(names, rows, len(whole.encode()))

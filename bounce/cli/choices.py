@@ -31,7 +31,7 @@ from ..contact.models import (
 from ..golf import AIRS
 from ..laws import TURFS, BounceLaw, CrossBounce, PennerBounce, RigidBounce, TiltedBounce
 from ..units import BALLS, Ball, Scaling
-from .values import SYSTEMS, angle_within, assignment, in_si, number
+from .values import SYSTEMS, angle_within, assignment, in_si, number, quantity
 
 CONTACT_MODELS: dict[str, type[ContactModel]] = {
     c.__name__: c
@@ -134,10 +134,35 @@ def chosen_model(args: argparse.Namespace) -> Chosen:
     return Chosen(CONTACT_MODELS[args.model](friction=friction(**own), **values), ball, scaling)
 
 
+def air_arguments(parser: argparse.ArgumentParser, usual: str, when: str) -> None:
+    """Add the arguments of air, wind and weather."""
+    parser.add_argument(
+        "--air", choices=["none", *AIRS], default=usual, help=f"drag and lift {when}"
+    )
+    parser.add_argument(
+        "--wind", type=quantity("speed"), help="from behind; negative from the front"
+    )
+    parser.add_argument("--cross-wind", type=quantity("speed"), help="to the right")
+    parser.add_argument(
+        "--altitude", type=quantity("height"), help="above the sea, for the density of air"
+    )
+    parser.add_argument("--temperature", type=number, help="of the air, degrees C (default: 20)")
+
+
 def surroundings(args: argparse.Namespace) -> dict[str, Any]:
-    """The air and the slopes of the ground, as the functions of ``bounce.golf`` take them."""
+    """Air, wind and slopes of the ground, as the functions of ``bounce.golf`` take them."""
     air = None if args.air == "none" else AIRS[args.air]
-    return dict(air=air, slope=_slope(args), side_slope=side_slope(args))
+    weather = {"altitude": args.altitude, "temperature": args.temperature}
+    weather = {
+        k: v.si(args.units) if k == "altitude" else v for k, v in weather.items() if v is not None
+    }
+    wind = tuple(0.0 if v is None else v.si(args.units) for v in (args.wind, args.cross_wind))
+    if air is None and (weather or any(wind)):
+        raise ns.OptionError(
+            "--wind, --altitude, --temperature: expected together with --air, received none."
+        )
+    air = air.at(**weather) if air is not None and weather else air
+    return dict(air=air, wind=wind, slope=_slope(args), side_slope=side_slope(args))
 
 
 def side_slope(args: argparse.Namespace) -> float:

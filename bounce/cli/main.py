@@ -11,9 +11,9 @@ from typing import Any, NoReturn
 
 import nonsmooth as ns
 
-from . import explore, fit, flight, map, models, shot
+from . import explore, fit, land, launch, map, models
 
-_COMMANDS = (shot, flight, map, fit, explore, models)
+_COMMANDS = (launch, land, map, fit, explore, models)
 _USAGE = (ns.ParameterError, ns.OptionError, ns.DefinitionError, ns.PointError)
 
 
@@ -49,11 +49,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Examples
     --------
-    >>> main("shot --speed 28.5 --angle 37.3 --spin 2094 --turf natural".split())
-    lift-off  10.71 m/s, 37.3 deg, -4536 rpm, slip -1.61 m/s (III+: slips, then rolls from
+    >>> main("land --speed 28.5 --angle 37.3 --spin 2094 --turf natural".split())
+    lift-off  10.7 m/s, 37.3 deg, -4536 rpm, slip -1.61 m/s (III+: slips, then rolls from
         compression on)
-    run       23.19 m in 4.94 s: 13 bounces (10 of them outside the fit), the first 2.14 m high, over
-        23.00 m; rolls 0.18 m
+    run       23 m in 4.9 s (not validated): 13 bounces (10 of them outside the fit), the first 2.1 m
+        high, over 23 m; rolls 0.2 m
     0
     """
     parser = _arguments()

@@ -39,9 +39,11 @@ class Units:
             value = value.si(self._system)
         return value / factor(kind, self.names[kind])
 
-    def say(self, kind: str, value: float, digits: int = 2) -> str:
-        """Return a value in SI units as text in the chosen unit."""
-        return f"{self.show(kind, value):.{digits}f} {self.names[kind]}"
+    def say(self, kind: str, value: float, digits: int | None = None) -> str:
+        """Return a value in SI units as text in the chosen unit; by default two digits, and all before the point."""
+        shown = self.show(kind, value)
+        digits = int(abs(shown) < 9.95) if digits is None else digits
+        return f"{shown:.{digits}f} {self.names[kind]}"
 
     def report(self, report: dict[str, Any]) -> dict[str, Any]:
         """Return a report in SI units in the chosen units."""
@@ -85,7 +87,7 @@ def echoed(report: dict[str, float], typed: dict[str, Quantity], system: str) ->
 
 def in_words(state: Landing, units: Units) -> str:
     """Speed, angle and spin of a state in a line."""
-    digits = dict(speed=2, angle=4 if units.names["angle"] == "rad" else 1, spin=0)
+    digits = dict(speed=1, angle=4 if units.names["angle"] == "rad" else 1, spin=0)
     return ", ".join(units.say(name, value, digits[name]) for name, value in polar(state).items())
 
 

@@ -11,7 +11,7 @@ from ..units import Landing
 from .choices import side_slope
 from .values import angle_within, quantity
 
-_NAMES = ("side_spin", "axis_tilt", "launch_angle", "side_slope")
+_NAMES = ("side_spin", "axis_tilt", "launch_angle", "side_slope", "cross_wind")
 
 #: Angles in degrees: least and most, and whether these are among them.
 _ANGLES = {

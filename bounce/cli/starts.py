@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from types import MappingProxyType
 from typing import NamedTuple
 
 import nonsmooth as ns
@@ -13,6 +14,24 @@ from ..units import Landing
 from .values import KINDS, Quantity, quantity
 
 NAMES = ("speed", "angle", "spin")
+#: Headings of launch monitors, for launches and for landings; the first that is there counts.
+_LAUNCHED = {
+    "speed": ("ball_speed", "ballspeed", "launch_speed"),
+    "angle": (
+        "launch_angle",
+        "vertical_launch_angle",
+        "vertical_launch",
+        "vla",
+        "launch_v",
+        "launch",
+    ),
+    "spin": ("backspin", "back_spin", "spin_rate", "spinrate", "total_spin"),
+}
+_LANDED = {
+    "speed": ("landing_speed", "land_speed", "impact_speed"),
+    "angle": ("landing_angle", "land_angle", "descent_angle", "angle_of_descent"),
+    "spin": ("landing_spin", "backspin", "back_spin"),
+}
 _HELP = dict(
     speed="such as 28.5, 64mph or 103km/h",
     angle="between path and ground, such as 37.3 or 0.65rad",
@@ -26,6 +45,7 @@ class Start(NamedTuple):
     state: Landing | None
     typed: dict[str, Quantity]
     error: str
+    others: dict[str, str] = MappingProxyType({})  # type: ignore[assignment]
 
 
 def start_arguments(parser: argparse.ArgumentParser, what: str) -> None:
@@ -35,7 +55,8 @@ def start_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument(
         "--input",
         metavar="FILE",
-        help="CSV instead of one start: columns speed, angle, spin, with units as in 'speed [mph]'",
+        help="CSV instead of one start: columns speed, angle, spin, with units as in 'speed [mph]', or a launch "
+        "monitor's headings; other columns are kept",
     )
     parser.add_argument(
         "--output", metavar="FILE", help="of --input: CSV, to the terminal if not given"
@@ -62,7 +83,8 @@ def read_starts(args: argparse.Namespace, up: bool) -> list[Start]:
         raise ns.OptionError(
             f"--input: expected instead of {', '.join('--' + n for n in NAMES)}, received both."
         )
-    table = read_rows(args.input, {name: KINDS[name] for name in NAMES})
+    kinds = {name: KINDS[name] for name in NAMES}
+    table = read_rows(args.input, kinds, _LAUNCHED if up else _LANDED)
     absent = [name for name in NAMES if name not in table.units]
     if absent:
         raise ns.OptionError(f"--input: expected columns {absent}, received {table.titles}.")
@@ -71,12 +93,12 @@ def read_starts(args: argparse.Namespace, up: bool) -> list[Start]:
 
 def _of_row(row: Row, units: dict[str, str | None], system: str, up: bool) -> Start:
     if row.error:
-        return Start(None, {}, row.error + ".")
+        return Start(None, {}, row.error + ".", row.others)
     typed = {name: Quantity(row.values[name], units[name], name) for name in NAMES}
     try:
-        return Start(_start(typed, system, up, ""), typed, "")
+        return Start(_start(typed, system, up, ""), typed, "", row.others)
     except ns.OptionError as error:
-        return Start(None, typed, " ".join(str(error).split()))
+        return Start(None, typed, " ".join(str(error).split()), row.others)
 
 
 def _start(given: dict[str, Quantity], system: str, up: bool, prefix: str) -> Landing:

@@ -102,13 +102,14 @@ def number(text: str) -> float:
 
 def quantity(kind: str) -> Callable[[str], Quantity]:
     """Return what reads a number with a unit of a kind, or without."""
-    units = ", ".join(UNITS[kind])
+    known = UNITS["length" if kind == "height" else kind]
+    units = ", ".join(known)
 
     def read(text: str) -> Quantity:
         found = _NUMBER.fullmatch(text.translate(MINUS))
         unit = None if found is None or found[2] is None else found[2].replace("°", "deg")
-        if found is None or (unit is not None and unit not in UNITS[kind]):
-            example = f"1{next(iter(UNITS[kind]))}"
+        if found is None or (unit is not None and unit not in known):
+            example = f"1{next(iter(known))}"
             article = "an" if kind[0] in "aeiou" else "a"
             fail(text, f"{article} {kind} such as 1 or {example} (units: {units})")
         return Quantity(number(found[1]), unit, kind)

@@ -20,7 +20,7 @@ Examples
 import nonsmooth as ns
 
 from ..units import GOLF
-from .air import AIRS, QUINTAVALLA, SMITS_SMITH, Air
+from .air import AIRS, QUINTAVALLA, SMITS_SMITH, TOUR_2023, Air
 from .fits.columns import DataError
 from .fits.fit_result import FitResult, IdentifiabilityWarning
 from .fits.fitting import fit
@@ -32,6 +32,7 @@ from .ground import ExtrapolationWarning, Rebound, rebound
 from .maps import landing_map
 from .rollout import GREEN_ROLLING_FRICTION, Bounce, Glide, NoRestError, Run, play
 from .side_spin import AxisSpin, SideState, axis_spin
+from .tour_averages import TOUR_AVERAGES, TourAverage, tour_differences
 
 __all__ = [
     "AIRS",
@@ -39,6 +40,8 @@ __all__ = [
     "GREEN_ROLLING_FRICTION",
     "QUINTAVALLA",
     "SMITS_SMITH",
+    "TOUR_2023",
+    "TOUR_AVERAGES",
     "Air",
     "AxisSpin",
     "Bounce",
@@ -55,6 +58,7 @@ __all__ = [
     "Run",
     "SideState",
     "Start",
+    "TourAverage",
     "axis_spin",
     "fit",
     "flight",
@@ -62,6 +66,7 @@ __all__ = [
     "play",
     "read_measurements",
     "rebound",
+    "tour_differences",
 ]
 
 ns.notebook.add_cards(globals(), __all__)

@@ -1,10 +1,10 @@
-"""Drag and lift of a ball in still air, with published coefficients."""
+"""Drag and lift of a ball in air, with published coefficients and fitted ones."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import nonsmooth as ns
 
@@ -14,7 +14,7 @@ from ..units import GOLF, Ball
 
 @dataclass(frozen=True)
 class Air:
-    """Drag and lift of a ball in still air.
+    """Drag and lift of a ball in air.
 
     Parameters
     ----------
@@ -82,6 +82,45 @@ class Air:
             "is an extrapolation.",
         )
 
+    def at(self, altitude: float = 0.0, temperature: float = 20.0) -> Air:
+        """Return the same coefficients in dry air at an altitude and a temperature.
+
+        Pressure is that of the U.S. Standard Atmosphere 1976, viscosity Sutherland's.
+
+        Parameters
+        ----------
+        altitude : float, optional
+            m above the sea, below 11,000.
+        temperature : float, optional
+            Degrees C.
+
+        Returns
+        -------
+        Air
+            With another density and viscosity.
+
+        Raises
+        ------
+        nonsmooth.OptionError
+            An altitude outside -1000 to 11,000 m, or a temperature outside -60 to 60 degrees C.
+
+        Examples
+        --------
+        >>> high = SMITS_SMITH.at(altitude=1600.0, temperature=25.0)
+        >>> f"{high.density:.3f} kg/m3"
+        '0.976 kg/m3'
+        """
+        if not (-1000.0 <= altitude <= 11000.0 and -60.0 <= temperature <= 60.0):
+            raise ns.OptionError(
+                f"altitude={altitude!r}, temperature={temperature!r}: expected -1000 to 11000 m and -60 to "
+                "60 degrees C."
+            )
+        kelvin = temperature + 273.15
+        pressure = 101325.0 * (1.0 - 2.25577e-5 * altitude) ** 5.25588
+        density = pressure / (287.053 * kelvin)
+        dynamic = 1.458e-6 * kelvin**1.5 / (kelvin + 110.4)
+        return replace(self, density=density, viscosity=dynamic / density)
+
     def _of(self) -> str:
         return f"of {self.name} " if self.name else ""
 
@@ -134,5 +173,19 @@ QUINTAVALLA = Air(
     "S is held at 0.5, and Re above 2.9e5, 0.3 of the speed of sound, is cautioned (choices here).",
 )
 
-#: Published coefficients by name.
-AIRS = {air.name: air for air in (SMITS_SMITH, QUINTAVALLA)}
+#: Cd = 0.184 + 0.700 S - 0.555 S^2, Cl = 0.553 S/(0.204 + S); Reynolds numbers up to 2.2e5 occurred.
+TOUR_2023 = Air(
+    drag=lambda s, re: 0.184 + 0.700 * s - 0.555 * s**2,
+    lift=lambda s, re: 0.553 * s / (0.204 + s),
+    spin_decay=2.0e-5,
+    largest_spin_ratio=0.6,
+    largest_reynolds=2.2e5,
+    name="tour-2023",
+    source="Fitted here to carry, height and angle of descent of TrackMan's averages of 23 clubs of the PGA and "
+    "LPGA tours 2023 (bounce.golf.TOUR_AVERAGES), at sea level and 20 degrees C, with the spin decay of "
+    "smits-smith: carries differ from the averages by 2 % on average and by 4 % at most, heights by 2 yd, "
+    "angles by 3 to 4 degrees. They are of tour players' shots; slow shots and much spin are extrapolations.",
+)
+
+#: Coefficients by name.
+AIRS = {air.name: air for air in (TOUR_2023, SMITS_SMITH, QUINTAVALLA)}

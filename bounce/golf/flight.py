@@ -6,8 +6,8 @@ with a spin vector whose direction stays:
     v' = g - k |v| (Cd v - Cl e x v),  omega' = -decay |v| omega / radius,  e = omega/|omega|,
 
 with k = density area / (2 mass), and Cd and Cl of the spin ratio S = radius |omega| / |v| and the Reynolds
-number Re = 2 radius |v| / viscosity; the lift falls as the sine of the angle between axis and path. Still
-air. Without air the path is the parabola, in closed form.
+number Re = 2 radius |v| / viscosity; the lift falls as the sine of the angle between axis and path. In wind, which
+is the same at every height, v is the velocity through the air. Without air the path is the parabola, in closed form.
 """
 
 from __future__ import annotations
@@ -85,6 +85,7 @@ def flight(
     air: Air | None = None,
     slope: float = 0.0,
     side_slope: float = 0.0,
+    wind: tuple[float, float] = (0.0, 0.0),
     start: tuple[float, ...] = (0.0, 0.0),
     tol: float = 1e-10,
 ) -> Flight[S]:
@@ -100,6 +101,9 @@ def flight(
         Drag and lift; none by default.
     slope, side_slope : float, optional
         Of the ground, rad, uphill forward and to the right; a side slope needs a SideState.
+    wind : (float, float), optional
+        m/s forward (from behind) and to the right, along the ground; it needs ``air``, and to the right a
+        SideState.
     start : tuple of float, optional
         x, y and perhaps z of the centre relative to a ball that touches the ground, m; y may be a
         little below 0, as at lift-off from soft ground.
@@ -116,8 +120,8 @@ def flight(
     nonsmooth.PointError
         A launch that never rises above the ground.
     nonsmooth.OptionError
-        A launch of another type; a slope outside of $-pi/2$ to $pi/2$; coefficients of air with which the
-        ball never comes down.
+        A launch of another type; a slope outside of $-pi/2$ to $pi/2$; wind without air; coefficients of
+        air with which the ball never comes down.
 
     Warns
     -----
@@ -147,6 +151,7 @@ def flight(
     if len(given) not in (2, 3):
         raise ns.PointError(f"start: expected x, y and perhaps z, received {start!r}.")
     place = np.array([*given, 0.0][:3])
+    blown = _wind(wind, air, launch)
     up, height, down = float(state.velocity[1]), float(place[1]), -float(gravity[1])
     if height <= 0.0 and not (up > 0.0 and up**2 > -2 * down * height):
         raise ns.PointError(
@@ -158,14 +163,29 @@ def flight(
     if air is None:
         fall = _parabola(state, gravity, place, in_vacuum)
     else:
-        fall = _through_air(state, ball, air, gravity, place, in_vacuum, tol)
-        cautions = air.cautions(math.hypot(*state.velocity), ball)
+        fall = _through_air(state, ball, air, gravity, blown, place, in_vacuum, tol)
+        cautions = air.cautions(math.hypot(*(state.velocity - blown)), ball)
     for caution in cautions:
         warnings.warn(caution, ExtrapolationWarning, stacklevel=2)
     landing = same_kind(launch, fall.velocity, fall.spin)
     begin = tuple(place.tolist()[: 2 if isinstance(launch, Landing) else 3])
     way = (float(fall.way[0]), float(fall.way[2]))
     return Flight(launch, landing, fall.time, begin, *way, fall.height, fall.path, cautions)
+
+
+def _wind(wind: tuple[float, float], air: Air | None, launch: object) -> Array:
+    """The velocity of the air, forward, up and to the right."""
+    try:
+        along, across = (number(value, "wind", ns.OptionError) for value in wind)
+    except (TypeError, ValueError) as error:
+        raise ns.OptionError(f"wind={wind!r}: expected m/s forward and to the right.") from error
+    if (along or across) and air is None:
+        raise ns.OptionError(f"wind={wind!r}: there is no air. Give air=, such as SMITS_SMITH.")
+    if across and not isinstance(launch, SideState):
+        raise ns.OptionError(
+            f"wind={wind!r}: it blows across the plane of the flight. Give the launch as a SideState."
+        )
+    return np.array([along, 0.0, across])
 
 
 class _Fall(NamedTuple):
@@ -194,6 +214,7 @@ def _through_air(
     ball: Ball,
     air: Air,
     gravity: Array,
+    wind: Array,
     place: Array,
     in_vacuum: float,
     tol: float,
@@ -202,7 +223,7 @@ def _through_air(
     from scipy.integrate import solve_ivp
 
     velocity, spin = state.velocity.copy(), state.spin.copy()
-    flat = not (velocity[2] or gravity[2] or spin[0] or spin[1])
+    flat = not (velocity[2] or gravity[2] or wind[2] or spin[0] or spin[1])
     axes, turning = (2, slice(2, 3)) if flat else (3, slice(3))
 
     def ground(t: float, z: Any) -> float:
@@ -216,7 +237,7 @@ def _through_air(
 
     def solve(dense: bool) -> Any:
         return solve_ivp(
-            _field(ball, air, gravity.tolist(), flat),
+            _field(ball, air, gravity.tolist(), wind.tolist(), flat),
             (0.0, 10 * in_vacuum + 10.0),
             np.concatenate([place[:axes], state.velocity[:axes], state.spin[turning]]),
             method="DOP853",
@@ -251,15 +272,18 @@ def _through_air(
 
 
 def _field(
-    ball: Ball, air: Air, gravity: list[float], flat: bool
+    ball: Ball, air: Air, gravity: list[float], wind: list[float], flat: bool
 ) -> Callable[[float, Any], list[float]]:
     area = math.pi * ball.radius**2
     k = air.density * area / (2 * ball.mass)
     gx, gy, gz = gravity
+    wind_x, _, wind_z = wind
 
     def field(t: float, z: Any) -> list[float]:
         x = z.tolist()  # plain numbers: NumPy's are slow one by one
         u, v, w, p, q, r = (*x[2:4], 0.0, 0.0, 0.0, x[4]) if flat else x[3:]
+        moved_x, moved_z = u, w
+        u, w = u - wind_x, w - wind_z
         speed, turning = math.hypot(u, v, w), math.hypot(p, q, r)
         drag, lift, decay, (a, b, c) = 0.0, 0.0, -air.spin_decay * speed, (0.0, 0.0, 0.0)
         if speed > 0.0:
@@ -272,8 +296,16 @@ def _field(
         forward = gx - drag * u + lift * (b * w - c * v)
         up = gy - drag * v + lift * (c * u - a * w)
         if flat:
-            return [u, v, forward, up, decay * r / ball.radius]
+            return [moved_x, v, forward, up, decay * r / ball.radius]
         right = gz - drag * w + lift * (a * v - b * u)
-        return [u, v, w, forward, up, right, *(decay * s / ball.radius for s in (p, q, r))]
+        return [
+            moved_x,
+            v,
+            moved_z,
+            forward,
+            up,
+            right,
+            *(decay * s / ball.radius for s in (p, q, r)),
+        ]
 
     return field

@@ -92,9 +92,10 @@ def landing_map(
             f"{np.min(speed):g} to {np.max(speed):g} m/s and {np.min(angle):g} to {np.max(angle):g} rad."
         )
     landing = (speed * np.cos(angle), -speed * np.sin(angle), values["spin"] * ball.radius)
+    outside = None
     if isinstance(model, BounceLaw):
         off = _of_law(model, np.broadcast_arrays(*landing))
-        _warn_outside(model, landing[0], landing[1], values["spin"])
+        outside = _outside(model, landing[0], landing[1], values["spin"])
     else:
         unit = require_scaling(model, ball, scaling)
         parameters = {name: v for name, v in values.items() if name not in POLAR}
@@ -102,13 +103,15 @@ def landing_map(
         off = _scaled(many, unit)
     shape = (len(axes[second]), len(axes[first]))
     spin = np.broadcast_to(np.asarray(values["spin"], dtype=float), shape)
-    return OutcomeMap(model, (first, second), (axes[first], axes[second]), others, off, spin)
+    pair = (axes[first], axes[second])
+    return OutcomeMap(model, (first, second), pair, others, off, spin, outside)
 
 
-def _warn_outside(law: BounceLaw, xdot: Array, ydot: Array, spin: Array) -> None:
+def _outside(law: BounceLaw, xdot: Array, ydot: Array, spin: Array) -> NDArray[np.bool_] | None:
+    """Whether landings are outside those that a law was fitted to, with a warning."""
     if law.covers is None:
-        return
-    inside = law.covers.holds(xdot, ydot, spin)
+        return None
+    inside = np.broadcast_arrays(law.covers.holds(xdot, ydot, spin), xdot, ydot)[0]
     if not np.all(inside):
         warnings.warn(
             f"{type(law).__name__}: {np.size(inside) - np.sum(inside)} of {np.size(inside)} landings are "
@@ -116,6 +119,7 @@ def _warn_outside(law: BounceLaw, xdot: Array, ydot: Array, spin: Array) -> None
             ExtrapolationWarning,
             stacklevel=3,
         )
+    return np.asarray(~inside)
 
 
 def _of_law(law: BounceLaw, landing: tuple[Array, ...]) -> LiftOffs:

@@ -1,8 +1,8 @@
 """The rest of the shot: bounces with flight between them, then sliding, then rolling to rest.
 
 The ground is flat with a constant slope. Each bounce follows one law or contact model, and each hop is a flight
-in still air or none. A ball that stays down slides under Coulomb friction until it rolls, and rolls against a
-constant resistance opposite to its velocity; on a side slope the direction of friction turns. Not modelled: wind,
+in air or none. A ball that stays down slides under Coulomb friction until it rolls, and rolls against a
+constant resistance opposite to its velocity; on a side slope the direction of friction turns. Not modelled:
 plugging, ground that changes, spin that decays while rolling, and hops below ``min_height``.
 """
 
@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Generic
+from typing import Any, Generic
 
 import casadi as ca
 import numpy as np
@@ -206,6 +206,7 @@ def play(
     *,
     scaling: Scaling | None = None,
     air: Air | None = None,
+    wind: tuple[float, float] = (0.0, 0.0),
     slope: float = 0.0,
     side_slope: float = 0.0,
     rolling_friction: float = GREEN_ROLLING_FRICTION,
@@ -232,6 +233,8 @@ def play(
         Needed for a contact model, see :func:`rebound`.
     air : Air, optional
         Drag and lift; none by default.
+    wind : (float, float), optional
+        During the hops, as of :func:`flight`.
     slope, side_slope : float, optional
         Of the ground, rad, uphill forward and to the right; speeds are along and normal to it. A side
         slope needs a SideState.
@@ -294,7 +297,7 @@ def play(
         hit = turf.rebound(state)
         off, hop = hit.lift_off, None
         if upward(off) > 0.0 and hit.y + _height(off, gravity) >= min_height:
-            options = dict(slope=slope, side_slope=side_slope, tol=tol)
+            options: dict[str, Any] = dict(slope=slope, side_slope=side_slope, tol=tol, wind=wind)
             hop = flight(off, ball, air=air, start=(x + hit.x, hit.y, z + hit.z), **options)
         bounces.append(Bounce(t, x, hit, hop, z))
         t, x, z = t + hit.time, x + hit.x, z + hit.z

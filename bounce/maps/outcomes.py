@@ -41,6 +41,8 @@ class OutcomeMap:
         Arrays (n, m).
     spin : ndarray
         At touch-down, of a shape that broadcasts to (n, m).
+    extrapolated : ndarray of bool (n, m) or None
+        Which landings are outside those that a law was fitted to; None where that is not known.
     """
 
     model: Parametrised
@@ -49,6 +51,7 @@ class OutcomeMap:
     fixed: dict[str, float]
     lift_offs: LiftOffs
     spin: Array
+    extrapolated: NDArray[np.bool_] | None = None
 
     @property
     def regions(self) -> tuple[str, ...]:

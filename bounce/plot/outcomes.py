@@ -135,7 +135,7 @@ def outcome_map(
             if curve is None
             else draw_curve(page, outcomes.names, curve, (_ends(x), _ends(y)))
         )
-        lines |= _without_lift_off(page, outcomes)
+        lines |= _without_lift_off(page, outcomes) | _outside(page, outcomes, x, y)
         patches: list[Patch] = []
         if quantity == "itinerary":
             room = LISTED - len(lines) if is_narrow(ax) else LISTED
@@ -160,6 +160,22 @@ def _without_lift_off(page: Canvas, outcomes: OutcomeMap) -> dict[str, Any]:
     hatched: Any = {"hatch": "////", "linewidth": 0.0}
     page.ax.patch.set(facecolor=page.paper, edgecolor=page.on_paper("0.45"), **hatched)
     return {"no lift-off": Patch(facecolor="white", edgecolor="0.45", **hatched)}
+
+
+def _outside(page: Canvas, outcomes: OutcomeMap, x: Array, y: Array) -> dict[str, Any]:
+    """Hatch the landings that are outside those that the law was fitted to; their entry of the key."""
+    if outcomes.extrapolated is None or not outcomes.extrapolated.any():
+        return {}
+    from contourpy import contour_generator
+    from matplotlib.patches import Patch, PathPatch
+    from matplotlib.path import Path
+
+    look: Any = {"facecolor": "none", "edgecolor": "0.25", "hatch": "...", "linewidth": 0.0}
+    mask = outcomes.extrapolated.astype(float)
+    areas: Any = contour_generator(x, y, mask, fill_type="OuterCode").filled(0.5, 1.5)
+    for points, codes in zip(*areas, strict=True):
+        page.ax.add_patch(PathPatch(Path(points, codes), zorder=2, gid="extrapolated", **look))
+    return {"outside the landings of the fit": Patch(**look)}
 
 
 def _cases(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:

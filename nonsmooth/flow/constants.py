@@ -52,6 +52,9 @@ TIE = 8 * EPSILON
 #: this part of it.
 ROOT_SHARE = 1e-3
 
+#: Terms of the series of a power of the time differ by this part from those of the first ones.
+SHARE_SPREAD = 0.05
+
 #: Close to rest on a surface with a root steps are shorter than flights by the inverse of this, and below rounding.
 ROOT_REST = 1e-7
 

@@ -153,6 +153,14 @@ def endless_jumps(names: Sequence[str], t: float) -> str:
     return f"At t = {t:.10g} jumps of {' and '.join(map(repr, names))} repeat without end."
 
 
+def unmet(name: str) -> str:
+    """An event whose condition was true from the start on."""
+    return (
+        f"{name!r} was true at the start and did not happen: events happen where they become true. "
+        "initially=True lets it happen at the start, level=True while it is true, initially=False says no more of it."
+    )
+
+
 def reached_end(t_end: float) -> str:
     """Nothing stopped the run."""
     return f"t_end = {t_end:g} reached."

@@ -315,8 +315,24 @@ class _Classifier:
         away = math.sqrt(max(1.0 - (float(f1 @ f2) / lengths) ** 2, 0.0)) if lengths else 0.0
         if f1 @ f2 < 0 and self.is_zero(away, "rest"):
             self.evidence["nu"] = float(np.linalg.norm(f1) / np.linalg.norm(f1 - f2))
+            if self._planar and bends[0] < 0:
+                label = f"{self._turning(bends)}, {label}"
             return self.result("rest", label)
         return self.result("touch", label)
+
+    def _turning(self, bends: list[float]) -> str:
+        """Stability of rest around which orbits turn: of L -> L + (2/3) (b1/|L11| + b2/|L22|) L^2, b = dLii/dL."""
+        numbers, tangent = self.numbers, self.numbers.tangents[:, 0]
+        hessians, growth = self.where.hessians(numbers.x)[0], 0.0
+        for k, second in enumerate(bends):
+            along = numbers.lie_gradients[k]
+            slope = self.derivatives[k].T @ along + hessians[1 + k] @ numbers.fields[k]
+            growth += float(slope @ tangent) / float(along @ tangent) / abs(second)
+        self.evidence["growth"] = growth
+        speed = float(np.linalg.norm(numbers.fields[0]) * np.linalg.norm(numbers.gradient))
+        if abs(growth) * speed < self.margin:
+            return "neutral"
+        return "stable" if growth < 0 else "unstable"
 
     def _fold_fold(self) -> LocalObject:
         found = fold_fold_of(self.where, self.numbers, 1e-300)

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,10 @@ Array = NDArray[np.float64]
 
 #: Bytes of a CSV file that are read; a device may have no end.
 LARGEST = 1 << 28
+
+
+#: Units as launch monitors write them.
+_UNITS = {"°": "deg", "degrees": "deg", "MPH": "mph", "RPM": "rpm", "yards": "yd", "yds": "yd"}
 
 
 class DataError(ns.NonsmoothError, ValueError):
@@ -38,10 +43,11 @@ class Columns(NamedTuple):
 
 
 class Row(NamedTuple):
-    """The numbers of a row, in the units of the columns, or what is wrong with it."""
+    """The numbers of a row, in the units of the columns, or what is wrong with it; and its other cells."""
 
     values: dict[str, float]
     error: str
+    others: dict[str, str]
 
 
 class Rows(NamedTuple):
@@ -74,22 +80,34 @@ def read_columns(data: Any, kinds: Mapping[str, str]) -> Columns:
     return Columns(columns, si, [str(title) for title, _ in table], units, wrong_rows)
 
 
-def read_rows(path: str, kinds: Mapping[str, str]) -> Rows:
-    """Read the columns ``name [unit]`` of a file row by row; a bad row keeps its error."""
+def read_rows(
+    path: str,
+    kinds: Mapping[str, str],
+    headings: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> Rows:
+    """Read the columns ``name [unit]`` of a file row by row, also under other headings; a bad row keeps its error."""
     titles, cells = _csv(Path(path))
     places = [(*_title(title), k) for k, title in enumerate(titles)]
-    places = [place for place in places if place[0] in kinds]
+    there = [name for name, _, _ in places]
+    known = {
+        heading: name
+        for name in kinds
+        for heading in [one for one in (name, *headings.get(name, ())) if one in there][:1]
+    }
+    places = [(known[name], unit, k) for name, unit, k in places if name in known]
+    rest = {titles[k]: k for k in range(len(titles)) if k not in [place[2] for place in places]}
     _require_each_once([(name, titles[k]) for name, _, k in places])
     _in_si([(name, unit, titles[k]) for name, unit, k in places], kinds)
     if not cells:
         raise DataError("data: the table has no rows. Give at least one.")
     rows = []
     for row in cells:
+        others = {title: row[k] if k < len(row) else "" for title, k in rest.items()}
         try:
             _require_length(row, titles)
-            rows.append(Row({name: _number(row[k], titles[k]) for name, _, k in places}, ""))
+            rows.append(Row({n: _number(row[k], titles[k]) for n, _, k in places}, "", others))
         except ValueError as wrong:
-            rows.append(Row({}, str(wrong)))
+            rows.append(Row({}, str(wrong), others))
     return Rows(rows, titles, {name: unit for name, unit, _ in places})
 
 
@@ -120,7 +138,8 @@ def _title(title: Any) -> tuple[str, str | None]:
     match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(](.*)[\])])?\s*", str(title), re.DOTALL)
     assert match is not None
     name = re.sub(r"[\s-]+", "_", match[1].strip().lower())
-    return name, None if match[2] is None else match[2].strip()
+    unit = None if match[2] is None else match[2].strip()
+    return name, _UNITS.get(unit, unit) if unit else unit
 
 
 def _require_each_once(columns: list[tuple[str, str]]) -> None:

@@ -23,6 +23,9 @@ typedef struct {
   const int8_t *passed; /* stops that do not end the run, or NULL */
 } Options;
 
+/* Letters of a set: off it, h carried along after that, its first step away from it, and one without friction. */
+enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5, IDLE = 6 };
+
 /* Trajectories of a call: all of the arrays, or those listed in ``which``; where results go. */
 typedef struct {
   int64_t count, p_stride;
@@ -52,9 +55,11 @@ typedef struct {
   int64_t steps, events, segment_steps, history;
   int64_t *kinds;
   double *x;
+  double *unknowns; /* of a set that is left: its direction, then h; not given back */
   int8_t *letter, *side; /* side: of stops */
   Recent *past;
   int32_t drop, itinerary, status; /* drop: first coefficients of the first guard that vanish */
+  int32_t near; /* 1 close to a set, 2 if its guard fell: the set is seen to instead of a step */
 } Suspended;
 
 /* The driver as lanes call it: a run, and what begins one or makes a step of it. */

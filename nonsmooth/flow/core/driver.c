@@ -217,9 +217,11 @@ static int only_sliding(const Run *r) {
   return found;
 }
 
+static int nears_root(Run *r);
+
 static void watch_two_fold(Run *r) {
   int s = only_sliding(r);
-  if (s >= 0 && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
+  if (s >= 0 && !(r->has_roots && nears_root(r)) && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
 }
 
 static int rest_at_limit(Run *r, int before);
@@ -269,7 +271,7 @@ static void serve(Run *r, int row) {
 
 /* 0 where the state after the step is not finite; the run then ends before it. */
 static int advance(Run *r, const Expansion *e, double dt) {
-  int n = r->n, stride = r->stride, kept = 0;
+  int stride = r->stride, kept = 0;
   double *x = r->at_work;
   for (int i = 0; i < r->s->dimension; i++) x[i] = value_at(e->states + (int64_t)i * stride, r->order, dt);
   if (!finite_all(x, r->s->dimension)) { finish(r, NOT_FINITE, STATE, 0); return 0; }

@@ -58,6 +58,7 @@ static size_t place_instant(Instant *i, char *base, size_t used, const System *s
   for (int k = 0; k < 5; k++) *flags[k] = LETTERS(atoms);
   i->pending = LETTERS(triggers);
   i->was = LETTERS(triggers);
+  i->unmet = LETTERS(triggers);
   i->value = DOUBLES(atoms);
   i->noise = DOUBLES(atoms);
   i->residual = DOUBLES(atoms);
@@ -217,6 +218,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->instant.running = 0;
   r->instant.tied = -1;
   memset(r->instant.passing, 0, s->rules.atoms);
+  memset(r->instant.unmet, 0, s->rules.triggers);
   memset(r->kinds, 0, sizeof r->kinds);
   r->step_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
   r->itinerary = r->active_count = r->several_count = 0;
@@ -268,13 +270,20 @@ static int go_on(Run *r, int64_t *budget) {
 
 int run_continue(Run *r, int64_t budget) { return go_on(r, &budget); }
 
+/* The first stop or reset whose condition was true at the start and that has not happened; -1 if there is none. */
+static int unmet_event(const Run *r) {
+  for (int k = 0; k < r->s->rules.triggers; k++) if (r->instant.unmet[k]) return r->s->rules.trigger_event[k];
+  return -1;
+}
+
 void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, int32_t *several,
               double *rates) {
   numbers[0] = r->t;
   numbers[1] = r->limit;
   numbers[2] = r->at_t;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
-                    r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts};
+                    r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts,
+                    unmet_event(r)};
   memcpy(counts, head, sizeof head);
   memcpy(active, r->active, sizeof(int32_t) * r->active_count);
   memcpy(several, r->several, sizeof(int32_t) * r->several_count);
@@ -330,11 +339,22 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
 
 /* Steps of runs that are lanes' between them ------------------------------------------------------- */
 
-/* Whether lanes can go on from here: nothing is to be served or told apart, and only the first guard has known
- * zeros. */
-static int is_plain(const Run *r) {
+/* Whether a set is reached, or far and has been so for a step. */
+static int is_apart(Run *r, int f) {
+  int k = size_of(r, f);
+  double scale = 0;
+  if (r->letter[f] == 0 || r->letter[f] > OFF) return r->letter[f] == 0;
+  const double *h = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
+  for (int i = f; i < f + k; i++) scale = larger(scales_of[i], scale);
+  return length_of(h + f, k) > CLOSE * scale;
+}
+
+/* Whether lanes can go on from here: nothing is to be served or told apart, and only a surface's guard has
+ * known zeros. */
+static int is_plain(Run *r) {
   if (r->instant.running || r->due_impact >= 0 || r->hold < INFINITY) return 0;
-  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m ? 0 : 2)) return 0;
+  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m || r->s->sets ? 0 : 2)) return 0;
+  EACH_SET(r, f) if (!is_apart(r, f)) return 0;
   for (int j = 0; j < r->s->stops; j++) if (!r->instant.side[j]) return 0;
   return 1;
 }
@@ -344,13 +364,18 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   static const Output none;
   clear(r, o, (Pair){b->t0, 0});
   r->out = none;
-  if (b->p_stride || !r->prepared) set_parameters(r, b->p + i * b->p_stride);
+  if (b->p_stride || !r->prepared) {
+    set_parameters(r, b->p + i * b->p_stride);
+    find_idle(r);
+  }
   r->prepared = 1;
   memcpy(r->x, m->x, sizeof(double) * r->n);
   memcpy(r->letter, m->letter, r->width);
+  if (r->s->sets) memcpy(r->unknowns, m->unknowns, sizeof(double) * r->width);
   lay_out(r, r->letter, &r->now);
   improve(r, &r->now, r->x, r->unknowns, 2);
-  r->mode = r->shown = r->segment_mode = r->now.mode;
+  r->mode = r->now.mode;
+  r->shown = r->segment_mode = shown_number(r, r->letter);
   r->drop[0] = m->drop;
   memcpy(r->instant.side, m->side, r->s->stops);
   memcpy(r->instant.view, m->side, r->s->stops);
@@ -426,7 +451,8 @@ void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended
     memcpy(r->at_x, b->at_x + i * r->s->dimension, sizeof(double) * r->s->dimension);
   }
   if (m->since == 0 && m->history) see_limit(r); /* the last event was a lane's */
-  if (r->status == RUNNING) step(r);
+  if (r->status == RUNNING && m->near) near_set(r, 0, m->near == 2);
+  else if (r->status == RUNNING) step(r);
   go_on_until_plain(r, b, i, m);
 }
 

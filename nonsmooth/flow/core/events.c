@@ -228,7 +228,10 @@ static void serve_event(Run *r, int served) {
   int index = served - r->s->stops, row = r->now.atoms + served, nd = r->s->dimension, kept = -1;
   double *x = r->before;
   for (int k = u->triggers - 1; k >= 0; k--)
-    if (u->trigger_event[k] == served && i->pending[k]) { kept = k; i->pending[k] = 0; }
+    if (u->trigger_event[k] == served) {
+      if (i->pending[k]) kept = k;
+      i->pending[k] = i->unmet[k] = 0;
+    }
   r->met = (Met){r->now.kind[row], r->now.index[row], r->now.side[row]};
   i->last = served;
   if (served < r->s->stops) {
@@ -458,6 +461,7 @@ static void begin_events(Run *r, const double *motion) {
                                            || (k + 1 < u->triggers && u->trigger_event[k + 1] == event);
     int arrived = triggers(r, k, i->side) && !triggers(r, k, i->now), wanted = u->initially[event];
     if (wanted > 0 ? triggers(r, k, i->side) : wanted < 0 && event >= r->s->stops && arrived && !two) pend(r, k);
+    i->unmet[k] = wanted < 0 && !two && !(u->flags[event] & LEVEL) && !i->pending[k] && triggers(r, k, i->side);
     if (two && wanted < 0 && event >= r->s->stops && arrived && i->zero[event]
         && turns_round(r, event, r->drop[r->now.atoms + event], i->side[event]))
       finish(r, NON_UNIQUE, TWO_SIDED, event - r->s->stops);

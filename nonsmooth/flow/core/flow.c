@@ -69,12 +69,9 @@ static void expand_column(Flow *w, int column, const double *z) {
       int row = g->row[active[a]];
       double sum = 0;
       for (; a < count && g->row[active[a]] == row; a++) {
-        int q = active[a], j = g->column[q], bend = w->bend[q], first = k < bend ? 0 : k + 1 - bend;
-        const double *c = w->rules + f->series.output[n + f->watched + q] * stride, *d = own + j * stride;
-        int last = j >= n ? -1 : terms[j] <= k ? terms[j] - 1 : k;
-        if (j >= n) sum += c[k];
-        else if (first == last) sum += d[first] * c[k - first];
-        else if (first < last) sum += convolve(d, c, k, first, last);
+        int q = active[a], j = g->column[q];
+        const double *c = w->rules + f->series.output[n + f->watched + q] * stride;
+        sum += j >= n ? c[k] : product_of(own + j * stride, terms[j], c, w->bend[q], k);
       }
       if (sum == 0) continue;
       own[row * stride + k + 1] = sum * part;
@@ -97,11 +94,8 @@ static int expand_flow(Flow *w, const double *z) {
       for (int i = 0; i < n; i++) w->states[i * stride + k + 1] = w->rules[t->output[i] * stride + k] / (k + 1);
     for (int j = 0; j < f->watched; j++) w->watched[j * stride + k] = w->rules[t->output[n + j] * stride + k];
   }
-  for (int q = 0; q < f->derivatives.count; q++) {
-    const double *c = w->rules + t->output[n + f->watched + q] * stride;
-    w->bend[q] = order;
-    while (w->bend[q] && c[w->bend[q] - 1] == 0) w->bend[q]--;
-  }
+  for (int q = 0; q < f->derivatives.count; q++)
+    w->bend[q] = terms_of(w->rules + t->output[n + f->watched + q] * stride, order);
   for (int column = 0; column < f->columns; column++) expand_column(w, column, z);
   double zero = 0;
   for (int64_t i = 0; i < n * stride; i++) zero += 0 * w->states[i];

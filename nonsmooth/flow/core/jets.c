@@ -46,9 +46,26 @@ static void inputs_of(Run *r, const Expansion *e, int k) {
   set_inputs(r, x, held, lam);
 }
 
+/* The state that alone a surface is a function of, or -1. */
+static int only_state(const Run *r, int surface) {
+  const Entries *g = &r->s->surface_gradient;
+  int found = -1;
+  for (int q = 0; q < g->count; q++) {
+    if (g->row[q] != surface) continue;
+    if (found >= 0 || g->column[q] >= r->s->dimension) return -1;
+    found = g->column[q];
+  }
+  return found;
+}
+
+/* States of which a root is taken do not move at all where that is zero. */
 static void next_states(Run *r, Expansion *e, int k) {
   double part = 1.0 / (k + 1);
   for (int i = 0; i < r->n; i++) e->states[(int64_t)i * r->stride + k + 1] = row_of(r, i)[k] * part;
+  for (int j = 0; r->has_roots && j < e->l.slides; j++) {
+    int i = e->l.sliding[j], state = i < r->m && element(r, i)->power > 0 && degree_of(r, i) == 1 ? only_state(r, i) : -1;
+    if (state >= 0) e->states[(int64_t)state * r->stride + k + 1] = 0;
+  }
 }
 
 /* Coefficients k of all that is known without unknowns of that order, directions of sets with them. */

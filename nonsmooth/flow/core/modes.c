@@ -117,13 +117,13 @@ static double layer_of(const Run *r, int i) { return out_of(&r->s->point, r->poi
 static double factor_of(const Run *r, int i) { return out_of(&r->s->point, r->point, r->width + i); }
 
 /* Sums over the states of |gradient| times a vector, for each row; infinite slopes, those of a square root
- * at zero, are left out with ``finite_only``. */
+ * at zero, are left out with ``finite_only``, and those of no value, of higher powers there, always. */
 static void gradient_sums(const Run *r, const Values *t, const double *w, int first, const Entries *g, int rows,
                           const double *vector, int finite_only, double *sum) {
   for (int i = 0; i < rows; i++) sum[i] = 0;
   for (int k = 0; k < g->count; k++) {
     double slope = fabs(out_of(t, w, first + k));
-    if (!finite_only || slope < INFINITY) sum[g->row[k]] += slope * vector[g->column[k]];
+    if (slope < INFINITY || (!finite_only && slope == slope)) sum[g->row[k]] += slope * vector[g->column[k]];
   }
 }
 

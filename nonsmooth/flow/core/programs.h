@@ -128,6 +128,19 @@ static inline double convolve(const double *u, const double *v, int k, int first
   if (i + 2 < count) c = MULADD(u[i + 2], v[-i - 2], c);
   return (a + b) + (c + d);
 }
+
+/* Terms up to the last that is not zero. */
+static inline int terms_of(const double *c, int count) {
+  while (count && c[count - 1] == 0) count--;
+  return count;
+}
+
+/* Coefficient k of a product of series of which so many terms are not zero. */
+static inline double product_of(const double *u, int u_terms, const double *v, int v_terms, int k) {
+  int first = k < v_terms ? 0 : k + 1 - v_terms, last = u_terms <= k ? u_terms - 1 : k;
+  if (first < last) return convolve(u, v, k, first, last);
+  return first == last ? u[first] * v[k - first] : 0;
+}
 static inline double weigh(const double *u, const double *v, int k, int first, int last) {
   int count = last - first + 1, i = 4;
   if (count <= 0) return 0;

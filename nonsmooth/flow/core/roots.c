@@ -30,6 +30,13 @@ static double near_root(Run *r, int i) {
   return r->small[i];
 }
 
+/* Whether a surface with a root is within the tolerance. */
+static int nears_root(Run *r) {
+  for (int i = 0; i < r->m; i++)
+    if (element(r, i)->power > 0 && r->letter[i] && SAFETY * fabs(surface_values(r, r->x)[i]) <= near_root(r, i)) return 1;
+  return 0;
+}
+
 /* Move along a line. */
 static int move_by(Run *r, const double *field, double dt) {
   Expansion *e = &r->e;
@@ -79,9 +86,33 @@ static int grow_off_root(Run *r, int i, double rate, const double *bare, double 
   return 1;
 }
 
+/* Where a surface slides, multipliers follow the root of another one: the time to its zero and the mean field until
+ * then, where h is a power of the time to it above one, as its series say; 0 where it is not. */
+static double power_law(Run *r, int i, double *mean) {
+  Expansion *e = &r->e;
+  int row = 0;
+  if (!r->now.slides) return 0;
+  expand(r, r->letter, r->x, r->unknowns, e);
+  while (row < e->l.rows && !(e->l.kind[row] == SURFACE_GUARD && e->l.index[row] == i)) row++;
+  if (row == e->l.rows || !e->finite) return 0;
+  const double *g = e->guards + (int64_t)row * r->stride;
+  double q = 2 * g[0] * g[2] / (g[1] * g[1]), exponent = 1 / (1 - q), time = -exponent * g[0] / g[1];
+  if (!(g[0] > 0 && g[1] < 0 && q > 0 && q < 1)) return 0;
+  if (!(fabs(3 * g[3] * time + g[2] * (exponent - 2)) <= SHARE_SPREAD * g[2])) return 0;
+  for (int k = 0; k < r->n; k++) {
+    const double *x = e->states + (int64_t)k * r->stride;
+    mean[k] = x[1] + 2 * x[2] * time * (1 - q);
+  }
+  return time;
+}
+
 /* Go to a surface with a root that is near; whether it is reached. */
 static int approach_root(Run *r, int i, double h, double level, double left) {
   double p = element(r, i)->power, *with = r->before, *mean = r->at_root, own, bare, share = 0, dt;
+  if ((dt = power_law(r, i, mean)) > 0) {
+    move_by(r, mean, smaller(dt, left));
+    return dt < left;
+  }
   own = field_at_root(r, i, r->x, 1, with);
   bare = field_at_root(r, i, r->x, 0, mean);
   int side = r->letter[i];

@@ -61,11 +61,12 @@ typedef struct {
 enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
 
 /* What happens at one time (events.c). Of atoms: sides, as the jumps have made them, as evaluated now; those that are
- * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before. */
+ * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before,
+ * whether true at the start and not met since. */
 typedef struct {
   int32_t running, first, settled, unsettled, last, tied, is_last;
   int64_t jumps, counted, sampled, *count;
-  int8_t *side, *view, *now, *passing, *zero, *pending, *was;
+  int8_t *side, *view, *now, *passing, *zero, *pending, *was, *unmet;
   double *value, *noise, *residual, *germ, *trigger_x, *arrived, *tick; /* two numbers each; germ: first coefficients on arrival */
 } Instant;
 
@@ -84,9 +85,6 @@ typedef struct {
   /* of sets: multipliers, h in units of |h|, its root, distances when leaving, slopes then, |h| at the start */
   double *lambda, *apart, *root, *rates, *slopes, *radius, *per_radius;
 } Expansion;
-
-/* Letters of a set: off it, h carried along after that, its first step away from it, and one without friction. */
-enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5, IDLE = 6 };
 
 /* A mode that can continue, and the zeros of its guards. */
 typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Continuation;
@@ -250,10 +248,10 @@ Table *table_new(int32_t width) {
 int32_t table_modes(const Table *t) { return t->count; }
 int32_t table_size(const Table *t) { return t->tree.size; }
 void table_read(const Table *t, int32_t *parent, int32_t *mode, int8_t *letter) {
-  for (int32_t k = 0; k < t->tree.size; k++) {
+  for (int32_t k = 0; parent && k < t->tree.size; k++) {
     parent[k] = t->tree.node[k].parent;
     mode[k] = t->tree.node[k].mode;
   }
-  memcpy(letter, t->letter, (size_t)t->count * t->width);
+  if (letter) memcpy(letter, t->letter, (size_t)t->count * t->width);
 }
 void table_free(Table *t) { free(t->tree.node); free(t->letter); free(t->bucket); free(t); }

@@ -205,7 +205,7 @@ static void rounding_of(Run *r, const Expansion *e, double *noise) {
 static int agrees(Run *r, const Expansion *e, double time, double dt) {
   int n = r->n, order = r->order, stride = r->stride, slides = e->l.slides;
   int guards = e->l.bent_count, all = n + slides + guards;
-  double *x = r->vector, *lam = x + n, ignored;
+  double *x = r->vector, *lam = x + n;
   double *found = r->sample, *noise = found + all, *moved = noise + all;
   const int32_t *bent = e->l.is_free ? r->s->bent_free : r->s->bent;
   at_time(r, e, time, x, lam);
@@ -295,8 +295,7 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   }
   /* Most guards have no root, and all their terms: that is seen here, with the length known. */
   if (!drop && c[0] > rest_of(c, r->order, h)) return -1;
-  int is_root = kind == SURFACE_GUARD && element(r, e->l.index[row])->power > 0; /* its series are those of no point beyond */
-  if (has_height(kind) && !is_root) return sure_root(r, e, row, c, r->order - drop, h, 0, drop, 0);
+  if (has_height(kind)) return sure_root(r, e, row, c, r->order - drop, h, 0, drop, 0);
   double dt = first_root(c, r->order - drop, h);
   return kind == SLIP_GUARD && dt > 0 ? slip_root(r, e, row, dt, h) : dt; /* squares lose digits */
 }

@@ -39,11 +39,6 @@ static const double *derivative_row(const Run *r, int q) {
   return row_of(r, r->n + 3 * r->width + r->s->rules.atoms + r->s->slope_outputs + q);
 }
 
-static int terms_of(const double *c, int count) {
-  while (count && c[count - 1] == 0) count--;
-  return count;
-}
-
 /* The unknown of an entry of what moves, after the states; -1 where the mode has it not. */
 static int unknown_at(const Run *r, int column) {
   int i = column - r->n, nu = i - r->width;
@@ -85,12 +80,8 @@ static void derive(const Run *r, const Columns *c, int k) {
   memset(c->sum, 0, sizeof(double) * (r->n + 3 * r->width));
   for (int j = 0; j < size; j++) if (c->of[j] && c->of[j][k] != 0) c->terms[j] = k + 1;
   for (int a = 0; a < c->count; a++) {
-    int q = c->active[a], j = g->column[q], bend = c->bend[q], last = c->terms[j] - 1;
-    int first = k < bend ? 0 : k + 1 - bend;
-    if (last > k) last = k;
-    if (last < first) continue;
-    const double *row = derivative_row(r, q), *own = c->of[j];
-    c->sum[g->row[q]] += first == last ? own[first] * row[k - first] : convolve(own, row, k, first, last);
+    int q = c->active[a], j = g->column[q];
+    c->sum[g->row[q]] += product_of(c->of[j], c->terms[j], derivative_row(r, q), c->bend[q], k);
   }
 }
 
@@ -311,10 +302,13 @@ static int begin_leg(Run *r, const Leg *l) {
   memcpy(r->letter, l->letter, r->width);
   find_idle(r);
   const double *h = surface_values(r, r->x);
-  for (int i = 0; i < r->m; i++) {
-    if (set_of(r, i) < 0 || r->letter[i] == 0) continue;
-    r->letter[i] = r->idle[set_of(r, i)] ? IDLE : r->letter[i] == OFF ? LEFT_BEHIND : LEAVING;
-    r->unknowns[i] = h[i];
+  EACH_SET(r, f) {
+    if (r->letter[f] == 0) continue;
+    int k = size_of(r, f), stays = r->idle[f] && !(length_of(h + f, k) > 0); /* friction that a parameter may bring acts */
+    for (int i = f; i < f + k; i++) {
+      r->letter[i] = stays ? IDLE : r->letter[i] == OFF ? LEFT_BEHIND : LEAVING;
+      r->unknowns[i] = h[i];
+    }
   }
   lay_out(r, r->letter, &r->now);
   mode_solutions(r, &r->now, &all);

@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 
 from ...model import Array, FilippovSystem, coupled_of
-from ..constants import HAND_OVER
 from ..options import Options
 from ..results import Chunk, Stopped
 from .arrays import (
@@ -88,26 +87,7 @@ class Lanes:
             _call(self.library, batch, c_options, tree, _core(run, self.random), stop)
             used = np.flatnonzero(np.bincount(chunk.itinerary))
             chunk.rename(tape.words(table, used.tolist())[1])
-        self._run_rest(x, p, options, at, chunk, stop)
         return chunk
-
-    def _run_rest(
-        self,
-        x: Array,
-        p: Array,
-        options: Options,
-        at: tuple[int, int] | None,
-        out: Chunk,
-        stop: Callable[[], bool],
-    ) -> None:
-        """Give what the lanes hand over to the interpreter."""
-        rest = np.flatnonzero(out.status == HAND_OVER)
-        if not rest.size:
-            return
-        own = p if p.ndim == 1 else p[rest]
-        out.replace(
-            rest, tape_for(self.system, options).run_many(x[rest], own, options, at, None, stop)
-        )
 
 
 def _call(

@@ -58,7 +58,7 @@ static inline double start_of(const Given *g, int64_t i, int k, int64_t *left) {
 
 static inline void store(Lanes *s, Work *w, int, int status) {
   const Results *out = &w->out;
-  int64_t i = s->index[0];
+  int64_t i = s->index.v;
   w->alive = 0;
   UNROLL for (int k = 0; k < ND; k++) out->x[i * ND + k] = s->x[k].v;
   out->t[i] = s->t.v;
@@ -75,9 +75,11 @@ static inline void shorten_codes(Lanes *s, Work *w) { finish_lanes(s, w, I(-1), 
 static inline void begin_elsewhere(Lanes *s, Work *w, I which) { finish_lanes(s, w, which, HAND_OVER); }
 INLINE I by_chance(const Lanes *, const Work *) { return NONE; }
 
-INLINE void keep_event(const Lanes *s, Work *w, int kind, I which) {
+INLINE void count(Lanes *s, Work *w, int kind, I which) {
+  s->kinds[kind] -= which;
+  s->events -= which;
   if (w->o.at_kind != kind || !w->out.at_x || !any(which & (s->kinds[kind] == w->o.at_count))) return;
-  int64_t i = s->index[0];
+  int64_t i = s->index.v;
   w->out.at_t[i] = s->t.v;
   UNROLL for (int k = 0; k < ND; k++) w->out.at_x[i * ND + k] = s->x[k].v;
 }
@@ -103,7 +105,7 @@ static inline int load(Lanes *s, Work *w) {
   s->lambda = BC(0);
   UNROLL for (int k = 0; k < LAST_KIND; k++) s->kinds[k] = I(0);
   UNROLL for (int k = 0; k < STOPS; k++) s->above_stop[k] = I(0);
-  s->index[0] = i;
+  s->index = I(i);
   s->live = I(-1);
   w->alive = 1;
   if (w->out.at_x) {

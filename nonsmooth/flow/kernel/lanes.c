@@ -16,6 +16,8 @@
 #define FIRST_STOP (SLOTS - STOPS)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 60)
+#define LETTERS 1
+#define OF_POOLS int alive;
 
 #if RARE_CASES_HERE
 #define ROWS_KEPT 256 /* a power of two */
@@ -24,9 +26,6 @@
  * negative where a lane had none. */
 typedef struct { T interval[ROWS_KEPT]; I pattern[ROWS_KEPT]; } Log;
 
-/* Of a trajectory, what only the driver needs: the last events, and up to which row of the log; halved steps, and up to
- * which step that is so. */
-typedef struct { Recent event[HISTORY]; int64_t count, row, steps; double shortened; } Past;
 #endif
 
 typedef struct {
@@ -38,8 +37,7 @@ typedef struct {
   I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
   I above_stop[STOPS > 0 ? STOPS : 1]; /* where the guard of a stop was at the start of the step before */
   double size; /* of states at which both tolerances are as large */
-  int64_t index[W];
-  int32_t base[W];
+  I index, base;
 #if RARE_CASES_HERE
   Past *past; /* of each lane */
   Log *log;
@@ -57,7 +55,7 @@ static void store(Lanes *s, Work *w, int l, int status);
 static void shorten_codes(Lanes *s, Work *w);
 static void begin_elsewhere(Lanes *s, Work *w, I which);
 INLINE I by_chance(const Lanes *s, const Work *w);
-INLINE void keep_event(const Lanes *s, Work *w, int kind, I which);
+INLINE void count(Lanes *s, Work *w, int kind, I which);
 
 /* Number of the mode: 0 above, 1 below, 2 sliding. */
 INLINE I mode_of(const Lanes *s) { return (s->slides & 2) | (~s->slides & ~s->above & (M > 0)); }
@@ -259,13 +257,7 @@ static __attribute__((noinline)) void resolve_steps(const Lanes *s, T g[S1][P + 
   for (int j = 0; j < SLOTS; j++) {
     I active = which;
     if (M > 0 && j == 1) active &= s->slides;
-    while (any(active)) {
-      T power = BC(1), sum = BC(0), step = *h;
-      for (int k = P - 2; k >= 0; k--) { sum = sum * step + ABS(g[j][k]); power *= step; }
-      T last = MAX(ABS(g[j][P]) * step, ABS(g[j][P - 1])) * power, rest = RESOLVED * sum;
-      active &= (last > rest) & (rest > 0) & (rest < INFINITY);
-      *h = SELECT(active, step * 0.99 * EXP2(LOG2(rest / last) * (1.0 / (P - 1))), step);
-    }
+    resolve_step(g[j], active, h);
   }
 }
 #endif
@@ -323,14 +315,7 @@ SELDOM I resolve(Guards *v) {
     UNROLL for (int k = 0; k <= P; k++) b[k] = v->a[SLOTS - 1][k];
     for (int j = 0; j < SLOTS - 1; j++)
       if (any(mine[j])) UNROLL for (int k = 0; k <= P; k++) b[k] = SELECT(mine[j], v->a[j][k], b[k]);
-    UNROLL for (int k = 0; k <= P; k++) b[k] += ROUNDING * ABS(b[k]);
-    to_bernstein(b, P);
-    I changes = {0}, positive = b[0] > 0, first = positive;
-    UNROLL for (int k = 1; k <= P; k++) {
-      I next = b[k] > 0;
-      changes -= positive ^ next;
-      positive = next;
-    }
+    I first, changes = sign_changes(b, &first);
     UNROLL for (int j = 0; j < SLOTS; j++) {
       I one = mine[j] & first & (changes == 1) & ~v->wrong_way[j];
       I deep = mine[j] & ~one & ~(first & (changes == 0));
@@ -470,33 +455,6 @@ static void recall(const Lanes *s, int l) {
   }
 }
 
-/* Sum of the last intervals but ``back``. */
-static double block(const Past *p, int64_t back, int lag) {
-  double sum = 0;
-  for (int k = 0; k < lag; k++) sum += p->event[(p->count - 1 - back - k) % HISTORY].interval;
-  return sum;
-}
-
-/* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
-static int may_accumulate(const Past *p) {
-  for (int l = 0; l < LAG_COUNT; l++) {
-    int lag = LAGS[l];
-    if (p->count < (BLOCKS + 1) * lag) return 0;
-    double later = block(p, 0, lag), low = INFINITY, high = 0, last = 0;
-    if (!(later > 0)) return 1;
-    for (int b = 1; b < BLOCKS; b++) {
-      double earlier = block(p, b * lag, lag), ratio = later / earlier;
-      low = smaller(ratio, low);
-      high = larger(ratio, high);
-      if (b == 1) last = ratio;
-      if (!(high < SHRINKS && high - low <= SPREAD * (1 - last))) break;
-      if (b == BLOCKS - 1) return 1;
-      later = earlier;
-    }
-  }
-  return 0;
-}
-
 /* Lanes whose last event, just before, may be one of those that accumulate, so that the run may end here: the driver
  * acts where the states change by less than their tolerances up to the limit, and the time left is a part of the last
  * interval, SHRINKS_TO or more. */
@@ -530,12 +488,6 @@ INLINE I remember(Lanes *s, I which, I, I) {
   return which & (s->shrinking >= 3);
 }
 #endif
-
-INLINE void count(Lanes *s, Work *w, int kind, I which) {
-  s->kinds[kind] -= which;
-  s->events -= which;
-  keep_event(s, w, kind, which);
-}
 
 #if M > 0
 /* Lanes that met the surface or an end of sliding change their mode; ``slope`` is that of the guard

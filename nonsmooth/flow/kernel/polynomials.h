@@ -168,3 +168,30 @@ INLINE void polish(int n, const T *const *a, const T *end, const I *which, T *s,
     if (!any(some)) return;
   }
 }
+
+/* Sign changes of all Bernstein coefficients of polynomials on [0, 1], which are lost; whether the first is positive. */
+INLINE I sign_changes(T *b, I *first) {
+  UNROLL for (int k = 0; k <= P; k++) b[k] += ROUNDING * ABS(b[k]);
+  to_bernstein(b, P);
+  I changes = {0}, positive = b[0] > 0;
+  *first = positive;
+  UNROLL for (int k = 1; k <= P; k++) {
+    I next = b[k] > 0;
+    changes -= positive ^ next;
+    positive = next;
+  }
+  return changes;
+}
+
+#if RARE_CASES_HERE
+/* Shorten steps until a guard's series converges within them, as in the interpreter. */
+static __attribute__((noinline)) void resolve_step(const T *g, I active, T *h) {
+  while (any(active)) {
+    T power = BC(1), sum = BC(0), step = *h;
+    for (int k = P - 2; k >= 0; k--) { sum = sum * step + ABS(g[k]); power *= step; }
+    T last = MAX(ABS(g[P]) * step, ABS(g[P - 1])) * power, rest = RESOLVED * sum;
+    active &= (last > rest) & (rest > 0) & (rest < INFINITY);
+    *h = SELECT(active, step * 0.99 * EXP2(LOG2(rest / last) * (1.0 / (P - 1))), step);
+  }
+}
+#endif

@@ -1,5 +1,37 @@
-/* What lanes of every kind keep alike on this processor: itineraries as nodes of a tree, starts that are no numbers. */
+/* What lanes of every kind keep alike on this processor: itineraries as nodes of a tree, starts that are no numbers, the
+ * last events of each. */
 #define MEMORY 256
+
+/* Of a trajectory, what only the driver needs: the last events, and up to which row of a log; halved steps, and up to
+ * which step that is so. */
+typedef struct { Recent event[HISTORY]; int64_t count, row, steps; double shortened; } Past;
+
+/* Sum of the last intervals but ``back``. */
+static double block(const Past *p, int64_t back, int lag) {
+  double sum = 0;
+  for (int k = 0; k < lag; k++) sum += p->event[(p->count - 1 - back - k) % HISTORY].interval;
+  return sum;
+}
+
+/* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
+static int may_accumulate(const Past *p) {
+  for (int l = 0; l < LAG_COUNT; l++) {
+    int lag = LAGS[l];
+    if (p->count < (BLOCKS + 1) * lag) return 0;
+    double later = block(p, 0, lag), low = INFINITY, high = 0, last = 0;
+    if (!(later > 0)) return 1;
+    for (int b = 1; b < BLOCKS; b++) {
+      double earlier = block(p, b * lag, lag), ratio = later / earlier;
+      low = smaller(ratio, low);
+      high = larger(ratio, high);
+      if (b == 1) last = ratio;
+      if (!(high < SHRINKS && high - low <= SPREAD * (1 - last))) break;
+      if (b == BLOCKS - 1) return 1;
+      later = earlier;
+    }
+  }
+  return 0;
+}
 
 /* A tree of itineraries, and nodes by code as a memory of the last ones. */
 typedef struct {

@@ -1,72 +1,7 @@
-/* W trajectories in step, for systems with one set of codimension two or three, and stops.
- *
- * Off the set, on it and leaving it are three programs, and what is done near it is a fourth; each has lanes of
- * its own, and a trajectory waits until all lanes of a program are filled (fewer run only when no start is left).
- * These are GROUPS of W: each part of a step is done for all groups before the next part, since a step's text is
- * longer than what a processor keeps of instructions close by. What is rare falls back to the driver: such a
- * trajectory gets the status HAND_OVER and runs again from its start in the interpreter. No lane's result depends on
- * its neighbours.
- *
- * The generated text defines, besides what common.h needs: N states with time, ND without, K, STOPS,
- * DIRECTION[STOPS], TIMED, W, GROUPS, ROWS and ROW[ROWS] of the field that are not affine (on the set ON_ROWS),
- * BENT_SLIP, BENT_STOPS, OWN[K] states that the switching functions are (NAMED: whether they are), and the functions of
- * nonsmooth/model/printing/set_program.py.
- */
-#define SLOTS (STOPS + 2) /* the set's guard, stops, friction's limit */
-#define LIMIT_SLOT (STOPS + 1)
-#define INNER (P - P / 3) /* degree that is enough at half of a step */
-#define LONG_CODE (1LL << 60)
-#define WAITING (4 * GROUPS * W)
-#define OFTEN 8 /* fewer groups run where the starts do not fill all of them so many times */
-#define FALLEN 0.01 /* a step ends where |h| has fallen to this part, closer to rounding to FALL */
-#define PASSED 1e-11 /* what passes h = 0 closer than this much of its terms may cross it: the interpreter sees to it */
-#define TURNED 1e-7 /* to this at least the direction is known in which a set is left */
-#define THIRD 3 /* what the last way leaves out is so many times what its terms suggest, or less */
-#define LAST_WAY 0.1 /* part of the tolerance that it may be, once for each time that a set is reached */
-#define SMALL 0.05 /* it is tried where |h| is a third of the cube root of the tolerance */
-#define LAST_TERM 2.0 /* off the set and on it the last two terms of series may be so many times the tolerance */
-#define BEFORE_LAST 10.0
-#define AT_LIMIT 10 /* at the end of rolling |lambda| is 1 to so many times the tolerance */
-#define ROOM_TO_ROLL 1e-6 /* |lambda| is clearly below 1 */
-
-enum { OFF, ON, LEAVING, NEAR_SET, POOLS };
-
-/* All members are vectors, so that a trajectory is a column of words. */
-typedef struct {
-  T x[N], t, last_event, shortest, length, left_at, lam[K]; /* when the set was left, and in which direction */
-  I behind, live, steps, events, kinds[LAST_KIND], shrinking, code, base, index;
-  I above_stop[STOPS > 0 ? STOPS : 1];
-  T q[NQ];
-} Lanes;
-
-#define WORDS ((int)(sizeof(Lanes) / sizeof(T)))
-
-typedef struct { int64_t word[WORDS]; } Traveller;
-
-typedef struct {
-  const Batch *b;
-  const Options *o;
-  const Core *core;
-  Words words;
-  int64_t next;
-  double size; /* of states at which both tolerances are as large */
-  int alive[POOLS], waiting[POOLS], groups, column; /* words of a trajectory */
-  Traveller queue[POOLS][WAITING];
-} Work;
-
-#define SELECT_I(m, a, b) (((a) & (m)) | ((b) & ~(m)))
-#define LANE(v, l) (((double *)&(v))[l])
-#define LANE_I(v, l) (((int64_t *)&(v))[l])
-#define LAMBDA(v) UNPACK(v), BC(0)
-#if K == 2
-#define UNPACK(v) (v)[0], (v)[1]
-#else
-#define UNPACK(v) (v)[0], (v)[1], (v)[2]
-#endif
-
 /* A mode, by its number among the system's, follows. */
 static void note_mode(Lanes *s, Work *w, I which, int mode) {
   s->code = SELECT_I(which, (s->code << 2) + (mode + 1), s->code);
+  s->entered = SELECT_I(which, s->steps, s->entered);
   for EACH(l, s->code >= LONG_CODE) {
     LANE_I(s->base, l) = walk(w->words.tree, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
     LANE_I(s->code, l) = 0;
@@ -75,26 +10,18 @@ static void note_mode(Lanes *s, Work *w, I which, int mode) {
 
 /* Loading, storing, moving on --------------------------------------------------------------------- */
 
-static void store(Lanes *s, Work *w, int pool, int l, int status) {
-  const Batch *b = w->b;
-  int64_t i = LANE_I(s->index, l);
+/* A lane is free. */
+static void leave(Lanes *s, Work *w, int pool, int l) {
   LANE_I(s->live, l) = 0;
   w->alive[pool]--;
-  b->totals[0] += LANE_I(s->steps, l);
-  b->totals[1] += LANE_I(s->events, l);
-  for (int k = 0; k < ND; k++) if (!isfinite(LANE(s->x[k], l))) status = HAND_OVER;
-  b->status[i] = (int8_t)status;
-  if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
-  for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
-  b->t[i] = LANE(s->t, l);
-  b->itinerary[i] = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
-  int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
-  for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
-  kinds[LAST_KIND] = status == REACHED_END;
+  w->spare[w->spares++] = (int)LANE_I(s->own, l);
 }
 
 static void finish_lanes(Lanes *s, Work *w, int pool, I which, int status) {
-  for EACH(l, which & s->live) store(s, w, pool, l, status);
+  for EACH(l, which & s->live) {
+    keep_end(s, w, (int)l, status);
+    leave(s, w, pool, (int)l);
+  }
 }
 
 /* Put the next start into a lane; 0 if there is none. */
@@ -110,12 +37,15 @@ static int load(Lanes *s, Work *w, int l) {
     prepare(b->p + i * b->p_stride, q);
     for (int k = 0; k < NQ; k++) LANE(s->q[k], l) = q[k];
   }
-  LANE(s->t, l) = LANE(s->last_event, l) = b->t0;
-  LANE(s->shortest, l) = 1e-3;
+  LANE(s->t, l) = b->t0;
   LANE(s->left_at, l) = -INFINITY;
+  int own = w->spares ? w->spare[--w->spares] : w->begun++;
+  LANE_I(s->own, l) = own;
+  w->past[own].count = w->past[own].steps = 0;
+  w->past[own].shortened = 0;
   LANE_I(s->live, l) = -1;
   LANE_I(s->index, l) = i;
-  w->alive[OFF]++;
+  w->alive[AWAY]++;
   return 1;
 }
 
@@ -137,6 +67,8 @@ static void receive(Lanes *s, Work *w, int pool) {
     w->alive[pool]++;
   }
 }
+
+static Past *past_of(const Lanes *s, Work *w, int l) { return &w->past[LANE_I(s->own, l)]; }
 
 /* The set -------------------------------------------------------------------------------------- */
 
@@ -351,30 +283,73 @@ INLINE I project(Lanes *s, const Work *w, I which) {
 
 /* Events --------------------------------------------------------------------------------------- */
 
-INLINE void count(Lanes *s, Work *w, int kind, I which) {
-  s->kinds[kind] -= which;
-  s->events -= which;
-  const Batch *b = w->b;
-  if (w->o->at_kind != kind || !b->at_x) return;
-  I now = which & (s->kinds[kind] == w->o->at_count);
-  for EACH(l, now) {
-    int64_t at = LANE_I(s->index, l);
-    b->at_t[at] = LANE(s->t, l);
-    UNROLL for (int i = 0; i < ND; i++) b->at_x[at * ND + i] = LANE(s->x[i], l);
+static void write_mode(const Lanes *s, Work *w, int l, Suspended *m) {
+  int pool = w->pool, behind = pool == AWAY && LANE_I(s->behind, l);
+  T h[K], g[K][N];
+  if (behind) heights(s, w, h, g);
+  for (int i = 0; i < K; i++) {
+    m->letter[i] = pool == ON ? 0 : pool == GOING ? LEAVING : behind ? LEFT_BEHIND : OFF;
+    m->unknowns[i] = pool == GOING ? LANE(s->lam[i], l) : behind ? LANE(h[i], l) : 0;
+  }
+  m->drop = pool == GOING ? 2 : 0;
+  m->near = pool != NEAR_SET ? 0 : LANE_I(s->fell, l) ? 2 : 1;
+}
+
+static void read_mode(Lanes *s, Work *w, int l, const Suspended *m) {
+  w->landed = m->letter[0] ? AWAY : ON;
+  LANE(s->left_at, l) = m->letter[0] && m->events ? m->t - m->since : -INFINITY;
+  LANE_I(s->behind, l) = 0;
+}
+
+/* What a step may have changed in lanes where it is not clear. */
+typedef struct { T x[N], t, since, length; I behind, steps, above_stop[STOPS + 1]; } Start;
+
+INLINE void keep_start(const Lanes *s, Start *a) {
+  UNROLL for (int i = 0; i < N; i++) a->x[i] = s->x[i];
+  UNROLL for (int j = 0; j < STOPS; j++) a->above_stop[j] = s->above_stop[j];
+  a->t = s->t;
+  a->since = s->since;
+  a->length = s->length;
+  a->behind = s->behind;
+  a->steps = s->steps;
+}
+
+static void go_elsewhere(Lanes *s, Work *w, I which, int begun) {
+  for EACH(l, which & s->live) {
+    I one = {0};
+    LANE_I(one, l) = -1;
+    if (!driven(s, w, (int)l, begun)) leave(s, w, w->pool, (int)l);
+    else if (w->landed != w->pool) send(s, w, w->pool, one, w->landed);
   }
 }
 
-/* Whatever changes its mode: the lanes that are left to the interpreter. */
-INLINE I change_mode(Lanes *s, Work *w, I which, int kind, int mode) {
-  T interval = s->t - s->last_event;
-  I shorter = which & (interval < SHRINKS * s->shortest);
+static __attribute__((noinline)) void step_elsewhere(Lanes *s, Work *w, I which, const Start *from) {
+  for (int i = 0; i < N; i++) s->x[i] = SELECT(which, from->x[i], s->x[i]);
+  s->t = SELECT(which, from->t, s->t);
+  s->since = SELECT(which, from->since, s->since);
+  s->length = SELECT(which, from->length, s->length);
+  s->behind = SELECT_I(which, from->behind, s->behind);
+  s->steps = SELECT_I(which, from->steps, s->steps);
+  for (int j = 0; j < STOPS; j++) s->above_stop[j] = SELECT_I(which, from->above_stop[j], s->above_stop[j]);
+  go_elsewhere(s, w, which, 1);
+}
+
+/* Whatever changes its mode: the lanes that are left to the driver, unchanged. */
+INLINE I change_mode(Lanes *s, Work *w, I which, int kind, int guard, int mode) {
+  I unclear = which & (s->events + 1 >= w->o->max_events);
+  for EACH(l, which & ~unclear) {
+    Past *p = past_of(s, w, (int)l);
+    p->event[p->count++ % HISTORY] = (Recent){LANE(s->since, l), ((int64_t)kind << 40) + ((int64_t)guard << 32)};
+    if (!may_accumulate(p)) continue;
+    p->count--;
+    LANE_I(unclear, l) = -1;
+  }
+  which &= ~unclear;
   count(s, w, kind, which);
-  s->last_event = SELECT(which, s->t, s->last_event);
-  s->shortest = SELECT(shorter, interval, s->shortest);
-  s->shrinking -= shorter;
+  s->since = SELECT(which, BC(0), s->since);
   s->length = SELECT(which, BC(0), s->length);
   note_mode(s, w, which, mode);
-  return which & ((s->shrinking >= 3) | (s->events >= w->o->max_events));
+  return unclear;
 }
 
 /* Lanes near h = 0: those that reach it now are put there; those left to the interpreter are added to
@@ -430,6 +405,7 @@ static __attribute__((noinline)) I reach(Lanes *s, Work *w, I which, I *unclear)
   *unclear |= met & ((I)(dt > left) | (floor & ~(I)(bend <= radius)));
   UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(met, end[i], s->x[i]);
   s->t = SELECT(met, s->t + dt, s->t);
+  s->since = SELECT(met, s->since + dt, s->since);
   if (TIMED) s->x[N - 1] = s->t;
   s->steps -= met;
   if (!any(met)) return met;
@@ -474,5 +450,5 @@ static void begin(Lanes *s, Work *w, I fresh) {
   }
 #endif
   note_mode(s, w, fresh & ~unclear, 0);
-  finish_lanes(s, w, OFF, fresh & unclear, HAND_OVER);
+  go_elsewhere(s, w, fresh & unclear, 0);
 }

@@ -74,8 +74,8 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
   const T *g = e->g[0];
   e->level = sum;
   e->fall = SELECT(e->radius * (SAFETY * o->rtol) > LEFT * sum, BC(FALLEN), BC(FALL));
-  if (mode == OFF) bound(g[P], g[P - 1], e->radius * ROUGH_INVERSE(sum + o->rtol * e->radius * ABS(g[0])), last, before);
-  if (mode == LEAVING) bound(g[P - 2], g[P - 3], 1.0 / sum, last, before);
+  if (mode == AWAY) bound(g[P], g[P - 1], e->radius * ROUGH_INVERSE(sum + o->rtol * e->radius * ABS(g[0])), last, before);
+  if (mode == GOING) bound(g[P - 2], g[P - 3], 1.0 / sum, last, before);
   if (mode == ON) {
     T value[K + 1], slope[K + 1][N];
     slip_values(s->x, s->q, LAMBDA(s->lam), value, &slope[0][0]);
@@ -107,10 +107,10 @@ INLINE T size_of(T last, T before, int more) {
 
 /* The coefficients of a step. */
 INLINE void expand_step(const Lanes *s, Step *e, int mode) {
-  e->stretch = mode == OFF ? stretch_of(s) : BC(0);
-  if (mode == OFF) off_jet(s->x, s->q, UNPACK(s->lam), e->stretch, &e->c[0][0], &e->g[0][0], e->ends, &e->radius);
+  e->stretch = mode == AWAY ? stretch_of(s) : BC(0);
+  if (mode == AWAY) off_jet(s->x, s->q, UNPACK(s->lam), e->stretch, &e->c[0][0], &e->g[0][0], e->ends, &e->radius);
   if (mode == ON) on_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
-  if (mode == LEAVING) leave_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
+  if (mode == GOING) leave_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
 }
 
 /* The size that the coefficients allow: terms fall to a fifth of the one before or less, so what comes after the
@@ -129,14 +129,14 @@ INLINE T series_size(const Lanes *s, const Work *w, Step *e, int mode, I *finite
   guard_bounds(s, w, e, mode, &last, &before);
   UNROLL for (int i = 0; i < K; i++) {
     if (mode == ON) continue;
-    T one = mode == OFF ? e->ends[2 * i + 1] : e->unknowns[i][P], two = mode == OFF ? e->ends[2 * i] : e->unknowns[i][P - 1];
+    T one = mode == AWAY ? e->ends[2 * i + 1] : e->unknowns[i][P], two = mode == AWAY ? e->ends[2 * i] : e->unknowns[i][P - 1];
     sum += one + two;
-    if (mode == OFF) { one = SELECT(s->behind, one, BC(0)); two = SELECT(s->behind, two, BC(0)); }
-    if (mode == LEAVING) bound(one, two, BC(1), &turn, &turn_before);
+    if (mode == AWAY) { one = SELECT(s->behind, one, BC(0)); two = SELECT(s->behind, two, BC(0)); }
+    if (mode == GOING) bound(one, two, BC(1), &turn, &turn_before);
     else bound(one, two, per, &last, &before);
   }
   *finite = ABS(sum) < INFINITY;
-  if (mode == OFF) e->g[0][0] -= e->fall;
+  if (mode == AWAY) e->g[0][0] -= e->fall;
   if (mode == ON) {
     T *g = e->g[LIMIT_SLOT], first = 1.0 / g[0];
     e->radius = g[0];
@@ -144,7 +144,7 @@ INLINE T series_size(const Lanes *s, const Work *w, Step *e, int mode, I *finite
     UNROLL for (int k = 1; k <= P; k++) g[k] = SELECT(moves, g[k] * first, BC(0));
     g[0] = BC(1 - LIMIT_FALL);
   }
-  if (mode != LEAVING) return size_of(last * (1 / LAST_TERM), before * (1 / BEFORE_LAST), 0);
+  if (mode != GOING) return size_of(last * (1 / LAST_TERM), before * (1 / BEFORE_LAST), 0);
   T h = size_of(last, before, 0);
   /* Where the set is far behind at the end h has to be known to the tolerance, nearer its direction. */
   T rate = e->g[0][0], part = rate / e->level;
@@ -168,29 +168,13 @@ static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, i
   return stops && s > 0 && met > s ? NAN : met;
 }
 
-/* Shorten steps until a guard's series converges within them, as in the interpreter. */
-static __attribute__((noinline)) void resolve_step(const T *g, I active, T *h) {
-  while (any(active)) {
-    T power = BC(1), sum = BC(0), step = *h;
-    for (int k = P - 2; k >= 0; k--) { sum = sum * step + ABS(g[k]); power *= step; }
-    T last = MAX(ABS(g[P]) * step, ABS(g[P - 1])) * power, rest = RESOLVED * sum;
-    active &= (last > rest) & (rest > 0) & (rest < INFINITY);
-    *h = SELECT(active, step * 0.99 * EXP2(LOG2(rest / last) * (1.0 / (P - 1))), step);
-  }
-}
-
 /* Hard cases by sign changes of all Bernstein coefficients: those with one become ``one``, those without are
  * none, the others stay. */
 static __attribute__((noinline)) void count_changes(const T *a, I wrong_way, I *one, I *hard) {
   T b[P + 1];
-  UNROLL for (int k = 0; k <= P; k++) b[k] = a[k] + ROUNDING * ABS(a[k]);
-  to_bernstein(b, P);
-  I changes = {0}, positive = b[0] > 0, first = positive;
-  UNROLL for (int k = 1; k <= P; k++) {
-    I next = b[k] > 0;
-    changes -= positive ^ next;
-    positive = next;
-  }
+  I first, changes;
+  UNROLL for (int k = 0; k <= P; k++) b[k] = a[k];
+  changes = sign_changes(b, &first);
   *one |= *hard & first & (changes == 1) & ~wrong_way;
   *hard &= ~(*one | (first & (changes == 0)));
 }
@@ -283,9 +267,9 @@ INLINE I disagrees(const Lanes *s, const Step *e, int mode, T *x, T at, T dt, in
   T f[N], d[N], stop[STOPS + 1], rate = rate_of(e, at);
   const int rows = mode == ON ? ON_ROWS : ROWS, *const row_of = mode == ON ? ON_ROW : ROW;
   follow(e, at, degree, x, d);
-  if (mode == OFF) off_check(x, s->q, LAMBDA(s->lam), f, stop);
+  if (mode == AWAY) off_check(x, s->q, LAMBDA(s->lam), f, stop);
   if (mode == ON) on_check(x, s->q, LAMBDA(s->lam), f, stop);
-  if (mode == LEAVING) {
+  if (mode == GOING) {
     T whole[N], u[K], length;
     UNROLL for (int i = 0; i < K; i++) u[i] = series_at(e->unknowns[i], degree, at);
     length = length_of(u);
@@ -374,10 +358,12 @@ INLINE void take_step(Lanes *s, Work *w, Step *e, int mode) {
   const Options *o = w->o;
   T dt, slope = BC(0), end[N];
   I finite, slot;
+  Start from;
+  keep_start(s, &from);
   T by_series = series_size(s, w, e, mode, &finite);
   T h = by_series, left = o->t_end - s->t, longest = SELECT(s->length > 0, GROWTH * s->length, BC(INFINITY));
   longest = MIN(longest, BC(o->max_step));
-  I held = time_of(e, h) > longest, last, unclear = ~finite;
+  I held = time_of(e, h) > longest, last, unclear = ~finite | by_chance(s, w);
   if (any(held)) h = SELECT(held, place_of(e, longest), h);
   last = time_of(e, h) >= left;
   unclear |= ~last & ((time_of(e, h) <= SHORTEST * MAX(ABS(s->t), ABS(s->t - w->b->t0))) | (h >= LONG));
@@ -397,24 +383,30 @@ INLINE void take_step(Lanes *s, Work *w, Step *e, int mode) {
   s->length = SELECT(dt < wanted, passed, MIN(time_of(e, h), left));
   UNROLL for (int i = 0; i < N; i++) s->x[i] = end[i];
   s->t += passed;
+  s->since += passed;
   if (TIMED) s->x[N - 1] = s->t;
   s->steps += 1;
+  T sum = BC(0);
+  UNROLL for (int i = 0; i < ND; i++) sum += end[i] - end[i];
+  unclear |= ~(I)(sum == 0);
   I live = s->live & ~unclear, met = live & (slot == 1), stopped = live & (slot > 1) & (slot <= STOPS + 1);
   s->t = SELECT(live & over, BC(o->t_end), s->t);
   last &= live & (slot == 0);
   I gone = {0};
-  if (mode == OFF) {
+  if (mode == AWAY) {
     T height[K], g[K][N], scale = heights(s, w, height, g), radius = length_of(height);
     if (any(s->behind)) s->behind &= radius <= LEFT * scale;
     I small = (radius <= CLOSE * scale) | ((e->stretch > 0) & (radius * radius * radius <= SMALL * o->rtol * scale * scale * scale));
     gone = met | (live & ~stopped & ~last & small);
+    s->fell = met;
   } else if (mode == ON) {
     unclear |= project(s, w, s->live);
     gone = met;
     if (any(gone)) {
       unclear |= gone & ~(I)(slope < -1e-10 * e->g[0][0]);
-      unclear |= release(s, w, gone) | change_mode(s, w, gone & ~unclear, EXIT, 0);
-      s->left_at = SELECT(gone, s->t, s->left_at);
+      unclear |= release(s, w, gone);
+      unclear |= change_mode(s, w, gone & ~unclear, EXIT, SLIP_GUARD, 0);
+      s->left_at = SELECT(gone & ~unclear, s->t, s->left_at);
     }
   } else {
     unclear |= met | (live & ~(I)(e->g[0][0] > 0));
@@ -427,13 +419,13 @@ INLINE void take_step(Lanes *s, Work *w, Step *e, int mode) {
     if (!NAMED) unclear |= gone & s->behind;
     s->length = BC(0);
   }
-  finish_lanes(s, w, mode, unclear, HAND_OVER);
   if (STOPS > 0 && any(stopped & ~unclear)) {
     count(s, w, STOP, stopped & ~unclear);
     finish_lanes(s, w, mode, stopped & ~unclear, STOPPED);
   }
   finish_lanes(s, w, mode, last & ~unclear, REACHED_END);
-  send(s, w, mode, gone & ~unclear, mode == OFF ? NEAR_SET : mode == ON ? LEAVING : OFF);
+  send(s, w, mode, gone & ~unclear, mode == AWAY ? NEAR_SET : mode == ON ? GOING : AWAY);
+  if (any(unclear &= s->live)) step_elsewhere(s, w, unclear, &from);
 }
 
 /* The parts of a step one after the other for all groups: the text of each is long, and read once for them all. */
@@ -445,17 +437,20 @@ INLINE void step_in(Lanes *groups, Work *w, int mode) {
     if (any(groups[group].live)) take_step(&groups[group], w, &e[group], mode);
 }
 
-static __attribute__((noinline)) void step_off(Lanes *s, Work *w) { step_in(s, w, OFF); }
+static __attribute__((noinline)) void step_off(Lanes *s, Work *w) { step_in(s, w, AWAY); }
 static __attribute__((noinline)) void step_on(Lanes *s, Work *w) { step_in(s, w, ON); }
-static __attribute__((noinline)) void step_leaving(Lanes *s, Work *w) { step_in(s, w, LEAVING); }
+static __attribute__((noinline)) void step_leaving(Lanes *s, Work *w) { step_in(s, w, GOING); }
 
 /* What is near the set reaches it, or goes on off it. */
 INLINE void come_near(Lanes *s, Work *w) {
-  I unclear = {0}, there = reach(s, w, s->live, &unclear) & ~unclear;
-  if (any(there)) unclear |= change_mode(s, w, there, ENTRY, 1);
-  finish_lanes(s, w, NEAR_SET, unclear, HAND_OVER);
+  Start from;
+  keep_start(s, &from);
+  I unclear = by_chance(s, w), there = reach(s, w, s->live & ~unclear, &unclear) & ~unclear;
+  if (any(there)) unclear |= change_mode(s, w, there, ENTRY, NEAR_GUARD, 1);
+  there &= ~unclear;
   send(s, w, NEAR_SET, there, ON);
-  send(s, w, NEAR_SET, ~there, OFF);
+  send(s, w, NEAR_SET, ~(there | unclear), AWAY);
+  if (any(unclear &= s->live)) step_elsewhere(s, w, unclear, &from);
 }
 
 static __attribute__((noinline)) void step_near(Lanes *groups, Work *w) {
@@ -492,9 +487,9 @@ static void load_lanes(Lanes *s, Work *w) {
 
 /* The mode whose lanes take a step: the last one of a run that has enough of them. */
 static int chosen(const Work *w) {
-  for (int pool = POOLS - 1; pool >= OFF; pool--) if (w->alive[pool] + w->waiting[pool] >= w->groups * W) return pool;
-  if (w->next < w->b->count) return OFF;
-  for (int pool = OFF; pool < POOLS; pool++) if (w->alive[pool] + w->waiting[pool]) return pool;
+  for (int pool = POOLS - 1; pool >= AWAY; pool--) if (w->alive[pool] + w->waiting[pool] >= w->groups * W) return pool;
+  if (w->next < w->b->count) return AWAY;
+  for (int pool = AWAY; pool < POOLS; pool++) if (w->alive[pool] + w->waiting[pool]) return pool;
   return -1;
 }
 
@@ -508,14 +503,15 @@ int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, const Cor
     if (pool < 0) return 0;
     Lanes *s = many->lanes[pool];
     for (int group = 0; group < w->groups; group++) receive(&s[group], w, pool);
-    if (pool == OFF && w->alive[OFF] < w->groups * W && w->next < b->count) {
+    w->pool = pool;
+    if (pool == AWAY && w->alive[AWAY] < w->groups * W && w->next < b->count) {
       for (int group = 0; group < w->groups; group++) load_lanes(&s[group], w);
       continue;
     }
     if ((budget -= w->groups) < 0) return 1;
-    if (pool == OFF) step_off(s, w);
+    if (pool == AWAY) step_off(s, w);
     else if (pool == ON) step_on(s, w);
-    else if (pool == LEAVING) step_leaving(s, w);
+    else if (pool == GOING) step_leaving(s, w);
     else step_near(s, w);
   }
 }

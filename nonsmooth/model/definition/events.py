@@ -81,7 +81,8 @@ class Reset(_Conditional):
         Otherwise where the condition becomes true.
     initially : bool, optional
         True: due at the start if true there. False: never due at the start. Unless given, what is clearly
-        true at the start is not due; a reset on its zero is, if the motion goes in.
+        true at the start is not due, and the run's message says so if it does not happen later; a reset on its
+        zero is, if the motion goes in.
     by_jumps : bool, optional
         Whether a jump of another event that makes the condition true makes the event due.
     priority : number or expression, optional

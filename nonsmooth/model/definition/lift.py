@@ -37,7 +37,7 @@ import casadi as ca
 
 from ..errors import DefinitionError, NotSmoothError
 from ..expressions.cancel import Sum, normal_forms, simple_zeros
-from ..expressions.graph import NOT_SMOOTH, evaluate, instructions, operation
+from ..expressions.graph import NOT_SMOOTH, POWERS, evaluate, instructions, operation, power_of
 
 _ROUNDING = 16 * 2.220446049250313e-16
 
@@ -82,7 +82,7 @@ class Switches:
 
     def find(self, h: ca.SX, origin: str) -> tuple[int | None, int]:
         """Number of the surface h = 0 and the sign of h over its function; None, sgn h if constant."""
-        h = simple_zeros(h, *self.inputs)
+        h = self._on_both_sides(simple_zeros(h, *self.inputs))
         forms = self._forms([h, *(s.h for s in self.all)])
         if all(monomial == () for monomial in forms[0]):
             c = forms[0].get((), 0.0)
@@ -103,6 +103,18 @@ class Switches:
         self.all.append(Switch(h, lam, even, [origin]))
         return k, 1
 
+    def _on_both_sides(self, h: ca.SX) -> ca.SX:
+        """A function of |g|^p, g another switch, on one of its sides, as one that is a number on the other too."""
+        nodes, rows = instructions(self.inputs, [h])
+        if all(node.op not in POWERS for node in nodes):
+            return h
+        return evaluate(nodes, _EvenPowers(self))[rows[0][0]]
+
+    def is_found(self, g: ca.SX) -> bool:
+        """Whether a function is a multiple of one that has been found."""
+        form, *forms = self._forms([g, *(s.h for s in self.all)])
+        return any(_ratio([form, other]) for other in forms)
+
     def _forms(self, expressions: list[ca.SX]) -> list[Sum]:
         return [row[0] for row in normal_forms(self.inputs, expressions)[1]]
 
@@ -118,6 +130,25 @@ class Switches:
 
     def _states_of(self, h: ca.SX) -> tuple[int, ...]:
         return tuple(i for i in range(self.states.numel()) if ca.depends_on(h, self.states[i]))
+
+
+class _EvenPowers:
+    """The algebra of expressions in which powers of switching functions are those of their magnitude."""
+
+    def __init__(self, switches: Switches):
+        self._switches = switches
+
+    def constant(self, value: float) -> ca.SX:
+        return ca.SX(value)
+
+    def symbol(self, vector: int, position: int) -> ca.SX:
+        return self._switches.inputs[vector][position]
+
+    def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
+        power = power_of(op, args)
+        if power is None or not self._switches.is_found(args[0]):
+            return operation(op, list(args))
+        return (args[0] * args[0]) ** (power / 2)
 
 
 def _prefixes() -> Iterator[str]:

@@ -43,6 +43,9 @@ NOT_SMOOTH: dict[str, str] = {
 }
 
 
+#: Operations that may be a power that is not a whole number.
+POWERS = ("sqrt", "pow", "constpow")
+
 #: Smooth operations that are no longer so where one of their arguments is always zero.
 _BESIDE_ZERO: dict[str, str] = {
     "atan2": "atan2 with an argument that is zero (a jump where the other one changes its sign)",
@@ -194,3 +197,13 @@ def _beside_zero(node: Node, nodes: Sequence[Node]) -> str | None:
     """Name an operation that is not smooth because one of its arguments is zero."""
     zero = any(nodes[a].op == "const" and nodes[a].payload == 0.0 for a in node.args)
     return _BESIDE_ZERO.get(node.op) if zero else None
+
+
+def power_of(op: str, args: Sequence[ca.SX]) -> float | None:
+    """The exponent of a positive power that is not a whole number."""
+    if op == "sqrt":
+        return 0.5
+    if op not in POWERS or not args[1].is_constant():
+        return None
+    power = float(args[1])
+    return power if power > 0.0 and power != int(power) else None

@@ -22,6 +22,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ..definition.roots import gate_roots, roots_of
 from ..definition.system import FilippovSystem
 from ..expressions.cancel import cancel_common_factor
 from ..expressions.identity import vanish_on
@@ -30,7 +31,6 @@ from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .degree import Degree, degree_of
 from .evaluators import Evaluator
-from .roots import gate_roots
 from .switches import Guard, event_guards
 
 
@@ -153,7 +153,8 @@ class Coupled:
         """The field in which roots of switching functions are zero on their surfaces, where lambda_i is."""
         d, x = self.system.definition, self.system.extended_states
         gates = ca.SX.sym("gate", self._surfaces)
-        field, powers = gate_roots(field, d.surfaces, x, ca.vertsplit(gates))
+        powers = roots_of(field, d.surfaces, x)
+        field = gate_roots(field, d.surfaces, x, ca.vertsplit(gates))[0]
         for i, factor in enumerate(factors):
             factors[i] = gate_roots(factor, d.surfaces, x, ca.vertsplit(gates))[0]
         for i, power in powers.items():

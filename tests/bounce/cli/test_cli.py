@@ -9,7 +9,7 @@ import pytest
 import nonsmooth as ns
 from bounce.cli import CONTACT_MODELS, main
 
-SHOT = "shot --speed 28.5 --angle 37.3 --spin 2094"
+SHOT = "land --speed 28.5 --angle 37.3 --spin 2094"
 KV = "--model KelvinVoigt --set mu=0.3 --set d1=0.1 --set d2=0.15 --set eta=0.5"
 
 
@@ -32,18 +32,18 @@ ON = "--model TiltedBounce --set mu=0.3 "
     ("argv", "code", "message"),
     [
         ("", 2, "command"),
-        ("shot", 2, "--speed"),
-        ("shot --speed fast --angle 37.3 --spin 2094", 2, "--speed"),
-        ("shot --speed 28furlongs --angle 37.3 --spin 2094", 2, "m/s, km/h, mph, ft/s"),
-        ("shot --speed -3mph --angle 30 --spin 0", 2, "-3 mph"),
-        ("shot --speed 28.5 --angle 100 --spin 0", 2, "--angle"),
-        ("shot --speed 28.5 --angle 2rad --spin 0", 2, "pi/2 rad"),
-        ("shot --speed 28.5 --angle 12degrees --spin 0", 2, "--angle"),
-        ("flight --speed 60 --angle 0 --spin 0", 2, "--angle"),
-        ("shot --speed 3 --angle 30", 2, "--spin"),
-        ("shot --speed 28.5 --angle 37.3 --spin inf", 2, "--spin"),
-        ("shot --speed 28.5 --angle 37.3 --spin 1e999", 2, "--spin"),
-        ("shot --input nowhere.csv", 1, "nowhere.csv"),
+        ("land", 2, "--speed"),
+        ("land --speed fast --angle 37.3 --spin 2094", 2, "--speed"),
+        ("land --speed 28furlongs --angle 37.3 --spin 2094", 2, "m/s, km/h, mph, ft/s"),
+        ("land --speed -3mph --angle 30 --spin 0", 2, "-3 mph"),
+        ("land --speed 28.5 --angle 100 --spin 0", 2, "--angle"),
+        ("land --speed 28.5 --angle 2rad --spin 0", 2, "pi/2 rad"),
+        ("land --speed 28.5 --angle 12degrees --spin 0", 2, "--angle"),
+        ("launch --speed 60 --angle 0 --spin 0", 2, "--angle"),
+        ("land --speed 3 --angle 30", 2, "--spin"),
+        ("land --speed 28.5 --angle 37.3 --spin inf", 2, "--spin"),
+        ("land --speed 28.5 --angle 37.3 --spin 1e999", 2, "--spin"),
+        ("land --input nowhere.csv", 1, "nowhere.csv"),
         (f"{SHOT} --input a.csv", 2, "--input"),
         (f"{SHOT} --turf mud", 2, "--turf"),
         (f"{SHOT} --turf natural --model Hertz", 2, "--model"),
@@ -83,14 +83,14 @@ def test_errors_are_one_line_with_a_code(command, argv, code, message):
 
 def test_help(command):
     code, out, _ = command("--help")
-    assert code == 0 and all(word in out for word in ("shot", "flight", "map", "fit", "models"))
+    assert code == 0 and all(word in out for word in ("land", "launch", "map", "fit", "models"))
 
 
 @pytest.mark.parametrize(
     ("name", "defaults"),
     [
-        ("shot", ["natural", "none", "0.131", "golf", "Coulomb"]),
-        ("flight", ["smits-smith", "0.131", "golf"]),
+        ("land", ["natural", "none", "0.131", "golf", "Coulomb"]),
+        ("launch", ["tour-2023", "0.131", "golf"]),
         ("map", ["natural", "region", "angle=5deg:75deg:150", "speed=28m/s"]),
         ("fit", ["16", "natural"]),
     ],
@@ -101,7 +101,7 @@ def test_help_says_the_defaults(command, name, defaults):
     assert "(default: None)" not in out and "(default: [])" not in out
 
 
-@pytest.mark.parametrize("name", ["shot", "flight"])
+@pytest.mark.parametrize("name", ["land", "launch"])
 def test_help_says_what_is_not_validated(command, name):
     assert "not been compared with measurements" in " ".join(command(name, "--help")[1].split())
 
@@ -124,7 +124,7 @@ def test_as_a_process():
 def test_a_missing_column_is_named_with_those_that_are_there(command, tmp_path):
     table = tmp_path / "shots.csv"
     table.write_text("speed,angle\n28.5,37.3\n")
-    code, _, err = command("shot", "--input", table)
+    code, _, err = command("land", "--input", table)
     assert code == 2
     assert "['spin']" in err and "['speed', 'angle']" in err
 
@@ -132,16 +132,16 @@ def test_a_missing_column_is_named_with_those_that_are_there(command, tmp_path):
 def test_a_table_with_semicolons_needs_commas(command, tmp_path):
     table = tmp_path / "shots.csv"
     table.write_text("speed [mph];angle [deg];spin [rpm]\n167;10,9;2686\n")
-    code, _, err = command("flight", "--input", table)
+    code, _, err = command("launch", "--input", table)
     assert code == 1
     assert "shots.csv" in err and "commas" in err
 
 
 def test_typeset_minus_signs_and_degrees_are_read(command, tmp_path):
     """As they are copied from a page: U+2212, and the sign for degrees."""
-    plain = command(*"shot --speed 28 --angle 40deg --spin -500 --set mu=0.5".split())
+    plain = command(*"land --speed 28 --angle 40deg --spin -500 --set mu=0.5".split())
     typeset = command(
-        "shot", "--speed", "28", "--angle", "40°", "--spin", "\u2212500", "--set", "mu=0.5"
+        "land", "--speed", "28", "--angle", "40°", "--spin", "\u2212500", "--set", "mu=0.5"
     )
     assert plain[0] == 0 and typeset == plain
     rows = []
@@ -149,7 +149,7 @@ def test_typeset_minus_signs_and_degrees_are_read(command, tmp_path):
         table = tmp_path / f"{name}.csv"
         text = f"speed [m/s],angle [deg],spin [rpm]\n28,40,{minus}500\n"
         table.write_text(text, encoding="utf-8")
-        rows.append(command("shot", "--input", table))
+        rows.append(command("land", "--input", table))
     assert rows[0][0] == 0 and rows[0] == rows[1]
 
 

@@ -1,4 +1,4 @@
-"""``bounce shot`` and ``bounce flight`` take side spin, a tilted axis and a side slope, and print the library's
+"""``bounce land`` and ``bounce launch`` take side spin, a tilted axis and a side slope, and print the library's
 kick, curve and place of rest."""
 
 import json
@@ -8,7 +8,7 @@ import pytest
 
 import bounce
 
-WEDGE = "shot --speed 25 --angle 53 --spin 9000 --first-only".split()
+WEDGE = "land --speed 25 --angle 53 --spin 9000 --first-only".split()
 RIGID = "--model RigidBounce --set mu=0.5 --set restitution=0.3".split()
 KV = "--model KelvinVoigt --set mu=0.5 --set d1=0.1 --set d2=0.5 --set eta=0.3".split()
 DEG = math.pi / 180
@@ -46,12 +46,12 @@ def test_published_turf_and_tables(command, tmp_path):
     table.write_text(
         "speed [m/s],angle [deg],spin [rpm]\n25,53,9000\n20,45,6000\n", encoding="utf-8"
     )
-    code, out, _ = command("shot", "--input", table, "--first-only", "--side-spin", 500)
+    code, out, _ = command("land", "--input", table, "--first-only", "--side-spin", 500)
     assert code == 0 and "kick [deg]" in out.splitlines()[0] and len(out.splitlines()) == 3
 
 
 def test_a_run_until_rest_with_side_spin(command, tmp_path):
-    argv = "shot --speed 25 --angle 53 --spin 4000".split()
+    argv = "land --speed 25 --angle 53 --spin 4000".split()
     law = bounce.laws.TURFS["natural"].law
     landing = bounce.Landing.polar(25, 53 * DEG, 4000)
     state = bounce.golf.SideState.of(landing, 500 * math.pi / 30, 0.0, 2 * DEG)
@@ -64,30 +64,30 @@ def test_a_run_until_rest_with_side_spin(command, tmp_path):
     assert rest == pytest.approx([run.run_out, run.side], rel=1e-12)
     assert report["run"]["kick"] == pytest.approx(run.kick / DEG, rel=1e-9)
     words = command(*argv, *more)[1]
-    assert f"run       {run.run_out:.2f} m on and {abs(run.side):.2f} m to the " in words
-    assert f"over {run.bounced:.2f} m; rolls {run.rolled:.2f} m" in words
+    assert f"run       {run.run_out:.1f} m on and {abs(run.side):.1f} m to the " in words
+    assert f"over {run.bounced:.1f} m; rolls {run.rolled:.1f} m" in words
     table = tmp_path / "landings.csv"
     table.write_text("speed,angle,spin\n25,53,4000\n", encoding="utf-8")
-    code, out, _ = command("shot", "--input", table, "--side-spin", 500)
+    code, out, _ = command("land", "--input", table, "--side-spin", 500)
     assert code == 0 and "run_run_side [m]" in out.splitlines()[0]
 
 
 @pytest.mark.slow
 def test_a_flight_curves_with_the_axis(command, tmp_path):
-    argv = "flight --speed 70 --angle 11 --spin 2700 --axis-tilt".split()
+    argv = "launch --speed 70 --angle 11 --spin 2700 --axis-tilt".split()
     report = json.loads(command(*argv, 10, "--turf", "natural", "--json")[1])
     spin = bounce.golf.axis_spin(2700 * math.pi / 30, 10 * DEG, 11 * DEG)
     launch = bounce.Landing(70 * math.cos(11 * DEG), 70 * math.sin(11 * DEG), spin.backspin)
     start = bounce.golf.SideState.of(launch, spin.side, spin.vertical)
-    path = bounce.golf.flight(start, air=bounce.golf.SMITS_SMITH)
+    path = bounce.golf.flight(start, air=bounce.golf.TOUR_2023)
     assert report["side"] == pytest.approx(path.side, rel=1e-9) and path.side > 0
     assert report["heading"] == pytest.approx(path.landing.heading / DEG, rel=1e-9)
     assert report["total_side"] == pytest.approx(path.side + report["run"]["run_side"], rel=1e-12)
     code, out, _ = command(*argv, -10, "--turf", "natural")
-    assert code == 0 and f"{path.side:.2f} m to the left" in out and "total" in out
+    assert code == 0 and f"{path.side:.0f} m to the left" in out and "total" in out
     table = tmp_path / "launches.csv"
     table.write_text("speed,angle,spin\n70,11,2700\n", encoding="utf-8")
-    assert "side [m]" in command("flight", "--input", table, "--axis-tilt", 10)[1]
+    assert "side [m]" in command("launch", "--input", table, "--axis-tilt", 10)[1]
 
 
 @pytest.mark.parametrize(
@@ -111,5 +111,5 @@ def test_a_flight_curves_with_the_axis(command, tmp_path):
     ],
 )
 def test_usage_errors(command, argv, message):
-    code, _, err = command(*"shot --speed 25 --angle 53 --spin 9000".split(), *RIGID, *argv)
+    code, _, err = command(*"land --speed 25 --angle 53 --spin 9000".split(), *RIGID, *argv)
     assert code == 2 and message in err

@@ -241,3 +241,18 @@ def test_a_legend_of_dozens_of_regions_is_short():
     assert names[-1].endswith("more")
     assert max(map(len, names)) < 30
     assert len({*names}) == 6  # shortened, they still differ
+
+
+def test_landings_outside_the_fit_are_hatched_and_named():
+    m = golf_map("natural")
+    axes = bounce.plot.outcome_map(m).axes[0]
+    areas = [patch for patch in axes.patches if patch.get_gid() == "extrapolated"]
+    (low, high), (left, right) = (axes.get_ylim(), axes.get_xlim())
+    angle, spin = np.degrees(m.axes[0]), m.axes[1] * 30 / np.pi
+    points = np.stack(np.meshgrid(angle, spin), axis=-1)[2:-2, 2:-2].reshape(-1, 2)
+    hatched = np.any([area.get_path().contains_points(points) for area in areas], axis=0)
+    assert 0.95 < np.mean(hatched == m.extrapolated[2:-2, 2:-2].ravel()) and hatched.any()
+    assert not hatched.all() and left < right and low < high
+    said = {text.get_text() for text in axes.findobj(Text)}
+    assert "outside the landings of the fit" in said
+    assert golf_map("natural").extrapolated.shape == m.slip.shape

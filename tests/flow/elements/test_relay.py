@@ -139,6 +139,56 @@ def test_relays_are_what_discrete_states_and_resets_are(width):
     np.testing.assert_allclose(one.x[-1], two.x[-1][:2], atol=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_relays_among_other_elements_are_what_discrete_states_and_resets_are(seed):
+    """Random linear systems with friction that a relay scales, a set, and a contact that a relay loads."""
+    rng = np.random.default_rng(seed)
+    z, mu = ca.SX.sym("z", 4), ca.SX.sym("mu", 2)
+    gap, speed, r = ca.SX.sym("gap"), ca.SX.sym("speed"), ca.SX.sym("r")
+    matrix = rng.normal(size=(4, 4)) / 2 - 0.3 * np.eye(4)
+    loads, signals = rng.normal(size=(4, 2)) * [1.5, 1.0], rng.normal(size=(2, 4))
+    low, high = np.sort(rng.normal(size=(2, 2)), axis=1).T
+    sets = [ca.vertcat(z[2], z[3])] if seed % 2 else []
+
+    def field(one, two):
+        rates = ca.SX(matrix) @ z + ca.SX(loads) @ ca.vertcat(one, two)
+        rates[1] -= 0.8 * lam * (1 + 0.3 * one)
+        rates[2:] -= 0.7 * mu * bool(sets)
+        return [*ca.vertsplit(rates), speed, -1 - 1.5 * one]
+
+    h = [ca.dot(ca.SX(row), z) for row in signals]
+    states, impact = [*ca.vertsplit(z), gap, speed], ns.Impact(gap, restitution=0.5)
+    relays = [ns.Relay(h[k], on=high[k], off=low[k]) for k in range(2)]
+    one = ns.FilippovSystem(
+        states,
+        field=field(u, w),
+        surfaces=[relays[0], z[1], *sets, relays[1]],
+        multipliers=[u, lam, *[mu] * len(sets), w],
+        impacts=impact,
+    )
+    levels = [(h[k], (low, high)[to > 0][k], (q, r)[k], to) for k in range(2) for to in (1, -1)]
+    two = ns.FilippovSystem(
+        states,
+        field=field(q, r),
+        surfaces=[z[1], *sets],
+        multipliers=[lam, *[mu] * len(sets)],
+        impacts=impact,
+        discrete={q: (-1, 1), r: (-1, 1)},
+        resets=[
+            ns.Reset(f - level, {of: to}, to, level=True, when=of == -to, name=f"{of} {to}")
+            for f, level, of, to in levels
+        ],
+    )
+    start = [*rng.normal(size=4), 1.0, 0.0]
+    ours = ns.simulate(one, start, 6.0, tol=1e-11)
+    theirs = ns.simulate(two, [*start, -1, -1], 6.0, tol=1e-11)
+    assert ours.status is theirs.status
+    times = [e.t for e in ours.events if e.name in ("h0", f"h{2 + len(sets)}") and e.t > 0]
+    expected = [e.t for e in theirs.events if e.kind == "reset" and e.t > 0]
+    np.testing.assert_allclose(times, expected, atol=1e-7)
+    np.testing.assert_allclose(ours.x[-1], theirs.x[-1][:6], rtol=1e-7, atol=1e-7)
+
+
 def test_two_relays_with_one_signal_switch_together():
     system = ns.FilippovSystem(
         [x],

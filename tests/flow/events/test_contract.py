@@ -281,3 +281,36 @@ def test_a_multiple_zero_that_rounding_hides_is_refused_when_it_is_met(many):
     _, status, _, _ = ends(system, [0.0, 0.0], 2.0, many)
     assert status is ns.Status.NON_UNIQUE
     assert "multiple zero" in ns.simulate(system, [0.0, 0.0], 2.0).message
+
+
+# 13 What is clearly true at the start is no edge: the message says so once, if it did not happen later.
+
+
+@pytest.mark.parametrize(
+    ("event", "start", "is_said"),
+    [
+        (ns.Reset(x - 1, [0], 1, "kick"), 2.0, True),
+        (ns.Stop(x - 1, 1, "kick"), 2.0, True),
+        (ns.Stop(x - 1, 1, "kick"), 0.0, False),  # not true
+        (
+            ns.Reset(x - 1, [0], 0, "kick"),
+            2.0,
+            False,
+        ),  # either way: no condition is true at a start
+        (ns.Reset(x - 1, [0], 1, "kick", initially=True), 2.0, False),
+        (ns.Reset(x - 1, [0], 1, "kick", initially=False), 2.0, False),
+        (ns.Reset(x - 1, [0], 1, "kick", level=True), 2.0, False),
+    ],
+)
+def test_an_event_that_is_true_at_the_start_and_silent_is_named(event, start, is_said):
+    given = {"stops": [event]} if isinstance(event, ns.Stop) else {"resets": [event]}
+    run = ns.simulate(ns.FilippovSystem([x], field=[1], **given), [start], 0.5)
+    assert ("'kick' was true at the start" in run.message) == is_said
+    assert "initially=True" in run.message or not is_said
+
+
+def test_an_event_that_is_true_at_the_start_and_happens_later_is_not_named():
+    kick = ns.Reset(x - 0.5, [x - 1, y], 1, "kick")
+    system = ns.FilippovSystem([x, y], field=[y, -x], resets=[kick])
+    run = ns.simulate(system, [1.0, 0.0], 6.0)
+    assert any(e.name == "kick" for e in run.events) and "at the start" not in run.message

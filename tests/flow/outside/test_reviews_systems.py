@@ -6,12 +6,6 @@ import pytest
 
 import nonsmooth as ns
 
-#: Tests that fail, and why; a repair deletes its line.
-OPEN = {
-    "test_finite_time_control_with_powers[0.5-3.0812374]": "no roots",
-    "test_finite_time_control_with_powers[-0.5-2.5849508]": "no roots",
-}
-
 x, v, t, a, b = (ca.SX.sym(name) for name in ("x", "v", "t", "a", "b"))
 REACHED = ns.Status.REACHED_END
 

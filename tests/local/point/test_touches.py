@@ -38,7 +38,7 @@ SPRING = _sides([v, 2 - 2 * x - 5 * (x - 1)], [v, 2 - 2 * x], surface=x - 1)
         (STOP, [1.0, 0.0], "touch", "from above"),
         (_sides([v, -2.0], [v, -1.0]), [0.0, 0.0], "touch", "from below"),
         (_sides([v, 1.0], [v, -1.0]), [0.0, 0.0], "rest", "visible on both sides"),
-        (_sides([v, -2.0], [v, 1.0]), [0.0, 0.0], "rest", "invisible on both sides"),
+        (_sides([v, -2.0], [v, 1.0]), [0.0, 0.0], "rest", "neutral, invisible on both sides"),
         (
             _sides([v, -2.0, 1.0], [v, 1.0, 1.0], (x, v, z)),
             [0.0, 0.0, 0.0],
@@ -169,3 +169,20 @@ def test_scans_find_no_folds_where_nothing_slides():
         scan = SurfaceScan.of(system, {}, Box(-1, 1, -1, 1))
         assert len(scan.folds) == folds and not scan.two_folds
         assert set(np.unique(scan.regions)) == ({2, 3} if folds == 0 else {0, 2, 3})
+
+
+@at_most(15)
+@given(st.integers(0, 10**6))
+def test_rest_between_two_forces_is_stable_as_runs_around_it_say(seed):
+    generator = np.random.default_rng(seed)
+    a1, a2 = generator.uniform(0.3, 2, 2)
+    b1, b2, c1, c2, d1, d2 = generator.uniform(-1, 1, 6)
+    system = _sides([v, -a1 + b1 * v + c1 * x + d1 * v * v], [v, a2 + b2 * v + c2 * x + d2 * v * v])
+    found = ns.classify(system, [0.0, 0.0])
+    assert found.kind == "rest"
+    run = ns.simulate(system, [0.0, 1e-3], 20.0, tol=1e-13)
+    first, second = [event.x[1] for event in run.events if event.kind == "crossing"][1:4:2]
+    growth = found.evidence["growth"]
+    assert (second - first) / first**2 == pytest.approx(2 / 3 * growth, rel=0.02, abs=0.01)
+    word = "stable" if growth < 0 else "unstable"
+    assert found.label == f"{word}, invisible on both sides"

@@ -51,7 +51,10 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
             head,
             *texts,
             program,
-            *map(driver_text, ("kernel/lanes.c", "kernel/records.h", "kernel/batch.c")),
+            *map(
+                driver_text,
+                ("kernel/records.h", "kernel/lanes.c", "kernel/exchange.c", "kernel/batch.c"),
+            ),
         ]
     )
 
@@ -110,6 +113,8 @@ def set_lanes_source(coupled: Coupled, order: int, width: int) -> str:
     drivers = (
         "kernel/polynomials.h",
         "kernel/records.h",
+        "kernel/set_state.h",
+        "kernel/exchange.c",
         "kernel/set_lanes.c",
         "kernel/set_steps.c",
     )

@@ -9,6 +9,7 @@ import pytest
 
 import nonsmooth as ns
 from benchmarks import bounces_in_space
+from nonsmooth.flow.engine import lanes as engine
 from nonsmooth.flow.engine.lanes import lanes_for
 from nonsmooth.flow.engine.tape import tape_for
 from nonsmooth.flow.ensembles import ensemble
@@ -55,6 +56,45 @@ def test_random_landings_agree_with_the_interpreter():
     kind = np.arange(400) % 8
     alone = both(plane.ball("contact", True), x[kind < 5], p[kind < 5], TOL)[0]
     assert lanes.totals[2] < 80 and alone.totals[2] <= 3
+
+
+def mixed(system, x, p, tol, t_end, width, monkeypatch, at=None):
+    """Runs in lanes, half of whose steps the driver makes, and in the driver alone."""
+    monkeypatch.setattr(engine, "lane_width", lambda: width)
+    options = Options(t_end=t_end, rtol=tol, atol=tol)
+    lanes = engine.Lanes(system, lanes_for(system, options).order)
+    lanes.random = 5
+    return lanes.run_many(x, p, options, at), tape_for(system, options).run_many(x, p, options, at)
+
+
+@pytest.mark.parametrize("width", [1, 4, 8])
+def test_steps_made_by_the_driver_at_random(width, monkeypatch):
+    x, p = drawn(400)
+    found, tape = mixed(plane.ball("contact", True), x, p, TOL, 20.0, width, monkeypatch, (0, 1))
+    agree(found, tape, 10 * TOL)
+    for name in ("at_t", "at_x"):
+        pair = getattr(found, name), getattr(tape, name)
+        np.testing.assert_allclose(*pair, rtol=0, atol=100 * TOL, err_msg=name)
+    assert 0.4 < found.totals[2] / found.totals[0] < 0.6
+
+
+def test_steps_made_by_the_driver_at_random_where_slip_is_no_state(monkeypatch):
+    """A block on a turning disc under a load that swings: it slips, sticks, and is flung off."""
+    x, v, lam, t = ca.SX.sym("x", 2), ca.SX.sym("v", 2), ca.SX.sym("lam", 2), ca.SX.sym("t")
+    slip = v - ca.vertcat(-x[1], x[0])
+    stops = [ns.Stop(ca.sumsqr(x) - 4.0, 1)]
+    system = ns.FilippovSystem(
+        ca.vertcat(x, v),
+        field=ca.vertcat(v, -(0.7 + 0.5 * ca.sin(2 * t)) * lam),
+        surfaces=[slip],
+        multipliers=[lam],
+        stops=stops,
+        time=t,
+    )
+    start = np.random.default_rng(3).uniform(-1, 1, (120, 5)) * [1, 1, 1, 1, 0]
+    found, tape = mixed(system, start, system.parameter_vector(), TOL, 6.0, 4, monkeypatch)
+    agree(found, tape, 100 * TOL)
+    assert {"* s", "* s *"} <= set(found.words) and (found.status == ns.Status.STOPPED).any()
 
 
 @pytest.mark.slow
@@ -154,13 +194,15 @@ def test_reference_cases(load, tol):
 @pytest.mark.slow
 def test_many_random_landings_agree_at_tight_and_loose_tolerances():
     x, p = drawn(1600, 7)
-    for tol, bound in [(1e-6, 100e-6), (1e-13, 1e-12)]:
-        agree(*both(plane.ball("contact", True), x, p, tol), bound)
+    system, on_line = plane.ball("contact", True), np.arange(1600) % 8 == 5
+    agree(*both(system, x, p, 1e-13), 1e-12)
+    # Whether h = 0 is passed exactly, or at less than the tolerance from it, a loose tolerance does not tell.
+    agree(*both(system, x[~on_line], p[~on_line], 1e-6), 100e-6)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["pivoting_disc", "elliptical"])
-def test_sets_of_three_and_friction_with_a_grain(kind):
+def test_sets_of_three_and_friction_with_a_grain(kind, monkeypatch):
     rng = np.random.default_rng(0)
     disc = kind == "pivoting_disc"
     case = next(
@@ -172,6 +214,7 @@ def test_sets_of_three_and_friction_with_a_grain(kind):
     x = rng.normal(size=(64, system.dimension))
     fast, slow = both(system, x, system.parameter_vector(), 1e-10, 3.0)
     agree(fast, slow, 1e-8)
+    agree(mixed(system, x, system.parameter_vector(), 1e-10, 3.0, 4, monkeypatch)[0], slow, 1e-8)
     assert {"*", "* s"} == set(fast.words) and not fast.status.any()
 
 

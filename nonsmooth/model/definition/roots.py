@@ -7,10 +7,8 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ..expressions.graph import evaluate, instructions, operation
+from ..expressions.graph import POWERS, evaluate, instructions, operation, power_of
 from ..expressions.identity import vanish_on
-
-_POWERS = ("sqrt", "pow", "constpow")
 
 #: Random points at which signs are compared.
 _DRAWS = 21
@@ -32,24 +30,16 @@ class _Gated:
         return self._symbols[position]
 
     def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
-        result, power = operation(op, list(args)), self._power(op, args)
+        result, power = operation(op, list(args)), power_of(op, args)
         if power is None or not ca.depends_on(args[0], self._x):
             return result
+        base, times = (args[0].dep(0), 2) if args[0].op() == ca.OP_SQ else (args[0], 1)
         for i, h in enumerate(self._surfaces):
-            if vanish_on([args[0]], h, self._x):
-                self.powers[i] = min(power, self.powers.get(i, power))
+            if vanish_on([base], h, self._x):
+                self.powers[i] = min(times * power, self.powers.get(i, times * power))
                 gate = _side(args[0], h) * self._gates[i]
                 return gate * (1 + gate) / 2 * result
         return result
-
-    def _power(self, op: str, args: Sequence[ca.SX]) -> float | None:
-        """The exponent of a positive power that is not a whole number."""
-        if op == "sqrt":
-            return 0.5
-        if op not in _POWERS or not args[1].is_constant():
-            return None
-        power = float(args[1])
-        return power if power > 0.0 and power != int(power) else None
 
 
 def _side(e: ca.SX, h: ca.SX) -> int:
@@ -61,6 +51,15 @@ def _side(e: ca.SX, h: ca.SX) -> int:
     return 1 if sum(np.sign(p) for p in points if p == p) >= 0.0 else -1
 
 
+def roots_of(field: ca.SX, surfaces: ca.SX, x: ca.SX) -> dict[int, float]:
+    """The smallest exponent of a root of each switching function, in a field or in switching functions."""
+    gates, found = ca.vertsplit(ca.SX.ones(surfaces.numel())), dict[int, float]()
+    for e in (field, surfaces) if surfaces.numel() else ():
+        for i, power in gate_roots(e, surfaces, x, gates)[1].items():
+            found[i] = min(power, found.get(i, power))
+    return found
+
+
 def gate_roots(
     field: ca.SX, surfaces: ca.SX, x: ca.SX, gates: Sequence[ca.SX]
 ) -> tuple[ca.SX, dict[int, float]]:
@@ -68,7 +67,7 @@ def gate_roots(
     # A gate is 1 or -1, the side, or 0; a root is multiplied by 1 on the side where it is defined, else by 0.
     symbols = ca.vertcat(*ca.symvar(field)) if field.numel() else ca.SX(0, 1)
     nodes, rows = instructions([symbols], [field])
-    if not any(node.op in _POWERS for node in nodes):
+    if not any(node.op in POWERS for node in nodes):
         return field, {}
     algebra = _Gated(symbols, ca.vertsplit(surfaces), x, gates)
     values = evaluate(nodes, algebra)

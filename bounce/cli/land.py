@@ -1,20 +1,32 @@
-"""The command ``bounce shot``: a landing, the bounce, and the run until rest."""
+"""The command ``bounce land``: a landing, the bounce, and the run until rest."""
 
 from __future__ import annotations
 
 import argparse
+import math
+import warnings
 from typing import Any
 
-from ..golf import AIRS, GREEN_ROLLING_FRICTION, Rebound, Run, SideState, play, rebound
+from ..golf import GREEN_ROLLING_FRICTION, Rebound, Run, SideState, play, rebound
 from ..units import Landing
 from .batch import answer
-from .choices import Chosen, chosen_model, ground_arguments, require_scale, side_slope, surroundings
+from .choices import (
+    Chosen,
+    air_arguments,
+    chosen_model,
+    ground_arguments,
+    require_scale,
+    side_slope,
+    surroundings,
+)
 from .report import Units, echoed, in_words, polar, sideways, with_meaning
 from .side import require_side, side_arguments, with_side
 from .starts import Start, start_arguments
 from .values import number, quantity
 
+_FAST, _FLAT = 45.0, math.radians(25.0)  # of a launch: no ball lands so fast and so flat
 HELP = "a landing: the bounce, and the run until rest"
+NOT_VALIDATED = "not validated"  # of a number that has not been compared with measurements
 UNVALIDATED = (
     "How a run splits into bounces and roll has not been compared with measurements: the laws of turf "
     "were fitted to single bounces."
@@ -26,7 +38,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     start_arguments(parser, "landing")
     ground_arguments(parser)
-    parser.add_argument("--air", choices=["none", *AIRS], default="none", help="during the hops")
+    air_arguments(parser, "none", "during the hops")
     run_arguments(parser)
     parser.add_argument("--first-only", action="store_true", help="the first bounce only")
     side_arguments(parser)
@@ -55,9 +67,21 @@ def run(args: argparse.Namespace) -> int:
         return {**report, "landing": echoed(report["landing"], start.typed, args.units)}
 
     def lines(landing: Landing, units: Units) -> list[str]:
+        _hint(landing)
         return _lines(*_bounce(args, chosen, with_side(args, landing)[1]), chosen, units)
 
     return answer(args, False, report_on, lines)
+
+
+def _hint(landing: Landing) -> None:
+    """Warn of a start that is rather the launch of a shot than its landing."""
+    if landing.speed > _FAST and landing.angle < _FLAT:
+        warnings.warn(
+            f"a landing at {landing.speed:.0f} m/s and {math.degrees(landing.angle):.0f} deg looks like a "
+            "launch. For a shot from the tee: bounce launch.",
+            UserWarning,
+            stacklevel=2,
+        )
 
 
 def _bounce(
@@ -148,7 +172,7 @@ def run_line(rest: Run[Any], units: Units) -> str:
     bounces = "1 bounce" if count == 1 else f"{count} bounces"
     bounces += f" ({rest.extrapolated} of them outside the fit)" if rest.extrapolated else ""
     return (
-        f"run       {way} in {rest.time:.2f} s: {bounces}, the first "
+        f"run       {way} in {rest.time:.1f} s ({NOT_VALIDATED}): {bounces}, the first "
         f"{units.say('height', rest.first_height)} high, over {units.say('length', rest.bounced)}; "
         f"rolls {units.say('length', rest.rolled)}"
     )

@@ -1,4 +1,4 @@
-"""``bounce shot`` gives the library's numbers in any units, echoes its inputs, and reads tables."""
+"""``bounce land`` gives the library's numbers in any units, echoes its inputs, and reads tables."""
 
 import csv
 import io
@@ -11,7 +11,7 @@ import pytest
 import bounce
 import nonsmooth as ns
 
-SHOT = "shot --speed 28.5 --angle 37.3 --spin 2094".split()
+SHOT = "land --speed 28.5 --angle 37.3 --spin 2094".split()
 EXPECTED = bounce.golf.play(
     bounce.laws.TURFS["natural"].law, bounce.Landing.polar(28.5, math.radians(37.3), 2094)
 )
@@ -28,7 +28,7 @@ def test_shot_is_play(command):
     assert report["run"]["run_out"] == pytest.approx(expected.run_out, rel=1e-12)
     off = expected.bounces[0].rebound.lift_off
     assert report["lift_off"]["spin"] == pytest.approx(off.backspin_rpm, rel=1e-12)
-    assert command(*SHOT)[1].startswith("lift-off  10.71 m/s, 37.3 deg")
+    assert command(*SHOT)[1].startswith("lift-off  10.7 m/s, 37.3 deg")
 
 
 @pytest.mark.parametrize(
@@ -50,13 +50,13 @@ def test_the_turf_that_was_not_typed_is_an_input_too(command):
     assert json.loads(command(*SHOT, "--turf", "penner", "--json")[1])["inputs"]["turf"] == "penner"
     contact = json.loads(command(*SHOT, *KV, "--stiffness", "2e4", "--first-only", "--json")[1])
     assert contact["inputs"]["turf"] is None and contact["inputs"]["model"] == "KelvinVoigt"
-    flight = "flight --speed 20 --angle 45 --spin 0 --json".split()
+    flight = "launch --speed 20 --angle 45 --spin 0 --json".split()
     assert json.loads(command(*flight)[1])["inputs"]["turf"] is None  # it has no ground
 
 
 def test_units_are_two_views_of_one_shot(command):
     golf = json.loads(command(*SHOT, "--json")[1])
-    argv = ["shot", "--speed", 28.5, "--angle", np.radians(37.3), "--spin", 2094 * np.pi / 30]
+    argv = ["land", "--speed", 28.5, "--angle", np.radians(37.3), "--spin", 2094 * np.pi / 30]
     si = json.loads(command(*argv, "--units", "si", "--json")[1])
     assert si["run"] == pytest.approx(golf["run"], rel=1e-9)
     assert si["lift_off"]["angle"] == pytest.approx(np.radians(golf["lift_off"]["angle"]))
@@ -85,25 +85,25 @@ def test_shot_on_a_contact_model_and_through_air(command):
     ],
 )
 def test_units_are_said_or_those_of_the_system(command, words):
-    report = json.loads(command("shot", *words.split(), "--json")[1])
+    report = json.loads(command("land", *words.split(), "--json")[1])
     us = "us" in words.split()
     assert report["lift_off"]["speed"] * (0.44704 if us else 1.0) == pytest.approx(SPEED, rel=1e-4)
     assert report["run"]["run_out"] * (0.9144 if us else 1.0) == pytest.approx(RUN_OUT, rel=1e-4)
 
 
 def test_yards_feet_and_mph(command):
-    out = command(*"shot --speed 63.753mph --angle 37.3 --spin 2094 --units us".split())[1]
+    out = command(*"land --speed 63.753mph --angle 37.3 --spin 2094 --units us".split())[1]
     assert out.startswith(
-        f"lift-off  {SPEED / 0.44704:.2f} mph, 37.3 deg, -4536 rpm, slip -3.6 mph"
+        f"lift-off  {SPEED / 0.44704:.1f} mph, 37.3 deg, -4536 rpm, slip -3.6 mph"
     )
-    assert f"{RUN_OUT / 0.9144:.2f} yd in 4.94 s" in out
-    assert f"the first {EXPECTED.first_height / 0.3048:.2f} ft high" in out
+    assert f"{RUN_OUT / 0.9144:.0f} yd in 4.9 s" in out
+    assert f"the first {EXPECTED.first_height / 0.3048:.1f} ft high" in out
 
 
 def test_every_input_is_echoed_with_the_version(command):
     words = "--turf artificial --air quintavalla --slope -2deg --rolling-friction 0.2 --set mu=0.7"
     report = json.loads(command(*SHOT, *words.split(), "--json")[1])
-    assert report["version"] == ns.__version__ and report["command"] == "shot"
+    assert report["version"] == ns.__version__ and report["command"] == "land"
     inputs = report["inputs"]
     assert inputs["speed"] == dict(value=28.5, unit="m/s")
     assert inputs["angle"] == dict(value=37.3, unit="deg")
@@ -128,11 +128,11 @@ def test_angles_of_the_model_have_units(command):
 
 
 def test_a_shot_beyond_the_fit_is_cautioned(command):
-    code, out, err = command("shot", "--speed", 28, "--angle", 90, "--spin", 0)
+    code, out, err = command("land", "--speed", 28, "--angle", 90, "--spin", 0)
     assert code == 0 and out.startswith("lift-off")
     assert err.startswith("bounce: caution: TiltedBounce: a landing outside") and "90 deg" in err
     assert len(err.strip().splitlines()) == 1
-    report = json.loads(command("shot", "--speed", 28, "--angle", 90, "--spin", 0, "--json")[1])
+    report = json.loads(command("land", "--speed", 28, "--angle", 90, "--spin", 0, "--json")[1])
     assert len(report["cautions"]) == 1 and report["run"]["extrapolated"] > 0
 
 
@@ -148,7 +148,7 @@ def table(tmp_path):
 
 
 def test_a_table_of_landings(command, table, tmp_path):
-    code, out, err = command("shot", "--input", table)
+    code, out, err = command("land", "--input", table)
     rows = list(csv.DictReader(io.StringIO(out)))
     assert code == 1 and len(rows) == 4
     assert "1 of 4 rows: see cautions" in err and "2 of 4 rows: see the column error" in err
@@ -162,9 +162,9 @@ def test_a_table_of_landings(command, table, tmp_path):
     assert "outside what it was fitted to" in rows[2]["cautions"]
     assert "spin" in rows[3]["error"]
     written = tmp_path / "out.csv"
-    assert command("shot", "--input", table, "--output", written)[1] == ""
+    assert command("land", "--input", table, "--output", written)[1] == ""
     assert written.read_text(encoding="utf-8") == out
-    report = json.loads(command("shot", "--input", table, "--json")[1])
+    report = json.loads(command("land", "--input", table, "--json")[1])
     assert [row["row"] for row in report["rows"]] == [1, 2, 3, 4]
     assert report["inputs"]["input"] == str(table)
 
@@ -172,9 +172,9 @@ def test_a_table_of_landings(command, table, tmp_path):
 def test_a_table_without_units_has_those_of_the_system(command, tmp_path):
     path = tmp_path / "plain.csv"
     path.write_text("speed,angle,spin\n28.5,37.3,2094\n", encoding="utf-8")
-    rows = list(csv.DictReader(io.StringIO(command("shot", "--input", path)[1])))
+    rows = list(csv.DictReader(io.StringIO(command("land", "--input", path)[1])))
     assert float(rows[0]["run_run_out [m]"]) == pytest.approx(RUN_OUT, rel=1e-4)
-    rows = list(csv.DictReader(io.StringIO(command("shot", "--input", path, "--units", "us")[1])))
+    rows = list(csv.DictReader(io.StringIO(command("land", "--input", path, "--units", "us")[1])))
     assert float(rows[0]["landing_speed [mph]"]) == pytest.approx(28.5)
 
 
@@ -192,11 +192,11 @@ def test_what_is_wrong_with_a_row_is_said_in_the_units_of_its_columns(
 ):
     path = tmp_path / "wrong.csv"
     path.write_text(f"{titles}\n{row}\n", encoding="utf-8")
-    (found,) = csv.DictReader(io.StringIO(command("shot", "--input", path, "--units", "us")[1]))
+    (found,) = csv.DictReader(io.StringIO(command("land", "--input", path, "--units", "us")[1]))
     assert said in found["error"]
 
 
 @pytest.mark.parametrize("side", [[], ["--side-spin", "100"]])
 def test_one_bounce_is_said_in_the_singular(command, side):
-    out = command(*"shot --speed 2 --angle 41 --spin 2141".split(), *side)[1]
+    out = command(*"land --speed 2 --angle 41 --spin 2141".split(), *side)[1]
     assert ": 1 bounce (1 of them outside the fit)" in out

@@ -1,16 +1,23 @@
-"""The command ``bounce flight``: a launch, carry and landing, and the run until rest."""
+"""The command ``bounce launch``: a launch, carry and landing, and the run until rest."""
 
 from __future__ import annotations
 
 import argparse
 from typing import Any
 
-from ..golf import AIRS, Flight, Run, SideState, flight
+from ..golf import Flight, Run, SideState, flight
 from ..units import Landing
 from .batch import answer
-from .choices import Chosen, chosen_model, ground_arguments, require_scale, surroundings
+from .choices import (
+    Chosen,
+    air_arguments,
+    chosen_model,
+    ground_arguments,
+    require_scale,
+    surroundings,
+)
+from .land import NOT_VALIDATED, UNVALIDATED, run_arguments, run_line, run_report, to_rest
 from .report import Units, echoed, in_words, polar, sideways
-from .shot import UNVALIDATED, run_arguments, run_line, run_report, to_rest
 from .side import require_side, side_arguments, with_side
 from .starts import Start, start_arguments
 
@@ -21,9 +28,7 @@ ABOUT = f"Fly a ball to the ground; with --turf or --model also to rest. {UNVALI
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     start_arguments(parser, "launch")
-    parser.add_argument(
-        "--air", choices=["none", *AIRS], default="smits-smith", help="during flight and hops"
-    )
+    air_arguments(parser, "tour-2023", "during flight and hops")
     ground_arguments(parser, turf=None)
     run_arguments(parser)
     side_arguments(parser, launched=True)
@@ -83,7 +88,11 @@ def _lines(path: Flight[Any], rest: Run[Any] | None, units: Units) -> list[str]:
         heading = f", heading {units.say('angle', abs(hit.heading), 1)} to the {side}"
         hit = hit.in_plane
     lines = [
-        f"carry     {carry}{way} in {path.time:.2f} s, {units.say('height', path.height)} high",
+        f"carry     {carry}{way} in {path.time:.1f} s, {units.say('height', path.height)} high",
         f"landing   {in_words(hit, units)}{heading}",
     ]
-    return lines if rest is None else [*lines, run_line(rest, units), f"total     {total}"]
+    return (
+        lines
+        if rest is None
+        else [*lines, run_line(rest, units), f"total     {total} ({NOT_VALIDATED})"]
+    )

@@ -1,0 +1,130 @@
+/* What lanes of every kind give to the driver and take back, on this processor; where their runs end. After the types of
+ * the lanes, which define LETTERS, OF_POOLS, past_of, write_mode and read_mode.
+ */
+
+/* A batch, and how far it is. */
+struct Work {
+  const Batch *b;
+  const Options *o;
+  const Core *core;
+  Words words;
+  int64_t next;
+  int groups;
+  OF_POOLS
+};
+
+/* A lane as the driver takes and gives it back. */
+typedef struct {
+  Suspended m;
+  double x[N], unknowns[LETTERS];
+  int64_t kinds[KINDS];
+  int8_t letter[LETTERS], side[STOPS + 1];
+} Packed;
+
+static Past *past_of(const Lanes *s, Work *w, int l);
+static void write_mode(const Lanes *s, Work *w, int l, Suspended *m);
+static void read_mode(Lanes *s, Work *w, int l, const Suspended *m);
+
+static void point_to(Packed *a, Past *past) {
+  a->m.x = a->x;
+  a->m.unknowns = a->unknowns;
+  a->m.kinds = a->kinds;
+  a->m.letter = a->letter;
+  a->m.side = a->side;
+  a->m.past = past->event;
+  a->m.near = a->m.drop = 0;
+}
+
+static void pack(const Lanes *s, Work *w, int l, Packed *a) {
+  Suspended *m = &a->m;
+  const Past *past = past_of(s, w, l);
+  write_mode(s, w, l, m);
+  UNROLL for (int i = 0; i < N; i++) a->x[i] = LANE(s->x[i], l);
+  for (int k = 0; k < LAST_KIND; k++) a->kinds[k] = LANE_I(s->kinds[k], l);
+  for (int j = 0; j < STOPS; j++) a->side[j] = LANE_I(s->above_stop[j], l) ? 1 : -1;
+  m->t = LANE(s->t, l);
+  m->since = LANE(s->since, l);
+  m->length = LANE(s->length, l);
+  m->steps = LANE_I(s->steps, l);
+  m->shortened = larger(0, past->shortened - 0.2 * (double)(m->steps - past->steps));
+  m->events = LANE_I(s->events, l);
+  m->segment_steps = m->steps - LANE_I(s->entered, l);
+  m->history = past->count;
+  m->itinerary = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
+}
+
+static void unpack(Lanes *s, Work *w, int l, const Packed *a) {
+  const Suspended *m = &a->m;
+  Past *past = past_of(s, w, l);
+  UNROLL for (int i = 0; i < N; i++) LANE(s->x[i], l) = a->x[i];
+  for (int k = 0; k < LAST_KIND; k++) LANE_I(s->kinds[k], l) = a->kinds[k];
+  for (int j = 0; j < STOPS; j++) LANE_I(s->above_stop[j], l) = -(int64_t)(a->side[j] > 0);
+  LANE(s->t, l) = m->t;
+  LANE(s->since, l) = m->since;
+  LANE(s->length, l) = m->length;
+  LANE_I(s->steps, l) = past->steps = m->steps;
+  past->shortened = m->shortened;
+  LANE_I(s->events, l) = m->events;
+  LANE_I(s->entered, l) = m->steps - m->segment_steps;
+  past->count = m->history;
+  LANE_I(s->base, l) = m->itinerary;
+  LANE_I(s->code, l) = 0;
+  read_mode(s, w, l, m);
+}
+
+static void keep_end(const Lanes *s, Work *w, int l, int status) {
+  const Batch *b = w->b;
+  int64_t i = LANE_I(s->index, l);
+  b->totals[0] += LANE_I(s->steps, l);
+  b->totals[1] += LANE_I(s->events, l);
+  b->status[i] = (int8_t)status;
+  UNROLL for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
+  b->t[i] = LANE(s->t, l);
+  b->itinerary[i] = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
+  int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
+  UNROLL for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
+  kinds[LAST_KIND] = status == REACHED_END;
+}
+
+INLINE void keep_event(const Lanes *s, Work *w, int kind, I which) {
+  const Batch *b = w->b;
+  if (w->o->at_kind != kind || !b->at_x) return;
+  I now = which & (s->kinds[kind] == w->o->at_count);
+  for EACH(l, now) {
+    int64_t i = LANE_I(s->index, l);
+    b->at_t[i] = LANE(s->t, l);
+    UNROLL for (int k = 0; k < ND; k++) b->at_x[i * ND + k] = LANE(s->x[k], l);
+  }
+}
+
+INLINE void count(Lanes *s, Work *w, int kind, I which) {
+  s->kinds[kind] -= which;
+  s->events -= which;
+  keep_event(s, w, kind, which);
+}
+
+/* Lanes whose step is made by the driver although it may be clear. */
+INLINE I by_chance(const Lanes *s, const Work *w) {
+  I which = NONE;
+  if (!w->core->random) return which;
+  for (int l = 0; l < W; l++) {
+    uint64_t z = ((uint64_t)(LANE_I(s->index, l) + 1) << 32) + (uint64_t)(LANE_I(s->steps, l) * 2654435761LL + w->core->random);
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+    LANE_I(which, l) = -(int64_t)(z >> 63);
+  }
+  return which;
+}
+
+/* Let the driver begin the run of a lane, or make its step: whether the run goes on, in the lane. Else the driver has
+ * stored where it ended. */
+static __attribute__((noinline)) int driven(Lanes *s, Work *w, int l, int begun) {
+  Packed a;
+  point_to(&a, past_of(s, w, l));
+  if (begun) pack(s, w, l, &a);
+  (begun ? w->core->step : w->core->begin)(w->core->run, w->b, w->o, LANE_I(s->index, l), &a.m);
+  w->b->totals[2]++;
+  if (a.m.status != RUNNING) return 0;
+  unpack(s, w, l, &a);
+  return 1;
+}

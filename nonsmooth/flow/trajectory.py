@@ -118,10 +118,13 @@ class Facts:
     unproved : bool
         One solution was found for more than eight elements that act on one another, and no test shows that it
         is the only one.
+    rested_below : tuple of str
+        Names of what ``rest_below=`` put to rest: the run is off by its speed there.
     """
 
     depends_on_widths: bool = False
     unproved: bool = False
+    rested_below: tuple[str, ...] = ()
 
 
 def _require_whole(run: Trajectory) -> None:

@@ -27,16 +27,18 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
     """Convert a run."""
     status, few = Status(run.status), run.few or None
     limit = None if math.isnan(run.limit) else run.limit
-    facts = Facts(bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED))
+    events = Events.when_read(
+        partial(_events, system, run), few and partial(_few_events, system, run)
+    )
+    rested = {e.name: None for e in events if e.kind == "rest_below"} if options.rest_below else ()
+    facts = Facts(bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED), tuple(rested))
     warn_of_facts(facts.depends_on_widths, facts.unproved)
     return Trajectory(
         system=system,
         parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),
         t=run.t,
         x=run.x,
-        events=Events.when_read(
-            partial(_events, system, run), few and partial(_few_events, system, run)
-        ),
+        events=events,
         segments=Segments.when_read(
             partial(_segments, system, run), few and partial(_few_segments, system, run)
         ),

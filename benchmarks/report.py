@@ -10,7 +10,7 @@ from typing import Any
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import Labels
 
-from . import bounces_in_space, gpu, periodic_orbits, proof_checks
+from . import bounces_in_space, gpu, periodic_orbits, proof_checks, reading
 
 #: Targets, and whether more or less is better.
 TARGETS = {
@@ -39,7 +39,7 @@ TARGETS = {
     "proof: a linear bounce (s)": (0.05, "at most"),
     "proof: all 100 two-folds of a box (s)": (10.0, "at most"),
     "wrong or missing theorems": (0, "at most"),
-    **{**periodic_orbits.TARGETS, **bounces_in_space.TARGETS},
+    **{**periodic_orbits.TARGETS, **bounces_in_space.TARGETS, **reading.TARGETS},
     "wrong itineraries, random starts": (0, "at most"),
     "wrong itineraries, within 1e-9 of a boundary": (0, "at most"),
 }
@@ -79,6 +79,7 @@ def figures(results: dict[str, Any]) -> dict[str, float]:
     if "theorems" in results:
         found["wrong or missing theorems"] = proof_checks.wrong(results["theorems"])
     found |= periodic_orbits.figures(results.get("orbits", {})) | bounces_in_space.figures(results)
+    found |= reading.figures(results)
     return found | _startup(results) | _itineraries(results)
 
 
@@ -318,6 +319,7 @@ _SECTIONS: dict[str, Callable[[dict[str, Any]], str]] = {
     "orbits": lambda section: periodic_orbits.markdown(section, table),
     bounces_in_space.NAME: lambda section: bounces_in_space.markdown(section, table),
     gpu.NAME: lambda section: gpu.markdown(section, table),
+    reading.NAME: lambda section: reading.markdown(section, table),
     "correctness": _correct,
 }
 

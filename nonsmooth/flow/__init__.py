@@ -27,23 +27,27 @@ from .ensembles.ensemble import ensemble
 from .ensembles.lazy_starts import Grid, RandomStarts
 from .ensembles.outcomes import Outcomes, outcomes
 from .ensembles.work import Work
+from .events import Event, Events
 from .follow import follow
 from .polynomial import first_crossing, first_root
 from .results import Ensemble
 from .saving import load
 from .section import Section
+from .segments import Segment, Segments
 from .simulate import simulate
 from .status import Status
-from .trajectory import Event, Segment, Trajectory
+from .trajectory import Trajectory
 
 __all__ = [
     "Ensemble",
     "Event",
+    "Events",
     "Grid",
     "Outcomes",
     "RandomStarts",
     "Section",
     "Segment",
+    "Segments",
     "Status",
     "Trajectory",
     "Work",

@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import Array
+from .events import Event, Events
 from .names import change
 from .polynomial import shift
-from .trajectory import Event, Segment, Steps, Trajectory
+from .segments import Segment, Segments
+from .trajectory import Steps, Trajectory
 
 
 def forward(run: Trajectory) -> Trajectory:
@@ -26,8 +28,8 @@ def forward(run: Trajectory) -> Trajectory:
         run,
         t=run.t[::-1].copy(),
         x=run.x[::-1].copy(),
-        events=[Event("end", last, run.x[0], mode, mode)],
-        segments=[Segment(mode, float(run.t[-1]), last, 0, count)],
+        events=Events.of([Event("end", last, run.x[0], mode, mode)]),
+        segments=Segments.of([Segment(mode, float(run.t[-1]), last, 0, count)]),
         steps=Steps(starts, coefficients[::-1]),
     )
 
@@ -40,8 +42,8 @@ def straight(run: Trajectory, t: float, x: Array) -> Trajectory:
         run,
         t=np.array([t, end]),
         x=np.array([x, run.x[0]]),
-        events=[Event("end", end, run.x[0], mode, mode)],
-        segments=[Segment(mode, t, end, 0, 1)],
+        events=Events.of([Event("end", end, run.x[0], mode, mode)]),
+        segments=Segments.of([Segment(mode, t, end, 0, 1)]),
         steps=Steps(np.array([t]), [np.column_stack([x, slope])]),
     )
 
@@ -52,17 +54,18 @@ def until(run: Trajectory, t: float) -> Trajectory:
     kept = run.t < t
     mode = next((s.mode for s in run.segments if t <= s.t_end), run.segments[-1].mode)
     x = run(t)
+    events = [e for e in run.events if e.kind != "end" and e.t < t]
+    segments = [
+        Segment(s.mode, s.t_start, min(s.t_end, t), s.first, min(s.last, count))
+        for s in run.segments
+        if s.t_start < t
+    ]
     return replace(
         run,
         t=np.append(run.t[kept], t),
         x=np.vstack([run.x[kept], x]),
-        events=[e for e in run.events if e.kind != "end" and e.t < t]
-        + [Event("end", t, x, mode, mode)],
-        segments=[
-            Segment(s.mode, s.t_start, min(s.t_end, t), s.first, min(s.last, count))
-            for s in run.segments
-            if s.t_start < t
-        ],
+        events=Events.of([*events, Event("end", t, x, mode, mode)]),
+        segments=Segments.of(segments),
         steps=run.steps.part(0, count),
     )
 
@@ -93,8 +96,8 @@ def join(pieces: Sequence[Trajectory]) -> Trajectory:
         pieces[-1],
         t=np.concatenate(times),
         x=np.vstack(states),
-        events=events,
-        segments=segments,
+        events=Events.of(events),
+        segments=Segments.of(segments),
         steps=Steps(
             np.concatenate([p.steps.starts for p in pieces]),
             [c for p in pieces for c in p.steps.coefficients],

@@ -30,10 +30,12 @@ from . import messages
 from .engine.arrays import Run, guard_of
 from .engine.convert import message_of
 from .engine.tape import tape_for
+from .events import Event, Events
 from .names import guard_name
 from .options import Options, tolerances
+from .segments import Segment, Segments
 from .status import ADVICE, Status
-from .trajectory import Event, Segment, Steps, Trajectory
+from .trajectory import Steps, Trajectory
 
 
 def follow(
@@ -156,8 +158,8 @@ def _stuck(
         parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),
         t=np.array([t]),
         x=x[None, :],
-        events=[Event("end", t, x, mode, mode, str(status))],
-        segments=[Segment(mode, t, t, 0, 0)],
+        events=Events.of([Event("end", t, x, mode, mode, str(status))]),
+        segments=Segments.of([Segment(mode, t, t, 0, 0)]),
         status=status,
         message=f"{message} {ADVICE[status]}",
     )
@@ -181,12 +183,13 @@ def _trajectory(
     coefficients = run.coefficients[:, rows] * flips
     coefficients[:, n:] *= sign  # the time of the flow is -t
     events = list[Event]()
-    for k, code in enumerate(run.event_guards.tolist()):
+    happened = run.each()
+    for k, (code, time, state) in enumerate(happened):
         at = made.stops[guard_of(made.system, code).index]
-        guard, last = made.guards[at], status is Status.STOPPED and k == len(run.event_kinds) - 1
-        kind, x = "stop" if last else "zero", run.event_x[k, :n].copy()
+        guard, last = made.guards[at], status is Status.STOPPED and k == len(happened) - 1
+        kind, x = "stop" if last else "zero", state[:n].copy()
         of = (guard.element, guard.side)
-        events.append(Event(kind, float(sign * run.event_t[k]), x, mode, mode, names[at], x, *of))
+        events.append(Event(kind, sign * time, x, mode, mode, names[at], x, *of))
     end, x_end = float(t[-1]), run.x[-1, :n].copy()
     if status is Status.REACHED_END:
         message = messages.reached_end(end)
@@ -203,8 +206,8 @@ def _trajectory(
         parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),
         t=t,
         x=run.x[:, :n].copy(),
-        events=events,
-        segments=[Segment(mode, float(t[0]), end, 0, len(run.starts))],
+        events=Events.of(events),
+        segments=Segments.of([Segment(mode, float(t[0]), end, 0, len(run.starts))]),
         status=status,
         message=f"{message} {ADVICE[status]}",
         steps=Steps(sign * run.starts, coefficients),

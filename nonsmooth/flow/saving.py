@@ -23,7 +23,7 @@ from . import archive, files
 from .schema import Schema, Validator
 from .status import Status
 
-_FORMAT = 2
+_FORMAT = 3
 _FIELDS: dict[str, type[Any]] = {}
 _SCHEMAS: dict[type[Any], Schema] = {}
 C = TypeVar("C", bound=type[Any])
@@ -141,6 +141,9 @@ class _Writer:
     def __init__(self) -> None:
         self.rows: dict[str, list[NDArray[Any]]] = {}
         self.sizes: dict[str, int] = {}
+        self.written: dict[
+            int, tuple[NDArray[Any], Any]
+        ] = {}  # arrays by identity, as long as they live
         self.systems: list[FilippovSystem] = []
 
     def tree(self, value: Any) -> Any:
@@ -175,11 +178,15 @@ class _Writer:
             raise OptionError(
                 f"save cannot write an array of {value.dtype}. Save arrays of numbers."
             )
+        if id(value) in self.written:
+            return self.written[id(value)][1]
         kind = value.dtype.name
         start = self.sizes.get(kind, 0)
         self.rows.setdefault(kind, []).append(np.ascontiguousarray(value).ravel())
         self.sizes[kind] = start + value.size
-        return {"array": [kind, start, list(value.shape)]}
+        made = {"array": [kind, start, list(value.shape)]}
+        self.written[id(value)] = value, made
+        return made
 
     def _number(self, system: FilippovSystem) -> int:
         for k, known in enumerate(self.systems):
@@ -222,11 +229,12 @@ def _read(path: str | bytes | os.PathLike[Any]) -> Any:
 
 
 class _Reader:
-    """Values from a tree and rows of numbers, of which each is used once."""
+    """Values from a tree and rows of numbers, of which each is in one array."""
 
     def __init__(self, rows: Mapping[str, NDArray[Any]]):
         self.rows = rows
         self.left = {kind: row.size for kind, row in rows.items()}
+        self.arrays: dict[tuple[Any, ...], NDArray[Any]] = {}  # one array may be in several places
         self.systems: list[FilippovSystem] = []
 
     def value(self, tree: Any) -> Any:
@@ -253,11 +261,15 @@ class _Reader:
     def _array(self, kind: str, start: int, shape: list[Any]) -> NDArray[Any]:
         if not all(type(k) is int and 0 <= k <= _LONGEST for k in shape):
             raise ValueError(f"an array of shape {shape}")
+        if (kind, start, *shape) in self.arrays:
+            return self.arrays[kind, start, *shape]
         size = math.prod(shape)
         self.left[kind] -= size
         if start < 0 or start + size > self.rows[kind].size or self.left[kind] < 0:
             raise ValueError("arrays that are larger than what the file holds")
-        return self.rows[kind][start : start + size].reshape(shape).copy()
+        made = self.rows[kind][start : start + size].reshape(shape).copy()
+        self.arrays[kind, start, *shape] = made
+        return made
 
     def _object(self, cls: type[Any], fields: dict[str, Any]) -> Any:
         if {*fields} != {field.name for field in dataclasses.fields(cls)}:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,8 +24,9 @@ from ..model import (
     with_section,
 )
 from .constants import KINDS
+from .events import Events, Label
 from .saving import savable
-from .trajectory import Event, Trajectory
+from .trajectory import Trajectory
 
 #: Kinds of events that a section can be at: all but the end.
 KINDS_OF_SECTIONS = KINDS[:-1]
@@ -115,32 +115,23 @@ class Hits:
         """Number of the event that ends a run."""
         return math.inf if self.count is None else self.skip + self.every * self.count
 
-    def has(self, t: float, kind: str, name: str, before: str) -> bool:
-        """Whether an event is at the section."""
-        if (
-            t <= self.begin
-            or kind not in self.kinds
-            or (self.names is not None and name not in self.names)
-        ):
+    def has(self, label: Label) -> bool:
+        """Whether events of a label are at the section."""
+        named = self.names is None or label.name in self.names
+        if label.kind not in self.kinds or not named:
             return False
-        return self.letter is None or before[self.letter[0]] == self.letter[1]
+        return self.letter is None or label.mode_before[self.letter[0]] == self.letter[1]
 
-    def select(self, events: Sequence[Event]) -> list[Event]:
-        """Return the events that are sampled."""
-        hits = [e for e in events if self.has(e.t, e.kind, e.name, e.mode_before)]
-        kept = hits[self.skip + self.every - 1 :: self.every]
-        return kept if self.count is None else kept[: self.count]
-
-    def fill(self, events: Sequence[Event], t: Array, x: Array) -> None:
-        """Write the samples into arrays (K,) and (K, n)."""
-        found = self.select(events)[: len(t)]
-        if not found:
-            return
-        times = np.array([event.t for event in events])
-        for k, event in enumerate(found):
-            own = np.flatnonzero(times == event.t)  # the events of its instant
-            t[k] = event.t
-            x[k] = events[own[-1]].x_after if self.after else events[own[0]].x
+    def samples(self, events: Events) -> tuple[Array, Array]:
+        """Times (K,) and states (K, n) of the events that are sampled."""
+        own = np.array([self.has(label) for label in events.labels], bool)
+        hits = np.flatnonzero((events.t > self.begin) & own[events.codes])
+        t = events.t[hits[self.skip + self.every - 1 :: self.every][: self.count]]
+        # the first and the last of the events of an instant
+        if self.after:
+            k = np.searchsorted(events.t, t, side="right") - 1
+            return t, events.states[events.rows[k] + events.jumps[k]]
+        return t, events.states[events.rows[np.searchsorted(events.t, t, side="left")]]
 
 
 @dataclass(frozen=True)
@@ -310,12 +301,12 @@ def _strobe(section: Section, period: float | str, t_start: float, t_end: float,
     return Times((), period, t_start, section.every, section.skip, count)
 
 
-def sampled(run: Trajectory, times: Array) -> tuple[Array, Array]:
-    """Return times (K,) and states (K, n) of a run; NaN beyond its end."""
+def sampled(run: Trajectory, times: Array, read: Array | None) -> tuple[Array, Array]:
+    """Return times (K,) and states (K, n) of a run; NaN beyond its end. ``read``: those before it, if known."""
     t, x = np.full(times.shape, np.nan), np.full((times.size, run.x.shape[1]), np.nan)
     last = float(run.t[-1])
     within, ends = times < last, times == last
     t[within | ends] = times[within | ends]
-    x[within] = run(times[within])
+    x[within] = run(times[within]) if read is None else read
     x[ends] = run.x[-1]
     return t, x

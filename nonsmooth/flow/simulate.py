@@ -6,16 +6,16 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, OptionError, Parameters, require_system
 from .engine.convert import trajectory
 from .engine.tape import tape_for
 from .ensembles.starts import require_start, require_start_mode
+from .events import Event
 from .options import Options, tolerances
-from .section import Section, Times, read_sampling, sampled, sectioned
-from .trajectory import Event, Trajectory
+from .section import Section, read_sampling, sampled, sectioned
+from .trajectory import Trajectory
 
 
 def simulate(
@@ -37,6 +37,7 @@ def simulate(
     rest_below: float | None = None,
     t_eval: ArrayLike | None = None,
     at: Any = None,
+    dense: bool = True,
 ) -> Trajectory:
     """Integrate a Filippov system through crossings, sliding, stops and resets.
 
@@ -78,6 +79,10 @@ def simulate(
     at : Section, str, number or expression, optional
         Keep the states at a section: at a surface, stop, reset or impact of that name, at a kind of
         event, or after each period. See :class:`Section`.
+    dense : bool, optional
+        Keep the polynomials of the steps, so that the result can be read at any time. ``False`` keeps points,
+        events, segments and samples, which need an eighth of the memory or less. Such a run can be continued
+        from its end, but not from its other events if the system has stops, resets or impacts.
 
     Returns
     -------
@@ -116,12 +121,10 @@ def simulate(
     ('- + - + s', True)
     """
     require_system(system, sets=True, hysteresis=True)
-    if start is not None:
-        x0, t_start, parameters = _continued(start, x0, t_start, parameters)
-    elif x0 is None:
-        raise OptionError("x0 is missing. Give a start, or start= with a run or event to continue.")
+    x0, t_start, parameters = _begun(start, x0, t_start, parameters)
     if t_end is None:
         raise OptionError("t_end is missing. Give the time at which the run ends.")
+    _require_flag(dense)
     rtol, atol = tolerances(tol, rtol, atol)
     options = Options(
         t_end=t_end,
@@ -151,46 +154,50 @@ def simulate(
         options = replace(options, hits=sampling.hits)
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
-    return _with_samples(_run(system, x, p, options, times, motion, mode), options, times, p)
+    read_at = None if times is None else times.of(p)
+    run = tape_for(system, options).run(x, p, options, read_at, motion, mode, dense)
+    return _with_samples(trajectory(system, p, options, run), options, read_at, run.sample_x)
 
 
-def _continued(
-    start: Trajectory | Event, x0: Any, t_start: float, parameters: Any
-) -> tuple[Array, float, Any]:
-    """State, time and parameters at which a run or event is continued."""
+def _require_flag(dense: object) -> None:
+    if not isinstance(dense, bool):
+        raise OptionError(f"dense is {dense!r}. Give True or False.")
+
+
+def _with_samples(
+    made: Trajectory, options: Options, read_at: Array | None, read: Array
+) -> Trajectory:
+    """Add the samples to a run; ``read`` are those at times if it is not dense."""
+    if read_at is not None:
+        t, states = sampled(made, read_at, None if made.dense else read)
+    elif options.hits is not None:
+        t, states = options.hits.samples(made.events)
+    else:
+        return made
+    return replace(made, sample_t=t, sample_x=states)
+
+
+def _begun(
+    start: Trajectory | Event | None, x0: Any, t_start: float, parameters: Any
+) -> tuple[Any, float, Any]:
+    """State, time and parameters at the start, or where a run or event is continued."""
+    if start is None:
+        if x0 is None:
+            raise OptionError(
+                "x0 is missing. Give a start, or start= with a run or event to continue."
+            )
+        return x0, t_start, parameters
     if not isinstance(start, (Trajectory, Event)):
         raise OptionError(
             f"start is {start!r}. Give a run of nonsmooth.simulate or one of its events."
         )
     if x0 is not None or t_start != 0.0:
         raise OptionError("start= has a state and a time. Leave out x0 and t_start.")
+    if isinstance(start, Event) and start.motion is not None and not len(start.motion):
+        raise OptionError(
+            "start is an event within a run with dense=False, which keeps what a restart needs at its end "
+            "only. Continue from the run, or simulate it with dense=True."
+        )
     if isinstance(start, Event):
         return start.x_after, start.t, parameters
     return start.x[-1], float(start.t[-1]), start.parameters if parameters is None else parameters
-
-
-def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Array) -> Trajectory:
-    """Add the samples to a run."""
-    if times is not None:
-        t, x = sampled(run, times.of(p))
-        return replace(run, sample_t=t, sample_x=x)
-    if options.hits is None:
-        return run
-    kept = options.hits.select(run.events)
-    t, x = np.empty(len(kept)), np.empty((len(kept), run.x.shape[1]))
-    options.hits.fill(run.events, t, x)
-    return replace(run, sample_t=t, sample_x=x)
-
-
-def _run(
-    system: FilippovSystem,
-    x: Array,
-    p: Array,
-    options: Options,
-    times: Times | None,
-    motion: Array | None,
-    mode: str | None,
-) -> Trajectory:
-    read_at = None if times is None else times.of(p)
-    run = tape_for(system, options).run(x, p, options, read_at, motion, mode)
-    return trajectory(system, p, options, run)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..model import OptionError
 from .status import Status
 
@@ -38,10 +36,12 @@ def trajectory_table(run: Trajectory, what: str) -> Any:
         index = pandas.Index(run.sample_t, name="t")
         frame = pandas.DataFrame(run.sample_x, columns=names, index=index)
     elif what == "events":
-        columns = ("t", "kind", "name", "element", "side", "mode_before", "mode_after")
-        frame = pandas.DataFrame({c: [getattr(e, c) for e in run.events] for c in columns})
-        for suffix, attribute in (("", "x"), ("_after", "x_after")):
-            states = np.array([getattr(e, attribute) for e in run.events]).reshape(-1, len(names))
+        events, labels = (
+            run.events,
+            ("kind", "name", "element", "side", "mode_before", "mode_after"),
+        )
+        frame = pandas.DataFrame({"t": events.t} | {c: events.column(c) for c in labels})
+        for suffix, states in (("", events.x), ("_after", events.x_after)):
             for i, name in enumerate(names):
                 frame[name + suffix] = states[:, i]
     else:

@@ -9,88 +9,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model import Array, FilippovSystem, PointError, real_array
+from ..model import Array, FilippovSystem, OptionError, PointError, real_array
 from ..notebook import card, lines
 from . import tables
+from .events import Events
 from .names import shown_mode
 from .saving import Savable, savable
+from .segments import Segments, ShownMode
 from .status import Status
 
 #: Coefficients that are read at once, so that they stay in the cache.
 _BLOCK = 1 << 17
 
-
-@savable(x="n", x_after="n", motion="* nan")
-@dataclass(frozen=True)
-class Event:
-    """Something that happened at one instant.
-
-    Attributes
-    ----------
-    kind : {"crossing", "entry", "exit", "stop", "reset", "zero", "end"}
-        ``entry`` and ``exit`` are of sliding; ``zero`` is a zero found by ``follow``.
-    t : float
-        Time of the event.
-    x : ndarray (n,)
-        State before a reset, on the surface otherwise.
-    mode_before, mode_after : str
-        Equal at a stop, a zero and the end. After a reset the mode that starts there, also where
-        the jump went through a surface.
-    name : str
-        Of the surface (``h0``, ``h1``, ...), the limit of a multiplier at which sliding ends
-        (``lambda0 = 1``, ``lambda0 = -1``, ``|lambda0| = 1`` of a set), the stop, reset, impact or
-        function.
-    x_after : ndarray (n,)
-        State after a reset, ``x`` otherwise.
-    element : int
-        What it belongs to: position of the surface, set or contact among the letters of the modes;
-        number of the stop or reset, clocks counted after the resets; -1 for none.
-    side : int
-        Of a crossing or entry the side, +1 or -1, from which the motion comes; of the end of sliding
-        the one to which it goes; of a stop or reset its direction; of an impact 1; otherwise 0.
-    motion : ndarray or None
-        Sides of all conditions and what else is due then, for ``simulate(system, start=event)``.
-    """
-
-    kind: str
-    t: float
-    x: Array
-    mode_before: str
-    mode_after: str
-    name: str = ""
-    x_after: Array = None  # type: ignore[assignment]  # x unless given
-    element: int = -1
-    side: int = 0
-    motion: Array | None = field(default=None, repr=False)
-
-    def __post_init__(self) -> None:
-        if self.x_after is None:
-            object.__setattr__(self, "x_after", self.x)
-
-
-@savable()
-@dataclass(frozen=True)
-class Segment:
-    """A stretch of motion in one mode, between two events.
-
-    Attributes
-    ----------
-    mode : str
-        One letter for each surface, and one for each impact.
-    t_start, t_end : float
-        Times at which it begins and ends.
-    first, last : int
-        Its steps are those with the numbers ``first`` to ``last - 1`` of ``Trajectory.steps``.
-    discrete : tuple of float
-        Values of the discrete states.
-    """
-
-    mode: str
-    t_start: float
-    t_end: float
-    first: int
-    last: int
-    discrete: tuple[float, ...] = ()
+#: Letters of an itinerary in a representation.
+_SHOWN = 40
 
 
 @savable(starts="s", coefficients="s; N *")
@@ -186,10 +118,13 @@ class Facts:
     unproved : bool
         One solution was found for more than eight elements that act on one another, and no test shows that it
         is the only one.
+    rested_below : tuple of str
+        Names of what ``rest_below=`` put to rest: the run is off by its speed there.
     """
 
     depends_on_widths: bool = False
     unproved: bool = False
+    rested_below: tuple[str, ...] = ()
 
 
 def _require_whole(run: Trajectory) -> None:
@@ -197,7 +132,8 @@ def _require_whole(run: Trajectory) -> None:
     steps = np.diff(run.t)
     if not len(run.t) or ((steps < 0).any() and (steps > 0).any()):
         raise ValueError("Trajectory.t: it is empty or turns back")
-    if any(not 0 <= s.first <= s.last <= len(run.steps) for s in run.segments):
+    first, last = run.segments.first, run.segments.last
+    if ((first < 0) | (last < first) | (last > len(run.steps))).any():
         raise ValueError("Trajectory.segments: they have other steps than the run")
 
 
@@ -215,12 +151,12 @@ class Trajectory(
         Name and value of every parameter of the run.
     t, x : ndarray (m,), (m, n)
         Accepted steps and events, both ends included; a reset appears twice at its time.
-    events : list of Event
-        What happened, in order of time; the last one is the end.
+    events : Events
+        What happened, in order of time: a sequence of Event. The last one is the end.
     itinerary : str
         Modes in order, separated by blanks.
-    segments : list of Segment
-        Pieces in one mode each, between events.
+    segments : Segments
+        Pieces in one mode each, between events: a sequence of Segment.
     status : Status
         Why the run ended.
     message : str
@@ -228,7 +164,7 @@ class Trajectory(
     accumulation_time : float or None
         Estimated limit of the event times when the status is ACCUMULATION.
     steps : Steps
-        Accepted steps with their Taylor polynomials.
+        Accepted steps with their Taylor polynomials; empty with ``dense=False``.
     sample_t, sample_x : ndarray (K,), (K, n) or None
         Times and states of the samples by ``t_eval`` (NaN after an early end) or ``at``.
     continuations : list of Continuation
@@ -236,14 +172,16 @@ class Trajectory(
         known.
     facts : Facts
         What the decisions of the run rest on.
+    dense : bool
+        Whether the polynomials were kept, so that the run can be read between its points.
     """
 
     system: FilippovSystem
     parameters: dict[str, float]
     t: Array
     x: Array
-    events: list[Event]
-    segments: list[Segment]
+    events: Events
+    segments: Segments
     status: Status
     message: str
     accumulation_time: float | None = None
@@ -252,12 +190,20 @@ class Trajectory(
     sample_x: Array | None = None
     continuations: list[Continuation] = field(default_factory=list)
     facts: Facts = field(default_factory=Facts)
+    dense: bool = True
 
     @property
     def itinerary(self) -> str:
         """Modes in order, separated by blanks, e.g. ``"- s -"``."""
-        shown = [shown_mode(self.system, s.mode, s.discrete) for s in self.segments]
-        return " ".join(mode or "o" for mode in shown)
+        return self._itinerary(len(self.segments))
+
+    def _itinerary(self, most: int) -> str:
+        """The first modes of the itinerary."""
+        shown: dict[ShownMode, str] = {}
+        for one in (modes := self.segments.shown(most)):
+            if one not in shown:
+                shown[one] = shown_mode(self.system, one.mode, one.discrete) or "o"
+        return " ".join([shown[one] for one in modes])
 
     def __call__(self, t: ArrayLike, side: str = "right") -> Array:
         """Evaluate the dense output.
@@ -278,6 +224,8 @@ class Trajectory(
         ------
         PointError
             Times outside the run, or another ``side``.
+        OptionError
+            A time between two points of a run with ``dense=False``.
         """
         if side not in ("right", "left"):
             raise PointError(f'side is {side!r}. Give "right" or "left".')
@@ -290,6 +238,8 @@ class Trajectory(
                 f"the run ended with status {self.status}. {self.message}"
             )
         n = self.x.shape[1]
+        if not self.dense:
+            return self._at_points(times, side)
         if not len(self.steps):
             return np.broadcast_to(self.x[-1], (*times.shape, n)).copy()
         forward = bool(self.t[-1] >= self.t[0])
@@ -299,6 +249,32 @@ class Trajectory(
         else:
             found[times == self.t[0]] = self.x[0]
         return found
+
+    def _at_points(self, times: Array, side: Any) -> Array:
+        """States at points of the run."""
+        k = np.searchsorted(self.t, times, side=side) - (side == "right")
+        k = np.clip(k, 0, len(self.t) - 1)
+        if not np.array_equal(self.t[k], times):
+            self.require_dense("the run between its points")
+        return self.x[k]
+
+    def require_dense(self, what: str) -> None:
+        """Raise an error if the run has no polynomials.
+
+        Parameters
+        ----------
+        what : str
+            What needs them, for the message.
+
+        Raises
+        ------
+        OptionError
+            The run was simulated with ``dense=False``.
+        """
+        if not self.dense:
+            raise OptionError(
+                f"dense=False kept no polynomials of this run, which {what} needs. Simulate with dense=True."
+            )
 
     def to_pandas(self, what: str = "points") -> Any:
         """Return a DataFrame: steps and events in time, a row each event, or the samples.
@@ -341,11 +317,13 @@ class Trajectory(
         """Notebook representation: status, itinerary, states over time."""
         rows = (
             ("time", f"{self.t[0]:g} to {self.t[-1]:g}, {len(self.events)} events"),
-            ("itinerary", _shorten(self.itinerary)),
+            ("itinerary", self._shown_itinerary()),
             ("status", self.status),
             ("message", "" if self.status.complete else self.message),
         )
         times = np.linspace(self.t[0], self.t[-1], 240)
+        if not self.dense:
+            times = self.t[:: max(1, len(self.t) // 240)]
         states = self(times) if self.t[-1] > self.t[0] else self.x[:1]
         return card(
             "Trajectory", rows, lines(times[: len(states)], states, self.system.state_names)
@@ -354,9 +332,9 @@ class Trajectory(
     def __repr__(self) -> str:
         return (
             f"Trajectory(t = {self.t[0]:g} .. {self.t[-1]:g}, {len(self.t)} points, "
-            f"{len(self.events)} events, itinerary {_shorten(self.itinerary)!r}, {self.status})"
+            f"{len(self.events)} events, itinerary {self._shown_itinerary()!r}, {self.status})"
         )
 
-
-def _shorten(text: str, width: int = 40) -> str:
-    return text if len(text) <= width else text[: width - 4] + " ..."
+    def _shown_itinerary(self) -> str:
+        text = self._itinerary(_SHOWN)
+        return text if len(text) <= _SHOWN else text[: _SHOWN - 4] + " ..."

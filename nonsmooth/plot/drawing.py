@@ -271,18 +271,18 @@ def _checked_look(look: dict[str, Any]) -> dict[str, Any]:
     return own
 
 
-#: Entries of the legends of axes on which several pictures are drawn.
-_KEYS: WeakKeyDictionary[Axes, dict[str, Any]] = WeakKeyDictionary()
+#: Entries and position of the legends of axes on which several pictures are drawn.
+_KEYS: WeakKeyDictionary[Axes, tuple[dict[str, Any], dict[str, Any]]] = WeakKeyDictionary()
 
 
 def key(ax: Axes, handles: list[Any], **options: Any) -> None:
-    """Draw the legend of axes; entries of earlier pictures on the same axes stay."""
-    entries = _KEYS.setdefault(ax, {})
-    if ax.get_legend() is None:
-        entries.clear()
+    """Draw the legend of axes; entries and position of an earlier one that this function drew stay."""
+    if ax not in _KEYS or ax.get_legend() is None:
+        _KEYS[ax] = {}, {"loc": "best", **options}
+    entries, place = _KEYS[ax]
     entries |= {handle.get_label(): handle for handle in handles}
     if entries:
-        ax.legend(list(entries.values()), list(entries), **{"loc": "best", **options})
+        ax.legend(list(entries.values()), list(entries), **place)
 
 
 def _palette(colors: Iterable[Any]) -> ListedColormap:

@@ -6,6 +6,8 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
+from .drawing import key
+
 _NARROW = 4.6  # inches: a legend beside the axes would leave little room
 _SHORT = 20  # letters of entries of which two are side by side in a column
 
@@ -25,4 +27,4 @@ def beside(ax: Axes, handles: list[Any], **options: Any) -> None:
         figure.legend(handles=handles, loc="outside lower center", ncols=columns)
         return
     look = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "borderaxespad": 0.0}
-    ax.legend(handles=handles, **{**look, **options})
+    key(ax, handles, **{**look, **options})

@@ -139,8 +139,8 @@ def test_an_orbit_has_its_modes_and_lies_over_a_portrait():
     words = [text.get_text() for text in ax.get_legend().get_texts()]
     assert words == ["mode \N{MINUS SIGN}", "mode s", "event", "surface"]
     under = ns.plot.phase_portrait(block, (-2, 2, -1, 1))
-    figure = ns.plot.periodic_orbit(orbit, ax=under.axes[0])
-    assert figure is under
+    assert ns.plot.periodic_orbit(orbit, ax=under.axes[0]) is under.axes[0]
+    assert len(under.axes[0].get_legend().get_texts()) > 4  # of both
 
 
 def test_multipliers_are_where_they_are_and_along_a_branch_coloured(relay):

@@ -40,7 +40,8 @@ static double sure_root(Run *r, const Expansion *e, int row, const double *c, in
   double low = first_low(c, n, end, LOW, 0);
   if (low > 0) {
     floor = guard_noise(r, e, row, from + low);
-    if (from > 0) floor += ROUNDING * (fabs(g[0]) + rest_of(g, r->order, from + low)); /* of the shift by ``from`` */
+    if (from > 0) /* of the shift by ``from``, and of what was known to be zero before it */
+      floor += ROUNDING * (fabs(g[0]) + rest_of(g, r->order, from + low)) + left_out(g + known, known, from + low);
     floor = (floor / pow(from + low, known) + left_out(c, drop, low)) / pow(low, drop);
     if (floor > 0) low = first_low(c, n, end, LOW, floor);
   }

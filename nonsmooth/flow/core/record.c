@@ -33,6 +33,7 @@ static void renote(Run *r) {
 static void enter_segment(Run *r, int mode) {
   Tree *tree = &r->table->tree;
   if (mode == r->segment_mode) return;
+  if (r->o.dense) { r->segment_mode = mode; return; } /* that of its steps is written */
   if (r->segment_steps == 0) r->itinerary = tree->node[r->itinerary].parent;
   if (r->itinerary < 0) r->itinerary = 0;
   r->itinerary = tree_child(tree, r->itinerary, mode);

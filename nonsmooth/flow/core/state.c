@@ -248,10 +248,10 @@ Table *table_new(int32_t width) {
 int32_t table_modes(const Table *t) { return t->count; }
 int32_t table_size(const Table *t) { return t->tree.size; }
 void table_read(const Table *t, int32_t *parent, int32_t *mode, int8_t *letter) {
-  for (int32_t k = 0; k < t->tree.size; k++) {
+  for (int32_t k = 0; parent && k < t->tree.size; k++) {
     parent[k] = t->tree.node[k].parent;
     mode[k] = t->tree.node[k].mode;
   }
-  memcpy(letter, t->letter, (size_t)t->count * t->width);
+  if (letter) memcpy(letter, t->letter, (size_t)t->count * t->width);
 }
 void table_free(Table *t) { free(t->tree.node); free(t->letter); free(t->bucket); free(t); }

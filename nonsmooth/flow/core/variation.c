@@ -302,10 +302,13 @@ static int begin_leg(Run *r, const Leg *l) {
   memcpy(r->letter, l->letter, r->width);
   find_idle(r);
   const double *h = surface_values(r, r->x);
-  for (int i = 0; i < r->m; i++) {
-    if (set_of(r, i) < 0 || r->letter[i] == 0) continue;
-    r->letter[i] = r->idle[set_of(r, i)] ? IDLE : r->letter[i] == OFF ? LEFT_BEHIND : LEAVING;
-    r->unknowns[i] = h[i];
+  EACH_SET(r, f) {
+    if (r->letter[f] == 0) continue;
+    int k = size_of(r, f), stays = r->idle[f] && !(length_of(h + f, k) > 0); /* friction that a parameter may bring acts */
+    for (int i = f; i < f + k; i++) {
+      r->letter[i] = stays ? IDLE : r->letter[i] == OFF ? LEFT_BEHIND : LEAVING;
+      r->unknowns[i] = h[i];
+    }
   }
   lay_out(r, r->letter, &r->now);
   mode_solutions(r, &r->now, &all);

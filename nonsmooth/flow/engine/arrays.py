@@ -1,11 +1,12 @@
-"""What Python and the drivers in C share: structures of options and batches, a dense run as arrays."""
+"""What Python and the drivers in C share: structures of options and batches, a run as arrays."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,9 +57,42 @@ class BatchStructure(ctypes.Structure):
     ]
 
 
+class Happened(NamedTuple):
+    """Events and segments of a run as arrays.
+
+    Attributes
+    ----------
+    event_t, event_rows, event_jumps : ndarray (e + 1,)
+        Events, and the end of the run: time, row of the state in ``states``, whether the state after it is the
+        next row.
+    event_codes, keys : ndarray (e + 1,), sequence of tuple
+        What an event is, as a position in the keys (the end is after them): kind (position in
+        ``facts.KINDS``), modes before and after, guard (``guard_of``) or -1.
+    states : ndarray
+        The points of the run, then what else is the state of an event.
+    event_motions : ndarray (e, w)
+        What a restart after each event needs; empty without dense output.
+    segment_modes, segment_starts : ndarray (k,), (k + 1,)
+        Segments: numbers of their modes, and times at which they begin, and the last one ends.
+    segment_firsts : ndarray (k,)
+        Numbers of the first steps of the segments; zero without dense output.
+    """
+
+    event_t: Array
+    event_rows: NDArray[np.int64]
+    event_jumps: NDArray[np.bool_]
+    event_codes: NDArray[np.int32]
+    event_motions: Array
+    segment_modes: NDArray[np.int32]
+    segment_starts: Array
+    segment_firsts: NDArray[np.int64]
+    states: Array
+    keys: Sequence[tuple[int, ...]]
+
+
 @dataclass
 class Run:
-    """One dense run as arrays.
+    """One run as arrays.
 
     Attributes
     ----------
@@ -70,7 +104,6 @@ class Run:
         Last mode.
     limit : float
         Accumulation time or NaN.
-    itinerary : str
     letters : sequence of str
         Modes by number.
     active : list of int
@@ -85,14 +118,20 @@ class Run:
         A stop or reset, in this order, that was true at the start and did not happen, or -1.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
-    starts, coefficients, modes : ndarray (s,), (s, N, P+1), (s,)
-        Steps: start times, Taylor coefficients, numbers of modes.
-    event_kinds, event_t, event_x, event_after_x : ndarray (e,) or (e, n)
-    event_before, event_after, event_guards : ndarray (e,)
-        Events: kind (position in ``facts.KINDS``), modes before and after, guard (``guard_of``) or -1.
-        The final "end" is not among them.
-    event_motions, motion : ndarray (e, w), (w,)
-        What a restart needs besides the state, after each event and at the end.
+    motion : ndarray (w,)
+        What a restart at the end needs besides the state.
+    dense : bool
+        Whether the following were kept.
+    starts, coefficients : ndarray (s,), (s, N, P+1)
+        Steps: start times, Taylor coefficients.
+    sample_x : ndarray (K, n)
+        States at the times before the end at which the run was to be read, unless it is dense.
+    event_count : int
+        Number of events but the end.
+    make_happened : callable
+        Makes events and segments, when they are first looked at.
+    few : mapping or None
+        What the driver wrote, by name, if events and steps are few.
     labels : sequence of tuple
         Values of the discrete states by number of mode; empty without any.
     """
@@ -102,7 +141,6 @@ class Run:
     where: int
     mode: int
     limit: float
-    itinerary: str
     letters: Sequence[str]
     active: list[int]
     several: list[str]
@@ -111,65 +149,30 @@ class Run:
     unmet: int
     t: Array
     x: Array
-    starts: Array
-    coefficients: Array
-    modes: NDArray[np.int32]
-    event_kinds: NDArray[np.int32]
-    event_t: Array
-    event_x: Array
-    event_after_x: Array
-    event_before: NDArray[np.int32]
-    event_after: NDArray[np.int32]
-    event_guards: NDArray[np.int32]
-    event_motions: Array
     motion: Array
     labels: Sequence[tuple[float, ...]]
+    dense: bool
+    starts: Array
+    coefficients: Array
+    sample_x: Array
+    event_count: int
+    make_happened: Callable[[], Happened]
+    few: Mapping[str, NDArray[Any]] | None
 
-    @classmethod
-    def of(
-        cls,
-        whole: dict[str, NDArray[Any]],
-        n: int,
-        numbers: Sequence[float],
-        counts: Sequence[int],
-        itinerary: str,
-        letters: Sequence[str],
-        active: list[int],
-        several: list[str],
-        rates: Array,
-        motion: Array,
-        labels: Sequence[tuple[float, ...]],
-    ) -> Run:
-        """Put together what a run wrote, and what the driver says of its end."""
-        return cls(
-            status=counts[0],
-            reason=counts[1],
-            where=counts[2],
-            mode=counts[3],
-            limit=numbers[1],
-            itinerary=itinerary,
-            letters=letters,
-            active=active,
-            several=several,
-            rates=rates,
-            facts=counts[12],
-            unmet=counts[13],
-            t=whole["point_t"],
-            x=whole["point_x"][:, :n],
-            starts=whole["start"],
-            coefficients=whole["coefficients"],
-            modes=whole["step_mode"],
-            event_kinds=whole["event_kind"],
-            event_t=whole["event_t"],
-            event_x=whole["event_x"][:, :n],
-            event_after_x=whole["event_after_x"][:, :n],
-            event_before=whole["event_before"],
-            event_after=whole["event_after"],
-            event_guards=whole["event_guard"],
-            event_motions=whole["event_motion"],
-            motion=motion,
-            labels=labels,
-        )
+    @cached_property
+    def happened(self) -> Happened:
+        """Events and segments."""
+        return self.make_happened()
+
+    def each(self) -> list[tuple[int, float, Array]]:
+        """Guard, time and state of each event but the end."""
+        if self.few is not None:
+            rows, t, x = (self.few[f"event_{name}"] for name in ("guard", "t", "x"))
+            return [*zip(rows.tolist(), t.tolist(), x, strict=True)]
+        found = self.happened
+        guards = [found.keys[code][-1] for code in found.event_codes[:-1]]
+        states = found.states[found.event_rows[:-1]]
+        return [*zip(guards, found.event_t.tolist()[:-1], states, strict=True)]
 
 
 def guard_of(system: FilippovSystem, code: int) -> Guard:

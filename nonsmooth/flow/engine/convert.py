@@ -3,42 +3,45 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
 
 from ...model import Array, FilippovSystem, Guard
 from .. import messages
 from ..constants import DEPENDS_ON_WIDTHS, KINDS, REASONS, UNPROVED
+from ..events import NOT_KEPT, Event, Events, Label
 from ..names import guard_name
 from ..options import Options
+from ..segments import Segment, Segments, ShownMode
 from ..status import ADVICE, Status
-from ..trajectory import Continuation, Event, Facts, Segment, Steps, Trajectory
+from ..trajectory import Continuation, Facts, Steps, Trajectory
 from ..warn import warn_of_facts
 from .arrays import Run, guard_of
 
 
 def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> Trajectory:
-    """Convert a dense run."""
-    status, modes = Status(run.status), run.letters
+    """Convert a run."""
+    status, few = Status(run.status), run.few or None
     limit = None if math.isnan(run.limit) else run.limit
-    facts = Facts(bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED))
+    events = Events.when_read(
+        partial(_events, system, run), few and partial(_few_events, system, run)
+    )
+    rested = {e.name: None for e in events if e.kind == "rest_below"} if options.rest_below else ()
+    facts = Facts(bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED), tuple(rested))
     warn_of_facts(facts.depends_on_widths, facts.unproved)
-    events = _events(system, run)
-    motion = run.motion if len(run.motion) else None
-    if status is not Status.STOPPED:
-        letters = system.spelled(modes[run.mode])
-        last = run.x[-1]
-        events.append(
-            Event("end", float(run.t[-1]), last, letters, letters, str(status), motion=motion)
-        )
-    elif motion is not None:
-        events[-1] = replace(events[-1], motion=motion)
     return Trajectory(
         system=system,
         parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),
         t=run.t,
         x=run.x,
         events=events,
-        segments=_segments(system, run),
+        segments=Segments.when_read(
+            partial(_segments, system, run), few and partial(_few_segments, system, run)
+        ),
         status=status,
         message=f"{message_of(system, options, run)} {ADVICE[status]}{_unmet(system, run)}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
@@ -49,32 +52,61 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
             if status is Status.NON_UNIQUE
         ],
         facts=facts,
+        dense=run.dense,
     )
 
 
-def _events(system: FilippovSystem, run: Run) -> list[Event]:
-    modes, found = run.letters, []
-    known: dict[tuple[str, str, int], tuple[str, str, str, int, int]]
-    known = system.cached("events of compiled runs", dict)
-    numbers = (run.event_before, run.event_after, run.event_guards)
-    for k, (one, two, code) in enumerate(zip(*(a.tolist() for a in numbers), strict=True)):
-        key = (modes[one], modes[two], code)
-        if key not in known:
-            known[key] = _named(system, *key)
-        before, after, name, element, side = known[key]
-        t, kind = float(run.event_t[k]), KINDS[run.event_kinds[k]]
-        states = run.event_x[k].copy(), run.event_after_x[k].copy()
-        motion = run.event_motions[k].copy() if len(run.motion) else None
-        found.append(
-            Event(kind, t, states[0], before, after, name, states[1], element, side, motion)
-        )
+def _few_events(system: FilippovSystem, run: Run) -> list[Event]:
+    """Events of a short run, one by one."""
+    n, own, found, kept = system.dimension, run.few or {}, list[Event](), len(run.motion) > 0
+    columns = (own[f"event_{name}"].tolist() for name in ("kind", "before", "after", "guard"))
+    keys, times = [*zip(*columns, strict=True)], own["event_t"].tolist()
+    for k, (label, t) in enumerate(zip(_labels(system, run, keys), times, strict=True)):
+        x, after = (own[name][k, :n].copy() for name in ("event_x", "event_after_x"))
+        motion = own["event_motion"][k].copy() if run.dense else NOT_KEPT
+        found.append(label.event(t, x, after, motion if kept else None))
+    last = run.motion if kept else None
+    if run.status != Status.STOPPED:
+        end, x = float(run.t[-1]), run.x[-1].copy()
+        found.append(_end_label(system, run).event(end, x, x, last))
+    elif kept:
+        found[-1] = replace(found[-1], motion=last)
     return found
 
 
-def _named(
-    system: FilippovSystem, before: str, after: str, code: int
-) -> tuple[str, str, str, int, int]:
-    """Modes, name, element and side of an event."""
+def _labels(system: FilippovSystem, run: Run, keys: Sequence[tuple[int, ...]]) -> list[Label]:
+    """Labels of events from their kinds, modes and guards."""
+    modes, known, labels = run.letters, system.cached("labels of events", dict[Any, Label]), []
+    for kind, one, two, row in keys:
+        key = (kind, modes[one], modes[two], row)
+        if key not in known:
+            known[key] = _label(system, *key)
+        labels.append(known[key])
+    return labels
+
+
+def _events(system: FilippovSystem, run: Run) -> Events:
+    """Events of a run, with its end unless a stop is the last of them."""
+    found = run.happened
+    labels = _labels(system, run, found.keys)
+    status, width = Status(run.status), len(run.motion)
+    motions = found.event_motions if width else np.zeros((0, 0))
+    labels, own = [*labels, _end_label(system, run)], slice(None)
+    if status is Status.STOPPED:  # by the last event
+        motions, own = motions[:-1], slice(-1)
+    if width:
+        motions = np.concatenate([motions, run.motion[None]])
+    numbers = found.event_rows[own], found.event_jumps[own], found.event_codes[own]
+    return Events(found.event_t[own], found.states, *numbers, tuple(labels), motions)
+
+
+def _end_label(system: FilippovSystem, run: Run) -> Label:
+    letters = system.spelled(run.letters[run.mode])
+    return Label("end", letters, letters, str(Status(run.status)))
+
+
+def _label(system: FilippovSystem, kind: int, before: str, after: str, code: int) -> Label:
+    """Kind, modes, name, element and side of an event."""
     if code >= 0:
         own = [guard_of(system, code)]
     else:  # what comes to rest together where events accumulate
@@ -87,24 +119,48 @@ def _named(
         own = [*surfaces, *[Guard("release", i - m, 0, first + i) for i in rests if i >= m]]
     name = " and ".join([guard_name(system, guard) for guard in own])
     of = (own[0].element, own[0].side) if own else (-1, 0)
-    return system.spelled(before), system.spelled(after), name, *of
+    return Label(KINDS[kind], system.spelled(before), system.spelled(after), name, *of)
 
 
-def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
-    """Stretches of steps in one mode; a run without a step has its one mode."""
-    t_last, shown = float(run.t[-1]), [system.spelled(letters) for letters in run.letters]
-    discrete = len(system.definition.discrete)
-    labels = run.labels or [()] * len(shown)
-    if not len(run.modes):
-        own = tuple(run.x[-1][system.dimension - discrete :].tolist())
-        return [Segment(shown[run.mode], t_last, t_last, 0, 0, own)]
-    changes = (run.modes[1:] != run.modes[:-1]).nonzero()[0] + 1
-    bounds = [0, *changes.tolist(), len(run.modes)]
-    ends = [*(float(run.starts[k]) for k in changes), t_last]
+def _few_segments(system: FilippovSystem, run: Run) -> list[Segment]:
+    """Segments of a short run, one by one."""
+    own = run.few or {}
+    modes, starts, end = own["step_mode"].tolist(), own["start"].tolist(), float(run.t[-1])
+    shown, discrete = run.letters, len(system.definition.discrete)
+    if not modes:
+        return [_only_segment(system, run)]
+    bounds = [k for k, mode in enumerate(modes) if not k or mode != modes[k - 1]]
+    ends = [*(starts[k] for k in bounds[1:]), end]
+    lasts = [*bounds[1:], len(modes)]
     return [
-        Segment(shown[run.modes[a]], float(run.starts[a]), end, a, b, labels[run.modes[a]])
-        for a, b, end in zip(bounds[:-1], bounds[1:], ends, strict=True)
+        Segment(
+            system.spelled(shown[modes[a]]),
+            starts[a],
+            t,
+            a * run.dense,
+            b * run.dense,
+            run.labels[modes[a]] if discrete else (),
+        )
+        for a, b, t in zip(bounds, lasts, ends, strict=True)
     ]
+
+
+def _only_segment(system: FilippovSystem, run: Run) -> Segment:
+    """The segment of a run without a step, which has its one mode."""
+    t, values = float(run.t[-1]), run.x[-1][system.dimension - len(system.definition.discrete) :]
+    return Segment(system.spelled(run.letters[run.mode]), t, t, 0, 0, tuple(values.tolist()))
+
+
+def _segments(system: FilippovSystem, run: Run) -> Segments:
+    """Stretches of steps in one mode."""
+    found, shown = run.happened, [system.spelled(letters) for letters in run.letters]
+    labels = run.labels or [()] * len(shown)
+    if not len(found.segment_modes):
+        return Segments.of([_only_segment(system, run)])
+    times, first = found.segment_starts, found.segment_firsts
+    last = np.append(first[1:], len(run.starts)) if run.dense else first
+    modes = tuple(map(ShownMode, shown, labels))
+    return Segments(times[:-1], times[1:], first, last, found.segment_modes, modes)
 
 
 def _unmet(system: FilippovSystem, run: Run) -> str:
@@ -123,12 +179,12 @@ def message_of(system: FilippovSystem, options: Options, run: Run) -> str:
     if status is Status.STOPPED:
         return messages.stopped(system.stops[run.where][0], t)
     if status is Status.ENDLESS_JUMPS:
-        at_once = [e for e in _events(system, run) if e.t == t][-options.max_jumps // 2 :]
-        return messages.endless_jumps(sorted({e.name for e in at_once}), t)
+        at_once = _events(system, run)[-1 - (options.max_jumps + 1) // 2 : -1]
+        return messages.endless_jumps(sorted({e.name for e in at_once if e.t == t}), t)
     if status is Status.ACCUMULATION and REASONS[run.reason] == "pressed":
         return messages.pressed(system.resets[run.where][0], t)
     if status is Status.ACCUMULATION:
-        return messages.accumulation(len(run.event_kinds), run.limit)
+        return messages.accumulation(run.event_count, run.limit)
     if status is Status.TOO_MANY_EVENTS:
         return messages.too_many("events", options.max_events)
     if status is Status.TOO_MANY_STEPS:

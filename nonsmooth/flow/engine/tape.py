@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache
@@ -31,128 +30,7 @@ from .arrays import (
 )
 from .building.codegen import tape_order
 from .library import core_library
-
-# Where a dense run is written: arrays of steps, points and events, which grow.
-
-#: Arrays in the order of C's pointers: type, and what there is one of for each entry.
-_ARRAYS = {
-    "start": (float, "step"),
-    "coefficients": (float, "step"),
-    "point_t": (float, "point"),
-    "point_x": (float, "point"),
-    "event_t": (float, "event"),
-    "event_x": (float, "event"),
-    "event_after_x": (float, "event"),
-    "event_motion": (float, "event"),
-    "step_mode": (np.int32, "step"),
-    "event_kind": (np.int32, "event"),
-    "event_before": (np.int32, "event"),
-    "event_after": (np.int32, "event"),
-    "event_guard": (np.int32, "event"),
-}
-
-#: What there is several of, and room for at first; arrays of larger runs grow from there.
-_FIRST = {"step": 64, "point": 128, "event": 64}
-
-#: How rooms grow: pages that are not written cost nothing, so by much as long as they are small (bytes).
-_SMALL, _MUCH, _LITTLE = 1 << 26, 16, 2
-#: Rows that are copied at once.
-_COPIED = 1 << 16
-
-#: Rows of all arrays that C needs to be free before a step.
-_NEEDED = {"step": 2, "point": 4, "event": 4}
-
-Rooms = Mapping[str, int]
-
-
-@lru_cache(maxsize=64)
-def _layout(
-    n: int, order: int, motion: int
-) -> tuple[dict[str, tuple[int, tuple[int, ...]]], dict[str, int]]:
-    """For each array the bytes before it in its block, by room, and its shape; bytes of each kind."""
-    shapes: dict[str, tuple[int, ...]] = {
-        "coefficients": (n, order + 1),
-        **dict.fromkeys(("point_x", "event_x", "event_after_x"), (n,)),
-        "event_motion": (motion,),
-    }
-    used, places = dict.fromkeys(_FIRST, 0), {}
-    for name, (dtype, kind) in _ARRAYS.items():  # those of floats first
-        shape = shapes.get(name, ())
-        places[name] = used[kind], shape
-        used[kind] += math.prod(shape) * (8 if dtype is float else 4)
-    return places, used
-
-
-class Output:
-    """Arrays of a dense run, in a block of memory for each of steps, points and events."""
-
-    class Structure(ctypes.Structure):
-        """``Output`` of the drivers."""
-
-        _fields_ = [
-            *[(name, ctypes.c_int64) for name in ("steps", "points", "events")],
-            *[(name, ctypes.c_int64) for name in ("step_room", "point_room", "event_room")],
-            *[(name, ctypes.c_void_p) for name in _ARRAYS],
-        ]
-
-    def __init__(self, n: int, order: int, rooms: Rooms = _FIRST, motion: int = 0):
-        self._places, self._sizes = _layout(n, order, motion)
-        self._rooms = {
-            kind: max(least, min(rooms[kind], _SMALL // self._sizes[kind]))
-            for kind, least in _FIRST.items()
-        }
-        self._blocks = {kind: self._block(kind) for kind in _FIRST}
-        self._point_to((0, 0, 0))
-
-    def _block(self, kind: str) -> NDArray[np.uint8]:
-        return np.empty(self._rooms[kind] * self._sizes[kind], np.uint8)
-
-    def _point_to(self, counts: Sequence[int]) -> None:
-        first = {kind: address(block) or 0 for kind, block in self._blocks.items()}
-        rooms, places = self._rooms, self._places
-        at = [first[own] + rooms[own] * places[name][0] for name, (_, own) in _ARRAYS.items()]
-        self.pointer = ctypes.byref(self.Structure(*counts, *rooms.values(), *at))
-
-    def grow(self, counts: Sequence[int]) -> None:
-        """Make room where there is little, with the same content."""
-        for (kind, room), size in zip(self._rooms.items(), counts, strict=True):
-            if size + _NEEDED[kind] <= room:
-                continue
-            written = self._of(kind, size)
-            small = _MUCH * self._blocks[kind].nbytes < _SMALL
-            self._rooms[kind] = room * (_MUCH if small else _LITTLE)
-            self._blocks[kind] = self._block(kind)
-            for name, array in self._of(kind, size).items():
-                for k in range(0, size, _COPIED):  # Ctrl-C is heard between the pieces
-                    array[k : k + _COPIED] = written[name][k : k + _COPIED]
-        self._point_to(counts)
-
-    def filled(self, counts: Sequence[int]) -> dict[str, NDArray[Any]]:
-        """Return the parts that were written: steps, points and events."""
-        # They are views of the blocks, unless nearly all of these would be kept for nothing.
-        found = {}
-        for (kind, room), size in zip(self._rooms.items(), counts, strict=True):
-            own = self._of(kind, size)
-            if room > _FIRST[kind] and _MUCH * size < room:
-                own = {name: array.copy() for name, array in own.items()}
-            found.update(own)
-        return found
-
-    def _of(self, kind: str, size: int) -> dict[str, NDArray[Any]]:
-        room, block = self._rooms[kind], self._blocks[kind]
-        return {
-            name: np.ndarray((size, *shape), _ARRAYS[name][0], block, room * before)
-            for name, (before, shape) in self._places.items()
-            if _ARRAYS[name][1] == kind
-        }
-
-
-def rooms_of(counts: Sequence[int]) -> Rooms:
-    """Room for a run of so many steps, points and events."""
-    return {
-        kind: count + needed for (kind, needed), count in zip(_NEEDED.items(), counts, strict=True)
-    }
-
+from .recording import Output, Recorder, Rooms, rooms_of
 
 _I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
@@ -328,7 +206,7 @@ class TapeEngine:
         self._c = self._structure(self.coupled, tape)
         if entries is not None:
             self._c.derivatives = self._entries(entries)
-        self._rooms = rooms_of((0, 0, 0))
+        self._rooms: Rooms = rooms_of((0, 0, 0))
 
     def _structure(self, coupled: Coupled, tape: Tape) -> _System:
         system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
@@ -437,13 +315,16 @@ class TapeEngine:
         read_at: Array | None = None,
         motion: Array | None = None,
         mode: str | None = None,
+        dense: bool = True,
     ) -> Run:
-        """Run one trajectory from an extended start, dense output kept, to be read at ``read_at`` times."""
+        """Run one trajectory from an extended start, to be read at ``read_at`` times."""
         # ``motion`` and ``mode`` are those of a run or event that is continued.
         width = self._c.rules.width
         if motion is not None:
             motion = self._checked(motion)
-        output = Output(self.system.extended_dimension, self.order, self._rooms, width)
+        rooms = {"rooms": self._rooms} if dense else {}
+        output = Output(self.system.extended_dimension, self.order, motion=width, **rooms)
+        recorder = Recorder(output, self.system.dimension, dense, read_at)
         x, p = np.array(x, float), np.array([*p, 0.0], float)
         start, known = self._letters(options.start_mode), self._letters(mode)
         with self.held_table() as table, self.held_run(table) as state:
@@ -461,27 +342,31 @@ class TapeEngine:
                 numbers, counts, active, several, rates = self._read(state)
                 if status != FULL:
                     break
-                output.grow(counts[7:10])
+                recorder.make_room(counts[7:10])
                 library().run_resume(state, output.pointer)
-            self._rooms = rooms_of(counts[7:10])  # of the next run, which is often a similar one
-            modes, words = self.words(table, [counts[4]])
-            labels = self._labels(table)
+            recorded = recorder.finished(counts[7:10])
+            self._rooms = recorder.rooms if dense else self._rooms  # the next run is often similar
+            modes, labels = self._modes(table), self._labels(table)
             final = np.zeros(width)
             library().run_motion(state, address(final))
             if width == 1 and options.t_start == 0:  # times of events are known to rounding
                 final = final[:0]
-        return Run.of(
-            output.filled(counts[7:10]),
-            self.system.dimension,
-            numbers=numbers,
-            counts=counts,
-            itinerary=words[counts[4]],
+        return Run(
+            status=counts[0],
+            reason=counts[1],
+            where=counts[2],
+            mode=counts[3],
+            limit=numbers[1],
             letters=modes,
             active=active,
             several=[modes[k] for k in several],
             rates=rates[:, : self.system.dimension],
+            facts=counts[12],
+            unmet=counts[13],
             motion=final,
             labels=labels,
+            dense=dense,
+            **recorded,
         )
 
     def _checked(self, motion: Array) -> Array:
@@ -528,33 +413,36 @@ class TapeEngine:
 
     def words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
         """Modes that were met, and itineraries of some nodes of their tree."""
-        parent, mode, letters = self._tree(table)
-        width = self.system.surface_count + len(self.system.impacts)
-        modes = [self._spelled(row) for row in letters[:, :width].tolist()]
+        modes = self._modes(table)
         spelled = [self.system.spelled(letters) for letters in modes]
         if self.system.definition.discrete:
             rows = self._labels(table)
             spelled = [
                 shown_mode(self.system, one, row) for one, row in zip(spelled, rows, strict=True)
             ]
+        size = library().table_size(table)
+        parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
+        library().table_read(table, address(parent), address(mode), None)
         return modes, words_of(parent, mode, spelled, nodes)
 
-    def _tree(self, table: int) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int8]]:
-        """Parents and modes of the nodes of a tree, and the modes that were met, as bytes."""
-        made, width = library(), self._width
-        size, count = made.table_size(table), made.table_modes(table)
-        parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
+    def _modes(self, table: int) -> list[str]:
+        """Modes that were met, by number."""
+        width = self.system.surface_count + len(self.system.impacts)
+        return [self._spelled(row) for row in self._met(table)[:, :width].tolist()]
+
+    def _met(self, table: int) -> NDArray[np.int8]:
+        """Modes that were met, as bytes."""
+        width, count = self._width, library().table_modes(table)
         met = np.empty(count * width + 1, np.int8)
-        made.table_read(table, address(parent), address(mode), address(met))
-        return parent, mode, met[:-1].reshape(count, width)
+        library().table_read(table, None, None, address(met))
+        return met[:-1].reshape(count, width)
 
     def _labels(self, table: int) -> list[tuple[float, ...]]:
         """Values of the discrete states in the modes that were met."""
         discrete = len(self.system.definition.discrete)
         if not discrete:
             return []
-        _, _, letters = self._tree(table)
-        rows = np.ascontiguousarray(letters[:, -8 * discrete :]).view(np.float64)
+        rows = np.ascontiguousarray(self._met(table)[:, -8 * discrete :]).view(np.float64)
         return [tuple(row) for row in rows.tolist()]
 
     def _spelled(self, signs: list[int]) -> str:

@@ -25,6 +25,7 @@ from ..values import Array, state_values
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .parse_definition import Definition, consistent_parameters, read_definition
+from .roots import roots_of
 from .switching import Switching, class_of
 
 T = TypeVar("T")
@@ -286,6 +287,7 @@ class FilippovSystem:
         surfaces = len(self.entries) - len(self.sets)
         if surfaces or not self.sets:
             parts.append(f"{surfaces} surface{'s' * (surfaces != 1)}{self._classes()}{names}")
+        parts += [f"root |{name}|^{power:g}" for name, power in self.roots.items()]
         parts += [f"set of codimension {len(members)}" for members in self.sets]
         if self.parameter_names:
             parts.append(f"parameters: {', '.join(self.parameter_names)}")
@@ -311,6 +313,24 @@ class FilippovSystem:
     def dimension(self) -> int:
         """Number n of states."""
         return int(self.definition.states.numel())
+
+    @cached_property
+    def roots(self) -> dict[str, float]:
+        """Roots of switching functions by name of the surface: the smallest exponent that was found.
+
+        A run goes through the zero of such a root; that of another function ends it.
+
+        Examples
+        --------
+        >>> import casadi as ca
+        >>> import nonsmooth as ns
+        >>> x = ca.SX.sym("x")
+        >>> ns.FilippovSystem([x], surface=x, above=[-ca.sqrt(x)], below=[0]).roots
+        {'h0': 0.5}
+        """
+        d = self.definition
+        found = roots_of(d.field, d.surfaces, self.extended_states)
+        return {f"h{self.entry_of(i)}": power for i, power in sorted(found.items())}
 
     @cached_property
     def surface_count(self) -> int:

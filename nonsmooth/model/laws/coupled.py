@@ -22,6 +22,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ..definition.roots import gate_roots, roots_of
 from ..definition.system import FilippovSystem
 from ..expressions.cancel import cancel_common_factor
 from ..expressions.identity import vanish_on
@@ -30,7 +31,6 @@ from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .degree import Degree, degree_of
 from .evaluators import Evaluator
-from .roots import gate_roots
 from .switches import Guard, event_guards
 
 
@@ -52,6 +52,8 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     field = plain = system.field_with(lam, reactions)
     factors, unknowns = [ca.SX(1)] * system.surface_count, [*ca.vertsplit(lam)][: lam.numel()]
     known, variables = ca.vertcat(p, lam), ca.vertcat(x, reactions)
+    ones = [ca.SX(1)] * system.surface_count
+    roots = gate_roots(plain, system.definition.surfaces, x, ones)[1]
     columns = ca.jacobian(plain, lam)
     for members in system.entries:  # a set has one factor
         places = [(row, i) for i in members for row in columns[:, i].sparsity().row()]
@@ -67,6 +69,12 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
         if not entries:
             continue
         reduced, factor = cancel_common_factor(entries, variables, known)
+        for e, part in zip(entries, reduced, strict=True):
+            if (
+                not roots and part.is_constant()
+            ):  # the factor as the field has it, so that one series serves both
+                reduced, factor = [own / part for own in reduced], e
+                break
         if ca.depends_on(factor, variables):
             field = ca.SX(field)
             for i in members:
@@ -145,11 +153,10 @@ class Coupled:
         """The field in which roots of switching functions are zero on their surfaces, where lambda_i is."""
         d, x = self.system.definition, self.system.extended_states
         gates = ca.SX.sym("gate", self._surfaces)
-        field, powers = gate_roots(field, d.surfaces, x, ca.vertsplit(gates))
+        powers = roots_of(field, d.surfaces, x)
+        field = gate_roots(field, d.surfaces, x, ca.vertsplit(gates))[0]
         for i, factor in enumerate(factors):
             factors[i] = gate_roots(factor, d.surfaces, x, ca.vertsplit(gates))[0]
-        for i, power in gate_roots(d.surfaces, d.surfaces, x, ca.vertsplit(gates))[1].items():
-            powers[i] = min(power, powers.get(i, power))
         for i, power in powers.items():
             if i in self.system.set_of:
                 continue

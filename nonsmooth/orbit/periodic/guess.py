@@ -265,7 +265,7 @@ def _require_steady(run: Trajectory) -> None:
     """Raise for a run that chatters: it had too many events, and the times between them shrink."""
     if run.status is not Status.TOO_MANY_EVENTS or len(run.events) < _MANY:
         return
-    times = np.array([event.t for event in run.events])
+    times = run.events.t
     waits = np.diff(times)
     part = len(waits) // 10
     parts = (waits[4 * part : 5 * part], waits[6 * part : 7 * part], waits[-part:])

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...flow.events import Event, Events
 from ...flow.follow import follow
+from ...flow.segments import Segment, Segments
 from ...flow.status import Status
-from ...flow.trajectory import Event, Segment, Steps, Trajectory
+from ...flow.trajectory import Steps, Trajectory
 from ...model import Array, FilippovSystem
 from ..runs.legs import Leg
 
@@ -90,8 +92,8 @@ def orbit_run(
         parameters=dict(parameters),
         t=np.concatenate(times),
         x=np.vstack(states),
-        events=events,
-        segments=segments,
+        events=Events.of(events),
+        segments=Segments.of(segments),
         status=Status.REACHED_END,
         message="One period.",
         steps=Steps(np.array(starts), coefficients),

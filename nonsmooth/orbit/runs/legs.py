@@ -15,9 +15,10 @@ import numpy as np
 
 from ...flow.constants import TIE
 from ...flow.engine.columns import EndOfLeg
+from ...flow.events import Event
 from ...flow.fixed import flow_for
 from ...flow.names import event_name, shown_mode
-from ...flow.trajectory import Event, Trajectory
+from ...flow.trajectory import Trajectory
 from ...flow.variation import CarriedField
 from ...model import Array, DegenerateError, FilippovSystem, coupled_of, multiplier_enters
 from ...model.derivatives.event_maps import (

@@ -261,6 +261,7 @@ def _pulled(
 def _require_run(run: Trajectory) -> Trajectory:
     if not isinstance(run, Trajectory):
         raise OptionError(f"run={run!r} is no Trajectory. Give the result of ns.simulate.")
+    run.require_dense("its sensitivity")
     if not len(run.steps):
         raise OptionError(f"run has no step ({run.message}) Give a start from which it moves.")
     if run.status not in (Status.REACHED_END, Status.STOPPED):

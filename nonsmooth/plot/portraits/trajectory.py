@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from ...flow import Segment, Trajectory
-from ...model import DefinitionError, FilippovSystem, OptionError, whole
+from ...model import Array, DefinitionError, FilippovSystem, OptionError, whole
 from .. import style
 from ..arguments import results
 from ..drawing import Canvas, Colors, Drawn, canvas
@@ -144,7 +144,7 @@ def trajectory(
 class _Part:
     """One segment with times and states at which it is drawn."""
 
-    def __init__(self, run: Trajectory, segment: Segment, samples: int):
+    def __init__(self, run: Trajectory, segment: Segment, samples: int, resets: Array):
         span = abs(run.t[-1] - run.t[0]) or 1.0
         low, high = sorted((segment.t_start, segment.t_end))
         count = max(int(samples * (high - low) / span), 8)
@@ -152,9 +152,9 @@ class _Part:
         # stay inside: at the ends, a reset would show the state after it
         inner = (high - low) * 1e-9
         times = np.union1d(np.linspace(low + inner, high - inner, count), steps)
-        resets = [e.t for e in run.events if e.kind == "reset" and low < e.t < high]
-        around = [t + shift for t in resets for shift in (-inner, inner)]
-        times = np.union1d(times, np.clip(around, low, high)) if resets else times
+        resets = resets[(low < resets) & (resets < high)]
+        around = np.concatenate([resets - inner, resets + inner])
+        times = np.union1d(times, np.clip(around, low, high)) if len(resets) else times
         x = run(times)
         # a jump is a gap in the curve
         k = np.searchsorted(times, resets)
@@ -180,10 +180,14 @@ class _Picture:
 
     def __init__(self, page: Canvas, runs: list[Trajectory], samples: int):
         self.page, self.runs, self.run = page, runs, runs[0]
-        self.parts = [_Part(run, segment, samples) for run in runs for segment in run.segments]
-        self.events = [event for run in runs for event in run.events]
-        if len(self.events) > _MANY:
-            self.events = self.events[-1:]
+        resets = [run.events.t[run.events.column("kind") == "reset"] for run in runs]
+        self.parts = [
+            _Part(run, segment, samples, own)
+            for run, own in zip(runs, resets, strict=True)
+            for segment in run.segments
+        ]
+        few = sum(len(run.events) for run in runs) <= _MANY
+        self.events = [e for run in runs for e in run.events] if few else [runs[-1].events[-1]]
         self.looks, self.texts = self._looks()
 
     def _looks(self) -> tuple[dict[str, dict[str, Any]], dict[str, str]]:

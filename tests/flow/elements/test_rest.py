@@ -142,6 +142,9 @@ def test_slow_relay_rests_below_a_speed():
     assert len(run.events) == pytest.approx(150, abs=5) and run.x[-1].tolist() == [0, 0]
     crossings = [abs(event.x[1]) for event in run.events if event.kind == "crossing"]
     assert crossings[-1] < 1e-2 and crossings[-3] >= 1e-2
+    assert run.facts.rested_below == ("h0",)
+    none = ns.simulate(_relay(-lam - v), [1, 0], 1.0, rest_below=1e-2)
+    assert none.facts.rested_below == ()
     many = ns.ensemble(_relay(-lam - v), [[1, 0]], 100.0, rest_below=1e-2)
     assert many.itinerary[0] == run.itinerary
 

@@ -117,3 +117,21 @@ def test_powers_in_a_switching_function_hold_what_is_below_the_gain(push, rests)
     run = ns.simulate(ns.FilippovSystem.from_expression([x, v], rhs), [0.0, 0.0], 1.0)
     assert (run.status is ns.Status.REACHED_END) == rests
     assert not rests or run.x[-1].tolist() == [0, 0]
+
+
+def test_roots_that_were_found_are_named():
+    """Above, below, in one field with multipliers, in a switching function; not a square, nor what is no surface."""
+    tank = ns.FilippovSystem([x, y], surface=x, above=[-ca.sqrt(x), ca.sqrt(y)], below=[0, 0])
+    assert tank.roots == {"h0": 0.5} and "root |h0|^0.5" in repr(tank)
+    valve = ns.FilippovSystem.from_expression([x], [-ca.sign(x) * ca.fabs(x) ** (1 / 3)])
+    assert valve.roots == {"h0": pytest.approx(1 / 3)} and "root |h0|^0.333333" in repr(valve)
+    first, second = (1 + one) / 2 * ca.sqrt(x), (1 + two) / 2 * ca.sqrt(y)
+    cascade = ns.FilippovSystem(
+        [x, y], surfaces=[x, y], multipliers=[one, two], field=[-first, first - second]
+    )
+    assert cascade.roots == {"h0": 0.5, "h1": 0.5}
+    surface = v + 2 * ca.sqrt(ca.fabs(x)) * ca.sign(x)
+    terminal = ns.FilippovSystem.from_expression([x, v], [v, -3 * ca.sign(surface)])
+    assert set(terminal.roots.values()) == {0.5} and len(terminal.roots) == 1
+    smooth = ns.FilippovSystem([x], surface=x, above=[-(x**2)], below=[1])
+    assert smooth.roots == {} and "root" not in repr(smooth)

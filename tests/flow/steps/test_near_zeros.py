@@ -58,6 +58,20 @@ def test_zeros_in_a_cluster(motion):
         assert passes(guard, motion, direction) == pytest.approx(times, abs=1e-10, rel=0), seed
 
 
+def test_a_touch_after_two_zeros_in_one_direction():
+    """The residual of the first event is no zero of what follows the second."""
+    first, second, touched = 1.1060725023078326, 1.106075028716518, 1.1060804522925578
+    guard = (
+        (x - first) * (x - second) * (x - touched) * ca.sin(x - touched) * (x - 1.8284017703851982)
+    )
+    when = MOTIONS["bent"][2]
+    for size in (-1.0, 1.0):
+        zeros = [(first, True), (second, True), (touched, False), (1.8284017703851982, True)]
+        for direction in (-1, 1):
+            times = [float(when(mp.mpf(z))) for z in expected(zeros, -int(size), direction)]
+            assert passes(size * guard, "bent", direction) == pytest.approx(times, abs=1e-10, rel=0)
+
+
 @pytest.mark.parametrize("direction", [-1, 0, 1])
 @pytest.mark.parametrize("multiplicity", [2, 3, 4])
 @motions

@@ -86,6 +86,18 @@ def test_a_bounce_against_central_differences(start, itinerary):
         assert found.dt_dp[:, column] == pytest.approx(slope[8 : 8 + times], abs=5e-8)
 
 
+def test_friction_that_a_parameter_may_bring():
+    """Without friction v = v0 + a t; its derivative by the friction c is minus the integral of v/|v|."""
+    start, t = [0.0, 0.0, 0.3, 0.4], np.polynomial.legendre.leggauss(40)
+    run = ns.simulate(block(), start, 1.0, parameters={"c": 0.0}, tol=1e-13)
+    found = ns.sensitivity(run, wrt="c")
+    nodes, weights = (t[0] + 1) / 2, t[1] / 2
+    v = np.array([0.3 + 0.3 * nodes, np.full(40, 0.4)])
+    u = v / np.linalg.norm(v, axis=0)
+    assert found.dx_dp[2:, 0] == pytest.approx(-u @ weights, abs=1e-13)
+    assert found.dx_dp[:2, 0] == pytest.approx(-u @ (weights * (1 - nodes)), abs=1e-13)
+
+
 def test_two_sets():
     v, w = plane.columns("v1", "v2"), plane.columns("w1", "w2")
     one, two = (ca.vertcat(*plane.columns(f"{n}1", f"{n}2")) for n in "lm")

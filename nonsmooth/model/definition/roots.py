@@ -51,6 +51,15 @@ def _side(e: ca.SX, h: ca.SX) -> int:
     return 1 if sum(np.sign(p) for p in points if p == p) >= 0.0 else -1
 
 
+def roots_of(field: ca.SX, surfaces: ca.SX, x: ca.SX) -> dict[int, float]:
+    """The smallest exponent of a root of each switching function, in a field or in switching functions."""
+    gates, found = ca.vertsplit(ca.SX.ones(surfaces.numel())), dict[int, float]()
+    for e in (field, surfaces) if surfaces.numel() else ():
+        for i, power in gate_roots(e, surfaces, x, gates)[1].items():
+            found[i] = min(power, found.get(i, power))
+    return found
+
+
 def gate_roots(
     field: ca.SX, surfaces: ca.SX, x: ca.SX, gates: Sequence[ca.SX]
 ) -> tuple[ca.SX, dict[int, float]]:

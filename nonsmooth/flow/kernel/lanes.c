@@ -237,8 +237,8 @@ static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, i
     *slope = d;
     return s;
   }
-  int direction = DIRECTION[slot - FIRST_STOP];
-  double met = first_crossing(c, P, 1, flipped ? -direction : direction);
+  int direction = flipped ? -DIRECTION[slot - FIRST_STOP] : DIRECTION[slot - FIRST_STOP];
+  double met = c[0] > 0 && direction <= 0 ? s : first_crossing(c, P, 1, direction);
   return s > 0 && met > s ? NAN : met;
 }
 #endif

@@ -91,6 +91,29 @@ static void close_order(Run *r, Expansion *e, int k) {
   series_at(t, k ? t->late : t->moving, k ? t->late_count : t->moving_count, k, r->stride, r->input, r->series);
 }
 
+/* Rounding in the multipliers leaves functions that are kept at zero a rate, which a state at rest would follow for as
+ * long as it rests: the field's part along their gradients is taken away. */
+static void keep_rates(Run *r, Expansion *e) {
+  const Entries *g = &r->s->height_gradient;
+  int first = 2 * r->width + r->s->slope.count + r->s->layer_gradient.count, stride = r->stride;
+  weigh_again(r, e);
+  for (int k = 0, from = 0, to = 0; k < 2 * e->l.slides; k++) {
+    int i = e->l.sliding[k % e->l.slides];
+    double rate = 0, size = 0;
+    if (k == e->l.slides) to = 0;
+    while (to < g->count && g->row[to] < i) to++;
+    for (from = to; to < g->count && g->row[to] == i; to++) {
+      double slope = out_of(&r->s->point, r->point, first + to);
+      rate += slope * e->states[(int64_t)g->column[to] * stride + 1];
+      if (g->column[to] < r->s->dimension) size += slope * slope;
+    }
+    if (i >= r->m || degree_of(r, i) > 1 || rate == 0 || !isfinite(rate / size)) continue;
+    for (int q = from; q < to; q++)
+      if (g->column[q] < r->s->dimension)
+        e->states[(int64_t)g->column[q] * stride + 1] -= rate / size * out_of(&r->s->point, r->point, first + q);
+  }
+}
+
 /* Coefficients of all that a mode needs in which something slides, or with sets; ``start`` are places in the inverse. */
 static void mode_series(Run *r, Expansion *e, const int32_t *start) {
   int leaving = begin_directions(r, e);
@@ -101,6 +124,7 @@ static void mode_series(Run *r, Expansion *e, const int32_t *start) {
     if (k && (leaving || e->l.slides)) close_order(r, e, k);
     if (r->s->sets) close_sets(r, e, k);
     if (k < r->order) next_states(r, e, k);
+    if (k == 0 && e->l.slides) keep_rates(r, e);
   }
 }
 

@@ -87,11 +87,13 @@ INLINE T rounding_scale(const Lanes *s, const T *gradient);
 INLINE I project(Lanes *s, I which) {
   I off = {0};
 #if M > 0
-  for (int iteration = 0; iteration < (CURVED ? 3 : 1); iteration++) {
+  for (int iteration = 0; iteration < (CURVED ? 3 : 2); iteration++) {
     T h, g[N], size = BC(0);
     surface_values(s->x, s->q, s->slides, s->above, s->lambda, &h, g);
+    I apart = which & (I)(h != 0);
+    if (!CURVED && !any(apart)) break;
     UNROLL for (int i = 0; i < ND; i++) size += g[i] * g[i];
-    T step = SELECT(which & (I)(h != 0), h * QUICK_INVERSE(size), BC(0));
+    T step = SELECT(apart, h / size, BC(0)); /* what is left of h moves a state at rest for as long as it rests */
     UNROLL for (int i = 0; i < ND; i++) s->x[i] -= step * g[i];
   }
   if (CURVED) {
@@ -235,8 +237,8 @@ static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, i
     *slope = d;
     return s;
   }
-  int direction = DIRECTION[slot - FIRST_STOP];
-  double met = first_crossing(c, P, 1, flipped ? -direction : direction);
+  int direction = flipped ? -DIRECTION[slot - FIRST_STOP] : DIRECTION[slot - FIRST_STOP];
+  double met = c[0] > 0 && direction <= 0 ? s : first_crossing(c, P, 1, direction);
   return s > 0 && met > s ? NAN : met;
 }
 #endif
@@ -623,7 +625,7 @@ INLINE void expand_step(Lanes *s, Work *w, Step *e) {
   I after = (s->since == 0) & (s->events > BLOCKS);
   if (any(after)) e->unclear |= watch_limit(s, e->c, e->allowed, after);
 #endif
-  e->unclear |= ~e->last & ((h <= SHORTEST * ABS(s->t)) | (h >= LONG));
+  e->unclear |= ~e->last & ((h <= SHORTEST * ABS(s->t)) | (h >= LONGEST));
   e->unclear |= (s->steps >= o->max_steps) | passed_between(s, e->g);
   /* What happens at the end, to rounding, happens. */
   e->h = SELECT(e->last, left + AT_END * MAX(ABS(s->t), ABS(s->t + left)), h);

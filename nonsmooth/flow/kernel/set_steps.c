@@ -366,7 +366,7 @@ INLINE void take_step(Lanes *s, Work *w, Step *e, int mode) {
   I held = time_of(e, h) > longest, last, unclear = ~finite | by_chance(s, w);
   if (any(held)) h = SELECT(held, place_of(e, longest), h);
   last = time_of(e, h) >= left;
-  unclear |= ~last & ((time_of(e, h) <= SHORTEST * MAX(ABS(s->t), ABS(s->t - w->b->t0))) | (h >= LONG));
+  unclear |= ~last & ((time_of(e, h) <= SHORTEST * MAX(ABS(s->t), ABS(s->t - w->b->t0))) | (h >= LONGEST));
   unclear |= (s->steps >= o->max_steps) | passed_between(s, e);
   if (any(last)) h = SELECT(last, place_of(e, left + AT_END * MAX(ABS(s->t), ABS(s->t + left))), h);
   T whole = h;

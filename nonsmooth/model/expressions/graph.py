@@ -161,6 +161,19 @@ def depends_on(nodes: Sequence[Node], variable: Sequence[bool]) -> list[bool]:
     return result
 
 
+def reached(
+    arguments: Sequence[Sequence[int]], wanted: Sequence[bool], roots: Sequence[int]
+) -> list[int]:
+    """Return what some nodes follow from, in order, as far as it is wanted."""
+    found, pending = set[int](), list(roots)
+    while pending:
+        j = pending.pop()
+        if j not in found and wanted[j]:
+            found.add(j)
+            pending += arguments[j]
+    return sorted(found)
+
+
 def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str) -> None:
     """Refuse an expression that is not smooth in ``variables``; in ``others`` it need not be."""
     nodes, _ = instructions([variables, others], [expression])

@@ -17,7 +17,7 @@ from typing import Any, Protocol, TypeAlias
 
 import casadi as ca
 
-from .graph import depends_on, instructions, operation
+from .graph import depends_on, instructions, operation, reached
 from .simplification import simplified
 from .taylor_rules import Rule, entered, lower
 
@@ -45,6 +45,10 @@ class Arithmetic(Protocol):
 
     def apply(self, op: str, args: Sequence[Any]) -> Any:
         """Return an operation of values, with 0 for None."""
+        ...
+
+    def chosen(self, c: Sequence[Any], u: Any) -> Any:
+        """Return a coefficient where one of others is not zero, else zero."""
         ...
 
 
@@ -77,6 +81,10 @@ class Expressions:
     def apply(self, op: str, args: Sequence[Coefficient]) -> ca.SX:
         """Return an operation of values."""
         return operation(op, [value_of(a) for a in args])
+
+    def chosen(self, c: Sequence[Coefficient], u: Coefficient) -> Coefficient:
+        """Return a coefficient unless the others are zeros by structure."""
+        return None if all(v is None for v in c) else u
 
 
 def taylor(
@@ -146,26 +154,23 @@ class Expansion:
         self.series: list[list[Any]] = [[] for _ in rules]
         self._moving: Sequence[Any] = ()
         self._moves = entered(rules, lambda _: True)
-        self._recurrences = [self._recurrence(j, rule) for j, rule in enumerate(rules)]
-
-    def restart(self, still: Sequence[Any]) -> None:
-        """Discard all coefficients; vector 1 has new values."""
-        self._still = still
-        for c in self.series:
-            c.clear()
+        arguments, roots = [rule.args for rule in rules], [j for row in rows for j in row]
+        self._needed = reached(arguments, [True] * len(rules), roots)
+        self._recurrences = {j: self._recurrence(j, rules[j]) for j in self._needed}
 
     def advance(self, k: int, moving: Sequence[Any]) -> list[list[Any]]:
         """Expand everything to order k, given coefficient k of vector 0; the outputs' coefficients."""
         self._moving = moving
-        for c, recurrence, moves in zip(self.series, self._recurrences, self._moves, strict=True):
-            c.append(recurrence(k) if moves or not k else None)
+        for j in self._needed:
+            self.series[j].append(self._recurrences[j](k) if self._moves[j] or not k else None)
         return self.outputs(k)
 
     def again(self, k: int, moving: Sequence[Any], which: Sequence[int]) -> list[list[Any]]:
         """Expand some rules once more to the same order, with other coefficients of vector 0."""
         self._moving = moving
         for j in which:
-            self.series[j][k] = self._recurrences[j](k)
+            if j in self._recurrences:
+                self.series[j][k] = self._recurrences[j](k)
         return self.outputs(k)
 
     def outputs(self, k: int) -> list[list[Any]]:
@@ -199,7 +204,7 @@ class Expansion:
         """Sum of i u_i v_(k-i) for i from first to last."""
         total = None
         for i in range(first, last + 1):
-            total = self._sum(total, self._scaled(self._product(u[i], v[k - i]), float(i)))
+            total = self._sum(total, self._product(self._scaled(u[i], float(i)), v[k - i]))
         return total
 
     # one recurrence for each rule ---------------------------------------------------------------
@@ -324,4 +329,4 @@ class Expansion:
         return angle
 
     def _chosen(self, _: Rule, __: list[Any], c: list[Any], u: list[Any]) -> Callable[[int], Any]:
-        return lambda k: None if all(v is None for v in c[: k + 1]) else u[k]
+        return lambda k: self._on.chosen(c[: k + 1], u[k])

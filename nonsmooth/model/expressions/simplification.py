@@ -9,6 +9,7 @@ shared, and no product is multiplied out.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -47,6 +48,16 @@ class _Factor:
 
     node: Node | None
     sums: tuple[Sum, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Side:
+    """A factor 1 + sign u, and the sum that it is multiplied with."""
+
+    factor: int
+    u: Product
+    sign: float
+    rest: Sum
 
 
 class _Reader:
@@ -98,7 +109,12 @@ class _Reader:
         if node.op == "assign":
             return self._sums[args[0]]
         if node.op in ("add", "sub"):
-            return _add(self._sums[args[0]], self._sums[args[1]], node.op == "sub")
+            a, b = self._sums[args[0]], self._sums[args[1]]
+            if node.op == "sub":
+                b = {product: -c for product, c in b.items()}
+            one, two = self._side(a), self._side(b)
+            joined = self._joined(one, two) if one and two else None
+            return _add(a, b) if joined is None else joined
         if node.op in ("neg", "twice"):
             return self._scaled(args[0], ca.SX(-1.0 if node.op == "neg" else 2.0))
         if node.op == "mul" and not all(self._moving[a] for a in args):
@@ -109,6 +125,47 @@ class _Reader:
         if node.op == "div" and not self._moving[args[1]]:
             return self._scaled(args[0], 1.0 / self._constant(args[1]))
         return {self._new(_Factor(node, tuple(self._sums[a] for a in args))): ca.SX(1)}
+
+    def _side(self, terms: Sum) -> _Side | None:
+        """A product with 1 + u or 1 - u."""
+        if len(terms) != 1:
+            return None
+        ((product, coefficient),) = terms.items()
+        for f in product:
+            own = self.factors[f].sums[0] if self.factors[f].node is None else {}
+            u = next((p for p in own if p), ())
+            if len(own) == 2 and own.get((), ca.SX(0)).is_one() and abs(_number(own[u])) == 1.0:
+                k = product.index(f)
+                rest = product[:k] + product[k + 1 :]
+                whole = len(rest) == 1 and self.factors[rest[0]].node is None
+                inside = self.factors[rest[0]].sums[0] if whole else {rest: ca.SX(1)}
+                return _Side(f, u, _number(own[u]), {p: coefficient * c for p, c in inside.items()})
+        return None
+
+    def _joined(self, one: _Side, two: _Side) -> Sum | None:
+        """(1 + u) a + (1 - u) b with what a and b have in common, or with another sign, taken out."""
+        if (one.u, one.sign) != (two.u, -two.sign):
+            return None
+        a, b, result = dict(one.rest), dict(two.rest), Sum()
+        for product in {**a, **b}:
+            if product and not (product in a and product in b):
+                continue
+            c, d = a.get(product, ca.SX(0)), b.get(product, ca.SX(0))
+            mean, half = c + d, c - d
+            if ca.is_equal(c, d, _DEPTH):
+                mean, half = 2.0 * c, ca.SX(0)
+            elif ca.simplify(mean).is_zero():
+                mean, half = ca.SX(0), 2.0 * c
+            elif (_number(mean + half), _number(mean - half)) != (2 * _number(c), 2 * _number(d)):
+                continue  # rounding would make others of the sides
+            a.pop(product, None), b.pop(product, None)
+            turned = tuple(sorted(product + one.u))
+            result = _add(_add(result, {product: mean}), {turned: one.sign * half})
+        for side, rest in ((one, a), (two, b)):
+            if result and rest:
+                inside = self._new(_Factor(None, (rest,)))
+                result = _add(result, {tuple(sorted((side.factor, *inside))): ca.SX(1)})
+        return {product: c for product, c in result.items() if not c.is_zero()} or None
 
     def _scaled(self, j: int, factor: ca.SX) -> Sum:
         """One scaling of a sum instead of one for each of its terms."""
@@ -154,6 +211,11 @@ class _Reader:
         return self.whole[product]
 
 
+def _number(coefficient: ca.SX) -> float:
+    """Value of a number; NaN for an expression."""
+    return float(coefficient) if coefficient.is_constant() else math.nan
+
+
 def _is_extreme(coefficient: ca.SX) -> bool:
     """Whether a number is so large or small that products with it leave the range of doubles."""
     if not coefficient.is_constant():
@@ -161,14 +223,11 @@ def _is_extreme(coefficient: ca.SX) -> bool:
     return not _LEAST < abs(float(coefficient)) < 1.0 / _LEAST
 
 
-def _add(a: Sum, b: Sum, subtract: bool) -> Sum:
+def _add(a: Sum, b: Sum) -> Sum:
     result = dict(a)
     for product, coefficient in b.items():
         old = result.pop(product, None)
-        if old is not None:
-            new = old - coefficient if subtract else old + coefficient
-        else:
-            new = -coefficient if subtract else coefficient
+        new = coefficient if old is None else old + coefficient
         if not new.is_zero():
             result[product] = new
     return result

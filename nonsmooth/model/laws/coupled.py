@@ -52,6 +52,8 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     field = plain = system.field_with(lam, reactions)
     factors, unknowns = [ca.SX(1)] * system.surface_count, [*ca.vertsplit(lam)][: lam.numel()]
     known, variables = ca.vertcat(p, lam), ca.vertcat(x, reactions)
+    ones = [ca.SX(1)] * system.surface_count
+    roots = gate_roots(plain, system.definition.surfaces, x, ones)[1]
     columns = ca.jacobian(plain, lam)
     for members in system.entries:  # a set has one factor
         places = [(row, i) for i in members for row in columns[:, i].sparsity().row()]
@@ -67,6 +69,12 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
         if not entries:
             continue
         reduced, factor = cancel_common_factor(entries, variables, known)
+        for e, part in zip(entries, reduced, strict=True):
+            if (
+                not roots and part.is_constant()
+            ):  # the factor as the field has it, so that one series serves both
+                reduced, factor = [own / part for own in reduced], e
+                break
         if ca.depends_on(factor, variables):
             field = ca.SX(field)
             for i in members:

@@ -22,8 +22,6 @@ _WRITTEN_OUT = 3
 class Solved:
     """The law of a mode of coupled surfaces and contacts (see ``switches.Sliding``)."""
 
-    regular = True
-
     def __init__(self, system: FilippovSystem, mode: str):
         coupled, x = coupled_of(system), system.extended_states
         self.system, self.mode, self.coupled = system, mode, coupled

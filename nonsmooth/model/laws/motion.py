@@ -11,7 +11,6 @@ Stops and resets follow the guards as they were given; the driver checks their d
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from functools import cached_property
 
 import casadi as ca
 
@@ -19,7 +18,6 @@ from ..definition.parse_definition import read_function
 from ..definition.system import FilippovSystem, require_system
 from ..errors import DefinitionError
 from ..expressions.jets import taylor
-from ..expressions.linearity import bent
 from .switches import Guarded, Sliding, guards_of, sliding
 
 
@@ -39,18 +37,6 @@ class Motion:
         self.guards = tuple(guard for guard, _ in guarded)
         functions = [function for _, function in guarded]
         self.functions = ca.densify(ca.vertcat(*functions)) if functions else ca.SX(0, 1)
-
-    @property
-    def regular(self) -> bool:
-        """Whether the sliding field has no 0/0 where both fields are tangent to the surface."""
-        return self.law.regular
-
-    @cached_property
-    def affine(self) -> bool:
-        """Whether field and guards are affine in the states, with sines of the time added, so that
-        the first coefficients of their series tell all the others."""
-        both = ca.vertcat(self.field, self.functions)
-        return not any(bent(both, self.states, self.system.definition.time))
 
     def value_function(self) -> ca.Function:
         """Return (x, p) -> the field (N, 1) and the guard functions (m, 1)."""

@@ -59,8 +59,6 @@ class Sliding(Protocol):
     def states(self) -> ca.SX: ...
     @property
     def field(self) -> ca.SX: ...
-    @property
-    def regular(self) -> bool: ...
 
     def exits(self, surface: int) -> Guarded:
         """Functions that are positive while a surface slides."""
@@ -86,7 +84,6 @@ class Free:
     """No surface slides."""
 
     surfaces: tuple[int, ...] = ()
-    regular = False
 
     def __init__(self, system: FilippovSystem, mode: str):
         self.states = system.extended_states
@@ -112,16 +109,14 @@ class Affine:
         field = system.field_with(multipliers)
         middle = ca.substitute(field, lam, 0)
         entries = ca.vertsplit(ca.densify(ca.jacobian(field, lam)))
-        self.regular = self._continuous(entries)
-        if self.regular:
+        if self._continuous(entries):
             self.field = middle
             return
         gradient = ca.jacobian(system.surface_function(surface), self.states)
         a = ca.simplify(ca.mtimes(gradient, middle))
         # A factor of G is one of b = grad h . G too, and there it may no longer be in sight.
-        reduced, factor = cancel_common_factor(entries, self.states, system.parameter_symbols)
+        reduced, _ = cancel_common_factor(entries, self.states, system.parameter_symbols)
         b = ca.simplify(ca.mtimes(gradient, ca.vertcat(*reduced)))
-        self.regular = bool(ca.depends_on(factor, self.states)) and not b.is_zero()
         self.field = middle - (a / b) * ca.vertcat(*reduced)
 
     def exits(self, surface: int) -> Guarded:
@@ -159,8 +154,6 @@ def _with_letter(mode: str, surface: int, letter: str) -> str:
 
 class Implicit:
     """Sliding whose multipliers solve grad h_i . f(x, lambda) = 0 implicitly."""
-
-    regular = True
 
     def __init__(self, system: FilippovSystem, mode: str):
         self.system, self.mode = system, mode

@@ -1,1 +1,1 @@
-"""Expressions printed as C: statements, programs of a system, modes blended for lanes."""
+"""A system as a tape that core runs, and the functions of the lanes printed from it as C."""

@@ -1,9 +1,9 @@
 """Expressions printed as C: one statement per instruction, value-numbered over a whole program.
 
-A :class:`Program` collects named functions of one system (jets of its modes, guards, surfaces,
-maps) in one graph, so that equal subexpressions are found once. What depends on parameters alone is
-moved to a function ``prepare`` that runs once per trajectory and fills an array ``q``; what remains
-is printed on a type ``T`` that is ``double`` or a vector of doubles.
+A :class:`Program` collects named functions of one system (jets of its modes, guards, surfaces) in
+one graph, so that equal terms are found once. What depends on parameters alone is moved to a function
+``prepare`` that runs once per trajectory and fills an array ``q``; what remains is printed on a type ``T``
+that is ``double`` or a vector of doubles.
 """
 
 from __future__ import annotations
@@ -11,11 +11,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import casadi as ca
-
-from ..expressions.graph import Node, instructions
+from ..expressions.graph import Node, reached
+from .terms import MASKS, Graph, Terms
 
 #: C for operations on T; ``{0}`` and ``{1}`` are the arguments.
 _ARITHMETIC = {
@@ -23,10 +22,9 @@ _ARITHMETIC = {
     "add": "{0} + {1}",
     "sub": "{0} - {1}",
     "mul": "{0} * {1}",
-    "div": "{0} / {1}",
     "neg": "-{0}",
     "sq": "{0} * {0}",
-    "twice": "{0} + {0}",
+    "twice": "2.0 * {0}",
     "inv": "1.0 / {0}",
 }
 
@@ -40,8 +38,8 @@ _LIBRARY = {
 #: Compilers take more than proportional time for long functions: statements of one that is not
 #: split, and of a part.
 _WHOLE, _PART = 5000, 250
-_NAME = re.compile(r"\b[vr]\d+\b")
-_DEFINED = re.compile(r"  const T ([vr]\d+) =")
+_NAME = re.compile(r"\b[vm]\d+\b")
+_DEFINED = re.compile(r"  const [TI] ([vm]\d+) =")
 
 #: What only parameters may go through; always on doubles.
 _PARAMETERS_ONLY = {
@@ -75,69 +73,48 @@ class _Function:
 class Program:
     """C functions ``void name(const T *x, const T *q, [extra,] T *a, ...)`` of one system."""
 
-    # ``x`` are the states; ``q`` is prepared from the parameters. Symbols of ``extra`` (multipliers, masks) differ
-    # between lanes and steps, and have the types "T" or "I", a mask of all or no bits.
-    def __init__(
-        self,
-        states: ca.SX,
-        parameters: ca.SX,
-        extra: ca.SX | None = None,
-        extra_types: Sequence[str] = (),
-    ):
-        self._inputs = [states, parameters, ca.SX(0, 1) if extra is None else extra]
-        self._types = tuple(extra_types)
+    # ``x`` are the states; ``q`` is prepared from the parameters. What differs between lanes and steps besides has
+    # the types "T" or "I", a mask of all or no bits.
+    def __init__(self, graph: Graph, types: Sequence[str]):
+        self._graph, self._types = graph, tuple(types)
         self._functions: list[_Function] = []
-        self._outputs: list[ca.SX] = []
+        self._rows: list[list[int]] = []
 
-    def add(self, name: str, **outputs: ca.SX) -> None:
-        """Add a function that stores each output, row by row, in the array of its name."""
-        self._functions.append(_Function(name, tuple(outputs), len(self._outputs)))
-        self._outputs += [ca.densify(ca.SX(e)).T for e in outputs.values()]
+    def add(self, name: str, **outputs: Terms) -> None:
+        """Add a function that stores each output in the array of its name."""
+        self._functions.append(_Function(name, tuple(outputs), len(self._rows)))
+        self._rows += [[self._graph.whole(e).number for e in row] for row in outputs.values()]
 
     def text(self) -> str:
         """Return the C text: ``NQ``, ``prepare`` and all functions."""
-        nodes, rows = instructions(self._inputs, self._outputs)
-        graph = _Graph(nodes, rows, self._types)
-        parts = [graph.prepare()]
+        nodes, roots = self._graph.nodes, [j for row in self._rows for j in row]
+        kept = reached([node.args for node in nodes], [True] * len(nodes), roots)
+        number = {j: k for k, j in enumerate(kept)}
+        own = [replace(nodes[j], args=tuple(number[a] for a in nodes[j].args)) for j in kept]
+        rows = [[number[j] for j in row] for row in self._rows]
+        printed = _Printed(own, rows, self._types)
+        parts = [printed.prepare()]
         for function in self._functions:
             outputs = rows[function.first : function.first + len(function.arrays)]
-            parts.append(graph.function(function, outputs))
+            parts.append(printed.function(function, outputs))
         return "\n".join(parts)
 
 
-class _Graph:
+class _Printed:
     """A value-numbered program: which nodes are constants, prepared, or computed each time."""
 
     def __init__(self, nodes: Sequence[Node], rows: Sequence[Sequence[int]], types: Sequence[str]):
         self.nodes, self.types = nodes, types
-        self.moving, self.constant = [], []
+        self.moving: list[bool] = []
         for node in nodes:
-            if node.op == "input":
-                self.moving.append(_place(node)[0] != 1)
-                self.constant.append(False)
-            else:
-                self.moving.append(any(self.moving[a] for a in node.args))
-                self.constant.append(node.op == "const")
-        self.prepared: dict[int, int] = {}
-        self._find_divisors()
+            own = node.op in MASKS or (node.op == "input" and node.source[0] != 1)
+            self.moving.append(own or any(self.moving[a] for a in node.args))
+        self.constant = [node.op == "const" for node in nodes]
         self._find_sums(rows)
         used = {j for row in rows for j in row}
-        for j, node in enumerate(nodes):
-            if self.moving[j]:
-                divisor = node.op == "div" and node.args[1] in self.divisors
-                used.update(node.args[:1] if divisor else node.args)
+        used.update(a for j, node in enumerate(nodes) if self.moving[j] for a in node.args)
         frontier = sorted(j for j in used if not self.moving[j] and not self.constant[j])
         self.prepared = {j: k for k, j in enumerate(frontier)}
-        inverted = sorted(j for j in self.divisors if not self.moving[j] and not self.constant[j])
-        self.inverted = {j: len(frontier) + k for k, j in enumerate(inverted)}
-
-    def _find_divisors(self) -> None:
-        """Nodes whose reciprocal is taken once: a division costs as much as twenty products."""
-        count: dict[int, int] = {}
-        for j, node in enumerate(self.nodes):
-            if self.moving[j] and node.op == "div":
-                count[node.args[1]] = count.get(node.args[1], 0) + 1
-        self.divisors = {j for j, k in count.items() if k > 1 or not self.moving[j]}
 
     def _find_sums(self, rows: Sequence[Sequence[int]]) -> None:
         """Terms, with signs, of sums whose partial sums have no other use, in the order in which they are known."""
@@ -150,11 +127,7 @@ class _Graph:
         depth = [0] * len(self.nodes)  # operations one after the other until a node is known
         for j, node in enumerate(self.nodes):
             depth[j] = 1 + max((depth[a] for a in node.args), default=-1)
-            if (
-                node.op not in ("add", "sub")
-                or not self.moving[j]
-                or self._choice(node) is not None
-            ):
+            if node.op not in ("add", "sub") or not self.moving[j]:
                 continue
             if node.op == "sub" and node.args[1] in terms:
                 continue
@@ -191,12 +164,6 @@ class _Graph:
             text = f"({text}) {'-' if minus else '+'} {self.name(k)}"
         return text
 
-    def _reciprocal(self, j: int) -> str:
-        if self.constant[j]:
-            value = _value(self.nodes[j])
-            return _literal(1.0 / value) if value else "INFINITY"
-        return f"q[{self.inverted[j]}]" if j in self.inverted else f"r{j}"
-
     def name(self, j: int) -> str:
         """C of a node's value."""
         node = self.nodes[j]
@@ -205,19 +172,19 @@ class _Graph:
         if j in self.prepared:
             return f"q[{self.prepared[j]}]"
         if node.op == "input":
-            vector, position = _place(node)
+            vector, position = node.source
             return f"x[{position}]" if vector == 0 else f"e{position}"
-        return f"v{j}"
+        return f"m{j}" if node.op in MASKS else f"v{j}"
 
     def prepare(self) -> str:
         """C of the function from parameters to q."""
         lines = []
-        for j in self._reachable([*self.prepared, *self.inverted], moving=False):
+        for j in self._reachable(list(self.prepared), moving=False):
             node = self.nodes[j]
             if node.op == "const":
                 continue
             if node.op == "input":
-                value = f"p[{_place(node)[1]}]"
+                value = f"p[{node.source[1]}]"
             else:
                 args = [
                     _literal(_value(self.nodes[a])) if self.constant[a] else f"v{a}"
@@ -226,9 +193,8 @@ class _Graph:
                 value = _scalar(node.op, args)
             lines.append(f"  const double v{j} = {value};")
         lines += [f"  q[{k}] = v{j};" for j, k in self.prepared.items()]
-        lines += [f"  q[{k}] = 1.0 / v{j};" for j, k in self.inverted.items()]
         return (
-            f"#define NQ {max(1, len(self.prepared) + len(self.inverted))}\n"
+            f"#define NQ {max(1, len(self.prepared))}\n"
             "static void prepare(const double *p, double *q) {\n  (void)p; (void)q;\n"
             + "\n".join(lines)
             + "\n}\n"
@@ -242,14 +208,10 @@ class _Graph:
                 stores.setdefault(j, []).append(f"{array}[{k}]")
         lines = []
         reachable = self._early(outputs)
-        divisors = self.divisors & {
-            self.nodes[j].args[1] for j in reachable if self.nodes[j].op == "div"
-        }
         for j in reachable:
-            if self.nodes[j].op not in ("input", "not"):
-                lines.append(f"  const T {self.name(j)} = {self._value(j)};")
-            if j in divisors:
-                lines.append(f"  const T r{j} = 1.0 / {self.name(j)};")
+            if self.nodes[j].op != "input":
+                kind = "I" if self.nodes[j].op in MASKS else "T"
+                lines.append(f"  const {kind} {self.name(j)} = {self._value(j)};")
             lines += [f"  {target} = {self.name(j)};" for target in stores.pop(j, [])]
         for j, targets in stores.items():
             value = f"BC({self.name(j)})" if self.constant[j] else self.name(j)
@@ -290,50 +252,22 @@ class _Graph:
         return sorted(key, key=lambda j: (key[j], j))
 
     def _arguments(self, j: int) -> list[int]:
-        """Arguments of the statement that a node is printed as: a choice skips its halves."""
-        node = self.nodes[j]
-        if node.op == "add" and self.moving[j] and self._choice(node) is not None:
-            return [a for half in node.args for a in self.nodes[half].args]
-        return [k for k, _ in self.sums[j]] if j in self.sums else list(node.args)
-
-    def _mask(self, j: int) -> tuple[str, bool]:
-        node = self.nodes[j]
-        if node.op == "not":
-            name, negated = self._mask(node.args[0])
-            return name, not negated
-        return self.name(j), False
+        """Arguments of the statement that a node is printed as."""
+        return [k for k, _ in self.sums[j]] if j in self.sums else list(self.nodes[j].args)
 
     def _value(self, j: int) -> str:
         node = self.nodes[j]
-        if node.op == "if_else_zero":
-            mask, negated = self._mask(node.args[0])
-            chosen = self._broadcast(node.args[1])
-            pair = ("BC(0.0)", chosen) if negated else (chosen, "BC(0.0)")
-            return f"SELECT({mask}, {pair[0]}, {pair[1]})"
-        if node.op == "add" and (choice := self._choice(node)) is not None:
-            return choice
         if j in self.sums:
             return self._sum(self.sums[j])
-        if node.op == "div" and node.args[1] in self.divisors:
-            return f"{self.name(node.args[0])} * {self._reciprocal(node.args[1])}"
         args = [self.name(a) for a in node.args]
         if node.op in _ARITHMETIC:
             return _ARITHMETIC[node.op].format(*args)
+        if node.op == "select":
+            return f"SELECT({args[0]}, {', '.join(map(self._broadcast, node.args[1:]))})"
+        if node.op in MASKS:
+            return f"(I)({args[0]} != 0)" if node.op == "nonzero" else " | ".join(args)
         call = _LIBRARY[node.op].upper().replace("NS_", "") + "_"
-        return f"{call}({', '.join(self._broadcast(a) for a in node.args)})"
-
-    def _choice(self, node: Node) -> str | None:
-        """``if_else`` is written by CasADi as a sum of two halves of which one is zero."""
-        halves = [self.nodes[a] for a in node.args]
-        if any(half.op != "if_else_zero" for half in halves):
-            return None
-        (one, first), (two, second) = (self._mask(half.args[0]) for half in halves)
-        if one != two or first == second:
-            return None
-        values = [self._broadcast(half.args[1]) for half in halves]
-        if first:
-            values.reverse()
-        return f"SELECT({one}, {values[0]}, {values[1]})"
+        return f"{call}({', '.join(map(self._broadcast, node.args))})"
 
     def _broadcast(self, j: int) -> str:
         return f"BC({self.name(j)})" if self.constant[j] else self.name(j)
@@ -351,19 +285,14 @@ def _parts(lines: Sequence[str]) -> tuple[list[list[str]], int]:
         for name in _NAME.findall(line):
             if home[name] != k // _PART:
                 shared.setdefault(name, len(shared))
+    read = lambda name: f"{'(I)' * (name[0] == 'm')}w[{shared[name]}]"
     parts: list[list[str]] = [[] for _ in range(0, len(lines), _PART)]
     for k, line in enumerate(lines):
-        here = lambda m, k=k: m[0] if home[m[0]] == k // _PART else f"w[{shared[m[0]]}]"
+        here = lambda m, k=k: m[0] if home[m[0]] == k // _PART else read(m[0])
         parts[k // _PART].append(_NAME.sub(here, line))
         if (m := _DEFINED.match(line)) and m[1] in shared:
-            parts[k // _PART].append(f"  w[{shared[m[1]]}] = {m[1]};")
+            parts[k // _PART].append(f"  w[{shared[m[1]]}] = (T){m[1]};")
     return parts, len(shared)
-
-
-def _place(node: Node) -> tuple[int, int]:
-    """Vector and position of an input."""
-    assert isinstance(node.payload, tuple)
-    return node.payload
 
 
 def _value(node: Node) -> float:

@@ -15,16 +15,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..definition.system import FilippovSystem
-from ..expressions.graph import depends_on, instructions
-from ..expressions.jets import Coefficient, Expansion, Expressions, scaled, value_of
-from ..expressions.simplification import simplified
-from ..expressions.taylor_rules import lower, touched
 from ..laws.coupled import Coupled
 from .ccode import Program
+from .terms import Graph, OfTape, Term, Terms
 
 #: Lines of functions that are short.
 _SHORT = 150
+
+Rows = list[list["Term | None"]]
 
 
 @dataclass(frozen=True)
@@ -44,254 +42,246 @@ def set_program(coupled: Coupled, order: int) -> SetProgram:
     return _Writer(coupled, order).program()
 
 
-class _Writer:
-    def __init__(self, coupled: Coupled, order: int):
-        system: FilippovSystem = coupled.system
-        self.system, self.order = system, order
-        self.x, self.p = system.extended_states, system.parameter_symbols
-        self.n, self.k = int(self.x.numel()), system.surface_count
-        self.lam, self.stretch = coupled.multipliers, ca.SX.sym("stretch")
-        nu = ca.vertcat(*[coupled.unknown(i) for i in range(self.k)])
-        field, layer, heights, factor, stops = coupled.outputs
-        none = ca.SX.zeros(self.k, 1)
-        #: Field, layer and stops off the set in states and lambda; on it in states and nu.
-        self.scaled = coupled.scaled[0]
-        off = ca.substitute([field, layer], [nu], [none]) if self.scaled else [field, layer]
-        on = ca.substitute([field, layer], [self.lam], [none]) if self.scaled else [field, layer]
-        self.off_field, self.off_layer = (ca.densify(e) for e in off)
-        self.on_field, self.on_layer = (ca.densify(e) for e in on)
-        self.nu, self.heights, self.factor = nu, ca.densify(heights), factor[0]
-        if self.scaled:
-            self._count_in_loads()
-        self.stops = stops
-        self.pull = ca.jacobian(self.off_layer, self.lam)  # -M of h' = a - M lambda
-        self.push = ca.jacobian(self.on_layer, nu)
-        rates = ca.substitute(self.on_layer, nu, none)
-        self.nu_at = -_inverse(self.push) @ rates
+class _Writer(OfTape):
+    """Its modes in terms."""
 
-    def _count_in_loads(self) -> None:
-        """Let the factor be a load as the field has it, if it has one: the same sums, expanded once."""
-        loads = ca.densify(ca.jacobian(self.off_field, self.lam[0]))
-        parts = ca.densify(ca.jacobian(self.on_field, self.nu[0]))
-        for load, part in zip(ca.vertsplit(loads), ca.vertsplit(parts), strict=True):
-            if not load.is_zero() and not ca.depends_on(part, self.x):
-                on = [self.on_field, self.on_layer]
-                self.on_field, self.on_layer = ca.substitute(on, [self.nu], [self.nu / part])
-                self.factor = load
-                return
+    def __init__(self, coupled: Coupled, order: int):
+        super().__init__(coupled)
+        self.order, self.k, self.scaled = order, self.m, coupled.scaled[0]
+        *self.lam, self.stretch = self.graph.inputs(2, self.k + 1)
+        point = self.point(self._acting(None))
+        self.rates, self.factor = point.layer, point.factors[0]
+        self.rate_slopes, self.factor_slopes = point.layer_gradient, point.factor_gradient[: self.n]
+        self.push = [point.slope[i * self.k : (i + 1) * self.k] for i in range(self.k)]
+        self.pull = [self._scaled(row) for row in self.push]  # -M of h' = a - M lambda
+
+    def _scaled(self, row: Terms) -> list[Term | None]:
+        """What is there for each unknown for each multiplier."""
+        return [self.graph.inner([e], [self.factor]) if self.scaled else e for e in row]
+
+    def _acting(
+        self, unknowns: Terms | None, multipliers: Terms | None = None
+    ) -> list[Term | None]:
+        """Multipliers, and unknowns where these are others."""
+        none: list[Term | None] = [None] * self.k
+        if not self.scaled:
+            return [*(unknowns or multipliers or none)]
+        return [*(multipliers or none), *(unknowns or none)]
 
     def program(self) -> SetProgram:
-        x, k = self.x, self.k
-        program = Program(x, self.p, ca.vertcat(self.lam, self.stretch), ("T",) * (k + 1))
-        program.add("off_jet", **self._off())
-        program.add("on_jet", **self._on())
-        program.add("leave_jet", **self._leave())
-        program.add("height_values", h=self.heights, gradient=_gradient(self.heights, x))
-        rates = ca.substitute(self.off_layer, self.lam, ca.SX.zeros(k, 1))
-        program.add("frozen_values", a=rates, m=-self.pull)
-        program.add("field_values", f=self.off_field)
-        own = ca.substitute(self.off_field, self.lam, ca.SX.zeros(k, 1))
-        flow = self.stretch * own + ca.jacobian(self.off_field, self.lam) @ self.lam
+        graph, program = self.graph, Program(self.graph, ("T",) * (self.k + 1))
+        off, on, leave = self._off(), self._on(), self._leave()
+        for name, jet in (("off", off), ("on", on), ("leave", leave)):
+            arrays = {key: [e for row in rows for e in row] for key, rows in jet.items()}
+            program.add(f"{name}_jet", **arrays)
+        heights, height_slopes = self.surfaces()
+        stops, stop_slopes = self.stops()
+        slip, slip_slopes = self._slip()
+        program.add("height_values", h=heights, gradient=height_slopes)
+        negative = [None if e is None else -e for row in self.pull for e in row]
+        program.add("frozen_values", a=self.rates, m=negative)
+        free, field = (self.expansion((0,)).advance(0, [*self.x, *own])[0] for own in (
+            self._acting(None), self._acting(None, self.lam)))  # fmt: skip
+        program.add("field_values", f=field)
+        columns = self.columns(self._acting(None))
+        acts = [graph.inner([lam], [self.factor]) if self.scaled else lam for lam in self.lam]
+        flow = [
+            graph.total(graph.inner([self.stretch], [own]), graph.inner(row, acts))
+            for own, row in zip(free, columns, strict=True)
+        ]
         program.add("flow_values", f=flow)
-        program.add("stop_values", value=self.stops, gradient=_gradient(self.stops, x))
-        used = ca.vertcat(self.nu_at, self.factor)
-        program.add("slip_values", value=used, gradient=_gradient(used, x))
-        radius = ca.sqrt(ca.sumsqr(self.heights))
-        off = ca.substitute(self.off_field, self.lam, self.heights / radius)
-        on = ca.substitute(self.on_field, self.nu, self.nu_at)
-        rows, on_rows = (
-            tuple(i for i in range(self.n) if not ca.is_linear(f[i], x)) for f in (off, on)
+        program.add("stop_values", value=stops, gradient=stop_slopes)
+        program.add("slip_values", value=slip, gradient=slip_slopes)
+        rows, on_rows, bent_slip, bent_stops = self._bent()
+        for name, jet, checked in (("off", off, rows), ("on", on, on_rows)):
+            own = [row[0] for row in jet["g"][1 : 1 + len(stops)]]
+            program.add(f"{name}_check", f=[jet["c"][i][1] for i in checked], value=own)
+        text = self._slopes(height=height_slopes, slip=slip_slopes, stop=stop_slopes)
+        found = [self.x.index(h) for h in heights if h in self.x]
+        states = tuple(found) if len(found) == self.k else ()
+        return SetProgram(
+            text + _short_inline(program.text()), rows, on_rows, bent_slip, bent_stops, states
         )
-        program.add("off_check", f=off[list(rows)], value=self.stops)
-        program.add("on_check", f=on[list(on_rows)], value=self.stops)
-        bent_slip = not ca.is_linear(used, x)
-        bent_stops = bool(self.stops.numel()) and not ca.is_linear(self.stops, x)
-        text = self._slopes(height=self.heights, slip=used, stop=self.stops)
-        text += _short_inline(program.text())
-        return SetProgram(text, rows, on_rows, bent_slip, bent_stops, self._states())
 
-    def _slopes(self, **functions: ca.SX) -> str:
-        """Which of their derivatives by states are not zero."""
+    def _slopes(self, **gradients: Terms) -> str:
+        """Which derivatives by states are not zero."""
         lines = []
-        for name, values in functions.items():
-            there = [
-                [int(not e.is_zero()) for e in ca.horzsplit(row)]
-                for row in ca.vertsplit(_gradient(values, self.x))
-            ]
-            rows = ", ".join("{" + ", ".join(map(str, row)) + "}" for row in there) or "{0}"
+        for name, values in gradients.items():
+            there = [str(int(e is not None)) for e in values]
+            rows = [", ".join(there[i : i + self.n]) for i in range(0, len(there), self.n)]
+            entries = ", ".join(f"{{{row}}}" for row in rows) or "{0}"
             lines.append(
-                f"__attribute__((unused)) static const char {name.upper()}_SLOPES[][N] = {{{rows}}};\n"
+                f"__attribute__((unused)) static const char {name.upper()}_SLOPES[][N] = {{{entries}}};\n"
             )
         return "".join(lines)
 
-    def _states(self) -> tuple[int, ...]:
-        found = []
-        for h in ca.vertsplit(self.heights):
-            found += [i for i in range(self.n) if ca.is_equal(h, self.x[i])]
-        return tuple(found) if len(found) == self.k else ()
+    def _slip(self) -> tuple[list[Term | None], list[Term | None]]:
+        """The unknowns that keep h' at zero and their limit, with their gradients."""
+        values = [*self._kept(self.rates), self.factor]
+        n, slopes = self.n, list[Term | None]()
+        columns = [self._kept(self.rate_slopes[j::n]) for j in range(n)]
+        for i in range(self.k):
+            slopes += [column[i] for column in columns]
+        return values, [*slopes, *self.factor_slopes]
+
+    def _kept(self, rates: Terms) -> list[Term | None]:
+        """The unknowns that take rates away."""
+        found = self._times(_inverse(self.graph, self.push), rates)
+        return [None if e is None else -e for e in found]
+
+    def _times(self, matrix: Sequence[Terms], vector: Terms) -> list[Term | None]:
+        return [self.graph.inner(row, vector) for row in matrix]
+
+    def _bent(self) -> tuple[tuple[int, ...], tuple[int, ...], bool, bool]:
+        """Rows of the field that are not affine off the set and on it; whether slip and stops are not."""
+        of, k = self.coupled, self.k
+        x, unknown = of.system.extended_states, of.symbols_of(range(k))
+        lam = of.multipliers if self.scaled else ca.SX(0, 1)
+        field, layer = ca.substitute([of.field, of.layer], [lam], [ca.SX.zeros(lam.numel(), 1)])
+        free = ca.substitute([field, layer], [unknown], [ca.SX.zeros(k, 1)])
+        kept = -ca.mtimes(ca.inv(ca.jacobian(layer, unknown)), free[1])
+        on, acts = ca.substitute(field, unknown, kept), of.columns_of_field.sparsity().row()
+        bent = [not ca.is_linear(e, x) for e in ca.vertsplit(free[0])]
+        rows = tuple(i for i in range(self.n) if bent[i] or i in acts)
+        on_rows = tuple(i for i in range(self.n) if not ca.is_linear(on[i], x))
+        slip = ca.vertcat(kept, of.factors[0])
+        return rows, on_rows, not ca.is_linear(slip, x), not ca.is_linear(of.stops, x)
 
     # jets --------------------------------------------------------------------------------------
 
-    def _expansion(self, outputs: Sequence[ca.SX], unknowns: ca.SX) -> tuple[Expansion, list[int]]:
-        """The series of some outputs in states and unknowns, and the rules that unknowns enter."""
-        inputs = [ca.vertcat(self.x, unknowns), self.p]
-        outputs = [ca.densify(e) for e in outputs]
-        nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
-        rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
-        rows = [[rule_of[j] for j in row] for row in rows]
-        still = [self.p[i] for i in range(self.p.numel())]
-        return Expansion(rules, rows, still, Expressions()), touched(rules, self.n)
-
-    def _off(self) -> dict[str, ca.SX]:
+    def _off(self) -> dict[str, Rows]:
         """Off the set: coefficients of states, of |h| over its first, of stops; the last ones of h."""
-        field, unknowns = (self.on_field, self.nu) if self.scaled else (self.off_field, self.lam)
-        outputs = [field, self.heights, self.factor, self.stops]
-        expansion, late = self._expansion(outputs, unknowns)
+        expansion = self.expansion((0, 2, 3, 4))
         jet = self._begin()
-        direction = _Direction(self.k, self.scaled)
-        stops: list[list[Coefficient]] = []
-        fields: list[list[Coefficient]] = []
-        none: list[Coefficient] = [None] * self.k
+        direction = _Direction(self.graph, self.k, self.scaled)
+        stops, fields = Rows(), Rows()
         for k in range(self.order + 1):
             now = [row[k] for row in jet]
-            if k == 0:
-                heights = [clean(h) for h in ca.vertsplit(self.heights)]
-                known = expansion.advance(0, [*now, *direction.push(0, heights, self.factor)])
-            else:
-                _, heights, (factor,), _ = expansion.advance(k, [*now, *none])
-                known = expansion.again(k, [*now, *direction.push(k, heights, factor)], late)
+            _, heights, factors, _ = expansion.advance(k, [*now, *self._acting(None)])
+            found = direction.push(k, heights, factors[0])
+            known = expansion.again(k, [*now, *self._acting(found)], self.late)
             stops.append(known[3])
             fields.append(known[0])
             if k < self.order:
                 for row, value in zip(jet, self._stretched(fields), strict=True):
                     row.append(value)
-        return dict(
-            c=_matrix(jet),
-            g=_matrix([direction.root, *zip(*stops, strict=True)]),
-            ends=_column([row[k] for row in direction.own for k in (self.order - 1, self.order)]),
-            radius=direction.radius,
-        )
+        ends = [row[k] for row in direction.own for k in (self.order - 1, self.order)]
+        guards = [direction.root, *map(list, zip(*stops, strict=True))]
+        return dict(c=jet, g=guards, ends=[ends], radius=[[direction.radius]])
 
-    def _on(self) -> dict[str, ca.SX]:
+    def _on(self) -> dict[str, Rows]:
         """On the set: coefficients of states, of stops, of the unknowns and of their limit."""
-        outputs = [self.on_field, self.on_layer, self.factor, self.stops]
-        expansion, late = self._expansion(outputs, self.nu)
-        jet = self._begin()
-        inverse = _inverse(self.push)
-        first: list[Coefficient] = [clean(e) for e in ca.vertsplit(self.nu_at)]
-        series: list[list[Coefficient]] = [[] for _ in range(self.k)]
-        limit: list[Coefficient] = []
-        stops: list[list[Coefficient]] = []
+        graph, expansion, jet = self.graph, self.expansion((0, 1, 3, 4)), self._begin()
+        series: Rows = [[] for _ in range(self.k)]
+        limit: list[Term | None] = []
+        stops = Rows()
         for k in range(self.order + 1):
             now = [row[k] for row in jet]
-            known = expansion.advance(k, [*now, *(first if k == 0 else [None] * self.k)])
-            found = first
-            if k:
-                found = [clean(e) for e in ca.vertsplit(-inverse @ _column(known[1]))]
-                known = expansion.again(k, [*now, *found], late)
+            known = expansion.advance(k, [*now, *self._acting(None)])
+            found = self._kept(known[1])
+            known = expansion.again(k, [*now, *self._acting(found)], self.late)
             for row, value in zip(series, found, strict=True):
                 row.append(value)
             limit.append(known[2][0])
             stops.append(known[3])
             self._next(jet, known[0], k)
-        room = [
-            clean(
-                value_of(_square(limit, k))
-                - sum((value_of(_square(row, k)) for row in series), ca.SX(0))
-            )
-            for k in range(self.order + 1)
-        ]
-        return dict(
-            c=_matrix(jet), g=_matrix([room, *zip(*stops, strict=True), limit]), nu=_matrix(series)
-        )
-
-    def _leave(self) -> dict[str, ca.SX]:
-        """Leaving the set at no rate yet."""
-        expansion, late = self._expansion([self.off_field, self.off_layer, self.stops], self.lam)
-        jet = self._begin()
-        start = self.lam
-        inverse = _inverse(self.pull)
-        turned = inverse @ start
-        per = 1 / ca.dot(start, turned)
-        u: list[list[Coefficient]] = [[start[i]] for i in range(self.k)]
-        radius: list[Coefficient] = [None, None]
-        stops: list[list[Coefficient]] = []
+        room = []
         for k in range(self.order + 1):
-            now = [row[k] for row in jet]
-            known = expansion.advance(
-                k, [*now, *([row[0] for row in u] if k == 0 else [None] * self.k)]
-            )
+            square: Term | None = None
+            for row in series:
+                square = graph.total(square, _square(graph, row, k))
+            room.append(graph.difference(_square(graph, limit, k), square))
+        return dict(c=jet, g=[room, *map(list, zip(*stops, strict=True)), limit], nu=series)
+
+    def _leave(self) -> dict[str, Rows]:
+        """Leaving the set at no rate yet."""
+        graph, expansion, jet = self.graph, self.expansion((0, 1, 4)), self._begin()
+        inverse = _inverse(graph, self.pull)
+        turned = self._times(inverse, self.lam)
+        per = graph.constant(1.0) / graph.whole(graph.inner(self.lam, turned))
+        u: Rows = [[lam] for lam in self.lam]
+        radius: list[Term | None] = [None, None]
+        stops = Rows()
+        for k in range(self.order + 1):
+            now, none = [row[k] for row in jet], [None] * self.k
+            first = self.lam if k == 0 else none
+            known = expansion.advance(k, [*now, *self._acting(None, first)])
             if k:
-                right = -_column(known[1])
-                for i in range(self.k):
-                    right[i] += (k + 1) * value_of(_products(u[i], radius, 1, k - 1, k + 1))
-                short = sum(
-                    (value_of(_inner(row, k)) for row in u), ca.SX(0)
-                )  # half of the squares
-                back = inverse @ right
-                rate = (-short - ca.dot(start, back)) * per
-                found = back + rate * turned
-                for row, value in zip(u, ca.vertsplit(found), strict=True):
-                    row.append(clean(value))
-                radius.append(clean(rate / (k + 1)))
-                known = expansion.again(k, [*now, *[row[k] for row in u]], late)
+                right: list[Term | None] = []
+                for row, rate in zip(u, known[1], strict=True):
+                    more = _products(graph, row, radius, 1, k - 1, k + 1)
+                    own = None if more is None else float(k + 1) * more
+                    right.append(graph.difference(own, rate))
+                short: Term | None = None  # half of the squares
+                for row in u:
+                    short = graph.total(short, _inner(graph, row, k))
+                back = self._times(inverse, right)
+                along = graph.total(short, graph.inner(self.lam, back))
+                rate = graph.inner([graph.difference(None, along)], [per])
+                for row, one, two in zip(u, back, turned, strict=True):
+                    row.append(graph.total(one, graph.inner([rate], [two])))
+                radius.append(None if rate is None else (1.0 / (k + 1)) * rate)
+                known = expansion.again(
+                    k, [*now, *self._acting(None, [row[k] for row in u])], self.late
+                )
             stops.append(known[2])
             self._next(jet, known[0], k)
         distance = [*radius[2:], *[None] * (self.order + 3 - len(radius))]
-        return dict(
-            c=_matrix(jet), g=_matrix([distance, *zip(*stops, strict=True)]), u=_matrix(u)
-        )  # fmt: skip
+        return dict(c=jet, g=[distance, *map(list, zip(*stops, strict=True))], u=u)
 
-    def _stretched(self, fields: Sequence[Sequence[Coefficient]]) -> list[Coefficient]:
+    def _stretched(self, fields: Rows) -> list[Term | None]:
         """The next coefficients of states, from those of (1 - w s/3)^2 times the field."""
         w, per = self.stretch, 1.0 / len(fields)
-        weights = (per, w * (-2 / 3 * per), w * w * (1 / 9 * per))
-        result = []
-        for row in zip(*reversed(fields[-3:]), strict=True):
-            terms = [weights[i] * value_of(c) for i, c in enumerate(row) if c is not None]
-            result.append(clean(sum(terms[1:], terms[0])) if terms else None)
-        return result
+        weights = (self.graph.constant(per), (-2 / 3 * per) * w, (1 / 9 * per) * (w * w))
+        return [
+            self.graph.inner(weights[: len(row)], row)
+            for row in zip(*reversed(fields[-3:]), strict=True)
+        ]
 
-    def _begin(self) -> list[list[Coefficient]]:
-        return [[self.x[i]] for i in range(self.n)]
+    def _begin(self) -> Rows:
+        return [[x] for x in self.x]
 
-    def _next(self, jet: list[list[Coefficient]], field: Sequence[Coefficient], k: int) -> None:
+    def _next(self, jet: Rows, field: Terms, k: int) -> None:
         if k < self.order:
             for row, value in zip(jet, field, strict=True):
-                row.append(scaled(value, 1.0 / (k + 1)))
+                row.append(None if value is None else (1.0 / (k + 1)) * value)
 
 
 class _Direction:
-    """The series of h/|h|, or of n h/|h|, and of |h| over its first value, as expressions (``Direction``)."""
+    """The series of h/|h|, or of n h/|h|, and of |h| over its first value (``Direction``)."""
 
-    def __init__(self, size: int, scaled: bool):
-        self.own: list[list[Coefficient]] = [[] for _ in range(size)]
-        self.u: list[list[Coefficient]] = [[] for _ in range(size)]
-        self.root: list[Coefficient] = []
-        self.radius, self._per = ca.SX(1), ca.SX(1)
-        self._scaled, self._part = scaled, list[Coefficient]()  # of n |h| at first over |h|
+    def __init__(self, graph: Graph, size: int, scaled: bool):
+        self._graph = graph
+        self.own: Rows = [[] for _ in range(size)]
+        self.u: Rows = [[] for _ in range(size)]
+        self.root: list[Term | None] = []
+        self._scaled, self._part = scaled, list["Term | None"]()  # of n |h| at first over |h|
 
-    def push(self, k: int, h: Sequence[Coefficient], factor: Coefficient) -> list[Coefficient]:
+    def push(self, k: int, h: Terms, factor: Term | None) -> list[Term | None]:
         """Coefficients k of the direction, or n times that, from those of h and of n."""
+        graph = self._graph
         if k == 0:
-            self.radius = ca.sqrt(ca.sumsqr(_column(h)))
-            self._per = 1 / self.radius
+            self.radius = graph.apply("sqrt", [graph.inner(h, h)])
+            self._per = graph.constant(1.0) / self.radius
         for row, value in zip(self.own, h, strict=True):
             row.append(None if value is None else value * self._per)
         if k == 0:
-            self.root.append(ca.SX(1))
+            self.root.append(graph.constant(1.0))
         else:
-            total = sum((value_of(row[0]) * value_of(row[k]) for row in self.own), ca.SX(0))
-            curved = sum((value_of(_inner(row, k)) for row in self.own), ca.SX(0))
-            self.root.append(clean(total + (curved - value_of(_inner(self.root, k)))))
+            total = graph.inner([row[0] for row in self.own], [row[k] for row in self.own])
+            curved: Term | None = None
+            for row in self.own:
+                curved = graph.total(curved, _inner(graph, row, k))
+            self.root.append(
+                graph.total(total, graph.difference(curved, _inner(graph, self.root, k)))
+            )
         if self._scaled:
             # (n/|h|) h has a product less than n (h/|h|).
-            known = _products(self._part, self.root, 0, k - 1, k)
-            self._part.append(clean(value_of(factor) - value_of(known)))
-            return [_products(self._part, row, 0, k, k) for row in self.own]
+            known = _products(graph, self._part, self.root, 0, k - 1, k)
+            self._part.append(graph.difference(factor, known))
+            return [_products(graph, self._part, row, 0, k, k) for row in self.own]
         for row, own in zip(self.u, self.own, strict=True):
-            known = _products(row, self.root, 0, k - 1, k)
-            row.append(clean(value_of(own[k]) - value_of(known)))
+            row.append(graph.difference(own[k], _products(graph, row, self.root, 0, k - 1, k)))
         return [row[k] for row in self.u]
 
 
@@ -304,62 +294,39 @@ def _short_inline(text: str) -> str:
     return text
 
 
-def clean(a: ca.SX) -> Coefficient:
-    """Return None for zero."""
-    return None if a.is_zero() else a
-
-
-def _products(
-    u: Sequence[Coefficient], v: Sequence[Coefficient], first: int, last: int, k: int
-) -> Coefficient:
+def _products(graph: Graph, u: Terms, v: Terms, first: int, last: int, k: int) -> Term | None:
     """Sum of u_i v_(k-i) for i from first to last."""
-    total: Coefficient = None
-    for i in range(first, last + 1):
-        a, b = u[i], v[k - i]
-        if a is not None and b is not None:
-            total = a * b if total is None else total + a * b
-    return total
+    places = range(first, last + 1)
+    return graph.inner([u[i] for i in places], [v[k - i] for i in places])
 
 
-def _inner(row: Sequence[Coefficient], k: int) -> Coefficient:
+def _inner(graph: Graph, row: Terms, k: int) -> Term | None:
     """Half of coefficient k of a square, without its first and last products."""
-    total = _products(row, row, 1, (k - 1) // 2, k)
     middle = row[k // 2] if k % 2 == 0 and k else None
-    if middle is None:
-        return total
-    half = 0.5 * (middle * middle)
-    return half if total is None else total + half
+    half = None if middle is None else 0.5 * (middle * middle)
+    return graph.total(_products(graph, row, row, 1, (k - 1) // 2, k), half)
 
 
-def _square(row: Sequence[Coefficient], k: int) -> Coefficient:
+def _square(graph: Graph, row: Terms, k: int) -> Term | None:
     """Coefficient k of a square."""
-    ends = _products(row, row, 0, 0, k)
-    if k == 0:
-        return ends
-    total = value_of(ends) + value_of(_inner(row, k))
-    return clean(2.0 * total)
+    ends = graph.inner([row[0]], [row[k]])
+    total = graph.total(ends, _inner(graph, row, k)) if k else None
+    return ends if k == 0 else None if total is None else 2.0 * total
 
 
-def _inverse(m: ca.SX) -> ca.SX:
+def _inverse(graph: Graph, m: Sequence[Terms]) -> list[list[Term | None]]:
     """Inverse of a matrix of two or three rows, from its cofactors."""
-    m = ca.densify(m)
-    if m.shape[0] == 2:
-        adjugate = ca.vertcat(ca.horzcat(m[1, 1], -m[0, 1]), ca.horzcat(-m[1, 0], m[0, 0]))
-    else:
-        adjugate = ca.adj(m)
-    determinant = ca.mtimes(m[0, :], adjugate[:, 0])
-    return adjugate * (1 / determinant)
+    size = len(m)
 
+    def cofactor(i: int, j: int) -> Term | None:
+        rows, columns = ([(k + s) % size for s in range(1, size)] for k in (i, j))
+        if size == 2:
+            own = m[rows[0]][columns[0]]
+            return graph.difference(None, own) if (i + j) % 2 else own
+        (a, b), (c, d) = ([m[r][q] for q in columns] for r in rows)
+        return graph.difference(graph.inner([a], [d]), graph.inner([b], [c]))
 
-def _gradient(functions: ca.SX, x: ca.SX) -> ca.SX:
-    return ca.densify(ca.jacobian(functions, x)) if functions.numel() else ca.SX(0, x.numel())
-
-
-def _column(values: Sequence[Coefficient]) -> ca.SX:
-    return ca.vertcat(*[value_of(v) for v in values])
-
-
-def _matrix(rows: Sequence[Sequence[Coefficient]], order: int = 0) -> ca.SX:
-    if not rows:
-        return ca.SX(0, order + 1)
-    return ca.vertcat(*[ca.horzcat(*[value_of(v) for v in row]) for row in rows])
+    adjugate = [[cofactor(j, i) for j in range(size)] for i in range(size)]
+    determinant = graph.whole(graph.inner(m[0], [row[0] for row in adjugate]))
+    per = graph.constant(1.0) / determinant
+    return [[graph.inner([e], [per]) for e in row] for row in adjugate]

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expressions.graph import depends_on, instructions
+from ..expressions.graph import Node, depends_on, instructions, reached
 from ..expressions.simplification import simplified
 from ..expressions.taylor_rules import Rule, entered, lower
 from ..laws.coupled import Coupled
@@ -42,6 +42,8 @@ class Values:
         Nodes of the outputs.
     paired : ndarray of int32
         Whether each node is evaluated in two numbers where the time is two; see ``flow/core/pairs.h``.
+    nodes : sequence of Node
+        The same nodes, to be printed.
     """
 
     op: Integers
@@ -53,6 +55,7 @@ class Values:
     free: Integers
     outputs: Integers
     paired: Integers
+    nodes: Sequence[Node]
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,8 @@ class Series:
     outputs: Integers
     #: Whether each is evaluated in two numbers where the time is two.
     paired: Integers
+    #: The same rules, to be printed.
+    rules: Sequence[Rule]
 
 
 @dataclass(frozen=True)
@@ -122,7 +127,7 @@ def tape_of(coupled: Coupled) -> Tape:
     """Write a system as a tape."""
     system, d = coupled.system, coupled.system.definition
     x, p = system.extended_states, system.parameter_symbols
-    slope, gradients = sparse_entries(coupled.slope), [sparse_entries(g) for g in coupled.gradients]
+    slope, gradients = sparse_entries(coupled.slope), [_by_rows(g) for g in coupled.gradients]
     matrices = [slope, *gradients]
     kept = coupled.kept
     surface_gradient = (
@@ -197,6 +202,7 @@ def values_of(
         free=_reached([node.args for node in nodes], moving, [j for k in free for j in rows[k]]),
         outputs=_integers([j for row in rows for j in row]),
         paired=_paired([node.op for node in nodes], [node.args for node in nodes], is_time),
+        nodes=nodes,
     )
 
 
@@ -312,6 +318,7 @@ def _series(
         early=_integers(sorted(j for j in needed if not late[j])),
         outputs=_integers([j for row in rows for j in row]),
         paired=_paired([rule.rule for rule in rules], arguments, is_time),
+        rules=rules,
     )
 
 
@@ -323,14 +330,7 @@ def _operation(rule: Rule) -> str:
 def _reached(
     arguments: Sequence[Sequence[int]], wanted: Sequence[bool], roots: Sequence[int]
 ) -> Integers:
-    """What some nodes follow from, in order, as far as it is wanted."""
-    found, pending = set[int](), list(roots)
-    while pending:
-        j = pending.pop()
-        if j not in found and wanted[j]:
-            found.add(j)
-            pending += arguments[j]
-    return _integers(sorted(found))
+    return _integers(reached(arguments, wanted, roots))
 
 
 def _is_still(rule: Rule) -> bool:
@@ -374,6 +374,12 @@ def sparse_entries(matrix: ca.SX) -> tuple[ca.SX, Entries]:
     rows, columns = matrix.sparsity().row(), matrix.sparsity().get_col()
     nonzeros = ca.vertcat(*matrix.nonzeros()) if rows else ca.SX(0, 1)
     return nonzeros, Entries(_integers(rows), _integers(columns))
+
+
+def _by_rows(matrix: ca.SX) -> tuple[ca.SX, Entries]:
+    """The same, row after row."""
+    nonzeros, places = sparse_entries(matrix.T)
+    return nonzeros, Entries(places.column, places.row)
 
 
 def _moving_slopes(coupled: Coupled) -> tuple[Integers, Integers, ca.SX]:

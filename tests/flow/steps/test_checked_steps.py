@@ -137,8 +137,32 @@ def test_a_late_end_loses_no_event(many, tol, t_end):
     assert abs(state[1] + (2 * 9.81) ** 0.5) < 1e-12
 
 
+@pytest.mark.parametrize("slow", [0.0, 0.3])
+def test_what_rests_stays(slow):
+    """Rounding in the multiplier that holds a block is no force."""
+    starts = np.random.default_rng(1).normal(size=(20, 2))
+    by_fields = ns.FilippovSystem(
+        [y, v], surface=v - slow, above=[v - slow, -y - 0.27], below=[v - slow, 0.27 - y]
+    )
+    lam = ca.SX.sym("lam")
+    by_law = ns.FilippovSystem(
+        [y, v], surface=2 * v - 2 * slow, multipliers=lam, field=[v - slow, -y - 0.27 * lam]
+    )
+    for system in (by_fields, by_law):
+        for start in starts:
+            early, *late = [ns.simulate(system, start, t_end) for t_end in (60.0, 1e6, 1e12)]
+            for run in late:
+                assert run.itinerary == early.itinerary
+                np.testing.assert_allclose(run.x[-1], early.x[-1], rtol=0, atol=1e-12)
+
+
 @one_and_many
 def test_a_late_end_loses_no_reset_and_no_surface(many):
+    for tol in (1e-10, 1e-14):
+        friction = ns.FilippovSystem([y, v], surface=v, above=[v, -y - 0.3], below=[v, 0.3 - y])
+        state, status, itinerary = end(friction, [1.0, 0.0], 1e30, many, tol)
+        assert status is ns.Status.REACHED_END and itinerary == "- + s"
+        assert state[1] == 0.0 and abs(state[0] + 0.2) < 1e3 * tol
     hop = ns.Reset(y, [y, 0.0 * v, ca.SX(0)], direction=-1)
     z = ca.SX.sym("z")
     system = ns.FilippovSystem([y, v, z], field=[v, -9.81 * z, 0], resets=[hop])

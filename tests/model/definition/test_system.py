@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.model import motion
+from nonsmooth.model import coupled_of, motion
 
 x, v, t, lam, kap = (ca.SX.sym(s) for s in ("x", "v", "t", "lam", "kap"))
 belt, friction = ca.SX.sym("belt"), ca.SX.sym("friction")
@@ -214,7 +214,7 @@ def test_a_field_continuous_across_the_surface_is_seen_however_it_is_written():
     system = ns.FilippovSystem(
         [x, v], surface=v - 1, above=[a * b, v], below=[(a + (v - 1)) * b, v * v]
     )
-    assert motion(system, "s").regular
+    assert coupled_of(system).continuous[0]
     run = ns.simulate(ns.FilippovSystem([x, v], surface=v, above=[1, a * v], below=[1, (a + v) * v]),
                       [0.0, 0.0], 1.0)  # fmt: skip
     assert run.status is ns.Status.REACHED_END

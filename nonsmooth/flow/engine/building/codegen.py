@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ....model import Coupled, FilippovSystem, coupled_of, motion
-from ....model.printing.programs import is_flat, lanes_program
+from ....model import Coupled, FilippovSystem, coupled_of
+from ....model.printing.programs import lanes_program
 from ....model.printing.set_program import set_program
 from ...options import Options
 from .core_source import driver_text, facts_header, listed
@@ -72,21 +72,22 @@ def device_source(system: FilippovSystem, order: int, threads: int, resident: in
 
 def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
     """Definitions that the lanes' text needs before it, and the functions of a system."""
-    program, blend = lanes_program(system, order)
-    (rows, checked), affine = blend.checked, blend.affine
-    slots = 2 * system.surface_count + len(system.stops)
-    cancelled = system.surface_count == 0 or motion(system, "s").regular
-    directions = ", ".join(str(d) for _, d in system.stops) or "0"
+    program, shape = lanes_program(system, order)
+    of = coupled_of(system)
+    m, directions = system.surface_count, listed(d for _, d in system.stops) or 0
+    # The sliding field has no 0/0 where both fields are tangent.
+    cancelled = not m or of.continuous[0] or of.scaled[0]
+    modes, affine = (listed(map(int, flags)) for flags in (shape.affine_modes, shape.affine))
     defines = (
-        f"#define SLOTS {slots}\n#define STOPS {len(system.stops)}\n"
-        f"#define CANCELLED {int(cancelled)}\n#define ROWS {len(rows)}\n"
-        f"#define GUARDS {len(checked)}\n"
-        f"#define CURVED {int(bool(affine) and not is_flat(system))}\n"
-        f"#define LINEAR {int(all(_affine_modes(system)))}\n"
+        f"#define SLOTS {len(shape.affine)}\n#define STOPS {len(system.stops)}\n"
+        f"#define CANCELLED {int(cancelled)}\n#define ROWS {len(shape.rows)}\n"
+        f"#define GUARDS {len(shape.slots)}\n"
+        f"#define CURVED {int(any(of.linearity.curved_guards[:m]))}\n"
+        f"#define LINEAR {int(all(shape.affine_modes))}\n"
         f"static const int DIRECTION[] = {{{directions}}};\n"
-        f"static const long long AFFINE_MODES[] = {{{listed(_affine_modes(system))}}};\n"
-        f"static const int ROW[] = {{{listed(rows) or 0}}}, SLOT[] = {{{listed(checked) or 0}}};\n"
-        f"static const int AFFINE[] = {{{', '.join(str(int(a)) for a in affine) or '1'}}};\n"
+        f"static const long long AFFINE_MODES[] = {{{modes}}};\n"
+        f"static const int ROW[] = {{{listed(shape.rows) or 0}}}, SLOT[] = {{{listed(shape.slots) or 0}}};\n"
+        f"static const int AFFINE[] = {{{affine or 1}}};\n"
     )
     return facts_header() + _sizes(system, order) + defines, program
 
@@ -126,18 +127,14 @@ def set_lanes_source(coupled: Coupled, order: int, width: int) -> str:
     )
 
 
-def _affine_modes(system: FilippovSystem) -> list[int]:
-    """Of above, below and sliding; a system without a surface has one mode."""
-    modes = ["+", "-", "s"] if system.surface_count else [""] * 3
-    return [int(motion(system, mode).affine) for mode in modes]
-
-
 def _sizes(system: FilippovSystem, order: int) -> str:
-    sizes = {
+    # Steps of lanes have a longest one, where all terms vanish; one as long is the driver's.
+    sizes: dict[str, float] = {
+        "LONGEST": 0.5 * 10 ** (300 / (order + 2)),
         "N": system.extended_dimension,
         "ND": system.dimension,
         "P": order,
         "M": system.surface_count,
         "TIMED": int(system.time_dependent),
     }
-    return "".join(f"#define {name} {value}\n" for name, value in sizes.items())
+    return "".join(f"#define {name} {value!r}\n" for name, value in sizes.items())

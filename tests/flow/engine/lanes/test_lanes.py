@@ -179,6 +179,24 @@ def test_every_operation():
     assert agree(system, [0.4, 0.9], options, {"p": 1.5}, 1e-9) is Status.REACHED_END
 
 
+def test_functions_of_one_side_are_not_evaluated_on_the_other():
+    """The root of the side above has no argument below, where all runs end."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    above, below = [1, -1 - ca.sqrt(y) * ca.log(1 + y)], [1, -2 - 0.1 * y]
+    system = FilippovSystem([x, y], surface=y, above=above, below=below)
+    assert agree(system, [0.0, 0.8], Options(t_end=3.0, **LOOSE), None, 1e-9) is Status.REACHED_END
+
+
+def test_multipliers_whose_factor_is_on_the_surface_zero_act_beside_it():
+    """Of two products with a multiplier one vanishes with h: it has no part in sliding."""
+    x, y, lam = (ca.SX.sym(s) for s in ("x", "y", "lam"))
+    field = [1 + lam * y, 0.3 * ca.sin(x) - lam * (2 + ca.cos(x))]
+    system = FilippovSystem([x, y], field=field, surface=y, multipliers=lam)
+    for start in ([0.0, 0.8], [0.5, -0.3]):
+        status = agree(system, start, Options(t_end=3.0, **LOOSE), None, 1e-9)
+        assert status is Status.REACHED_END
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [25])
 def test_functions_in_parts(size, monkeypatch):

@@ -81,14 +81,14 @@ pytestmark = [
     pytest.mark.skipif(library() is None, reason="no NVRTC: pip install nvidia-cuda-nvrtc"),
 ]
 
-#: Bytes of stack, and of spills written and read, of NVRTC 13.5 and an eighth more.
+#: Bytes of stack, and of spills written and read, of NVRTC 13.5 and at most an eighth more.
 CEILINGS = {
-    ("linear", "sm_80"): (820, 955, 895),
+    ("linear", "sm_80"): (850, 970, 900),
     ("linear", "sm_90"): (820, 955, 910),
     ("linear", "sm_100"): (640, 640, 730),
     ("nonlinear", "sm_80"): (985, 1155, 1090),
-    ("nonlinear", "sm_90"): (1045, 1210, 1170),
-    ("nonlinear", "sm_100"): (1300, 1405, 1530),
+    ("nonlinear", "sm_90"): (1045, 1210, 1285),
+    ("nonlinear", "sm_100"): (1115, 1260, 1330),
 }
 
 

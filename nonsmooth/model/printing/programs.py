@@ -79,6 +79,9 @@ class _Writer(OfTape):
             if self.m:
                 unknown = self._unknown(k, layer[0], factors[0])
                 field, _, heights, _, stops = every.again(k, [*now, *unknown], self.late)
+                field = list(field)
+                for i in self._kept:
+                    field[i] = self.graph.select(self.slides, None, field[i])
                 above, below = self._rates(k, now, layer[0], factors[0], sides)
                 height = self.graph.inner([self.lam], heights)
                 leaves = None if above is None else -above
@@ -88,6 +91,14 @@ class _Writer(OfTape):
                 for row, value in zip(jet, field, strict=True):
                     row.append(None if value is None else (1.0 / (k + 1)) * value)
         return jet, [list(row) for row in zip(*guards, strict=True)]
+
+    @cached_property
+    def _kept(self) -> list[int]:
+        """The state that a surface of one state keeps: rounding in its rate would move what rests."""
+        x, h = self.coupled.system.extended_states, self.coupled.system.surface_function(0)
+        own = [i for i in range(x.numel()) if ca.depends_on(h, x[i])]
+        alone = len(own) == 1 and own[0] < self.coupled.system.dimension
+        return own if alone and not self.coupled.continuous[0] else []
 
     def _held(self, multiplier: float | None) -> list[Term | None]:
         """The multiplier as a number, and none of its unknown."""

@@ -229,3 +229,13 @@ def test_a_field_whose_first_steps_are_all_too_long_has_no_branch_point(many):
     assert status is ns.Status.REACHED_END and state[1] == pytest.approx(
         1e9 * 2.0**41 / 41, rel=1e-8
     )
+
+
+def test_rows_that_rest_stay():
+    starts = np.random.default_rng(1).normal(size=(100, 2))
+    system = ns.FilippovSystem([y, v], surface=v, above=[v, -y - 0.27], below=[v, 0.27 - y])
+    early, late = [
+        ns.ensemble(system, starts, t_end, work=ns.Work(progress=False)) for t_end in (60.0, 1e12)
+    ]
+    assert early.engine == "lanes" and late.itinerary.tolist() == early.itinerary.tolist()
+    np.testing.assert_allclose(late.x, early.x, rtol=0, atol=1e-12)

@@ -162,10 +162,13 @@ class LocalSurface:
 
     @property
     def switching(self) -> Switching:
-        """The class of the surface at these values of the parameters, the other surfaces on their sides."""
+        """The class of the surface, the other surfaces on their sides.
+
+        Generic is one that is so for other values of the parameters: it passes a bifurcation at these.
+        """
         system, mode = self.system, self.mode if self.system.surface_count > 1 else None
         for_all = system.switching(self.surface, mode=mode)
-        if not for_all.slides:
+        if for_all.slides:
             return for_all
         return system.switching(self.surface, mode=mode, parameters=self.values)
 

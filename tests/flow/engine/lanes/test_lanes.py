@@ -267,7 +267,7 @@ def test_lanes_of_any_width_and_instruction_set(width, flags, monkeypatch):
         patch.setattr(lanes_module, "FLAGS", (*lanes_module.FLAGS, *flags.split()))
         patch.setattr(lanes_module, "lane_width", lambda: width)
         chunk = lanes_module.Lanes(system, options.order).run_many(starts, p, options, None)
-    assert chunk.totals[2] < chunk.totals[0] / 10  # steps that the driver made
+    assert chunk.totals[2] < chunk.totals[1]  # the driver makes fewer steps than there are events
     expected = tape_for(system, options).run_many(starts, p, options, None)
     np.testing.assert_allclose(chunk.x, expected.x, rtol=0, atol=1e-8)
     assert [chunk.words[k] for k in chunk.itinerary] == [

@@ -260,7 +260,7 @@ def test_lanes_of_any_width_and_instruction_set(width, flags, monkeypatch):
     if flags and platform.machine() not in ("x86_64", "AMD64"):
         pytest.skip("flags of another processor")
     problem = textbook.by_name("leine_stick_slip")
-    system, options = problem.system, Options(t_end=30.0, rtol=1e-6, atol=1e-6)
+    system, options = problem.system, Options(t_end=30.0, rtol=1e-9, atol=1e-9)
     starts = np.random.default_rng(1).normal(size=(50, 2))
     p = system.parameter_vector()
     with monkeypatch.context() as patch:

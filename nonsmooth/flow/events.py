@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Any, Self
@@ -216,13 +217,21 @@ class Events(LazySequence[Event]):
         after = self.states[row + 1].copy() if self.jumps[k] else x
         return label.event(float(self.t[k]), x, after, self._motion(k))
 
+    def _each(self) -> Iterator[Event]:
+        x, after = self.x, self.x_after
+        rows = zip(self.t.tolist(), self.codes.tolist(), self.jumps.tolist(), strict=True)
+        for k, (t, code, jumps) in enumerate(rows):
+            own = x[k]
+            yield self.labels[code].event(t, own, after[k] if jumps else own, self._motion(k))
+
     def _motion(self, k: int) -> Array | None:
-        own = k - len(self) + len(self.motions)
+        own = k - self._size() + len(self.motions)
         if not self.motions.shape[1]:
             return None
-        if own < 0 or self.motions[own, 0] == np.inf:
+        first = math.inf if own < 0 else float(self.motions[own, 0])
+        if first == math.inf:
             return NOT_KEPT
-        return None if np.isnan(self.motions[own, 0]) else self.motions[own].copy()
+        return None if math.isnan(first) else self.motions[own].copy()
 
     def _part(self, which: slice) -> Self:
         chosen = np.arange(len(self))[which]

@@ -83,7 +83,11 @@ class LazySequence(Sequence[T]):
 
     def __iter__(self) -> Iterator[T]:
         objects = self._objects
-        return map(self._made, range(len(self))) if objects is None else iter(objects)
+        return self._each() if objects is None else iter(objects)
+
+    def _each(self) -> Iterator[T]:
+        """Make all objects in turn."""
+        return map(self._made, range(self._size()))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, (list, LazySequence)):

@@ -194,6 +194,18 @@ def choices_at(
     system: FilippovSystem, kind: str, element: int, x: Array, p: Array
 ) -> tuple[Array, Array]:
     """Differences (k,) by which comparisons, fmin, fmax and if_else in a map and a filter decide, with gradients."""
+    seen = deciding(system, kind, element)
+    if not seen:
+        return np.zeros(0), np.zeros((0, len(x)))
+    own = ca.vertcat(*seen)
+    outputs = lambda: [own, ca.jacobian(own, system.extended_states)]
+    made = lambda: Evaluator(system.function(("choices", kind, element), outputs))
+    values, gradient = system.cached(("choices of", kind, element), made).copied(x, p)
+    return values.ravel(), gradient
+
+
+def deciding(system: FilippovSystem, kind: str, element: int) -> list[ca.SX]:
+    """The differences of states or time by which the map and the filter of a stop or reset decide."""
     d = system.definition
 
     def build() -> list[ca.SX]:
@@ -204,14 +216,7 @@ def choices_at(
         evaluate(instructions(inputs, outputs)[0], found)
         return [e for e in found.seen if ca.depends_on(e, ca.vertcat(moving, d.time))]
 
-    seen = system.cached(("differences of", kind, element), build)
-    if not seen:
-        return np.zeros(0), np.zeros((0, len(x)))
-    own = ca.vertcat(*seen)
-    outputs = lambda: [own, ca.jacobian(own, system.extended_states)]
-    made = lambda: Evaluator(system.function(("choices", kind, element), outputs))
-    values, gradient = system.cached(("choices of", kind, element), made).copied(x, p)
-    return values.ravel(), gradient
+    return system.cached(("differences of", kind, element), build)
 
 
 def _values_at(

@@ -26,6 +26,7 @@ from ...model.derivatives.event_maps import (
     EventMap,
     atoms_at,
     choices_at,
+    deciding,
     event_map,
     instant_map,
     surface_map,
@@ -220,7 +221,7 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
         if discrete:
             own = x[system.dimension - discrete : system.dimension]
             leg = replace(leg, discrete=tuple(own.tolist()))
-        if result:
+        if result and system.sets:
             leg = replace(leg, left=sets_left(system, result[-1].leg.mode, leg.mode, x, p))
         result.append(Stretch(leg, t, first.t - t, x, x_end, after))
         t, x = last.t, after
@@ -327,10 +328,11 @@ def _require_located(system: FilippovSystem, event: Event, x: Array, p: Array, l
 
 def _require_smooth_choices(system: FilippovSystem, group: Sequence[Event], p: Array) -> None:
     """Refuse an instant at which a comparison in a map or filter changes: a corner."""
+    served = [event for event in group if event.kind in ("stop", "reset")]
+    if not any(deciding(system, event.kind, event.element) for event in served):
+        return
     moves = np.eye(system.extended_dimension)  # of the state by that before the instant
-    for event in group:
-        if event.kind not in ("stop", "reset"):
-            continue
+    for event in served:
         x = _extended(system, event.x, event.t)
         values, gradient = choices_at(system, event.kind, event.element, x, p)
         near = np.abs(values) <= _LOCATED * (1.0 + np.abs(gradient) @ np.abs(x))

@@ -27,13 +27,12 @@ from .ensembles.ensemble import ensemble
 from .ensembles.lazy_starts import Grid, RandomStarts
 from .ensembles.outcomes import Outcomes, outcomes
 from .ensembles.work import Work
-from .events import Event, Events
+from .events import Event, Events, Segment, Segments
 from .follow import follow
 from .polynomial import first_crossing, first_root
 from .results import Ensemble
 from .saving import load
 from .section import Section
-from .segments import Segment, Segments
 from .simulate import simulate
 from .status import Status
 from .trajectory import Trajectory

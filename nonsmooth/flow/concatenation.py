@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import Array
-from .events import Event, Events
+from .events import Event, Events, Segment, Segments
 from .names import change
 from .polynomial import shift
-from .segments import Segment, Segments
 from .trajectory import Steps, Trajectory
 
 

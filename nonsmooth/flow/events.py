@@ -1,19 +1,132 @@
-"""Events of a run: arrays, from which an event is made where one is looked at."""
+"""Events and segments of a run: sequences kept as arrays, which make an object where one is read."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+import operator
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
-from functools import partial
-from typing import Any, Self
+from typing import Any, Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array
 from .saving import savable
-from .sequences import LazySequence
+
+T = TypeVar("T")
+
+
+class LazySequence(Sequence[T]):
+    """A sequence like a list. Subclasses are dataclasses of the arrays from which its objects are made."""
+
+    # ``_make`` makes the arrays when one of them is first read; ``_list`` makes the objects of a short one,
+    # for which arrays do not pay.
+
+    @classmethod
+    def when_read(
+        cls, make: Callable[[], Self], listed: Callable[[], list[T]] | None = None
+    ) -> Self:
+        """Return a sequence whose arrays, or else whose objects, are made when they are read."""
+        made = object.__new__(cls)
+        vars(made).update(_make=make, _list=listed)
+        return made
+
+    @property
+    def _objects(self) -> list[T] | None:
+        own = vars(self)
+        if own.get("_list") is not None:
+            own["_made_objects"], own["_list"] = own["_list"](), None
+        return own.get("_made_objects")
+
+    def __getattr__(self, name: str) -> Any:
+        own = vars(self)
+        if name.startswith("_") or "_make" not in own:
+            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+        if own["_make"] is not None:
+            own.update(_state(own["_make"]()))
+            own["_make"] = None
+        if name not in own:
+            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+        return own[name]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return _state(self)
+
+    @classmethod
+    def of(cls, objects: Sequence[T]) -> Self:
+        """Return a sequence of objects that were made one by one."""
+        if isinstance(objects, cls):
+            return objects
+        made = list(objects)
+        return cls.when_read(lambda: cls._of(made), lambda: made)
+
+    @classmethod
+    @abstractmethod
+    def _of(cls, objects: list[T]) -> Self:
+        """Return their arrays."""
+
+    @abstractmethod
+    def _size(self) -> int:
+        """Number of objects."""
+
+    @abstractmethod
+    def _made(self, k: int) -> T:
+        """Make the object of a number from 0."""
+
+    @abstractmethod
+    def _part(self, which: slice) -> Self:
+        """Return a slice of it."""
+
+    def __len__(self) -> int:
+        objects = self._objects
+        return self._size() if objects is None else len(objects)
+
+    @overload
+    def __getitem__(self, k: int) -> T: ...
+    @overload
+    def __getitem__(self, k: slice) -> Self: ...
+    def __getitem__(self, k: int | slice) -> T | Self:
+        objects = self._objects
+        if isinstance(k, slice):
+            return self._part(k) if objects is None else self.of(objects[k])
+        number, size = operator.index(k), len(self)
+        if not -size <= number < size:
+            raise IndexError(f"index {number} is out of range for {size} entries")
+        return self._made(number % size) if objects is None else objects[number]
+
+    def __iter__(self) -> Iterator[T]:
+        objects = self._objects
+        return self._each() if objects is None else iter(objects)
+
+    def _each(self) -> Iterator[T]:
+        """Make all objects in turn."""
+        return map(self._made, range(self._size()))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, (list, LazySequence)):
+            return NotImplemented
+        return len(self) == len(other) and all(map(operator.eq, self, other))
+
+    __hash__ = None  # type: ignore[assignment]  # as that of a list
+
+    def __add__(self, other: Sequence[T]) -> list[T]:
+        return [*self, *other]
+
+    def __radd__(self, other: Sequence[T]) -> list[T]:
+        return [*other, *self]
+
+    def __repr__(self) -> str:
+        return repr([*self])
+
+
+def _state(made: Any) -> dict[str, Any]:
+    """The arrays of a sequence by name."""
+    return {field.name: getattr(made, field.name) for field in fields(made)}
+
+
+# Events -------------------------------------------------------------------------------------------
 
 #: The motion of an event within a run with dense=False, which keeps that of its end only.
 NOT_KEPT = np.zeros(0)
@@ -117,7 +230,7 @@ def _require_rows(events: Events) -> None:
 class Events(LazySequence[Event]):
     """Events in order of time: a sequence of :class:`Event`, kept as arrays.
 
-    Indices, slices, loops and comparisons work as with a list. An event is made when it is looked at, so that
+    Indices, slices, loops and comparisons work as with a list. An event object is made when it is read, so that
     a run with a million of them needs little time and memory; the arrays have all of them at once.
 
     Attributes
@@ -156,29 +269,21 @@ class Events(LazySequence[Event]):
     motions: Array
 
     @classmethod
-    def of(cls, events: Sequence[Event]) -> Events:
-        """Return events that were made one by one."""
-        if isinstance(events, Events):
-            return events
-        objects = list(events)
-        return cls.when_read(partial(cls._of, objects), lambda: objects)
-
-    @classmethod
-    def _of(cls, events: list[Event]) -> Events:
+    def _of(cls, objects: list[Event]) -> Events:
         known: dict[Label, int] = {}
         labels = [
-            Label(e.kind, e.mode_before, e.mode_after, e.name, e.element, e.side) for e in events
+            Label(e.kind, e.mode_before, e.mode_after, e.name, e.element, e.side) for e in objects
         ]
         codes = [known.setdefault(label, len(known)) for label in labels]
-        states = [x for e in events for x in (e.x, e.x_after)]
+        states = [x for e in objects for x in (e.x, e.x_after)]
         return cls(
-            np.array([e.t for e in events], float),
+            np.array([e.t for e in objects], float),
             np.array(states, float) if states else np.zeros((0, 0)),
-            2 * np.arange(len(events), dtype=np.int64),
-            np.ones(len(events), np.bool_),
+            2 * np.arange(len(objects), dtype=np.int64),
+            np.ones(len(objects), np.bool_),
             np.array(codes, np.int32),
             tuple(known),
-            _motions([e.motion for e in events]),
+            _motions([e.motion for e in objects]),
         )
 
     @property
@@ -255,3 +360,107 @@ def _motions(given: Sequence[Array | None]) -> Array:
         if motion is not None and width:
             row[: max(len(motion), 1)] = motion if len(motion) else np.inf
     return motions
+
+
+# Segments -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of motion in one mode, between two events.
+
+    Attributes
+    ----------
+    mode : str
+        One letter for each surface, and one for each impact.
+    t_start, t_end : float
+        Times at which it begins and ends.
+    first, last : int
+        Its steps are those with the numbers ``first`` to ``last - 1`` of ``Trajectory.steps``.
+    discrete : tuple of float
+        Values of the discrete states.
+    """
+
+    mode: str
+    t_start: float
+    t_end: float
+    first: int
+    last: int
+    discrete: tuple[float, ...] = ()
+
+
+@savable()
+@dataclass(frozen=True)
+class ShownMode:
+    """A mode with the values of the discrete states."""
+
+    mode: str
+    discrete: tuple[float, ...] = ()
+
+
+@savable(t_start="k", t_end="k", first="k", last="k", codes="k <modes")
+@dataclass(frozen=True, eq=False, repr=False)
+class Segments(LazySequence[Segment]):
+    """Segments in order of time: a sequence of :class:`Segment`, kept as arrays.
+
+    Attributes
+    ----------
+    t_start, t_end : ndarray (k,)
+        Times at which they begin and end.
+    first, last : ndarray (k,)
+        Numbers of their first steps, and those after their last ones.
+    codes : ndarray (k,)
+        Positions in ``modes``.
+    modes : tuple
+        The modes, with the values of the discrete states.
+    """
+
+    t_start: Array
+    t_end: Array
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    codes: NDArray[np.int32]
+    modes: tuple[ShownMode, ...]
+
+    @classmethod
+    def _of(cls, objects: list[Segment]) -> Segments:
+        known: dict[ShownMode, int] = {}
+        codes = [known.setdefault(ShownMode(s.mode, s.discrete), len(known)) for s in objects]
+        return cls(
+            np.array([s.t_start for s in objects], float),
+            np.array([s.t_end for s in objects], float),
+            np.array([s.first for s in objects], np.int64),
+            np.array([s.last for s in objects], np.int64),
+            np.array(codes, np.int32),
+            tuple(known),
+        )
+
+    def shown(self, most: int) -> list[ShownMode]:
+        """Return the modes of the first segments.
+
+        Parameters
+        ----------
+        most : int
+            Number of segments at most.
+
+        Returns
+        -------
+        list
+            Modes with the values of the discrete states.
+        """
+        objects = self._objects
+        if objects is not None:
+            return [ShownMode(s.mode, s.discrete) for s in objects[:most]]
+        return [self.modes[k] for k in self.codes[:most].tolist()]
+
+    def _size(self) -> int:
+        return len(self.codes)
+
+    def _made(self, k: int) -> Segment:
+        shown, ends = self.modes[self.codes[k]], (float(self.t_start[k]), float(self.t_end[k]))
+        return Segment(shown.mode, *ends, int(self.first[k]), int(self.last[k]), shown.discrete)
+
+    def _part(self, which: slice) -> Self:
+        t_start, t_end = self.t_start[which], self.t_end[which]
+        first, last = self.first[which], self.last[which]
+        return type(self)(t_start, t_end, first, last, self.codes[which], self.modes)

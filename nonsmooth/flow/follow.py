@@ -30,10 +30,9 @@ from . import messages
 from .engine.arrays import Run, guard_of
 from .engine.convert import message_of
 from .engine.tape import tape_for
-from .events import Event, Events
+from .events import Event, Events, Segment, Segments
 from .names import guard_name
 from .options import Options, tolerances
-from .segments import Segment, Segments
 from .status import ADVICE, Status
 from .trajectory import Steps, Trajectory
 

@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..model import Array, FilippovSystem, OptionError, PointError, real_array
 from ..notebook import card, lines
 from . import tables
-from .events import Events
+from .events import Events, Segments, ShownMode
 from .names import shown_mode
 from .saving import Savable, savable
-from .segments import Segments, ShownMode
 from .status import Status
 
 #: Coefficients that are read at once, so that they stay in the cache.

@@ -13,10 +13,9 @@ import numpy as np
 from ...model import Array, FilippovSystem, Guard
 from .. import messages
 from ..constants import DEPENDS_ON_WIDTHS, KINDS, REASONS, UNPROVED
-from ..events import NOT_KEPT, Event, Events, Label
+from ..events import NOT_KEPT, Event, Events, Label, Segment, Segments, ShownMode
 from ..names import guard_name
 from ..options import Options
-from ..segments import Segment, Segments, ShownMode
 from ..status import ADVICE, Status
 from ..trajectory import Continuation, Facts, Steps, Trajectory
 from ..warn import warn_of_facts

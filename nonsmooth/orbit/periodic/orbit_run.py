@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...flow.events import Event, Events
+from ...flow.events import Event, Events, Segment, Segments
 from ...flow.follow import follow
-from ...flow.segments import Segment, Segments
 from ...flow.status import Status
 from ...flow.trajectory import Steps, Trajectory
 from ...model import Array, FilippovSystem

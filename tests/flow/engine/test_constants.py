@@ -8,7 +8,7 @@ import pytest
 import nonsmooth
 
 FOLDER = Path(nonsmooth.__file__).parent / "flow"
-FILES = [*sorted((FOLDER / "core").glob("*.[ch]"))]
+FILES = [*sorted((FOLDER / "core").rglob("*.[ch]"))]
 
 #: Functions that are approximations by coefficients.
 _FITTED = re.compile(r"static (?:inline )?double (?:rough_\w+|ns_erfinv)\(.*?\n}", re.DOTALL)

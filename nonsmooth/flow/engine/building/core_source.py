@@ -19,22 +19,11 @@ from ...status import Status
 MOST_ORDER = 48
 
 #: The driver in C, in the order in which it is read: one text.
-_FILES = (
-    *(
-        "programs.h",
-        "pairs.h",
-        "linear.h",
-        "state.c",
-        "modes.c",
-        "jets.c",
-        "stability.c",
-        "sets.c",
-        "stepper.c",
-        "near_zeros.c",
-    ),
-    *("elements.c", "record.c", "spiral.c", "decide.c", "layer.c", "contacts.c"),
-    *("approach.c", "events.c", "driver.c", "accumulation.c", "roots.c", "entry.c", "variation.c"),
-)
+_FILES = """
+    programs.h pairs.h linear.h state.c modes.c jets.c laws/stability.c laws/sets.c stepper.c
+    near_zeros.c laws/elements.c record.c laws/spiral.c laws/decide.c laws/layer.c laws/contacts.c
+    laws/approach.c events.c driver.c accumulation.c laws/roots.c entry.c variation.c
+""".split()
 
 
 #: The folder of those of the C files.

@@ -359,7 +359,7 @@ static void step(Run *r) {
   if (last) {
     r->t = r->o.t_end;
     r->t_low = 0;
-    tell_time(r);
+    set_time_state(r);
     if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
   }
   if (row >= 0 && is_atom(r->now.kind[row])) arrive(r, e, dt, r->instant.tied);

@@ -246,7 +246,7 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   clear(r, o, (Pair){t, motion ? *motion : 0});
   r->out = *out;
   memcpy(r->x, x, sizeof(double) * r->n);
-  tell_time(r);
+  set_time_state(r);
   set_parameters(r, p);
   if (finite_all(r->x, r->n)) { begin(r, start_mode, motion); return; }
   memset(r->letter, 1, r->width);
@@ -383,7 +383,7 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   memset(r->instant.pending, 0, r->s->rules.triggers);
   memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
   r->t = m->t;
-  tell_time(r);
+  set_time_state(r);
   r->since = m->since;
   r->length = m->length;
   r->shortened = m->shortened;

@@ -391,7 +391,7 @@ static void arrive(Run *r, const Expansion *e, double dt, int tied) {
     if (i->passing[r->s->stops + u->clock_reset[c]]) {
       r->t = tick_of(r, c, &r->t_low);
       r->x[u->clock_state[c]] = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
-      tell_time(r);
+      set_time_state(r);
       if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
       renote(r);
     }

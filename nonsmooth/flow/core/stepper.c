@@ -24,7 +24,7 @@ static double bound_at(double part, int order) {
 }
 
 /* The time since the start is a state of a system with an explicit time. */
-static void tell_time(Run *r) {
+static void set_time_state(Run *r) {
   if (r->s->timed) r->x[r->n - 1] = (r->t - r->begun.high) + (r->t_low - r->begun.low);
 }
 
@@ -33,7 +33,7 @@ static void pass_time(Run *r, double dt) {
   double sum = r->t + dt, moved = sum - r->t, lost = (r->t - (sum - moved)) + (dt - moved) + r->t_low;
   r->t = sum + lost;
   r->t_low = lost - (r->t - sum);
-  tell_time(r);
+  set_time_state(r);
 }
 
 /* A step's length in a run that begins late, changed so little that the time after it is one number. */

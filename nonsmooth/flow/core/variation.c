@@ -298,7 +298,7 @@ static void event_gradient(Run *r, const Leg *l, Columns *c) {
 static int begin_leg(Run *r, const Leg *l) {
   Solutions all = {0};
   memcpy(r->x, l->x, sizeof(double) * r->n);
-  tell_time(r);
+  set_time_state(r);
   memcpy(r->letter, l->letter, r->width);
   find_idle(r);
   const double *h = surface_values(r, r->x);

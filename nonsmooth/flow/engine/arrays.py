@@ -129,7 +129,7 @@ class Run:
     event_count : int
         Number of events but the end.
     make_happened : callable
-        Makes events and segments, when they are first looked at.
+        Makes events and segments when they are first read.
     few : mapping or None
         What the driver wrote, by name, if events and steps are few.
     labels : sequence of tuple

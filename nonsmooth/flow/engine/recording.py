@@ -173,7 +173,7 @@ class Recorder:
 
     # What can no longer change, all before the instant of the last point, is taken out of the blocks whenever
     # they are full. The state of an event is nearly always one of the points, so its row is kept. Events and
-    # segments of a run that fits into the blocks are read when they are looked at.
+    # segments of a run that fits into the blocks are made when they are first read.
 
     def __init__(self, output: Output, dimension: int, dense: bool, read_at: Array | None):
         self.output, self._n, self._dense = output, dimension, dense

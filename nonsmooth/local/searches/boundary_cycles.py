@@ -53,7 +53,7 @@ class BoundaryCycle:
         return (
             f"a {kind} cycle of period {self.period:.6g} and multiplier {self.multiplier:.6g} around the "
             f"equilibrium where h {'>' if self.side == '+' else '<'} 0, its size proportional to the distance of "
-            "that from the surface"
+            "the equilibrium from the surface"
         )
 
 

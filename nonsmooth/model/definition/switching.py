@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..reading import Parameters
     from .system import FilippovSystem
 
-#: Orders that are looked at.
+#: Largest order that is computed.
 _MOST = 6
 
 Kind = Literal["continuous", "velocity continuous", "generic", "undecided"]

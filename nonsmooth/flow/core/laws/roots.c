@@ -47,7 +47,7 @@ static int move_by(Run *r, const double *field, double dt) {
   for (int k = 0; k < r->n; k++) { e->states[k * stride] = r->x[k]; e->states[k * stride + 1] = field[k]; }
   for (int i = 0; i < e->l.slides; i++) e->series[e->l.sliding[i] * stride] = r->unknowns[e->l.sliding[i]];
   if (!advance(r, e, dt)) return 0;
-  if (r->t >= r->o.t_end) { r->t = r->o.t_end; r->t_low = 0; tell_time(r); }
+  if (r->t >= r->o.t_end) { r->t = r->o.t_end; r->t_low = 0; set_time_state(r); }
   return 1;
 }
 

@@ -19,6 +19,9 @@ from ..point.surface_point import SIDES, Side
 #: Nearest to half a turn that the time round the equilibrium is looked for, relative to it.
 _NEAREST = 1e-13
 
+#: Longest time on the side of a node.
+_LONGEST = 1e15
+
 
 @dataclass(frozen=True)
 class BoundaryCycle:
@@ -75,6 +78,8 @@ class _Side:
         w, half = self.frequency, 0.5 * self.trace
         if w > 0:
             c, s, whole, scale = -math.cos(w * t), -math.sin(w * t) / w, t + math.pi / w, 0.0
+        elif w == 0:
+            c, s, whole, scale = 1.0, t, t, 0.0
         else:  # over exp(scale t)
             c, s = 0.5 + 0.5 * math.exp(2 * w * t), -0.5 * math.expm1(2 * w * t) / -w
             whole, scale = t, -w
@@ -90,26 +95,29 @@ def _exp(power: float) -> float:
 def born_cycle(
     traces: tuple[float, float], determinants: tuple[float, float]
 ) -> BoundaryCycle | None:
-    """The cycle of two linear parts, of F1 and F2, that are no saddles; None if there is none."""
+    """The cycle of two linear parts, of F1 and F2; None if there is none, or none that doubles resolve."""
     sides = [_Side(t, d) for t, d in zip(traces, determinants, strict=True)]
     if min(determinants) <= 0 or traces[0] * traces[1] >= 0:
         return None
     foci = [side.frequency > 0 for side in sides]
-    growth = [s.trace / s.frequency for s in sides]  # of half a turn, over pi
     if not any(foci):
         return None
     unstable = 0 if traces[0] > 0 else 1
-    if all(foci) and sum(growth) == 0:
-        return None
-    own = unstable if not all(foci) or sum(growth) < 0 else 1 - unstable
-    if not foci[own]:
-        own = 1 - own
+    own = foci.index(True)  # a node is not surrounded
+    if all(foci):
+        growth = sum(s.trace / s.frequency for s in sides)  # of a turn, over pi
+        if growth == 0:
+            return None
+        own = unstable if growth < 0 else 1 - unstable
     stable = own == unstable
     # the cycle round a stable focus is that round an unstable one in reversed time
     inner, outer = (
         _Side(s.trace if stable else -s.trace, s.determinant) for s in (sides[own], sides[1 - own])
     )
-    times = _times(inner, outer)
+    try:
+        times = _times(inner, outer)
+    except ValueError:  # no change of sign: the cycle is smaller or larger than rounding lets it be
+        return None
     into, out = inner.at(times[0])
     turned = math.pi / outer.frequency if foci[1 - own] else 0.0
     durations = times[0] + math.pi / inner.frequency, times[1] + turned
@@ -140,6 +148,8 @@ def _times(inner: _Side, outer: _Side) -> tuple[float, float]:
         end = 1.0
         while outer.at(end)[0] < height:
             end *= 2.0
+            if end > _LONGEST:
+                raise ValueError
         return _root(lambda u: outer.at(u)[0] - height, 1e-9 * end, end)
 
     t = _root(

@@ -81,7 +81,8 @@ class BoundaryEquilibrium:
     other_eigenvalues : ndarray (n,) or None
         On a continuous surface those of $F2$.
     cycle : BoundaryCycle or None
-        The cycle that is born there; of planar continuous systems.
+        The cycle that is born there, of planar continuous systems; None too where it is too small or too
+        large, relative to the distance of the equilibrium, for doubles.
     """
 
     point: Array

@@ -18,8 +18,11 @@ from ..values import Array
 #: Most breakpoints, each a surface.
 _MOST = 500
 
-#: Jumps of a derivative below this part of the largest one are rounding.
-_ROUNDING = 1e-11
+#: Jumps of a derivative below this part of it are rounding.
+_ROUNDING = 1e-12
+
+#: Part of the largest value that values may be off by.
+_LOST = 1e-9
 
 Bounds = tuple[float, float]
 
@@ -60,7 +63,7 @@ def table(
     ------
     DefinitionError
         Values that are not finite, not increasing, too few or of different lengths; another order or outside;
-        more than 500 breakpoints.
+        more than 500 breakpoints, or breakpoints with which the values lose their digits.
 
     Examples
     --------
@@ -82,20 +85,17 @@ def table(
             f"outside of the table: expected 'constant' or 'linear', received {outside!r}. A Stop at the first or "
             "last breakpoint ends a run there."
         )
-    pieces = _pieces(x, y, order, outside)
-    sizes = np.abs(pieces).max(axis=0)
-    low, high = _bounds_of(e)
+    pieces, (low, high) = _pieces(x, y, order, outside), _bounds_of(e)
     first = int(np.searchsorted(x, low, side="right"))  # the piece at the lowest argument
-    result = _polynomial(pieces[first], e - x[max(first - 1, 0)])
-    for k in range(first, len(x)):
-        if x[k] >= high:
-            break
-        before = _moved(pieces[k], x[k] - x[max(k - 1, 0)])
-        jump = pieces[k + 1] - before
-        jump[np.abs(jump) <= _ROUNDING * sizes] = 0.0
-        if jump[1:].any():
-            result += _polynomial(np.append(0.0, jump[1:]), ca.fmax(e - x[k], 0))
-    return result
+    last = int(np.searchsorted(x, high))
+    jumps = [_jump(pieces, x, k, order, outside) for k in range(first, last)]
+    u = ca.SX.sym("u")
+    curve = _polynomial(pieces[first], u - x[max(first - 1, 0)])
+    for k, jump in enumerate(jumps, first):
+        if jump.any():
+            curve += _polynomial(jump, ca.fmax(u - x[k], 0))
+    _require_exact(ca.Function("table", [u], [curve]), pieces, x, first, last)
+    return ca.substitute(curve, u, e)
 
 
 def _read(xs: ArrayLike, ys: ArrayLike) -> tuple[Array, Array]:
@@ -137,6 +137,37 @@ def _pieces(x: Array, y: Array, order: int, outside: str) -> Array:
         pieces[0, 1] = pieces[1, 1]
         pieces[-1, 1] = _moved(pieces[-2], x[-1] - x[-2])[1]
     return pieces
+
+
+def _jump(pieces: Array, x: Array, k: int, order: int, outside: str) -> Array:
+    """What a breakpoint adds, from its first derivative that can jump on."""
+    before = _moved(pieces[k], x[k] - x[max(k - 1, 0)])
+    jump = pieces[k + 1] - before
+    jump[np.abs(jump) <= _ROUNDING * (np.abs(before) + np.abs(pieces[k + 1]))] = 0.0
+    at_end = k in (0, len(x) - 1) and outside == "constant"
+    jump[: 1 if order == 1 else 2 if at_end else 3] = 0.0
+    return jump
+
+
+def _require_exact(curve: ca.Function, pieces: Array, x: Array, first: int, last: int) -> None:
+    """Refuse tables whose terms, added up, lose the digits of the values."""
+    if last - first < 1:
+        return
+    ends = np.concatenate([[2 * x[0] - x[1]], x, [2 * x[-1] - x[-2]]])
+    at = np.concatenate(
+        [ends[first : last + 2], (ends[first : last + 1] + ends[first + 1 : last + 2]) / 2]
+    )
+    which = np.searchsorted(x, at, side="right")
+    exact = np.array(
+        [_moved(pieces[k], u - x[max(k - 1, 0)])[0] for k, u in zip(which, at, strict=True)]
+    )
+    wrong = float(np.abs(np.array(curve(at[None, :])).ravel() - exact).max())
+    size = float(np.abs(exact).max())
+    if wrong > _LOST * size:
+        raise DefinitionError(
+            f"table: added up piece by piece its values are known to {wrong:.1e} only, of {size:.1e}: it has "
+            "too many breakpoints for a spline, or some too close together. Use fewer, or order=1."
+        )
 
 
 def _moved(c: Array, by: float) -> Array:

@@ -82,6 +82,24 @@ def test_cycles_of_reference(case):
     assert found.speeds == pytest.approx(speeds, rel=1e-11)
 
 
+@pytest.mark.parametrize(("own", "other"), [(0.5, -2.0), (0.5, -2.0 - 1e-9), (1.9, -2.0)])
+def test_a_cycle_beside_a_node_with_equal_eigenvalues(own, other):
+    """One side is a degenerate node: a run from the surface closes after the period."""
+    cycle = born_cycle((own, other), (1.0, 1.0))
+    system = _sides([own * x - y, x - 1], [other * x - y, x - 1], (x, y))
+    start = np.array([0.0, -cycle.speeds[0]])
+    turn = ns.simulate(system, start, cycle.period, tol=1e-13)
+    np.testing.assert_allclose(turn.x[-1], start, atol=1e-10 * np.abs(turn.x).max())
+    assert cycle.side == "+" and cycle.stable
+
+
+def test_a_cycle_that_is_not_resolved_is_none():
+    assert born_cycle((1e-3, -1e3), (1.0, 1e7)) is None
+    assert (
+        born_cycle((2.0, -1.0), (1.0, 1.0)) is not None
+    )  # round the stable focus, in reversed time
+
+
 @at_most(25)
 @given(st.integers(0, 10**6))
 def test_a_cycle_is_one_of_the_linear_system_and_scales(seed):

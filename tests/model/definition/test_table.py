@@ -119,3 +119,21 @@ def test_the_measured_friction_of_the_examples():
 def test_what_is_no_table_is_refused(args, words):
     with pytest.raises(ns.DefinitionError, match=words):
         ns.table(*args)
+
+
+def test_kinks_beside_a_steep_piece_are_kept():
+    xs, ys = [0.0, 1e-3, 1.0, 2.0, 3.0], [0.0, 1e3, 0.0, 5.0, 0.0]
+    curve = ca.Function("curve", [x], [ns.table(x, xs, ys)])
+    at = np.linspace(-0.5, 3.5, 401)
+    found = np.array(curve(at[None, :])).ravel()
+    np.testing.assert_allclose(found, np.interp(at, xs, ys), rtol=0, atol=1e-8)
+
+
+def test_tables_that_lose_their_digits_are_refused():
+    noise = np.random.default_rng(0).normal(size=200)
+    with pytest.raises(ns.DefinitionError, match="too many breakpoints for a spline"):
+        ns.table(x, np.linspace(0, 1, 200), noise, order=3)
+    with pytest.raises(ns.DefinitionError, match="too close together"):
+        ns.table(x, [0.0, 1e-9, 1.0], [0.0, 1e6, 0.0])
+    curve = ca.Function("curve", [x], [ns.table(x, np.linspace(0, 1, 200), noise)])
+    assert abs(float(curve(0.7)) - np.interp(0.7, np.linspace(0, 1, 200), noise)) < 1e-11

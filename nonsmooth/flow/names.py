@@ -14,8 +14,9 @@ def guard_name(system: FilippovSystem, guard: Guard) -> str:
         return (system.stops if kind == "stop" else system.resets)[k][0]
     if kind in ("zero", "atom"):
         return f"f{k}"
-    if k >= len(system.entries):
-        return system.impacts[k - len(system.entries)]
+    first = len(system.entries) - len(system.complementarity)
+    if k >= first:
+        return [*system.complementarity, *system.impacts][k - first]
     if kind in ("surface", "near"):
         return f"h{k}"
     if len(system.entries[k]) > 1:
@@ -26,6 +27,9 @@ def guard_name(system: FilippovSystem, guard: Guard) -> str:
 def described(system: FilippovSystem, guard: Guard) -> str:
     """A guard's condition in words."""
     k, name = guard.element, guard_name(system, guard)
+    is_condition = 0 <= len(system.entries) - 1 - k < len(system.complementarity)
+    if is_condition and guard.kind in ("surface", "release"):
+        return f"{'y' if guard.kind == 'surface' else 'the multiplier'} of {name!r} >= 0"
     if guard.kind == "surface":
         return f"h{k} {'>' if guard.side > 0 else '<'} 0"
     if guard.kind == "exit":

@@ -180,7 +180,7 @@ def guard_of(system: FilippovSystem, code: int) -> Guard:
     kind, side, i, m = GUARDS[code & 15], (code >> 4 & 3) - 1, code >> 6, system.surface_count
     if kind in ("stop", "reset"):
         return Guard(kind, i, (system.stops if kind == "stop" else system.resets)[i][1], i)
-    if kind in ("impact", "release"):
+    if kind in ("impact", "release") and i >= m:
         return Guard(kind, i - m, side, len(system.entries) + i - m)
     return Guard(kind, i, 0 if kind == "branch" else side, system.entry_of(i))
 
@@ -248,11 +248,12 @@ def options_of(
 
 def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
     """Whether the guards of each kind have a name that is looked for."""
+    half_lines = [""] * system.half_lines.start + [*system.complementarity, *system.impacts]
     names = {
         **dict.fromkeys(("surface", "near"), system.surface_names),
         "stop": [name for name, _ in system.stops],
         "reset": [name for name, _ in system.resets],
-        **dict.fromkeys(("impact", "release"), [""] * system.surface_count + [*system.impacts]),
+        **dict.fromkeys(("impact", "release"), half_lines),
     }
     width = max(system.surface_count + 1, *map(len, names.values()))
     named = np.zeros((len(GUARDS), width), np.int8)

@@ -155,26 +155,55 @@ def _after(system: FilippovSystem, mode: str, guard: Guard, letters: str) -> ca.
     return None
 
 
+@dataclass(frozen=True)
+class Struck:
+    """Who may take part in the impact of a contact: friction that is carried, contacts that are closed."""
+
+    carried: tuple[int, ...]
+    closed: tuple[int, ...]
+
+    def choices(self, mode: str) -> list[str]:
+        """Letters of each, the present ones of friction and contacts that take an impulse first."""
+        friction = [mode[i] + "".join(c for c in "s+-" if c != mode[i]) for i in self.carried]
+        return [*friction, *["co"] * len(self.closed)]
+
+
+def struck_by(system: FilippovSystem, mode: str, contact: int) -> Struck:
+    """Who may take part in an impact."""
+    coupled, m = coupled_of(system), system.surface_count
+    signs = system.parse_letters(mode)
+    closed = [j for j in range(len(system.impacts)) if not signs[m + j] and j != contact]
+    carried = [i for i in range(m) if any(j in (contact, *closed) for j in coupled.carriers[i])]
+    return Struck(tuple(carried), tuple(closed))
+
+
 def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -> ca.SX:
     """The state after the impulses at a gap that closes (``contacts.c``)."""
-    # Contacts that are closed take part with the rate zero; friction on them acts with the impulse
-    # in the same proportion as with the reaction, and ``letters`` say to which side.
+    # Contacts that are closed take part with the rate zero, if ``letters`` say so, which also say to which side
+    # friction acts, with the impulse in the same proportion as with the reaction.
     coupled, m, d = coupled_of(system), system.surface_count, system.definition
-    signs = system.parse_letters(mode)
-    taking = [contact, *[j for j in range(len(system.impacts)) if not signs[m + j]]]
-    carried = [i for i in range(m) if any(j in taking for j in coupled.carriers[i])]
-    held = dict(zip(carried, letters or [mode[i] for i in carried], strict=True))
+    others = struck_by(system, mode, contact)
+    carried = others.carried
+    letters = letters or "".join(own[0] for own in others.choices(mode))
+    takes = zip(others.closed, letters[len(carried) :], strict=True)
+    taking = [contact, *[j for j, letter in takes if letter == "c"]]
+    held = dict(zip(carried, letters, strict=False))
     numbers = ca.SX([{"+": 1.0, "-": -1.0}.get(held.get(i, mode[i]), 0.0) for i in range(m)])
     stuck = [i for i in carried if held[i] == "s"]
     every = [*stuck, *[m + j for j in taking]]
     columns = ca.jacobian(coupled.field, coupled.symbols_of(every))
     columns = ca.substitute(columns, coupled.multipliers, numbers) if m else columns
-    kept = ca.vertcat(d.surfaces, d.gap_rates)
-    gradient = ca.jacobian(kept, system.extended_states)
-    wanted = [-d.surfaces[i] for i in stuck]
-    wanted += [-(1 + (d.restitutions[j] if j == contact else 0)) * d.gap_rates[j] for j in taking]
-    slope = ca.mtimes(gradient[every, :], columns)
-    impulses = solved(slope, ca.vertcat(*wanted))
+    rates = ca.vertcat(d.surfaces, d.gap_rates)[every]
+    slope = ca.mtimes(ca.jacobian(rates, system.extended_states), columns)
+    back, k = d.restitutions[taking], len(stuck)
+    if d.impact_law == "poisson":  # friction is the same in both parts
+        impulses = (1 + back) * solved(slope, -rates)[k:]
+        if k:
+            rest = -rates[:k] - ca.mtimes(slope[:k, k:], impulses)
+            impulses = ca.vertcat(solved(slope[:k, :k], rest), impulses)
+    else:
+        back = ca.vertcat(ca.SX.zeros(k), back[0], ca.SX.zeros(len(taking) - 1))
+        impulses = solved(slope, -(1 + back) * rates)
     return ca.densify(system.extended_states + ca.mtimes(columns, impulses))
 
 

@@ -29,6 +29,7 @@ from ...model.derivatives.event_maps import (
     deciding,
     event_map,
     instant_map,
+    struck_by,
     surface_map,
 )
 from ...model.derivatives.variational import VariationalField, variational_field
@@ -414,17 +415,19 @@ def struck_letters(
     system: FilippovSystem, mode: str, element: int, struck: Callable[[str], AtEvent], after: Array
 ) -> str:
     """The sides with which friction acted at an impact, of those that are possible."""
-    m, coupled = system.surface_count, coupled_of(system)
-    signs, mode = system.parse_letters(mode), system.widened(mode)
-    contact = element - len(system.entries)
-    taking = [contact, *[j for j in range(len(system.impacts)) if not signs[m + j]]]
-    carried = [i for i in range(m) if any(j in taking for j in coupled.carriers[i])]
-    choices = [mode[i] + "".join(c for c in "s+-" if c != mode[i]) for i in carried]
+    mode, contact = system.widened(mode), element - len(system.entries)
     misses: list[tuple[float, str]] = []
-    for choice in product(*choices):
+    for choice in product(*struck_by(system, mode, contact).choices(mode)):
         letters = "".join(choice)
-        misses.append((float(np.abs(struck(letters).after - after).max()), letters))
-    return min(misses)[1]
+        miss = float(np.abs(struck(letters).after - after).max())
+        misses.append((miss if np.isfinite(miss) else np.inf, letters))
+    miss, letters = min(misses)
+    if miss > _LOCATED * (1.0 + float(np.abs(after).max())):
+        raise DegenerateError(
+            f"impact of {system.impacts[contact]!r}: its derivatives are implemented where one contact closes, "
+            "and friction acts in one way throughout the impact. Start after it."
+        )
+    return letters
 
 
 def _caused(

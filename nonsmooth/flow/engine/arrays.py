@@ -248,12 +248,14 @@ def options_of(
 
 def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
     """Whether the guards of each kind have a name that is looked for."""
-    half_lines = [""] * system.half_lines.start + [*system.complementarity, *system.impacts]
+    own = [name if i in system.half_lines else "" for i, name in enumerate(system.surface_names)]
+    half_lines = [*own, *system.impacts]
     names = {
         **dict.fromkeys(("surface", "near"), system.surface_names),
         "stop": [name for name, _ in system.stops],
         "reset": [name for name, _ in system.resets],
-        **dict.fromkeys(("impact", "release"), half_lines),
+        "impact": half_lines,
+        "release": half_lines,
     }
     width = max(system.surface_count + 1, *map(len, names.values()))
     named = np.zeros((len(GUARDS), width), np.int8)
@@ -261,8 +263,8 @@ def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
         if hits.names is None:
             row[:] = 1
         else:
-            own = names.get(kind, ())
-            row[: len(own)] = [name in hits.names for name in own]
+            of_kind = names.get(kind, ())
+            row[: len(of_kind)] = [name in hits.names for name in of_kind]
     return named
 
 

@@ -258,5 +258,5 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
 
 def _contacts(system: FilippovSystem, run: Run) -> list[str]:
     """Names of the contacts at the last point that was decided."""
-    first, names = system.half_lines.start, [*system.complementarity, *system.impacts]
-    return [names[i - first] for i in run.active if i >= first]
+    m, names = system.surface_count, [*system.surface_names, *system.impacts]
+    return [names[i] for i in run.active if i >= m or i in system.half_lines]

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 def require_complementarity(d: Definition) -> None:
     """Refuse conditions whose multipliers enter nonlinearly, or neither y nor its rate."""
-    count = len(d.complementarity)
-    if not count:
+    which = list(d.half_lines)
+    if not which:
         return
-    first = d.surfaces.numel() - count
-    own, others = d.multipliers[first:], ca.vertcat(d.multipliers[:first], d.reactions)
+    rest = [i for i in range(d.surfaces.numel()) if i not in which]
+    own, others = d.multipliers[which], ca.vertcat(d.multipliers[rest], d.reactions)
     every = ca.vertcat(d.multipliers, d.reactions)
     if not ca.is_linear(d.field, every) or d.hidden or any(size > 1 for size in d.sizes):
         raise DefinitionError(
@@ -28,9 +28,7 @@ def require_complementarity(d: Definition) -> None:
             f"{d.field}. Products of multipliers, hidden dynamics, vector multipliers and friction by a reaction do "
             "not go with it yet."
         )
-    for name, y, lam in zip(
-        d.complementarity, listed(d.surfaces[first:]), listed(own), strict=True
-    ):
+    for name, y, lam in zip(d.complementarity, listed(d.surfaces[which]), listed(own), strict=True):
         if ca.depends_on(y, others) or not ca.is_linear(y, own):
             raise DefinitionError(
                 f"y of {name!r}: {y} is not linear in the multipliers of complementarity conditions alone. A "

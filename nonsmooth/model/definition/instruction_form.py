@@ -369,9 +369,6 @@ def _require_shapes(d: Definition) -> None:
     known = [law in LAWS and law != "contact" for law in d.laws]
     _require(len(known) in (0, len(d.sizes or range(d.surfaces.numel()))) and all(known), "laws")
     _require(d.hysteresis.numel() in (0, d.surfaces.numel()), "a hysteresis of each surface")
-    conditions = len(d.complementarity)
-    last = d.laws[len(d.laws) - conditions :]
-    is_right = set(last) <= {"complementarity"} and d.laws.count("complementarity") == conditions
-    _require(is_right, "laws of complementarity conditions")
+    _require(len(d.half_lines) == len(d.complementarity), "names of complementarity conditions")
     names = [*(n for n, _ in (*d.stops, *d.resets)), *d.impacts, *d.complementarity]
     _require(len({*names}) == len(names), "events of different names")

@@ -19,6 +19,7 @@ from ..checks import real
 from ..errors import DefinitionError, ParameterError
 from ..expressions.cancel import powers
 from ..expressions.graph import require_smooth
+from ..numbering import IMPACT_LAWS
 from ..reading import (
     Expression,
     Parameters,
@@ -85,7 +86,8 @@ class Definition:
     layer_widths: tuple[float, ...] = ()
     laws: tuple[str, ...] = ()  # of the entries, where not all are surfaces and sets
     hysteresis: ca.SX = _NONE  # how much lower each function is where its multiplier is -1
-    complementarity: tuple[str, ...] = ()  # names of the last entries, which are such conditions
+    complementarity: tuple[str, ...] = ()  # names of the conditions among the entries
+    impact_law: str = "newton"
 
     @cached_property
     def plain(self) -> bool:
@@ -114,6 +116,14 @@ class Definition:
     def extended_states(self) -> ca.SX:
         """The states, followed by the time where the system depends on it."""
         return ca.vertcat(self.states, self.time)
+
+    @cached_property
+    def half_lines(self) -> tuple[int, ...]:
+        """Functions y of complementarity conditions, among the surfaces."""
+        sizes = self.sizes or (1,) * self.surfaces.numel()
+        firsts = [sum(sizes[:k]) for k in range(len(sizes))]
+        laws = zip(firsts, self.laws, strict=False)
+        return tuple(first for first, law in laws if law == "complementarity")
 
     @property
     def open_surfaces(self) -> ca.SX:
@@ -152,6 +162,7 @@ class Definition:
         some |= {"clocks": self.clocks, "discrete": self.discrete}
         some |= {"layer_widths": self.layer_widths, "laws": self.laws}
         some |= {"complementarity": self.complementarity}
+        some |= {"impact_law": self.impact_law} if self.impact_law != "newton" else {}
         return {
             **{name: value for name, value in some.items() if value},
             "definition": ca.Function("definition", inputs, outputs).serialize(),
@@ -177,7 +188,8 @@ class Definition:
         tuples: dict[str, Any] = {
             name: tuple(state.get(name, ())) for name in (*some, "complementarity")
         }
-        return cls(**parts, **rest, **tuples)
+        law = state.get("impact_law", "newton")
+        return cls(**parts, **rest, **tuples, impact_law=law)
 
 
 _DIRECTIONS = (-1, 0, 1)
@@ -236,6 +248,7 @@ def read_definition(
         gaps=_of_impacts(impacts, "gap"),
         restitutions=_of_impacts(impacts, "restitution"),
         impacts=tuple(i.name for i in impacts),
+        impact_law=_law_of(impacts),
         field=f,
         surfaces=h,
         defaults=defaults,
@@ -284,6 +297,23 @@ def _events(
         "stops": tuple((s.name, direction_of(s)) for s in stops),
         "resets": tuple((r.name, direction_of(r)) for r in resets),
     }
+
+
+def _law_of(impacts: Sequence[Impact]) -> str:
+    """The law of impacts, one for all of them."""
+    for impact in impacts:
+        if impact.law not in IMPACT_LAWS:
+            raise DefinitionError(
+                f"law of {impact.name!r} is {impact.law!r}. Give one of {', '.join(IMPACT_LAWS)}."
+            )
+    laws = {impact.law: impact.name for impact in impacts}
+    if len(laws) > 1:
+        received = " and ".join(f"{law!r} for {name!r}" for law, name in laws.items())
+        raise DefinitionError(
+            f"impacts have different laws: {received}. Contacts that are struck together need one: give all "
+            "the same law=."
+        )
+    return next(iter(laws), "newton")
 
 
 def _of_impacts(impacts: Sequence[Any], what: str) -> ca.SX:
@@ -485,9 +515,8 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
     atoms = [*guards, *["a condition"] * (d.guards.numel() - len(guards))]
     named = [("field", d.field, True)]
-    surfaces = d.surfaces.numel() - len(d.complementarity)
     functions = [*zip(_function_names(d), listed(d.surfaces), strict=True)]
-    named += [(name, e, i >= surfaces) for i, (name, e) in enumerate(functions)]
+    named += [(name, e, i in d.half_lines) for i, (name, e) in enumerate(functions)]
     named += [(name, d.guards[i], False) for i, name in enumerate(atoms)]
     switched = [(f"map of reset {n!r}", d.maps[:, j]) for j, (n, _) in enumerate(d.resets)]
     switched += [(f"when of {name}", d.whens[i]) for i, name in enumerate(guards)]
@@ -519,7 +548,9 @@ def require_consistent(d: Definition, given: bool = True) -> None:
         _require_states(name, d.guards[i], d.extended_states, d)
         if given:
             _require_simple(name, d.guards[i], d)
-    for name, h in functions[:surfaces]:
+    for i, (name, h) in enumerate(functions):
+        if i in d.half_lines:
+            continue
         _require_states(name, h, d.extended_states, d)
         _require_simple(name, h, d)
     for j in range(len(d.impacts)):
@@ -533,8 +564,9 @@ def require_consistent(d: Definition, given: bool = True) -> None:
 
 def _function_names(d: Definition) -> list[str]:
     """Names of the switching functions in messages."""
-    surfaces = d.surfaces.numel() - len(d.complementarity)
-    return [*[f"surface {i}" for i in range(surfaces)], *[f"y of {n!r}" for n in d.complementarity]]
+    names = dict(zip(d.half_lines, d.complementarity, strict=True))
+    of = lambda i: f"y of {names[i]!r}" if i in names else f"surface {i}"
+    return [of(i) for i in range(d.surfaces.numel())]
 
 
 def _check_impact(d: Definition, j: int) -> None:

@@ -23,6 +23,7 @@ from ..expressions.mathml import equation, rate, symbol
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
 from .complementarity import holds
+from .discrete_states import held_values, with_values
 from .elements import Complementarity
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
@@ -224,6 +225,51 @@ class FilippovSystem:
         system.lifted = found.switches
         return system
 
+    def holding(self, values: Mapping[Any, float]) -> FilippovSystem:
+        """Hold the discrete states at values: the system between two events, without stops and resets.
+
+        Functions of a point, such as :func:`classify` and :func:`find_equilibrium`, do this themselves, with
+        the values in the point. Portraits, two-folds and manifolds take the system that this returns.
+
+        Parameters
+        ----------
+        values : mapping
+            A number for each discrete state; keys are symbols or names.
+
+        Returns
+        -------
+        FilippovSystem
+            Of the other states.
+
+        Raises
+        ------
+        DefinitionError
+            Other names than those of the discrete states.
+        PointError
+            A value that the discrete state does not have.
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, q = ca.SX.sym("x"), ca.SX.sym("q")
+        >>> on = ns.Reset(x - 18, {q: 1}, -1, level=True, when=q == 0, name="on")
+        >>> off = ns.Reset(x - 22, {q: 0}, 1, level=True, when=q == 1, name="off")
+        >>> room = ns.FilippovSystem([x], field=[30 * q - x], discrete={q: (0, 1)}, resets=[on, off])
+        >>> room.holding({q: 1})
+        FilippovSystem(1 state: x; 0 surfaces)
+        >>> ns.find_equilibrium(room, [20.0, 1]).eigenvalues
+        array([-1.])
+        """
+        key = tuple(held_values(self.definition, values))
+
+        def made() -> FilippovSystem:
+            system = type(self).__new__(type(self))
+            system._adopt(with_values(self.definition, list(key)))
+            system.lifted = self.lifted
+            return system
+
+        return self.cached(("holding", key), made)
+
     def _adopt(self, definition: Definition) -> None:
         self.definition = definition
         self.stops, self.resets = definition.stops, definition.resets
@@ -339,7 +385,8 @@ class FilippovSystem:
         {'h0': 0.5}
         """
         d = self.definition
-        found = roots_of(d.field, d.surfaces[: self.half_lines.start], self.extended_states)
+        surfaces = d.surfaces[: min((*self.half_lines, self.surface_count))]
+        found = roots_of(d.field, surfaces, self.extended_states)
         return {f"h{self.entry_of(i)}": power for i, power in sorted(found.items())}
 
     @cached_property
@@ -382,23 +429,25 @@ class FilippovSystem:
         widths = listed(self.definition.hysteresis)
         return tuple(i for i, width in enumerate(widths) if not width.is_zero())
 
-    @cached_property
-    def half_lines(self) -> range:
-        """Functions y of complementarity conditions, the last among the switching functions."""
-        return range(self.surface_count - len(self.complementarity), self.surface_count)
+    @property
+    def half_lines(self) -> tuple[int, ...]:
+        """Functions y of complementarity conditions, among the switching functions."""
+        return self.definition.half_lines
 
     @cached_property
     def algebraic(self) -> tuple[int, ...]:
         """Those of them that hold a multiplier: relative degree 0."""
         d, states = self.definition, self.extended_states
-        own = d.multipliers[self.surface_count - len(self.complementarity) :]
+        own = d.multipliers[list(self.half_lines)]
         return tuple(i for i in self.half_lines if holds(d.surfaces[i], own, states))
 
     @cached_property
     def surface_names(self) -> tuple[str, ...]:
         """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set, or as given."""
         names = [f"h{k}" for k, members in enumerate(self.entries) for _ in members]
-        return (*names[: len(names) - len(self.complementarity)], *self.complementarity)
+        for i, name in zip(self.half_lines, self.complementarity, strict=True):
+            names[i] = name
+        return tuple(names)
 
     def entry_of(self, function: int) -> int:
         """Number, in names and modes, of the surface or set of a switching ``function`` (index)."""
@@ -809,12 +858,30 @@ def require_system(
         )
 
 
+def parted(system: FilippovSystem, point: ArrayLike) -> tuple[Array, dict[str, float]]:
+    """Split a state (n,) into the states that move and the values of the discrete ones."""
+    x, count = state_values(system.state_names, point), len(system.definition.discrete)
+    values = dict(zip(system.state_names[-count:], x[-count:].tolist(), strict=True))
+    return x[:-count], values
+
+
 def require_plain(system: FilippovSystem, what: str) -> None:
     """Refuse a system whose events have conditions, filters or levels, or that has discrete states."""
     if not system.definition.plain:
         raise DefinitionError(
             f"system: {system!r} has conditions of events, when=, level=, or discrete states, which {what} "
             "does not support. Give guards that are passed."
+        )
+
+
+def require_continuous(system: FilippovSystem, what: str) -> None:
+    """Refuse a system with discrete states."""
+    count = len(system.definition.discrete)
+    if count:
+        values = ", ".join(f"{name!r}: 0" for name in system.state_names[-count:])
+        raise DefinitionError(
+            f"system: {system!r} has discrete states, which {what} does not support. Hold them, as in "
+            f"system.holding({{{values}}})."
         )
 
 

@@ -397,8 +397,8 @@ class Coupled:
 
 
 def _surfaces(system: FilippovSystem) -> ca.SX:
-    """The switching functions of surfaces and sets, not of complementarity conditions."""
-    return system.definition.surfaces[: system.half_lines.start]
+    """The switching functions of surfaces and sets, before those of complementarity conditions."""
+    return system.definition.surfaces[: min((*system.half_lines, system.surface_count))]
 
 
 def coupled_of(system: FilippovSystem) -> Coupled:

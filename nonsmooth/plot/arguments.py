@@ -30,7 +30,7 @@ def same(several: list[Any], attribute: str) -> Any:
 def require_one_surface(system: FilippovSystem, caller: str, dimension: int, others: str) -> None:
     """Raise DefinitionError unless a system has so many states, one surface and no explicit time."""
     runs = "Draw runs with trajectory."
-    require_system(system, sets=True, hysteresis=True)
+    require_system(system, sets=True, hysteresis=True, joints=True)
     if system.dimension != dimension:
         received, advice = f"{system.dimension} states: {', '.join(system.state_names)}", others
     elif system.sets:

@@ -14,7 +14,7 @@ import nonsmooth as ns
 CASES = Path(__file__).parents[1] / "cases" / "inclusions.json"
 
 #: Constructs that the library does not have.
-MISSING = ("complementarity", "constraints", "vector_multipliers")
+MISSING = ("complementarity", "vector_multipliers")
 
 #: Functions that the strings use.
 FUNCTIONS = {n: getattr(ca, n) for n in ("sin", "cos", "sqrt", "exp", "log", "fabs")}
@@ -37,7 +37,8 @@ class Case:
             self.data = {**self.data, "field": slider_crank(), "start_mode": "oocc"}
         names = [self.data.get(key, "") for key in ("states", "multipliers", "reactions", "time")]
         self.names = [name.split() for name in names]
-        self.symbols = {n: ca.SX.sym(n) for names in self.names for n in names}
+        held = [own["reaction"] for own in self.data.get("constraints", [])]
+        self.symbols = {n: ca.SX.sym(n) for names in (*self.names, held) for n in names}
 
     def parse(self, text: str) -> list:
         value = eval(
@@ -58,6 +59,10 @@ class Case:
             )
             for i, own in enumerate(data.get("impacts", []))
         ]
+        constraints = [
+            ns.Constraint(self.parse(own["g"])[0], reaction=self.symbols[own["reaction"]])
+            for own in data.get("constraints", [])
+        ]
         return ns.FilippovSystem(
             states,
             field=self.parse(data["field"]) if "field" in data else None,
@@ -67,6 +72,7 @@ class Case:
             surfaces=self.parse(data.get("surfaces", "")) or None,
             multipliers=multipliers or None,
             impacts=impacts or None,
+            constraints=constraints,
             time=time[0] if time else None,
         )
 

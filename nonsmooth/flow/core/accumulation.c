@@ -124,7 +124,7 @@ static int choose_closed(Run *r, const int32_t *contact, int count) {
   memcpy(r->x, r->at_work, sizeof(double) * r->n);
   for (int i = 0; i < count; i++) which[kept++] = m + contact[i];
   for (int i = 0; i < count; i++) which[kept++] = m + c + contact[i];
-  project(r, which, kept);
+  project(r, which, with_joints(r, which, kept));
   return decide_among(r, which, count);
 }
 
@@ -196,7 +196,7 @@ static int choose_rest(Run *r, const int32_t *element, int count, const double *
   memcpy(x, r->x, sizeof(double) * r->n);
   for (int i = 0; i < count; i++) which[kept++] = element[i];
   for (int i = 0; i < count; i++) kept += lower_rows(r, element[i], which + kept);
-  project(r, which, kept);
+  project(r, which, with_joints(r, which, kept));
   for (int i = 0; near && i < r->n; i++)
     close &= fabs(r->x[i] - x[i]) <= 4 * near[i] + VANISHES * (r->size + fabs(x[i]));
   if (close && decide_among(r, element, count)) {

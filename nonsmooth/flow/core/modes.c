@@ -3,6 +3,9 @@
 static const Element *element(const Run *r, int i) { return r->s->element + i; }
 static int degree_of(const Run *r, int i) { return element(r, i)->degree; }
 static int is_scaled(const Run *r, int i) { return element(r, i)->flags & SCALED; }
+static int has_law(const Run *r, int i, int law) { return element(r, i)->law == law; }
+/* Whether an unknown is in a set of finite size: not reactions. */
+static int is_bounded(const Run *r, int i) { return !has_law(r, i, CONTACT_LAW) && !has_law(r, i, JOINT_LAW); }
 static int size_of(const Run *r, int i) { return element(r, i)->k; }
 
 /* The set of a function, as its first one, or -1; all sets. */

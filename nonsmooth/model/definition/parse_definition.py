@@ -33,6 +33,7 @@ from ..reading import (
 )
 from ..values import Array, parameter_values
 from .conditions import Atoms, Rule, located, passages
+from .constraints import joints_of, read_constraints
 from .elements import functions_of, hysteresis_of, laws_of, multipliers_of, read_entries
 from .events import Clock, Impact, Reset, Stop
 from .read_events import direction_of, read_maps, read_rules, read_when, require_no_endless_level
@@ -79,6 +80,7 @@ class Definition:
     laws: tuple[str, ...] = ()  # of the entries, where not all are surfaces and sets
     hysteresis: ca.SX = _NONE  # how much lower each function is where its multiplier is -1
     impact_law: str = "newton"
+    constraints: tuple[str, ...] = ()  # names of the joints, the last entries
 
     @cached_property
     def plain(self) -> bool:
@@ -111,10 +113,7 @@ class Definition:
     @property
     def gap_rates(self) -> ca.SX:
         """Rates of the gaps (c,), in states, parameters and time."""
-        x = self.extended_states
-        free = ca.vertcat(self.field, ca.SX.ones(self.time.numel(), 1))
-        rates = ca.jtimes(self.gaps, x, free) if self.gaps.numel() else ca.SX(0, 1)
-        return ca.densify(rates)
+        return _rate(self, self.gaps) if self.gaps.numel() else ca.SX(0, 1)
 
     @property
     def names(self) -> dict[str, list[str]]:
@@ -136,6 +135,7 @@ class Definition:
         some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed, "rules": self.rules}
         some |= {"clocks": self.clocks, "discrete": self.discrete}
         some |= {"layer_widths": self.layer_widths, "laws": self.laws}
+        some |= {"constraints": self.constraints}
         some |= {"impact_law": self.impact_law} if self.impact_law != "newton" else {}
         return {
             **{name: value for name, value in some.items() if value},
@@ -158,7 +158,16 @@ class Definition:
         inputs = ("states", "time", "parameters", "multipliers", "reactions")
         rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
         parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=False))
-        some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths", "laws")
+        some = (
+            "sizes",
+            "renamed",
+            "rules",
+            "clocks",
+            "discrete",
+            "layer_widths",
+            "laws",
+            "constraints",
+        )
         tuples: dict[str, Any] = {name: tuple(state.get(name, ())) for name in some}
         law = state.get("impact_law", "newton")
         return cls(**parts, **rest, **tuples, impact_law=law)
@@ -182,6 +191,7 @@ def read_definition(
     resets: Any,
     impacts: Any,
     hidden: bool,
+    constraints: Any = (),
     clocks: Sequence[Clock] = (),
     discrete: Sequence[tuple[float, ...] | None] = (),
     layer_widths: Any = None,
@@ -202,9 +212,18 @@ def read_definition(
         lam = symbols([s for entry in listed(multipliers) for s in listed(entry)], "multipliers")
         f = column(field, "field", x.numel())
     _one_multiplier_each(lam, h)
+    widths = _widths(layer_widths, h.numel())
+    joined = read_constraints(constraints)
     kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
-    (stops, resets, impacts), renamed = _distinct([_items(*k) for k in kinds], _own_names(sizes))
-    reactions, f = _reactions(impacts, x, t, f)
+    items = [joined, *[_items(*k) for k in kinds]]
+    (joined, stops, resets, impacts), renamed = _distinct(items, _own_names(sizes))
+    reactions, f = _reactions(impacts, "gap", x, t, f)
+    held, f = _reactions(joined, "function", x, t, f)
+    joints = joints_of(joined, listed(held), f)
+    f, entries = joints.field, [*entries, *joints.entries]
+    lam = ca.vertcat(lam, *[entry.multiplier for entry in joints.entries])
+    h, sizes = functions_of(entries), (*sizes, *[1] * len(joints.entries))
+    widths = (*widths, *[1.0] * len(joints.entries)) if widths else ()
     definition = Definition(
         states=x,
         time=t,
@@ -221,7 +240,8 @@ def read_definition(
         hidden=hidden or any(entry.hidden for entry in entries),
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
-        layer_widths=_widths(layer_widths, h.numel()),
+        layer_widths=widths,
+        constraints=joints.names,
         laws=laws_of(entries),
         hysteresis=hysteresis_of(entries),
         **_events(stops, resets, clocks, discrete, x, t, p),
@@ -403,15 +423,15 @@ def _two_fields(
     return lam, ca.vertcat(*entries)
 
 
-def _direction(impact: Impact, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
-    """Direction of a reaction that is not given: the gradient of the gap's rate by the velocities."""
+def _direction(name: str, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
+    """Direction of a reaction that is not given: the gradient of a function's rate by the velocities."""
     positions = _depends_on_each(gap, x)
     push = ca.densify(ca.gradient(rate, x))
     velocities = [i for i in range(x.numel()) if not positions[i] and not push[i].is_zero()]
     if velocities and not ca.is_linear(rate, ca.vertcat(*[x[i] for i in velocities])):
         raise DefinitionError(
-            f"reaction of {impact.name!r}: the rate {rate} of the gap is not linear in the states "
-            "that are not in the gap, so it does not give the direction of the reaction. Give "
+            f"reaction of {name!r}: the rate {rate} of {gap} is not linear in the states "
+            "that it does not hold itself, so it does not give the direction of the reaction. Give "
             "reaction=, a symbol in the field."
         )
     return ca.vertcat(*[push[i] if i in velocities else 0 for i in range(x.numel())])
@@ -422,17 +442,19 @@ def _depends_on_each(function: ca.SX, x: ca.SX) -> list[bool]:
     return [bool(ca.depends_on(function, x[i])) for i in range(x.numel())]
 
 
-def _reactions(impacts: Sequence[Impact], x: ca.SX, t: ca.SX, field: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Symbols of the reactions, and the field with those that were not in it."""
+def _reactions(
+    items: Sequence[Any], what: str, x: ca.SX, t: ca.SX, field: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    """Symbols of the reactions of impacts or constraints, and the field with those that were not in it."""
     given: list[ca.SX] = []
-    for j, impact in enumerate(impacts):
-        if impact.reaction is not None:
-            given.append(symbols([impact.reaction], f"reaction of {impact.name!r}"))
+    for j, item in enumerate(items):
+        if item.reaction is not None:
+            given.append(symbols([item.reaction], f"reaction of {item.name!r}"))
             continue
-        gap = column([impact.gap], f"gap of {impact.name!r}", 1)
+        gap = column([getattr(item, what)], f"{what} of {item.name!r}", 1)
         rate = ca.jtimes(gap, ca.vertcat(x, t), ca.vertcat(field, ca.SX.ones(t.numel(), 1)))
-        given.append(ca.SX.sym(f"reaction{j}"))
-        field = field + given[-1] * _direction(impact, gap, rate, x)
+        given.append(ca.SX.sym(f"reaction{j}" if what == "gap" else f"{item.name} reaction"))
+        field = field + given[-1] * _direction(item.name, gap, rate, x)
     return ca.vertcat(*given) if given else ca.SX(0, 1), field
 
 
@@ -480,7 +502,7 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
     atoms = [*guards, *["a condition"] * (d.guards.numel() - len(guards))]
     named = [("field", d.field, True)]
-    named += [(f"surface {i}", e, False) for i, e in enumerate(listed(d.surfaces))]
+    named += [(what, e, False) for what, e in _named_surfaces(d)]
     named += [(name, d.guards[i], False) for i, name in enumerate(atoms)]
     switched = [(f"map of reset {n!r}", d.maps[:, j]) for j, (n, _) in enumerate(d.resets)]
     switched += [(f"when of {name}", d.whens[i]) for i, name in enumerate(guards)]
@@ -512,15 +534,59 @@ def require_consistent(d: Definition, given: bool = True) -> None:
         _require_states(name, d.guards[i], d.extended_states, d)
         if given:
             _require_simple(name, d.guards[i], d)
-    for i, h in enumerate(listed(d.surfaces)):
-        _require_states(f"surface {i}", h, d.extended_states, d)
-        _require_simple(f"surface {i}", h, d)
+    for what, h in _named_surfaces(d):
+        _require_states(what, h, d.extended_states, d)
+        _require_simple(what, h, d)
     for j in range(len(d.impacts)):
         _check_impact(d, j)
+    _require_linear_joints(d)
     if not d.hidden:
         _require_linear(d)
     _require_linear_sets(d)
     _require_hysteresis(d)
+
+
+def _rate(d: Definition, function: ca.SX) -> ca.SX:
+    """Derivative of a function along the motion."""
+    free = ca.vertcat(d.field, ca.SX.ones(d.time.numel(), 1))
+    return ca.densify(ca.jtimes(function, d.extended_states, free))
+
+
+def _named_surfaces(d: Definition) -> list[tuple[str, ca.SX]]:
+    """Switching functions and functions of constraints with their names in messages."""
+    functions = listed(d.surfaces)
+    first = len(functions) - len(d.constraints)
+    names = [f"surface {i}" for i in range(first)] + [f"function of {n!r}" for n in d.constraints]
+    return list(zip(names, functions, strict=True))
+
+
+def _require_linear_joints(d: Definition) -> None:
+    """Refuse reactions of constraints that enter nonlinearly or in products."""
+    first = d.multipliers.numel() - len(d.constraints)
+    every = ca.vertcat(d.multipliers, d.reactions)
+    for name, reaction in zip(d.constraints, listed(d.multipliers)[first:], strict=True):
+        effect = ca.jacobian(d.field, reaction)
+        if ca.depends_on(effect, every):
+            raise DefinitionError(
+                f"reaction of {name!r}: {reaction} is multiplied with {reaction} or another unknown. A joint's reaction enters "
+                "linearly; friction at it is that of two contacts, nonsmooth.Impact(gap, reaction=) on either side."
+            )
+        if effect.is_zero():
+            raise DefinitionError(
+                f"reaction of {name!r}: {reaction} is not in the field. Write the force of the joint as reaction "
+                "times its direction."
+            )
+    joints, others = d.multipliers[first:], ca.vertcat(d.multipliers[:first], d.reactions)
+    for name, g in _named_surfaces(d)[first:]:
+        rate = _rate(d, g)
+        if not ca.depends_on(rate, ca.vertcat(joints, others)):
+            rate = _rate(d, rate)
+        if not ca.depends_on(rate, joints):
+            held = ca.depends_on(rate, others)
+            raise DefinitionError(
+                f"{name}: {g} {'changes by other multipliers first' if held else 'has two derivatives'} without a "
+                "reaction of a constraint. Give a function of positions, or of velocities, on which the reaction acts."
+            )
 
 
 def _check_impact(d: Definition, j: int) -> None:

@@ -22,6 +22,7 @@ from ..errors import DefinitionError, PointError
 from ..expressions.mathml import equation, rate, symbol
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
+from .constraints import Constraint
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .parse_definition import Definition, consistent_parameters, read_definition
@@ -71,6 +72,8 @@ class FilippovSystem:
         Surfaces on which the state jumps.
     impacts : sequence of Impact, optional
         Contacts that cannot be passed.
+    constraints : sequence of Constraint, optional
+        Joints: functions that stay zero. Each has the letter ``s`` in a mode, after the surfaces.
     clocks : sequence of Clock, optional
         What is periodic in time; each adds its phase to the states.
     discrete : sequence of SX symbols or mapping, optional
@@ -122,6 +125,7 @@ class FilippovSystem:
         stops: Sequence[Stop] = (),
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
+        constraints: Sequence[Constraint] | Constraint = (),
         clocks: Sequence[Clock] | Clock = (),
         discrete: Discrete = (),
         hidden: bool = False,
@@ -140,6 +144,7 @@ class FilippovSystem:
             "stops": stops,
             "resets": resets,
             "impacts": impacts,
+            "constraints": constraints,
             "hidden": hidden,
             "layer_widths": layer_widths,
         }
@@ -221,7 +226,7 @@ class FilippovSystem:
     def _adopt(self, definition: Definition) -> None:
         self.definition = definition
         self.stops, self.resets = definition.stops, definition.resets
-        self.impacts = definition.impacts
+        self.impacts, self.constraints = definition.impacts, definition.constraints
         self.hidden = definition.hidden
         field, multipliers = definition.field, listed(definition.multipliers)
         self.nonlinear = tuple(not ca.is_linear(field, lam) for lam in multipliers)
@@ -272,7 +277,12 @@ class FilippovSystem:
             written += [f"and {more} more"] * (more > 0)
             rows.append((where, Markup("<br>".join(written))))
         for k, function in enumerate(listed(own.surfaces)[:_EQUATIONS_SHOWN]):
-            rows.append((f"surface h{k}", Markup(equation(symbol(f"h{k}"), function, known))))
+            name = (
+                f"constraint {self.constraints[self.joints.index(k)]}"
+                if k in self.joints
+                else f"surface h{k}"
+            )
+            rows.append((name, Markup(equation(symbol(f"h{k}"), function, known))))
         rows += [("parameters", ", ".join(self.parameter_names))]
         rows += [("stops", ", ".join(n for n, _ in self.stops))]
         rows += [("resets", ", ".join(n for n, _ in self.resets))]
@@ -284,7 +294,7 @@ class FilippovSystem:
             f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
         ]
         names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
-        surfaces = len(self.entries) - len(self.sets)
+        surfaces = len(self.entries) - len(self.sets) - len(self.joints)
         if surfaces or not self.sets:
             parts.append(f"{surfaces} surface{'s' * (surfaces != 1)}{self._classes()}{names}")
         parts += [f"root |{name}|^{power:g}" for name, power in self.roots.items()]
@@ -295,11 +305,12 @@ class FilippovSystem:
             parts.append(f"time {self.definition.time}")
         parts += [f"stop {n!r}" for n, _ in self.stops] + [f"reset {n!r}" for n, _ in self.resets]
         parts += [f"impact {n!r}" for n in self.impacts]
+        parts += [f"constraint {n!r}" for n in self.constraints]
         return f"FilippovSystem({'; '.join(parts)})"
 
     def _classes(self) -> str:
         """The classes of surfaces, for people, where one is not generic."""
-        own = [members[0] for members in self.entries if len(members) == 1]
+        own = [e[0] for e in self.entries if len(e) == 1 and e[0] not in self.joints]
         if len(own) > _CLASSES_SHOWN:
             return ""
         words = [self.switching(i).name for i in own]
@@ -373,6 +384,12 @@ class FilippovSystem:
         return tuple(i for i, width in enumerate(widths) if not width.is_zero())
 
     @cached_property
+    def joints(self) -> tuple[int, ...]:
+        """Functions of constraints, the last of the switching functions."""
+        m = self.surface_count
+        return tuple(range(m - len(self.constraints), m))
+
+    @cached_property
     def surface_names(self) -> tuple[str, ...]:
         """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set."""
         return tuple(f"h{k}" for k, members in enumerate(self.entries) for _ in members)
@@ -384,7 +401,8 @@ class FilippovSystem:
     @cached_property
     def coupled(self) -> bool:
         """Whether multipliers are solved for together: several, a nonlinear one, or reactions."""
-        return self.surface_count > 1 or any(self.nonlinear) or bool(self.impacts)
+        several = self.surface_count > 1 or bool(self.impacts) or bool(self.joints)
+        return several or any(self.nonlinear)
 
     def spelled(self, mode: str) -> str:
         """Shorten a ``mode`` to one letter for each surface, set and impact."""
@@ -471,6 +489,7 @@ class FilippovSystem:
     def require_mode(self, mode: object) -> None:
         """Refuse a ``mode`` without one letter for each surface and set, or with letters of runs."""
         known = ["*s" if len(members) > 1 else "+-s" for members in self.entries]
+        known[len(known) - len(self.joints) :] = "s" * len(self.joints)
         whole = [*known, *["oc"] * len(self.impacts)]
         fits = isinstance(mode, str) and len(mode) in (len(known), len(whole))
         if not fits or any(a not in b for a, b in zip(str(mode), whole, strict=False)):
@@ -546,8 +565,9 @@ class FilippovSystem:
         i = self.surface_index(surface)
         if mode is not None:
             self.require_mode(mode)
-        if i in (*self.set_of, *self.remembering):
+        if i in (*self.set_of, *self.remembering, *self.joints):
             what = "as a set" if i in self.set_of else "with hysteresis"
+            what = "as a constraint" if i in self.joints else what
             return Switching("generic", None, None, f"its definition {what}")
         values = None if parameters is None else tuple(self.parameter_vector(parameters).tolist())
         key = ("switching", i, mode, values)
@@ -744,8 +764,10 @@ class FilippovSystem:
         return np.array([*values, moment]) if self.time_dependent else values
 
 
-def require_system(value: Any, sets: bool = False, hysteresis: bool = False) -> None:
-    """Refuse all but a FilippovSystem; ``sets`` allows vector multipliers, ``hysteresis`` relays with it."""
+def require_system(
+    value: Any, sets: bool = False, hysteresis: bool = False, joints: bool = False
+) -> None:
+    """Refuse all but a FilippovSystem; vector multipliers, relays with hysteresis and constraints if not allowed."""
     if not isinstance(value, FilippovSystem):
         raise DefinitionError(
             f"system: expected a FilippovSystem, received {value!r} ({type(value).__name__}). "
@@ -762,6 +784,11 @@ def require_system(value: Any, sets: bool = False, hysteresis: bool = False) -> 
         raise DefinitionError(
             f"system: {value!r} has elements with hysteresis, which this function does not support. They "
             "work in simulate, ensemble and outcomes."
+        )
+    if value.constraints and not joints:
+        raise DefinitionError(
+            f"system: {value!r} has constraints, which this function does not support. They work in simulate, "
+            "ensemble, outcomes and sensitivity. Write the motion in coordinates that satisfy them."
         )
 
 

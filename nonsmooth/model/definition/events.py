@@ -11,6 +11,7 @@ import casadi as ca
 from ..checks import real
 from ..errors import DefinitionError
 from ..reading import Expression, column, listed, scalar
+from .discrete_choices import without_choices
 
 
 @dataclass(frozen=True)
@@ -254,9 +255,14 @@ def with_added_states(clocks: Any, discrete: Any, given: dict[str, Any]) -> dict
     result["discrete"] = [_values(symbol, given) for symbol, given in values.items()]
     if not clocks and not still:
         return result
+    allowed = dict(zip(still, result["discrete"], strict=True))
+    for name in ("surface", "surfaces"):
+        if still and given.get(name) is not None:
+            result[name] = without_choices(given[name], allowed, name)
     for name in ("above", "below", "field", "rhs"):
         if given.get(name) is not None:
             entries = column(given[name], name, n)
+            entries = without_choices(entries, allowed, name) if still else entries
             result[name] = [*ca.vertsplit(entries)[: entries.numel()], *[1.0] * len(clocks)]
             result[name] += [0.0] * len(still)
     resets = [given["resets"]] if isinstance(given["resets"], Reset) else listed(given["resets"])

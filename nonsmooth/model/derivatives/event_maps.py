@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ..cache import Content
+from ..definition.conditions import decides
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
 from ..expressions.graph import evaluate, instructions, operation
@@ -83,9 +84,15 @@ class AtEvent:
 
 
 def event_map(
-    system: FilippovSystem, mode: str, kind: str, element: int, side: int, letters: str = ""
+    system: FilippovSystem,
+    mode: str,
+    kind: str,
+    element: int,
+    side: int,
+    letters: str = "",
+    atom: int = -1,
 ) -> EventMap:
-    """The map of an event of a mode; built once."""
+    """The map of an event of a mode, with the function of an ``atom`` of its condition; built once."""
     if system.sets:
         return instant_map(system, system.widened(mode), kind, element, letters)
 
@@ -94,13 +101,14 @@ def event_map(
         for row, guard in enumerate(of_mode.guards):
             if guard.ends(kind, element, side):
                 after = _after(system, mode, guard, letters)
-                return EventMap(system, of_mode.states, of_mode.functions[row], guard, after)
+                function = of_mode.functions[row] if atom < 0 else system.definition.guards[atom]
+                return EventMap(system, of_mode.states, function, guard, after)
         raise DegenerateError(
             f"leg in mode {mode!r}: its {kind} is no zero of a function, as where a branch of hidden "
             "sliding ends, and has no derivative. End the run before it."
         )
 
-    return system.cached(("event map", mode, kind, element, side, letters), build)
+    return system.cached(("event map", mode, kind, element, side, letters, atom), build)
 
 
 def instant_map(
@@ -210,14 +218,39 @@ def surface_map(system: FilippovSystem, surface: int) -> EventMap:
     return system.cached(("surface map", surface), build)
 
 
-def atoms_at(system: FilippovSystem, kind: str, element: int, x: Array, p: Array) -> list[float]:
+def atoms_at(
+    system: FilippovSystem, kind: str, element: int, x: Array, p: Array
+) -> dict[int, float]:
     """Values of the functions that decide when a stop or reset is due and that move along a motion."""
     d = system.definition
     rule = d.rules[element if kind == "stop" else len(d.stops) + element]
     own = {code // 8 for tree in rule.located for code in tree if code >= 0}
     atoms = [k for k, way in enumerate(d.located) if k in own and way != UNWATCHED]
     build = lambda: [d.guards[k] for k in atoms]
-    return _values_at(system, ("atoms of", kind, element), build, x, p)
+    values = _values_at(system, ("atoms of", kind, element), build, x, p)
+    return dict(zip(atoms, values, strict=True))
+
+
+def atom_of(system: FilippovSystem, guard: Guard) -> int:
+    """Index of the function of a guard of an event among those of all conditions."""
+    before = {"reset": len(system.stops), "atom": len(system.stops) + len(system.resets)}
+    return guard.element + before.get(guard.kind, 0)
+
+
+def is_due_at(system: FilippovSystem, guard: Guard, x: Array, p: Array) -> bool:
+    """Whether an event becomes due, or ceases to be, where a function of its condition passes zero at a state."""
+    d = system.definition
+    if d.plain:
+        return True
+    i = atom_of(system, guard)
+    build = lambda: [*ca.vertsplit(d.guards), *ca.vertsplit(d.whens)]
+    values = _values_at(system, ("conditions",), build, x, p)
+    count = d.guards.numel()
+    sides = [(v > 0.0) - (v < 0.0) for v in values[:count]]
+    rules = zip(d.rules, values[count:], strict=True)
+    return any(
+        (when != 0.0 or rule.when is not None) and decides(rule, i, sides) for rule, when in rules
+    )
 
 
 def choices_at(

@@ -76,7 +76,7 @@ from .model import (
     regularise,
 )
 from .model.definition.constraints import Constraint
-from .model.definition.elements import Relay
+from .model.definition.elements import Complementarity, Relay
 from .model.definition.friction import Friction
 from .model.definition.table import table
 from .orbit import (
@@ -113,6 +113,7 @@ __version__ = "0.1.0.dev0"
 
 __all__ = [
     "Clock",
+    "Complementarity",
     "Constraint",
     "ConvergenceError",
     "DefinitionError",

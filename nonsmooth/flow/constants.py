@@ -58,6 +58,9 @@ SHARE_SPREAD = 0.05
 #: Close to rest on a surface with a root steps are shorter than flights by the inverse of this, and below rounding.
 ROOT_REST = 1e-7
 
+#: Steps of Newton's method to where complementarity conditions jump, and part of a state by which it is differenced.
+JUMP_STEPS, DIFFERENCED = 60, 1e-7
+
 #: Part of the time in which the states change by their size over which a rate is differenced.
 REACH = 1e-6
 
@@ -211,7 +214,8 @@ DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 #: Kinds of events, by number in ensembles and in C.
 KINDS = (
     *("crossing", "entry", "exit", "stop", "reset"),
-    *("impact", "contact", "release", "stability", "rest", "rest_below", "end"),
+    *("impact", "contact", "release", "stability", "rest", "rest_below", "jump"),
+    "end",
 )
 
 #: The first and the last of these, as many, can happen without resets and impacts.
@@ -267,6 +271,7 @@ REASONS = (
     "undetermined",
     "high_degree",
     "discrete_value",
+    "no_jump",
     "off_constraint",
     "dead_point",
 )

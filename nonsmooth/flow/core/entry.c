@@ -109,6 +109,10 @@ static size_t place_run(Run *r, char *base) {
   r->at_x = DOUBLES(n);
   r->before = DOUBLES(n);
   r->saved = DOUBLES(n);
+  int jumping = 0;
+  for (int i = 0; i < s->m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;
+  r->jumped_from = DOUBLES(n);
+  r->jump_work = DOUBLES(jumping ? (size_t)n * (2 * n + jumping + 1) : 0);
   r->speed = DOUBLES(w);
   r->at_root = DOUBLES(3 * n);
   r->at_work = DOUBLES(n);

@@ -107,7 +107,7 @@ static void keep_rates(Run *r, Expansion *e) {
       rate += slope * e->states[(int64_t)g->column[to] * stride + 1];
       if (g->column[to] < r->s->dimension) size += slope * slope;
     }
-    if (i >= r->m || degree_of(r, i) > 1 || rate == 0 || !isfinite(rate / size)) continue;
+    if (i >= r->m || degree_of(r, i) != 1 || rate == 0 || !isfinite(rate / size)) continue;
     for (int q = from; q < to; q++)
       if (g->column[q] < r->s->dimension)
         e->states[(int64_t)g->column[q] * stride + 1] -= rate / size * out_of(&r->s->point, r->point, first + q);

@@ -164,6 +164,7 @@ typedef struct {
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
   double *saved, *speed, *at_root; /* a state to return to; of each surface at its last zero */
+  double *jumped_from, *jump_work; /* the state before the last jump of complementarity conditions */
   int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
   int32_t shown, has_roots;
   const Expansion *expansion;

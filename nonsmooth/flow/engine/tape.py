@@ -143,6 +143,7 @@ def _elements(coupled: Coupled) -> list[_Element]:
         i, k, further = members[0], len(members), len(coupled.lower[members[0]])
         flags = coupled.continuous[i] + 2 * coupled.scaled[i]
         law, degree = LAWS.index(name), 1 if i in system.remembering else further + 1
+        degree = 0 if i in system.algebraic else degree
         size = (system.layer_widths[i], coupled.powers[i])
         made += [_Element(law, i, k, degree, lower, flags, *size)] * k
         lower += further
@@ -449,9 +450,11 @@ class TapeEngine:
 
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``core/state.c`` for those of sets."""
-        m = self.system.surface_count
-        surfaces = ("-s+*blli"[sign + 1] for sign in signs[:m])
-        return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
+        m, half_lines = self.system.surface_count, self.system.half_lines
+        letters = ["-s+*blli"[sign + 1] for sign in signs[:m]]
+        for i in half_lines:
+            letters[i] = "o" if signs[i] else "c"
+        return "".join([*letters, *("o" if sign else "c" for sign in signs[m:])])
 
     # many trajectories -------------------------------------------------------------------------
 

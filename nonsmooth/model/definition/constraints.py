@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
 from ..errors import DefinitionError
 from ..reading import Expression, listed, scalar
+from .complementarity import rate_of
 from .elements import Entry
+
+if TYPE_CHECKING:
+    from .parse_definition import Definition
 
 
 @dataclass(frozen=True)
@@ -116,3 +120,32 @@ def _eliminated(
     value = -ca.solve(slope, ca.substitute(residual, own, 0))
     field, *rest = (ca.substitute(e, own, value) for e in (field, *functions))
     return field, rest
+
+
+def require_constraints(d: Definition) -> None:
+    """Refuse reactions of constraints that enter nonlinearly, in products, or not in two derivatives."""
+    first, names = d.multipliers.numel() - len(d.constraints), d.constraints
+    joints, others = d.multipliers[first:], ca.vertcat(d.multipliers[:first], d.reactions)
+    every = ca.vertcat(joints, others)
+    for name, reaction in zip(names, listed(joints), strict=True):
+        effect = ca.jacobian(d.field, reaction)
+        if ca.depends_on(effect, every):
+            raise DefinitionError(
+                f"reaction of {name!r}: {reaction} is multiplied with {reaction} or another unknown. A joint's reaction enters "
+                "linearly; friction at it is that of two contacts, nonsmooth.Impact(gap, reaction=) on either side."
+            )
+        if effect.is_zero():
+            raise DefinitionError(
+                f"reaction of {name!r}: {reaction} is not in the field. Write the force of the joint as reaction "
+                "times its direction."
+            )
+    for name, g in zip(names, listed(d.surfaces)[first:], strict=True):
+        rate = rate_of(d, g)
+        if not ca.depends_on(rate, every):
+            rate = rate_of(d, rate)
+        if not ca.depends_on(rate, joints):
+            held = ca.depends_on(rate, others)
+            raise DefinitionError(
+                f"function of {name!r}: {g} {'changes by other multipliers first' if held else 'has two derivatives'} without "
+                "a reaction of a constraint. Give a function of positions, or of velocities, on which the reaction acts."
+            )

@@ -32,9 +32,17 @@ from ..reading import (
     symbols,
 )
 from ..values import Array, parameter_values
+from .complementarity import rate_of, require_complementarity
 from .conditions import Atoms, Rule, located, passages
-from .constraints import joints_of, read_constraints
-from .elements import functions_of, hysteresis_of, laws_of, multipliers_of, read_entries
+from .constraints import joints_of, read_constraints, require_constraints
+from .elements import (
+    Complementarity,
+    functions_of,
+    hysteresis_of,
+    laws_of,
+    multipliers_of,
+    read_entries,
+)
 from .events import Clock, Impact, Reset, Stop
 from .read_events import direction_of, read_maps, read_rules, read_when, require_no_endless_level
 
@@ -79,6 +87,7 @@ class Definition:
     layer_widths: tuple[float, ...] = ()
     laws: tuple[str, ...] = ()  # of the entries, where not all are surfaces and sets
     hysteresis: ca.SX = _NONE  # how much lower each function is where its multiplier is -1
+    complementarity: tuple[str, ...] = ()  # names of the conditions among the entries
     impact_law: str = "newton"
     constraints: tuple[str, ...] = ()  # names of the joints, the last entries
 
@@ -110,10 +119,26 @@ class Definition:
         """The states, followed by the time where the system depends on it."""
         return ca.vertcat(self.states, self.time)
 
+    @cached_property
+    def half_lines(self) -> tuple[int, ...]:
+        """Functions y of complementarity conditions, among the surfaces."""
+        sizes = self.sizes or (1,) * self.surfaces.numel()
+        firsts = [sum(sizes[:k]) for k in range(len(sizes))]
+        laws = zip(firsts, self.laws, strict=False)
+        return tuple(first for first, law in laws if law == "complementarity")
+
+    @property
+    def open_surfaces(self) -> ca.SX:
+        """The switching functions (m,) as functions of states alone, without multipliers."""
+        if not self.complementarity:
+            return self.surfaces
+        none = ca.SX.zeros(self.multipliers.numel(), 1)
+        return ca.substitute(self.surfaces, self.multipliers, none)
+
     @property
     def gap_rates(self) -> ca.SX:
         """Rates of the gaps (c,), in states, parameters and time."""
-        return _rate(self, self.gaps) if self.gaps.numel() else ca.SX(0, 1)
+        return rate_of(self, self.gaps) if self.gaps.numel() else ca.SX(0, 1)
 
     @property
     def names(self) -> dict[str, list[str]]:
@@ -135,7 +160,7 @@ class Definition:
         some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed, "rules": self.rules}
         some |= {"clocks": self.clocks, "discrete": self.discrete}
         some |= {"layer_widths": self.layer_widths, "laws": self.laws}
-        some |= {"constraints": self.constraints}
+        some |= {"complementarity": self.complementarity, "constraints": self.constraints}
         some |= {"impact_law": self.impact_law} if self.impact_law != "newton" else {}
         return {
             **{name: value for name, value in some.items() if value},
@@ -158,17 +183,10 @@ class Definition:
         inputs = ("states", "time", "parameters", "multipliers", "reactions")
         rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
         parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=False))
-        some = (
-            "sizes",
-            "renamed",
-            "rules",
-            "clocks",
-            "discrete",
-            "layer_widths",
-            "laws",
-            "constraints",
-        )
-        tuples: dict[str, Any] = {name: tuple(state.get(name, ())) for name in some}
+        some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths", "laws")
+        tuples: dict[str, Any] = {
+            name: tuple(state.get(name, ())) for name in (*some, "complementarity", "constraints")
+        }
         law = state.get("impact_law", "newton")
         return cls(**parts, **rest, **tuples, impact_law=law)
 
@@ -191,6 +209,7 @@ def read_definition(
     resets: Any,
     impacts: Any,
     hidden: bool,
+    complementarity: Any = (),
     constraints: Any = (),
     clocks: Sequence[Clock] = (),
     discrete: Sequence[tuple[float, ...] | None] = (),
@@ -204,6 +223,7 @@ def read_definition(
     p, defaults = _parameters(parameters)
     entries = read_entries(surface, surfaces)
     h, sizes = functions_of(entries), tuple(len(entry.functions) for entry in entries)
+    conditions = _items(complementarity, Complementarity, "complementarity")
     if above is not None or below is not None:
         lam, f = _two_fields(above, below, field, multipliers, h, x.numel())
     else:
@@ -215,15 +235,15 @@ def read_definition(
     widths = _widths(layer_widths, h.numel())
     joined = read_constraints(constraints)
     kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
-    items = [joined, *[_items(*k) for k in kinds]]
-    (joined, stops, resets, impacts), renamed = _distinct(items, _own_names(sizes))
+    items = [*[_items(*k) for k in kinds], conditions, joined]
+    (stops, resets, impacts, conditions, joined), renamed = _distinct(items, _own_names(sizes))
     reactions, f = _reactions(impacts, "gap", x, t, f)
     held, f = _reactions(joined, "function", x, t, f)
     joints = joints_of(joined, listed(held), f)
-    f, entries = joints.field, [*entries, *joints.entries]
-    lam = ca.vertcat(lam, *[entry.multiplier for entry in joints.entries])
-    h, sizes = functions_of(entries), (*sizes, *[1] * len(joints.entries))
-    widths = (*widths, *[1.0] * len(joints.entries)) if widths else ()
+    own = [*[condition.entry() for condition in conditions], *joints.entries]
+    f, entries, sizes = joints.field, [*entries, *own], (*sizes, *[1] * len(own))
+    h, lam = functions_of(entries), ca.vertcat(lam, *[entry.multiplier for entry in own])
+    widths = (*widths, *[1.0] * len(own)) if widths else ()
     definition = Definition(
         states=x,
         time=t,
@@ -244,6 +264,7 @@ def read_definition(
         constraints=joints.names,
         laws=laws_of(entries),
         hysteresis=hysteresis_of(entries),
+        complementarity=tuple(condition.name for condition in conditions),
         **_events(stops, resets, clocks, discrete, x, t, p),
     )
     require_consistent(definition)
@@ -356,7 +377,7 @@ def _parameters(
 
 
 def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
-    """Read stops=, resets= or impacts=: one, or a sequence of them."""
+    """Read stops=, resets=, impacts= or complementarity=: one, or a sequence of them."""
     items = [values] if isinstance(values, kind) else listed(values)
     for i, item in enumerate(items):
         if not isinstance(item, kind):
@@ -365,7 +386,7 @@ def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
                 f"({type(item).__name__}). Write {what}=[nonsmooth.{kind.__name__}(function, "
                 "...)]."
             )
-        if kind is Impact:
+        if kind in (Impact, Complementarity):
             continue
         if isinstance(item.direction, bool) or item.direction not in _DIRECTIONS:
             raise DefinitionError(
@@ -502,7 +523,8 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
     atoms = [*guards, *["a condition"] * (d.guards.numel() - len(guards))]
     named = [("field", d.field, True)]
-    named += [(what, e, False) for what, e in _named_surfaces(d)]
+    functions = [*zip(_function_names(d), listed(d.surfaces), strict=True)]
+    named += [(name, e, i in d.half_lines) for i, (name, e) in enumerate(functions)]
     named += [(name, d.guards[i], False) for i, name in enumerate(atoms)]
     switched = [(f"map of reset {n!r}", d.maps[:, j]) for j, (n, _) in enumerate(d.resets)]
     switched += [(f"when of {name}", d.whens[i]) for i, name in enumerate(guards)]
@@ -534,59 +556,28 @@ def require_consistent(d: Definition, given: bool = True) -> None:
         _require_states(name, d.guards[i], d.extended_states, d)
         if given:
             _require_simple(name, d.guards[i], d)
-    for what, h in _named_surfaces(d):
-        _require_states(what, h, d.extended_states, d)
-        _require_simple(what, h, d)
+    for i, (name, h) in enumerate(functions):
+        if i in d.half_lines:
+            continue
+        _require_states(name, h, d.extended_states, d)
+        _require_simple(name, h, d)
     for j in range(len(d.impacts)):
         _check_impact(d, j)
-    _require_linear_joints(d)
+    require_complementarity(d)
+    require_constraints(d)
     if not d.hidden:
         _require_linear(d)
     _require_linear_sets(d)
     _require_hysteresis(d)
 
 
-def _rate(d: Definition, function: ca.SX) -> ca.SX:
-    """Derivative of a function along the motion."""
-    free = ca.vertcat(d.field, ca.SX.ones(d.time.numel(), 1))
-    return ca.densify(ca.jtimes(function, d.extended_states, free))
-
-
-def _named_surfaces(d: Definition) -> list[tuple[str, ca.SX]]:
-    """Switching functions and functions of constraints with their names in messages."""
-    functions = listed(d.surfaces)
-    first = len(functions) - len(d.constraints)
+def _function_names(d: Definition) -> list[str]:
+    """Names of the switching functions in messages."""
+    first = d.surfaces.numel() - len(d.constraints)
     names = [f"surface {i}" for i in range(first)] + [f"function of {n!r}" for n in d.constraints]
-    return list(zip(names, functions, strict=True))
-
-
-def _require_linear_joints(d: Definition) -> None:
-    """Refuse reactions of constraints that enter nonlinearly or in products."""
-    first = d.multipliers.numel() - len(d.constraints)
-    every = ca.vertcat(d.multipliers, d.reactions)
-    for name, reaction in zip(d.constraints, listed(d.multipliers)[first:], strict=True):
-        effect = ca.jacobian(d.field, reaction)
-        if ca.depends_on(effect, every):
-            raise DefinitionError(
-                f"reaction of {name!r}: {reaction} is multiplied with {reaction} or another unknown. A joint's reaction enters "
-                "linearly; friction at it is that of two contacts, nonsmooth.Impact(gap, reaction=) on either side."
-            )
-        if effect.is_zero():
-            raise DefinitionError(
-                f"reaction of {name!r}: {reaction} is not in the field. Write the force of the joint as reaction "
-                "times its direction."
-            )
-    joints, others = d.multipliers[first:], ca.vertcat(d.multipliers[:first], d.reactions)
-    for name, g in _named_surfaces(d)[first:]:
-        rate = _rate(d, g)
-        if not ca.depends_on(rate, ca.vertcat(joints, others)):
-            rate = _rate(d, rate)
-        if not ca.depends_on(rate, joints):
-            held = ca.depends_on(rate, others)
-            raise DefinitionError(
-                f"{name}: {g} {'changes by other multipliers first' if held else 'has two derivatives'} without a "
-                "reaction of a constraint. Give a function of positions, or of velocities, on which the reaction acts."
-            )
+    for i, name in zip(d.half_lines, d.complementarity, strict=True):
+        names[i] = f"y of {name!r}"
+    return names
 
 
 def _check_impact(d: Definition, j: int) -> None:

@@ -188,7 +188,8 @@ _MOST_NESTED = 6
 
 _INFINITELY_MANY = (
     "It switches on infinitely many surfaces. Declare those that the motion can reach, each as "
-    "sign(x - c) or as a surface with its multiplier; a jump of a state is a Reset."
+    "sign(x - c) or as a surface with its multiplier; a jump of a state is a Reset, and what is periodic in time "
+    "is a function of the phase of a Clock."
 )
 _EQUALITY = (
     "Equality holds on a surface only, and what a field is there does not matter in Filippov's "

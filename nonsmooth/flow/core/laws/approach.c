@@ -118,7 +118,7 @@ static void near_set(Run *r, int row, int fell) {
   double radius = unit_of(h, k, u);
   if (!freeze(r, r->letter, r->x, r->unknowns, own, k, a, m)) { finish(r, NOT_FINITE, FIELD, 0); return; }
   int at_floor = radius <= VANISHES * scale;
-  int hits = is_ball_definite(m, k, VANISHES * k) && solve_ball(m, k, 0, a, b);
+  int hits = is_vector_definite(m, k, VANISHES * k) && solve_vector(m, k, 0, a, b);
   hits = hits && length_of(b, k) < 1;
   for (int i = 0; i < k; i++) c += m[i * k + i] / k;
   int same = 1;
@@ -145,7 +145,7 @@ static void near_set(Run *r, int row, int fell) {
     memcpy(mean, u, sizeof u);
     if (hits) {
       for (int i = 0; i < k; i++) b[i] = a[i] + h[i] / dt;
-      solve_ball(m, k, 0, b, mean);
+      solve_vector(m, k, 0, b, mean);
     }
     int good = field_with(r, r->letter, r->x, r->unknowns, f, k, mean, field);
     for (int i = 0; i < n; i++) end[i] = r->x[i] + dt * field[i];

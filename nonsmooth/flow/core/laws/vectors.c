@@ -10,21 +10,21 @@ static double largest_of(const double *m, int count) {
   return most;
 }
 
-static int is_ball_symmetric(const double *m, int k, double part) {
+static int is_vector_symmetric(const double *m, int k, double part) {
   double most = largest_of(m, k * k);
   for (int i = 0; i < k; i++) for (int j = 0; j < i; j++) if (fabs(m[i * k + j] - m[j * k + i]) > part * most) return 0;
   return 1;
 }
 
 /* Whether the symmetric part, of a largest element 1, is positive definite by a margin. */
-static int is_ball_definite(const double *m, int k, double margin) {
+static int is_vector_definite(const double *m, int k, double margin) {
   double a[9], most = largest_of(m, k * k);
   for (int i = 0; i < k; i++) for (int j = 0; j < k; j++) a[i * k + j] = 0.5 * (m[i * k + j] + m[j * k + i]) / most;
   return most > 0 && is_definite(a, k, margin);
 }
 
 /* y of (M + shift) y = b. */
-static int solve_ball(const double *m, int k, double shift, const double *b, double *y) {
+static int solve_vector(const double *m, int k, double shift, const double *b, double *y) {
   double a[9];
   for (int i = 0; i < k * k; i++) a[i] = m[i] + (i % (k + 1) ? 0 : shift);
   memcpy(y, b, sizeof(double) * k);
@@ -38,13 +38,13 @@ static int leaving_direction(const double *a, const double *m, int k, double *u)
   for (int i = 0; i < k * k; i++) s += m[i] * m[i];
   s = larger(0, length_of(a, k) - sqrt(s));
   for (int again = 0; again < 100; again++) {
-    if (!solve_ball(m, k, s, a, d) || !solve_ball(m, k, s, d, w)) return 0;
+    if (!solve_vector(m, k, s, a, d) || !solve_vector(m, k, s, d, w)) return 0;
     double n = length_of(d, k), slope = 0;
     for (int i = 0; i < k; i++) slope += d[i] * w[i];
     s += (n - 1) * n * n / slope;
     if (!(fabs(n - 1) > SOLVED)) break;
   }
-  if (!solve_ball(m, k, s, a, d)) return 0;
+  if (!solve_vector(m, k, s, a, d)) return 0;
   unit_of(d, k, u);
   return finite_all(u, k);
 }
@@ -79,7 +79,7 @@ static void secular(const double *a, const double *m, int k, double *polynomial)
 static int direction_at(const double *a, const double *m, int k, double s, double *u) {
   double d[3], w[3], start = s, n = 0;
   for (int again = 0; again < LAYER_NEWTON; again++) {
-    if (!solve_ball(m, k, s, a, d) || !solve_ball(m, k, s, d, w)) return 0;
+    if (!solve_vector(m, k, s, a, d) || !solve_vector(m, k, s, d, w)) return 0;
     double slope = 0;
     for (int i = 0; i < k; i++) slope += d[i] * w[i];
     n = length_of(d, k);
@@ -98,7 +98,7 @@ static int limit_directions(const double *given, const double *matrix, int k, do
   double a[3], m[9], p[P + 1], size = largest_of(given, k) + largest_of(matrix, k * k), at = -LAYER_RESIDUAL;
   int degree = 2 * k, count = 0, zeros = 0;
   if (!(size > 0)) return 0;
-  if (is_ball_symmetric(matrix, k, VANISHES) && is_ball_definite(matrix, k, VANISHES * k))
+  if (is_vector_symmetric(matrix, k, VANISHES) && is_vector_definite(matrix, k, VANISHES * k))
     return leaving_direction(given, matrix, k, u[0]);
   for (int i = 0; i < k; i++) a[i] = given[i] / size;
   for (int i = 0; i < k * k; i++) m[i] = matrix[i] / size;

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LAWS, LIMIT_FALL, MOST_CODES, UNWATCHED
+from ..model.numbering import FALL, IMPACT_LAWS, LAWS, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LAWS", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
+__all__ = ["FALL", "IMPACT_LAWS", "LAWS", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 
@@ -57,6 +57,9 @@ SHARE_SPREAD = 0.05
 
 #: Close to rest on a surface with a root steps are shorter than flights by the inverse of this, and below rounding.
 ROOT_REST = 1e-7
+
+#: Steps of Newton's method to where complementarity conditions jump, and part of a state by which it is differenced.
+JUMP_STEPS, DIFFERENCED = 60, 1e-7
 
 #: Part of the time in which the states change by their size over which a rate is differenced.
 REACH = 1e-6
@@ -208,7 +211,8 @@ DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 #: Kinds of events, by number in ensembles and in C.
 KINDS = (
     *("crossing", "entry", "exit", "stop", "reset"),
-    *("impact", "contact", "release", "stability", "rest", "rest_below", "end"),
+    *("impact", "contact", "release", "stability", "rest", "rest_below", "jump"),
+    "end",
 )
 
 #: The first and the last of these, as many, can happen without resets and impacts.
@@ -264,6 +268,7 @@ REASONS = (
     "undetermined",
     "high_degree",
     "discrete_value",
+    "no_jump",
 )
 
 #: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.

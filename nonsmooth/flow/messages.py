@@ -18,10 +18,10 @@ def slid_to_two_fold(surface: int) -> str:
     return f"Sliding reached a two-fold of h{surface} = 0: both fields are tangent there."
 
 
-def ambiguous(modes: Sequence[str]) -> str:
+def ambiguous(modes: Sequence[str], names: Sequence[str]) -> str:
     """Several modes can continue."""
     differing = [i for i, letters in enumerate(zip(*modes, strict=True)) if len(set(letters)) > 1]
-    surfaces = " and ".join(f"h{i}" for i in differing)
+    surfaces = " and ".join(names[i] for i in differing)
     where = (
         "an intersection" if len(differing) > 1 else "repelling sliding or a fold of both fields"
     )
@@ -194,6 +194,11 @@ def no_impulse(name: str, t: float) -> str:
 def restitution(name: str, t: float) -> str:
     """A coefficient of restitution that gives energy, or pushes on."""
     return f"The restitution of {name!r} is not from 0 to 1 at t = {t:.10g}."
+
+
+def no_jump(name: str, t: float) -> str:
+    """No jump leads to y >= 0."""
+    return f"y of {name!r} is negative at t = {t:.10g}, and no impulses of the multipliers lead to y >= 0."
 
 
 def no_reaction(names: Sequence[str]) -> str:

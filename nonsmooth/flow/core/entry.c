@@ -109,6 +109,10 @@ static size_t place_run(Run *r, char *base) {
   r->at_x = DOUBLES(n);
   r->before = DOUBLES(n);
   r->saved = DOUBLES(n);
+  int jumping = 0;
+  for (int i = 0; i < s->m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;
+  r->jumped_from = DOUBLES(n);
+  r->jump_work = DOUBLES(jumping ? (size_t)n * (2 * n + jumping + 1) : 0);
   r->speed = DOUBLES(w);
   r->at_root = DOUBLES(3 * n);
   r->at_work = DOUBLES(n);
@@ -135,9 +139,9 @@ static size_t place_run(Run *r, char *base) {
   r->sample = DOUBLES(3 * ((size_t)n + w + g));
   r->work = DOUBLES(6 * square + 8 * w + rows + g);
   r->gradient_row = DOUBLES((size_t)all * n + 2 * all);
-  r->rates = DOUBLES(2 * all + c);
+  r->rates = DOUBLES(2 * all + 2 * c);
   r->lam = DOUBLES(2 * w);
-  r->matrix = DOUBLES(square + 6 * w + all + 2 * c);
+  r->matrix = DOUBLES(square + 8 * w + all + 2 * c);
   r->small = DOUBLES(4 * w + s->rules.atoms);
   r->atom_work = DOUBLES(pair_room(s->atoms.size, 1));
   r->choice_work = DOUBLES(pair_room(s->choices.size, 1));

@@ -19,6 +19,7 @@ from ..checks import real
 from ..errors import DefinitionError, ParameterError
 from ..expressions.cancel import powers
 from ..expressions.graph import require_smooth
+from ..numbering import IMPACT_LAWS
 from ..reading import (
     Expression,
     Parameters,
@@ -31,8 +32,16 @@ from ..reading import (
     symbols,
 )
 from ..values import Array, parameter_values
+from .complementarity import require_complementarity
 from .conditions import Atoms, Rule, located, passages
-from .elements import functions_of, hysteresis_of, laws_of, multipliers_of, read_entries
+from .elements import (
+    Complementarity,
+    functions_of,
+    hysteresis_of,
+    laws_of,
+    multipliers_of,
+    read_entries,
+)
 from .events import Clock, Impact, Reset, Stop
 from .read_events import direction_of, read_maps, read_rules, read_when, require_no_endless_level
 
@@ -77,6 +86,8 @@ class Definition:
     layer_widths: tuple[float, ...] = ()
     laws: tuple[str, ...] = ()  # of the entries, where not all are surfaces and sets
     hysteresis: ca.SX = _NONE  # how much lower each function is where its multiplier is -1
+    complementarity: tuple[str, ...] = ()  # names of the conditions among the entries
+    impact_law: str = "newton"
 
     @cached_property
     def plain(self) -> bool:
@@ -106,6 +117,22 @@ class Definition:
         """The states, followed by the time where the system depends on it."""
         return ca.vertcat(self.states, self.time)
 
+    @cached_property
+    def half_lines(self) -> tuple[int, ...]:
+        """Functions y of complementarity conditions, among the surfaces."""
+        sizes = self.sizes or (1,) * self.surfaces.numel()
+        firsts = [sum(sizes[:k]) for k in range(len(sizes))]
+        laws = zip(firsts, self.laws, strict=False)
+        return tuple(first for first, law in laws if law == "complementarity")
+
+    @property
+    def open_surfaces(self) -> ca.SX:
+        """The switching functions (m,) as functions of states alone, without multipliers."""
+        if not self.complementarity:
+            return self.surfaces
+        none = ca.SX.zeros(self.multipliers.numel(), 1)
+        return ca.substitute(self.surfaces, self.multipliers, none)
+
     @property
     def gap_rates(self) -> ca.SX:
         """Rates of the gaps (c,), in states, parameters and time."""
@@ -134,6 +161,8 @@ class Definition:
         some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed, "rules": self.rules}
         some |= {"clocks": self.clocks, "discrete": self.discrete}
         some |= {"layer_widths": self.layer_widths, "laws": self.laws}
+        some |= {"complementarity": self.complementarity}
+        some |= {"impact_law": self.impact_law} if self.impact_law != "newton" else {}
         return {
             **{name: value for name, value in some.items() if value},
             "definition": ca.Function("definition", inputs, outputs).serialize(),
@@ -156,8 +185,11 @@ class Definition:
         rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
         parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=False))
         some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths", "laws")
-        tuples: dict[str, Any] = {name: tuple(state.get(name, ())) for name in some}
-        return cls(**parts, **rest, **tuples)
+        tuples: dict[str, Any] = {
+            name: tuple(state.get(name, ())) for name in (*some, "complementarity")
+        }
+        law = state.get("impact_law", "newton")
+        return cls(**parts, **rest, **tuples, impact_law=law)
 
 
 _DIRECTIONS = (-1, 0, 1)
@@ -178,6 +210,7 @@ def read_definition(
     resets: Any,
     impacts: Any,
     hidden: bool,
+    complementarity: Any = (),
     clocks: Sequence[Clock] = (),
     discrete: Sequence[tuple[float, ...] | None] = (),
     layer_widths: Any = None,
@@ -190,6 +223,7 @@ def read_definition(
     p, defaults = _parameters(parameters)
     entries = read_entries(surface, surfaces)
     h, sizes = functions_of(entries), tuple(len(entry.functions) for entry in entries)
+    conditions = _items(complementarity, Complementarity, "complementarity")
     if above is not None or below is not None:
         lam, f = _two_fields(above, below, field, multipliers, h, x.numel())
     else:
@@ -199,7 +233,11 @@ def read_definition(
         f = column(field, "field", x.numel())
     _one_multiplier_each(lam, h)
     kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
-    (stops, resets, impacts), renamed = _distinct([_items(*k) for k in kinds], _own_names(sizes))
+    given = [*[_items(*k) for k in kinds], conditions]
+    (stops, resets, impacts, conditions), renamed = _distinct(given, _own_names(sizes))
+    own = [condition.entry() for condition in conditions]
+    entries, sizes = [*entries, *own], (*sizes, *[1] * len(own))
+    h, lam = functions_of(entries), ca.vertcat(lam, *[entry.multiplier for entry in own])
     reactions, f = _reactions(impacts, x, t, f)
     definition = Definition(
         states=x,
@@ -210,6 +248,7 @@ def read_definition(
         gaps=_of_impacts(impacts, "gap"),
         restitutions=_of_impacts(impacts, "restitution"),
         impacts=tuple(i.name for i in impacts),
+        impact_law=_law_of(impacts),
         field=f,
         surfaces=h,
         defaults=defaults,
@@ -219,6 +258,7 @@ def read_definition(
         layer_widths=_widths(layer_widths, h.numel()),
         laws=laws_of(entries),
         hysteresis=hysteresis_of(entries),
+        complementarity=tuple(condition.name for condition in conditions),
         **_events(stops, resets, clocks, discrete, x, t, p),
     )
     require_consistent(definition)
@@ -257,6 +297,23 @@ def _events(
         "stops": tuple((s.name, direction_of(s)) for s in stops),
         "resets": tuple((r.name, direction_of(r)) for r in resets),
     }
+
+
+def _law_of(impacts: Sequence[Impact]) -> str:
+    """The law of impacts, one for all of them."""
+    for impact in impacts:
+        if impact.law not in IMPACT_LAWS:
+            raise DefinitionError(
+                f"law of {impact.name!r} is {impact.law!r}. Give one of {', '.join(IMPACT_LAWS)}."
+            )
+    laws = {impact.law: impact.name for impact in impacts}
+    if len(laws) > 1:
+        received = " and ".join(f"{law!r} for {name!r}" for law, name in laws.items())
+        raise DefinitionError(
+            f"impacts have different laws: {received}. Contacts that are struck together need one: give all "
+            "the same law=."
+        )
+    return next(iter(laws), "newton")
 
 
 def _of_impacts(impacts: Sequence[Any], what: str) -> ca.SX:
@@ -314,7 +371,7 @@ def _parameters(
 
 
 def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
-    """Read stops=, resets= or impacts=: one, or a sequence of them."""
+    """Read stops=, resets=, impacts= or complementarity=: one, or a sequence of them."""
     items = [values] if isinstance(values, kind) else listed(values)
     for i, item in enumerate(items):
         if not isinstance(item, kind):
@@ -323,7 +380,7 @@ def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
                 f"({type(item).__name__}). Write {what}=[nonsmooth.{kind.__name__}(function, "
                 "...)]."
             )
-        if kind is Impact:
+        if kind in (Impact, Complementarity):
             continue
         if isinstance(item.direction, bool) or item.direction not in _DIRECTIONS:
             raise DefinitionError(
@@ -458,7 +515,8 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
     atoms = [*guards, *["a condition"] * (d.guards.numel() - len(guards))]
     named = [("field", d.field, True)]
-    named += [(f"surface {i}", e, False) for i, e in enumerate(listed(d.surfaces))]
+    functions = [*zip(_function_names(d), listed(d.surfaces), strict=True)]
+    named += [(name, e, i in d.half_lines) for i, (name, e) in enumerate(functions)]
     named += [(name, d.guards[i], False) for i, name in enumerate(atoms)]
     switched = [(f"map of reset {n!r}", d.maps[:, j]) for j, (n, _) in enumerate(d.resets)]
     switched += [(f"when of {name}", d.whens[i]) for i, name in enumerate(guards)]
@@ -490,15 +548,25 @@ def require_consistent(d: Definition, given: bool = True) -> None:
         _require_states(name, d.guards[i], d.extended_states, d)
         if given:
             _require_simple(name, d.guards[i], d)
-    for i, h in enumerate(listed(d.surfaces)):
-        _require_states(f"surface {i}", h, d.extended_states, d)
-        _require_simple(f"surface {i}", h, d)
+    for i, (name, h) in enumerate(functions):
+        if i in d.half_lines:
+            continue
+        _require_states(name, h, d.extended_states, d)
+        _require_simple(name, h, d)
     for j in range(len(d.impacts)):
         _check_impact(d, j)
+    require_complementarity(d)
     if not d.hidden:
         _require_linear(d)
     _require_linear_sets(d)
     _require_hysteresis(d)
+
+
+def _function_names(d: Definition) -> list[str]:
+    """Names of the switching functions in messages."""
+    names = dict(zip(d.half_lines, d.complementarity, strict=True))
+    of = lambda i: f"y of {names[i]!r}" if i in names else f"surface {i}"
+    return [of(i) for i in range(d.surfaces.numel())]
 
 
 def _check_impact(d: Definition, j: int) -> None:

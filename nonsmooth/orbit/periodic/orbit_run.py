@@ -61,6 +61,7 @@ def orbit_run(
     coefficients: list[Array] = []
     events: list[Event] = []
     segments: list[Segment] = []
+    held = system.dimension - len(system.definition.discrete)
     for k, leg in enumerate(legs):
         if leg.duration <= 0.0:
             continue
@@ -79,7 +80,8 @@ def orbit_run(
         starts += run.steps.starts.tolist()
         coefficients += list(run.steps.coefficients)
         end, following = leg.t + leg.duration, legs[(k + 1) % len(legs)]
-        segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients)))
+        values = tuple(leg.start[held:].tolist())
+        segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients), values))
         if leg.event:
             modes, of = (leg.mode, following.mode), (leg.element, leg.side)
             after = following.start

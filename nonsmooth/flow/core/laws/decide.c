@@ -23,6 +23,7 @@ typedef struct {
   double tie; /* part of terms that is zero */
   const int32_t *own;
   double *a, *b, *matrix, *share, *floor; /* share: bounds by the reactions in the block; floor: rounding of w */
+  double *room; /* rounding of nu where the diagonal does not say it, or NULL */
   int8_t *state, *is_contact;
 } Block;
 
@@ -137,6 +138,7 @@ static double rate_of(const Block *k, int i, const double *nu, double *terms) {
 static double zero_of(const Block *k, int i, double terms) { return larger(k->floor[i], k->tie * terms); }
 static double room_zero(const Block *k, int i, double zero, double bound) {
   double own = fabs(k->matrix[i * (k->size + 1)]), most = k->tie * fabs(bound);
+  if (k->room) return larger(k->room[i], most);
   return own > 0 ? larger(zero / own, most) : most;
 }
 
@@ -498,7 +500,7 @@ static int read_law(Run *r, Decision *d) {
   memset(d->share, 0, sizeof(double) * k * k);
   for (int i = 0; i < k; i++) {
     int own = d->own[i] = r->active[i];
-    d->is_contact[i] = has_law(r, own, CONTACT_LAW);
+    d->is_contact[i] = (int8_t)is_half_line(r, own);
     d->turn[i] = d->is_contact[i] ? -1 : 1;
     d->is_idle[i] = element(r, own)->flags & CONTINUOUS;
     for (int j = 0; j < r->c && own < r->m; j++) carried |= r->s->carries[own * r->c + j];
@@ -693,6 +695,23 @@ static Block part_of_law(Decision *d, int order, int which) {
   return b;
 }
 
+/* Rounding of the unknowns through an inverse of the matrix, and of the rates by them: a row may hold no own unknown,
+ * and no state, as those of a diode bridge. */
+static void add_rounding(Decision *d, Block *b) {
+  int n = b->size, any = 0;
+  double *room = b->share + n * n, *inverse = d->work, *ones = inverse + n * n;
+  for (int i = 0; i < n; i++) any |= b->is_contact[i] && b->matrix[i * (n + 1)] == 0;
+  if (n < 2 || !any) return;
+  for (int i = 0; i < n; i++) ones[i] = 1;
+  if (!invert_any(b->matrix, n, ones, inverse, ones + n, d->pivot)) return;
+  for (int i = 0; i < n; i++) {
+    room[i] = 0;
+    for (int j = 0; j < n; j++) room[i] += fabs(inverse[i * n + j]) * b->floor[j];
+  }
+  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) b->floor[i] += fabs(b->matrix[i * n + j]) * room[j];
+  b->room = room;
+}
+
 /* What is proved of each block, once. */
 static int certificate_of(Decision *d, const Block *b, int which) {
   if (d->proved[which] < 0)
@@ -704,6 +723,7 @@ static int certificate_of(Decision *d, const Block *b, int which) {
 static int solutions_of(Run *r, Decision *d, int order, int which, double *found, int8_t *class) {
   Block b = part_of_law(d, order, which);
   int n = b.size, count;
+  add_rounding(d, &b);
   int8_t *position = b.is_contact + d->count;
   for (int i = 0; i < n; i++) {
     int letter = d->letter[d->own[b.own[i]]], is_open = b.is_contact[i] && letter;
@@ -1077,7 +1097,7 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
 /* Where no mode continues: stay where all orbits spiral in, or say why the run ends. */
 static int no_motion(Run *r, const int8_t *letter) {
   int contacts = 0, k = r->active_count;
-  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
+  for (int i = 0; i < k; i++) contacts |= is_half_line(r, r->active[i]);
   if (r->status != RUNNING) return 0;
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
   else if (meets_sets(r)) finish(r, NON_UNIQUE, UNDETERMINED, 0);
@@ -1100,7 +1120,7 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
   if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
   if (is_mixed(r, r->active, k)) return decide_in_layer(r, letter, known, known_count);
   if (k == 1 && decide_by_rates(r, letter, known, known_count)) return 1;
-  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
+  for (int i = 0; i < k; i++) contacts |= is_half_line(r, r->active[i]);
   if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {
     finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);
     return 0;

@@ -133,7 +133,7 @@ static int choose_closed(Run *r, const int32_t *contact, int count, const int32_
   for (int i = 0; i < surfaces; i++) which[kept++] = surface[i];
   for (int i = 0; i < count; i++) which[kept++] = m + c + contact[i];
   for (int i = 0; i < surfaces; i++) kept += lower_rows(r, surface[i], which + kept);
-  project(r, which, kept);
+  project(r, which, with_joints(r, which, kept));
   return decide_among(r, which, count + surfaces);
 }
 
@@ -209,7 +209,7 @@ static int choose_rest(Run *r, const int32_t *element, int count, const double *
   memcpy(x, r->x, sizeof(double) * r->n);
   for (int i = 0; i < count; i++) which[kept++] = element[i];
   for (int i = 0; i < count; i++) kept += lower_rows(r, element[i], which + kept);
-  project(r, which, kept);
+  project(r, which, with_joints(r, which, kept));
   for (int i = 0; near && i < r->n; i++)
     close &= fabs(r->x[i] - x[i]) <= 4 * near[i] + VANISHES * (r->size + fabs(x[i]));
   if (close && decide_among(r, element, count)) {

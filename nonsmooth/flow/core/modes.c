@@ -3,12 +3,16 @@
 static const Element *element(const Run *r, int i) { return r->s->element + i; }
 static int degree_of(const Run *r, int i) { return element(r, i)->degree; }
 static int is_scaled(const Run *r, int i) { return element(r, i)->flags & SCALED; }
+static int has_law(const Run *r, int i, int law) { return element(r, i)->law == law; }
 static int size_of(const Run *r, int i) { return element(r, i)->k; }
 
 /* Whether the multiplier of an element is not negative, and zero where it is open: contacts, complementarity. */
 static int is_half_line(const Run *r, int i) {
   return element(r, i)->law == CONTACT_LAW || element(r, i)->law == COMPLEMENTARITY_LAW;
 }
+
+/* Whether an unknown is in a set of finite size: not reactions. */
+static int is_bounded(const Run *r, int i) { return !is_half_line(r, i) && !has_law(r, i, JOINT_LAW); }
 
 /* The set of a function, as its first one, or -1; all sets. */
 static int set_of(const Run *r, int i) { return element(r, i)->law == SET_LAW ? element(r, i)->first : -1; }

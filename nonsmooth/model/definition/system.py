@@ -23,6 +23,7 @@ from ..expressions.mathml import equation, rate, symbol
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
 from .complementarity import holds
+from .constraints import Constraint
 from .discrete_states import held_values, with_values
 from .elements import Complementarity
 from .events import Clock, Impact, Reset, Stop, with_added_states
@@ -76,6 +77,8 @@ class FilippovSystem:
         Contacts that cannot be passed.
     complementarity : sequence of Complementarity, optional
         Ideal diodes, projections and sweeping sets: ``0 <= y``, ``multiplier >= 0``, one of them zero.
+    constraints : sequence of Constraint, optional
+        Joints: functions that stay zero. Each has the letter ``s`` in a mode, after the surfaces.
     clocks : sequence of Clock, optional
         What is periodic in time; each adds its phase to the states.
     discrete : sequence of SX symbols or mapping, optional
@@ -128,6 +131,7 @@ class FilippovSystem:
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
         complementarity: Sequence[Complementarity] | Complementarity = (),
+        constraints: Sequence[Constraint] | Constraint = (),
         clocks: Sequence[Clock] | Clock = (),
         discrete: Discrete = (),
         hidden: bool = False,
@@ -147,6 +151,7 @@ class FilippovSystem:
             "resets": resets,
             "impacts": impacts,
             "complementarity": complementarity,
+            "constraints": constraints,
             "hidden": hidden,
             "layer_widths": layer_widths,
         }
@@ -273,7 +278,8 @@ class FilippovSystem:
     def _adopt(self, definition: Definition) -> None:
         self.definition = definition
         self.stops, self.resets = definition.stops, definition.resets
-        self.impacts, self.complementarity = definition.impacts, definition.complementarity
+        self.impacts, self.constraints = definition.impacts, definition.constraints
+        self.complementarity = definition.complementarity
         self.hidden = definition.hidden
         field, multipliers = definition.field, listed(definition.multipliers)
         self.nonlinear = tuple(not ca.is_linear(field, lam) for lam in multipliers)
@@ -327,6 +333,8 @@ class FilippovSystem:
             name, what = f"h{k}", f"surface h{k}"
             if k in self.half_lines:
                 name, what = "y", f"complementarity {self.surface_names[k]}"
+            if k in self.joints:
+                name, what = "g", f"constraint {self.constraints[self.joints.index(k)]}"
             rows.append((what, Markup(equation(symbol(name), function, known))))
         rows += [("parameters", ", ".join(self.parameter_names))]
         rows += [("stops", ", ".join(n for n, _ in self.stops))]
@@ -339,8 +347,9 @@ class FilippovSystem:
             f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
         ]
         names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
-        surfaces = len(self.entries) - len(self.sets) - len(self.complementarity)
-        if surfaces or not (self.sets or self.complementarity):
+        others = len(self.complementarity) + len(self.constraints)
+        surfaces = len(self.entries) - len(self.sets) - others
+        if surfaces or not (self.sets or others):
             parts.append(f"{surfaces} surface{'s' * (surfaces != 1)}{self._classes()}{names}")
         parts += [f"root |{name}|^{power:g}" for name, power in self.roots.items()]
         parts += [f"set of codimension {len(members)}" for members in self.sets]
@@ -351,11 +360,13 @@ class FilippovSystem:
         parts += [f"stop {n!r}" for n, _ in self.stops] + [f"reset {n!r}" for n, _ in self.resets]
         parts += [f"impact {n!r}" for n in self.impacts]
         parts += [f"complementarity {n!r}" for n in self.complementarity]
+        parts += [f"constraint {n!r}" for n in self.constraints]
         return f"FilippovSystem({'; '.join(parts)})"
 
     def _classes(self) -> str:
         """The classes of surfaces, for people, where one is not generic."""
-        own = [i for i, *more in self.entries if not more and i not in self.half_lines]
+        others = (*self.half_lines, *self.joints)
+        own = [i for i, *more in self.entries if not more and i not in others]
         if len(own) > _CLASSES_SHOWN:
             return ""
         words = [self.switching(i).name for i in own]
@@ -442,6 +453,12 @@ class FilippovSystem:
         return tuple(i for i in self.half_lines if holds(d.surfaces[i], own, states))
 
     @cached_property
+    def joints(self) -> tuple[int, ...]:
+        """Functions of constraints, the last of the switching functions."""
+        m = self.surface_count
+        return tuple(range(m - len(self.constraints), m))
+
+    @cached_property
     def surface_names(self) -> tuple[str, ...]:
         """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set, or as given."""
         names = [f"h{k}" for k, members in enumerate(self.entries) for _ in members]
@@ -457,6 +474,7 @@ class FilippovSystem:
     def coupled(self) -> bool:
         """Whether multipliers are solved for together: several, a nonlinear one, or reactions."""
         several = self.surface_count > 1 or bool(self.impacts) or bool(self.complementarity)
+        several = several or bool(self.constraints)
         return several or any(self.nonlinear)
 
     def spelled(self, mode: str) -> str:
@@ -508,6 +526,8 @@ class FilippovSystem:
 
     def _letters(self, i: int) -> str:
         """Letters of a switching function; in runs those of sets are more."""
+        if i in self.joints:
+            return "s"
         return "*sbli" if i in self.set_of else "oc" if i in self.half_lines else "+-s"
 
     def parse_mode(self, mode: str) -> tuple[int, ...]:
@@ -630,8 +650,9 @@ class FilippovSystem:
             )
         if mode is not None:
             self.require_mode(mode)
-        if i in (*self.set_of, *self.remembering):
+        if i in (*self.set_of, *self.remembering, *self.joints):
             what = "as a set" if i in self.set_of else "with hysteresis"
+            what = "as a constraint" if i in self.joints else what
             return Switching("generic", None, None, f"its definition {what}")
         values = None if parameters is None else tuple(self.parameter_vector(parameters).tolist())
         key = ("switching", i, mode, values)
@@ -831,9 +852,13 @@ class FilippovSystem:
 
 
 def require_system(
-    value: Any, sets: bool = False, hysteresis: bool = False, complementarity: bool = False
+    value: Any,
+    sets: bool = False,
+    hysteresis: bool = False,
+    complementarity: bool = False,
+    joints: bool = False,
 ) -> None:
-    """Refuse all but a FilippovSystem; flags allow vector multipliers, relays and complementarity conditions."""
+    """Refuse all but a FilippovSystem; flags allow vector multipliers, relays, complementarity and constraints."""
     if not isinstance(value, FilippovSystem):
         raise DefinitionError(
             f"system: expected a FilippovSystem, received {value!r} ({type(value).__name__}). "
@@ -855,6 +880,11 @@ def require_system(
         raise DefinitionError(
             f"system: {value!r} has complementarity conditions, which this function does not support. They work "
             "in simulate, ensemble and outcomes."
+        )
+    if value.constraints and not joints:
+        raise DefinitionError(
+            f"system: {value!r} has constraints, which this function does not support. They work in simulate, "
+            "ensemble, outcomes and sensitivity. Write the motion in coordinates that satisfy them."
         )
 
 

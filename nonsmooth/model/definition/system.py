@@ -24,7 +24,7 @@ from ..reading import Expression, Parameters, column, listed, matrix, require_kn
 from ..values import Array, state_values
 from .complementarity import holds
 from .discrete_states import held_values, with_values
-from .elements import Complementarity
+from .elements import Complementarity, multipliers_of_conditions
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .parse_definition import Definition, consistent_parameters, read_definition
@@ -165,6 +165,7 @@ class FilippovSystem:
         stops: Sequence[Stop] = (),
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
+        complementarity: Sequence[Complementarity] | Complementarity = (),
         clocks: Sequence[Clock] | Clock = (),
         discrete: Discrete = (),
         hidden: bool = False,
@@ -178,8 +179,8 @@ class FilippovSystem:
 
         Parameters
         ----------
-        states, parameters, time, stops, resets, impacts, clocks, discrete
-            As for the class. Gaps must be smooth.
+        states, parameters, time, stops, resets, impacts, complementarity, clocks, discrete
+            As for the class. Gaps and y must be smooth.
         rhs : sequence of n expressions
             In states, parameters and time, with switches.
         hidden : bool, optional
@@ -211,13 +212,15 @@ class FilippovSystem:
         column(rhs, "rhs", len(listed(states)))  # before clocks are added
         given = {"states": states, "rhs": rhs, "parameters": parameters, "time": time}
         given |= {"stops": stops, "resets": resets, "impacts": impacts, "hidden": hidden}
+        given["complementarity"] = complementarity
         given = with_added_states(clocks, discrete, given)
         n, rhs = len(listed(given["states"])), given.pop("rhs")
         frame = cls(given["states"], field=[0] * n, parameters=parameters, time=time).definition
         entries = column(rhs, "rhs", n)
-        known = ca.vertcat(frame.extended_states, frame.parameters)
+        held = ca.vertcat(frame.parameters, multipliers_of_conditions(complementarity))
+        known = ca.vertcat(frame.extended_states, held)
         require_known(entries, known, "rhs", **frame.names)
-        found = lift(entries, frame.states, frame.time, frame.parameters, hidden=hidden)
+        found = lift(entries, frame.states, frame.time, held, hidden=hidden)
         given |= {"field": found.field, "multipliers": found.multipliers, "surface": None}
         given |= {"surfaces": found.surfaces, "above": None, "below": None}
         system = cls.__new__(cls)
@@ -854,7 +857,7 @@ def require_system(
     if value.complementarity and not complementarity:
         raise DefinitionError(
             f"system: {value!r} has complementarity conditions, which this function does not support. They work "
-            "in simulate, ensemble and outcomes."
+            "in simulate, ensemble, outcomes, sensitivity, find_equilibrium, periodic_orbit and continue_orbit."
         )
 
 

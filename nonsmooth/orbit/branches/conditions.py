@@ -168,8 +168,20 @@ def _starting(
 ) -> list[tuple[int, int, Condition]]:
     """Guards that are not zero by construction at the start of a leg, of those to order 3."""
     guards = guarded_field(system, leg.mode).motion.guards
-    orders = [(k, guard, _order(system, guard, before)) for k, guard in enumerate(guards)]
+    orders = [
+        (k, guard, None if _changes(system, guard, before, leg) else _order(system, guard, before))
+        for k, guard in enumerate(guards)
+    ]
     return [(k, order, Condition("start", i, g)) for k, g, order in orders if order is not None]
+
+
+def _changes(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> bool:
+    """Whether a guard is of a complementarity condition whose letter changes at the event before a leg."""
+    k = guard.element
+    if guard.kind not in ("surface", "release") or k >= len(system.entries):
+        return False
+    jumps = before.kind in ("reset", "impact", "jump") or before.timed
+    return not jumps and system.entries[k][0] in system.half_lines and before.mode[k] != leg.mode[k]
 
 
 def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:

@@ -18,6 +18,7 @@ from ..definition.conditions import decides
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
 from ..expressions.graph import evaluate, instructions, operation
+from ..expressions.identity import vanish_on
 from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
 from ..laws.explicit import explicit, solved
@@ -235,6 +236,18 @@ def jumped(system: FilippovSystem, element: int, letters: str) -> tuple[ca.SX, c
         )
     impulses = solved(ca.mtimes(gradient, columns), -y)
     return d.open_surfaces[system.entries[element][0]], x + ca.mtimes(columns, impulses)
+
+
+def keeps_zero(system: FilippovSystem, surface: int, reset: int) -> bool:
+    """Whether the map of a reset leads to zeros of a switching function from its zeros."""
+    d = system.definition
+
+    def build() -> bool:
+        h = d.open_surfaces[surface]
+        after = ca.substitute(h, d.states, d.maps[:, reset])
+        return bool(ca.is_equal(h, after, 10)) or vanish_on([after], h, d.extended_states)
+
+    return system.cached(("keeps zero", surface, reset), build)
 
 
 def surface_map(system: FilippovSystem, surface: int) -> EventMap:

@@ -109,6 +109,9 @@ ROOT_ROUNDING = 16 * EPSILON
 #: A point is on a surface where h is zero to this much of its terms.
 ON_SURFACE = 16 * EPSILON
 
+#: A state satisfies a constraint that is zero to this part of its terms, and is projected onto it.
+CONSISTENT = 1e-8
+
 #: A coefficient of a guard below this part of its terms is zero by rounding.
 VANISHES = 64 * EPSILON
 
@@ -269,6 +272,8 @@ REASONS = (
     "high_degree",
     "discrete_value",
     "no_jump",
+    "off_constraint",
+    "dead_point",
 )
 
 #: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.

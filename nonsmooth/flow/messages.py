@@ -186,6 +186,22 @@ def behind(name: str, t: float) -> str:
     return f"The gap of {name!r} is negative at t = {t:.10g}."
 
 
+def off_constraint(name: str, what: str, value: float, t: float) -> str:
+    """A state that does not satisfy a constraint."""
+    return (
+        f"{what} of {name!r} is {value:.6g} at t = {t:.10g}, and has to be 0. Start on the constraint, with velocities "
+        "along it, and let jumps keep it."
+    )
+
+
+def dead_point(names: Sequence[str], t: float) -> str:
+    """Constraints that cannot all be kept."""
+    return (
+        f"No reactions keep {' and '.join(map(repr, names))} at t = {t:.10g}: the constraints contradict one another, or "
+        "become dependent there, as those of a linkage at its dead point."
+    )
+
+
 def no_impulse(name: str, t: float) -> str:
     """No impulses satisfy the law of impact and friction."""
     return f"No impulse fits the impact {name!r} at t = {t:.10g}."

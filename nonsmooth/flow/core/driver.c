@@ -58,6 +58,7 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
     memcpy(r->chosen.letter, letter, r->width);
     memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
     keep_carried(r, letter, r->chosen.unknowns);
+    if (r->s->joints && !hold(r, &r->chosen, 0)) return 0;
   }
   adopt(r, &r->chosen);
   return 1;
@@ -140,6 +141,7 @@ static void start_in(Run *r, const int8_t *asked) {
   memcpy(r->letter, letter, r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
+  if (r->s->joints > 1) find_dependent(r, &r->now, r->letter, r->unknowns);
   mode_solutions(r, &r->now, &all);
   if (all.count > 1) keep_stable(r, &r->now, &all);
   if (all.count != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, all.count); return; }
@@ -147,11 +149,24 @@ static void start_in(Run *r, const int8_t *asked) {
   if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
 }
 
+/* The size of the time: in it the states change by theirs, at the rates of the start. */
+static void measure_time(Run *r) {
+  double unit = r->o.t_end - r->t;
+  r->time_size = r->size;
+  if (!r->s->timed) return;
+  aim(r, r->letter, r->x, r->unknowns);
+  set_inputs(r, r->x, held_of(r, r->letter), r->unknowns);
+  first_values(r, 0);
+  for (int i = 0; i < r->s->dimension; i++) unit = smaller((r->size + fabs(r->x[i])) / fabs(row_of(r, i)[0]), unit);
+  if (unit > 0 && unit < INFINITY) r->time_size = unit;
+}
+
 static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   note(r);
   find_idle(r);
   if (start_mode || r->remembered) memcpy(r->letter, start_mode ? start_mode : r->remembered, r->width);
   else memset(r->letter, -1, r->width);
+  measure_time(r);
   int finite = letters_of(r, r->letter);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
@@ -162,7 +177,7 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
     project(r, r->involved, gather(r, -1, r->m, r->involved));
     renote(r);
     if (start_mode) start_in(r, start_mode);
-    else if (r->active_count) {
+    else if (r->active_count || r->s->joints) {
       memcpy(r->start, r->letter, r->width);
       choose(r, r->start, 0, 0);
     }
@@ -223,7 +238,7 @@ static void release(Run *r, int row) {
 static int only_sliding(const Run *r) {
   int found = -1;
   for (int i = 0; i < r->m; i++)
-    if (r->letter[i] == 0 && !is_half_line(r, i)) { if (found >= 0) return -1; found = i; }
+    if (r->letter[i] == 0 && is_bounded(r, i)) { if (found >= 0) return -1; found = i; }
   return found;
 }
 
@@ -298,6 +313,11 @@ static int advance(Run *r, const Expansion *e, double dt) {
   r->segment_steps++;
   kept = kept_by(r, r->letter, r->involved);
   project(r, r->involved, kept);
+  if (r->s->joints) {
+    surface_values(r, r->x);
+    require_joints(r, surface_scales(r, r->x));
+    if (r->status != RUNNING) r->reason = DEAD_POINT;
+  }
   if (e->l.slides || r->s->sets) {
     double *ahead = r->lam;
     for (int i = 0; i < r->width; i++) ahead[i] = value_at(e->series + (int64_t)i * stride, r->order, dt);

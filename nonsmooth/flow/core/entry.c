@@ -79,8 +79,10 @@ static size_t place_decision(Run *r, char *base, size_t used) {
   to->own = INTEGERS(w); to->order = INTEGERS(w); to->first = INTEGERS(w + 1); to->mark = INTEGERS(4 * w);
   to->pivot = INTEGERS(8 * w + 8); to->proved = INTEGERS(w);
   to->is_contact = LETTERS(w); to->is_idle = LETTERS(w); to->is_touched = LETTERS(w); to->is_known = LETTERS(w);
-  to->state = LETTERS(orders + w); to->block_state = LETTERS(3 * w); to->large_class = LETTERS(w);
-  to->matrix = DOUBLES(square); to->share = DOUBLES(square);
+  to->state = LETTERS(orders + w); to->block_state = LETTERS(4 * w); to->large_class = LETTERS(w);
+  to->base = LETTERS(w); to->span = LETTERS(w); to->began = LETTERS(w);
+  to->along = DOUBLES(orders); to->speed = DOUBLES(orders); to->axes = DOUBLES(3 * w);
+  to->matrix = DOUBLES(square); to->share = DOUBLES(square); to->joint = DOUBLES(square); to->through = DOUBLES(square);
   to->a = DOUBLES(orders); to->b = DOUBLES(orders); to->nu = DOUBLES(orders); to->floor = DOUBLES(orders);
   to->turn = DOUBLES(w); to->sign = DOUBLES(w); to->old = DOUBLES(w); to->yard = DOUBLES(w); to->room = DOUBLES(w);
   to->steep = DOUBLES(w); to->block = DOUBLES(6 * square + 8 * w); to->large = DOUBLES(w);
@@ -122,7 +124,7 @@ static size_t place_run(Run *r, char *base) {
   r->tried_letter = LETTERS(2 * w);
   r->drop = INTEGERS(g);
   r->active = INTEGERS(w);
-  r->involved = INTEGERS(3 * w + 2 * all + 1);
+  r->involved = INTEGERS(3 * w + 4 * all + 1);
   r->p = DOUBLES(s->parameters);
   r->series = DOUBLES(pair_room(s->series.size, stride));
   r->rounding = DOUBLES(s->series.size);
@@ -160,7 +162,6 @@ static size_t place_run(Run *r, char *base) {
   r->idle = LETTERS(s->m);
   r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
   r->of_defect = DOUBLES(g);
-  r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
   r->key = LETTERS(w + 8 * s->rules.discrete);
   r->met_at = DOUBLES(g);
   return used;
@@ -373,6 +374,9 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
     find_idle(r);
   }
   r->prepared = 1;
+  memset(r->letter, -1, r->width);
+  memcpy(r->x, b->x0 + i * r->n, sizeof(double) * r->n);
+  measure_time(r);
   memcpy(r->x, m->x, sizeof(double) * r->n);
   memcpy(r->letter, m->letter, r->width);
   if (r->s->sets) memcpy(r->unknowns, m->unknowns, sizeof(double) * r->width);

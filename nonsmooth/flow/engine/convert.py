@@ -233,6 +233,12 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.behind(system.impacts[run.where], t)
     if reason == "no_jump":
         return messages.no_jump(system.surface_names[run.where], t)
+    if reason == "off_constraint":
+        what = "Function" if run.where < system.surface_count else "Rate of the function"
+        name = system.constraints[system.joints.index(run.where % system.surface_count)]
+        return messages.off_constraint(name, what, run.limit, t)
+    if reason == "dead_point":
+        return messages.dead_point(system.constraints, t)
     if reason == "no_impulse":
         return messages.no_impulse(system.impacts[run.where], t)
     if reason == "restitution":

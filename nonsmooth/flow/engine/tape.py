@@ -96,7 +96,7 @@ class _System(ctypes.Structure):
         *[(name, _POINTER) for name in ("slope_output", "slope_moves", "slope_symmetric")],
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
-        *[(name, _I32) for name in ("affine", "sets", "kept_rows", "impact_law")],
+        *[(name, _I32) for name in ("affine", "sets", "kept_rows", "impact_law", "joints")],
         *[(name, _POINTER) for name in ("mixed", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
@@ -251,6 +251,7 @@ class TapeEngine:
             "early_free": tape.free.early,
         }
         made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
+        made.joints = len(system.joints)
         made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
         table = (_Element * (len(elements) + 1))(*elements)
         made.element = self._at(np.frombuffer(bytes(table), np.uint8))

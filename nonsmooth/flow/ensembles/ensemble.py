@@ -124,7 +124,7 @@ def ensemble(
         rest_below=rest_below,
         start_mode=start_mode,
     )
-    require_system(system, sets=True, hysteresis=True, complementarity=True)
+    require_system(system, sets=True, hysteresis=True, complementarity=True, joints=True)
     work = checked_work(work)
     if start_mode is not None:
         system.require_mode(start_mode)

@@ -73,6 +73,8 @@ class Solved:
                 functions.append(sign * heights[i])
             elif i >= m or i in self.system.half_lines:
                 functions.append(self.values[sliding.index(i)])
+            elif i in self.system.joints:
+                continue
             elif i not in sliding:
                 functions += [-layer[i], layer[i]]
             else:
@@ -117,7 +119,7 @@ def least_norm(matrix: ca.SX, right: ca.SX) -> ca.SX:
 
 def explicit(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode as a field of the states, for any system; built once."""
-    require_system(system, complementarity=True)
+    require_system(system, complementarity=True, joints=True)
     if not system.coupled:
         return motion(system, mode)
 

@@ -145,7 +145,9 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
             "release": "adding-sliding",
         }.get(leg.kind, "grazing, escaping")
     if {before.kind, leg.kind} == {"contact", "release"} and before.element == leg.element:
-        name = _touch(problem, leg.element, "adding-sliding" if leg.kind == "contact" else "grazing-sliding")
+        name = _touch(
+            problem, leg.element, "adding-sliding" if leg.kind == "contact" else "grazing-sliding"
+        )
         return name if before.mode == mode_after(leg) else "corner"
     if before.kind == "entry" and leg.kind == "exit":
         came, left = before.mode, mode_after(leg)
@@ -171,7 +173,11 @@ def _grazed(
     if guard.kind == "exit":
         return "adding-sliding"
     if is_condition(problem, guard):
-        return _touch(problem, guard.element, "grazing-sliding" if guard.kind == "surface" else "adding-sliding")
+        return _touch(
+            problem,
+            guard.element,
+            "grazing-sliding" if guard.kind == "surface" else "adding-sliding",
+        )
     if guard.kind == "release":
         return "release"
     t = touching(problem.system, leg, guard, at.starts[test.leg], float(at.durations[test.leg]), p)
@@ -327,7 +333,11 @@ def _shorter(
 ) -> ChangedItinerary | None:
     if kind in ("impact grazing", "grazing of a reset"):
         return _missed(before, at.leg, p)
-    if kind == "corner" and at.what == "duration" and before.problem.legs[at.leg - 1].kind == "contact":
+    if (
+        kind == "corner"
+        and at.what == "duration"
+        and before.problem.legs[at.leg - 1].kind == "contact"
+    ):
         return never_closed(before, at.leg, p)
     if kind == "corner" and at.what == "duration":
         cut = cut_corner(before, at.leg, p)
@@ -464,7 +474,9 @@ def closed_before(editor: LegEditor, i: int, guard: Guard, p: Array) -> ChangedI
         return None
     end = integrate_leg(system, before, editor.starts[k], editor.durations[k], p).end
     closed = replace(before, mode=with_letter(before.mode, own, "c"))
-    editor.legs[k] = replace(before, kind="contact", element=own, side=1, letters="", further=(), atom=-1)
+    editor.legs[k] = replace(
+        before, kind="contact", element=own, side=1, letters="", further=(), atom=-1
+    )
     editor.insert(k + 1, closed, end[: editor.problem.dimension])
     return editor.done(k + 1)
 
@@ -480,7 +492,9 @@ def never_closed(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary
         return None
     editor.legs[i - 1] = replace(closed, mode=first.mode)
     editor.remove(i)
-    guards = guarded_field(editor.problem.system, editor.legs[i % len(editor.legs)].mode).motion.guards
+    guards = guarded_field(
+        editor.problem.system, editor.legs[i % len(editor.legs)].mode
+    ).motion.guards
     guard = next(g for g in guards if g.kind == "surface" and g.element == own)
     return editor.done(test=Condition("start", i % len(editor.legs), guard))
 

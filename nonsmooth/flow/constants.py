@@ -266,5 +266,19 @@ REASONS = (
     "discrete_value",
 )
 
-#: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.
-RUNNING, FULL, HAND_OVER = -1, -2, -3
+#: Steps that a run may take: what costs least, or one kind.
+METHODS = ("auto", "taylor", "stiff")
+
+#: Implicit steps have seven stages in place of five below this relative tolerance, end Newton's method at this part
+#: of it, and are tried after so many Taylor steps in a row that were held by a decay rate, first with so many times
+#: their length, given up after so many in a row that Taylor steps would have made at less cost; matrices are dense, so that systems of more states have none.
+SEVEN_STAGES = 3e-9
+NEWTON = 0.01
+HELD_STEPS = 16
+EIGHTFOLD = 8.0
+IDLE_STEPS = 5
+MOST_STATES = 1500
+
+#: Not a status: the run continues in the next call, after its arrays were emptied, in another driver, or once the
+#: program of its derivatives is given.
+RUNNING, FULL, HAND_OVER, NEEDS_PROGRAM = -1, -2, -3, -4

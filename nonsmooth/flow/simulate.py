@@ -38,6 +38,7 @@ def simulate(
     t_eval: ArrayLike | None = None,
     at: Any = None,
     dense: bool = True,
+    method: str = "auto",
 ) -> Trajectory:
     """Integrate a Filippov system through crossings, sliding, stops and resets.
 
@@ -137,6 +138,7 @@ def simulate(
         max_jumps=max_jumps,
         rest_below=rest_below,
         start_mode=start_mode,
+        method=method,
     )
     system, at = sectioned(system, at)
     x = system.extended_point(x0, options.t_start)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem, Guard
-from ..constants import GUARDS, KINDS
+from ..constants import GUARDS, KINDS, METHODS
 from ..options import Options
 from ..results import Chunk
 from ..section import Hits
@@ -33,7 +33,7 @@ class OptionsStructure(ctypes.Structure):
         *[(name, _I64) for name in ("max_steps", "max_events", "max_jumps")],
         *[(name, _I32) for name in ("start_mode", "at_kind")],
         ("at_count", _I64),
-        *[(name, _I32) for name in ("dense", "hit_after")],
+        *[(name, _I32) for name in ("dense", "hit_after", "method", "pad")],
         *[(name, _I64) for name in ("hit_kinds", "hit_width", "hit_side", "hit_skip", "hit_every")],
         ("hit_count", _I64),
         ("hit_named", _POINTER),
@@ -229,6 +229,7 @@ def options_of(
         min(count, limit),
         int(dense),
     )
+    made.method = METHODS.index(o.method)
     made.hit_every = 1
     if o.hits is not None:
         named = _named(system, o.hits)

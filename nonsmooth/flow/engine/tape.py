@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
 from ...model.printing.tape import Entries, Series, Tape, Values, derived_series_of, tape_of
-from ..constants import FULL, LAWS, RUNNING, SEVERAL
+from ..constants import FULL, LAWS, NEEDS_PROGRAM, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
@@ -101,6 +103,8 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
         ("derivatives", EntriesStructure),
+        ("implicit", _POINTER),
+        ("places", _POINTER),
     ]
 
 
@@ -186,6 +190,14 @@ class _Held:
         self.free(self.pointer)
 
 
+def _places(entries: Entries, n: int) -> NDArray[np.int32]:
+    """States in an order in which those that are coupled are close: reverse Cuthill-McKee."""
+    of_states = (entries.row < n) & (entries.column < n)
+    places = (entries.row[of_states], entries.column[of_states])
+    graph = coo_array((np.ones(len(places[0])), places), shape=(n, n)).tocsr()
+    return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int32)
+
+
 def _ends(parts: Sequence[Sequence[Any]]) -> list[int]:
     """Where parts of a row begin, and the end of the last."""
     return [0, *np.cumsum([len(part) for part in parts], dtype=int).tolist()]
@@ -207,6 +219,15 @@ class TapeEngine:
         if entries is not None:
             self._c.derivatives = self._entries(entries)
         self._rooms: Rooms = rooms_of((0, 0, 0))
+
+    def add_implicit(self) -> None:
+        """Give the driver the field's derivatives, which implicit steps need."""
+        series, entries = self.system.cached("derived", lambda: derived_series_of(self.coupled))
+        implicit = series_structure(series, self._kept)
+        self._c.derivatives = self._entries(entries)
+        self._c.places = self._at(_places(entries, self.system.extended_dimension))
+        self._c.implicit = ctypes.addressof(implicit)
+        self._implicit = implicit
 
     def _structure(self, coupled: Coupled, tape: Tape) -> _System:
         system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
@@ -340,6 +361,9 @@ class TapeEngine:
                 while (status := library().run_continue(state, BURST)) == RUNNING:
                     pass
                 numbers, counts, active, several, rates = self._read(state)
+                if status == NEEDS_PROGRAM:
+                    self.add_implicit()
+                    continue
                 if status != FULL:
                     break
                 recorder.make_room(counts[7:10])
@@ -474,7 +498,9 @@ class TapeEngine:
         c_options = options_of(self.system, options, dense=False, at=at)
         with self.held_table() as table, self.held_run(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
-            while library().run_many(*call, address(start), BURST):
+            while status := library().run_many(*call, address(start), BURST):
+                if status == NEEDS_PROGRAM:
+                    self.add_implicit()
                 if stop():
                     raise Stopped
             used = np.flatnonzero(np.bincount(chunk.itinerary)).tolist()

@@ -266,14 +266,18 @@ REASONS = (
     "discrete_value",
 )
 
+#: Flag of the mode of an implicit step, as it is recorded.
+IMPLICIT_STEP = 1 << 30
+
 #: Steps that a run may take: what costs least, or one kind.
 METHODS = ("auto", "taylor", "stiff")
 
 #: Implicit steps have seven stages in place of five below this relative tolerance, end Newton's method at this part
-#: of it, and are tried after so many Taylor steps in a row that were held by a decay rate, first with so many times
+#: of it (or where it changes nothing but rounding, between two bounds), and are tried after so many Taylor steps in a row that were held by a decay rate, first with so many times
 #: their length, given up after so many in a row that Taylor steps would have made at less cost; matrices are dense, so that systems of more states have none.
 SEVEN_STAGES = 3e-9
 NEWTON = 0.01
+LEAST_CHANGE, MOST_CHANGE = 1e-7, 1e-2
 HELD_STEPS = 16
 EIGHTFOLD = 8.0
 IDLE_STEPS = 5

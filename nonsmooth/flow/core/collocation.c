@@ -77,94 +77,7 @@ static void end_collocation(Run *r) {
   r->collocation = 0;
 }
 
-/* Linear equations ------------------------------------------------------------------------------------------ */
-
-/* Factors of a - J in place, rows changed for the largest pivots; entries are no further than ``band`` from the
- * diagonal. 0 where there is no inverse. */
-static int factor_real(double *f, int n, int band, int32_t *pivot) {
-  for (int k = 0; k < n; k++) {
-    int best = k, low = k + band < n ? k + band : n - 1, right = k + 2 * band < n ? k + 2 * band : n - 1;
-    for (int i = k + 1; i <= low; i++) if (fabs(f[(int64_t)i * n + k]) > fabs(f[(int64_t)best * n + k])) best = i;
-    double *one = f + (int64_t)k * n, *other = f + (int64_t)best * n;
-    pivot[k] = best;
-    if (!(fabs(other[k]) > 0 && fabs(other[k]) < INFINITY)) return 0;
-    for (int j = k; j <= right && best != k; j++) { double t = one[j]; one[j] = other[j]; other[j] = t; }
-    for (int i = k + 1; i <= low; i++) {
-      double *row = f + (int64_t)i * n, part = row[k] /= one[k];
-      if (part != 0) for (int j = k + 1; j <= right; j++) row[j] -= part * one[j];
-    }
-  }
-  return 1;
-}
-
-static void solve_real(const double *f, int n, int band, const int32_t *pivot, double *b) {
-  for (int k = 0; k < n; k++) {
-    int low = k + band < n ? k + band : n - 1;
-    double t = b[k]; b[k] = b[pivot[k]]; b[pivot[k]] = t;
-    for (int i = k + 1; i <= low; i++) b[i] -= f[(int64_t)i * n + k] * b[k];
-  }
-  for (int k = n - 1; k >= 0; k--) {
-    int right = k + 2 * band < n ? k + 2 * band : n - 1;
-    for (int j = k + 1; j <= right; j++) b[k] -= f[(int64_t)k * n + j] * b[j];
-    b[k] /= f[(int64_t)k * n + k];
-  }
-}
-
-/* The same of complex numbers, as real and imaginary parts side by side. */
-static int factor_complex(double *f, int n, int band, int32_t *pivot) {
-  for (int k = 0; k < n; k++) {
-    int best = k, low = k + band < n ? k + band : n - 1, right = k + 2 * band < n ? k + 2 * band : n - 1;
-    double most = -1;
-    for (int i = k; i <= low; i++) {
-      const double *c = f + 2 * ((int64_t)i * n + k);
-      double size = fabs(c[0]) + fabs(c[1]);
-      if (size > most) { most = size; best = i; }
-    }
-    if (!(most > 0 && most < INFINITY)) return 0;
-    double *one = f + 2 * (int64_t)k * n, *other = f + 2 * (int64_t)best * n;
-    pivot[k] = best;
-    for (int j = 2 * k; j <= 2 * right + 1 && best != k; j++) { double t = one[j]; one[j] = other[j]; other[j] = t; }
-    double a = one[2 * k], b = one[2 * k + 1], d = 1 / (a * a + b * b);
-    for (int i = k + 1; i <= low; i++) {
-      double *row = f + 2 * (int64_t)i * n, u = row[2 * k], v = row[2 * k + 1];
-      if (u == 0 && v == 0) continue;
-      double p = (u * a + v * b) * d, q = (v * a - u * b) * d;
-      row[2 * k] = p;
-      row[2 * k + 1] = q;
-      for (int j = k + 1; j <= right; j++) {
-        row[2 * j] -= p * one[2 * j] - q * one[2 * j + 1];
-        row[2 * j + 1] -= p * one[2 * j + 1] + q * one[2 * j];
-      }
-    }
-  }
-  return 1;
-}
-
-static void solve_complex(const double *f, int n, int band, const int32_t *pivot, double *b) {
-  for (int k = 0; k < n; k++) {
-    int low = k + band < n ? k + band : n - 1, best = pivot[k];
-    for (int part = 0; part < 2; part++) {
-      double t = b[2 * k + part]; b[2 * k + part] = b[2 * best + part]; b[2 * best + part] = t;
-    }
-    for (int i = k + 1; i <= low; i++) {
-      const double *c = f + 2 * ((int64_t)i * n + k);
-      b[2 * i] -= c[0] * b[2 * k] - c[1] * b[2 * k + 1];
-      b[2 * i + 1] -= c[0] * b[2 * k + 1] + c[1] * b[2 * k];
-    }
-  }
-  for (int k = n - 1; k >= 0; k--) {
-    int right = k + 2 * band < n ? k + 2 * band : n - 1;
-    const double *row = f + 2 * (int64_t)k * n;
-    double u = b[2 * k], v = b[2 * k + 1];
-    for (int j = k + 1; j <= right; j++) {
-      u -= row[2 * j] * b[2 * j] - row[2 * j + 1] * b[2 * j + 1];
-      v -= row[2 * j] * b[2 * j + 1] + row[2 * j + 1] * b[2 * j];
-    }
-    double a = row[2 * k], c = row[2 * k + 1], d = 1 / (a * a + c * c);
-    b[2 * k] = (u * a + v * c) * d;
-    b[2 * k + 1] = (v * a - u * c) * d;
-  }
-}
+/* Matrices -------------------------------------------------------------------------------------------------- */
 
 /* The state in the place k of the matrices, in which what belongs together is close. */
 static int placed(const Run *r, int k) { return r->s->places ? r->s->places[k] : k; }
@@ -333,7 +246,7 @@ static double correct(Run *r) {
 /* Solve a step of length h from the guess in z; 0 where Newton's method fails. */
 static int solve_stages(Run *r, const Expansion *e, double h) {
   Collocation *m = r->collocation;
-  double before = 0, least = smaller(1e-2, larger(1e-7, SOLVED / r->o.rtol));
+  double before = 0, least = smaller(MOST_CHANGE, larger(LEAST_CHANGE, SOLVED / r->o.rtol));
   int most = 10 + m->method->s / 2;
   for (int k = 0; k <= m->method->s; k++) memcpy(m->unknowns + k * r->width, r->unknowns, sizeof(double) * r->width);
   m->rate = 0;
@@ -497,7 +410,7 @@ static int guards_agree(Run *r, Expansion *e, double h) {
 
 /* Step length for an error, from the last ones. */
 static double next_length(const Collocation *m, double h, double error) {
-  double order = m->method->s + 1, size = larger(error, 1e-10);
+  double order = m->method->s + 1, size = larger(error, TIED);
   double longest = m->rejected ? 1 : 5, factor = smaller(longest, 0.9 * pow(size, -1 / order));
   factor = smaller(factor, 0.99 * pow(size, -1 / order) * pow(larger(m->error, 0.01) / size, 0.3 / order));
   if (m->rate > 0.2) factor = smaller(factor, larger(0.5, sqrt(0.2 / m->rate)));
@@ -580,120 +493,4 @@ static int end_at(Run *r, Expansion *e, int row, double *dt) {
   m->is_end_known = 0;
   *dt = time;
   return 1;
-}
-
-/* When ---------------------------------------------------------------------------------------------------------- */
-
-/* The part of the longest Taylor step that a decay rate allows, in units of its inverse. */
-static double longest_decay(const Run *r) { return 3 - 0.5 * log10(r->o.rtol); }
-
-static int can_collocate(const Run *r) {
-  return r->o.method != METHOD_TAYLOR && !r->s->sets && !r->has_roots && !r->repelling && r->n <= MOST_STATES;
-}
-
-static void set_known(Collocation *m, int mode, int8_t known) {
-  if (mode >= m->modes) {
-    int32_t room = 2 * mode + 16;
-    int8_t *more = realloc(m->known, room);
-    if (!more) return;
-    memset(more + m->modes, 0, room - m->modes);
-    m->known = more;
-    m->modes = room;
-  }
-  m->known[mode] = known;
-}
-
-/* After a step: the next one begins at its end, with the derivative there. */
-static void go_on_implicitly(Run *r) {
-  Collocation *m = r->collocation;
-  double *kept = m->jacobian;
-  m->from = 1;
-  m->is_fresh = m->is_end_known;
-  m->jacobian = m->end_jacobian;
-  m->end_jacobian = kept;
-}
-
-/* Whether the next step is implicit: never the first of a leg, in which guards have known zeros. */
-static int is_implicit(Run *r) {
-  Collocation *m = r->collocation;
-  if (r->since <= 0 || !can_collocate(r)) return 0;
-  if (r->o.method == METHOD_STIFF && !r->s->implicit) { r->wants_program = 1; return 0; }
-  if (r->o.method == METHOD_STIFF && !m && begin_collocation(r)) m = r->collocation;
-  if (!m || !(r->o.method == METHOD_STIFF || (r->mode < m->modes && m->known[r->mode]))) return 0;
-  if (m->leg != r->event_count) {
-    m->leg = r->event_count;
-    m->h = EIGHTFOLD * r->length;
-    m->length = 0;
-    m->is_fresh = 0;
-    m->error = 1;
-    m->idle = 0;
-  }
-  return 1;
-}
-
-/* The fastest rate, renewed by products with the field's derivative. */
-static double fastest(Run *r, const double *jacobian, int pairs) {
-  Collocation *m = r->collocation;
-  int n = r->n;
-  double *v = m->fast, *next = m->work, rho = 0;
-  for (int pass = 0; pass < pairs; pass++) {
-    double size = 0, grown = 0;
-    for (int i = 0; i < n; i++) size = larger(fabs(v[i]), size);
-    if (!(size > 0 && size < INFINITY)) for (int i = 0; i < n; i++) v[i] = 1 + 0.1 * i / n;
-    else for (int i = 0; i < n; i++) v[i] /= size;
-    for (int product = 0; product < 2; product++) {
-      for (int i = 0; i < n; i++) {
-        next[i] = 0;
-        for (int j = 0; j < n; j++) next[i] += jacobian[(int64_t)i * n + j] * v[j];
-      }
-      memcpy(v, next, sizeof(double) * n);
-    }
-    for (int i = 0; i < n; i++) grown = larger(fabs(v[i]), grown);
-    rho = sqrt(grown);
-  }
-  return rho;
-}
-
-/* Operations of a Taylor step over those of an implicit one. */
-static double cost_ratio(const Run *r) {
-  double n = r->n, s = r->collocation->method->s, band = r->collocation->band, rules = r->s->series.moving_count;
-  double taylor = rules * (r->order + 1) * (r->order + 2) / 2;
-  double linear = 0.5 * (s + 1) * n * (8 * band * band + 32 * band + 8);
-  return taylor / (30 * rules + linear + 4 * s * s * n);
-}
-
-/* After a Taylor step: whether a decay rate has held it, as so many before. */
-static void watch_decay(Run *r, const Expansion *e, double h) {
-  Collocation *m = r->collocation;
-  double last = 0, before = 0, limit = 0.6 * longest_decay(r);
-  if (r->o.method != METHOD_AUTO || !can_collocate(r)) return;
-  for (int i = 0; i < r->s->dimension; i++) {
-    const double *c = e->states + (int64_t)i * r->stride;
-    last = larger(fabs(c[r->order]) / e->allowed[i], last);
-    before = larger(fabs(c[r->order - 1]) / e->allowed[i], before);
-  }
-  if (!(h * r->order * last > limit * before)) { r->held_steps = 0; return; }
-  if (++r->held_steps < (m ? m->wait : HELD_STEPS)) return;
-  r->held_steps = 0;
-  if (!r->s->implicit) { r->wants_program = 1; r->held_steps = HELD_STEPS; return; }
-  if (!begin_collocation(r)) return;
-  m = r->collocation;
-  if (!jacobian_at(r, &e->l, r->x, r->unknowns, m->jacobian)) return;
-  m->rho = fastest(r, m->jacobian, 8);
-  if (h * m->rho > limit) { set_known(m, r->mode, 1); m->leg = -1; m->steps = 0; }
-  else m->wait *= 2;
-}
-
-/* Go back to Taylor steps where those would be cheaper, or where no implicit step is possible. */
-static void watch_cost(Run *r, double h) {
-  Collocation *m = r->collocation;
-  if (h > 0 && r->o.method == METHOD_AUTO) {
-    m->rho = fastest(r, m->jacobian, 1);
-    m->idle = h * m->rho * cost_ratio(r) < longest_decay(r) ? m->idle + 1 : 0;
-  }
-  m->steps++;
-  if (h > 0 && m->idle < IDLE_STEPS) return;
-  set_known(m, r->mode, 0);
-  m->wait = m->steps > 2 * IDLE_STEPS ? HELD_STEPS : 2 * m->wait;
-  m->idle = 0;
 }

@@ -213,6 +213,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
   r->held_steps = r->wants_program = 0;
+  r->held_length = 0;
   end_collocation(r);
   r->hold = INFINITY;
   r->begun = t;

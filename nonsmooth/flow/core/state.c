@@ -145,7 +145,7 @@ typedef struct {
   int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
-  double size, length, shortened, hold; /* the last: the step's end before zeros of a guard that are not told apart */
+  double size, length, shortened, held_length, hold; /* the last: the step's end before zeros of a guard that are not told apart */
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;

@@ -122,8 +122,8 @@ class Run:
         What a restart at the end needs besides the state.
     dense : bool
         Whether the following were kept.
-    starts, coefficients : ndarray (s,), (s, N, P+1)
-        Steps: start times, Taylor coefficients.
+    starts, coefficients, implicit : ndarray (s,), (s, N, P+1), (s,)
+        Steps: start times, coefficients of the states, whether they are implicit.
     sample_x : ndarray (K, n)
         States at the times before the end at which the run was to be read, unless it is dense.
     event_count : int
@@ -154,6 +154,7 @@ class Run:
     dense: bool
     starts: Array
     coefficients: Array
+    implicit: NDArray[np.bool_]
     sample_x: Array
     event_count: int
     make_happened: Callable[[], Happened]

@@ -44,7 +44,7 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         status=status,
         message=f"{message_of(system, options, run)} {ADVICE[status]}{_unmet(system, run)}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
-        steps=Steps(run.starts, run.coefficients),
+        steps=Steps(run.starts, run.coefficients, run.implicit),
         continuations=[
             Continuation(system.spelled(mode), rates)
             for mode, rates in zip(run.several, run.rates, strict=True)

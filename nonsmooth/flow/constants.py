@@ -264,6 +264,7 @@ REASONS = (
     "undetermined",
     "high_degree",
     "discrete_value",
+    "decay",
 )
 
 #: Flag of the mode of an implicit step, as it is recorded.

@@ -80,6 +80,10 @@ def simulate(
     at : Section, str, number or expression, optional
         Keep the states at a section: at a surface, stop, reset or impact of that name, at a kind of
         event, or after each period. See :class:`Section`.
+    method : {"auto", "taylor", "stiff"}, optional
+        Steps: explicit Taylor steps; implicit ones (collocation at Radau points, of order 9, or 13 for ``rtol`` below
+        3e-9) where a decay rate is much faster than the motion; or, by default, what costs less, mode by mode. Of
+        systems with a vector multiplier all steps are explicit. ``run.steps.implicit`` says which steps are.
     dense : bool, optional
         Keep the polynomials of the steps, so that the result can be read at any time. ``False`` keeps points,
         events, segments and samples, which need an eighth of the memory or less. Such a run can be continued

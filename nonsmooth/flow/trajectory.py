@@ -128,11 +128,14 @@ class Facts:
         is the only one.
     rested_below : tuple of str
         Names of what ``rest_below=`` put to rest: the run is off by its speed there.
+    implicit_steps : int
+        How many steps were implicit, because a decay rate held explicit ones.
     """
 
     depends_on_widths: bool = False
     unproved: bool = False
     rested_below: tuple[str, ...] = ()
+    implicit_steps: int = 0
 
 
 def _require_whole(run: Trajectory) -> None:

@@ -280,7 +280,7 @@ static int advance(Run *r, const Expansion *e, double dt) {
   memcpy(r->x, x, sizeof(double) * r->s->dimension);
   pass_time(r, dt);
   r->since += dt;
-  if (e->end && r->collocation) go_on_implicitly(r);
+  if (e->end) go_on_implicitly(r);
   r->step_count++;
   r->segment_steps++;
   kept = kept_by(r, r->letter, r->involved);
@@ -352,6 +352,7 @@ static int taylor_piece(Run *r, double left, Piece *q) {
   if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return 0; }
   if (dt < wanted) row = -1, last = 0;
   if (row < 0) watch_decay(r, e, by_series);
+  if (r->wants_program) return 0;
   *q = (Piece){dt, row, last && dt == h};
   return 1;
 }
@@ -376,11 +377,13 @@ static void step(Run *r) {
   if (r->due_impact >= 0) { serve_between(r, r->due_impact); return; }
   double left = r->o.t_end - r->t - r->t_low;
   if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
-  if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
+  if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, r->held_steps >= HELD_STEPS ? DECAY : NO_REASON, 0); return; }
   if (r->has_roots && pass_root(r, left)) return;
   Expansion *e = &r->e;
   Piece q;
-  if (!(is_implicit(r) && implicit_piece(r, left, &q)) && !taylor_piece(r, left, &q)) return;
+  int is_stiff = is_implicit(r);
+  if (r->wants_program) return;
+  if (!(is_stiff && implicit_piece(r, left, &q)) && !taylor_piece(r, left, &q)) return;
   if (q.row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
   if (q.dt > 0) note_sides(r, e, q.dt);
   r->falls = q.row >= 0 && is_steep(r, e, q.row, q.dt);

@@ -209,7 +209,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   memset(r->instant.passing, 0, s->rules.atoms);
   memset(r->instant.unmet, 0, s->rules.triggers);
   memset(r->kinds, 0, sizeof r->kinds);
-  r->step_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
+  r->step_count = r->implicit_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
   r->held_steps = r->wants_program = 0;
@@ -276,7 +276,7 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
   numbers[2] = r->at_t;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
                     r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts,
-                    unmet_event(r)};
+                    unmet_event(r), r->implicit_count};
   memcpy(counts, head, sizeof head);
   memcpy(active, r->active, sizeof(int32_t) * r->active_count);
   memcpy(several, r->several, sizeof(int32_t) * r->several_count);

@@ -142,7 +142,7 @@ typedef struct {
   Met met;
   Instant instant;
   int32_t mode, status, reason, where, due_impact, falls, repelling, folded, *drop;
-  int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
+  int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
   double size, length, shortened, held_length, hold; /* the last: the step's end before zeros of a guard that are not told apart */

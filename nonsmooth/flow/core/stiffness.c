@@ -23,6 +23,7 @@ static void set_known(Collocation *m, int mode, int8_t known) {
 static void go_on_implicitly(Run *r) {
   Collocation *m = r->collocation;
   double *kept = m->jacobian;
+  r->implicit_count++;
   m->from = 1;
   m->is_fresh = m->is_end_known;
   m->jacobian = m->end_jacobian;
@@ -78,11 +79,11 @@ static double cost_ratio(const Run *r) {
   return taylor / (30 * rules + linear + 4 * s * s * n);
 }
 
-/* After a Taylor step: whether a decay rate has held it, as so many before. */
+/* Whether a decay rate holds a Taylor step, as so many before. Where that takes the program of derivatives the step is
+ * made once it is there. */
 static void watch_decay(Run *r, const Expansion *e, double h) {
   Collocation *m = r->collocation;
   double last = 0, before = 0, limit = 0.6 * longest_decay(r);
-  if (r->o.method != METHOD_AUTO || !can_collocate(r)) return;
   for (int i = 0; i < r->s->dimension; i++) {
     const double *c = e->states + (int64_t)i * r->stride;
     last = larger(fabs(c[r->order]) / e->allowed[i], last);
@@ -91,9 +92,10 @@ static void watch_decay(Run *r, const Expansion *e, double h) {
   int shrinks = h < STEADY * r->held_length; /* as before a branch point */
   r->held_length = h;
   if (shrinks || !(h * r->order * last > limit * before)) { r->held_steps = 0; return; }
-  if (++r->held_steps < (m ? m->wait : HELD_STEPS)) return;
+  r->held_steps++;
+  if (r->o.method != METHOD_AUTO || !can_collocate(r) || r->held_steps < (m ? m->wait : HELD_STEPS)) return;
+  if (!r->s->implicit) { r->wants_program = 1; r->held_steps--; return; }
   r->held_steps = 0;
-  if (!r->s->implicit) { r->wants_program = 1; r->held_steps = HELD_STEPS; return; }
   if (!begin_collocation(r)) return;
   m = r->collocation;
   if (!jacobian_at(r, &e->l, r->x, r->unknowns, m->jacobian)) return;

@@ -116,6 +116,8 @@ class Run:
         What was noted about the decisions, as bits.
     unmet : int
         A stop or reset, in this order, that was true at the start and did not happen, or -1.
+    implicit_steps : int
+        How many steps were implicit.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
     motion : ndarray (w,)
@@ -147,6 +149,7 @@ class Run:
     rates: Array
     facts: int
     unmet: int
+    implicit_steps: int
     t: Array
     x: Array
     motion: Array

@@ -30,7 +30,12 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         partial(_events, system, run), few and partial(_few_events, system, run)
     )
     rested = {e.name: None for e in events if e.kind == "rest_below"} if options.rest_below else ()
-    facts = Facts(bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED), tuple(rested))
+    facts = Facts(
+        bool(run.facts & DEPENDS_ON_WIDTHS),
+        bool(run.facts & UNPROVED),
+        tuple(rested),
+        run.implicit_steps,
+    )
     warn_of_facts(facts.depends_on_widths, facts.unproved)
     return Trajectory(
         system=system,
@@ -186,6 +191,8 @@ def message_of(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.accumulation(run.event_count, run.limit)
     if status is Status.TOO_MANY_EVENTS:
         return messages.too_many("events", options.max_events)
+    if status is Status.TOO_MANY_STEPS and REASONS[run.reason] == "decay":
+        return messages.held_by_decay(t, float(run.t[-1] - run.t[-2]), not system.sets)
     if status is Status.TOO_MANY_STEPS:
         return messages.too_many("steps", options.max_steps)
     if status is Status.STEP_TOO_SMALL and REASONS[run.reason] == "branch_point":

@@ -226,7 +226,11 @@ class Recorder:
             found = {name: growing.array() for name, growing in self._kept.items()}
             whole = self._whole(found)
         names = ("starts", "coefficients", "implicit")
-        empty = {"starts": np.zeros(0), "coefficients": own["coefficients"], "implicit": np.zeros(0, bool)}
+        empty = {
+            "starts": np.zeros(0),
+            "coefficients": own["coefficients"],
+            "implicit": np.zeros(0, bool),
+        }
         return {name: found.get(name, empty.get(name)) for name in ("t", "x", *names)} | {
             "sample_x": np.vstack(self._samples) if self._samples else found["x"][:0],
             "event_count": total[2],

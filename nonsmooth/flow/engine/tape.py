@@ -108,6 +108,10 @@ class _System(ctypes.Structure):
     ]
 
 
+#: Steps by which a run is known to be stiff.
+_PROBED = 400
+
+
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL:
     """Return the driver."""
@@ -387,11 +391,17 @@ class TapeEngine:
             rates=rates[:, : self.system.dimension],
             facts=counts[12],
             unmet=counts[13],
+            implicit_steps=counts[14],
             motion=final,
             labels=labels,
             dense=dense,
             **recorded,
         )
+
+    def is_stiff(self, x: Array, p: Array, options: Options) -> bool:
+        """Whether a run takes implicit steps soon."""
+        few = replace(options, max_steps=min(options.max_steps, _PROBED), hits=None)
+        return bool(np.isfinite(x).all()) and self.run(x, p, few, dense=False).implicit_steps > 0
 
     def _checked(self, motion: Array) -> Array:
         """What a run or event keeps for a restart, if it is of this system."""
@@ -427,7 +437,7 @@ class TapeEngine:
         return _Held(state, made.run_free)
 
     def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
-        numbers, counts = (_D * 3)(), (_I64 * 14)()
+        numbers, counts = (_D * 3)(), (_I64 * 15)()
         width = self.system.surface_count + len(self.system.impacts)
         active, several = (_I32 * (width + 1))(), (_I32 * SEVERAL)()
         rates = np.empty((SEVERAL, self.system.extended_dimension))

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LAWS, LIMIT_FALL, MOST_CODES, UNWATCHED
+from ..model.numbering import FALL, IMPACT_LAWS, LAWS, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LAWS", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
+__all__ = ["FALL", "IMPACT_LAWS", "LAWS", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 

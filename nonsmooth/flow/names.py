@@ -12,8 +12,13 @@ def guard_name(system: FilippovSystem, guard: Guard) -> str:
     k, kind = guard.element, guard.kind
     if kind in ("stop", "reset"):
         return (system.stops if kind == "stop" else system.resets)[k][0]
-    if kind in ("zero", "atom"):
+    if kind == "zero":
         return f"f{k}"
+    if kind == "atom":
+        names = [name for name, _ in (*system.stops, *system.resets)]
+        own = len(names) + k
+        rules = zip(names, system.definition.rules, strict=True)
+        return next((f"a function of {name}" for name, r in rules if own in r.decided_by), f"f{k}")
     if k >= len(system.entries):
         return system.impacts[k - len(system.entries)]
     if kind in ("surface", "near"):

@@ -7,7 +7,8 @@
 static const Happened *back(const Run *r, int64_t k) { return &r->past[(r->history - k) % HISTORY]; }
 
 /* Number of the last events whose times decrease like a geometric series, as one block of a pattern that is
- * repeated, or 0; the time left to the limit, and how much the last block has changed the estimate. */
+ * repeated, or 0; the time left to the limit, and its error. The ratio itself converges, at least as fast as the times
+ * do: what blocks change in the estimate is summed too (Aitken). */
 static int block_of(const Run *r, double *left, double *error) {
   int at_once = r->history > AT_ONCE;
   for (int k = 1; at_once && k <= AT_ONCE; k++) at_once = back(r, k)->interval == 0 && back(r, k)->kind != RESET;
@@ -18,20 +19,26 @@ static int block_of(const Run *r, double *left, double *error) {
     if (r->history < need + lag) return 0;
     for (int k = 1; k <= need && same; k++) same = back(r, k)->pattern == back(r, k + lag)->pattern;
     if (!same) continue;
-    double block[BLOCKS], low = INFINITY, high = 0, ratio = 0, earlier = 0;
+    double block[BLOCKS], low = INFINITY, high = 0, ratio = 0, change = 0, before = 0;
     for (int b = 0; b < BLOCKS; b++) {
       block[b] = 0;
       for (int k = 0; k < lag; k++) block[b] += back(r, need - b * lag - k)->interval;
     }
     for (int b = 1; b < BLOCKS; b++) {
-      earlier = ratio;
+      before = change;
+      change = block[b] - *left;
       ratio = block[b] / block[b - 1]; /* not a number after an empty block */
+      *left = block[b] * ratio / (1 - ratio);
+      change += *left;
       low = ratio > 0 ? fmin(low, ratio) : -INFINITY;
       high = fmax(high, ratio);
     }
     if (!(high < SHRINKS && high - low <= SPREAD * (1 - ratio))) continue;
-    *left = block[BLOCKS - 1] * ratio / (1 - ratio);
-    *error = fabs(block[BLOCKS - 2] * earlier / (1 - earlier) - block[BLOCKS - 1] - *left);
+    *error = fabs(change);
+    if (!(*error < ratio * fabs(before))) return lag;
+    double rest = change * change / (before - change);
+    *error *= larger(*error, fabs(rest)) / *left;
+    *left += rest;
     return lag;
   }
   return 0;
@@ -134,11 +141,19 @@ static void go_to_limit(Run *r, double left, int kind, int before) {
   event(r, kind, before, -1, r->x);
 }
 
+/* Whether no state moves by more than the tolerance within the error of a limit. */
+static int is_sure(Run *r, double error) {
+  expand(r, r->letter, r->x, r->unknowns, &r->e);
+  for (int i = 0; i < r->s->dimension; i++)
+    if (error * fabs(r->e.states[(int64_t)i * r->stride + 1]) > r->e.allowed[i] / SAFETY) return 0;
+  return 1;
+}
+
 /* Close the contacts of impacts that accumulate, unless further impacts are to be served. */
 static void close_contacts(Run *r, int block, double left, double error) {
   double speed, *near = r->before, *x = r->saved;
   int count = gathered(r, block, r->involved, &speed), before = r->mode, at_once = is_instant(r, left);
-  if (!at_once && speed * left > r->o.atol) return;
+  if (!at_once && (speed * left > r->o.atol || !is_sure(r, error))) return;
   memcpy(x, r->x, sizeof(double) * r->n);
   if (!choose_closed(r, r->involved, count)) {
     if (r->status == RUNNING) { r->limit = r->t + left; finish(r, ACCUMULATION, NO_REASON, 0); }

@@ -124,9 +124,9 @@ static size_t place_run(Run *r, char *base) {
   r->sample = DOUBLES(3 * ((size_t)n + w + g));
   r->work = DOUBLES(6 * square + 8 * w + rows + g);
   r->gradient_row = DOUBLES((size_t)all * n + 2 * all);
-  r->rates = DOUBLES(2 * all + c);
+  r->rates = DOUBLES(2 * all + 2 * c);
   r->lam = DOUBLES(2 * w);
-  r->matrix = DOUBLES(square + 6 * w + all + 2 * c);
+  r->matrix = DOUBLES(square + 8 * w + all + 2 * c);
   r->small = DOUBLES(4 * w + s->rules.atoms);
   r->atom_work = DOUBLES(pair_room(s->atoms.size, 1));
   r->choice_work = DOUBLES(pair_room(s->choices.size, 1));

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
 from ...model.printing.tape import Entries, Series, Tape, Values, derived_series_of, tape_of
-from ..constants import FULL, LAWS, NEEDS_PROGRAM, RUNNING, SEVERAL
+from ..constants import FULL, IMPACT_LAWS, LAWS, NEEDS_PROGRAM, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
@@ -98,7 +98,7 @@ class _System(ctypes.Structure):
         *[(name, _POINTER) for name in ("slope_output", "slope_moves", "slope_symmetric")],
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
-        *[(name, _I32) for name in ("affine", "sets", "kept_rows")],
+        *[(name, _I32) for name in ("affine", "sets", "kept_rows", "impact_law")],
         *[(name, _POINTER) for name in ("mixed", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
@@ -275,6 +275,7 @@ class TapeEngine:
             "early_free": tape.free.early,
         }
         made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
+        made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
         table = (_Element * (len(elements) + 1))(*elements)
         made.element = self._at(np.frombuffer(bytes(table), np.uint8))
         made.early_count, made.early_free_count = len(tape.series.early), len(tape.free.early)

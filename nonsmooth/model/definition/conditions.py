@@ -46,6 +46,13 @@ class Rule:
         return {code // 8 for tree in self.triggers for code in tree if code >= 0}
 
     @property
+    def decided_by(self) -> set[int]:
+        """Atoms of its conditions and of its filter."""
+        return {
+            code // 8 for tree in (*self.triggers, self.when or ()) for code in tree if code >= 0
+        }
+
+    @property
     def located(self) -> tuple[Tree, ...]:
         """Conditions whose changes along a motion are located: a filter only while it makes a level due."""
         return (*self.triggers, *([self.when] if self.when and self.level else []))
@@ -79,6 +86,16 @@ def holds(tree: Sequence[int], sides: Sequence[int]) -> bool:
             two, one = stack.pop(), stack.pop()
             stack.append(one and two if code == AND else one or two)
     return stack[-1]
+
+
+def decides(rule: Rule, atom: int, sides: Sequence[int]) -> bool:
+    """Whether the sign of one atom decides if an event is due, for given signs of the others."""
+    own, due = list(sides), list[bool]()
+    for tree in rule.triggers:
+        for side in (-1, 1):
+            own[atom] = side
+            due.append(holds(tree, own) and (rule.when is None or holds(rule.when, own)))
+    return any(one != two for one, two in zip(due[::2], due[1::2], strict=True))
 
 
 def is_boolean(e: ca.SX) -> bool:

@@ -19,6 +19,7 @@ from ..checks import real
 from ..errors import DefinitionError, ParameterError
 from ..expressions.cancel import powers
 from ..expressions.graph import require_smooth
+from ..numbering import IMPACT_LAWS
 from ..reading import (
     Expression,
     Parameters,
@@ -77,6 +78,7 @@ class Definition:
     layer_widths: tuple[float, ...] = ()
     laws: tuple[str, ...] = ()  # of the entries, where not all are surfaces and sets
     hysteresis: ca.SX = _NONE  # how much lower each function is where its multiplier is -1
+    impact_law: str = "newton"
 
     @cached_property
     def plain(self) -> bool:
@@ -134,6 +136,7 @@ class Definition:
         some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed, "rules": self.rules}
         some |= {"clocks": self.clocks, "discrete": self.discrete}
         some |= {"layer_widths": self.layer_widths, "laws": self.laws}
+        some |= {"impact_law": self.impact_law} if self.impact_law != "newton" else {}
         return {
             **{name: value for name, value in some.items() if value},
             "definition": ca.Function("definition", inputs, outputs).serialize(),
@@ -157,7 +160,8 @@ class Definition:
         parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=False))
         some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths", "laws")
         tuples: dict[str, Any] = {name: tuple(state.get(name, ())) for name in some}
-        return cls(**parts, **rest, **tuples)
+        law = state.get("impact_law", "newton")
+        return cls(**parts, **rest, **tuples, impact_law=law)
 
 
 _DIRECTIONS = (-1, 0, 1)
@@ -210,6 +214,7 @@ def read_definition(
         gaps=_of_impacts(impacts, "gap"),
         restitutions=_of_impacts(impacts, "restitution"),
         impacts=tuple(i.name for i in impacts),
+        impact_law=_law_of(impacts),
         field=f,
         surfaces=h,
         defaults=defaults,
@@ -257,6 +262,23 @@ def _events(
         "stops": tuple((s.name, direction_of(s)) for s in stops),
         "resets": tuple((r.name, direction_of(r)) for r in resets),
     }
+
+
+def _law_of(impacts: Sequence[Impact]) -> str:
+    """The law of impacts, one for all of them."""
+    for impact in impacts:
+        if impact.law not in IMPACT_LAWS:
+            raise DefinitionError(
+                f"law of {impact.name!r} is {impact.law!r}. Give one of {', '.join(IMPACT_LAWS)}."
+            )
+    laws = {impact.law: impact.name for impact in impacts}
+    if len(laws) > 1:
+        received = " and ".join(f"{law!r} for {name!r}" for law, name in laws.items())
+        raise DefinitionError(
+            f"impacts have different laws: {received}. Contacts that are struck together need one: give all "
+            "the same law=."
+        )
+    return next(iter(laws), "newton")
 
 
 def _of_impacts(impacts: Sequence[Any], what: str) -> ca.SX:

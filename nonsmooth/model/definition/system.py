@@ -22,6 +22,7 @@ from ..errors import DefinitionError, PointError
 from ..expressions.mathml import equation, rate, symbol
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
+from .discrete_states import held_values, with_values
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .parse_definition import Definition, consistent_parameters, read_definition
@@ -217,6 +218,51 @@ class FilippovSystem:
         system._adopt(read_definition(**given))
         system.lifted = found.switches
         return system
+
+    def holding(self, values: Mapping[Any, float]) -> FilippovSystem:
+        """Hold the discrete states at values: the system between two events, without stops and resets.
+
+        Functions of a point, such as :func:`classify` and :func:`find_equilibrium`, do this themselves, with
+        the values in the point. Portraits, two-folds and manifolds take the system that this returns.
+
+        Parameters
+        ----------
+        values : mapping
+            A number for each discrete state; keys are symbols or names.
+
+        Returns
+        -------
+        FilippovSystem
+            Of the other states.
+
+        Raises
+        ------
+        DefinitionError
+            Other names than those of the discrete states.
+        PointError
+            A value that the discrete state does not have.
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, q = ca.SX.sym("x"), ca.SX.sym("q")
+        >>> on = ns.Reset(x - 18, {q: 1}, -1, level=True, when=q == 0, name="on")
+        >>> off = ns.Reset(x - 22, {q: 0}, 1, level=True, when=q == 1, name="off")
+        >>> room = ns.FilippovSystem([x], field=[30 * q - x], discrete={q: (0, 1)}, resets=[on, off])
+        >>> room.holding({q: 1})
+        FilippovSystem(1 state: x; 0 surfaces)
+        >>> ns.find_equilibrium(room, [20.0, 1]).eigenvalues
+        array([-1.])
+        """
+        key = tuple(held_values(self.definition, values))
+
+        def made() -> FilippovSystem:
+            system = type(self).__new__(type(self))
+            system._adopt(with_values(self.definition, list(key)))
+            system.lifted = self.lifted
+            return system
+
+        return self.cached(("holding", key), made)
 
     def _adopt(self, definition: Definition) -> None:
         self.definition = definition
@@ -765,12 +811,30 @@ def require_system(value: Any, sets: bool = False, hysteresis: bool = False) -> 
         )
 
 
+def parted(system: FilippovSystem, point: ArrayLike) -> tuple[Array, dict[str, float]]:
+    """Split a state (n,) into the states that move and the values of the discrete ones."""
+    x, count = state_values(system.state_names, point), len(system.definition.discrete)
+    values = dict(zip(system.state_names[-count:], x[-count:].tolist(), strict=True))
+    return x[:-count], values
+
+
 def require_plain(system: FilippovSystem, what: str) -> None:
     """Refuse a system whose events have conditions, filters or levels, or that has discrete states."""
     if not system.definition.plain:
         raise DefinitionError(
             f"system: {system!r} has conditions of events, when=, level=, or discrete states, which {what} "
             "does not support. Give guards that are passed."
+        )
+
+
+def require_continuous(system: FilippovSystem, what: str) -> None:
+    """Refuse a system with discrete states."""
+    count = len(system.definition.discrete)
+    if count:
+        values = ", ".join(f"{name!r}: 0" for name in system.state_names[-count:])
+        raise DefinitionError(
+            f"system: {system!r} has discrete states, which {what} does not support. Hold them, as in "
+            f"system.holding({{{values}}})."
         )
 
 

@@ -62,6 +62,7 @@ def orbit_run(
     implicit: list[bool] = []
     events: list[Event] = []
     segments: list[Segment] = []
+    held = system.dimension - len(system.definition.discrete)
     for k, leg in enumerate(legs):
         if leg.duration <= 0.0:
             continue
@@ -81,7 +82,8 @@ def orbit_run(
         coefficients += list(run.steps.coefficients)
         implicit += run.steps.implicit.tolist()
         end, following = leg.t + leg.duration, legs[(k + 1) % len(legs)]
-        segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients)))
+        values = tuple(leg.start[held:].tolist())
+        segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients), values))
         if leg.event:
             modes, of = (leg.mode, following.mode), (leg.element, leg.side)
             after = following.start

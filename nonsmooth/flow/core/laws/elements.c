@@ -299,11 +299,20 @@ static void serve_relay(Run *r, int row) {
   if (r->status == RUNNING) event(r, change_kind(r, before, r->mode), before, row, r->x);
 }
 
+/* A joint holds its function at zero with a reaction of any size and sign: nothing ends that. */
+static void lay_out_joint(const Run *r, Layout *l, int i) { (void)r, (void)l, (void)i; }
+
+static int8_t side_of_joint(const Run *r, int i, double h) {
+  (void)r, (void)i, (void)h;
+  return 0;
+}
+
 static const Law LAWS[] = {
   [SURFACE_LAW] = {lay_out_surface, guard_of_surface, rounding_of_element, side_of_surface, serve_surface},
   [CONTACT_LAW] = {lay_out_contact, guard_of_contact, rounding_of_element, side_of_contact, serve_contact},
   [SET_LAW] = {lay_out_set, guard_of_set, rounding_of_set, side_of_set, serve_set},
   [RELAY_LAW] = {lay_out_surface, guard_of_relay, rounding_of_element, side_of_relay, serve_relay},
+  [JOINT_LAW] = {.lay_out = lay_out_joint, .side = side_of_joint},
 };
 
 static const Law *law_of(const Run *r, int i) { return LAWS + element(r, i)->law; }

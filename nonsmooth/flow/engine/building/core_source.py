@@ -79,7 +79,8 @@ def facts_header() -> str:
     statuses = ", ".join(f"{s.name} = {s.value}" for s in Status)
     lines.append(f"enum {{ {statuses}, {', '.join(f'{n} = {numbers[n]}' for n in states)} }};")
     lines.append(f"enum {{ {', '.join(k.upper() for k in constants.KINDS)}, KINDS }};")
-    for ending, names in (("GUARD", constants.GUARDS), ("LAW", constants.LAWS)):
+    laws = (("LAW", constants.LAWS), ("IMPACTS", constants.IMPACT_LAWS))
+    for ending, names in (("GUARD", constants.GUARDS), *laws):
         lines.append(f"enum {{ {', '.join(f'{k.upper()}_{ending}' for k in names)} }};")
     lines.append(f"enum {{ {', '.join(f'METHOD_{m.upper()}' for m in constants.METHODS)} }};")
     lines.append(f"enum {{ {', '.join(r.upper() or 'NO_REASON' for r in constants.REASONS)} }};")

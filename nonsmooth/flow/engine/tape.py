@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
 from ...model.printing.tape import Entries, Series, Tape, Values, derived_series_of, tape_of
@@ -196,6 +194,9 @@ class _Held:
 
 def _places(entries: Entries, n: int) -> NDArray[np.int32]:
     """States in an order in which those that are coupled are close: reverse Cuthill-McKee."""
+    from scipy.sparse import coo_array  # slow to import
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
     of_states = (entries.row < n) & (entries.column < n)
     places = (entries.row[of_states], entries.column[of_states])
     graph = coo_array((np.ones(len(places[0])), places), shape=(n, n)).tocsr()
@@ -362,13 +363,8 @@ class TapeEngine:
                 state, c_options, output.pointer, *given, options.t_start, address(motion)
             )
             while True:
-                # Python hears Ctrl-C between the calls.
-                while (status := library().run_continue(state, BURST)) == RUNNING:
-                    pass
+                status = self._continued(state)
                 numbers, counts, active, several, rates = self._read(state)
-                if status == NEEDS_PROGRAM:
-                    self.add_implicit()
-                    continue
                 if status != FULL:
                     break
                 recorder.make_room(counts[7:10])
@@ -398,6 +394,13 @@ class TapeEngine:
             dense=dense,
             **recorded,
         )
+
+    def _continued(self, state: int) -> int:
+        """Go on until a run ends or its arrays are full; Python hears Ctrl-C between the calls."""
+        while (status := library().run_continue(state, BURST)) in (RUNNING, NEEDS_PROGRAM):
+            if status == NEEDS_PROGRAM:
+                self.add_implicit()
+        return int(status)
 
     def is_stiff(self, x: Array, p: Array, options: Options) -> bool:
         """Whether a run takes implicit steps soon."""

@@ -148,13 +148,13 @@ def ensemble(
     step = sampling.room is None and t_end > t_start and device is None
     chosen = engine_for(system, options, starts, step)
     job = Job(system, options, number, sampling.times, sampling.room, chosen)
-    if device is not None:
-        require_device(job, device, work.executor is not None)
     return _run(job, starts, work, device)
 
 
 def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     system, count = starts.system, starts.count
+    if device is not None:
+        require_device(job, device, work.executor is not None)
     away = (
         None
         if device is None

@@ -273,13 +273,16 @@ IMPLICIT_STEP = 1 << 30
 #: Steps that a run may take: what costs least, or one kind.
 METHODS = ("auto", "taylor", "stiff")
 
-#: Implicit steps have seven stages in place of five below this relative tolerance, end Newton's method at this part
-#: of it (or where it changes nothing but rounding, between two bounds), and are tried after so many Taylor steps in a row that were held by a decay rate, first with so many times
-#: their length, given up after so many in a row that Taylor steps would have made at less cost; matrices are dense, so that systems of more states have none.
+#: Implicit steps have seven stages in place of five below this relative tolerance. Newton's method ends at this part
+#: of it, or where it changes nothing but rounding, between two bounds. They are tried where a decay rate allows Taylor
+#: steps hardly longer (this part) in so many of them, of each fourth, first with so many times their length, and given
+#: up after so many in a row that Taylor steps would have made at less cost. Matrices are dense: systems of more states
+#: than these have none.
 SEVEN_STAGES = 3e-9
 NEWTON = 0.01
 LEAST_CHANGE, MOST_CHANGE = 1e-7, 1e-2
-HELD_STEPS = 16
+HELD_PART = 0.6
+HELD_STEPS, EVERY_STEP = 4, 4
 EIGHTFOLD = 8.0
 IDLE_STEPS = 5
 MOST_STATES = 1500

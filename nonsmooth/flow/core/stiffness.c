@@ -83,7 +83,9 @@ static double cost_ratio(const Run *r) {
  * made once it is there. */
 static void watch_decay(Run *r, const Expansion *e, double h) {
   Collocation *m = r->collocation;
-  double last = 0, before = 0, limit = 0.6 * longest_decay(r);
+  double last = 0, before = 0, limit;
+  if (r->step_count % EVERY_STEP) return;
+  limit = HELD_PART * longest_decay(r);
   for (int i = 0; i < r->s->dimension; i++) {
     const double *c = e->states + (int64_t)i * r->stride;
     last = larger(fabs(c[r->order]) / e->allowed[i], last);

@@ -58,6 +58,9 @@ SHARE_SPREAD = 0.05
 #: Close to rest on a surface with a root steps are shorter than flights by the inverse of this, and below rounding.
 ROOT_REST = 1e-7
 
+#: Steps of Newton's method to where complementarity conditions jump, and part of a state by which it is differenced.
+JUMP_STEPS, DIFFERENCED = 60, 1e-7
+
 #: Part of the time in which the states change by their size over which a rate is differenced.
 REACH = 1e-6
 
@@ -105,6 +108,9 @@ ROOT_ROUNDING = 16 * EPSILON
 
 #: A point is on a surface where h is zero to this much of its terms.
 ON_SURFACE = 16 * EPSILON
+
+#: A state satisfies a constraint that is zero to this part of its terms, and is projected onto it.
+CONSISTENT = 1e-8
 
 #: A coefficient of a guard below this part of its terms is zero by rounding.
 VANISHES = 64 * EPSILON
@@ -208,7 +214,8 @@ DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 #: Kinds of events, by number in ensembles and in C.
 KINDS = (
     *("crossing", "entry", "exit", "stop", "reset"),
-    *("impact", "contact", "release", "stability", "rest", "rest_below", "end"),
+    *("impact", "contact", "release", "stability", "rest", "rest_below", "jump"),
+    "end",
 )
 
 #: The first and the last of these, as many, can happen without resets and impacts.
@@ -264,6 +271,9 @@ REASONS = (
     "undetermined",
     "high_degree",
     "discrete_value",
+    "no_jump",
+    "off_constraint",
+    "dead_point",
     "decay",
 )
 

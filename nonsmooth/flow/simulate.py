@@ -125,7 +125,7 @@ def simulate(
     >>> run.itinerary, bool(abs(run.x[-1, 0] + 0.2) < 1e-9)
     ('- + - + s', True)
     """
-    require_system(system, sets=True, hysteresis=True)
+    require_system(system, sets=True, hysteresis=True, complementarity=True, joints=True)
     x0, t_start, parameters = _begun(start, x0, t_start, parameters)
     if t_end is None:
         raise OptionError("t_end is missing. Give the time at which the run ends.")

@@ -5,7 +5,7 @@ static int change_kind(const Run *r, int before, int after) {
   const int8_t *two = r->table->letter + (int64_t)after * r->width;
   int closed = 0, slides = 0;
   for (int i = 0; i < r->width; i++)
-    if (has_law(r, i, CONTACT_LAW)) closed += (two[i] == 0) - (one[i] == 0);
+    if (is_half_line(r, i)) closed += (two[i] == 0) - (one[i] == 0);
     else slides += (two[i] == 0) - (one[i] == 0);
   if (closed) return closed > 0 ? CONTACT : RELEASE;
   return slides > 0 ? ENTRY : slides < 0 ? EXIT : CROSSING;
@@ -58,6 +58,7 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
     memcpy(r->chosen.letter, letter, r->width);
     memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
     keep_carried(r, letter, r->chosen.unknowns);
+    if (r->s->joints && !hold(r, &r->chosen, 0)) return 0;
   }
   adopt(r, &r->chosen);
   return 1;
@@ -86,13 +87,18 @@ static void strike_due(Run *r) {
   }
 }
 
-/* Find the mode of a state that was jumped to. */
-static void settle_in(Run *r) {
+/* Find the mode of a state that was jumped to; whether complementarity conditions made it jump on. */
+static int settle_in(Run *r) {
+  Met met = r->met;
+  int before = r->mode, jumped = become_consistent(r);
   letters_of(r, r->start);
   active_surfaces(r, -1, r->start);
-  if (r->status != RUNNING) return;
+  if (r->status != RUNNING) return jumped;
   choose(r, r->start, 0, 0);
   strike_due(r);
+  if (jumped) event(r, JUMP, before, 0, r->jumped_from);
+  r->met = met;
+  return jumped;
 }
 
 /* Guards of the active elements in the mode that a run starts in: whether it can. Sliding from which both sides lead
@@ -106,7 +112,8 @@ static int can_start(Run *r) {
   for (int row = 0; row < e->l.rows; row++) {
     int kind = e->l.kind[row], index = e->l.index[row], active = 0;
     r->turned[row] = e->guards[(int64_t)row * r->stride] < 0 ? -1 : 1;
-    if (kind != SURFACE_GUARD && kind != EXIT_GUARD && kind != SLIP_GUARD && kind != NEAR_GUARD) continue;
+    int is_of_law = kind == SURFACE_GUARD || kind == EXIT_GUARD || kind == SLIP_GUARD || kind == NEAR_GUARD;
+    if (!is_of_law && !(kind == RELEASE_GUARD && has_law(r, index, COMPLEMENTARITY_LAW))) continue;
     if (kind == NEAR_GUARD && r->letter[index] == 0) continue; /* ends steps only */
     for (int j = 0; j < r->active_count; j++) active |= r->active[j] == index;
     if (!active) continue;
@@ -134,6 +141,7 @@ static void start_in(Run *r, const int8_t *asked) {
   memcpy(r->letter, letter, r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
+  if (r->s->joints > 1) find_dependent(r, &r->now, r->letter, r->unknowns);
   mode_solutions(r, &r->now, &all);
   if (all.count > 1) keep_stable(r, &r->now, &all);
   if (all.count != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, all.count); return; }
@@ -149,13 +157,14 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   int finite = letters_of(r, r->letter);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
+  int before = r->mode, jumped = finite && become_consistent(r);
   if (!finite) { finish(r, NOT_FINITE, SURFACE, 0); return; }
   active_surfaces(r, -1, r->letter);
   if (r->status == RUNNING) {
     project(r, r->involved, gather(r, -1, r->m, r->involved));
     renote(r);
     if (start_mode) start_in(r, start_mode);
-    else if (r->active_count) {
+    else if (r->active_count || r->s->joints) {
       memcpy(r->start, r->letter, r->width);
       choose(r, r->start, 0, 0);
     }
@@ -163,6 +172,7 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   r->shown = shown_number(r, r->letter);
   enter_segment(r, r->shown);
   strike_due(r);
+  if (jumped) event(r, JUMP, before, 0, r->jumped_from);
   begin_events(r, motion);
 }
 
@@ -204,7 +214,8 @@ static void impact(Run *r, int row) {
 
 static void release(Run *r, int row) {
   int before = r->mode, i = r->now.index[row];
-  Known known[] = {{RELEASE_GUARD, i, 0, 1}, {IMPACT_GUARD, i, 1, 3}};
+  Known known[] = {{RELEASE_GUARD, i, 0, 1}, {IMPACT_GUARD, i, 1, degree_of(r, i) + 1}};
+  if (has_law(r, i, COMPLEMENTARITY_LAW)) known[1].kind = SURFACE_GUARD;
   active_surfaces(r, i, r->letter);
   if (r->status != RUNNING) return;
   memcpy(r->start, r->letter, r->width);
@@ -213,7 +224,8 @@ static void release(Run *r, int row) {
 
 static int only_sliding(const Run *r) {
   int found = -1;
-  for (int i = 0; i < r->m; i++) if (r->letter[i] == 0) { if (found >= 0) return -1; found = i; }
+  for (int i = 0; i < r->m; i++)
+    if (r->letter[i] == 0 && is_bounded(r, i)) { if (found >= 0) return -1; found = i; }
   return found;
 }
 
@@ -234,7 +246,7 @@ static void pass(Run *r, int row, const Known *known, int known_count) {
   project(r, r->involved, gather(r, index, r->width, r->involved));
   renote(r);
   if (kind == EXIT_GUARD || kind == BRANCH_GUARD) watch_two_fold(r);
-  else if (kind == SURFACE_GUARD && !is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
+  else if (kind == SURFACE_GUARD && degree_of(r, index) && !is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
   if (r->status != RUNNING) return;
   memcpy(r->start, r->letter, r->width);
   take_sides(r, r->start, index);
@@ -252,6 +264,10 @@ static void serve_set(Run *r, int row) {
   int i = r->now.index[row];
   Known known[] = {{SLIP_GUARD, i, 0, 1}, {NEAR_GUARD, i, 0, 2}};
   if (r->now.kind[row] == NEAR_GUARD) near_set(r, row, 1); else pass(r, row, known, 2);
+}
+
+static void serve_complementarity(Run *r, int row) {
+  if (r->now.kind[row] == SURFACE_GUARD) pass(r, row, 0, 0); else release(r, row);
 }
 
 static void serve_contact(Run *r, int row) {
@@ -285,6 +301,11 @@ static int advance(Run *r, const Expansion *e, double dt) {
   r->segment_steps++;
   kept = kept_by(r, r->letter, r->involved);
   project(r, r->involved, kept);
+  if (r->s->joints) {
+    surface_values(r, r->x);
+    require_joints(r, surface_scales(r, r->x));
+    if (r->status != RUNNING) r->reason = DEAD_POINT;
+  }
   if (e->l.slides || r->s->sets) {
     double *ahead = r->lam;
     for (int i = 0; i < r->width; i++) ahead[i] = value_at(e->series + (int64_t)i * stride, r->order, dt);

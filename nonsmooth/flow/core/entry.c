@@ -69,7 +69,7 @@ static size_t place_decision(Run *r, char *base, size_t used) {
   to->pivot = INTEGERS(8 * w + 8); to->proved = INTEGERS(w);
   to->is_contact = LETTERS(w); to->is_idle = LETTERS(w); to->is_touched = LETTERS(w); to->is_known = LETTERS(w);
   to->state = LETTERS(orders + w); to->block_state = LETTERS(3 * w); to->large_class = LETTERS(w);
-  to->matrix = DOUBLES(square); to->share = DOUBLES(square);
+  to->matrix = DOUBLES(square); to->share = DOUBLES(square); to->joint = DOUBLES(square); to->through = DOUBLES(square);
   to->a = DOUBLES(orders); to->b = DOUBLES(orders); to->nu = DOUBLES(orders); to->floor = DOUBLES(orders);
   to->turn = DOUBLES(w); to->sign = DOUBLES(w); to->old = DOUBLES(w); to->yard = DOUBLES(w); to->room = DOUBLES(w);
   to->steep = DOUBLES(w); to->block = DOUBLES(6 * square + 8 * w); to->large = DOUBLES(w);
@@ -98,6 +98,10 @@ static size_t place_run(Run *r, char *base) {
   r->at_x = DOUBLES(n);
   r->before = DOUBLES(n);
   r->saved = DOUBLES(n);
+  int jumping = 0;
+  for (int i = 0; i < s->m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;
+  r->jumped_from = DOUBLES(n);
+  r->jump_work = DOUBLES(jumping ? (size_t)n * (2 * n + jumping + 1) : 0);
   r->speed = DOUBLES(w);
   r->at_root = DOUBLES(3 * n);
   r->at_work = DOUBLES(n);
@@ -107,7 +111,7 @@ static size_t place_run(Run *r, char *base) {
   r->tried_letter = LETTERS(2 * w);
   r->drop = INTEGERS(g);
   r->active = INTEGERS(w);
-  r->involved = INTEGERS(3 * w + 2 * all + 1);
+  r->involved = INTEGERS(3 * w + 4 * all + 1);
   r->p = DOUBLES(s->parameters);
   r->series = DOUBLES(pair_room(s->series.size, stride));
   r->rounding = DOUBLES(s->series.size);

@@ -8,7 +8,7 @@
 enum { LEVEL = 1, BY_JUMPS = 2, PERSISTENT = 4, AT_TRIGGER = 8 };
 
 static void serve(Run *r, int row);
-static void settle_in(Run *r);
+static int settle_in(Run *r);
 
 static int is_true(const int32_t *code, int count, const int8_t *side) {
   int8_t stack[MOST_CODES];
@@ -361,9 +361,11 @@ static void settle_instant(Run *r) {
     if (r->status == RUNNING) after_jump(r, -1);
     return;
   }
-  if (jumped) settle_in(r);
+  if (jumped) keep_truths(r);
+  jumped = jumped && settle_in(r);
   i->unsettled = 0;
   if (r->status != RUNNING) return;
+  if (jumped) { after_jump(r, -1); return; }
   keep_truths(r);
   leave_zeros(r);
   if (r->status != RUNNING) return;

@@ -3,7 +3,16 @@
 static const Element *element(const Run *r, int i) { return r->s->element + i; }
 static int degree_of(const Run *r, int i) { return element(r, i)->degree; }
 static int is_scaled(const Run *r, int i) { return element(r, i)->flags & SCALED; }
+static int has_law(const Run *r, int i, int law) { return element(r, i)->law == law; }
 static int size_of(const Run *r, int i) { return element(r, i)->k; }
+
+/* Whether the multiplier of an element is not negative, and zero where it is open: contacts, complementarity. */
+static int is_half_line(const Run *r, int i) {
+  return element(r, i)->law == CONTACT_LAW || element(r, i)->law == COMPLEMENTARITY_LAW;
+}
+
+/* Whether an unknown is in a set of finite size: not reactions. */
+static int is_bounded(const Run *r, int i) { return !is_half_line(r, i) && !has_law(r, i, JOINT_LAW); }
 
 /* The set of a function, as its first one, or -1; all sets. */
 static int set_of(const Run *r, int i) { return element(r, i)->law == SET_LAW ? element(r, i)->first : -1; }
@@ -84,7 +93,7 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
 
 /* Letters as the multipliers that are known: +1 and -1, 0 for what slides, open and closed contacts. */
 static const double *held_of(Run *r, const int8_t *letter) {
-  for (int i = 0; i < r->width; i++) r->held[i] = i >= r->m ? 0 : letter[i] > 1 ? r->direction[i] : letter[i];
+  for (int i = 0; i < r->width; i++) r->held[i] = is_half_line(r, i) ? 0 : letter[i] > 1 ? r->direction[i] : letter[i];
   return r->held;
 }
 

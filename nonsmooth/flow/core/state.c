@@ -50,7 +50,7 @@ typedef struct {
    * the time, nothing to be checked; the latter: 0 if affine in states and time, polynomials are exact. */
   const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
-  int32_t sets, kept_rows, impact_law; /* sets: of codimension two and more; kept_rows: see Element */
+  int32_t sets, kept_rows, impact_law, joints; /* sets: of codimension two and more; kept_rows: see Element */
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
   int32_t early_count, early_free_count;
@@ -103,7 +103,7 @@ typedef struct {
   const int8_t *letter;
   int32_t *own, *order, *first, *mark, *pivot, *proved;
   int8_t *is_contact, *is_idle, *is_touched, *is_known, *state, *block_state, *large_class;
-  double *matrix, *share, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
+  double *matrix, *share, *joint, *through, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
   double most, field, rate;
   Motion motion[SEVERAL];
 } Decision;
@@ -169,6 +169,7 @@ typedef struct {
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
   double *saved, *speed, *at_root; /* a state to return to; of each surface at its last zero */
+  double *jumped_from, *jump_work; /* the state before the last jump of complementarity conditions */
   int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
   int32_t shown, has_roots, held_steps, wants_program; /* held_steps: steps in a row that a decay rate held */
   Collocation *collocation;

@@ -184,7 +184,7 @@ def guard_of(system: FilippovSystem, code: int) -> Guard:
     kind, side, i, m = GUARDS[code & 15], (code >> 4 & 3) - 1, code >> 6, system.surface_count
     if kind in ("stop", "reset"):
         return Guard(kind, i, (system.stops if kind == "stop" else system.resets)[i][1], i)
-    if kind in ("impact", "release"):
+    if kind in ("impact", "release") and i >= m:
         return Guard(kind, i - m, side, len(system.entries) + i - m)
     return Guard(kind, i, 0 if kind == "branch" else side, system.entry_of(i))
 
@@ -253,11 +253,14 @@ def options_of(
 
 def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
     """Whether the guards of each kind have a name that is looked for."""
+    own = [name if i in system.half_lines else "" for i, name in enumerate(system.surface_names)]
+    half_lines = [*own, *system.impacts]
     names = {
         **dict.fromkeys(("surface", "near"), system.surface_names),
         "stop": [name for name, _ in system.stops],
         "reset": [name for name, _ in system.resets],
-        **dict.fromkeys(("impact", "release"), [""] * system.surface_count + [*system.impacts]),
+        "impact": half_lines,
+        "release": half_lines,
     }
     width = max(system.surface_count + 1, *map(len, names.values()))
     named = np.zeros((len(GUARDS), width), np.int8)
@@ -265,8 +268,8 @@ def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
         if hits.names is None:
             row[:] = 1
         else:
-            own = names.get(kind, ())
-            row[: len(own)] = [name in hits.names for name in own]
+            of_kind = names.get(kind, ())
+            row[: len(of_kind)] = [name in hits.names for name in of_kind]
     return named
 
 

@@ -211,7 +211,9 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
     if reason == "slid_to_two_fold":
         return messages.slid_to_two_fold(system.entry_of(run.where))
     if reason == "ambiguous":
-        return messages.ambiguous([system.spelled(mode) for mode in run.several])
+        names = [system.surface_names[members[0]] for members in system.entries]
+        several = [system.spelled(mode) for mode in run.several]
+        return messages.ambiguous(several, [*names, *system.impacts])
     if reason == "wrong_start":
         return messages.wrong_start(str(options.start_mode), modes[run.where])
     if reason == "start_solutions":
@@ -236,6 +238,14 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
     contacts = _contacts(system, run)
     if reason == "behind":
         return messages.behind(system.impacts[run.where], t)
+    if reason == "no_jump":
+        return messages.no_jump(system.surface_names[run.where], t)
+    if reason == "off_constraint":
+        what = "Function" if run.where < system.surface_count else "Rate of the function"
+        name = system.constraints[system.joints.index(run.where % system.surface_count)]
+        return messages.off_constraint(name, what, run.limit, t)
+    if reason == "dead_point":
+        return messages.dead_point(system.constraints, t)
     if reason == "no_impulse":
         return messages.no_impulse(system.impacts[run.where], t)
     if reason == "restitution":
@@ -261,5 +271,5 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
 
 def _contacts(system: FilippovSystem, run: Run) -> list[str]:
     """Names of the contacts at the last point that was decided."""
-    first = system.surface_count
-    return [system.impacts[i - first] for i in run.active if i >= first]
+    m, names = system.surface_count, [*system.surface_names, *system.impacts]
+    return [names[i] for i in run.active if i >= m or i in system.half_lines]

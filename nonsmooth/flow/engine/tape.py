@@ -96,7 +96,7 @@ class _System(ctypes.Structure):
         *[(name, _POINTER) for name in ("slope_output", "slope_moves", "slope_symmetric")],
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
-        *[(name, _I32) for name in ("affine", "sets", "kept_rows", "impact_law")],
+        *[(name, _I32) for name in ("affine", "sets", "kept_rows", "impact_law", "joints")],
         *[(name, _POINTER) for name in ("mixed", "early", "early_free")],
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
@@ -149,6 +149,7 @@ def _elements(coupled: Coupled) -> list[_Element]:
         i, k, further = members[0], len(members), len(coupled.lower[members[0]])
         flags = coupled.continuous[i] + 2 * coupled.scaled[i]
         law, degree = LAWS.index(name), 1 if i in system.remembering else further + 1
+        degree = 0 if i in system.algebraic else degree
         size = (system.layer_widths[i], coupled.powers[i])
         made += [_Element(law, i, k, degree, lower, flags, *size)] * k
         lower += further
@@ -276,6 +277,7 @@ class TapeEngine:
             "early_free": tape.free.early,
         }
         made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
+        made.joints = len(system.joints)
         made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
         table = (_Element * (len(elements) + 1))(*elements)
         made.element = self._at(np.frombuffer(bytes(table), np.uint8))
@@ -485,9 +487,11 @@ class TapeEngine:
 
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``core/state.c`` for those of sets."""
-        m = self.system.surface_count
-        surfaces = ("-s+*blli"[sign + 1] for sign in signs[:m])
-        return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
+        m, half_lines = self.system.surface_count, self.system.half_lines
+        letters = ["-s+*blli"[sign + 1] for sign in signs[:m]]
+        for i in half_lines:
+            letters[i] = "o" if signs[i] else "c"
+        return "".join([*letters, *("o" if sign else "c" for sign in signs[m:])])
 
     # many trajectories -------------------------------------------------------------------------
 

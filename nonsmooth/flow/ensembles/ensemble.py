@@ -126,7 +126,7 @@ def ensemble(
         start_mode=start_mode,
         method=method,
     )
-    require_system(system, sets=True, hysteresis=True)
+    require_system(system, sets=True, hysteresis=True, complementarity=True, joints=True)
     work = checked_work(work)
     if start_mode is not None:
         system.require_mode(start_mode)

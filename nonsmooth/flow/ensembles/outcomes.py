@@ -173,7 +173,7 @@ def outcomes(
     """
     rtol, atol = tolerances(tol, rtol, atol)
     options = Options(t_end=t_end, t_start=t_start, rtol=rtol, atol=atol)
-    require_system(system, sets=True, hysteresis=True)
+    require_system(system, sets=True, hysteresis=True, complementarity=True, joints=True)
     work = checked_work(work)
     if work.store is not None:
         raise OptionError("work has a store, but outcomes keeps no runs. Leave out store=.")

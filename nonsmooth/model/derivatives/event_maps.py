@@ -189,14 +189,15 @@ def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -
     taking = [contact, *[j for j, letter in takes if letter == "c"]]
     held = dict(zip(carried, letters, strict=False))
     numbers = ca.SX([{"+": 1.0, "-": -1.0}.get(held.get(i, mode[i]), 0.0) for i in range(m)])
-    stuck = [i for i in carried if held[i] == "s"]
-    every = [*stuck, *[m + j for j in taking]]
+    kept = [*system.joints, *[i for i in carried if held[i] == "s"]]
+    every = [*kept, *[m + j for j in taking]]
     columns = ca.jacobian(coupled.field, coupled.symbols_of(every))
     columns = ca.substitute(columns, coupled.multipliers, numbers) if m else columns
-    rates = ca.vertcat(d.surfaces, d.gap_rates)[every]
+    own = [[d.surfaces[i], *coupled.lower[i]][-1] for i in kept]
+    rates = ca.vertcat(*own, d.gap_rates[taking])
     slope = ca.mtimes(ca.jacobian(rates, system.extended_states), columns)
-    back, k = d.restitutions[taking], len(stuck)
-    if d.impact_law == "poisson":  # friction is the same in both parts
+    back, k = d.restitutions[taking], len(kept)
+    if d.impact_law == "poisson":  # what is kept by friction or joints is so in both parts
         impulses = (1 + back) * solved(slope, -rates)[k:]
         if k:
             rest = -rates[:k] - ca.mtimes(slope[:k, k:], impulses)

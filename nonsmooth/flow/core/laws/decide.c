@@ -23,6 +23,7 @@ typedef struct {
   double tie; /* part of terms that is zero */
   const int32_t *own;
   double *a, *b, *matrix, *share, *floor; /* share: bounds by the reactions in the block; floor: rounding of w */
+  double *room; /* rounding of nu where the diagonal does not say it, or NULL */
   int8_t *state, *is_contact;
 } Block;
 
@@ -137,6 +138,7 @@ static double rate_of(const Block *k, int i, const double *nu, double *terms) {
 static double zero_of(const Block *k, int i, double terms) { return larger(k->floor[i], k->tie * terms); }
 static double room_zero(const Block *k, int i, double zero, double bound) {
   double own = fabs(k->matrix[i * (k->size + 1)]), most = k->tie * fabs(bound);
+  if (k->room) return larger(k->room[i], most);
   return own > 0 ? larger(zero / own, most) : most;
 }
 
@@ -468,6 +470,41 @@ static void find_blocks(Decision *d) {
   for (int i = 0; i < d->count; i++) if (!d->mark[i]) visit(d, i, &time, &top);
 }
 
+/* Reactions of joints follow from the other unknowns. Rows of the law have them eliminated: row i less these parts of
+ * those of the joints, (count, joints), at ``d->through``; ``d->joint`` is the inverse of the joints' own matrix. */
+static void read_joints(Run *r, Decision *d) {
+  int first = r->m - r->s->joints, n = r->s->joints, w = r->width, k = d->count;
+  double *m = d->work, *size = m + n * n, *rest = size + n;
+  if (!n) return;
+  for (int i = 0; i < n; i++) {
+    size[i] = 1;
+    for (int j = 0; j < n; j++) m[i * n + j] = r->slope[(first + i) * w + first + j];
+  }
+  invert_any(m, n, size, d->joint, rest, d->pivot);
+  for (int i = 0; i < k; i++)
+    for (int j = 0; j < n; j++) {
+      double *part = d->through + i * n + j;
+      *part = 0;
+      for (int q = 0; q < n; q++) *part += r->slope[d->own[i] * w + first + q] * d->joint[q * n + j];
+    }
+}
+
+/* Rounding of a row with that of the joints. */
+static double with_rounding(const Run *r, const Decision *d, int i, const double *of) {
+  int first = r->m - r->s->joints;
+  double sum = of[d->own[i]];
+  for (int j = 0; j < r->s->joints; j++) sum += fabs(d->through[i * r->s->joints + j]) * of[first + j];
+  return sum;
+}
+
+/* A row of the law from one of each element: its own less that of the joints, ``of`` being those of all. */
+static double beside_joints(const Run *r, const Decision *d, int i, const double *of, int64_t apart) {
+  int first = r->m - r->s->joints;
+  double sum = of[d->own[i] * apart];
+  for (int j = 0; j < r->s->joints; j++) sum -= d->through[i * r->s->joints + j] * of[(first + j) * apart];
+  return sum;
+}
+
 /* Rows and bounds at a point with all active unknowns zero, and rounding in both; 0 where they are no numbers. */
 static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b, double *floor, double *room) {
   int k = d->count, w = r->width;
@@ -480,10 +517,12 @@ static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b,
   gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
   for (int i = 0; i < r->n; i++) near[i] = fabs(x[i]);
   gradient_sums(r, &r->s->point, r->point, first_of_factors(r), &r->s->factor_gradient, w, near, 1, factor);
+  read_joints(r, d);
+  for (int i = 0; i < w; i++) r->lam[i] = layer_of(r, i);
   for (int i = 0; i < k; i++) {
     int own = r->active[i];
-    a[i] = d->turn[i] * layer_of(r, own);
-    floor[i] = VANISHES * r->small[own];
+    a[i] = d->turn[i] * beside_joints(r, d, i, r->lam, 1);
+    floor[i] = VANISHES * with_rounding(r, d, i, r->small);
     b[i] = d->is_contact[i] || d->is_idle[i] ? 0 : factor_of(r, own);
     room[i] = VANISHES * factor[own];
     if (fabs(b[i]) <= room[i]) b[i] = 0;
@@ -498,7 +537,7 @@ static int read_law(Run *r, Decision *d) {
   memset(d->share, 0, sizeof(double) * k * k);
   for (int i = 0; i < k; i++) {
     int own = d->own[i] = r->active[i];
-    d->is_contact[i] = has_law(r, own, CONTACT_LAW);
+    d->is_contact[i] = (int8_t)is_half_line(r, own);
     d->turn[i] = d->is_contact[i] ? -1 : 1;
     d->is_idle[i] = element(r, own)->flags & CONTINUOUS;
     for (int j = 0; j < r->c && own < r->m; j++) carried |= r->s->carries[own * r->c + j];
@@ -506,7 +545,7 @@ static int read_law(Run *r, Decision *d) {
   if (!read_rows(r, d, r->x, d->a, d->b, d->floor, d->work)) return 0;
   for (int i = 0; i < k; i++)
     for (int j = 0; j < k; j++)
-      d->matrix[i * k + j] = d->is_idle[j] ? 0 : -d->turn[i] * r->slope[d->own[i] * w + d->own[j]];
+      d->matrix[i * k + j] = d->is_idle[j] ? 0 : -d->turn[i] * beside_joints(r, d, i, r->slope + d->own[j], w);
   for (int j = 0; carried && j < k; j++) { /* bounds are affine in the reactions */
     if (!d->is_contact[j]) continue;
     r->held[d->own[j]] = 1;
@@ -567,6 +606,7 @@ static void find_touched(Decision *d, const int8_t *letter) {
 /* Coefficients of an order without its unknowns. */
 static void begin_order(Run *r, Expansion *e, int order) {
   for (int i = 0; i < r->active_count; i++) e->series[(int64_t)r->active[i] * r->stride + order] = 0;
+  for (int i = r->m - r->s->joints; i < r->m; i++) e->series[(int64_t)i * r->stride + order] = 0;
   open_order(r, e, order);
 }
 
@@ -603,7 +643,7 @@ static void read_noise(Run *r, Decision *d) {
   for (int i = 0; i < k; i++) {
     int own = d->own[i];
     double of = height[degree_of(r, own) > 1 ? element(r, own)->lower + degree_of(r, own) - 2 : own];
-    d->steep[i] = steep[own];
+    d->steep[i] = with_rounding(r, d, i, steep);
     if (!(of > 0)) continue;
     d->field = larger(d->field, d->yard[i] / of);
     d->rate = larger(d->rate, d->steep[i] / of);
@@ -617,9 +657,10 @@ static void read_order(Run *r, Decision *d, int order) {
   double speed = 0, drift = VANISHES * d->field;
   for (int i = 2; i <= order; i++) drift *= d->rate / i;
   for (int i = 0; i < r->n; i++) speed = larger(fabs(e->states[(int64_t)i * r->stride + order]), speed);
+  for (int i = 0; i < w; i++) r->lam[i] = row_of(r, r->n + i)[order];
   for (int i = 0; i < k; i++) {
     int at = order * k + i;
-    d->a[at] = d->turn[i] * row_of(r, r->n + d->own[i])[order];
+    d->a[at] = d->turn[i] * beside_joints(r, d, i, r->lam, 1);
     d->b[at] = d->is_contact[i] || d->is_idle[i] ? 0 : d->sign[i] * row_of(r, r->n + 2 * w + d->own[i])[order];
     d->floor[at] = d->steep[i] * (VANISHES * (order + 1) * speed + drift);
     if (d->state[at] == UNDECIDED && !d->is_contact[i]) turn_bound(d, i, d->b + at);
@@ -694,6 +735,23 @@ static Block part_of_law(Decision *d, int order, int which) {
   return b;
 }
 
+/* Rounding of the unknowns through an inverse of the matrix, and of the rates by them: a row may hold no own unknown,
+ * and no state, as those of a diode bridge. */
+static void add_rounding(Decision *d, Block *b) {
+  int n = b->size, any = 0;
+  double *room = b->share + n * n, *inverse = d->work, *ones = inverse + n * n;
+  for (int i = 0; i < n; i++) any |= b->is_contact[i] && b->matrix[i * (n + 1)] == 0;
+  if (n < 2 || !any) return;
+  for (int i = 0; i < n; i++) ones[i] = 1;
+  if (!invert_any(b->matrix, n, ones, inverse, ones + n, d->pivot)) return;
+  for (int i = 0; i < n; i++) {
+    room[i] = 0;
+    for (int j = 0; j < n; j++) room[i] += fabs(inverse[i * n + j]) * b->floor[j];
+  }
+  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) b->floor[i] += fabs(b->matrix[i * n + j]) * room[j];
+  b->room = room;
+}
+
 /* What is proved of each block, once. */
 static int certificate_of(Decision *d, const Block *b, int which) {
   if (d->proved[which] < 0)
@@ -705,6 +763,7 @@ static int certificate_of(Decision *d, const Block *b, int which) {
 static int solutions_of(Run *r, Decision *d, int order, int which, double *found, int8_t *class) {
   Block b = part_of_law(d, order, which);
   int n = b.size, count;
+  add_rounding(d, &b);
   int8_t *position = b.is_contact + d->count;
   for (int i = 0; i < n; i++) {
     int letter = d->letter[d->own[b.own[i]]], is_open = b.is_contact[i] && letter;
@@ -855,6 +914,17 @@ static void add_motion(Run *r, Decision *d, int orders) {
       own->series[i * COMPARED + j - 1] = r->trial.states[(int64_t)i * r->stride + j];
 }
 
+/* Coefficients of the joints' reactions that keep them with the other unknowns. */
+static void hold_joints_in(Run *r, const Decision *d, Expansion *e, int order) {
+  int first = r->m - r->s->joints, n = r->s->joints;
+  for (int i = 0; i < n; i++) {
+    double sum = 0;
+    for (int j = 0; j < n; j++) sum += d->joint[i * n + j] * row_of(r, r->n + first + j)[order];
+    e->series[(int64_t)(first + i) * r->stride + order] = -sum;
+  }
+  close_order(r, e, order);
+}
+
 /* Close an order with the unknowns that were found. */
 static void close_with(Run *r, Decision *d, int order) {
   Expansion *e = &r->trial;
@@ -862,6 +932,7 @@ static void close_with(Run *r, Decision *d, int order) {
   for (int i = 0; i < d->count; i++)
     e->series[(int64_t)d->own[i] * r->stride + order] = d->sign[i] * d->nu[order * d->count + i];
   close_order(r, e, order);
+  if (r->s->joints) hold_joints_in(r, d, e, order);
   if (r->s->sets) close_sets(r, e, order);
   next_states(r, e, order);
 }
@@ -964,6 +1035,25 @@ static int is_determined(Run *r, const Layout *l, const int8_t *letter) {
   return 1;
 }
 
+/* Note a mode whose unknowns are not determined; whether the motion is, in spite of that. */
+static int find_dependent(Run *r, const Layout *l, const int8_t *letter, const double *unknowns) {
+  error_scales(r, r->x, held_of(r, letter), unknowns);
+  if (l->slides < 2 || invert_layer(r, l, unknowns, r->matrix)) return 1;
+  r->dependent = l->mode;
+  return is_determined(r, l, letter);
+}
+
+/* Unknowns of a mode, which is laid out, that keep what it holds: bounds that were reached to a tolerance are exact then.
+ * 0 where the run ends. */
+static int hold(Run *r, Continuation *to, int may_depend) {
+  Layout *l = &r->trial.l;
+  lay_out(r, to->letter, l);
+  if ((may_depend || r->s->joints > 1) && !find_dependent(r, l, to->letter, to->unknowns))
+    finish(r, NON_UNIQUE, UNDETERMINED_RATES, 0);
+  if (l->slides && !improve(r, l, r->x, to->unknowns, 1) && r->s->joints) finish(r, INCONSISTENT, DEAD_POINT, 0);
+  return r->status == RUNNING;
+}
+
 /* The mode of a motion to r->chosen, with the zeros of its guards. */
 static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   Continuation *to = &r->chosen;
@@ -972,15 +1062,7 @@ static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   keep_carried(r, to->letter, to->unknowns);
   for (int i = 0; i < d->count; i++)
     if (to->letter[d->own[i]] == 0 && !is_idle(r, to->letter, d->own[i])) to->unknowns[d->own[i]] = own->nu[i];
-  lay_out(r, to->letter, l);
-  if (l->slides > 1 && may_depend(d)) {
-    error_scales(r, r->x, held_of(r, to->letter), to->unknowns);
-    if (!invert_layer(r, l, to->unknowns, r->matrix)) {
-      r->dependent = l->mode;
-      if (!is_determined(r, l, to->letter)) finish(r, NON_UNIQUE, UNDETERMINED_RATES, 0);
-    }
-  }
-  if (l->slides) improve(r, l, r->x, to->unknowns, 1); /* bounds that were reached to a tolerance are exact now */
+  if (!hold(r, to, may_depend(d))) return;
   memset(to->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < l->rows; row++) {
     int kind = l->kind[row], of = l->index[row], is_off = kind == SURFACE_GUARD || kind == IMPACT_GUARD;
@@ -1025,6 +1107,7 @@ static int holds_its_own(const Run *r, int surface) {
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
   if (element(r, surface)->flags & CONTINUOUS || degree_of(r, surface) > 1 || !holds_its_own(r, surface)) return 0;
+  if (r->s->joints) return 0;
   double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
   for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
@@ -1046,7 +1129,7 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
 static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int own = r->active[0], w = r->width, exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
   double rate[2], *near = r->vector + r->n + w; /* not where inputs are put together */
-  if (!has_law(r, own, SURFACE_LAW) || !r->s->affine || is_scaled(r, own) || is_idle(r, letter, own)) return 0;
+  if (!has_law(r, own, SURFACE_LAW) || !r->s->affine || r->s->joints || is_scaled(r, own) || is_idle(r, letter, own)) return 0;
   if (known_count && !(exits && r->falls)) return 0;
   aim(r, letter, r->x, r->unknowns);
   for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
@@ -1078,7 +1161,7 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
 /* Where no mode continues: stay where all orbits spiral in, or say why the run ends. */
 static int no_motion(Run *r, const int8_t *letter) {
   int contacts = 0, k = r->active_count;
-  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
+  for (int i = 0; i < k; i++) contacts |= is_half_line(r, r->active[i]);
   if (r->status != RUNNING) return 0;
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
   else if (meets_sets(r)) finish(r, NON_UNIQUE, UNDETERMINED, 0);
@@ -1101,7 +1184,7 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
   if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
   if (is_mixed(r, r->active, k)) return decide_in_layer(r, letter, known, known_count);
   if (k == 1 && decide_by_rates(r, letter, known, known_count)) return 1;
-  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
+  for (int i = 0; i < k; i++) contacts |= is_half_line(r, r->active[i]);
   if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {
     finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);
     return 0;

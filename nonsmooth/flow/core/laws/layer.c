@@ -26,7 +26,7 @@ static void keep_finite(Run *r, Expansion *e) {
 static int is_stable(Run *r, const Layout *l) {
   int n = l->slides, rows = 0, w = r->width;
   double *a = r->decision->block, *m = r->work;
-  while (rows < n && l->sliding[rows] < r->m) rows++;
+  while (rows < n && is_bounded(r, l->sliding[rows])) rows++;
   for (int i = 0; i < n; i++) {
     double turn = i < rows ? -ns_sign(factor_of(r, l->sliding[i])) : 1;
     for (int j = 0; j < n; j++) m[i * n + j] = turn * r->slope[l->sliding[i] * w + l->sliding[j]];
@@ -209,7 +209,7 @@ static void keep_solution(Run *r, const Layout *l, double *unknowns, int steps, 
     double slope = 0;
     for (int j = 0; j < l->slides; j++) slope += fabs(r->slope[own * w + l->sliding[j]]);
     if (!(fabs(layer_of(r, own)) <= LAYER_RESIDUAL * (1 + slope))) return;
-    if (own < r->m && !(fabs(unknowns[own]) <= fabs(factor_of(r, own)) * (1 + LAYER_BEYOND))) return;
+    if (is_bounded(r, own) && !(fabs(unknowns[own]) <= fabs(factor_of(r, own)) * (1 + LAYER_BEYOND))) return;
   }
   for (int k = 0; k < found->count; k++) {
     double apart = 0;
@@ -308,12 +308,12 @@ static void solve_products(Run *r, const Layout *l, double *unknowns, Solutions 
 /* The same for other laws, and with reactions: Newton's method from a grid. */
 static void solve_from_grid(Run *r, const Layout *l, double *unknowns, Solutions *found) {
   int surfaces = 0, points = 1;
-  for (int i = 0; i < l->slides; i++) surfaces += l->sliding[i] < r->m;
+  for (int i = 0; i < l->slides; i++) surfaces += is_bounded(r, l->sliding[i]);
   for (int i = 0; i < surfaces && points < LAYER_STARTS; i++) points *= LAYER_GRID;
   for (int number = 0; number < points; number++) {
     memset(unknowns, 0, sizeof(double) * r->width);
     for (int i = 0, rest = number; i < l->slides; i++)
-      if (l->sliding[i] < r->m) {
+      if (is_bounded(r, l->sliding[i])) {
         unknowns[l->sliding[i]] = (2.0 * (rest % LAYER_GRID) + 1) / LAYER_GRID - 1;
         rest /= LAYER_GRID;
       }
@@ -340,7 +340,7 @@ static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
   }
   for (int i = 0; i < l->slides; i++) {
     bent |= r->s->mixed[l->sliding[i] * (w + 1)];
-    contacts |= l->sliding[i] >= r->m;
+    contacts |= !is_bounded(r, l->sliding[i]);
   }
   if (l->slides == 1) {
     int own = l->sliding[0], count = roots_along(r, l, unknowns, own, -1 - LAYER_BEYOND, 1 + LAYER_BEYOND, 0, root);
@@ -458,7 +458,7 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
 /* The same where unknowns of the active elements enter nonlinearly. */
 static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int alone = r->active_count == 1, own = alone ? r->active[0] : moves_alone(r, letter), count = r->active_count;
-  if (own >= r->m) own = -1;
+  if (own >= r->m || r->s->joints) own = -1;
   if (own >= 0 && is_two_fold(r, letter, own, 0)) { finish(r, NON_UNIQUE, TWO_FOLD, own); return 0; }
   if (own >= 0) {
     int32_t first = r->active[0];

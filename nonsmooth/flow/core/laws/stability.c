@@ -59,7 +59,7 @@ static void add_branches(const Run *r, Layout *l) {
       continue;
     }
     for (int i = 0; i < n; i++) {
-      if (!r->s->slope_moves[own[i] * (w + 1)]) continue;
+      if (!r->s->slope_moves[own[i] * (w + 1)] || (own[i] < r->m && !is_bounded(r, own[i]))) continue;
       add_row(l, BRANCH_GUARD, own[i], OF_ONE);
       l->branches++;
     }

@@ -149,11 +149,24 @@ static void start_in(Run *r, const int8_t *asked) {
   if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
 }
 
+/* The size of the time: in it the states change by theirs, at the rates of the start. */
+static void measure_time(Run *r) {
+  double unit = r->o.t_end - r->t;
+  r->time_size = r->size;
+  if (!r->s->timed) return;
+  aim(r, r->letter, r->x, r->unknowns);
+  set_inputs(r, r->x, held_of(r, r->letter), r->unknowns);
+  first_values(r, 0);
+  for (int i = 0; i < r->s->dimension; i++) unit = smaller((r->size + fabs(r->x[i])) / fabs(row_of(r, i)[0]), unit);
+  if (unit > 0 && unit < INFINITY) r->time_size = unit;
+}
+
 static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   note(r);
   find_idle(r);
   if (start_mode || r->remembered) memcpy(r->letter, start_mode ? start_mode : r->remembered, r->width);
   else memset(r->letter, -1, r->width);
+  measure_time(r);
   int finite = letters_of(r, r->letter);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;

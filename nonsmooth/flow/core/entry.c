@@ -367,6 +367,9 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
     find_idle(r);
   }
   r->prepared = 1;
+  memset(r->letter, -1, r->width);
+  memcpy(r->x, b->x0 + i * r->n, sizeof(double) * r->n);
+  measure_time(r);
   memcpy(r->x, m->x, sizeof(double) * r->n);
   memcpy(r->letter, m->letter, r->width);
   if (r->s->sets) memcpy(r->unknowns, m->unknowns, sizeof(double) * r->width);

@@ -190,7 +190,8 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
   }
   for (int row = 0; row < l->rows; row++) {
     int atom = row - l->atoms;
-    result[row] = atom < 0 ? law_of(r, l->index[row])->rounding(r, e, row, &of) : atom < stops ? stop[atom] : worst;
+    result[row] = atom < 0 ? law_of(r, l->index[row])->rounding(r, e, row, &of) : atom < stops ? stop[atom]
+                  : worst * branch_scale(r, l, row);
   }
 }
 
@@ -217,21 +218,29 @@ static void weigh_again(Run *r, Expansion *e) {
   weigh_point(r, e, x, unknowns);
 }
 
+/* The largest of the coefficients k of the states, in units of states. */
+static double speed_of(const Run *r, const Expansion *e, int k) {
+  double speed = 0;
+  for (int i = 0; i < r->n; i++)
+    speed = larger(fabs(e->states[(int64_t)i * r->stride + k]) / unit_of_state(r, i), speed);
+  return speed;
+}
+
 /* Rounding in the guards is these times epsilon. */
 static const double *scales(Run *r, Expansion *e) {
   if (e->scaled) return e->scale;
   weigh_again(r, e);
-  for (int i = 0; i < r->n; i++) r->vector[i] = r->size + fabs(e->states[(int64_t)i * r->stride]);
+  for (int i = 0; i < r->n; i++) r->vector[i] = size_of_state(r, i) + fabs(e->states[(int64_t)i * r->stride]);
   guard_sums(r, e, r->vector, 1, e->scale);
   e->scaled = 1;
   return e->scale;
 }
 
-/* Sums of the magnitudes of the guards' slopes. */
+/* Sums of the magnitudes of the guards' slopes, all by units of states. */
 static const double *steepness(Run *r, Expansion *e) {
   if (e->steepened) return e->steep;
   weigh_again(r, e);
-  for (int i = 0; i < r->n; i++) r->vector[i] = 1;
+  for (int i = 0; i < r->n; i++) r->vector[i] = unit_of_state(r, i);
   guard_sums(r, e, r->vector, 0, e->steep);
   e->steepened = 1;
   return e->steep;

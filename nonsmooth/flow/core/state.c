@@ -145,7 +145,7 @@ typedef struct {
   int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
-  double size, length, shortened, held_length, hold; /* the last: the step's end before zeros of a guard that are not told apart */
+  double size, time_size, length, shortened, held_length, hold; /* hold: the step's end before zeros of a guard that are not told apart */
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
@@ -177,6 +177,10 @@ typedef struct {
   void *arena;
 } Run;
 
+/* What a state has at least where rounding is weighed: of one, and of the time. */
+static double size_of_state(const Run *r, int i) { return i < r->s->dimension ? r->size : r->time_size; }
+static double unit_of_state(const Run *r, int i) { return i < r->s->dimension ? 1 : r->time_size / r->size; }
+
 /* Sums over the states of |gradient| times a vector: of layer, surfaces and gaps, stops and resets, factors; of
  * surfaces, gaps, stops and resets only where nothing slides. */
 typedef struct { double *layer, *height, *stop, *factor; } Sums;
@@ -192,6 +196,7 @@ typedef struct {
 
 static const Law *law_of(const Run *r, int i);
 static void add_branches(const Run *r, Layout *l);
+static double branch_scale(const Run *r, const Layout *l, int row);
 static void branch_row(const Run *r, const Layout *l, int row, int count, double *g);
 static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns);
 static void aim_again(Run *r, const Expansion *e);

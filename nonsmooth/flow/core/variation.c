@@ -349,6 +349,7 @@ static int carry(Run *r, Leg *l, Columns *c) {
     for (int i = 0; i < r->s->dimension; i++) size = larger(fabs(r->x[i]), size);
     r->o.atol = r->o.rtol * (size > 0 ? size : 1);
     r->size = size;
+    r->time_size = l->duration;
     expand(r, r->letter, r->x, r->unknowns, e);
     for (int i = 0; i < r->s->dimension; i++)
       size = larger(fabs(e->states[(int64_t)i * r->stride + 1]) * l->duration, size);

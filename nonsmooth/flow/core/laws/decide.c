@@ -513,7 +513,7 @@ static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b,
   held_of(r, d->letter);
   for (int i = 0; i < k; i++) r->held[r->active[i]] = 0;
   error_scales(r, x, r->held, r->none);
-  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
   gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
   for (int i = 0; i < r->n; i++) near[i] = fabs(x[i]);
   gradient_sums(r, &r->s->point, r->point, first_of_factors(r), &r->s->factor_gradient, w, near, 1, factor);
@@ -635,7 +635,7 @@ static void read_noise(Run *r, Decision *d) {
   int k = d->count, w = r->width, all = r->kept_rows, first = 2 * w + r->s->slope.count;
   double *ones = r->vector + r->n + w, *steep = r->small, *height = r->rates + all;
   d->field = d->rate = 0;
-  for (int i = 0; i < r->n; i++) ones[i] = 1;
+  for (int i = 0; i < r->n; i++) ones[i] = unit_of_state(r, i);
   error_scales(r, r->x, r->held, r->none);
   gradient_sums(r, &r->s->point, r->point, first, &r->s->layer_gradient, w, ones, 1, steep);
   surface_values(r, r->x);
@@ -654,9 +654,8 @@ static void read_noise(Run *r, Decision *d) {
 static void read_order(Run *r, Decision *d, int order) {
   Expansion *e = &r->trial;
   int k = d->count, w = r->width;
-  double speed = 0, drift = VANISHES * d->field;
+  double speed = speed_of(r, e, order), drift = VANISHES * d->field;
   for (int i = 2; i <= order; i++) drift *= d->rate / i;
-  for (int i = 0; i < r->n; i++) speed = larger(fabs(e->states[(int64_t)i * r->stride + order]), speed);
   for (int i = 0; i < w; i++) r->lam[i] = row_of(r, r->n + i)[order];
   for (int i = 0; i < k; i++) {
     int at = order * k + i;
@@ -682,7 +681,7 @@ static int read_growth(Run *r, Decision *d, int order) {
     double *c = e->states + (int64_t)i * r->stride;
     for (int q = 1; q <= order; q++) {
       if (!(fabs(c[q]) < INFINITY)) memset(c + q, 0, sizeof(double) * (order + 1 - q));
-      if (c[q] != 0) unit = smaller(unit, pow((fabs(c[0]) + r->size) / fabs(c[q]), 1.0 / q));
+      if (c[q] != 0) unit = smaller(unit, pow((fabs(c[0]) + size_of_state(r, i)) / fabs(c[q]), 1.0 / q));
     }
   }
   for (double part = SINGULAR_LONGEST; unit < INFINITY && part > SINGULAR_SHORTEST; part *= SINGULAR_SHORTER) {
@@ -1110,7 +1109,7 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
   if (r->s->joints) return 0;
   double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(r->x[i]);
   for (int side = 1; side >= -1; side -= 2) {
     held_of(r, letter);
     r->held[surface] = side;
@@ -1132,7 +1131,7 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
   if (!has_law(r, own, SURFACE_LAW) || !r->s->affine || r->s->joints || is_scaled(r, own) || is_idle(r, letter, own)) return 0;
   if (known_count && !(exits && r->falls)) return 0;
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(r->x[i]);
   for (int q = 0; q < 2; q++) {
     held_of(r, letter);
     r->held[own] = q ? 1 : -1;

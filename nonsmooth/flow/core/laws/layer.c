@@ -556,7 +556,7 @@ static int in_time(Run *r, Expansion *f, const double *rate, double s, double dt
     for (int q = 1; q < 4; q++) {
       double part = 0.25 * q * s, at = integral(rate, order, part);
       double off = fabs(horner(cubic, 3, at, &slope) - value_at(x, order, part));
-      if (off > f->allowed[i] + VANISHES * (r->size + fabs(x[0])) + (i < r->s->dimension ? 0 : TIE * fabs(x[0]))) return 0;
+      if (off > f->allowed[i] + VANISHES * (size_of_state(r, i) + fabs(x[0])) + (i < r->s->dimension ? 0 : TIE * fabs(x[0]))) return 0;
     }
     memset(x, 0, sizeof(double) * stride);
     memcpy(x, cubic, sizeof cubic);

@@ -68,7 +68,9 @@ static size_t place_decision(Run *r, char *base, size_t used) {
   to->own = INTEGERS(w); to->order = INTEGERS(w); to->first = INTEGERS(w + 1); to->mark = INTEGERS(4 * w);
   to->pivot = INTEGERS(8 * w + 8); to->proved = INTEGERS(w);
   to->is_contact = LETTERS(w); to->is_idle = LETTERS(w); to->is_touched = LETTERS(w); to->is_known = LETTERS(w);
-  to->state = LETTERS(orders + w); to->block_state = LETTERS(3 * w); to->large_class = LETTERS(w);
+  to->state = LETTERS(orders + w); to->block_state = LETTERS(4 * w); to->large_class = LETTERS(w);
+  to->base = LETTERS(w); to->span = LETTERS(w); to->began = LETTERS(w);
+  to->along = DOUBLES(orders); to->speed = DOUBLES(orders); to->axes = DOUBLES(3 * w);
   to->matrix = DOUBLES(square); to->share = DOUBLES(square); to->joint = DOUBLES(square); to->through = DOUBLES(square);
   to->a = DOUBLES(orders); to->b = DOUBLES(orders); to->nu = DOUBLES(orders); to->floor = DOUBLES(orders);
   to->turn = DOUBLES(w); to->sign = DOUBLES(w); to->old = DOUBLES(w); to->yard = DOUBLES(w); to->room = DOUBLES(w);
@@ -149,7 +151,6 @@ static size_t place_run(Run *r, char *base) {
   r->idle = LETTERS(s->m);
   r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
   r->of_defect = DOUBLES(g);
-  r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
   r->key = LETTERS(w + 8 * s->rules.discrete);
   r->met_at = DOUBLES(g);
   return used;

@@ -100,7 +100,12 @@ typedef struct { int8_t *state, *order, *before; int32_t terms; double *nu, *ser
  * (orders, count). */
 typedef struct {
   int32_t count, blocks, motions, branches, unstable, last; /* last: order that growth decides instead of coefficients */
+  int32_t is_imposed; /* whether states are given: those of a mode */
   const int8_t *letter;
+  /* Of vectors: rows of each, as in Block; the order at which their law is posed; directions u and speeds s of what
+   * leaves, by orders; axes. ``base`` has letters in which they are held. */
+  int8_t *base, *span, *began;
+  double *along, *speed, *axes;
   int32_t *own, *order, *first, *mark, *pivot, *proved;
   int8_t *is_contact, *is_idle, *is_touched, *is_known, *state, *block_state, *large_class;
   double *matrix, *share, *joint, *through, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
@@ -137,7 +142,7 @@ typedef struct {
   double t, t_low, since, limit, at_t, *x, *at_x, *unknowns;
   const int8_t *remembered; /* letters from which elements with hysteresis go on, or none */
   int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
-  double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
+  double *tried, *solutions, *of_defect; /* unknowns that enter nonlinearly; errors of guards */
   Layout now; /* of the present mode */
   Met met;
   Instant instant;
@@ -207,7 +212,6 @@ static void leave_sets(Run *r, Expansion *e, int k);
 static void close_sets(Run *r, Expansion *e, int k);
 static void direction_bounds(const Run *r, const Expansion *e, double *last, double *before);
 static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h);
-static int meets_sets(const Run *r);
 static void measure_limits(Run *r, Expansion *e);
 static void keep_carried(const Run *r, const int8_t *letter, double *unknowns);
 

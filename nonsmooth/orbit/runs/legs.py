@@ -207,6 +207,8 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
     system, p = run.system, run.system.parameter_vector(run.parameters)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
+    if len(system.joints) > 1:
+        _require_independent(system, run.events[0].mode_before, x, p)
     if system.sets:
         _require_held(system, run.events[0].mode_before, x, p)
     known: dict[tuple[object, ...], Leg] = {}
@@ -259,6 +261,17 @@ def sets_left(
         if all(abs(h.value) <= _ON_SET * float(np.abs(h.gradient) @ np.abs(x)) for h in at):
             found += members
     return tuple(found)
+
+
+def _require_independent(system: FilippovSystem, mode: str, x: Array, p: Array) -> None:
+    """Refuse constraints that depend on one another at a state (N,): their reactions have no derivatives."""
+    coupled, own = coupled_of(system), list(system.joints)
+    slope = coupled.layer_at(x, coupled.held(mode), np.zeros(coupled.count), p).slope[own][:, own]
+    if np.linalg.matrix_rank(slope, tol=_ON_SET * float(np.abs(slope).max()) * len(own)) < len(own):
+        raise DegenerateError(
+            f"Constraints {', '.join(map(repr, system.constraints))} depend on one another: derivatives are implemented "
+            "where their reactions are determined. Leave out those that follow from the others; the motion is the same."
+        )
 
 
 def _require_held(system: FilippovSystem, mode: str, x: Array, p: Array) -> None:

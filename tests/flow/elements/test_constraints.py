@@ -96,8 +96,8 @@ class Mechanism:
 
 
 def test_a_pendulum_swings_as_by_its_angle():
-    run = ns.simulate(pendulum(), placed((0.3, 1.5)), 50.0, tol=1e-11)
-    plain = ns.simulate(by_angle(), [0.3, 1.5], 50.0, tol=1e-11)
+    run = ns.simulate(pendulum(), placed((0.3, 1.5)), 20.0, tol=1e-11)
+    plain = ns.simulate(by_angle(), [0.3, 1.5], 20.0, tol=1e-11)
     assert run.status is ns.Status.REACHED_END and run.itinerary == "s"
     np.testing.assert_allclose(run.x[-1], placed(plain.x[-1]), atol=1e-8)
     assert abs((run.x[:, :2] ** 2).sum(1) - 1).max() < 1e-14
@@ -115,6 +115,7 @@ def test_a_pendulum_swings_as_by_its_angle():
                 [1.0, 0.5], [(-1, 0), (0, 1), (1, -2)], [(0, 0), (2, 0)], [0.2, 0.9, 1.7, 1.4]
             ),
             id="four-bar linkage",
+            marks=pytest.mark.slow,
         ),
         pytest.param(
             Mechanism(
@@ -124,6 +125,7 @@ def test_a_pendulum_swings_as_by_its_angle():
                 [0.6, -0.8, 1.6, -0.8, 2.6, -0.8],
             ),
             id="parallel links",
+            marks=pytest.mark.slow,
         ),
     ],
 )
@@ -138,7 +140,7 @@ def test_a_mechanism_moves_as_its_index_reduction(mechanism):
         np.testing.assert_allclose(np.linalg.norm(apart), length, rtol=1e-14)
 
 
-@pytest.mark.parametrize("links", [1, 2, 3, 5])
+@pytest.mark.parametrize("links", [1, 3, pytest.param(5, marks=pytest.mark.slow)])
 def test_a_table_hangs_on_parallel_links(links):
     """Three or more depend on one another; the table swings as a pendulum without turning (one link: turned fast)."""
     turn, spin = ca.SX.sym("turn"), ca.SX.sym("spin")
@@ -392,6 +394,24 @@ def test_derivatives_are_those_by_the_angle():
     found, true = ns.sensitivity(run), ns.sensitivity(want)
     np.testing.assert_allclose(found.dx_dp, outer @ true.dx_dp, atol=1e-8)
     np.testing.assert_allclose(found.dx_dx0 @ inner, outer @ true.dx_dx0, atol=1e-8)
+
+
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+def test_constraints_that_are_given_twice_change_nothing(law):
+    """Impulses act through both; derivatives ask for one of them."""
+    wall = ns.Impact(x + 0.4, restitution=0.6, name="wall", law=law)
+    twice = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, (r + lam) * x, (r + lam) * y - 1],
+        constraints=[ns.Constraint(ROD, reaction=r), ns.Constraint(2 * ROD, reaction=lam)],
+        impacts=wall,
+    )
+    start = placed((2 * np.pi - 0.1, 0.0))
+    run, own = (ns.simulate(s, start, 20.0, tol=1e-11) for s in (twice, pendulum(impacts=wall)))
+    assert [e.kind for e in run.events] == [e.kind for e in own.events]
+    np.testing.assert_allclose(run.x[-1], own.x[-1], atol=1e-8)
+    with pytest.raises(ns.DegenerateError, match="Leave out those that follow from the others"):
+        ns.sensitivity(run)
 
 
 @pytest.mark.parametrize(

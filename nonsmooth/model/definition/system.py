@@ -28,6 +28,7 @@ from .discrete_states import held_values, with_values
 from .elements import Complementarity
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
+from .matrix_symbols import in_scalar_symbols, read_dae
 from .parse_definition import Definition, consistent_parameters, read_definition
 from .roots import roots_of
 from .switching import Switching, class_of
@@ -155,6 +156,8 @@ class FilippovSystem:
             "hidden": hidden,
             "layer_widths": layer_widths,
         }
+        given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
+        clocks, discrete = given.pop("clocks"), given.pop("discrete")
         self._adopt(read_definition(**with_added_states(clocks, discrete, given)))
 
     # construction ------------------------------------------------------------------------------
@@ -213,12 +216,15 @@ class FilippovSystem:
         >>> system.field("+"), system.field("-")
         (SX([v, (-(x+0.4))]), SX([v, (-(x+-0.3))]))
         """
-        column(rhs, "rhs", len(listed(states)))  # before clocks are added
         given = {"states": states, "rhs": rhs, "parameters": parameters, "time": time}
         given |= {"stops": stops, "resets": resets, "impacts": impacts, "hidden": hidden}
+        given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
+        clocks, discrete = given.pop("clocks"), given.pop("discrete")
+        column(given["rhs"], "rhs", len(listed(given["states"])))  # before clocks are added
         given = with_added_states(clocks, discrete, given)
         n, rhs = len(listed(given["states"])), given.pop("rhs")
-        frame = cls(given["states"], field=[0] * n, parameters=parameters, time=time).definition
+        own = {name: given[name] for name in ("parameters", "time")}
+        frame = cls(given["states"], field=[0] * n, **own).definition
         entries = column(rhs, "rhs", n)
         known = ca.vertcat(frame.extended_states, frame.parameters)
         require_known(entries, known, "rhs", **frame.names)
@@ -229,6 +235,48 @@ class FilippovSystem:
         system._adopt(read_definition(**given))
         system.lifted = found.switches
         return system
+
+    @classmethod
+    def from_dae(
+        cls,
+        dae: Mapping[str, Any],
+        *,
+        parameters: Mapping[Any, float] | None = None,
+        **events: Any,
+    ) -> FilippovSystem:
+        """Read CasADi's dictionary of an ordinary differential equation, as its ``integrator`` takes it.
+
+        Parameters
+        ----------
+        dae : mapping
+            ``x`` and ``ode``, and ``t`` and ``p`` where there are any: SX, or MX that expand to SX. Entries of a
+            vector ``x`` are named x_0, x_1, ...
+        parameters : mapping, optional
+            Values of entries of ``p``, by name or symbol.
+        **events
+            As for ``from_expression``: stops, resets, ...
+
+        Returns
+        -------
+        FilippovSystem
+            With the switches of ``ode`` as surfaces.
+
+        Raises
+        ------
+        DefinitionError
+            Algebraic equations or other entries; MX that call a table or another Function that is no graph.
+        NotSmoothError
+            As ``from_expression``.
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, p = ca.MX.sym("x", 2), ca.MX.sym("mu")
+        >>> ode = ca.vertcat(x[1], -x[0] - p * ca.sign(x[1]))
+        >>> ns.FilippovSystem.from_dae({"x": x, "p": p, "ode": ode}, parameters={"mu": 0.1})
+        FilippovSystem(2 states: x_0, x_1; 1 surface: x_1; parameters: mu)
+        """
+        return cls.from_expression(**read_dae(dae, parameters), **events)
 
     def holding(self, values: Mapping[Any, float]) -> FilippovSystem:
         """Hold the discrete states at values: the system between two events, without stops and resets.

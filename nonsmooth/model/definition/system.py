@@ -935,7 +935,7 @@ def require_system(
     if value.constraints and not joints:
         raise DefinitionError(
             f"system: {value!r} has constraints, which this function does not support. They work in simulate, "
-            "ensemble, outcomes and sensitivity. Write the motion in coordinates that satisfy them."
+            "ensemble, outcomes, sensitivity, periodic_orbit and continue_orbit. Write the motion in coordinates that satisfy them."
         )
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import casadi as ca
 import numpy as np
@@ -259,6 +259,17 @@ def surface_map(system: FilippovSystem, surface: int) -> EventMap:
         return EventMap(system, system.extended_states, system.surface_function(surface), guard)
 
     return system.cached(("surface map", surface), build)
+
+
+def kept_maps(system: FilippovSystem, surfaces: Sequence[int]) -> list[EventMap]:
+    """What is zero while surfaces slide, as maps on the extended states: with the rates of joints."""
+    x, found = system.extended_states, list[EventMap]()
+    for i in surfaces:
+        found.append(surface_map(system, i))
+        for k, rate in enumerate(coupled_of(system).lower[i] if i in system.joints else ()):
+            build = partial(EventMap, system, x, rate, Guard("zero", i, 0, i))
+            found.append(system.cached(("rate map", i, k), build))
+    return found
 
 
 def atoms_at(

@@ -22,7 +22,7 @@ MOST_ORDER = 48
 _FILES = """
     programs.h pairs.h linear.h banded.h radau.h state.c modes.c jets.c laws/stability.c laws/sets.c stepper.c
     near_zeros.c laws/elements.c record.c laws/spiral.c laws/vectors.c laws/decide.c laws/layer.c laws/contacts.c
-    laws/complementarity.c laws/approach.c events.c collocation.c stiffness.c driver.c accumulation.c laws/roots.c
+    laws/complementarity.c laws/approach.c events.c collocation.c implicit.c stiffness.c driver.c accumulation.c laws/roots.c
     entry.c variation.c
 """.split()
 

@@ -49,7 +49,7 @@ def core_source() -> str:
     sizes = f"#define UNFUSED\n#define P {MOST_ORDER}\n"
     driver = [driver_text(f"core/{name}") for name in _FILES]
     flows = [driver_text("core/flow.c"), _extended("programs.h", "flow.c")]
-    fixed = driver_text("core/fixed.c")
+    fixed = driver_text("core/implicit_flow.c") + driver_text("core/fixed.c")
     return "".join(
         [facts_header(), sizes, head, driver_text("core/common.h"), *driver, *flows, fixed]
     )

@@ -212,7 +212,7 @@ Run *run_new(const System *s, Table *table) {
   r->now.mode = r->e.l.mode = r->trial.l.mode = -1;
   return r;
 }
-void run_free(Run *r) { end_collocation(r); free(r->arena); free(r); }
+void run_free(Run *r) { end_implicit(r); free(r->arena); free(r); }
 
 /* Times at which the run is read: no approximation of the motion may span one of them. */
 void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = times; r->read_count = count; }
@@ -250,7 +250,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->length = r->shortened = 0;
   r->held_steps = r->wants_program = 0;
   r->held_length = 0;
-  end_collocation(r);
+  end_implicit(r);
   r->hold = INFINITY;
   r->begun = t;
   r->t = t.high;

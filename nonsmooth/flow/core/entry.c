@@ -1,16 +1,5 @@
 /* Memory ------------------------------------------------------------------------------------------- */
 
-/* Where ``count`` objects of a size begin; with no base, how far one has come. */
-static void *place(char *base, size_t *used, size_t size, size_t count) {
-  *used = (*used + 15) & ~(size_t)15;
-  void *at = base ? base + *used : 0;
-  *used += size * (count + 1);
-  return at;
-}
-#define DOUBLES(count) place(base, &used, sizeof(double), (size_t)(count))
-#define INTEGERS(count) place(base, &used, sizeof(int32_t), (size_t)(count))
-#define LETTERS(count) place(base, &used, 1, (size_t)(count))
-
 static size_t place_layout(Layout *l, char *base, size_t used, int width, int guards) {
   l->letter = LETTERS(width);
   l->sliding = INTEGERS(width);
@@ -177,6 +166,37 @@ double polynomial_crossing(const double *c, int32_t n, double h, int32_t directi
   return first_crossing(c, n, h, direction);
 }
 
+/* What is proved of -dw/dnu of surfaces, of n rows. */
+int32_t law_certificate(const double *m, int32_t n) {
+  double *work = malloc(sizeof(double) * (4 * (size_t)n * n + 4 * n) + sizeof(int32_t) * n);
+  int32_t found = work ? certificate(m, n, work, (int32_t *)(work + 4 * (int64_t)n * n + 4 * n)) : NOTHING;
+  free(work);
+  return found;
+}
+
+/* The multipliers in [-1, 1] of surfaces with the rates a - m nu, where that is unique; whether it is found. */
+int32_t law_solution(const double *a, const double *m, int32_t n, double *nu) {
+  size_t square = (size_t)n * n, doubles = 60 * square + 100 * (size_t)n;
+  double *work = calloc(doubles, sizeof(double));
+  int32_t *pivot = calloc(8 * (size_t)n + 8, sizeof(int32_t)), found = 0;
+  int8_t *letter = calloc(3 * (size_t)n, 1); /* states, contacts, positions */
+  if (work && pivot && letter) {
+    Block b = {.size = n, .tie = VANISHES, .a = work, .b = work + n, .floor = work + 2 * n, .share = work + 3 * n,
+               .matrix = work + 3 * n + square, .state = letter, .is_contact = letter + n};
+    memcpy(b.a, a, sizeof(double) * n);
+    memcpy(b.matrix, m, sizeof(double) * square);
+    for (int i = 0; i < n; i++) b.b[i] = 1;
+    found = solve_block_of_many(&b, UNIQUE, letter + 2 * n, nu, work + 3 * n + 2 * square, pivot);
+  }
+  free(work); free(pivot); free(letter);
+  return found;
+}
+
+/* As go_round: of four quadrants rates (4, 2) and slopes (4, 2, 2). */
+int32_t law_round(double *rates, double *slopes, double *ratio, double *bend) {
+  return go_round((double (*)[2])rates, (double (*)[4])slopes, ratio, bend);
+}
+
 Run *run_new(const System *s, Table *table) {
   Run *r = calloc(1, sizeof(Run));
   if (!r) return 0;
@@ -192,7 +212,7 @@ Run *run_new(const System *s, Table *table) {
   r->now.mode = r->e.l.mode = r->trial.l.mode = -1;
   return r;
 }
-void run_free(Run *r) { free(r->arena); free(r); }
+void run_free(Run *r) { end_implicit(r); free(r->arena); free(r); }
 
 /* Times at which the run is read: no approximation of the motion may span one of them. */
 void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = times; r->read_count = count; }
@@ -225,9 +245,12 @@ static void clear(Run *r, const Options *o, Pair t) {
   memset(r->instant.passing, 0, s->rules.atoms);
   memset(r->instant.unmet, 0, s->rules.triggers);
   memset(r->kinds, 0, sizeof r->kinds);
-  r->step_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
+  r->step_count = r->implicit_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
+  r->held_steps = r->wants_program = 0;
+  r->held_length = 0;
+  end_implicit(r);
   r->hold = INFINITY;
   r->begun = t;
   r->t = t.high;
@@ -269,6 +292,7 @@ static int go_on(Run *r, int64_t *budget) {
       return FULL;
     if (--*budget < 0) return RUNNING;
     step(r);
+    if (r->wants_program) { r->wants_program = 0; return NEEDS_PROGRAM; }
   }
   return r->status;
 }
@@ -288,7 +312,7 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
   numbers[2] = r->at_t;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
                     r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts,
-                    unmet_event(r)};
+                    unmet_event(r), r->implicit_count};
   memcpy(counts, head, sizeof head);
   memcpy(active, r->active, sizeof(int32_t) * r->active_count);
   memcpy(several, r->several, sizeof(int32_t) * r->several_count);
@@ -325,7 +349,7 @@ static void keep(Run *r, const Batch *b, int64_t i) {
   b->totals[1] += r->event_count;
 }
 
-/* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``next`` is zero
+/* Run a batch, ``budget`` steps of it at most; 0, or why something is left for another call. ``next`` is zero
  * before the first, twice the number of runs done after it, and one more within a run. */
 int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8_t *start_mode, int64_t budget) {
   static const Output none;
@@ -336,7 +360,8 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
       run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, start_mode, b->t0, 0);
     }
     *next |= 1;
-    if (go_on(r, &budget) == RUNNING) return 1;
+    int status = go_on(r, &budget);
+    if (status == RUNNING || status == NEEDS_PROGRAM) return status;
     keep(r, b, i);
   }
   return 0;

@@ -75,6 +75,7 @@ from .model import (
     call,
     regularise,
 )
+from .model.definition.constraints import Constraint
 from .model.definition.elements import Complementarity, Relay
 from .model.definition.friction import Friction
 from .model.definition.table import table
@@ -113,6 +114,7 @@ __version__ = "0.1.0.dev0"
 __all__ = [
     "Clock",
     "Complementarity",
+    "Constraint",
     "ConvergenceError",
     "DefinitionError",
     "DegenerateError",

@@ -14,7 +14,7 @@ import nonsmooth as ns
 CASES = Path(__file__).parents[1] / "cases" / "inclusions.json"
 
 #: Constructs that the library does not have.
-MISSING = ("constraints", "vector_multipliers")
+MISSING = ("vector_multipliers",)
 
 #: Functions that the strings use.
 FUNCTIONS = {n: getattr(ca, n) for n in ("sin", "cos", "sqrt", "exp", "log", "fabs")}
@@ -38,6 +38,7 @@ class Case:
         names = [self.data.get(key, "") for key in ("states", "multipliers", "reactions", "time")]
         self.names = [name.split() for name in names]
         own = [condition["lam"] for condition in self.data.get("complementarity", [])]
+        own += [constraint["reaction"] for constraint in self.data.get("constraints", [])]
         self.symbols = {n: ca.SX.sym(n) for names in [*self.names, own] for n in names}
 
     def parse(self, text: str) -> list:
@@ -63,6 +64,10 @@ class Case:
             ns.Complementarity(self.parse(own["y"])[0], multiplier=self.symbols[own["lam"]])
             for own in data.get("complementarity", [])
         ]
+        constraints = [
+            ns.Constraint(self.parse(own["g"])[0], reaction=self.symbols[own["reaction"]])
+            for own in data.get("constraints", [])
+        ]
         return ns.FilippovSystem(
             states,
             complementarity=conditions,
@@ -73,6 +78,7 @@ class Case:
             surfaces=self.parse(data.get("surfaces", "")) or None,
             multipliers=multipliers or None,
             impacts=impacts or None,
+            constraints=constraints,
             time=time[0] if time else None,
         )
 

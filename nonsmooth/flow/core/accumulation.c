@@ -133,7 +133,7 @@ static int choose_closed(Run *r, const int32_t *contact, int count, const int32_
   for (int i = 0; i < surfaces; i++) which[kept++] = surface[i];
   for (int i = 0; i < count; i++) which[kept++] = m + c + contact[i];
   for (int i = 0; i < surfaces; i++) kept += lower_rows(r, surface[i], which + kept);
-  project(r, which, kept);
+  project(r, which, with_joints(r, which, kept));
   return decide_among(r, which, count + surfaces);
 }
 
@@ -163,7 +163,7 @@ static int vanishing(Run *r, const double *near, int32_t *which) {
   double *change = r->small, *own = r->vector;
   int count = 0;
   surface_values(r, r->x);
-  for (int i = 0; i < r->n; i++) own[i] = 4 * near[i] + ON_SURFACE * (r->size + fabs(r->x[i])); /* rates may jump */
+  for (int i = 0; i < r->n; i++) own[i] = 4 * near[i] + ON_SURFACE * (size_of_state(r, i) + fabs(r->x[i])); /* rates may jump */
   gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, own, 1, change);
   for (int i = 0; i < r->m; i++) {
     int small = has_law(r, i, SURFACE_LAW) && fabs(r->rates[i]) <= change[i], first = element(r, i)->lower;
@@ -209,7 +209,7 @@ static int choose_rest(Run *r, const int32_t *element, int count, const double *
   memcpy(x, r->x, sizeof(double) * r->n);
   for (int i = 0; i < count; i++) which[kept++] = element[i];
   for (int i = 0; i < count; i++) kept += lower_rows(r, element[i], which + kept);
-  project(r, which, kept);
+  project(r, which, with_joints(r, which, kept));
   for (int i = 0; near && i < r->n; i++)
     close &= fabs(r->x[i] - x[i]) <= 4 * near[i] + VANISHES * (r->size + fabs(x[i]));
   if (close && decide_among(r, element, count)) {

@@ -201,7 +201,7 @@ static int invert_layer(Run *r, const Layout *l, const double *unknowns, double 
   if (is_regular || n < 2) return 1;
   for (int i = 0; i < n; i++) {
     int own = l->sliding[i];
-    size[i] = is_half_line(r, own) ? fabs(unknowns[own]) : fabs(factor_of(r, own));
+    size[i] = is_bounded(r, own) ? fabs(factor_of(r, own)) : fabs(unknowns[own]);
     most = larger(size[i], most);
   }
   for (int i = 0; i < n; i++) size[i] = larger(size[i], MERGED * (most > 0 ? most : 1));
@@ -228,6 +228,7 @@ static void allow_for_roots(Run *r, Expansion *e) {
 /* Jets of a mode at x, with the multipliers of what slides; inverses of the layer's slope. */
 static void expand(Run *r, const int8_t *letter, const double *x, const double *unknowns, Expansion *e) {
   int w = r->width, stride = r->stride;
+  e->end = 0;
   lay_out(r, letter, &e->l);
   aim(r, letter, x, unknowns);
   weigh_point(r, e, x, unknowns);

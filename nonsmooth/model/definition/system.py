@@ -23,10 +23,12 @@ from ..expressions.mathml import equation, rate, symbol
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
 from .complementarity import holds
+from .constraints import Constraint
 from .discrete_states import held_values, with_values
-from .elements import Complementarity
+from .elements import Complementarity, multipliers_of_conditions
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
+from .matrix_symbols import in_scalar_symbols, read_dae
 from .parse_definition import Definition, consistent_parameters, read_definition
 from .roots import roots_of
 from .switching import Switching, class_of
@@ -76,6 +78,8 @@ class FilippovSystem:
         Contacts that cannot be passed.
     complementarity : sequence of Complementarity, optional
         Ideal diodes, projections and sweeping sets: ``0 <= y``, ``multiplier >= 0``, one of them zero.
+    constraints : sequence of Constraint, optional
+        Joints: functions that stay zero. Each has the letter ``s`` in a mode, after the surfaces.
     clocks : sequence of Clock, optional
         What is periodic in time; each adds its phase to the states.
     discrete : sequence of SX symbols or mapping, optional
@@ -128,6 +132,7 @@ class FilippovSystem:
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
         complementarity: Sequence[Complementarity] | Complementarity = (),
+        constraints: Sequence[Constraint] | Constraint = (),
         clocks: Sequence[Clock] | Clock = (),
         discrete: Discrete = (),
         hidden: bool = False,
@@ -147,9 +152,12 @@ class FilippovSystem:
             "resets": resets,
             "impacts": impacts,
             "complementarity": complementarity,
+            "constraints": constraints,
             "hidden": hidden,
             "layer_widths": layer_widths,
         }
+        given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
+        clocks, discrete = given.pop("clocks"), given.pop("discrete")
         self._adopt(read_definition(**with_added_states(clocks, discrete, given)))
 
     # construction ------------------------------------------------------------------------------
@@ -165,6 +173,7 @@ class FilippovSystem:
         stops: Sequence[Stop] = (),
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
+        complementarity: Sequence[Complementarity] | Complementarity = (),
         clocks: Sequence[Clock] | Clock = (),
         discrete: Discrete = (),
         hidden: bool = False,
@@ -178,8 +187,8 @@ class FilippovSystem:
 
         Parameters
         ----------
-        states, parameters, time, stops, resets, impacts, clocks, discrete
-            As for the class. Gaps must be smooth.
+        states, parameters, time, stops, resets, impacts, complementarity, clocks, discrete
+            As for the class. Gaps and y must be smooth.
         rhs : sequence of n expressions
             In states, parameters and time, with switches.
         hidden : bool, optional
@@ -208,22 +217,69 @@ class FilippovSystem:
         >>> system.field("+"), system.field("-")
         (SX([v, (-(x+0.4))]), SX([v, (-(x+-0.3))]))
         """
-        column(rhs, "rhs", len(listed(states)))  # before clocks are added
         given = {"states": states, "rhs": rhs, "parameters": parameters, "time": time}
         given |= {"stops": stops, "resets": resets, "impacts": impacts, "hidden": hidden}
+        given["complementarity"] = complementarity
+        given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
+        clocks, discrete = given.pop("clocks"), given.pop("discrete")
+        column(given["rhs"], "rhs", len(listed(given["states"])))  # before clocks are added
         given = with_added_states(clocks, discrete, given)
         n, rhs = len(listed(given["states"])), given.pop("rhs")
-        frame = cls(given["states"], field=[0] * n, parameters=parameters, time=time).definition
+        own = {name: given[name] for name in ("parameters", "time")}
+        frame = cls(given["states"], field=[0] * n, **own).definition
         entries = column(rhs, "rhs", n)
-        known = ca.vertcat(frame.extended_states, frame.parameters)
+        held = ca.vertcat(frame.parameters, multipliers_of_conditions(given["complementarity"]))
+        known = ca.vertcat(frame.extended_states, held)
         require_known(entries, known, "rhs", **frame.names)
-        found = lift(entries, frame.states, frame.time, frame.parameters, hidden=hidden)
+        found = lift(entries, frame.states, frame.time, held, hidden=hidden)
         given |= {"field": found.field, "multipliers": found.multipliers, "surface": None}
         given |= {"surfaces": found.surfaces, "above": None, "below": None}
         system = cls.__new__(cls)
         system._adopt(read_definition(**given))
         system.lifted = found.switches
         return system
+
+    @classmethod
+    def from_dae(
+        cls,
+        dae: Mapping[str, Any],
+        *,
+        parameters: Mapping[Any, float] | None = None,
+        **events: Any,
+    ) -> FilippovSystem:
+        """Read CasADi's dictionary of an ordinary differential equation, as its ``integrator`` takes it.
+
+        Parameters
+        ----------
+        dae : mapping
+            ``x`` and ``ode``, and ``t`` and ``p`` where there are any: SX, or MX that expand to SX. Entries of a
+            vector ``x`` are named x_0, x_1, ...
+        parameters : mapping, optional
+            Values of entries of ``p``, by name or symbol.
+        **events
+            As for ``from_expression``: stops, resets, ...
+
+        Returns
+        -------
+        FilippovSystem
+            With the switches of ``ode`` as surfaces.
+
+        Raises
+        ------
+        DefinitionError
+            Algebraic equations or other entries; MX that call a table or another Function that is no graph.
+        NotSmoothError
+            As ``from_expression``.
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, p = ca.MX.sym("x", 2), ca.MX.sym("mu")
+        >>> ode = ca.vertcat(x[1], -x[0] - p * ca.sign(x[1]))
+        >>> ns.FilippovSystem.from_dae({"x": x, "p": p, "ode": ode}, parameters={"mu": 0.1})
+        FilippovSystem(2 states: x_0, x_1; 1 surface: x_1; parameters: mu)
+        """
+        return cls.from_expression(**read_dae(dae, parameters), **events)
 
     def holding(self, values: Mapping[Any, float]) -> FilippovSystem:
         """Hold the discrete states at values: the system between two events, without stops and resets.
@@ -273,7 +329,8 @@ class FilippovSystem:
     def _adopt(self, definition: Definition) -> None:
         self.definition = definition
         self.stops, self.resets = definition.stops, definition.resets
-        self.impacts, self.complementarity = definition.impacts, definition.complementarity
+        self.impacts, self.constraints = definition.impacts, definition.constraints
+        self.complementarity = definition.complementarity
         self.hidden = definition.hidden
         field, multipliers = definition.field, listed(definition.multipliers)
         self.nonlinear = tuple(not ca.is_linear(field, lam) for lam in multipliers)
@@ -327,6 +384,8 @@ class FilippovSystem:
             name, what = f"h{k}", f"surface h{k}"
             if k in self.half_lines:
                 name, what = "y", f"complementarity {self.surface_names[k]}"
+            if k in self.joints:
+                name, what = "g", f"constraint {self.constraints[self.joints.index(k)]}"
             rows.append((what, Markup(equation(symbol(name), function, known))))
         rows += [("parameters", ", ".join(self.parameter_names))]
         rows += [("stops", ", ".join(n for n, _ in self.stops))]
@@ -339,8 +398,9 @@ class FilippovSystem:
             f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
         ]
         names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
-        surfaces = len(self.entries) - len(self.sets) - len(self.complementarity)
-        if surfaces or not (self.sets or self.complementarity):
+        others = len(self.complementarity) + len(self.constraints)
+        surfaces = len(self.entries) - len(self.sets) - others
+        if surfaces or not (self.sets or others):
             parts.append(f"{surfaces} surface{'s' * (surfaces != 1)}{self._classes()}{names}")
         parts += [f"root |{name}|^{power:g}" for name, power in self.roots.items()]
         parts += [f"set of codimension {len(members)}" for members in self.sets]
@@ -351,11 +411,13 @@ class FilippovSystem:
         parts += [f"stop {n!r}" for n, _ in self.stops] + [f"reset {n!r}" for n, _ in self.resets]
         parts += [f"impact {n!r}" for n in self.impacts]
         parts += [f"complementarity {n!r}" for n in self.complementarity]
+        parts += [f"constraint {n!r}" for n in self.constraints]
         return f"FilippovSystem({'; '.join(parts)})"
 
     def _classes(self) -> str:
         """The classes of surfaces, for people, where one is not generic."""
-        own = [i for i, *more in self.entries if not more and i not in self.half_lines]
+        others = (*self.half_lines, *self.joints)
+        own = [i for i, *more in self.entries if not more and i not in others]
         if len(own) > _CLASSES_SHOWN:
             return ""
         words = [self.switching(i).name for i in own]
@@ -442,6 +504,12 @@ class FilippovSystem:
         return tuple(i for i in self.half_lines if holds(d.surfaces[i], own, states))
 
     @cached_property
+    def joints(self) -> tuple[int, ...]:
+        """Functions of constraints, the last of the switching functions."""
+        m = self.surface_count
+        return tuple(range(m - len(self.constraints), m))
+
+    @cached_property
     def surface_names(self) -> tuple[str, ...]:
         """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set, or as given."""
         names = [f"h{k}" for k, members in enumerate(self.entries) for _ in members]
@@ -457,6 +525,7 @@ class FilippovSystem:
     def coupled(self) -> bool:
         """Whether multipliers are solved for together: several, a nonlinear one, or reactions."""
         several = self.surface_count > 1 or bool(self.impacts) or bool(self.complementarity)
+        several = several or bool(self.constraints)
         return several or any(self.nonlinear)
 
     def spelled(self, mode: str) -> str:
@@ -508,6 +577,8 @@ class FilippovSystem:
 
     def _letters(self, i: int) -> str:
         """Letters of a switching function; in runs those of sets are more."""
+        if i in self.joints:
+            return "s"
         return "*sbli" if i in self.set_of else "oc" if i in self.half_lines else "+-s"
 
     def parse_mode(self, mode: str) -> tuple[int, ...]:
@@ -630,8 +701,9 @@ class FilippovSystem:
             )
         if mode is not None:
             self.require_mode(mode)
-        if i in (*self.set_of, *self.remembering):
+        if i in (*self.set_of, *self.remembering, *self.joints):
             what = "as a set" if i in self.set_of else "with hysteresis"
+            what = "as a constraint" if i in self.joints else what
             return Switching("generic", None, None, f"its definition {what}")
         values = None if parameters is None else tuple(self.parameter_vector(parameters).tolist())
         key = ("switching", i, mode, values)
@@ -831,9 +903,13 @@ class FilippovSystem:
 
 
 def require_system(
-    value: Any, sets: bool = False, hysteresis: bool = False, complementarity: bool = False
+    value: Any,
+    sets: bool = False,
+    hysteresis: bool = False,
+    complementarity: bool = False,
+    joints: bool = False,
 ) -> None:
-    """Refuse all but a FilippovSystem; flags allow vector multipliers, relays and complementarity conditions."""
+    """Refuse all but a FilippovSystem; flags allow vector multipliers, relays, complementarity and constraints."""
     if not isinstance(value, FilippovSystem):
         raise DefinitionError(
             f"system: expected a FilippovSystem, received {value!r} ({type(value).__name__}). "
@@ -854,7 +930,12 @@ def require_system(
     if value.complementarity and not complementarity:
         raise DefinitionError(
             f"system: {value!r} has complementarity conditions, which this function does not support. They work "
-            "in simulate, ensemble and outcomes."
+            "in simulate, ensemble, outcomes, sensitivity, find_equilibrium, periodic_orbit and continue_orbit."
+        )
+    if value.constraints and not joints:
+        raise DefinitionError(
+            f"system: {value!r} has constraints, which this function does not support. They work in simulate, "
+            "ensemble, outcomes, sensitivity, periodic_orbit and continue_orbit. Write the motion in coordinates that satisfy them."
         )
 
 

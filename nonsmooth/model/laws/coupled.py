@@ -56,7 +56,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     roots = gate_roots(plain, _surfaces(system), x, ones)[1]
     columns = ca.jacobian(plain, lam)
     for members in system.entries:  # a set has one factor
-        if members[0] in system.half_lines:
+        if members[0] in (*system.half_lines, *system.joints):
             continue
         places = [(row, i) for i in members for row in columns[:, i].sparsity().row()]
         entries = [e for i in members for e in columns[:, i].nonzeros()]
@@ -122,8 +122,9 @@ class Coupled:
             self.layer[i] = h[i]
         #: Of each surface, derivatives that vanish while it rests; the layer has the next one.
         self.lower: list[tuple[ca.SX, ...]] = [()] * self._surfaces
-        if by_degree:
-            for i, found in enumerate(self.degrees(field, lam, unknowns)):
+        degrees = self.degrees(field, lam, unknowns) if by_degree or system.joints else []
+        for i, found in enumerate(degrees):
+            if by_degree or i in system.joints:
                 self.lower[i], self.layer[i] = found.lower, found.row
         for i in system.remembering:  # h at multiplier +1, the further function at -1
             self.lower[i] = (h[i] - d.hysteresis[i],)
@@ -144,7 +145,8 @@ class Coupled:
 
     def _is_continuous(self, surface: int) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""
-        if surface in (*self.system.set_of, *self.system.remembering, *self.system.half_lines):
+        special = (*self.system.set_of, *self.system.remembering, *self.system.half_lines)
+        if surface in (*special, *self.system.joints):
             return False
         d, x = self.system.definition, self.system.extended_states
         column = ca.jacobian(d.field, d.multipliers[surface])
@@ -181,8 +183,13 @@ class Coupled:
         x, d, found = self.system.extended_states, self.system.definition, list[Degree]()
         scaled = [e for e, own in zip(unknowns, self.scaled, strict=True) if own]
         every = [*ca.vertsplit(lam), *scaled, *ca.vertsplit(d.reactions)]
+        joints = list(self.system.joints)
         for i in range(self._surfaces):
             found.append(Degree((), self.layer[i]))
+            if i in joints:
+                own, others = lam[joints], ca.vertcat(*every[: joints[0]], *every[self._surfaces :])
+                found[i] = degree_of(d.surfaces[i], self.layer[i], own, others, x, field)
+                continue
             if self.continuous[i] or self.system.nonlinear[i] or i in self.system.set_of:
                 continue
             if i in (*self.system.remembering, *self.system.half_lines):
@@ -255,7 +262,7 @@ class Coupled:
                 result.append(Guard("impact" if sign else "release", j, sign, contacts + j))
             elif sign:
                 result.append(Guard("surface", i, sign, self.system.entry_of(i)))
-            else:
+            elif i not in self.system.joints:
                 result += [Guard("exit", i, side, self.system.entry_of(i)) for side in (1, -1)]
         return (*result, *event_guards(self.system))
 
@@ -357,6 +364,8 @@ class Coupled:
             if i in self.system.half_lines:
                 signs = (0.0,)
             held[n + i] = (*signs, 0.0) if self.scaled[i] else signs
+        for i in self.system.joints:
+            del held[n + i]
         return held
 
     @property

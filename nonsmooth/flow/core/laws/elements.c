@@ -3,8 +3,6 @@
  * differs between the laws stands in LAWS; bounds and signs where they are solved, in decide.c.
  */
 
-static int has_law(const Run *r, int i, int law) { return element(r, i)->law == law; }
-
 /* Surfaces, gaps, their rates and lower derivatives at x; gradients stay among the program's values. */
 static const double *surface_values(Run *r, const double *x) {
   const Values *t = &r->s->surfaces;
@@ -16,7 +14,7 @@ static const double *surface_values(Run *r, const double *x) {
 /* Rounding in each of them, times epsilon, after surface_values. */
 static const double *surface_scales(Run *r, const double *x) {
   double *near = r->vector, *scale = r->rates + r->kept_rows;
-  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
   gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, near, 1, scale);
   return scale;
 }
@@ -100,6 +98,13 @@ static void take_sides(Run *r, int8_t *letter, int certain) {
   }
 }
 
+/* The functions of joints, and derivatives. */
+static int with_joints(const Run *r, int32_t *which, int count) {
+  for (int i = 0; r->s->joints && i < r->m; i++) if (has_law(r, i, JOINT_LAW)) which[count++] = i;
+  for (int i = 0; r->s->joints && i < r->m; i++) if (has_law(r, i, JOINT_LAW)) count += lower_rows(r, i, which + count);
+  return count;
+}
+
 /* What the active elements below ``width`` keep at zero, contacts their gaps, and the ``certain`` one (or -1), also if
  * it is passed. */
 static int gather(const Run *r, int certain, int width, int32_t *which) {
@@ -111,7 +116,7 @@ static int gather(const Run *r, int certain, int width, int32_t *which) {
   if (!found) which[count++] = certain;
   for (int i = 0; i < r->active_count; i++)
     if (r->active[i] < r->m) count += lower_rows(r, r->active[i], which + count);
-  return count;
+  return with_joints(r, which, count);
 }
 
 /* Functions that a mode keeps at zero, and derivatives. */
@@ -161,6 +166,7 @@ static void leave_parallel(Run *r, int certain, const int8_t *letter) {
     } else count += has_law(r, own, SURFACE_LAW);
   }
   if (!count) return;
+  kept = with_joints(r, onto, kept);
   memcpy(x, r->x, sizeof(double) * r->n);
   project(r, onto, kept);
   memcpy(first, r->x, sizeof(double) * r->n);
@@ -179,6 +185,19 @@ static void leave_parallel(Run *r, int certain, const int8_t *letter) {
   memcpy(r->x, x, sizeof(double) * r->n);
 }
 
+/* The run ends where a state does not satisfy a joint, or does not move along it. */
+static void require_joints(Run *r, const double *scale) {
+  for (int i = 0; r->s->joints && i < r->m; i++) {
+    const Element *e = element(r, i);
+    for (int k = 0; has_law(r, i, JOINT_LAW) && k < e->degree; k++) {
+      int row = k ? e->lower + k - 1 : i;
+      if (fabs(r->rates[row]) <= CONSISTENT * scale[row] || r->status != RUNNING) continue;
+      r->limit = r->rates[row];
+      finish(r, INCONSISTENT, OFF_CONSTRAINT, k ? r->m + i : i);
+    }
+  }
+}
+
 static void active_surfaces(Run *r, int certain, const int8_t *letter) {
   r->active_count = 0;
   if (!r->width) return;
@@ -188,10 +207,11 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
     double gap = h[r->m + j];
     if (gap < 0 && !(fabs(gap) <= ON_SURFACE * scale[r->m + j])) finish(r, INCONSISTENT, BEHIND, j);
   }
+  require_joints(r, scale);
   int met = 0;
   for (int i = 0; i < r->width; i++) {
     int rests = fabs(h[i]) <= ON_SURFACE * scale[i], s = set_of(r, i), sure = i == certain;
-    if (has_law(r, i, RELAY_LAW)) continue; /* it switches, nothing is decided */
+    if (has_law(r, i, RELAY_LAW) || has_law(r, i, JOINT_LAW)) continue; /* nothing is decided */
     rests |= !keeps_height(r, i); /* its function holds unknowns: it is decided with them */
     if (s >= 0) {
       if (i == s) met = letter[s] <= OFF && is_met(r, letter, s, h, scale);

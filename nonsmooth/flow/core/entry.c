@@ -71,7 +71,7 @@ static size_t place_decision(Run *r, char *base, size_t used) {
   to->state = LETTERS(orders + w); to->block_state = LETTERS(4 * w); to->large_class = LETTERS(w);
   to->base = LETTERS(w); to->span = LETTERS(w); to->began = LETTERS(w);
   to->along = DOUBLES(orders); to->speed = DOUBLES(orders); to->axes = DOUBLES(3 * w);
-  to->matrix = DOUBLES(square); to->share = DOUBLES(square); to->joint = DOUBLES(square); to->through = DOUBLES(square);
+  to->matrix = DOUBLES(square); to->share = DOUBLES(square); to->bound = DOUBLES(orders); to->joint = DOUBLES(square); to->through = DOUBLES(square);
   to->a = DOUBLES(orders); to->b = DOUBLES(orders); to->nu = DOUBLES(orders); to->floor = DOUBLES(orders);
   to->turn = DOUBLES(w); to->sign = DOUBLES(w); to->old = DOUBLES(w); to->yard = DOUBLES(w); to->room = DOUBLES(w);
   to->steep = DOUBLES(w); to->block = DOUBLES(6 * square + 8 * w); to->large = DOUBLES(w);
@@ -164,6 +164,37 @@ int64_t output_size(void) { return sizeof(Output); }
 double polynomial_root(const double *c, int32_t n, double h) { return first_root(c, n, h); }
 double polynomial_crossing(const double *c, int32_t n, double h, int32_t direction) {
   return first_crossing(c, n, h, direction);
+}
+
+/* What is proved of -dw/dnu of surfaces, of n rows. */
+int32_t law_certificate(const double *m, int32_t n) {
+  double *work = malloc(sizeof(double) * (4 * (size_t)n * n + 4 * n) + sizeof(int32_t) * n);
+  int32_t found = work ? certificate(m, n, work, (int32_t *)(work + 4 * (int64_t)n * n + 4 * n)) : NOTHING;
+  free(work);
+  return found;
+}
+
+/* The multipliers in [-1, 1] of surfaces with the rates a - m nu, where that is unique; whether it is found. */
+int32_t law_solution(const double *a, const double *m, int32_t n, double *nu) {
+  size_t square = (size_t)n * n, doubles = 60 * square + 100 * (size_t)n;
+  double *work = calloc(doubles, sizeof(double));
+  int32_t *pivot = calloc(8 * (size_t)n + 8, sizeof(int32_t)), found = 0;
+  int8_t *letter = calloc(3 * (size_t)n, 1); /* states, contacts, positions */
+  if (work && pivot && letter) {
+    Block b = {.size = n, .tie = VANISHES, .a = work, .b = work + n, .floor = work + 2 * n, .share = work + 3 * n,
+               .matrix = work + 3 * n + square, .state = letter, .is_contact = letter + n};
+    memcpy(b.a, a, sizeof(double) * n);
+    memcpy(b.matrix, m, sizeof(double) * square);
+    for (int i = 0; i < n; i++) b.b[i] = 1;
+    found = solve_block_of_many(&b, UNIQUE, letter + 2 * n, nu, work + 3 * n + 2 * square, pivot);
+  }
+  free(work); free(pivot); free(letter);
+  return found;
+}
+
+/* As go_round: of four quadrants rates (4, 2) and slopes (4, 2, 2). */
+int32_t law_round(double *rates, double *slopes, double *ratio, double *bend) {
+  return go_round((double (*)[2])rates, (double (*)[4])slopes, ratio, bend);
 }
 
 Run *run_new(const System *s, Table *table) {

@@ -17,7 +17,7 @@ import casadi as ca
 
 from ..checks import real
 from ..errors import DefinitionError, ParameterError
-from ..expressions.cancel import powers
+from ..expressions.cancel import cancel_common_factor, powers
 from ..expressions.graph import IN_A_FIELD, IN_A_GAP, IN_A_GUARD, IN_A_SURFACE, require_smooth
 from ..numbering import IMPACT_LAWS
 from ..reading import (
@@ -512,7 +512,7 @@ def _require_alike(sizes: Sequence[int], multipliers: Any) -> None:
 
 
 def _require_linear_sets(d: Definition) -> None:
-    """Refuse sets whose multipliers enter nonlinearly or are multiplied by a reaction."""
+    """Refuse sets whose multipliers enter nonlinearly or whose components have different loads."""
     first = 0
     for i, size in enumerate(d.sizes):
         lam = d.multipliers[first : first + size]
@@ -524,11 +524,17 @@ def _require_linear_sets(d: Definition) -> None:
                 f"multiplier {lam}: expected a field linear in all of its components together, "
                 "received a nonlinear one. Hidden dynamics has one multiplier for each surface."
             )
-        if d.reactions.numel() and ca.depends_on(ca.jacobian(d.field, lam), d.reactions):
+        entries = ca.jacobian(d.field, lam).nonzeros()
+        if not any(ca.depends_on(e, d.reactions) for e in entries):
+            continue
+        variables, known = ca.vertcat(d.extended_states, d.reactions), ca.vertcat(d.parameters, lam)
+        if any(
+            ca.depends_on(e, d.reactions)
+            for e in cancel_common_factor(entries, variables, known)[0]
+        ):
             raise DefinitionError(
-                f"multiplier {lam} of surface {i}: it is multiplied by the reaction of an impact, "
-                "and impulses with friction in the plane are not implemented. Give the contact a "
-                "compliance, whose force is the load, or friction in one direction."
+                f"multiplier {lam} of surface {i}: its friction has no common bound {', '.join(map(str, entries))}. Write "
+                "each component as multiplier times one coefficient times one sum of reactions, the load."
             )
 
 

@@ -71,7 +71,7 @@ static size_t place_decision(Run *r, char *base, size_t used) {
   to->state = LETTERS(orders + w); to->block_state = LETTERS(4 * w); to->large_class = LETTERS(w);
   to->base = LETTERS(w); to->span = LETTERS(w); to->began = LETTERS(w);
   to->along = DOUBLES(orders); to->speed = DOUBLES(orders); to->axes = DOUBLES(3 * w);
-  to->matrix = DOUBLES(square); to->share = DOUBLES(square); to->joint = DOUBLES(square); to->through = DOUBLES(square);
+  to->matrix = DOUBLES(square); to->share = DOUBLES(square); to->bound = DOUBLES(orders); to->joint = DOUBLES(square); to->through = DOUBLES(square);
   to->a = DOUBLES(orders); to->b = DOUBLES(orders); to->nu = DOUBLES(orders); to->floor = DOUBLES(orders);
   to->turn = DOUBLES(w); to->sign = DOUBLES(w); to->old = DOUBLES(w); to->yard = DOUBLES(w); to->room = DOUBLES(w);
   to->steep = DOUBLES(w); to->block = DOUBLES(6 * square + 8 * w); to->large = DOUBLES(w);

@@ -109,7 +109,7 @@ typedef struct {
   double *along, *speed, *axes;
   int32_t *own, *order, *first, *mark, *pivot, *proved;
   int8_t *is_contact, *is_idle, *is_touched, *is_known, *state, *block_state, *large_class;
-  double *matrix, *share, *joint, *through, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
+  double *matrix, *share, *bound, *joint, *through, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
   double most, field, rate;
   Motion motion[SEVERAL];
 } Decision;

@@ -274,7 +274,7 @@ static int class_of(const Block *k, int i, const double *nu, double part) {
 
 /* The same of a vector, from its first row on. */
 static int class_of_vector(const Block *k, int i, const double *nu, double part) {
-  double w[3], terms, zero = 0, room = 0, bound = k->b[i];
+  double w[3], terms, zero = 0, room = 0, bound = bound_of(k, i, nu);
   int size = k->span[i];
   for (int j = 0; j < size; j++) {
     w[j] = rate_of(k, i + j, nu, &terms);
@@ -451,18 +451,10 @@ static int enumerate(const Block *k, double *found, double *work, int32_t *pivot
   return groups;
 }
 
-/* The solution of a symmetric block with vectors: each element in turn, as the others are, from the smallest nu with
- * w = 0 on (Gauss and Seidel). */
-static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
+/* Each element of a block with vectors in turn, as the others are (Gauss and Seidel); whether that converges. */
+static int relax_from(const Block *k, double *nu, double most) {
   int n = k->size;
-  double *ones = work, *inverse = ones + n, change = INFINITY, last = INFINITY, most = 0;
-  for (int i = 0; i < n; i++) { ones[i] = 1; most = larger(fabs(k->b[i]), most); }
-  invert_any(k->matrix, n, ones, inverse, inverse + (int64_t)n * n, pivot);
-  for (int i = 0; i < n; i++) {
-    nu[i] = 0;
-    for (int j = 0; j < n; j++) nu[i] += inverse[i * n + j] * k->a[j];
-    most = larger(fabs(nu[i]), most);
-  }
+  double change = INFINITY, last = INFINITY;
   for (int again = 0; again < 2000 && change > 4 * EPSILON * most && !(change >= last && last < TIED * most); again++) {
     last = change;
     change = 0;
@@ -492,13 +484,34 @@ static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
       for (int q = 0; q < size; q++) { change = larger(fabs(y[q] - nu[i + q]), change); nu[i + q] = y[q]; }
     }
   }
-  return finite_all(nu, n);
+  return finite_all(nu, n) && (!k->is_coupled || change <= TIED * most);
+}
+
+/* The solution of a block with vectors, symmetric but for loads, from the smallest nu with w = 0 on, in units of bounds
+ * where these are loads: then what depends on one another shares. */
+static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
+  int n = k->size;
+  double *unit = work, *inverse = unit + n;
+  for (int i = 0; i < n; i++) unit[i] = 1;
+  for (int pass = 0; pass <= k->is_coupled; pass++) {
+    double most = 0;
+    invert_any(k->matrix, n, unit, inverse, inverse + (int64_t)n * n, pivot);
+    for (int i = 0; i < n; i++) {
+      nu[i] = 0;
+      for (int j = 0; j < n; j++) nu[i] += inverse[i * n + j] * k->a[j];
+      most = larger(larger(fabs(k->b[i]), fabs(nu[i])), most);
+    }
+    if (!relax_from(k, nu, most)) return 0;
+    for (int i = 0; i < n; i++) unit[i] = larger(k->is_contact[i] ? nu[i] : bound_of(k, i, nu), MERGED * (most > 0 ? most : 1));
+  }
+  return 1;
 }
 
 /* Solutions of a block that is not of one element: one where a certificate or the size says so. */
 static int solve_block_of_many(const Block *k, int certificate, int8_t *position, double *found, double *work,
                                int32_t *pivot) {
-  if (certificate == NOTHING && k->size <= MOST_ENUMERATED) return enumerate(k, found, work, pivot);
+  int is_loaded = k->span && k->is_coupled; /* friction in space by reactions */
+  if (certificate == NOTHING && k->size <= MOST_ENUMERATED && !is_loaded) return enumerate(k, found, work, pivot);
   if (k->span) return relax(k, found, work, pivot);
   int most = certificate >= UNIQUE ? 10000 : 20 + 4 * k->size;
   int solved = pivot_block(k, position, found, most, work, pivot) || lemke_block(k, found, work, pivot);

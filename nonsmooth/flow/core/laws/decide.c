@@ -174,8 +174,8 @@ static void read_old(const Run *r, Decision *d, const int8_t *letter, const Know
 static int is_at_bound(const Decision *d, int i) {
   double bound = d->b[i];
   if (d->is_contact[i]) return d->old[i] <= TIED * d->room[i];
-  if (d->span[i]) return d->span[i] > 0 && bound - length_of(d->old + i, d->span[i]) <= TIED * d->room[i];
   for (int j = 0; j < d->count; j++) bound += d->share[i * d->count + j] * d->old[j];
+  if (d->span[i]) return d->span[i] > 0 && bound - length_of(d->old + i, d->span[i]) <= TIED * d->room[i];
   return bound - fabs(d->old[i]) <= TIED * d->room[i];
 }
 
@@ -313,7 +313,7 @@ static double middle(const double *one, const double *two, int apart, int other,
  * Of those of an order all that is known before it, the part along u of u itself is returned. */
 static double along_bound(const Decision *d, int i, int order, double *nu, double *w) {
   int k = d->count, size = d->span[i], j = order - d->began[i];
-  const double *b = d->b + d->began[i] * k + i, *s = d->speed + d->began[i] * k + i, *u = d->along + d->began[i] * k + i;
+  const double *b = d->bound + d->began[i] * k + i, *s = d->speed + d->began[i] * k + i, *u = d->along + d->began[i] * k + i;
   double bend = 0;
   for (int q = 0; q < size; q++) bend -= 0.5 * middle(u + q, u + q, k, k, j);
   for (int q = 0; q < size; q++) {
@@ -329,7 +329,7 @@ static void keep_vector(Decision *d, int i, int order) {
   if (d->state[at + i] == UNDECIDED) d->began[i] = (int8_t)(order + (state == UNDECIDED));
   if (state == UNDECIDED || state == INSIDE) return;
   int begun = d->began[i] * k + i;
-  double w[3], known[3] = {0}, rest[3] = {0}, speed = 0, bend = 0, bound = d->b[begun], *first = d->along + begun;
+  double w[3], known[3] = {0}, rest[3] = {0}, speed = 0, bend = 0, bound = d->bound[begun], *first = d->along + begun;
   for (int q = 0; q < size; q++) {
     w[q] = d->a[at + i + q];
     for (int c = 0; c < k; c++)
@@ -349,7 +349,7 @@ static void keep_vector(Decision *d, int i, int order) {
  * where w keeps its direction. */
 static void turn_rows(const Decision *d, Block *b, int i, int order) {
   int n = b->size, own = b->own[i], size = d->span[own];
-  const double *axes = d->axes + 3 * own, first = d->b[d->began[own] * d->count + own];
+  const double *axes = d->axes + 3 * own, first = d->bound[d->began[own] * d->count + own];
   double nu[3], w[3], slope = first > 0 ? d->speed[d->began[own] * d->count + own] / first : 0;
   along_bound(d, own, order, nu, w);
   for (int c = 0; c < n; c++) turn_vector(axes, size, 1, b->matrix + i * n + c, n);
@@ -361,6 +361,7 @@ static void turn_rows(const Decision *d, Block *b, int i, int order) {
     b->b[i + q] = nu[q];
     b->a[i + q] -= w[q] - (q ? slope * nu[q] : 0);
     if (q == 0) continue;
+    memset(b->share + (i + q) * n, 0, sizeof(double) * n);
     b->matrix[(i + q) * (n + 1)] += slope;
     b->state[i + q] = first > 0 ? INSIDE : ABOVE;
   }
@@ -391,6 +392,7 @@ static Block part_of_law(Decision *d, int order, int which) {
       b.is_coupled |= b.share[i * n + j] != 0;
     }
   }
+  for (int i = 0; i < n; i++) d->bound[at + b.own[i]] = b.b[i];
   for (int i = 0; i < n; i++) {
     int own = b.own[i], size = d->span[own];
     if (size >= 0) span[i] = 0;
@@ -701,6 +703,11 @@ static void explore(Run *r, Decision *d, int order, int which) {
         d->state[(order + 1) * k + own] = to[q * n + i];
       }
       for (int i = d->first[which]; i < d->first[which + 1]; i++) {
+        int own = d->order[i], at = order * k;
+        d->bound[at + own] = d->b[at + own];
+        for (int j = 0; j < d->first[which + 1]; j++) d->bound[at + own] += d->share[own * k + d->order[j]] * d->nu[at + d->order[j]];
+      }
+      for (int i = d->first[which]; i < d->first[which + 1]; i++) {
         int own = d->order[i];
         if (d->span[own] > 0) keep_vector(d, own, order);
       }
@@ -731,6 +738,7 @@ static void letters_of_motion(const Run *r, const Decision *d, const Motion *own
     int side = own->state[i] == INSIDE ? 0 : own->state[i] == ABOVE ? 1 : -1;
     letter[d->own[i]] = (int8_t)(d->span[i] && side ? LEAVING : d->is_contact[i] ? side != 0 : side);
   }
+  if (r->s->sets) idle_sets(r, letter, 0);
 }
 
 /* Whether a block may have more than one vector of unknowns. */

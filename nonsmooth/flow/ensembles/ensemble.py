@@ -156,7 +156,7 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     away = (
         None
         if device is None
-        else lambda first, out: run_on_device(job, device, starts, first, out)
+        else lambda first, out: run_on_device(job, device, starts, first, out, work.workers)
     )
     none = Chunk.empty(0, system, job.at is not None, job.room)
     most = work.largest(none.row_size)

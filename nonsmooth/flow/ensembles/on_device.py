@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem, OptionError
+from ..constants import SAFETY
 from ..engine.building.codegen import supports_lanes
 from ..engine.device.card import machine_for
 from ..engine.device.kernel import Bins, Kernel, Reduced, Reduction, Source
@@ -22,6 +24,9 @@ from .starts import Starts
 
 #: Trajectories of one call; each needs some 100 bytes of memory on the host, and 300 on the device.
 CHUNK = 1 << 22
+
+#: Order by the logarithm of the tolerance, as Jorba & Zou's; ``Options.order`` has a fifth more.
+_ORDER = 0.5
 
 #: How often a run returns to the card after a step that was not clear, before the driver completes it.
 _TURNS = 8
@@ -60,10 +65,15 @@ def _unsupported(system: FilippovSystem, options: Options) -> str:
 
 
 def _kernel(job: Job, device: str) -> Kernel:
-    system, order, machine = job.system, job.options.order, machine_for(device)
+    system, order, machine = job.system, device_order(job.options), machine_for(device)
     assert isinstance(system, FilippovSystem)
     key = ("device", order, machine)
     return system.cached(key, lambda: Kernel(system, order, machine))
+
+
+def device_order(options: Options) -> int:
+    """Order of the series on a card: lower than on a processor, for each thread has 255 registers at most."""
+    return max(6, math.ceil(_ORDER * -math.log(SAFETY * options.rtol)) + 1)
 
 
 def run_on_device(

@@ -89,7 +89,7 @@ class Core:
     def ProgramOptions(
         self, *, arch, std, device_as_default_execution_space, disable_warnings, fma
     ):
-        assert std == "c++17" and device_as_default_execution_space and fma
+        assert std == "c++17" and device_as_default_execution_space
         return arch
 
     def Program(self, code, code_type, options):

@@ -198,7 +198,7 @@ def outcomes(
 
 def _bins(system: FilippovSystem, ranges: Mapping[str, tuple[float, float]], bins: int) -> Bins:
     names = (*system.state_names, "t")
-    low, high = np.zeros(len(names)), np.ones(len(names))
+    low, high = np.full((2, len(names)), math.nan)  # without a range there are no bins
     for name, given in ranges.items():
         try:
             k = names.index(name)

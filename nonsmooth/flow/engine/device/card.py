@@ -21,8 +21,9 @@ _INSTALL = (
     "device= the ensemble runs on this machine's processors."
 )
 
-#: Threads of a block, and blocks that a multiprocessor holds at once: 8 warps of 255 registers.
-_THREADS, _RESIDENT = 128, 2
+#: Threads of a block, and blocks that a multiprocessor holds at once: 8 warps of 255 registers. Measured: 168 or 128
+#: registers spill too much, and two blocks of 128 threads read the long text of a nonlinear step at different points.
+_THREADS, _RESIDENT = 256, 1
 
 #: Bytes of each of the two buffers by which arrays are copied.
 _STAGED = 1 << 24
@@ -38,7 +39,8 @@ class Card:
 
     # Products and sums are ``fused`` as in the lanes on a processor; unless, the bits are those of C++.
     def __init__(self, core: Any, fused: bool = True):
-        self._core, self._fused, self._lock = core, fused, threading.RLock()
+        self._core, self._fused, self.lock = core, fused, threading.RLock()
+        self.kept: dict[str, tuple[int, Any]] = {}
         self.name = "the first CUDA device"
         with self._driven("start", _INSTALL):
             self._device = core.Device()
@@ -52,7 +54,7 @@ class Card:
     @contextmanager
     def _driven(self, verb: str, advice: str = "Run without device=.") -> Iterator[None]:
         """Errors of cuda-core and of the driver, of which there are several kinds, as DeviceError."""
-        with self._lock:
+        with self.lock:
             try:
                 if verb != "start":
                     self._device.set_current()  # of this thread

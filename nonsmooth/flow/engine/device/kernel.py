@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -97,8 +96,7 @@ class Kernel:
         self.record = record_type(system)
         self.steps = _FIRST_STEPS  # of a launch
         self._compiled: tuple[Any, int] | None = None
-        self._memory: dict[str, tuple[int, Any]] = {}
-        self.lock = threading.RLock()
+        self.lock = machine.lock
 
     @property
     def compiled(self) -> tuple[Any, int]:
@@ -113,10 +111,11 @@ class Kernel:
 
     def memory(self, name: str, size: int) -> Any:
         """Memory of at least so many bytes, which later calls use again."""
-        if name not in self._memory or self._memory[name][0] < size:
-            self._memory.pop(name, None)  # before there is more
-            self._memory[name] = size, self.machine.empty(size)
-        return self._memory[name][1]
+        kept = self.machine.kept
+        if name not in kept or kept[name][0] < size:
+            kept.pop(name, None)  # before there is more
+            kept[name] = size, self.machine.empty(size)
+        return kept[name][1]
 
     def run(
         self,

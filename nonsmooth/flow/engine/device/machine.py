@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -21,7 +22,10 @@ class DeviceError(NonsmoothError, RuntimeError):
 
 
 class Machine(Protocol):
-    """Where kernels run."""
+    """Where kernels run; ``kept`` is memory that all calls use, one after the other under the ``lock``."""
+
+    lock: threading.RLock
+    kept: dict[str, tuple[int, Any]]
 
     @property
     def name(self) -> str:

@@ -1,6 +1,7 @@
 """The kernels' text as C++ on this processor, block by block and thread by thread, in the place of a card."""
 
 import ctypes
+import threading
 
 import numpy as np
 
@@ -27,7 +28,7 @@ class Shim:
     name = "this processor, as a GPU"
 
     def __init__(self, fused=True, blocks=2, threads=3, flags=(), random=0):
-        self.random = random
+        self.random, self.lock, self.kept = random, threading.RLock(), {}
         self.blocks, self.threads = blocks, threads
         self.flags = (*FLAGS, f"-ffp-contract={'fast' if fused else 'off'}", *flags)
 

@@ -131,7 +131,7 @@ def test_an_ensemble_by_way_of_cuda_core(monkeypatch):
     )
     names = [name for name, _ in core.launched]
     assert names[:3] == ["parameters", "trajectories", "numbered"]
-    assert core.launched[1][1] == (4, 128)
+    assert core.launched[1][1] == (2, 256)
     assert np.array_equal(there.itinerary, here.itinerary)
     np.testing.assert_allclose(there.x, here.x, rtol=0, atol=1e-7)
     np.testing.assert_allclose(there.event_t, here.event_t, rtol=0, atol=1e-7)

@@ -79,7 +79,7 @@ def ensemble(
     work : Work, optional
         Threads or an executor, size of a chunk, progress bar, store; see :class:`Work`.
     device : {None, "cuda"}, optional
-        ``"cuda"`` runs on an NVIDIA card; rare cases fall back to the processor. It needs the
+        ``"cuda"`` runs on an NVIDIA card; steps that are not clear fall back to the processor. It needs the
         packages of ``nonsmooth-dynamics[cuda]``, and a system of at most one surface without resets and contacts.
 
     Returns

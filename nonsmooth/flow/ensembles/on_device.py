@@ -26,8 +26,8 @@ from .starts import Starts
 CHUNK = 1 << 22
 
 #: Order by the logarithm of the tolerance; ``Options.order`` has a quarter more. Measured on an H200 at tol=1e-10, order
-#: 14 against 17: 1.36 times the linear bounces a second and 1.28 times the nonlinear ones, and a third of the steps
-#: are the driver's.
+#: 14 against 17: 1.36 times the runs a second of a linear system and 1.28 times those of a nonlinear one, and less than
+#: half as many runs with a step of the driver.
 _ORDER = 0.48
 
 #: How often a run returns to the card after a step that was not clear, before the driver completes it.

@@ -29,7 +29,7 @@ _THREADS, _RESIDENT = 256, 1
 _STAGED = 1 << 24
 
 #: PTX for this architecture is compiled by every driver, for every card.
-_COMMON = "80"
+COMMON = "80"
 
 
 class Card:
@@ -71,10 +71,10 @@ class Card:
         """Return the kernels of a source, for this card."""
         own, said = str(self._device.arch), []
         # An NVRTC that is older than the card, or newer than the driver, may still write PTX for the driver's compiler.
-        for target, arch in (("cubin", own), ("ptx", own), ("ptx", _COMMON)):
+        for target, arch in (("cubin", own), ("ptx", own), ("ptx", COMMON)):
             try:
                 with self._driven("compile"):
-                    kernels = self._program(source, arch).compile(target)
+                    kernels = self.program(source, arch).compile(target)
                     kernels.get_kernel("trajectories")  # loads it
                     return kernels
             except DeviceError as error:
@@ -84,7 +84,8 @@ class Card:
             f"device='cuda': no way to compile kernels for {self.name} ({tried}). {_INSTALL}"
         )
 
-    def _program(self, source: str, arch: str) -> Any:
+    def program(self, source: str, arch: str) -> Any:
+        """Return a source for an architecture, to be compiled."""
         options = self._core.ProgramOptions(
             arch=f"sm_{arch}",
             std="c++17",

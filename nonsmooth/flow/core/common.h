@@ -78,10 +78,10 @@ typedef struct {
   int64_t steps, events, entered, shrinking, code, letter, drop, begun, kinds[SIMPLE_KINDS - 1];
 } Left;
 
-/* Itineraries of a card are numbers in base 4, digits from 1, the last mode lowest; FROZEN is added to one whose
- * further modes have no room. */
+/* Itineraries of a card are numbers in base 4, digits from 1, the last mode lowest; one whose further modes have no
+ * room is FROZEN too. */
 #define MOST_MODES 30
-#define FROZEN (1LL << 2 * MOST_MODES)
+#define FROZEN (1LL << 62)
 
 #ifndef ON_DEVICE
 /* Sizes of what Python and C share, compared when a library is loaded. */

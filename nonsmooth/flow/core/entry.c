@@ -370,6 +370,8 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   }
   r->prepared = 1;
   memcpy(r->x, m->x, sizeof(double) * r->n);
+  r->t = m->t;
+  set_time_state(r);
   memcpy(r->letter, m->letter, r->width);
   if (r->s->sets) memcpy(r->unknowns, m->unknowns, sizeof(double) * r->width);
   lay_out(r, r->letter, &r->now);
@@ -382,8 +384,6 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   memset(r->instant.residual, 0, sizeof(double) * r->s->stops);
   memset(r->instant.pending, 0, r->s->rules.triggers);
   memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
-  r->t = m->t;
-  set_time_state(r);
   r->since = m->since;
   r->length = m->length;
   r->shortened = m->shortened;

@@ -78,8 +78,10 @@ static inline void store(Lanes *s, Work *w, int, int status) {
   out->steps[i] = (int32_t)s->steps.v;
 }
 
-/* The first modes are kept. */
-static inline void shorten_codes(Lanes *s, Work *) { s->code = (s->code >> 2) | FROZEN; }
+/* The first modes are kept: a further one moves FROZEN out, and is taken away again. */
+static inline void shorten_codes(Lanes *s, Work *) {
+  if (!(s->code.v & FROZEN)) s->code = (s->code >> 2) | FROZEN;
+}
 
 static inline void write_record(const Lanes *s, int begun, int64_t *record) {
   Left *to = (Left *)record;

@@ -15,7 +15,7 @@
 #define S1 (SLOTS > 0 ? SLOTS : 1)
 #define FIRST_STOP (SLOTS - STOPS)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
-#define LONG_CODE FROZEN
+#define LONG_CODE (1LL << 2 * MOST_MODES)
 #define LETTERS 1
 #define OF_POOLS int alive;
 

@@ -22,7 +22,7 @@ Records = NDArray[np.void]
 
 #: Modes of an itinerary that a card keeps, and what its number has where there are more.
 MOST_MODES = 30
-FROZEN = 1 << 2 * MOST_MODES
+FROZEN = 1 << 62
 
 #: Least number of records for a thread of this processor.
 _LEAST = 64
@@ -45,7 +45,7 @@ def record_type(system: FilippovSystem) -> np.dtype[np.void]:
 
 def word_of(code: int, modes: Sequence[str]) -> str:
     """Return an itinerary from its code: digits from 1 to base 4, the last mode lowest."""
-    letters, rest = [], code & (FROZEN - 1)
+    letters, rest = [], code & ~FROZEN
     while rest:
         letters.append(modes[(rest & 3) - 1] or "o")
         rest >>= 2

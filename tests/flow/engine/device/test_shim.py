@@ -144,6 +144,15 @@ def test_of_long_itineraries_the_first_modes_are_kept(monkeypatch, random):
     assert found.itineraries == dict.fromkeys(words, 1)
 
 
+def test_modes_that_are_kept_stay_where_a_step_is_not_clear(as_card):
+    """The run falls back at its last event, after many modes for which there was no room."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    spiral = ns.FilippovSystem([x, y], surface=x, above=[y, -1 - 2 * y], below=[y, 1 - 2 * y])
+    runs = ns.ensemble(spiral, [[-1.0, 0.3]], 40.0, tol=1e-8, max_events=100, device="cuda")
+    assert runs.status == [ns.Status.TOO_MANY_EVENTS]
+    assert runs.itinerary[0] == "- + " * 15 + "..."
+
+
 @pytest.mark.parametrize(("name", "random"), [("belt", 1), ("belt", 2), ("linear", 3)])
 def test_runs_go_on_where_the_card_left_them(name, random, monkeypatch):
     """Every other step is the driver's: events and itineraries are equal, and numbers to the tolerance."""

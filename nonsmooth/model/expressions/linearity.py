@@ -42,7 +42,7 @@ def linearity(
 ) -> Linearity:
     """Determine which parts of a system are affine."""
     every = ca.vertcat(x, unknowns)
-    bent_rows, bent_guards = bent(field, every, time), bent(guards, x, time)
+    bent_rows, bent_guards = bent(field, every, time), bent(guards, every, time)
     bent_free_rows = bent(field, x, time)
     others = bent(ca.vertcat(layer, guards, factors), every, time)
     return Linearity(
@@ -51,7 +51,7 @@ def linearity(
         bent_rows=bent_rows if smooth else [True] * field.numel(),
         bent_free_rows=bent_free_rows if smooth else [True] * field.numel(),
         bent_guards=bent_guards,
-        curved_guards=bent(guards, x),
+        curved_guards=bent(guards, every),
     )
 
 

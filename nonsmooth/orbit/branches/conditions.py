@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, Evaluator, FilippovSystem, Guard
-from ...model.derivatives.variational import guarded_field, variational_field
+from ...model.derivatives.event_maps import keeps_zero
+from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import finite_return_map
-from ..runs.guards import LegGuards, watch
+from ..runs.guards import CONDITIONS, LegGuards, is_met, watch
 from ..runs.legs import Leg, surface_of
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
@@ -159,7 +160,7 @@ class _Tests:
                     state = at.by_leg[i].end
                     values = guard_values(self.system, self.legs[i].mode)(state, p)[1][:, 0]
                 found += [(condition, float(values[k])) for k, condition in others]
-            found += _interior(self.inside[i], rows)
+            found += _interior(self.inside[i], self.guards.fields[i], rows, p)
         return found
 
 
@@ -168,12 +169,34 @@ def _starting(
 ) -> list[tuple[int, int, Condition]]:
     """Guards that are not zero by construction at the start of a leg, of those to order 3."""
     guards = guarded_field(system, leg.mode).motion.guards
-    orders = [(k, guard, _order(system, guard, before)) for k, guard in enumerate(guards)]
+    orders = [(k, guard, _order(system, guard, before, leg)) for k, guard in enumerate(guards)]
     return [(k, order, Condition("start", i, g)) for k, g, order in orders if order is not None]
 
 
-def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
+def _leaves_zero(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> bool:
+    """Whether a function that the leg before kept at zero is zero where this leg begins, which it leaves at a rate."""
+    k = guard.element
+    if guard.kind != "surface" or before.timed or before.mode[k] not in "sc" or leg.mode[k] in "sc":
+        return False
+    i, *more = system.entries[k]
+    if more or i in system.algebraic or before.kind in ("impact", "jump"):
+        return False
+    return before.kind != "reset" or keeps_zero(system, i, before.element)
+
+
+def _changes(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> bool:
+    """Whether a guard is of a complementarity condition whose letter changes at the event before a leg."""
+    k = guard.element
+    if guard.kind not in ("surface", "release") or k >= len(system.entries):
+        return False
+    jumps = before.kind in ("reset", "impact", "jump") or before.timed
+    return not jumps and system.entries[k][0] in system.half_lines and before.mode[k] != leg.mode[k]
+
+
+def _order(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> int | None:
     """Order at which a guard is positive after the event of the leg before; None without a test."""
+    if _changes(system, guard, before, leg):
+        return None
     # A crossing leaves the guard zero and its rate positive. After an exit or release the rate is zero
     # too, and its positive second derivative is the transversality of that event.
     if guard.kind not in ("surface", "exit", "impact", "release"):
@@ -182,6 +205,8 @@ def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
         return None  # the rate after it is that before it, the transversality of the event
     if guard.kind == "surface" and surface_of(system, before) == guard.element:
         return 1 if before.kind == "crossing" else None
+    if _leaves_zero(system, guard, before, leg):
+        return 1
     if guard.kind == "impact" and guard.ends(before.kind, before.element, before.side):
         return None
     return 0
@@ -207,14 +232,15 @@ def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
 
 
 def _interior(
-    guards: Sequence[tuple[Condition, Guard]], rows: Array
+    guards: Sequence[tuple[Condition, Guard]], field: GuardedField, rows: Array, p: Array
 ) -> list[tuple[Condition, float]]:
-    """Smallest minimum of each guard inside a leg."""
+    """Smallest minimum of each guard inside a leg, where something happens at its zero."""
     least: dict[int, float] = {}
-    for number, _, value, bend in rows[:, :4].tolist():
+    for row in rows:
+        number, _, value, bend = row[:4].tolist()
         k = int(number)
         guard = guards[k][1]
-        if bend > 0.0 or (bend and guard.kind in ("stop", "reset")):
+        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_met(field, row, p):
             value = _signed(guard, value)
             least[k] = min(value, least.get(k, np.inf))
     return [(guards[k][0], value) for k, value in least.items()]

@@ -388,6 +388,7 @@ static void step(Run *r) {
   if (row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
   if (dt > 0) note_sides(r, e, dt);
   r->falls = row >= 0 && is_steep(r, e, row, dt);
+  if (row >= 0) note_hidden(r, e, row);
   last &= dt == h;
   if (!advance(r, e, dt)) return;
   if (last) {

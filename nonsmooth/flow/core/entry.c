@@ -163,6 +163,7 @@ static size_t place_run(Run *r, char *base) {
   r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
   r->key = LETTERS(w + 8 * s->rules.discrete);
   r->met_at = DOUBLES(g);
+  r->hidden = DOUBLES(g);
   return used;
 }
 
@@ -241,6 +242,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->reason = NO_REASON;
   r->where = 0;
   r->facts = 0;
+  r->t_error = 0;
   r->dependent = r->turned_mode = -1;
   r->segment_mode = r->due_impact = r->length_mode = -1;
 }
@@ -285,6 +287,7 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
   numbers[0] = r->t;
   numbers[1] = r->limit;
   numbers[2] = r->at_t;
+  numbers[3] = r->t_error;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
                     r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts,
                     unmet_event(r)};

@@ -30,8 +30,9 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         partial(_events, system, run), few and partial(_few_events, system, run)
     )
     rested = {e.name: None for e in events if e.kind == "rest_below"} if options.rest_below else ()
-    facts = Facts(bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED), tuple(rested))
-    warn_of_facts(facts.depends_on_widths, facts.unproved)
+    bits = (bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED))
+    facts = Facts(*bits, tuple(rested), run.t_error)
+    warn_of_facts(facts.depends_on_widths, facts.unproved, facts.t_error)
     return Trajectory(
         system=system,
         parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),

@@ -368,9 +368,21 @@ class _Lifter:
                 f = written
                 continue
             above, below = self._at(f, {i: 1}), self._at(f, {i: -1})
-            same = ca.is_equal(above, below, 20)
-            f = above if same else (1 + s.lam) / 2 * above + (1 - s.lam) / 2 * below
+            if ca.is_equal(above, below, 20):
+                f = above
+                continue
+            terms = [self._affine_in(i, term) for term in _terms(f)]
+            f = sum(terms[1:], terms[0])
         return f
+
+    def _affine_in(self, i: int, term: ca.SX) -> ca.SX:
+        """A term, or the affine function of a multiplier with its values at +1 and -1."""
+        s = self.switches[i]
+        if not ca.depends_on(term, ca.vertcat(s.lam, s.even)):
+            return term
+        above, below = self._at(term, {i: 1}), self._at(term, {i: -1})
+        same = ca.is_equal(above, below, 20)
+        return above if same else (1 + s.lam) / 2 * above + (1 - s.lam) / 2 * below
 
     def _entry_of(self, number: int) -> str:
         """Name the first entry of the right-hand side that uses a node."""
@@ -384,6 +396,17 @@ class _Lifter:
             if number in seen:
                 return f"rhs[{entry}]"
         return "rhs"
+
+
+def _terms(e: ca.SX) -> list[ca.SX]:
+    """The terms of a sum."""
+    op = e.op()
+    if op == ca.OP_NEG:
+        return [-term for term in _terms(e.dep(0))]
+    if op not in (ca.OP_ADD, ca.OP_SUB):
+        return [e]
+    second = _terms(e.dep(1))
+    return _terms(e.dep(0)) + (second if op == ca.OP_ADD else [-term for term in second])
 
 
 def _weighted(weights: list[ca.SX], values: list[ca.SX]) -> ca.SX:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..definition.system import FilippovSystem, require_system
-from .coupled import coupled_of
+from .coupled import coupled_of, raised_of
 from .motion import Motion, motion
 from .switches import Guarded
 
@@ -23,7 +23,8 @@ class Solved:
     """The law of a mode of coupled surfaces and contacts (see ``switches.Sliding``)."""
 
     def __init__(self, system: FilippovSystem, mode: str):
-        coupled, x = coupled_of(system), system.extended_states
+        coupled = raised_of(system) if rests_on(system, mode) else coupled_of(system)
+        x = system.extended_states
         self.system, self.mode, self.coupled = system, mode, coupled
         sliding = coupled.sliding(mode)
         self.surfaces = tuple(i for i in sliding if i < system.surface_count)
@@ -93,10 +94,21 @@ def solved(matrix: ca.SX, right: ca.SX) -> ca.SX:
     return ca.solve(matrix, right)
 
 
+def rests_on(system: FilippovSystem, mode: str) -> tuple[int, ...]:
+    """Surfaces that rest in a mode: their multipliers enter a higher derivative of their functions first."""
+    letters = system.parse_letters(mode)[: system.surface_count]
+    if 0 not in letters:
+        return ()
+    lower = raised_of(system).lower
+    return tuple(
+        i for i, own in enumerate(lower) if own and not letters[i] and i not in system.joints
+    )
+
+
 def explicit(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode as a field of the states, for any system; built once."""
     require_system(system, joints=True)
-    if not system.coupled:
+    if not system.coupled and not rests_on(system, mode):
         return motion(system, mode)
 
     def build() -> Motion:

@@ -27,7 +27,9 @@ from ...model import (
     FilippovSystem,
     require_plain,
 )
-from ...model.derivatives.event_maps import AtEvent
+from ...model.derivatives.event_maps import AtEvent, function_map
+from ...model.laws.coupled import raised_of
+from ...model.laws.explicit import rests_on
 from .guards import watch
 from .leg_integration import LegFlows, LegIntegrator
 from .legs import Leg, LegFlow, Stretch, integrate_leg, leg_name, sets_left, stretches
@@ -258,6 +260,29 @@ class Passage:
 
 def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     """Legs and events of a run, with derivatives by the start of each and by chosen parameters."""
+    first, *others = _passages(run, chosen)
+    along_rest = _rest_at(run.system, first.stretch, run.system.parameter_vector(run.parameters))
+    if along_rest is not None:
+        by_start = first.flow.by_start @ along_rest
+        first = replace(first, flow=replace(first.flow, by_start=by_start))
+    return [first, *others]
+
+
+def _rest_at(system: FilippovSystem, part: Stretch, p: Array) -> Array | None:
+    """The projection of a start (N,) onto the states at which a mode rests; None where nothing rests."""
+    resting = rests_on(system, part.leg.mode)
+    if not resting:
+        return None
+    n, mode = system.extended_dimension, part.leg.mode
+    kept = [
+        e for i in resting for e in (system.definition.surfaces[i], *raised_of(system).lower[i])
+    ]
+    y = part.leg.along(system).states_at(part.start, p)
+    rows = np.array([function_map(system, mode, e)(y, p).gradient[:n] for e in kept])
+    return np.eye(n) - np.linalg.pinv(rows) @ rows
+
+
+def _passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     system = run.system
     p = system.parameter_vector(run.parameters)
     parts = stretches(run)

@@ -274,7 +274,29 @@ REASONS = (
     "no_jump",
     "off_constraint",
     "dead_point",
+    "decay",
 )
 
-#: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.
-RUNNING, FULL, HAND_OVER = -1, -2, -3
+#: Flag of the mode of an implicit step, as it is recorded.
+IMPLICIT_STEP = 1 << 30
+
+#: Steps that a run may take: what costs least, or one kind.
+METHODS = ("auto", "taylor", "stiff")
+
+#: Implicit steps have seven stages in place of five below this relative tolerance. Newton's method ends at this part
+#: of it, or where it changes nothing but rounding, between two bounds. They are tried where a decay rate allows Taylor
+#: steps hardly longer (this part) in so many of them, of each fourth, first with so many times their length, and given
+#: up after so many in a row that Taylor steps would have made at less cost. Matrices are dense: systems of more states
+#: than these have none.
+SEVEN_STAGES = 3e-9
+NEWTON = 0.01
+LEAST_CHANGE, MOST_CHANGE = 1e-7, 1e-2
+HELD_PART = 0.6
+HELD_STEPS, EVERY_STEP = 4, 4
+EIGHTFOLD = 8.0
+IDLE_STEPS = 5
+MOST_STATES = 1500
+
+#: Not a status: the run continues in the next call, after its arrays were emptied, in another driver, or once the
+#: program of its derivatives is given.
+RUNNING, FULL, HAND_OVER, NEEDS_PROGRAM = -1, -2, -3, -4

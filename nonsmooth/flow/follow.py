@@ -104,7 +104,7 @@ def follow(
     >>> run.status.name, run.x[-1].round(12) + 0.0
     ('STOPPED', array([-2.,  0.]))
     """
-    require_system(system)
+    require_system(system, complementarity=True)
     t_start, t_end = real(t_start, "t_start"), real(t_end, "t_end")
     rtol, atol = tolerances(tol, rtol, atol)
     backward = t_end < t_start
@@ -209,5 +209,5 @@ def _trajectory(
         segments=Segments.of([Segment(mode, float(t[0]), end, 0, len(run.starts))]),
         status=status,
         message=f"{message} {ADVICE[status]}",
-        steps=Steps(sign * run.starts, coefficients),
+        steps=Steps(sign * run.starts, coefficients, run.implicit),
     )

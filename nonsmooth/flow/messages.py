@@ -5,6 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 
+def held_by_decay(t: float, step: float, is_possible: bool) -> str:
+    """Explicit steps that a decay rate holds."""
+    advice = (
+        "method='auto' takes implicit steps."
+        if is_possible
+        else "Implicit steps for it are not built."
+    )
+    return (
+        f"The steps are held near {step:.1e} at t = {t:.6g} by a decay rate of about {8 / step:.0e}, much faster "
+        f"than the motion: the system is stiff there. {advice}"
+    )
+
+
 def two_fold(surface: int) -> str:
     """Start or arrival at a two-fold off sliding."""
     return (

@@ -32,9 +32,10 @@ from .errors import (
 from .laws import complementarity
 from .laws.coupled import Coupled, coupled_of, raised_of
 from .laws.evaluators import Evaluator, Surfaces, evaluator
+from .laws.explicit import mode_field
 from .laws.followed import Followed, followed
 from .laws.layer import Layer, LayerNumbers, Loop, layer_of, loop_at
-from .laws.motion import Motion, mode_field, motion, watched_functions
+from .laws.motion import Motion, motion, watched_functions
 from .laws.multipliers import sliding_multipliers
 from .laws.switches import Guard
 from .reading import Parameters

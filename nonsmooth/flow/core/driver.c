@@ -302,13 +302,14 @@ static void serve(Run *r, int row) {
 static int advance(Run *r, const Expansion *e, double dt) {
   int stride = r->stride, kept = 0;
   double *x = r->at_work;
-  for (int i = 0; i < r->s->dimension; i++) x[i] = value_at(e->states + (int64_t)i * stride, r->order, dt);
+  for (int i = 0; i < r->s->dimension; i++) x[i] = e->end ? e->end[i] : value_at(e->states + (int64_t)i * stride, r->order, dt);
   if (!finite_all(x, r->s->dimension)) { finish(r, NOT_FINITE, STATE, 0); return 0; }
   if (dt > 0) note_step(r, e);
   if (r->times) sample_step(r, e, dt);
   memcpy(r->x, x, sizeof(double) * r->s->dimension);
   pass_time(r, dt);
   r->since += dt;
+  if (e->end) go_on_implicitly(r);
   r->step_count++;
   r->segment_steps++;
   kept = kept_by(r, r->letter, r->involved);
@@ -347,25 +348,24 @@ static void leave_singular(Run *r, Expansion *e, double left) {
     if (!r->instant.side[a]) r->instant.side[a] = (int8_t)ns_sign(e->guards[(int64_t)(e->l.atoms + a) * r->stride]);
 }
 
-static void step(Run *r) {
-  if (r->instant.running) { instant_next(r); return; }
-  if (r->due_impact >= 0) { serve_between(r, r->due_impact); return; }
-  double left = r->o.t_end - r->t - r->t_low, dt = 0;
-  if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
-  if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
-  if (r->has_roots && pass_root(r, left)) return;
+/* What a step is to do: its length, the guard at its end or -1, whether it reaches the end of the run. */
+typedef struct { double dt; int row, last; } Piece;
+
+/* A Taylor step; 0 where nothing is left to do. */
+static int taylor_piece(Run *r, double left, Piece *q) {
   Expansion *e = &r->e;
+  double dt = 0;
   expand(r, r->letter, r->x, r->unknowns, e);
-  if (!e->finite) { leave_singular(r, e, left); return; }
+  if (!e->finite) { leave_singular(r, e, left); return 0; }
   double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
   if (h <= SHORTEST * time_scale(r) && h < left) {
     finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
-    return;
+    return 0;
   }
   if (is_fold_ahead(r, e, by_series)) {
     int fold = reach_fold(r, e, left);
     if (fold >= 0) serve_between(r, fold);
-    if (fold >= 0 || r->status != RUNNING) return;
+    if (fold >= 0 || r->status != RUNNING) return 0;
   }
   int last = h >= left;
   if (last) h = left;
@@ -383,27 +383,59 @@ static void step(Run *r) {
   r->length_mode = r->mode;
   r->length = dt == wanted ? h : dt;
   int swallowed = dt < wanted && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
-  if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
+  if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return 0; }
   if (dt < wanted) row = -1, last = 0;
-  if (row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
-  if (dt > 0) note_sides(r, e, dt);
-  r->falls = row >= 0 && is_steep(r, e, row, dt);
-  if (row >= 0) note_hidden(r, e, row);
-  last &= dt == h;
-  if (!advance(r, e, dt)) return;
-  if (last) {
+  if (row < 0) watch_decay(r, e, by_series);
+  if (r->wants_program) return 0;
+  *q = (Piece){dt, row, last && dt == h};
+  return 1;
+}
+
+/* An implicit step; 0 where none could be made. */
+static int implicit_piece(Run *r, double left, Piece *q) {
+  Expansion *e = &r->e;
+  double h = collocate(r, e, smaller(left, r->o.max_step)), dt = 0;
+  watch_cost(r, h);
+  if (h == 0) return 0;
+  int last = h == left, row = first_hit(r, e, last ? h + AT_END * (time_scale(r) + h) : h, &dt);
+  dt = row >= 0 ? smaller(dt, h) : h;
+  if (r->hold < dt) { dt = r->hold; row = -1; } else r->hold = INFINITY;
+  if (dt < h && dt > 0 && !end_at(r, e, row, &dt)) { r->collocation->h = 0.5 * dt; return 0; }
+  r->length_mode = -1;
+  *q = (Piece){dt, row, last && dt == h};
+  return 1;
+}
+
+static void step(Run *r) {
+  if (r->instant.running) { instant_next(r); return; }
+  if (r->due_impact >= 0) { serve_between(r, r->due_impact); return; }
+  double left = r->o.t_end - r->t - r->t_low;
+  if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
+  if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, r->held_steps >= HELD_STEPS ? DECAY : NO_REASON, 0); return; }
+  if (r->has_roots && pass_root(r, left)) return;
+  Expansion *e = &r->e;
+  Piece q;
+  int is_stiff = is_implicit(r);
+  if (r->wants_program) return;
+  if (!(is_stiff && implicit_piece(r, left, &q)) && !taylor_piece(r, left, &q)) return;
+  if (q.row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
+  if (q.dt > 0) note_sides(r, e, q.dt);
+  r->falls = q.row >= 0 && is_steep(r, e, q.row, q.dt);
+  if (q.row >= 0) note_hidden(r, e, q.row);
+  if (!advance(r, e, q.dt)) return;
+  if (q.last) {
     r->t = r->o.t_end;
     r->t_low = 0;
     set_time_state(r);
     if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
   }
-  if (row >= 0 && is_atom(r->now.kind[row])) arrive(r, e, dt, r->instant.tied);
-  else if (row >= 0) {
+  if (q.row >= 0 && is_atom(r->now.kind[q.row])) arrive(r, e, q.dt, r->instant.tied);
+  else if (q.row >= 0) {
     int64_t events = r->event_count;
-    serve_between(r, row);
-    if (r->event_count == events && dt <= SHORTEST * time_scale(r)) r->shortened++; /* back where it was */
+    serve_between(r, q.row);
+    if (r->event_count == events && q.dt <= SHORTEST * time_scale(r)) r->shortened++; /* back where it was */
   }
-  else if (!last) {
+  else if (!q.last) {
     if (r->s->sets) look_at_sets(r);
     watch_two_fold(r);
   }

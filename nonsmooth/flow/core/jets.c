@@ -228,6 +228,7 @@ static void allow_for_roots(Run *r, Expansion *e) {
 /* Jets of a mode at x, with the multipliers of what slides; inverses of the layer's slope. */
 static void expand(Run *r, const int8_t *letter, const double *x, const double *unknowns, Expansion *e) {
   int w = r->width, stride = r->stride;
+  e->end = 0;
   lay_out(r, letter, &e->l);
   aim(r, letter, x, unknowns);
   weigh_point(r, e, x, unknowns);

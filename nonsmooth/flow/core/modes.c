@@ -100,6 +100,21 @@ static const double *held_of(Run *r, const int8_t *letter) {
 /* Whether a switching function is of a set off which the mode is. */
 static int is_moving(const Run *r, int i) { return r->s->sets && r->moving[i]; } /* a contact never is */
 
+/* Their number: states, unknowns, those of scaled elements once more. */
+static int moving_size(const Run *r) {
+  int size = r->n + r->width;
+  for (int i = 0; i < r->m; i++) size += is_scaled(r, i) != 0;
+  return size;
+}
+
+/* The unknown of an entry of what moves, after the states; -1 where the mode has it not. */
+static int unknown_at(const Run *r, int column) {
+  int i = column - r->n, nu = i - r->width;
+  if (nu < 0) return i >= r->m || is_moving(r, i) || !is_scaled(r, i) ? i : -1;
+  for (i = 0; i < r->m; i++) if (is_scaled(r, i) && nu-- == 0) return is_moving(r, i) ? -1 : i;
+  return -1;
+}
+
 /* The moving inputs: states, lambda and reactions, then nu. */
 static void set_inputs(Run *r, const double *x, const double *held, const double *unknowns) {
   double *in = r->input;

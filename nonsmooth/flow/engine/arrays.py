@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem, Guard
-from ..constants import GUARDS, KINDS
+from ..constants import GUARDS, KINDS, METHODS
 from ..options import Options
 from ..results import Chunk
 from ..section import Hits
@@ -33,7 +33,7 @@ class OptionsStructure(ctypes.Structure):
         *[(name, _I64) for name in ("max_steps", "max_events", "max_jumps")],
         *[(name, _I32) for name in ("start_mode", "at_kind")],
         ("at_count", _I64),
-        *[(name, _I32) for name in ("dense", "hit_after")],
+        *[(name, _I32) for name in ("dense", "hit_after", "method", "pad")],
         *[(name, _I64) for name in ("hit_kinds", "hit_width", "hit_side", "hit_skip", "hit_every")],
         ("hit_count", _I64),
         ("hit_named", _POINTER),
@@ -118,14 +118,16 @@ class Run:
         Largest error of the time of an event that rounding hides; see ``Facts``.
     unmet : int
         A stop or reset, in this order, that was true at the start and did not happen, or -1.
+    implicit_steps : int
+        How many steps were implicit.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
     motion : ndarray (w,)
         What a restart at the end needs besides the state.
     dense : bool
         Whether the following were kept.
-    starts, coefficients : ndarray (s,), (s, N, P+1)
-        Steps: start times, Taylor coefficients.
+    starts, coefficients, implicit : ndarray (s,), (s, N, P+1), (s,)
+        Steps: start times, coefficients of the states, whether they are implicit.
     sample_x : ndarray (K, n)
         States at the times before the end at which the run was to be read, unless it is dense.
     event_count : int
@@ -150,6 +152,7 @@ class Run:
     facts: int
     t_error: float
     unmet: int
+    implicit_steps: int
     t: Array
     x: Array
     motion: Array
@@ -157,6 +160,7 @@ class Run:
     dense: bool
     starts: Array
     coefficients: Array
+    implicit: NDArray[np.bool_]
     sample_x: Array
     event_count: int
     make_happened: Callable[[], Happened]
@@ -232,6 +236,7 @@ def options_of(
         min(count, limit),
         int(dense),
     )
+    made.method = METHODS.index(o.method)
     made.hit_every = 1
     if o.hits is not None:
         named = _named(system, o.hits)

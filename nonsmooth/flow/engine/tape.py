@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
 from ...model.printing.tape import Entries, Series, Tape, Values, derived_series_of, tape_of
-from ..constants import FULL, IMPACT_LAWS, LAWS, RUNNING, SEVERAL
+from ..constants import FULL, IMPACT_LAWS, LAWS, NEEDS_PROGRAM, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
@@ -101,7 +101,13 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("early_count", "early_free_count")],
         ("rules", _Rules),
         ("derivatives", EntriesStructure),
+        ("implicit", _POINTER),
+        ("places", _POINTER),
     ]
+
+
+#: Steps by which a run is known to be stiff.
+_PROBED = 400
 
 
 @lru_cache(maxsize=1)
@@ -187,6 +193,17 @@ class _Held:
         self.free(self.pointer)
 
 
+def _places(entries: Entries, n: int) -> NDArray[np.int32]:
+    """States in an order in which those that are coupled are close: reverse Cuthill-McKee."""
+    from scipy.sparse import coo_array  # slow to import
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    of_states = (entries.row < n) & (entries.column < n)
+    places = (entries.row[of_states], entries.column[of_states])
+    graph = coo_array((np.ones(len(places[0])), places), shape=(n, n)).tocsr()
+    return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int32)
+
+
 def _ends(parts: Sequence[Sequence[Any]]) -> list[int]:
     """Where parts of a row begin, and the end of the last."""
     return [0, *np.cumsum([len(part) for part in parts], dtype=int).tolist()]
@@ -208,6 +225,15 @@ class TapeEngine:
         if entries is not None:
             self._c.derivatives = self._entries(entries)
         self._rooms: Rooms = rooms_of((0, 0, 0))
+
+    def add_implicit(self) -> None:
+        """Give the driver the field's derivatives, which implicit steps need."""
+        series, entries = self.system.cached("derived", lambda: derived_series_of(self.coupled))
+        implicit = series_structure(series, self._kept)
+        self._c.derivatives = self._entries(entries)
+        self._c.places = self._at(_places(entries, self.system.extended_dimension))
+        self._c.implicit = ctypes.addressof(implicit)
+        self._implicit = implicit
 
     def _structure(self, coupled: Coupled, tape: Tape) -> _System:
         system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
@@ -339,9 +365,7 @@ class TapeEngine:
                 state, c_options, output.pointer, *given, options.t_start, address(motion)
             )
             while True:
-                # Python hears Ctrl-C between the calls.
-                while (status := library().run_continue(state, BURST)) == RUNNING:
-                    pass
+                status = self._continued(state)
                 numbers, counts, active, several, rates = self._read(state)
                 if status != FULL:
                     break
@@ -367,11 +391,24 @@ class TapeEngine:
             facts=counts[12],
             t_error=numbers[3],
             unmet=counts[13],
+            implicit_steps=counts[14],
             motion=final,
             labels=labels,
             dense=dense,
             **recorded,
         )
+
+    def _continued(self, state: int) -> int:
+        """Go on until a run ends or its arrays are full; Python hears Ctrl-C between the calls."""
+        while (status := library().run_continue(state, BURST)) in (RUNNING, NEEDS_PROGRAM):
+            if status == NEEDS_PROGRAM:
+                self.add_implicit()
+        return int(status)
+
+    def is_stiff(self, x: Array, p: Array, options: Options) -> bool:
+        """Whether a run takes implicit steps soon."""
+        few = replace(options, max_steps=min(options.max_steps, _PROBED), hits=None)
+        return bool(np.isfinite(x).all()) and self.run(x, p, few, dense=False).implicit_steps > 0
 
     def _checked(self, motion: Array) -> Array:
         """What a run or event keeps for a restart, if it is of this system."""
@@ -407,7 +444,7 @@ class TapeEngine:
         return _Held(state, made.run_free)
 
     def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
-        numbers, counts = (_D * 4)(), (_I64 * 14)()
+        numbers, counts = (_D * 4)(), (_I64 * 15)()
         width = self.system.surface_count + len(self.system.impacts)
         active, several = (_I32 * (width + 1))(), (_I32 * SEVERAL)()
         rates = np.empty((SEVERAL, self.system.extended_dimension))
@@ -480,7 +517,9 @@ class TapeEngine:
         c_options = options_of(self.system, options, dense=False, at=at)
         with self.held_table() as table, self.held_run(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
-            while library().run_many(*call, address(start), BURST):
+            while status := library().run_many(*call, address(start), BURST):
+                if status == NEEDS_PROGRAM:
+                    self.add_implicit()
                 if stop():
                     raise Stopped
             used = np.flatnonzero(np.bincount(chunk.itinerary)).tolist()

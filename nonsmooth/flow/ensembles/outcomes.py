@@ -180,7 +180,7 @@ def outcomes(
     made = _Sums(system, _bins(system, ranges or {}, bins))
     starts = Starts(system, x0, parameters, t_start)
     step = t_end > t_start and device is None
-    job = Job(system, options, None, None, None, engine_for(system, options, starts.count, step))
+    job = Job(system, options, None, None, None, engine_for(system, options, starts, step))
     if device is None:
         most = work.largest(Chunk.empty(0, system, at=False).row_size)
         size = work.chunk or size_of_chunk(job, starts, work.workers, most)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 
 from ..errors import DefinitionError
-from ..expressions.graph import require_smooth
+from ..expressions.graph import IN_A_GUARD, require_smooth
 from ..numbering import UNWATCHED
 
 #: Signs of an atom in the mask of a relation.
@@ -221,7 +221,7 @@ class Atoms:
                 f"{what}: == and != are for discrete states, received a comparison of {function}. A state "
                 "that moves is equal to a number at single instants only; write >= or <=."
             )
-        require_smooth(function, self.states, self.parameters, what)
+        require_smooth(function, self.states, self.parameters, what, IN_A_GUARD)
         if self.slot is not None:
             at, self.slot = self.slot, None
             self.functions[at] = function

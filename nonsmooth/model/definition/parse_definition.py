@@ -18,7 +18,7 @@ import casadi as ca
 from ..checks import real
 from ..errors import DefinitionError, ParameterError
 from ..expressions.cancel import powers
-from ..expressions.graph import require_smooth
+from ..expressions.graph import IN_A_FIELD, IN_A_GAP, IN_A_GUARD, IN_A_SURFACE, require_smooth
 from ..numbering import IMPACT_LAWS
 from ..reading import (
     Expression,
@@ -520,10 +520,11 @@ def _require_linear_sets(d: Definition) -> None:
 def require_consistent(d: Definition, given: bool = True) -> None:
     """Refuse unknown symbols, functions that are not smooth, and multipliers that do not fit."""
     # Sections of derived systems may have multiple zeros; only ``given`` guards must have simple ones.
-    guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
-    atoms = [*guards, *["a condition"] * (d.guards.numel() - len(guards))]
-    named = [("field", d.field, True)]
+    atoms = _guard_names(d)
+    guards = atoms[: len(d.stops) + len(d.resets)]
     functions = [*zip(_function_names(d), listed(d.surfaces), strict=True)]
+    gaps = [(f"gap of {name!r}", d.gaps[j]) for j, name in enumerate(d.impacts)]
+    named = [("field", d.field, True)]
     named += [(name, e, i in d.half_lines) for i, (name, e) in enumerate(functions)]
     named += [(name, d.guards[i], False) for i, name in enumerate(atoms)]
     switched = [(f"map of reset {n!r}", d.maps[:, j]) for j, (n, _) in enumerate(d.resets)]
@@ -531,11 +532,9 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     switched += [(f"priority of {name}", d.priorities[i]) for i, name in enumerate(guards)]
     switched += [("period of a clock", e) for e in listed(d.periods)]
     for j, name in enumerate(d.impacts):
-        named += [(f"gap of {name!r}", d.gaps[j], False)]
-        named += [(f"restitution of {name!r}", d.restitutions[j], False)]
+        named += [(*gaps[j], False), (f"restitution of {name!r}", d.restitutions[j], False)]
     known = ca.vertcat(d.extended_states, d.parameters, d.multipliers, d.reactions)
     require_unique(known)
-    moving = ca.vertcat(d.extended_states, d.multipliers, d.reactions)
     for what, expression, multipliers in [*named, *[(w, e, False) for w, e in switched]]:
         require_known(expression, known, what, **d.names)
         if not multipliers and ca.depends_on(expression, ca.vertcat(d.multipliers, d.reactions)):
@@ -544,8 +543,7 @@ def require_consistent(d: Definition, given: bool = True) -> None:
                 "with a multiplier. Only the field may contain multipliers."
             )
         require_finite(expression, known, what)
-    for what, expression, _ in named:
-        require_smooth(expression, moving, d.parameters, what)
+    _require_smooth_functions(d, gaps, [(what, e) for what, e, _ in named])
     for period in listed(d.periods):
         if ca.depends_on(period, d.extended_states):
             raise DefinitionError(
@@ -571,6 +569,24 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     _require_hysteresis(d)
 
 
+def _require_smooth_functions(
+    d: Definition, gaps: list[tuple[str, ca.SX]], named: list[tuple[str, ca.SX]]
+) -> None:
+    """Refuse switches in functions of the states, and say what to write in place of each."""
+    moving = ca.vertcat(d.extended_states, d.multipliers, d.reactions)
+    advice = dict.fromkeys(_function_names(d), IN_A_SURFACE)
+    advice |= dict.fromkeys([name for name, _ in gaps], IN_A_GAP)
+    advice |= dict.fromkeys(_guard_names(d), IN_A_GUARD)
+    for what, expression in [*gaps, *named]:
+        require_smooth(expression, moving, d.parameters, what, advice.get(what, IN_A_FIELD))
+
+
+def _guard_names(d: Definition) -> list[str]:
+    """Names in messages of the functions of stops and resets."""
+    own = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
+    return [*own, *["a condition"] * (d.guards.numel() - len(own))]
+
+
 def _function_names(d: Definition) -> list[str]:
     """Names of the switching functions in messages."""
     first = d.surfaces.numel() - len(d.constraints)
@@ -587,14 +603,16 @@ def _check_impact(d: Definition, j: int) -> None:
     if ca.depends_on(rate, ca.vertcat(d.multipliers, d.reactions)):
         raise DefinitionError(
             f"{what}: the rate {rate} of {gap} contains a multiplier. Forces act on velocities: a "
-            "gap is a function of positions and time."
+            "gap is a function of positions and time. A diode, or a bound on a state whose rate the multiplier "
+            "changes, is Complementarity(y, multiplier=...)."
         )
     effect = ca.mtimes(ca.jacobian(rate, d.states), ca.jacobian(d.field, d.reactions[j]))
     if effect.is_zero() or not ca.is_linear(d.field, d.reactions[j]):
         fault = "does not change the gap's rate" if effect.is_zero() else "enters nonlinearly"
         raise DefinitionError(
             f"reaction of {d.impacts[j]!r}: {d.reactions[j]} {fault}. Write the force that opens the "
-            "contact as reaction times its direction."
+            "contact as reaction times its direction. A diode, or a bound on a state whose own rate is changed, is "
+            "Complementarity(y, multiplier=...)."
         )
     e = d.restitutions[j]
     if e.is_constant() and not 0.0 <= float(e) <= 1.0:

@@ -25,9 +25,10 @@ from ..values import Array, state_values
 from .complementarity import holds
 from .constraints import Constraint
 from .discrete_states import held_values, with_values
-from .elements import Complementarity
+from .elements import Complementarity, multipliers_of_conditions
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
+from .matrix_symbols import in_scalar_symbols, read_dae
 from .parse_definition import Definition, consistent_parameters, read_definition
 from .roots import roots_of
 from .switching import Switching, class_of
@@ -155,6 +156,8 @@ class FilippovSystem:
             "hidden": hidden,
             "layer_widths": layer_widths,
         }
+        given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
+        clocks, discrete = given.pop("clocks"), given.pop("discrete")
         self._adopt(read_definition(**with_added_states(clocks, discrete, given)))
 
     # construction ------------------------------------------------------------------------------
@@ -170,6 +173,7 @@ class FilippovSystem:
         stops: Sequence[Stop] = (),
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
+        complementarity: Sequence[Complementarity] | Complementarity = (),
         clocks: Sequence[Clock] | Clock = (),
         discrete: Discrete = (),
         hidden: bool = False,
@@ -183,8 +187,8 @@ class FilippovSystem:
 
         Parameters
         ----------
-        states, parameters, time, stops, resets, impacts, clocks, discrete
-            As for the class. Gaps must be smooth.
+        states, parameters, time, stops, resets, impacts, complementarity, clocks, discrete
+            As for the class. Gaps and y must be smooth.
         rhs : sequence of n expressions
             In states, parameters and time, with switches.
         hidden : bool, optional
@@ -213,22 +217,69 @@ class FilippovSystem:
         >>> system.field("+"), system.field("-")
         (SX([v, (-(x+0.4))]), SX([v, (-(x+-0.3))]))
         """
-        column(rhs, "rhs", len(listed(states)))  # before clocks are added
         given = {"states": states, "rhs": rhs, "parameters": parameters, "time": time}
         given |= {"stops": stops, "resets": resets, "impacts": impacts, "hidden": hidden}
+        given["complementarity"] = complementarity
+        given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
+        clocks, discrete = given.pop("clocks"), given.pop("discrete")
+        column(given["rhs"], "rhs", len(listed(given["states"])))  # before clocks are added
         given = with_added_states(clocks, discrete, given)
         n, rhs = len(listed(given["states"])), given.pop("rhs")
-        frame = cls(given["states"], field=[0] * n, parameters=parameters, time=time).definition
+        own = {name: given[name] for name in ("parameters", "time")}
+        frame = cls(given["states"], field=[0] * n, **own).definition
         entries = column(rhs, "rhs", n)
-        known = ca.vertcat(frame.extended_states, frame.parameters)
+        held = ca.vertcat(frame.parameters, multipliers_of_conditions(given["complementarity"]))
+        known = ca.vertcat(frame.extended_states, held)
         require_known(entries, known, "rhs", **frame.names)
-        found = lift(entries, frame.states, frame.time, frame.parameters, hidden=hidden)
+        found = lift(entries, frame.states, frame.time, held, hidden=hidden)
         given |= {"field": found.field, "multipliers": found.multipliers, "surface": None}
         given |= {"surfaces": found.surfaces, "above": None, "below": None}
         system = cls.__new__(cls)
         system._adopt(read_definition(**given))
         system.lifted = found.switches
         return system
+
+    @classmethod
+    def from_dae(
+        cls,
+        dae: Mapping[str, Any],
+        *,
+        parameters: Mapping[Any, float] | None = None,
+        **events: Any,
+    ) -> FilippovSystem:
+        """Read CasADi's dictionary of an ordinary differential equation, as its ``integrator`` takes it.
+
+        Parameters
+        ----------
+        dae : mapping
+            ``x`` and ``ode``, and ``t`` and ``p`` where there are any: SX, or MX that expand to SX. Entries of a
+            vector ``x`` are named x_0, x_1, ...
+        parameters : mapping, optional
+            Values of entries of ``p``, by name or symbol.
+        **events
+            As for ``from_expression``: stops, resets, ...
+
+        Returns
+        -------
+        FilippovSystem
+            With the switches of ``ode`` as surfaces.
+
+        Raises
+        ------
+        DefinitionError
+            Algebraic equations or other entries; MX that call a table or another Function that is no graph.
+        NotSmoothError
+            As ``from_expression``.
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, p = ca.MX.sym("x", 2), ca.MX.sym("mu")
+        >>> ode = ca.vertcat(x[1], -x[0] - p * ca.sign(x[1]))
+        >>> ns.FilippovSystem.from_dae({"x": x, "p": p, "ode": ode}, parameters={"mu": 0.1})
+        FilippovSystem(2 states: x_0, x_1; 1 surface: x_1; parameters: mu)
+        """
+        return cls.from_expression(**read_dae(dae, parameters), **events)
 
     def holding(self, values: Mapping[Any, float]) -> FilippovSystem:
         """Hold the discrete states at values: the system between two events, without stops and resets.
@@ -879,12 +930,12 @@ def require_system(
     if value.complementarity and not complementarity:
         raise DefinitionError(
             f"system: {value!r} has complementarity conditions, which this function does not support. They work "
-            "in simulate, ensemble and outcomes."
+            "in simulate, ensemble, outcomes, sensitivity, find_equilibrium, periodic_orbit and continue_orbit."
         )
     if value.constraints and not joints:
         raise DefinitionError(
             f"system: {value!r} has constraints, which this function does not support. They work in simulate, "
-            "ensemble, outcomes and sensitivity. Write the motion in coordinates that satisfy them."
+            "ensemble, outcomes, sensitivity, periodic_orbit and continue_orbit. Write the motion in coordinates that satisfy them."
         )
 
 

@@ -59,6 +59,7 @@ def orbit_run(
     """Integrate each leg over its duration, and join them."""
     times, states, starts = list[Array](), list[Array](), list[float]()
     coefficients: list[Array] = []
+    implicit: list[bool] = []
     events: list[Event] = []
     segments: list[Segment] = []
     held = system.dimension - len(system.definition.discrete)
@@ -79,6 +80,7 @@ def orbit_run(
         states.append(run.x)
         starts += run.steps.starts.tolist()
         coefficients += list(run.steps.coefficients)
+        implicit += run.steps.implicit.tolist()
         end, following = leg.t + leg.duration, legs[(k + 1) % len(legs)]
         values = tuple(leg.start[held:].tolist())
         segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients), values))
@@ -97,5 +99,5 @@ def orbit_run(
         segments=Segments.of(segments),
         status=Status.REACHED_END,
         message="One period.",
-        steps=Steps(np.array(starts), coefficients),
+        steps=Steps(np.array(starts), coefficients, np.array(implicit, bool)),
     )

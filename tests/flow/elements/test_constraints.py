@@ -96,8 +96,8 @@ class Mechanism:
 
 
 def test_a_pendulum_swings_as_by_its_angle():
-    run = ns.simulate(pendulum(), placed((0.3, 1.5)), 50.0, tol=1e-11)
-    plain = ns.simulate(by_angle(), [0.3, 1.5], 50.0, tol=1e-11)
+    run = ns.simulate(pendulum(), placed((0.3, 1.5)), 20.0, tol=1e-11)
+    plain = ns.simulate(by_angle(), [0.3, 1.5], 20.0, tol=1e-11)
     assert run.status is ns.Status.REACHED_END and run.itinerary == "s"
     np.testing.assert_allclose(run.x[-1], placed(plain.x[-1]), atol=1e-8)
     assert abs((run.x[:, :2] ** 2).sum(1) - 1).max() < 1e-14
@@ -115,6 +115,7 @@ def test_a_pendulum_swings_as_by_its_angle():
                 [1.0, 0.5], [(-1, 0), (0, 1), (1, -2)], [(0, 0), (2, 0)], [0.2, 0.9, 1.7, 1.4]
             ),
             id="four-bar linkage",
+            marks=pytest.mark.slow,
         ),
         pytest.param(
             Mechanism(
@@ -124,6 +125,7 @@ def test_a_pendulum_swings_as_by_its_angle():
                 [0.6, -0.8, 1.6, -0.8, 2.6, -0.8],
             ),
             id="parallel links",
+            marks=pytest.mark.slow,
         ),
     ],
 )
@@ -138,7 +140,7 @@ def test_a_mechanism_moves_as_its_index_reduction(mechanism):
         np.testing.assert_allclose(np.linalg.norm(apart), length, rtol=1e-14)
 
 
-@pytest.mark.parametrize("links", [1, 2, 3, 5])
+@pytest.mark.parametrize("links", [1, 3, pytest.param(5, marks=pytest.mark.slow)])
 def test_a_table_hangs_on_parallel_links(links):
     """Three or more depend on one another; the table swings as a pendulum without turning (one link: turned fast)."""
     turn, spin = ca.SX.sym("turn"), ca.SX.sym("spin")
@@ -392,6 +394,54 @@ def test_derivatives_are_those_by_the_angle():
     found, true = ns.sensitivity(run), ns.sensitivity(want)
     np.testing.assert_allclose(found.dx_dp, outer @ true.dx_dp, atol=1e-8)
     np.testing.assert_allclose(found.dx_dx0 @ inner, outer @ true.dx_dx0, atol=1e-8)
+
+
+@pytest.mark.parametrize(("drag", "e"), [(0.1, 0.5), pytest.param(0, None, marks=pytest.mark.slow)])
+def test_orbits_and_their_multipliers_are_those_by_the_angle(drag, e):
+    """A forced pendulum with dry friction and a wall; each function that is held adds a zero multiplier."""
+    a = ca.SX.sym("a")
+    push, own = a * ca.cos(t), {"time": t, "parameters": {a: 0.5}}
+    torque = push - 0.2 * (x * v - y * u) - drag * lam
+    friction = lambda slip: {"surfaces": [slip], "multipliers": [lam]} if drag else {}
+    system = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, r * x - torque * y, r * y - 1 + torque * x],
+        constraints=ns.Constraint(ROD, reaction=r),
+        impacts=ns.Impact(x + 0.2, restitution=e) if e else (),
+        **friction(x * v - y * u),
+        **own,
+    )
+    plain = ns.FilippovSystem(
+        [angle, rate],
+        field=[rate, push - ca.cos(angle) - 0.2 * rate - drag * lam],
+        impacts=ns.Impact(angle + np.arccos(-0.2), restitution=e) if e else (),
+        **friction(rate),
+        **own,
+    )
+    starts = ((system, placed((-1.5, 0))), (plain, [-1.5, 0]))
+    found, want = (ns.periodic_orbit(s, ns.simulate(s, start, 150.0)) for s, start in starts)
+    assert found.stability == want.stability == "asymptotically stable"
+    np.testing.assert_allclose(found.multipliers, [*want.multipliers, 0.0, 0.0], atol=1e-9)
+    branch = ns.continue_orbit(found, "a", bounds=(0.48, 0.52))
+    assert not branch.events and {end.name for end in branch.ends} == {"REACHED_BOUND"}
+
+
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+def test_constraints_that_are_given_twice_change_nothing(law):
+    """Impulses act through both; derivatives ask for one of them."""
+    wall = ns.Impact(x + 0.4, restitution=0.6, name="wall", law=law)
+    twice = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, (r + lam) * x, (r + lam) * y - 1],
+        constraints=[ns.Constraint(ROD, reaction=r), ns.Constraint(2 * ROD, reaction=lam)],
+        impacts=wall,
+    )
+    start = placed((2 * np.pi - 0.1, 0.0))
+    run, own = (ns.simulate(s, start, 20.0, tol=1e-11) for s in (twice, pendulum(impacts=wall)))
+    assert [e.kind for e in run.events] == [e.kind for e in own.events]
+    np.testing.assert_allclose(run.x[-1], own.x[-1], atol=1e-8)
+    with pytest.raises(ns.DegenerateError, match="Leave out those that follow from the others"):
+        ns.sensitivity(run)
 
 
 @pytest.mark.parametrize(

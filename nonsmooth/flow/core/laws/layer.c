@@ -14,8 +14,6 @@ static int choices_of(const int8_t *possible, int count) {
   return total <= TRIED ? total : TRIED + 1;
 }
 
-static void many_may_hold(Run *r) { finish(r, NON_UNIQUE, POSSIBLY_SEVERAL, 0); }
-
 /* Coefficients that are no numbers decide nothing. */
 static void keep_finite(Run *r, Expansion *e) {
   for (int i = 0; i < r->n * r->stride; i++) if (!(fabs(e->states[i]) < INFINITY)) e->states[i] = 0;
@@ -121,6 +119,10 @@ static void spell_choice(const Run *r, const int8_t *letter, const int8_t *possi
     number /= bits(possible[i]);
     for (int bit = 0; bit < 3; bit++)
       if (possible[i] >> bit & 1 && which-- == 0) trial[r->active[i]] = bit == 0 ? 1 : bit == 1 ? -1 : 0;
+  }
+  for (int i = 0; i < r->active_count; i++) { /* a set has one letter, that of its first function */
+    int s = set_of(r, r->active[i]);
+    if (s >= 0) trial[r->active[i]] = trial[s] ? LEAVING : 0;
   }
 }
 
@@ -331,7 +333,29 @@ static void solve_from_grid(Run *r, const Layout *l, double *unknowns, Solutions
   }
 }
 
-static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found);
+/* All unknowns of a mode in which sets are left; as mode_solutions. */
+static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found) {
+  Decision *d = r->decision;
+  int kept = r->active_count, count = 0, w = r->width;
+  memcpy(r->involved, r->active, sizeof(int32_t) * kept);
+  for (int i = 0; i < w; i++)
+    if (l->letter[i] == LEAVING || (l->letter[i] == 0 && !is_idle(r, l->letter, i) && !has_law(r, i, JOINT_LAW)))
+      r->active[count++] = i;
+  r->active_count = count;
+  if (begin_law(r, l->letter, 0, 0)) {
+    for (int i = 0; i < count; i++) { d->is_touched[i] = 1; d->state[i] = l->letter[d->own[i]] ? ABOVE : INSIDE; }
+    d->is_imposed = 1;
+    explore(r, d, 0, 0);
+  }
+  memcpy(r->active, r->involved, sizeof(int32_t) * kept);
+  r->active_count = kept;
+  for (int q = 0; q < d->motions && r->status == RUNNING; q++) {
+    double *unknowns = found->each + found->count * w;
+    keep_carried(r, l->letter, unknowns);
+    for (int i = 0; i < count; i++) unknowns[d->own[i]] = d->motion[q].nu[i];
+    found->count += !l->slides || improve(r, l, r->x, unknowns, 2);
+  }
+}
 
 /* All unknowns with which a mode keeps what slides in it. */
 static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
@@ -448,9 +472,12 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
   int8_t *trial = r->tried_letter, *possible = trial + r->width;
   Solutions all = {0};
   Tally tally = {0};
-  for (int i = 0; i < k; i++) possible[i] = r->active[i] < r->m ? 7 : 5;
+  for (int i = 0; i < k; i++) {
+    int own = r->active[i], s = set_of(r, own);
+    possible[i] = s >= 0 && own != s ? 4 : s == own || own >= r->m ? 5 : 7;
+  }
   int total = choices_of(possible, k);
-  if (total > TRIED) { many_may_hold(r); return 0; }
+  if (total > TRIED) { finish(r, NON_UNIQUE, POSSIBLY_SEVERAL, 0); return 0; }
   r->several_count = 0;
   for (int number = 0; number < total && r->status == RUNNING; number++) {
     spell_choice(r, letter, possible, number, trial);

@@ -105,7 +105,7 @@ static void determinant_series(double *a, int n, int count, int stride, double *
   }
 }
 
-/* A of a group to ``to``, with rows times n / e or only turned by the sign of n. */
+/* A of a group to ``to``, with rows times n / e, both of a sign, or only turned by the sign of n. */
 static void group_matrix(const Run *r, const int32_t *own, int n, int count, int weighted, double *to) {
   int stride = r->stride;
   for (int i = 0; i < n; i++) {
@@ -116,7 +116,7 @@ static void group_matrix(const Run *r, const int32_t *own, int n, int count, int
       const double *slope = slope_row(r, own[i], own[j]);
       double *entry = to + (i * n + j) * stride;
       for (int q = 0; q < count; q++)
-        entry[q] = weighted ? -turn * convolve(factor, slope, q, 0, q) / element(r, own[i])->width : -turn * slope[q];
+        entry[q] = weighted ? -convolve(factor, slope, q, 0, q) / element(r, own[i])->width : -turn * slope[q];
     }
   }
 }

@@ -230,9 +230,13 @@ def no_jump(name: str, t: float) -> str:
     return f"y of {name!r} is negative at t = {t:.10g}, and no impulses of the multipliers lead to y >= 0."
 
 
-def no_reaction(names: Sequence[str]) -> str:
+def no_reaction(names: Sequence[str], algebraic: bool = False) -> str:
     """No reactions are consistent with closed or opening contacts."""
-    return f"At {' and '.join(map(repr, names))} neither the closed contact nor an open one holds."
+    advice = (
+        " No multipliers keep y >= 0: a sign is wrong, or closed conditions leave an equation of the states alone "
+        "(a resistance of 0, capacities that diodes join). Then write y as a function of the states."
+    )
+    return f"At {' and '.join(map(repr, names))} neither the closed contact nor an open one holds.{advice * algebraic}"
 
 
 def pressed(name: str, t: float) -> str:

@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import nonsmooth as ns
@@ -165,6 +166,74 @@ def test_a_branch_of_a_peak_rectifier():
         on = brentq(decay, 1.6 * np.pi, 2.5 * np.pi)
         assert leg.start[0] == pytest.approx(np.sin(off), abs=1e-9)
         assert leg.duration == pytest.approx(on - off, abs=1e-9)
+
+
+def boost():
+    """A boost converter whose switch is on for a part of each period of 0.2; the load 20 leaves no current at times."""
+    duty, s = ca.SX.sym("duty"), ca.SX.sym("s")
+    clock, on = ns.Clock(0.2, name="tick"), (1 - s) / 2
+    return ns.FilippovSystem(
+        [I, V],
+        field=[10 * (1 - (1 - on) * V + U), (1 - on) * I - V / 20],
+        surfaces=[clock.phase - 0.2 * duty],
+        multipliers=[s],
+        complementarity=condition(I, U, "diode"),
+        clocks=clock,
+        parameters={duty: 0.4},
+    )
+
+
+def least_current(duty):
+    """The least current of the orbit on which the diode never blocks, by exponentials."""
+    legs = []
+    for off, time in ((0, 0.2 * duty), (1, 0.2 * (1 - duty))):
+        legs.append(expm(time * np.array([[0, -10 * off, 10], [off, -0.05, 0], [0, 0, 0]])))
+    whole = legs[1] @ legs[0]  # from a tick to the next
+    return np.linalg.solve(np.eye(2) - whole[:2, :2], whole[:2, 2])[0]
+
+
+def test_a_branch_goes_from_discontinuous_to_continuous_conduction():
+    """The leg without a current ends at the duty at which the current is zero at the tick."""
+    system = boost()
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 2.5, 0.0], t_end=600.0))
+    assert orbit.itinerary == "+c -o +o"
+    branch = ns.continue_orbit(orbit, "duty", bounds=(0.35, 0.8))
+    assert [str(end) for end in branch.ends] == ["REACHED_BOUND", "REACHED_BOUND"]
+    (event,) = branch.events
+    assert (event.kind, event.far_side.itinerary) == ("corner", "+o -o")
+    assert event.parameter == pytest.approx(brentq(least_current, 0.5, 0.9), abs=1e-9)
+    (beyond,) = branch.at(0.79)
+    assert min(leg.start[0] for leg in beyond.legs) == pytest.approx(least_current(0.79), rel=1e-8)
+
+
+@pytest.mark.parametrize("start", [0.5, 0.9])
+def test_a_branch_passes_the_touch_of_a_diode(start):
+    """Without the diode i = b + sin(t - pi/4)/sqrt 2, which touches zero at b = 1/sqrt 2."""
+    diode = condition(I, U, "diode")
+    system = ns.FilippovSystem(
+        [I], field=[ca.sin(T) + B - I + U], complementarity=diode, time=T, parameters={B: start}
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.9], 60.0))
+    branch = ns.continue_orbit(orbit, "b", bounds=(0.2, 1.5))
+    (event,) = branch.events
+    assert event.kind == "grazing-sliding"
+    assert event.parameter == pytest.approx(np.sqrt(0.5), abs=1e-10)
+    assert event.far_side.verdict == "persistence"
+    assert event.far_side.numbers["radius of A_i"] < 1e-12  # all orbits leave zero alike
+    assert [str(end) for end in branch.ends] == ["REACHED_BOUND", "REACHED_BOUND"]
+
+
+def test_a_branch_passes_the_touch_of_a_condition_of_degree_zero():
+    """x = b + sin(t - pi/4)/sqrt 2 below 1, where a force -3 (x - 1) begins: the field is continuous."""
+    clip = condition(A - (X - 1), A, "clip")
+    system = ns.FilippovSystem(
+        [X], field=[ca.sin(T) + B - X - 3 * A], complementarity=clip, time=T, parameters={B: 0.1}
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0], 60.0))
+    branch = ns.continue_orbit(orbit, "b", bounds=(-0.2, 1.0))
+    (event,) = branch.events
+    assert event.kind == "grazing of a soft switch"
+    assert event.parameter == pytest.approx(1 - np.sqrt(0.5), abs=1e-10)
 
 
 def test_equilibria_of_modes():

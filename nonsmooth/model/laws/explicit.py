@@ -25,14 +25,13 @@ _WRITTEN_OUT = 3
 
 
 class Solved:
-    """The law of a mode of coupled surfaces and contacts (see ``switches.Sliding``)."""
+    """The law of a mode of coupled surfaces and contacts (see ``switches.Law``)."""
 
     def __init__(self, system: FilippovSystem, mode: str):
         coupled = raised_of(system) if rests_on(system, mode) else coupled_of(system)
         x = system.extended_states
         self.system, self.mode, self.coupled = system, mode, coupled
         sliding = coupled.sliding(mode)
-        self.surfaces = tuple(i for i in sliding if i < system.surface_count)
         own = [coupled.unknown(i) for i in sliding]
         symbols = ca.vertcat(*own) if own else ca.SX(0, 1)
         field, layer = coupled.held_at(mode, [coupled.field, coupled.layer])
@@ -51,14 +50,6 @@ class Solved:
         self.states = ca.vertcat(x, symbols)
         drift = ca.mtimes(ca.jacobian(residual, x), field)
         self.field = ca.vertcat(field, -solved(slope, drift))
-
-    def exits(self, surface: int) -> Guarded:
-        """Return the guards of a sliding surface."""
-        return [(g, f) for g, f in self.guarded() if g.kind == "exit" and g.index == surface]
-
-    def stability(self) -> Guarded:
-        """Return none: a leg of known duration leaves no branch."""
-        return []
 
     def guarded(self) -> Guarded:
         """Guards of the mode, in the order of ``Coupled.guards``, and their functions."""

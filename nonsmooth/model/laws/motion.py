@@ -15,9 +15,9 @@ from collections.abc import Hashable, Sequence
 import casadi as ca
 
 from ..definition.parse_definition import read_function
-from ..definition.system import FilippovSystem
+from ..definition.system import FilippovSystem, require_system
 from ..expressions.jets import taylor
-from .switches import Guarded, Sliding, guards_of, sliding
+from .switches import Guarded, Law, guards_of, kind_of
 
 
 class Motion:
@@ -27,7 +27,7 @@ class Motion:
         self,
         system: FilippovSystem,
         mode: str,
-        law: Sliding,
+        law: Law,
         guarded: Guarded,
         key: Hashable = (),
     ):
@@ -62,9 +62,10 @@ class Motion:
 
 def motion(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode, built once per system."""
+    require_system(system)
 
     def build() -> Motion:
-        law = sliding(system, mode)
+        law = kind_of(system, mode)
         return Motion(system, mode, law, guards_of(system, mode, law))
 
     return system.cached(("motion", mode), build)
@@ -75,3 +76,35 @@ def watched_functions(system: FilippovSystem, watched: Sequence[ca.SX]) -> list[
     return [
         read_function(system.definition, w, f"watched function {k}") for k, w in enumerate(watched)
     ]
+
+
+def mode_field(system: FilippovSystem, mode: str) -> ca.SX:
+    """Right-hand side of any mode, sliding included, time row included (SX, extended dimension).
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    mode : str
+        One letter for each surface; at most one ``s``, of a surface whose multiplier is linear.
+
+    Returns
+    -------
+    SX
+        While sliding Filippov's field, with the factor cancelled that makes it 0/0 where both
+        fields coincide.
+
+    Raises
+    ------
+    DefinitionError
+        A mode whose multipliers are only known implicitly.
+
+    Examples
+    --------
+    >>> import casadi as ca
+    >>> import nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> system = ns.FilippovSystem([x, y], surface=y, above=[1, -1], below=[3, 1])
+    >>> ns.local.mode_field(system, "s")
+    SX([2, 0])
+    """
+    return motion(system, mode).field

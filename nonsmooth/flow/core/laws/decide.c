@@ -280,7 +280,7 @@ static int class_of(const Block *k, int i, const double *nu, double part) {
 
 /* The same of a vector, from its first row on. */
 static int class_of_vector(const Block *k, int i, const double *nu, double part) {
-  double w[3], terms, zero = 0, room = 0, bound = k->b[i];
+  double w[3], terms, zero = 0, room = 0, bound = bound_of(k, i, nu);
   int size = k->span[i];
   for (int j = 0; j < size; j++) {
     w[j] = rate_of(k, i + j, nu, &terms);
@@ -457,18 +457,10 @@ static int enumerate(const Block *k, double *found, double *work, int32_t *pivot
   return groups;
 }
 
-/* The solution of a symmetric block with vectors: each element in turn, as the others are, from the smallest nu with
- * w = 0 on (Gauss and Seidel). */
-static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
+/* Each element of a block with vectors in turn, as the others are (Gauss and Seidel); whether that converges. */
+static int relax_from(const Block *k, double *nu, double most) {
   int n = k->size;
-  double *ones = work, *inverse = ones + n, change = INFINITY, last = INFINITY, most = 0;
-  for (int i = 0; i < n; i++) { ones[i] = 1; most = larger(fabs(k->b[i]), most); }
-  invert_any(k->matrix, n, ones, inverse, inverse + (int64_t)n * n, pivot);
-  for (int i = 0; i < n; i++) {
-    nu[i] = 0;
-    for (int j = 0; j < n; j++) nu[i] += inverse[i * n + j] * k->a[j];
-    most = larger(fabs(nu[i]), most);
-  }
+  double change = INFINITY, last = INFINITY;
   for (int again = 0; again < 2000 && change > 4 * EPSILON * most && !(change >= last && last < TIED * most); again++) {
     last = change;
     change = 0;
@@ -498,13 +490,34 @@ static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
       for (int q = 0; q < size; q++) { change = larger(fabs(y[q] - nu[i + q]), change); nu[i + q] = y[q]; }
     }
   }
-  return finite_all(nu, n);
+  return finite_all(nu, n) && (!k->is_coupled || change <= TIED * most);
+}
+
+/* The solution of a block with vectors, symmetric but for loads, from the smallest nu with w = 0 on, in units of bounds
+ * where these are loads: then what depends on one another shares. */
+static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
+  int n = k->size;
+  double *unit = work, *inverse = unit + n;
+  for (int i = 0; i < n; i++) unit[i] = 1;
+  for (int pass = 0; pass <= k->is_coupled; pass++) {
+    double most = 0;
+    invert_any(k->matrix, n, unit, inverse, inverse + (int64_t)n * n, pivot);
+    for (int i = 0; i < n; i++) {
+      nu[i] = 0;
+      for (int j = 0; j < n; j++) nu[i] += inverse[i * n + j] * k->a[j];
+      most = larger(larger(fabs(k->b[i]), fabs(nu[i])), most);
+    }
+    if (!relax_from(k, nu, most)) return 0;
+    for (int i = 0; i < n; i++) unit[i] = larger(k->is_contact[i] ? nu[i] : bound_of(k, i, nu), MERGED * (most > 0 ? most : 1));
+  }
+  return 1;
 }
 
 /* Solutions of a block that is not of one element: one where a certificate or the size says so. */
 static int solve_block_of_many(const Block *k, int certificate, int8_t *position, double *found, double *work,
                                int32_t *pivot) {
-  if (certificate == NOTHING && k->size <= MOST_ENUMERATED) return enumerate(k, found, work, pivot);
+  int is_loaded = k->span && k->is_coupled; /* friction in space by reactions */
+  if (certificate == NOTHING && k->size <= MOST_ENUMERATED && !is_loaded) return enumerate(k, found, work, pivot);
   if (k->span) return relax(k, found, work, pivot);
   int most = certificate >= UNIQUE ? 10000 : 20 + 4 * k->size;
   int solved = pivot_block(k, position, found, most, work, pivot) || lemke_block(k, found, work, pivot);
@@ -697,8 +710,8 @@ static void read_old(const Run *r, Decision *d, const int8_t *letter, const Know
 static int is_at_bound(const Decision *d, int i) {
   double bound = d->b[i];
   if (d->is_contact[i]) return d->old[i] <= TIED * d->room[i];
-  if (d->span[i]) return d->span[i] > 0 && bound - length_of(d->old + i, d->span[i]) <= TIED * d->room[i];
   for (int j = 0; j < d->count; j++) bound += d->share[i * d->count + j] * d->old[j];
+  if (d->span[i]) return d->span[i] > 0 && bound - length_of(d->old + i, d->span[i]) <= TIED * d->room[i];
   return bound - fabs(d->old[i]) <= TIED * d->room[i];
 }
 
@@ -836,7 +849,7 @@ static double middle(const double *one, const double *two, int apart, int other,
  * Of those of an order all that is known before it, the part along u of u itself is returned. */
 static double along_bound(const Decision *d, int i, int order, double *nu, double *w) {
   int k = d->count, size = d->span[i], j = order - d->began[i];
-  const double *b = d->b + d->began[i] * k + i, *s = d->speed + d->began[i] * k + i, *u = d->along + d->began[i] * k + i;
+  const double *b = d->bound + d->began[i] * k + i, *s = d->speed + d->began[i] * k + i, *u = d->along + d->began[i] * k + i;
   double bend = 0;
   for (int q = 0; q < size; q++) bend -= 0.5 * middle(u + q, u + q, k, k, j);
   for (int q = 0; q < size; q++) {
@@ -852,7 +865,7 @@ static void keep_vector(Decision *d, int i, int order) {
   if (d->state[at + i] == UNDECIDED) d->began[i] = (int8_t)(order + (state == UNDECIDED));
   if (state == UNDECIDED || state == INSIDE) return;
   int begun = d->began[i] * k + i;
-  double w[3], known[3] = {0}, rest[3] = {0}, speed = 0, bend = 0, bound = d->b[begun], *first = d->along + begun;
+  double w[3], known[3] = {0}, rest[3] = {0}, speed = 0, bend = 0, bound = d->bound[begun], *first = d->along + begun;
   for (int q = 0; q < size; q++) {
     w[q] = d->a[at + i + q];
     for (int c = 0; c < k; c++)
@@ -872,7 +885,7 @@ static void keep_vector(Decision *d, int i, int order) {
  * where w keeps its direction. */
 static void turn_rows(const Decision *d, Block *b, int i, int order) {
   int n = b->size, own = b->own[i], size = d->span[own];
-  const double *axes = d->axes + 3 * own, first = d->b[d->began[own] * d->count + own];
+  const double *axes = d->axes + 3 * own, first = d->bound[d->began[own] * d->count + own];
   double nu[3], w[3], slope = first > 0 ? d->speed[d->began[own] * d->count + own] / first : 0;
   along_bound(d, own, order, nu, w);
   for (int c = 0; c < n; c++) turn_vector(axes, size, 1, b->matrix + i * n + c, n);
@@ -884,6 +897,7 @@ static void turn_rows(const Decision *d, Block *b, int i, int order) {
     b->b[i + q] = nu[q];
     b->a[i + q] -= w[q] - (q ? slope * nu[q] : 0);
     if (q == 0) continue;
+    memset(b->share + (i + q) * n, 0, sizeof(double) * n);
     b->matrix[(i + q) * (n + 1)] += slope;
     b->state[i + q] = first > 0 ? INSIDE : ABOVE;
   }
@@ -914,6 +928,7 @@ static Block part_of_law(Decision *d, int order, int which) {
       b.is_coupled |= b.share[i * n + j] != 0;
     }
   }
+  for (int i = 0; i < n; i++) d->bound[at + b.own[i]] = b.b[i];
   for (int i = 0; i < n; i++) {
     int own = b.own[i], size = d->span[own];
     if (size >= 0) span[i] = 0;
@@ -1224,6 +1239,11 @@ static void explore(Run *r, Decision *d, int order, int which) {
         d->state[(order + 1) * k + own] = to[q * n + i];
       }
       for (int i = d->first[which]; i < d->first[which + 1]; i++) {
+        int own = d->order[i], at = order * k;
+        d->bound[at + own] = d->b[at + own];
+        for (int j = 0; j < d->first[which + 1]; j++) d->bound[at + own] += d->share[own * k + d->order[j]] * d->nu[at + d->order[j]];
+      }
+      for (int i = d->first[which]; i < d->first[which + 1]; i++) {
         int own = d->order[i];
         if (d->span[own] > 0) keep_vector(d, own, order);
       }
@@ -1254,6 +1274,7 @@ static void letters_of_motion(const Run *r, const Decision *d, const Motion *own
     int side = own->state[i] == INSIDE ? 0 : own->state[i] == ABOVE ? 1 : -1;
     letter[d->own[i]] = (int8_t)(d->span[i] && side ? LEAVING : d->is_contact[i] ? side != 0 : side);
   }
+  if (r->s->sets) idle_sets(r, letter, 0);
 }
 
 /* Whether a block may have more than one vector of unknowns. */

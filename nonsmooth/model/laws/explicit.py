@@ -42,7 +42,8 @@ class Solved:
             return
         slope = ca.jacobian(residual, symbols)
         if not ca.depends_on(slope, symbols):
-            rest, dependent = ca.substitute(residual, symbols, 0), bool(system.complementarity)
+            rest = ca.substitute(residual, symbols, 0)
+            dependent = system.complementarity or rests_on(system, mode)
             self.values = -(least_norm if dependent else solved)(slope, rest)
             self.field = ca.substitute(field, symbols, self.values)
             return

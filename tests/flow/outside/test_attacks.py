@@ -109,6 +109,26 @@ def test_derivatives_of_rest_that_lasts():
     np.testing.assert_allclose(cost.x0, [0, 0, left], rtol=0, atol=1e-9)
 
 
+def test_derivatives_of_rest_on_a_curve_and_of_dependent_multipliers():
+    # x = sin(a t) at rest, also where a changes: the speed that it starts with is a
+    curve = ns.FilippovSystem(
+        [x, v, y], field=[v, -3 * lam, a], surfaces=[x - ca.sin(y)], multipliers=[lam],
+        parameters={a: 1.0},
+    )  # fmt: skip
+    found = ns.sensitivity(ns.simulate(curve, [0.0, 1.0, 0.0], 1.0))
+    wanted = [[math.cos(1)], [math.cos(1) - math.sin(1)], [1]]
+    np.testing.assert_allclose(found.dx_dp, wanted, rtol=0, atol=1e-9)
+    # v' = 0 asks of two multipliers for their sum a, and y' = -a - y
+    twisting = ns.FilippovSystem(
+        [x, v, y], field=[v, a - 2 * lam - 0.9 * kap, -2 * lam - 0.9 * kap - y],
+        surfaces=[x, v], multipliers=[lam, kap], parameters={a: 0.3},
+    )  # fmt: skip
+    found = ns.sensitivity(ns.simulate(twisting, [0.0, 0.0, 0.5], 1.0))
+    left = math.exp(-1)
+    np.testing.assert_allclose(found.dx_dx0, np.diag([0, 0, left]), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.dx_dp, [[0], [0], [left - 1]], rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("values", ["now", "trigger"])
 def test_derivatives_of_a_map_of_the_state_at_its_trigger(values):
     resets = [

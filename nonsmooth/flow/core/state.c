@@ -1,7 +1,8 @@
 /* The driver: all that a run is. The system is data, not code.
  *
  * Read in the order of core_source.py: programs.h, pairs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c,
- * near_zeros.c, elements.c, decide.c, events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
+ * near_zeros.c, elements.c, vectors.c, blocks.c, decide.c, events.c, driver.c; sets.c and approach.c are how sets of
+ * codimension two and more move and are met.
  */
 
 
@@ -153,7 +154,7 @@ typedef struct {
   double size, time_size, length, shortened, held_length, hold; /* hold: the step's end before zeros of a guard that are not told apart */
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
-  Continuation chosen, one, first, rest, found;
+  Continuation chosen, found;
   Decision *decision;
   int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
   int32_t turned_mode; /* the mode of start_mode, whose guards of stability begin with these signs */

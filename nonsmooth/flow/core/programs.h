@@ -125,29 +125,25 @@ static void values_free(const Values *t, const double *x, const double *p, doubl
 #define SIXTEEN(k) FOUR(k), FOUR((k) + 4), FOUR((k) + 8), FOUR((k) + 12)
 static const double PART[] = {0, SIXTEEN(1), SIXTEEN(17), SIXTEEN(33)};
 
-/* Sums of u_i v_(k-i) and of i u_i v_(k-i), i from first to last, in four chains. */
+/* Sum of u_i v_(k-i), i from first to last, in four chains: the ends, which are known last, are added last. */
 static inline double convolve(const double *u, const double *v, int k, int first, int last) {
-  int count = last - first + 1, i = 4;
-  if (count <= 0) return 0;
+  int count = last - first, i = 1;
+  if (count < 0) return 0;
   u += first;
   v += k - first;
-  double a = u[0] * v[0], b, c, d;
-  if (count == 1) return a;
-  b = u[1] * v[-1];
-  if (count == 2) return a + b;
-  c = u[2] * v[-2];
-  if (count == 3) return (a + b) + c;
-  d = u[3] * v[-3];
+  double ends = u[0] * v[0], a = 0, b = 0, c = 0, d = 0;
+  if (count == 0) return ends;
+  ends += u[count] * v[-count];
   for (; i + 3 < count; i += 4) {
-    a = MULADD(u[i], v[-i], a);
-    b = MULADD(u[i + 1], v[-i - 1], b);
-    c = MULADD(u[i + 2], v[-i - 2], c);
-    d = MULADD(u[i + 3], v[-i - 3], d);
+    a += u[i] * v[-i];
+    b += u[i + 1] * v[-i - 1];
+    c += u[i + 2] * v[-i - 2];
+    d += u[i + 3] * v[-i - 3];
   }
-  if (i < count) a = MULADD(u[i], v[-i], a);
-  if (i + 1 < count) b = MULADD(u[i + 1], v[-i - 1], b);
-  if (i + 2 < count) c = MULADD(u[i + 2], v[-i - 2], c);
-  return (a + b) + (c + d);
+  if (i < count) a += u[i] * v[-i];
+  if (i + 1 < count) b += u[i + 1] * v[-i - 1];
+  if (i + 2 < count) c += u[i + 2] * v[-i - 2];
+  return ((a + b) + (c + d)) + ends;
 }
 
 /* Terms up to the last that is not zero. */
@@ -162,29 +158,30 @@ static inline double product_of(const double *u, int u_terms, const double *v, i
   if (first < last) return convolve(u, v, k, first, last);
   return first == last ? u[first] * v[k - first] : 0;
 }
-static inline double weigh(const double *u, const double *v, int k, int first, int last) {
-  int count = last - first + 1, i = 4;
-  if (count <= 0) return 0;
-  double x = first;
-  u += first;
-  v += k - first;
-  double a = x * u[0] * v[0], b, c, d;
-  if (count == 1) return a;
-  b = (x + 1) * u[1] * v[-1];
-  if (count == 2) return a + b;
-  c = (x + 2) * u[2] * v[-2];
-  if (count == 3) return (a + b) + c;
-  d = (x + 3) * u[3] * v[-3];
-  for (; i + 3 < count; i += 4) {
-    a = MULADD((x + i) * u[i], v[-i], a);
-    b = MULADD((x + i + 1) * u[i + 1], v[-i - 1], b);
-    c = MULADD((x + i + 2) * u[i + 2], v[-i - 2], c);
-    d = MULADD((x + i + 3) * u[i + 3], v[-i - 3], d);
+
+/* Sums of i u_i v_(k-i) and of i u_i w_(k-i), i from 1 to ``last``, which is added last. */
+static inline double weigh_both(const double *u, const double *v, const double *w, int k, int last, double *other) {
+  double a = 0, b = 0, c = 0, d = 0, x = 1;
+  if (last < 1) return *other = 0;
+  for (int i = 1; i + 1 < last; i += 2, x += 2) {
+    double one = x * u[i], two = (x + 1) * u[i + 1];
+    a += one * v[k - i];
+    b += two * v[k - i - 1];
+    c += one * w[k - i];
+    d += two * w[k - i - 1];
   }
-  if (i < count) a = MULADD((x + i) * u[i], v[-i], a);
-  if (i + 1 < count) b = MULADD((x + i + 1) * u[i + 1], v[-i - 1], b);
-  if (i + 2 < count) c = MULADD((x + i + 2) * u[i + 2], v[-i - 2], c);
-  return (a + b) + (c + d);
+  if (last % 2 == 0) {
+    double one = (last - 1) * u[last - 1];
+    a += one * v[k - last + 1];
+    c += one * w[k - last + 1];
+  }
+  double end = last * u[last];
+  *other = (c + d) + end * w[k - last];
+  return (a + b) + end * v[k - last];
+}
+static inline double weigh(const double *u, const double *v, int k, int last) {
+  double other;
+  return weigh_both(u, v, v, k, last, &other);
 }
 
 /* A coefficient that is zero stays so, whatever it is divided by: a square root of zero at rest. */
@@ -282,21 +279,21 @@ static void series_rules(const Series *t, const List *list, int first, int last,
       case RULE_under: EACH w[k] = settled(over(-convolve(w, v, k, 0, k - 1), v[0]), w[0], v[0]); break;
       case RULE_sqrt: EACH w[k] = over(0.5 * (u[k] - convolve(w, w, k, 1, k - 1)), w[0]); break;
       case RULE_power: EACH w[k] = power_coefficient(u, w, v[0], k); break;
-      case RULE_integral: EACH w[k] = q->first * PART[k] * weigh(u, v, k, 1, k); break;
+      case RULE_integral: EACH w[k] = q->first * PART[k] * weigh(u, v, k, k); break;
       case RULE_turn: EACH w[k] = q->first * PART[k] * (u[1] * v[k - 1]); break;
       case RULE_pair: EACH { /* row b is written too */
-        double part = weigh(u, w, k, 1, k);
-        w[k] = q->first * PART[k] * weigh(u, v, k, 1, k);
-        s[q->b + k] = q->second * PART[k] * part;
+        double other, own = weigh_both(u, v, w, k, k, &other);
+        w[k] = q->first * PART[k] * own;
+        s[q->b + k] = q->second * PART[k] * other;
       } break;
       case RULE_turns: EACH {
         w[k] = q->first * PART[k] * (u[1] * v[k - 1]);
         s[q->b + k] = q->second * PART[k] * (u[1] * w[k - 1]);
       } break;
-      case RULE_quotient: EACH w[k] = over(q->first * k * u[k] - weigh(w, v, k, 1, k - 1), v[0]) * PART[k]; break;
+      case RULE_quotient: EACH w[k] = over(q->first * k * u[k] - weigh(w, v, k, k - 1), v[0]) * PART[k]; break;
       case RULE_atan2: EACH {
         const double *r = s + q->c;
-        double top = weigh(u, v, k, 1, k) - weigh(v, u, k, 1, k) - weigh(w, r, k, 1, k - 1);
+        double top = weigh(u, v, k, k) - weigh(v, u, k, k) - weigh(w, r, k, k - 1);
         w[k] = over(top, r[0]) * PART[k];
       } break;
       /* A term that the mode leaves out has a factor that is zero; its other factors are not evaluated. */

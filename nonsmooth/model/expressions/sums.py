@@ -55,10 +55,9 @@ class _Joining:
         """Join a rule with those that nothing else needs."""
         rule = self.rules[j]
         if rule.rule in ("add", "sub"):
-            a, b = rule.args
-            self.sums[j] = self._whole(a) + _times(
-                self._single(b), -1.0 if rule.rule == "sub" else 1.0
-            )
+            terms = self._whole(rule.args[0])
+            terms += _times(self._single(rule.args[1]), -1.0 if rule.rule == "sub" else 1.0)
+            self.sums[j] = terms
         elif rule.rule in ("neg", "twice"):
             self.sums[j] = _times(self._whole(rule.args[0]), -1.0 if rule.rule == "neg" else 2.0)
         elif rule.rule == "affine":
@@ -69,15 +68,17 @@ class _Joining:
             self.sums[j] = self._product(rule.args[0], rule.args[-1])
 
     def _whole(self, a: int) -> list[_Term]:
-        """Terms of a rule that is added first."""
-        if self.rules[a].rule == "constant":
-            return [(self.rules[a].numbers[0], _ONE, _ONE)]
-        return self.sums[a] if a in self.sums and self.users[a] == 1 else [(1.0, a, _ONE)]
+        """Terms of a rule that is added first, to be changed."""
+        if a in self.sums and self.users[a] == 1:
+            return self.sums.pop(a)
+        return self._single(a)
 
     def _single(self, a: int) -> list[_Term]:
         """The same of one that is added later: its own sum would lose digits."""
-        found = self._whole(a)
-        return found if len(found) == 1 else [(1.0, a, _ONE)]
+        if self.rules[a].rule == "constant":
+            return [(self.rules[a].numbers[0], _ONE, _ONE)]
+        found = self.sums[a] if a in self.sums and self.users[a] == 1 else ()
+        return [*found] if len(found) == 1 else [(1.0, a, _ONE)]
 
     def _scaled(self, factor: float, a: int) -> list[_Term]:
         own = self._single(a)
@@ -87,13 +88,12 @@ class _Joining:
         for one, two in ((a, b), (b, a)):
             if self.rules[one].rule == "constant":
                 return self._scaled(self.rules[one].numbers[0], two)
-        sign, factors = 1.0, []
-        for one in (a, b):
-            factor, own, other = self._single(one)[0]
-            plain = other == _ONE and abs(factor) == 1.0 and own != _ONE
-            sign *= factor if plain else 1.0
-            factors.append(own if plain else one)
-        return [(sign, *factors)]
+        (f, one, x), (g, two, y) = self._single(a)[0], self._single(b)[0]
+        if x != _ONE or abs(f) != 1.0:
+            f, one = 1.0, a
+        if y != _ONE or abs(g) != 1.0:
+            g, two = 1.0, b
+        return [(f * g, one, two)]
 
 
 def _times(terms: Sequence[_Term], factor: float) -> list[_Term]:

@@ -108,7 +108,10 @@ class Coupled:
             [j for j in range(len(system.impacts)) if ca.depends_on(f, d.reactions[j])]
             for f in factors
         )
-        self.continuous = tuple(self._is_continuous(i) for i in range(self._surfaces))
+        columns = ca.jacobian(d.field, d.multipliers)
+        self.continuous = tuple(
+            self._is_continuous(i, columns[:, i].nonzeros()) for i in range(self._surfaces)
+        )
         extra = [n for n, scaled in zip(unknowns, self.scaled, strict=True) if scaled]
         self.moving = ca.vertcat(x, lam, d.reactions, *extra)
         self._symbols = [self.moving, system.parameter_symbols]
@@ -136,13 +139,12 @@ class Coupled:
         self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)
 
-    def _is_continuous(self, surface: int) -> bool:
+    def _is_continuous(self, surface: int, column: Sequence[ca.SX]) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""
         if surface in (*self.system.set_of, *self.system.remembering):
             return False
         d, x = self.system.definition, self.system.extended_states
-        column = ca.jacobian(d.field, d.multipliers[surface])
-        pieces = [e for e in ca.vertsplit(ca.densify(column)) if not e.is_zero()]
+        pieces = [e for e in column if not e.is_zero()]
         return all(ca.depends_on(e, x) for e in pieces) and vanish_on(
             pieces, d.surfaces[surface], x
         )
@@ -181,7 +183,8 @@ class Coupled:
             if i in self.system.remembering:
                 continue
             own = ca.vertcat(lam[i], unknowns[i]) if self.scaled[i] else lam[i]
-            others = ca.vertcat(*[e for e in every if not ca.depends_on(own, e)])
+            hashes = {e.element_hash() for e in ca.vertsplit(own)}
+            others = ca.vertcat(*[e for e in every if e.element_hash() not in hashes])
             found[i] = degree_of(d.surfaces[i], self.layer[i], own, others, x, field)
         return found
 
@@ -252,10 +255,11 @@ class Coupled:
     @cached_property
     def slope_moves(self) -> NDArray[np.bool_]:
         """Which derivatives of the layer's rates by the unknowns change along a motion (m, m)."""
-        moves = np.zeros((self.count, self.count), bool)
-        sparsity = self.slope.sparsity()
-        for i, j in zip(sparsity.row(), sparsity.get_col(), strict=True):
-            moves[i, j] = ca.depends_on(self.slope[i, j], self.moving)
+        moves, sparsity = np.zeros((self.count, self.count), bool), self.slope.sparsity()
+        if sparsity.nnz():
+            own = ca.vertcat(*self.slope.nonzeros())
+            found = ca.which_depends(own, self.moving, 1, True)
+            moves[sparsity.row(), sparsity.get_col()] = found
         return moves
 
     @cached_property

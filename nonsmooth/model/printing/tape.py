@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import NamedTuple, cast
 
 import casadi as ca
 import numpy as np
@@ -221,32 +221,40 @@ def _paired(
 
 def series_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Series:
     """Write the Taylor rules of expressions in two vectors, of which the first moves."""
-    rules, rows = _rules_of(inputs, outputs)
-    return _series(rules, rows, range(len(rows)), lambda _: True, lambda _: False)
+    program = _rules_of(inputs, outputs)
+    return _series(program, range(len(outputs)), lambda _: True, lambda _: False)
 
 
 def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
     """Rules of all that a mode needs: in any, and in one where nothing slides. They are numbered alike."""
     n, m = coupled.system.extended_dimension, coupled.system.surface_count
     inputs = [coupled.moving, coupled.system.parameter_symbols]
-    rules, rows = _rules_of(inputs, coupled.awake([*coupled.outputs, slopes]))
+    program = _rules_of(inputs, coupled.awake([*coupled.outputs, slopes]))
     of_sets = {n + i for i in coupled.system.set_of}
     held = {n + i for i in range(m) if coupled.scaled[i]} - of_sets
     time = _time_of(coupled)
-    every = _series(rules, rows, range(6), lambda k: k not in held, lambda k: k >= n, time)
+    every = _series(program, range(6), lambda k: k not in held, lambda k: k >= n, time)
     free = (0, 1, 2, 4) if of_sets else (0, 2, 4)
     follow = lambda k: k in of_sets
-    return every, _series(rules, rows, free, lambda k: k < n or follow(k), follow, time)
+    return every, _series(program, free, lambda k: k < n or follow(k), follow, time)
 
 
-def _rules_of(
-    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
-) -> tuple[list[Rule], list[list[int]]]:
-    """Rules of expressions, and the numbers of those of each output."""
+class _Rules(NamedTuple):
+    """Rules of expressions and the numbers of those of each output, and the same with sums."""
+
+    plain: list[Rule]
+    plain_rows: list[list[int]]
+    rules: list[Rule]
+    rows: list[list[int]]
+
+
+def _rules_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> _Rules:
+    """Rules of expressions."""
     outputs = [ca.densify(o) for o in outputs]
     nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
     rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
-    return rules, [[rule_of[j] for j in row] for row in rows]
+    rows = [[rule_of[j] for j in row] for row in rows]
+    return _Rules(rules, rows, *summed(rules, rows))
 
 
 def derived_series_of(coupled: Coupled) -> tuple[Series, Entries]:
@@ -255,25 +263,23 @@ def derived_series_of(coupled: Coupled) -> tuple[Series, Entries]:
     derivatives, entries = sparse_entries(coupled.derivatives)
     outputs = [*coupled.outputs, _moving_slopes(coupled)[2], derivatives]
     inputs = [coupled.moving, coupled.system.parameter_symbols]
-    rules, rows = _rules_of(inputs, coupled.awake(outputs))
+    program = _rules_of(inputs, coupled.awake(outputs))
     held = {n + i for i, own in enumerate(coupled.scaled) if own} - {
         n + i for i in coupled.system.set_of
     }
     moves, unknown = lambda k: k not in held, lambda k: n <= k < size
-    return _series(rules, rows, range(len(rows)), moves, unknown, _time_of(coupled)), entries
+    return _series(program, range(len(outputs)), moves, unknown, _time_of(coupled)), entries
 
 
 def _series(
-    rules: Sequence[Rule],
-    rows: Sequence[Sequence[int]],
+    program: _Rules,
     wanted: Sequence[int],
     moves: Callable[[int], bool],
     unknown: Callable[[int], bool],
     time: int | None = None,
 ) -> Series:
     """Rules as the interpreter reads them."""
-    given = (rules, rows)
-    rules, rows = summed(rules, rows)
+    rules, rows = program.rules, program.rows
     still = [_is_still(rule) for rule in rules]
     change = [not own for own in still]
     moving, late = entered(rules, moves), entered(rules, lambda k: unknown(k) and moves(k))
@@ -320,8 +326,8 @@ def _series(
         place=_integers([k for k, _ in inputs]),
         outputs=_integers([j for row in rows for j in row]),
         lists={name: _integers(own) for name, own in lists.items()},
-        rules=given[0],
-        rows=given[1],
+        rules=program.plain,
+        rows=program.plain_rows,
     )
 
 

@@ -31,7 +31,7 @@ TASKS = {
         "else happens to the state: stops, jumps, impacts, clocks. "
         "[Surfaces and sliding](../theory.md) explains the words.",
         "nonsmooth",
-        "FilippovSystem table model.Switching Friction Relay Stop Reset Impact Clock regularise call",
+        "FilippovSystem table model.Switching Friction Relay Complementarity Stop Reset Impact Constraint Clock regularise call",
     ),
     "runs": _task(
         "Follow an orbit",

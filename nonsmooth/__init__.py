@@ -75,7 +75,8 @@ from .model import (
     call,
     regularise,
 )
-from .model.definition.elements import Relay
+from .model.definition.constraints import Constraint
+from .model.definition.elements import Complementarity, Relay
 from .model.definition.friction import Friction
 from .model.definition.table import table
 from .orbit import (
@@ -112,6 +113,8 @@ __version__ = "0.1.0.dev0"
 
 __all__ = [
     "Clock",
+    "Complementarity",
+    "Constraint",
     "ConvergenceError",
     "DefinitionError",
     "DegenerateError",

@@ -29,7 +29,7 @@ def forward(run: Trajectory) -> Trajectory:
         x=run.x[::-1].copy(),
         events=Events.of([Event("end", last, run.x[0], mode, mode)]),
         segments=Segments.of([Segment(mode, float(run.t[-1]), last, 0, count)]),
-        steps=Steps(starts, coefficients[::-1]),
+        steps=Steps(starts, coefficients[::-1], run.steps.implicit[::-1]),
     )
 
 
@@ -100,6 +100,7 @@ def join(pieces: Sequence[Trajectory]) -> Trajectory:
         steps=Steps(
             np.concatenate([p.steps.starts for p in pieces]),
             [c for p in pieces for c in p.steps.coefficients],
+            np.concatenate([p.steps.implicit for p in pieces]),
         ),
     )
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import sys
 
-from ..model.numbering import FALL, LAWS, LIMIT_FALL, MOST_CODES, UNWATCHED
+from ..model.numbering import FALL, IMPACT_LAWS, LAWS, LIMIT_FALL, MOST_CODES, UNWATCHED
 
-__all__ = ["FALL", "LAWS", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
+__all__ = ["FALL", "IMPACT_LAWS", "LAWS", "LIMIT_FALL", "MOST_CODES", "UNWATCHED"]  # and all below
 
 EPSILON = sys.float_info.epsilon
 
@@ -58,6 +58,9 @@ SHARE_SPREAD = 0.05
 #: Close to rest on a surface with a root steps are shorter than flights by the inverse of this, and below rounding.
 ROOT_REST = 1e-7
 
+#: Steps of Newton's method to where complementarity conditions jump, and part of a state by which it is differenced.
+JUMP_STEPS, DIFFERENCED = 60, 1e-7
+
 #: Part of the time in which the states change by their size over which a rate is differenced.
 REACH = 1e-6
 
@@ -105,6 +108,9 @@ ROOT_ROUNDING = 16 * EPSILON
 
 #: A point is on a surface where h is zero to this much of its terms.
 ON_SURFACE = 16 * EPSILON
+
+#: A state satisfies a constraint that is zero to this part of its terms, and is projected onto it.
+CONSISTENT = 1e-8
 
 #: A coefficient of a guard below this part of its terms is zero by rounding.
 VANISHES = 64 * EPSILON
@@ -208,7 +214,8 @@ DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 #: Kinds of events, by number in ensembles and in C.
 KINDS = (
     *("crossing", "entry", "exit", "stop", "reset"),
-    *("impact", "contact", "release", "stability", "rest", "rest_below", "end"),
+    *("impact", "contact", "release", "stability", "rest", "rest_below", "jump"),
+    "end",
 )
 
 #: The first and the last of these, as many, can happen without resets and impacts.
@@ -264,7 +271,32 @@ REASONS = (
     "undetermined",
     "high_degree",
     "discrete_value",
+    "no_jump",
+    "off_constraint",
+    "dead_point",
+    "decay",
 )
 
-#: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.
-RUNNING, FULL, HAND_OVER = -1, -2, -3
+#: Flag of the mode of an implicit step, as it is recorded.
+IMPLICIT_STEP = 1 << 30
+
+#: Steps that a run may take: what costs least, or one kind.
+METHODS = ("auto", "taylor", "stiff")
+
+#: Implicit steps have seven stages in place of five below this relative tolerance. Newton's method ends at this part
+#: of it, or where it changes nothing but rounding, between two bounds. They are tried where a decay rate allows Taylor
+#: steps hardly longer (this part) in so many of them, of each fourth, first with so many times their length, and given
+#: up after so many in a row that Taylor steps would have made at less cost. Matrices are dense: systems of more states
+#: than these have none.
+SEVEN_STAGES = 3e-9
+NEWTON = 0.01
+LEAST_CHANGE, MOST_CHANGE = 1e-7, 1e-2
+HELD_PART = 0.6
+HELD_STEPS, EVERY_STEP = 4, 4
+EIGHTFOLD = 8.0
+IDLE_STEPS = 5
+MOST_STATES = 1500
+
+#: Not a status: the run continues in the next call, after its arrays were emptied, in another driver, or once the
+#: program of its derivatives is given.
+RUNNING, FULL, HAND_OVER, NEEDS_PROGRAM = -1, -2, -3, -4

@@ -209,5 +209,5 @@ def _trajectory(
         segments=Segments.of([Segment(mode, float(t[0]), end, 0, len(run.starts))]),
         status=status,
         message=f"{message} {ADVICE[status]}",
-        steps=Steps(sign * run.starts, coefficients),
+        steps=Steps(sign * run.starts, coefficients, run.implicit),
     )

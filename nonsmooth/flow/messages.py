@@ -5,6 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 
+def held_by_decay(t: float, step: float, is_possible: bool) -> str:
+    """Explicit steps that a decay rate holds."""
+    advice = (
+        "method='auto' takes implicit steps."
+        if is_possible
+        else "Implicit steps for it are not built."
+    )
+    return (
+        f"The steps are held near {step:.1e} at t = {t:.6g} by a decay rate of about {8 / step:.0e}, much faster "
+        f"than the motion: the system is stiff there. {advice}"
+    )
+
+
 def two_fold(surface: int) -> str:
     """Start or arrival at a two-fold off sliding."""
     return (
@@ -18,10 +31,10 @@ def slid_to_two_fold(surface: int) -> str:
     return f"Sliding reached a two-fold of h{surface} = 0: both fields are tangent there."
 
 
-def ambiguous(modes: Sequence[str]) -> str:
+def ambiguous(modes: Sequence[str], names: Sequence[str]) -> str:
     """Several modes can continue."""
     differing = [i for i, letters in enumerate(zip(*modes, strict=True)) if len(set(letters)) > 1]
-    surfaces = " and ".join(f"h{i}" for i in differing)
+    surfaces = " and ".join(names[i] for i in differing)
     where = (
         "an intersection" if len(differing) > 1 else "repelling sliding or a fold of both fields"
     )
@@ -186,6 +199,22 @@ def behind(name: str, t: float) -> str:
     return f"The gap of {name!r} is negative at t = {t:.10g}."
 
 
+def off_constraint(name: str, what: str, value: float, t: float) -> str:
+    """A state that does not satisfy a constraint."""
+    return (
+        f"{what} of {name!r} is {value:.6g} at t = {t:.10g}, and has to be 0. Start on the constraint, with velocities "
+        "along it, and let jumps keep it."
+    )
+
+
+def dead_point(names: Sequence[str], t: float) -> str:
+    """Constraints that cannot all be kept."""
+    return (
+        f"No reactions keep {' and '.join(map(repr, names))} at t = {t:.10g}: the constraints contradict one another, or "
+        "become dependent there, as those of a linkage at its dead point."
+    )
+
+
 def no_impulse(name: str, t: float) -> str:
     """No impulses satisfy the law of impact and friction."""
     return f"No impulse fits the impact {name!r} at t = {t:.10g}."
@@ -194,6 +223,11 @@ def no_impulse(name: str, t: float) -> str:
 def restitution(name: str, t: float) -> str:
     """A coefficient of restitution that gives energy, or pushes on."""
     return f"The restitution of {name!r} is not from 0 to 1 at t = {t:.10g}."
+
+
+def no_jump(name: str, t: float) -> str:
+    """No jump leads to y >= 0."""
+    return f"y of {name!r} is negative at t = {t:.10g}, and no impulses of the multipliers lead to y >= 0."
 
 
 def no_reaction(names: Sequence[str]) -> str:

@@ -12,10 +12,17 @@ def guard_name(system: FilippovSystem, guard: Guard) -> str:
     k, kind = guard.element, guard.kind
     if kind in ("stop", "reset"):
         return (system.stops if kind == "stop" else system.resets)[k][0]
-    if kind in ("zero", "atom"):
+    if kind == "zero":
         return f"f{k}"
+    if kind == "atom":
+        names = [name for name, _ in (*system.stops, *system.resets)]
+        own = len(names) + k
+        rules = zip(names, system.definition.rules, strict=True)
+        return next((f"a function of {name}" for name, r in rules if own in r.decided_by), f"f{k}")
     if k >= len(system.entries):
         return system.impacts[k - len(system.entries)]
+    if _is_condition(system, k):
+        return system.surface_names[system.entries[k][0]]
     if kind in ("surface", "near"):
         return f"h{k}"
     if len(system.entries[k]) > 1:
@@ -23,9 +30,16 @@ def guard_name(system: FilippovSystem, guard: Guard) -> str:
     return f"lambda{k} = {guard.side}" if guard.side else "stability of sliding"
 
 
+def _is_condition(system: FilippovSystem, k: int) -> bool:
+    """Whether entry k is a complementarity condition."""
+    return k < len(system.entries) and system.entries[k][0] in system.half_lines
+
+
 def described(system: FilippovSystem, guard: Guard) -> str:
     """A guard's condition in words."""
     k, name = guard.element, guard_name(system, guard)
+    if _is_condition(system, k) and guard.kind in ("surface", "release"):
+        return f"{'y' if guard.kind == 'surface' else 'the multiplier'} of {name!r} >= 0"
     if guard.kind == "surface":
         return f"h{k} {'>' if guard.side > 0 else '<'} 0"
     if guard.kind == "exit":

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..model import OptionError, real, whole
-from .constants import EPSILON, SAFETY
+from .constants import EPSILON, METHODS, SAFETY
 from .section import Hits
 
 
@@ -39,6 +39,7 @@ class Options:
     start_mode: str | None = None
     hits: Hits | None = None
     rest_below: float | None = None
+    method: str = "auto"
     passed: tuple[bool, ...] = ()  # stops that do not end the run, which has no section
 
     def __post_init__(self) -> None:
@@ -79,6 +80,10 @@ class Options:
                 low=math.nextafter(0.0, 1.0),
             )
             self._set("rest_below", speed)
+        if self.method not in METHODS:
+            raise OptionError(
+                f"method is {self.method!r}. Give 'auto' (implicit steps where they cost less), 'taylor' or 'stiff'."
+            )
         for name in ("max_steps", "max_events", "max_jumps"):
             self._set(name, whole(getattr(self, name), name))
 

@@ -27,7 +27,7 @@ class Stopped(Exception):
 
 def kinds_of(system: FilippovSystem) -> tuple[str, ...]:
     """Kinds of events that a system can have."""
-    if system.resets or system.impacts:
+    if system.resets or system.impacts or system.complementarity:
         return KINDS
     return (*KINDS[: SIMPLE_KINDS - 1], KINDS[-1])
 

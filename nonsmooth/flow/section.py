@@ -40,8 +40,8 @@ class Section:
     Parameters
     ----------
     at : str, number or expression
-        A name: of a surface (``"h0"``, ``"h1"``, ...), a stop, a reset or an impact (all to which it
-        was given), or else a kind of event (``"crossing"``, ``"entry"``, ``"exit"``, ``"reset"``, ...). A number, or an
+        A name: of a surface (``"h0"``, ``"h1"``, ...), a complementarity condition, a stop, a reset or an
+        impact (all to which it was given), or else a kind of event (``"crossing"``, ``"entry"``, ``"exit"``, ``"reset"``, ...). A number, or an
         expression in parameters, is a period: the run is sampled after each, from ``t_start``. An
         expression in states is a section of its own: the system gets a reset named ``"section"``
         where it is zero, which changes nothing. One that is a surface of the system, written alike,
@@ -233,7 +233,9 @@ def _hits(system: FilippovSystem, section: Section, t_start: float) -> Hits:
     names = tuple(n for kind in owners for n in called[kind]) or None
     if name in surfaces:
         kinds, names = KINDS_OF_SECTIONS, (name,)
-        if section.direction:
+        if section.direction and name in system.complementarity:
+            kinds = ("contact" if section.direction < 0 else "release",)
+        elif section.direction:
             letter = _side_before(system, name, section.direction)
     elif section.direction and (owners or name in KINDS_OF_SECTIONS):
         raise OptionError(

@@ -38,6 +38,7 @@ def simulate(
     t_eval: ArrayLike | None = None,
     at: Any = None,
     dense: bool = True,
+    method: str = "auto",
 ) -> Trajectory:
     """Integrate a Filippov system through crossings, sliding, stops and resets.
 
@@ -79,6 +80,10 @@ def simulate(
     at : Section, str, number or expression, optional
         Keep the states at a section: at a surface, stop, reset or impact of that name, at a kind of
         event, or after each period. See :class:`Section`.
+    method : {"auto", "taylor", "stiff"}, optional
+        Steps: explicit Taylor steps; implicit ones (collocation at Radau points, of order 9, or 13 for ``rtol`` below
+        3e-9) where a decay rate is much faster than the motion; or, by default, what costs less, mode by mode. Of
+        systems with a vector multiplier all steps are explicit. ``run.steps.implicit`` says which steps are.
     dense : bool, optional
         Keep the polynomials of the steps, so that the result can be read at any time. ``False`` keeps points,
         events, segments and samples, which need an eighth of the memory or less. Such a run can be continued
@@ -120,7 +125,7 @@ def simulate(
     >>> run.itinerary, bool(abs(run.x[-1, 0] + 0.2) < 1e-9)
     ('- + - + s', True)
     """
-    require_system(system, sets=True, hysteresis=True)
+    require_system(system, sets=True, hysteresis=True, complementarity=True, joints=True)
     x0, t_start, parameters = _begun(start, x0, t_start, parameters)
     if t_end is None:
         raise OptionError("t_end is missing. Give the time at which the run ends.")
@@ -137,6 +142,7 @@ def simulate(
         max_jumps=max_jumps,
         rest_below=rest_below,
         start_mode=start_mode,
+        method=method,
     )
     system, at = sectioned(system, at)
     x = system.extended_point(x0, options.t_start)

@@ -24,10 +24,10 @@ _BLOCK = 1 << 17
 _SHOWN = 40
 
 
-@savable(starts="s", coefficients="s; N *")
+@savable(starts="s", coefficients="s; N *", implicit="s")
 @dataclass(frozen=True)
 class Steps:
-    """Accepted steps with the Taylor polynomials of the states.
+    """Accepted steps with the polynomials of the states.
 
     Attributes
     ----------
@@ -36,17 +36,26 @@ class Steps:
     coefficients : sequence of ndarray (N, P+1)
         Of the states (time included where the system depends on it), in powers of the time since
         the start of the step. A step whose series ends early has fewer.
+    implicit : ndarray (s,) of bool
+        Whether a step is implicit (collocation at Radau points) in place of a Taylor step.
     """
 
     starts: Array = field(default_factory=lambda: np.zeros(0))
     coefficients: Sequence[Array] | Array = ()
+    implicit: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+
+    def __post_init__(self) -> None:
+        if len(self.implicit) != len(self.starts):
+            object.__setattr__(self, "implicit", np.zeros(len(self.starts), bool))
 
     def __len__(self) -> int:
         return len(self.coefficients)
 
     def part(self, first: int, last: int) -> Steps:
         """Return the steps first to last - 1."""
-        return Steps(self.starts[first:last], self.coefficients[first:last])
+        return Steps(
+            self.starts[first:last], self.coefficients[first:last], self.implicit[first:last]
+        )
 
     def at(self, t: Array, n: int, forward: bool = True, side: Any = "right") -> Array:
         """Evaluate the first n states at times (m,); (m, n)."""
@@ -119,11 +128,14 @@ class Facts:
         is the only one.
     rested_below : tuple of str
         Names of what ``rest_below=`` put to rest: the run is off by its speed there.
+    implicit_steps : int
+        How many steps were implicit, because a decay rate held explicit ones.
     """
 
     depends_on_widths: bool = False
     unproved: bool = False
     rested_below: tuple[str, ...] = ()
+    implicit_steps: int = 0
 
 
 def _require_whole(run: Trajectory) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from ..model import (
 )
 from ..model.checks import positive
 from .checks import MARGIN, require_linear
+from .discrete_states import with_discrete_states_held
 from .point.intersections import Intersection, Meeting
 from .point.regions import region_of
 from .point.surface_point import FIELDS, SIDES, LocalSurface, Numbers, surface_at
@@ -105,6 +106,7 @@ def spectrum(eigenvalues: NDArray[Any]) -> dict[str, float]:
     return values
 
 
+@with_discrete_states_held
 def classify(
     system: FilippovSystem,
     point: ArrayLike,
@@ -136,10 +138,9 @@ def classify(
     Raises
     ------
     PointError
-        Off the surface and no equilibrium; a wrong shape; not finite.
+        Off the surface, or without one, and no equilibrium; a wrong shape; not finite.
     DefinitionError
-        Hidden dynamics; a fold-fold of a planar system with explicit time; vector multipliers; no
-        surface; a ``mode`` or ``surface`` that the system does not have.
+        Hidden dynamics; a fold-fold of a planar system with explicit time; vector multipliers; a ``mode`` or ``surface`` that the system does not have.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     OptionError
@@ -163,7 +164,9 @@ def classify(
     meeting = meeting_at(system, point, parameters, t, mode, tol)
     if meeting is not None:
         return classify_intersection(meeting, tol, margin)
-    where, x = surface_at(system, point, parameters, t, surface, mode)
+    where, x = surface_at(system, point, parameters, t, surface, mode, smooth=True)
+    if not where.mode:
+        return _Classifier(where, where.at(x), tol, margin).smooth()
     require_linear(system, surface, "classify")
     numbers = where.finite_at(x)
     if not np.any(numbers.gradient):
@@ -219,6 +222,17 @@ class _Classifier:
             return True
         self.margins[name] = value
         return False
+
+    def smooth(self) -> LocalObject:
+        """An equilibrium of a smooth system."""
+        self.evidence.clear()
+        if self.to_zero[0] > self.margin:
+            raise PointError(
+                f"point {self.numbers.x}: expected an equilibrium, as the system has no surface, received the "
+                f"field {self.numbers.fields[0].tolist()}. find_equilibrium goes to one nearby."
+            )
+        self.is_zero(self.to_zero[0], "F = 0")
+        return replace(self._equilibrium(0, "real"), side="")
 
     # off the surface ---------------------------------------------------------------------------
 

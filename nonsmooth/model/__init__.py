@@ -9,7 +9,13 @@ from .definition.lift import LiftedSwitch
 from .definition.parse_definition import read_function
 from .definition.regularise import regularise
 from .definition.switching import Switching
-from .definition.system import FilippovSystem, multiplier_enters, require_plain, require_system
+from .definition.system import (
+    FilippovSystem,
+    multiplier_enters,
+    require_continuous,
+    require_plain,
+    require_system,
+)
 from .derivatives.forcing import clock_periods, is_function, periods, read_period
 from .derivatives.start_maps import StartMap
 from .errors import (
@@ -85,6 +91,7 @@ __all__ = [
     "real",
     "real_array",
     "regularise",
+    "require_continuous",
     "require_plain",
     "require_system",
     "reversed_system",

@@ -19,7 +19,10 @@ TAPE_RULES = tuple(
 )
 
 #: Laws of elements, by number in C.
-LAWS = ("surface", "contact", "set", "relay")
+LAWS = ("surface", "contact", "set", "relay", "joint", "complementarity")
+
+#: Laws of impacts, by number in C.
+IMPACT_LAWS = ("newton", "moreau", "poisson")
 
 #: Most numbers in a condition of an event, and how a function in it is located that is not watched.
 MOST_CODES, UNWATCHED = 256, 2

@@ -158,7 +158,8 @@ def symbols(values: Any, what: str) -> ca.SX:
         if not (isinstance(item, ca.SX) and item.is_scalar() and item.is_symbolic()):
             raise DefinitionError(
                 f"{what}[{i}]: expected a scalar symbol made by casadi.SX.sym, received {item!r} "
-                f"({type(item).__name__}). MX symbols, expressions and strings are not symbols."
+                f"({type(item).__name__}). Expressions and strings are not symbols; FilippovSystem.from_dae reads a "
+                "dictionary with 'x' and 'ode'."
             )
     return ca.vertcat(*items) if items else ca.SX(0, 1)
 

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..model import DefinitionError, FilippovSystem, NonsmoothError, OptionError, require_system
+from ..model import (
+    DefinitionError,
+    FilippovSystem,
+    NonsmoothError,
+    OptionError,
+    require_continuous,
+    require_system,
+)
 
 
 def results(
@@ -27,19 +34,25 @@ def same(several: list[Any], attribute: str) -> Any:
     return values[0]
 
 
-def require_one_surface(system: FilippovSystem, caller: str, dimension: int, others: str) -> None:
-    """Raise DefinitionError unless a system has so many states, one surface and no explicit time."""
+def require_one_surface(
+    system: FilippovSystem, caller: str, dimension: int, others: str, smooth: bool = False
+) -> None:
+    """Raise DefinitionError unless a system has so many states, one surface and no explicit time.
+
+    ``smooth`` allows one without surfaces.
+    """
     runs = "Draw runs with trajectory."
     require_system(system, sets=True, hysteresis=True)
+    require_continuous(system, caller)
     if system.dimension != dimension:
         received, advice = f"{system.dimension} states: {', '.join(system.state_names)}", others
     elif system.sets:
         received, advice = "a set of codimension two or three", runs
-    elif system.surface_count != 1:
+    elif system.surface_count > 1 or not (system.surface_count or smooth):
         received, advice = f"{system.surface_count} surfaces", runs
     elif system.time_dependent:
         received, advice = "explicit time", f"Hold time at a value. {runs}"
-    elif system.nonlinear[0]:
+    elif any(system.nonlinear):
         received, advice = "hidden dynamics", "Its sliding field is not a convex combination."
     else:
         return

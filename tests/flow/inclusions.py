@@ -14,7 +14,7 @@ import nonsmooth as ns
 CASES = Path(__file__).parents[1] / "cases" / "inclusions.json"
 
 #: Constructs that the library does not have.
-MISSING = ("complementarity", "constraints", "vector_multipliers")
+MISSING = ("vector_multipliers",)
 
 #: Functions that the strings use.
 FUNCTIONS = {n: getattr(ca, n) for n in ("sin", "cos", "sqrt", "exp", "log", "fabs")}
@@ -37,7 +37,9 @@ class Case:
             self.data = {**self.data, "field": slider_crank(), "start_mode": "oocc"}
         names = [self.data.get(key, "") for key in ("states", "multipliers", "reactions", "time")]
         self.names = [name.split() for name in names]
-        self.symbols = {n: ca.SX.sym(n) for names in self.names for n in names}
+        own = [condition["lam"] for condition in self.data.get("complementarity", [])]
+        own += [constraint["reaction"] for constraint in self.data.get("constraints", [])]
+        self.symbols = {n: ca.SX.sym(n) for names in [*self.names, own] for n in names}
 
     def parse(self, text: str) -> list:
         value = eval(
@@ -58,8 +60,17 @@ class Case:
             )
             for i, own in enumerate(data.get("impacts", []))
         ]
+        conditions = [
+            ns.Complementarity(self.parse(own["y"])[0], multiplier=self.symbols[own["lam"]])
+            for own in data.get("complementarity", [])
+        ]
+        constraints = [
+            ns.Constraint(self.parse(own["g"])[0], reaction=self.symbols[own["reaction"]])
+            for own in data.get("constraints", [])
+        ]
         return ns.FilippovSystem(
             states,
+            complementarity=conditions,
             field=self.parse(data["field"]) if "field" in data else None,
             above=self.parse(data["above"]) if "above" in data else None,
             below=self.parse(data["below"]) if "below" in data else None,
@@ -67,6 +78,7 @@ class Case:
             surfaces=self.parse(data.get("surfaces", "")) or None,
             multipliers=multipliers or None,
             impacts=impacts or None,
+            constraints=constraints,
             time=time[0] if time else None,
         )
 

@@ -50,7 +50,7 @@ def marked_source() -> str:
 
 
 def instrument(kind: str, folder: Path) -> None:
-    """Compile the driver in a folder, and let this process run it."""
+    """Compile the driver in a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in [*folder.glob("core*"), *folder.glob("report*")]:
         old.unlink()
@@ -66,6 +66,10 @@ def instrument(kind: str, folder: Path) -> None:
     ]
     command += [*BUILDS[kind].split(), "core.c", "-o", "core.so", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
+
+
+def use(folder: Path) -> None:
+    """Let this process run the driver of a folder."""
     loaded = ctypes.CDLL(str(folder / "core.so"))
     library._PACKAGED = folder / "none"
     library.build = lambda source: loaded
@@ -145,9 +149,11 @@ def main(kind: str, arguments: list[str]) -> int:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_configure() -> None:
-    """As a plug-in of pytest: build before tests are collected."""
+    """As a plug-in of pytest: build before tests are collected, once for all workers."""
     kind, _, folder = os.environ["NONSMOOTH_INSTRUMENT"].partition(":")
-    instrument(kind, Path(folder))
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        instrument(kind, Path(folder))
+    use(Path(folder))
 
 
 if __name__ == "__main__":

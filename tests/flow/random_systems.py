@@ -155,13 +155,7 @@ def difference(problem: Problem, truth: Outcome, run: Any, tol: float = TOLERANC
         return f"status: true {truth.status}, came {run.status.name} at {run.t[-1]:.6g}"
     if truth.status == "ENDLESS_JUMPS":
         return ""
-    late = max(  # the limit of impacts is extrapolated sooner where tol is larger
-        [
-            abs(a[0] - b[0]) / (10 if a[1] == "mode" and a[2].endswith("c") else 1)
-            for a, b in zip(true, events, strict=True)
-        ],
-        default=0.0,
-    )
+    late = max([abs(a[0] - b[0]) for a, b in zip(true, events, strict=True)], default=0.0)
     error = float(np.max(np.abs(run.x[-1] - truth.x) / (1 + np.abs(truth.x))))
     if max(late, error) <= 10 * tol:
         return ""

@@ -20,6 +20,7 @@ def system(n, field=None, **more):
 def test_portraits_are_of_autonomous_systems_with_one_surface(draw, n):
     two = {"surfaces": [x, y], "multipliers": [lam, kap]}
     hidden = {"surface": x, "multipliers": lam, "hidden": True}
+    one, z2 = {"surface": x, "multipliers": lam}, ca.SX.sym("z2")
     rest = [1] * (n - 2)
     timed = ns.FilippovSystem(
         [x, y, z][:n], surface=x, above=[1, t, *rest], below=[1, 1, *rest], time=t
@@ -27,13 +28,22 @@ def test_portraits_are_of_autonomous_systems_with_one_surface(draw, n):
     for wrong, received in (
         (1, "FilippovSystem"),
         (system(5 - n), f"{5 - n} states: x, y"),
-        (system(n, [y, -x, *rest]), "0 surfaces"),
+        (system(n, [lam, lam * y, *rest], discrete={z2: (0, 1)}, **one), "has discrete states"),
         (system(n, [-lam, -kap, *rest], **two), "2 surfaces"),
         (timed, "explicit time"),
         (system(n, [lam**3, 1, *rest], **hidden), "hidden dynamics"),
     ):
         with pytest.raises(ns.DefinitionError, match=received):
             draw(wrong, (-1, 1, -1, 1))
+
+
+def test_a_smooth_system_has_a_phase_portrait_and_no_sliding_portrait():
+    with pytest.raises(ns.DefinitionError, match="0 surfaces"):
+        ns.plot.sliding_portrait(system(3, [y, -x, z]), (-1, 1, -1, 1))
+    focus = system(2, [y, -x - y / 2])
+    axes = ns.plot.phase_portrait(focus, (-1, 1, -1, 1)).axes[0]
+    marks = {line.get_gid() for line in axes.lines}
+    assert "orbit" in marks and "stable focus" in marks
 
 
 @pytest.mark.parametrize("orbits", [-1, 1.5, True])

@@ -7,7 +7,8 @@
 static const Happened *back(const Run *r, int64_t k) { return &r->past[(r->history - k) % HISTORY]; }
 
 /* Number of the last events whose times decrease like a geometric series, as one block of a pattern that is
- * repeated, or 0; the time left to the limit, and how much the last block has changed the estimate. */
+ * repeated, or 0; the time left to the limit, and its error. The ratio itself converges, at least as fast as the times
+ * do: what blocks change in the estimate is summed too (Aitken). */
 static int block_of(const Run *r, double *left, double *error) {
   int at_once = r->history > AT_ONCE;
   for (int k = 1; at_once && k <= AT_ONCE; k++) at_once = back(r, k)->interval == 0 && back(r, k)->kind != RESET;
@@ -18,20 +19,26 @@ static int block_of(const Run *r, double *left, double *error) {
     if (r->history < need + lag) return 0;
     for (int k = 1; k <= need && same; k++) same = back(r, k)->pattern == back(r, k + lag)->pattern;
     if (!same) continue;
-    double block[BLOCKS], low = INFINITY, high = 0, ratio = 0, earlier = 0;
+    double block[BLOCKS], low = INFINITY, high = 0, ratio = 0, change = 0, before = 0;
     for (int b = 0; b < BLOCKS; b++) {
       block[b] = 0;
       for (int k = 0; k < lag; k++) block[b] += back(r, need - b * lag - k)->interval;
     }
     for (int b = 1; b < BLOCKS; b++) {
-      earlier = ratio;
+      before = change;
+      change = block[b] - *left;
       ratio = block[b] / block[b - 1]; /* not a number after an empty block */
+      *left = block[b] * ratio / (1 - ratio);
+      change += *left;
       low = ratio > 0 ? fmin(low, ratio) : -INFINITY;
       high = fmax(high, ratio);
     }
     if (!(high < SHRINKS && high - low <= SPREAD * (1 - ratio))) continue;
-    *left = block[BLOCKS - 1] * ratio / (1 - ratio);
-    *error = fabs(block[BLOCKS - 2] * earlier / (1 - earlier) - block[BLOCKS - 1] - *left);
+    *error = fabs(change);
+    if (!(*error < ratio * fabs(before))) return lag;
+    double rest = change * change / (before - change);
+    *error *= larger(*error, fabs(rest)) / *left;
+    *left += rest;
     return lag;
   }
   return 0;
@@ -50,6 +57,12 @@ static int is_awaited(const Run *r, double time) {
 /* Whether one of the last events was that of a guard. */
 static int is_repeated(const Run *r, int block, int kind, int index) {
   for (int k = 1; k <= block; k++) if (back(r, k)->met.kind == kind && back(r, k)->met.index == index) return 1;
+  return 0;
+}
+
+/* Whether one of the last events is of a kind. */
+static int has_kind(const Run *r, int block, int kind) {
+  for (int k = 1; k <= block; k++) if (back(r, k)->kind == kind) return 1;
   return 0;
 }
 
@@ -109,16 +122,19 @@ static int decide_among(Run *r, const int32_t *which, int count) {
   return r->status == RUNNING && decide(r, r->start, 0, 0) && rests_unstably(r, r->chosen.letter) < 0;
 }
 
-/* The mode of closed contacts as r->chosen, and the state in it as r->x; 0 if there is none. */
-static int choose_closed(Run *r, const int32_t *contact, int count) {
+/* The mode of closed contacts, and of surfaces whose events accumulate with theirs, as r->chosen, and the state in it as
+ * r->x; 0 if there is none. */
+static int choose_closed(Run *r, const int32_t *contact, int count, const int32_t *surface, int surfaces) {
   int kept = 0, m = r->m, c = r->c;
-  int32_t *which = r->involved + c;
+  int32_t *which = r->involved + r->width;
   if (!strike(r, contact, count, 1, r->at_work)) return 0;
   memcpy(r->x, r->at_work, sizeof(double) * r->n);
   for (int i = 0; i < count; i++) which[kept++] = m + contact[i];
+  for (int i = 0; i < surfaces; i++) which[kept++] = surface[i];
   for (int i = 0; i < count; i++) which[kept++] = m + c + contact[i];
-  project(r, which, kept);
-  return decide_among(r, which, count);
+  for (int i = 0; i < surfaces; i++) kept += lower_rows(r, surface[i], which + kept);
+  project(r, which, with_joints(r, which, kept));
+  return decide_among(r, which, count + surfaces);
 }
 
 /* Whether a time is below the rounding of the run's times. */
@@ -134,13 +150,40 @@ static void go_to_limit(Run *r, double left, int kind, int before) {
   event(r, kind, before, -1, r->x);
 }
 
+/* Whether no state moves by more than the tolerance within the error of a limit. */
+static int is_sure(Run *r, double error) {
+  expand(r, r->letter, r->x, r->unknowns, &r->e);
+  for (int i = 0; i < r->s->dimension; i++)
+    if (error * fabs(r->e.states[(int64_t)i * r->stride + 1]) > r->e.allowed[i] / SAFETY) return 0;
+  return 1;
+}
+
+/* Surfaces that are zero at a limit, with their lower derivatives, if the states change by ``near`` until then. */
+static int vanishing(Run *r, const double *near, int32_t *which) {
+  double *change = r->small, *own = r->vector;
+  int count = 0;
+  surface_values(r, r->x);
+  for (int i = 0; i < r->n; i++) own[i] = 4 * near[i] + ON_SURFACE * (size_of_state(r, i) + fabs(r->x[i])); /* rates may jump */
+  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, own, 1, change);
+  for (int i = 0; i < r->m; i++) {
+    int small = has_law(r, i, SURFACE_LAW) && fabs(r->rates[i]) <= change[i], first = element(r, i)->lower;
+    for (int k = first; k < first + degree_of(r, i) - 1; k++) small &= fabs(r->rates[k]) <= change[k];
+    if (small) which[count++] = i;
+  }
+  return count;
+}
+
 /* Close the contacts of impacts that accumulate, unless further impacts are to be served. */
 static void close_contacts(Run *r, int block, double left, double error) {
   double speed, *near = r->before, *x = r->saved;
-  int count = gathered(r, block, r->involved, &speed), before = r->mode, at_once = is_instant(r, left);
-  if (!at_once && speed * left > r->o.atol) return;
+  int count = gathered(r, block, r->involved, &speed), before = r->mode, at_once = is_instant(r, left), switches = 0;
+  for (int k = 1; k <= block; k++) switches |= back(r, k)->kind != IMPACT;
+  if (!at_once && (speed * left > r->o.atol || !is_sure(r, error))) return;
+  int32_t *surface = r->involved + r->c;
+  for (int i = 0; i < r->n; i++) near[i] = (left + error) * fabs(r->e.states[(int64_t)i * r->stride + 1]);
+  int surfaces = at_once || !switches ? 0 : vanishing(r, near, surface);
   memcpy(x, r->x, sizeof(double) * r->n);
-  if (!choose_closed(r, r->involved, count)) {
+  if (!choose_closed(r, r->involved, count, surface, surfaces)) {
     if (r->status == RUNNING) { r->limit = r->t + left; finish(r, ACCUMULATION, NO_REASON, 0); }
     return;
   }
@@ -157,21 +200,6 @@ static void close_contacts(Run *r, int block, double left, double error) {
   if (closed && r->e.finite) go_to_limit(r, left, change_kind(r, before, r->mode), before);
 }
 
-/* Surfaces that are zero at a limit, with their lower derivatives, if the states change by ``near`` until then. */
-static int vanishing(Run *r, const double *near, int32_t *which) {
-  double *change = r->small, *own = r->vector;
-  int count = 0;
-  surface_values(r, r->x);
-  for (int i = 0; i < r->n; i++) own[i] = 4 * near[i] + ON_SURFACE * (r->size + fabs(r->x[i])); /* rates may jump */
-  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, own, 1, change);
-  for (int i = 0; i < r->m; i++) {
-    int small = has_law(r, i, SURFACE_LAW) && fabs(r->rates[i]) <= change[i], first = element(r, i)->lower;
-    for (int k = first; k < first + degree_of(r, i) - 1; k++) small &= fabs(r->rates[k]) <= change[k];
-    if (small) which[count++] = i;
-  }
-  return count;
-}
-
 /* Put the state where some surfaces rest, as r->x, and the motion from there as r->chosen; 0 with the old state where
  * there is none, or where that is farther than ``near`` allows. */
 static int choose_rest(Run *r, const int32_t *element, int count, const double *near) {
@@ -181,7 +209,7 @@ static int choose_rest(Run *r, const int32_t *element, int count, const double *
   memcpy(x, r->x, sizeof(double) * r->n);
   for (int i = 0; i < count; i++) which[kept++] = element[i];
   for (int i = 0; i < count; i++) kept += lower_rows(r, element[i], which + kept);
-  project(r, which, kept);
+  project(r, which, with_joints(r, which, kept));
   for (int i = 0; near && i < r->n; i++)
     close &= fabs(r->x[i] - x[i]) <= 4 * near[i] + VANISHES * (r->size + fabs(x[i]));
   if (close && decide_among(r, element, count)) {
@@ -194,13 +222,25 @@ static int choose_rest(Run *r, const int32_t *element, int count, const double *
   return 0;
 }
 
+/* Whether a motion leaves the zero of a stop or reset among the last events. */
+static int leaves_jumps(Run *r, Expansion *e, int block) {
+  double value = 0;
+  for (int row = 0; row < e->l.rows && value == 0; row++)
+    if (is_atom(e->l.kind[row]) && is_repeated(r, block, e->l.kind[row], e->l.index[row])) leading(r, e, row, 1, &value);
+  return value != 0;
+}
+
 /* Rest where crossings and resets accumulate; 0 where no motion follows from there. */
-static int come_to_rest(Run *r, double left, const double *near) {
+static int come_to_rest(Run *r, double left, const double *near, int block) {
   int before = r->mode, count = vanishing(r, near, r->involved);
   if (!count || !choose_rest(r, r->involved, count, near)) return 0;
+  expand(r, r->chosen.letter, r->x, r->chosen.unknowns, &r->e);
+  if (leaves_jumps(r, &r->e, block)) {
+    memcpy(r->x, r->saved, sizeof(double) * r->n);
+    return 0;
+  }
   adopt(r, &r->chosen);
   note(r);
-  expand(r, r->letter, r->x, r->unknowns, &r->e);
   if (r->e.finite) go_to_limit(r, left, REST, before);
   return 1;
 }
@@ -221,19 +261,33 @@ static int rest_at_limit(Run *r, int before) {
   return 1;
 }
 
+/* Whether the guards of events that repeat stay at zero, to rounding, until the limit: further events are noise. */
+static int is_lost(Run *r, double time, int block) {
+  int repeated = 0;
+  for (int row = 0; row < r->now.rows; row++) {
+    const double *c = r->e.guards + (int64_t)row * r->stride;
+    int atom = row - r->now.atoms;
+    if (!is_atom(r->now.kind[row]) || !is_repeated(r, block, r->now.kind[row], r->now.index[row])) continue;
+    repeated = 1;
+    if (!(fabs(c[0]) + rest_of(c, r->order, time) <= FAR_FROM_LOW * VANISHES * r->instant.noise[atom])) return 0;
+  }
+  return repeated && r->e.finite;
+}
+
 /* Go to the limit of events that accumulate, where the motion rests or the run ends, unless further ones are to be
  * served. */
 static void end_at_limit(Run *r, int block, double left, double error) {
   double *near = r->before, time = left + error;
   int at_once = is_instant(r, left), is_short = r->has_roots && is_instant(r, ROOT_REST * time);
   expand(r, r->letter, r->x, r->unknowns, &r->e);
+  is_short |= is_lost(r, time, block);
   for (int i = 0; i < r->n; i++) {
     near[i] = time * fabs(r->e.states[(int64_t)i * r->stride + 1]);
     double small = larger(r->e.allowed[i], VANISHES * (r->size + fabs(r->x[i])));
     if (!at_once && !is_short && i < r->s->dimension && !(near[i] <= small)) return;
   }
   if (!at_once && !is_quiet(r, &r->e, r->drop, near, time, block)) return;
-  if (come_to_rest(r, left, near)) return;
+  if (come_to_rest(r, left, near, block)) return;
   r->limit = r->t + left;
   finish(r, ACCUMULATION, NO_REASON, 0);
 }
@@ -272,10 +326,8 @@ static void see_limit(Run *r) {
   int block;
   if (r->o.rest_below > 0 && r->status == RUNNING) rest_if_slow(r);
   block = block_of(r, &left, &error);
-  int only_impacts = r->c > 0;
   if (!block || r->status != RUNNING) return;
-  for (int k = 1; k <= block; k++) only_impacts &= back(r, k)->kind == IMPACT;
-  if (only_impacts) close_contacts(r, block, left, error); else end_at_limit(r, block, left, error);
+  if (has_kind(r, block, IMPACT) && !has_kind(r, block, RESET)) close_contacts(r, block, left, error); else end_at_limit(r, block, left, error);
 }
 
 /* Whether events accumulate at a point where no series exists: the run ends there. */

@@ -16,7 +16,7 @@ typedef struct {
   int64_t max_steps, max_events, max_jumps;
   int32_t start_mode, at_kind;
   int64_t at_count;
-  int32_t dense, hit_after;
+  int32_t dense, hit_after, method, pad;
   /* Events that are hits: kinds as bits; whether each guard is named, by kind and index; side (or 0). */
   int64_t hit_kinds, hit_width, hit_side, hit_skip, hit_every, hit_count;
   const int8_t *hit_named;

@@ -5,7 +5,7 @@ static int change_kind(const Run *r, int before, int after) {
   const int8_t *two = r->table->letter + (int64_t)after * r->width;
   int closed = 0, slides = 0;
   for (int i = 0; i < r->width; i++)
-    if (has_law(r, i, CONTACT_LAW)) closed += (two[i] == 0) - (one[i] == 0);
+    if (is_half_line(r, i)) closed += (two[i] == 0) - (one[i] == 0);
     else slides += (two[i] == 0) - (one[i] == 0);
   if (closed) return closed > 0 ? CONTACT : RELEASE;
   return slides > 0 ? ENTRY : slides < 0 ? EXIT : CROSSING;
@@ -58,6 +58,7 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
     memcpy(r->chosen.letter, letter, r->width);
     memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
     keep_carried(r, letter, r->chosen.unknowns);
+    if (r->s->joints && !hold(r, &r->chosen, 0)) return 0;
   }
   adopt(r, &r->chosen);
   return 1;
@@ -86,13 +87,18 @@ static void strike_due(Run *r) {
   }
 }
 
-/* Find the mode of a state that was jumped to. */
-static void settle_in(Run *r) {
+/* Find the mode of a state that was jumped to; whether complementarity conditions made it jump on. */
+static int settle_in(Run *r) {
+  Met met = r->met;
+  int before = r->mode, jumped = become_consistent(r);
   letters_of(r, r->start);
   active_surfaces(r, -1, r->start);
-  if (r->status != RUNNING) return;
+  if (r->status != RUNNING) return jumped;
   choose(r, r->start, 0, 0);
   strike_due(r);
+  if (jumped) event(r, JUMP, before, 0, r->jumped_from);
+  r->met = met;
+  return jumped;
 }
 
 /* Guards of the active elements in the mode that a run starts in: whether it can. Sliding from which both sides lead
@@ -106,7 +112,8 @@ static int can_start(Run *r) {
   for (int row = 0; row < e->l.rows; row++) {
     int kind = e->l.kind[row], index = e->l.index[row], active = 0;
     r->turned[row] = e->guards[(int64_t)row * r->stride] < 0 ? -1 : 1;
-    if (kind != SURFACE_GUARD && kind != EXIT_GUARD && kind != SLIP_GUARD && kind != NEAR_GUARD) continue;
+    int is_of_law = kind == SURFACE_GUARD || kind == EXIT_GUARD || kind == SLIP_GUARD || kind == NEAR_GUARD;
+    if (!is_of_law && !(kind == RELEASE_GUARD && has_law(r, index, COMPLEMENTARITY_LAW))) continue;
     if (kind == NEAR_GUARD && r->letter[index] == 0) continue; /* ends steps only */
     for (int j = 0; j < r->active_count; j++) active |= r->active[j] == index;
     if (!active) continue;
@@ -134,6 +141,7 @@ static void start_in(Run *r, const int8_t *asked) {
   memcpy(r->letter, letter, r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
+  if (r->s->joints > 1) find_dependent(r, &r->now, r->letter, r->unknowns);
   mode_solutions(r, &r->now, &all);
   if (all.count > 1) keep_stable(r, &r->now, &all);
   if (all.count != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, all.count); return; }
@@ -141,21 +149,35 @@ static void start_in(Run *r, const int8_t *asked) {
   if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
 }
 
+/* The size of the time: in it the states change by theirs, at the rates of the start. */
+static void measure_time(Run *r) {
+  double unit = r->o.t_end - r->t;
+  r->time_size = r->size;
+  if (!r->s->timed) return;
+  aim(r, r->letter, r->x, r->unknowns);
+  set_inputs(r, r->x, held_of(r, r->letter), r->unknowns);
+  first_values(r, 0);
+  for (int i = 0; i < r->s->dimension; i++) unit = smaller((r->size + fabs(r->x[i])) / fabs(row_of(r, i)[0]), unit);
+  if (unit > 0 && unit < INFINITY) r->time_size = unit;
+}
+
 static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   note(r);
   find_idle(r);
   if (start_mode || r->remembered) memcpy(r->letter, start_mode ? start_mode : r->remembered, r->width);
   else memset(r->letter, -1, r->width);
+  measure_time(r);
   int finite = letters_of(r, r->letter);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
+  int before = r->mode, jumped = finite && become_consistent(r);
   if (!finite) { finish(r, NOT_FINITE, SURFACE, 0); return; }
   active_surfaces(r, -1, r->letter);
   if (r->status == RUNNING) {
     project(r, r->involved, gather(r, -1, r->m, r->involved));
     renote(r);
     if (start_mode) start_in(r, start_mode);
-    else if (r->active_count) {
+    else if (r->active_count || r->s->joints) {
       memcpy(r->start, r->letter, r->width);
       choose(r, r->start, 0, 0);
     }
@@ -163,6 +185,7 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   r->shown = shown_number(r, r->letter);
   enter_segment(r, r->shown);
   strike_due(r);
+  if (jumped) event(r, JUMP, before, 0, r->jumped_from);
   begin_events(r, motion);
 }
 
@@ -204,7 +227,8 @@ static void impact(Run *r, int row) {
 
 static void release(Run *r, int row) {
   int before = r->mode, i = r->now.index[row];
-  Known known[] = {{RELEASE_GUARD, i, 0, 1}, {IMPACT_GUARD, i, 1, 3}};
+  Known known[] = {{RELEASE_GUARD, i, 0, 1}, {IMPACT_GUARD, i, 1, degree_of(r, i) + 1}};
+  if (has_law(r, i, COMPLEMENTARITY_LAW)) known[1].kind = SURFACE_GUARD;
   active_surfaces(r, i, r->letter);
   if (r->status != RUNNING) return;
   memcpy(r->start, r->letter, r->width);
@@ -213,7 +237,8 @@ static void release(Run *r, int row) {
 
 static int only_sliding(const Run *r) {
   int found = -1;
-  for (int i = 0; i < r->m; i++) if (r->letter[i] == 0) { if (found >= 0) return -1; found = i; }
+  for (int i = 0; i < r->m; i++)
+    if (r->letter[i] == 0 && is_bounded(r, i)) { if (found >= 0) return -1; found = i; }
   return found;
 }
 
@@ -234,7 +259,7 @@ static void pass(Run *r, int row, const Known *known, int known_count) {
   project(r, r->involved, gather(r, index, r->width, r->involved));
   renote(r);
   if (kind == EXIT_GUARD || kind == BRANCH_GUARD) watch_two_fold(r);
-  else if (kind == SURFACE_GUARD && !is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
+  else if (kind == SURFACE_GUARD && degree_of(r, index) && !is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
   if (r->status != RUNNING) return;
   memcpy(r->start, r->letter, r->width);
   take_sides(r, r->start, index);
@@ -252,6 +277,10 @@ static void serve_set(Run *r, int row) {
   int i = r->now.index[row];
   Known known[] = {{SLIP_GUARD, i, 0, 1}, {NEAR_GUARD, i, 0, 2}};
   if (r->now.kind[row] == NEAR_GUARD) near_set(r, row, 1); else pass(r, row, known, 2);
+}
+
+static void serve_complementarity(Run *r, int row) {
+  if (r->now.kind[row] == SURFACE_GUARD) pass(r, row, 0, 0); else release(r, row);
 }
 
 static void serve_contact(Run *r, int row) {
@@ -273,17 +302,23 @@ static void serve(Run *r, int row) {
 static int advance(Run *r, const Expansion *e, double dt) {
   int stride = r->stride, kept = 0;
   double *x = r->at_work;
-  for (int i = 0; i < r->s->dimension; i++) x[i] = value_at(e->states + (int64_t)i * stride, r->order, dt);
+  for (int i = 0; i < r->s->dimension; i++) x[i] = e->end ? e->end[i] : value_at(e->states + (int64_t)i * stride, r->order, dt);
   if (!finite_all(x, r->s->dimension)) { finish(r, NOT_FINITE, STATE, 0); return 0; }
   if (dt > 0) note_step(r, e);
   if (r->times) sample_step(r, e, dt);
   memcpy(r->x, x, sizeof(double) * r->s->dimension);
   pass_time(r, dt);
   r->since += dt;
+  if (e->end) go_on_implicitly(r);
   r->step_count++;
   r->segment_steps++;
   kept = kept_by(r, r->letter, r->involved);
   project(r, r->involved, kept);
+  if (r->s->joints) {
+    surface_values(r, r->x);
+    require_joints(r, surface_scales(r, r->x));
+    if (r->status != RUNNING) r->reason = DEAD_POINT;
+  }
   if (e->l.slides || r->s->sets) {
     double *ahead = r->lam;
     for (int i = 0; i < r->width; i++) ahead[i] = value_at(e->series + (int64_t)i * stride, r->order, dt);
@@ -313,25 +348,24 @@ static void leave_singular(Run *r, Expansion *e, double left) {
     if (!r->instant.side[a]) r->instant.side[a] = (int8_t)ns_sign(e->guards[(int64_t)(e->l.atoms + a) * r->stride]);
 }
 
-static void step(Run *r) {
-  if (r->instant.running) { instant_next(r); return; }
-  if (r->due_impact >= 0) { serve_between(r, r->due_impact); return; }
-  double left = r->o.t_end - r->t - r->t_low, dt = 0;
-  if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
-  if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
-  if (r->has_roots && pass_root(r, left)) return;
+/* What a step is to do: its length, the guard at its end or -1, whether it reaches the end of the run. */
+typedef struct { double dt; int row, last; } Piece;
+
+/* A Taylor step; 0 where nothing is left to do. */
+static int taylor_piece(Run *r, double left, Piece *q) {
   Expansion *e = &r->e;
+  double dt = 0;
   expand(r, r->letter, r->x, r->unknowns, e);
-  if (!e->finite) { leave_singular(r, e, left); return; }
+  if (!e->finite) { leave_singular(r, e, left); return 0; }
   double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
   if (h <= SHORTEST * time_scale(r) && h < left) {
     finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
-    return;
+    return 0;
   }
   if (is_fold_ahead(r, e, by_series)) {
     int fold = reach_fold(r, e, left);
     if (fold >= 0) serve_between(r, fold);
-    if (fold >= 0 || r->status != RUNNING) return;
+    if (fold >= 0 || r->status != RUNNING) return 0;
   }
   int last = h >= left;
   if (last) h = left;
@@ -349,26 +383,58 @@ static void step(Run *r) {
   r->length_mode = r->mode;
   r->length = dt == wanted ? h : dt;
   int swallowed = dt < wanted && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
-  if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
+  if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return 0; }
   if (dt < wanted) row = -1, last = 0;
-  if (row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
-  if (dt > 0) note_sides(r, e, dt);
-  r->falls = row >= 0 && is_steep(r, e, row, dt);
-  last &= dt == h;
-  if (!advance(r, e, dt)) return;
-  if (last) {
+  if (row < 0) watch_decay(r, e, by_series);
+  if (r->wants_program) return 0;
+  *q = (Piece){dt, row, last && dt == h};
+  return 1;
+}
+
+/* An implicit step; 0 where none could be made. */
+static int implicit_piece(Run *r, double left, Piece *q) {
+  Expansion *e = &r->e;
+  double h = collocate(r, e, smaller(left, r->o.max_step)), dt = 0;
+  watch_cost(r, h);
+  if (h == 0) return 0;
+  int last = h == left, row = first_hit(r, e, last ? h + AT_END * (time_scale(r) + h) : h, &dt);
+  dt = row >= 0 ? smaller(dt, h) : h;
+  if (r->hold < dt) { dt = r->hold; row = -1; } else r->hold = INFINITY;
+  if (dt < h && dt > 0 && !end_at(r, e, row, &dt)) { r->collocation->h = 0.5 * dt; return 0; }
+  r->length_mode = -1;
+  *q = (Piece){dt, row, last && dt == h};
+  return 1;
+}
+
+static void step(Run *r) {
+  if (r->instant.running) { instant_next(r); return; }
+  if (r->due_impact >= 0) { serve_between(r, r->due_impact); return; }
+  double left = r->o.t_end - r->t - r->t_low;
+  if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
+  if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, r->held_steps >= HELD_STEPS ? DECAY : NO_REASON, 0); return; }
+  if (r->has_roots && pass_root(r, left)) return;
+  Expansion *e = &r->e;
+  Piece q;
+  int is_stiff = is_implicit(r);
+  if (r->wants_program) return;
+  if (!(is_stiff && implicit_piece(r, left, &q)) && !taylor_piece(r, left, &q)) return;
+  if (q.row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
+  if (q.dt > 0) note_sides(r, e, q.dt);
+  r->falls = q.row >= 0 && is_steep(r, e, q.row, q.dt);
+  if (!advance(r, e, q.dt)) return;
+  if (q.last) {
     r->t = r->o.t_end;
     r->t_low = 0;
     set_time_state(r);
     if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
   }
-  if (row >= 0 && is_atom(r->now.kind[row])) arrive(r, e, dt, r->instant.tied);
-  else if (row >= 0) {
+  if (q.row >= 0 && is_atom(r->now.kind[q.row])) arrive(r, e, q.dt, r->instant.tied);
+  else if (q.row >= 0) {
     int64_t events = r->event_count;
-    serve_between(r, row);
-    if (r->event_count == events && dt <= SHORTEST * time_scale(r)) r->shortened++; /* back where it was */
+    serve_between(r, q.row);
+    if (r->event_count == events && q.dt <= SHORTEST * time_scale(r)) r->shortened++; /* back where it was */
   }
-  else if (!last) {
+  else if (!q.last) {
     if (r->s->sets) look_at_sets(r);
     watch_two_fold(r);
   }

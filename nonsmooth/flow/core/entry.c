@@ -1,16 +1,5 @@
 /* Memory ------------------------------------------------------------------------------------------- */
 
-/* Where ``count`` objects of a size begin; with no base, how far one has come. */
-static void *place(char *base, size_t *used, size_t size, size_t count) {
-  *used = (*used + 15) & ~(size_t)15;
-  void *at = base ? base + *used : 0;
-  *used += size * (count + 1);
-  return at;
-}
-#define DOUBLES(count) place(base, &used, sizeof(double), (size_t)(count))
-#define INTEGERS(count) place(base, &used, sizeof(int32_t), (size_t)(count))
-#define LETTERS(count) place(base, &used, 1, (size_t)(count))
-
 static size_t place_layout(Layout *l, char *base, size_t used, int width, int guards) {
   l->letter = LETTERS(width);
   l->sliding = INTEGERS(width);
@@ -79,8 +68,10 @@ static size_t place_decision(Run *r, char *base, size_t used) {
   to->own = INTEGERS(w); to->order = INTEGERS(w); to->first = INTEGERS(w + 1); to->mark = INTEGERS(4 * w);
   to->pivot = INTEGERS(8 * w + 8); to->proved = INTEGERS(w);
   to->is_contact = LETTERS(w); to->is_idle = LETTERS(w); to->is_touched = LETTERS(w); to->is_known = LETTERS(w);
-  to->state = LETTERS(orders + w); to->block_state = LETTERS(3 * w); to->large_class = LETTERS(w);
-  to->matrix = DOUBLES(square); to->share = DOUBLES(square);
+  to->state = LETTERS(orders + w); to->block_state = LETTERS(4 * w); to->large_class = LETTERS(w);
+  to->base = LETTERS(w); to->span = LETTERS(w); to->began = LETTERS(w);
+  to->along = DOUBLES(orders); to->speed = DOUBLES(orders); to->axes = DOUBLES(3 * w);
+  to->matrix = DOUBLES(square); to->share = DOUBLES(square); to->joint = DOUBLES(square); to->through = DOUBLES(square);
   to->a = DOUBLES(orders); to->b = DOUBLES(orders); to->nu = DOUBLES(orders); to->floor = DOUBLES(orders);
   to->turn = DOUBLES(w); to->sign = DOUBLES(w); to->old = DOUBLES(w); to->yard = DOUBLES(w); to->room = DOUBLES(w);
   to->steep = DOUBLES(w); to->block = DOUBLES(6 * square + 8 * w); to->large = DOUBLES(w);
@@ -109,6 +100,10 @@ static size_t place_run(Run *r, char *base) {
   r->at_x = DOUBLES(n);
   r->before = DOUBLES(n);
   r->saved = DOUBLES(n);
+  int jumping = 0;
+  for (int i = 0; i < s->m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;
+  r->jumped_from = DOUBLES(n);
+  r->jump_work = DOUBLES(jumping ? (size_t)n * (2 * n + jumping + 1) : 0);
   r->speed = DOUBLES(w);
   r->at_root = DOUBLES(3 * n);
   r->at_work = DOUBLES(n);
@@ -118,7 +113,7 @@ static size_t place_run(Run *r, char *base) {
   r->tried_letter = LETTERS(2 * w);
   r->drop = INTEGERS(g);
   r->active = INTEGERS(w);
-  r->involved = INTEGERS(3 * w + 2 * all + 1);
+  r->involved = INTEGERS(3 * w + 4 * all + 1);
   r->p = DOUBLES(s->parameters);
   r->series = DOUBLES(series_room(&s->series, stride));
   r->rounding = DOUBLES(s->series.size * stride);
@@ -135,9 +130,9 @@ static size_t place_run(Run *r, char *base) {
   r->sample = DOUBLES(3 * ((size_t)n + w + g));
   r->work = DOUBLES(6 * square + 8 * w + rows + g);
   r->gradient_row = DOUBLES((size_t)all * n + 2 * all);
-  r->rates = DOUBLES(2 * all + c);
+  r->rates = DOUBLES(2 * all + 2 * c);
   r->lam = DOUBLES(2 * w);
-  r->matrix = DOUBLES(square + 6 * w + all + 2 * c);
+  r->matrix = DOUBLES(square + 8 * w + all + 2 * c);
   r->small = DOUBLES(4 * w + s->rules.atoms);
   r->atom_work = DOUBLES(pair_room(s->atoms.size, 1));
   r->choice_work = DOUBLES(pair_room(s->choices.size, 1));
@@ -156,7 +151,6 @@ static size_t place_run(Run *r, char *base) {
   r->idle = LETTERS(s->m);
   r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
   r->of_defect = DOUBLES(g);
-  r->laws = DOUBLES(s->sets ? square + 2 * w : 0);
   r->key = LETTERS(w + 8 * s->rules.discrete);
   r->met_at = DOUBLES(g);
   return used;
@@ -187,7 +181,7 @@ Run *run_new(const System *s, Table *table) {
   r->now.mode = r->e.l.mode = r->trial.l.mode = -1;
   return r;
 }
-void run_free(Run *r) { free(r->arena); free(r); }
+void run_free(Run *r) { end_collocation(r); free(r->arena); free(r); }
 
 /* Times at which the run is read: no approximation of the motion may span one of them. */
 void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = times; r->read_count = count; }
@@ -220,9 +214,12 @@ static void clear(Run *r, const Options *o, Pair t) {
   memset(r->instant.passing, 0, s->rules.atoms);
   memset(r->instant.unmet, 0, s->rules.triggers);
   memset(r->kinds, 0, sizeof r->kinds);
-  r->step_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
+  r->step_count = r->implicit_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
   r->itinerary = r->active_count = r->several_count = 0;
   r->length = r->shortened = 0;
+  r->held_steps = r->wants_program = 0;
+  r->held_length = 0;
+  end_collocation(r);
   r->hold = INFINITY;
   r->begun = t;
   r->t = t.high;
@@ -264,6 +261,7 @@ static int go_on(Run *r, int64_t *budget) {
       return FULL;
     if (--*budget < 0) return RUNNING;
     step(r);
+    if (r->wants_program) { r->wants_program = 0; return NEEDS_PROGRAM; }
   }
   return r->status;
 }
@@ -283,7 +281,7 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
   numbers[2] = r->at_t;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
                     r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts,
-                    unmet_event(r)};
+                    unmet_event(r), r->implicit_count};
   memcpy(counts, head, sizeof head);
   memcpy(active, r->active, sizeof(int32_t) * r->active_count);
   memcpy(several, r->several, sizeof(int32_t) * r->several_count);
@@ -320,7 +318,7 @@ static void keep(Run *r, const Batch *b, int64_t i) {
   b->totals[1] += r->event_count;
 }
 
-/* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``next`` is zero
+/* Run a batch, ``budget`` steps of it at most; 0, or why something is left for another call. ``next`` is zero
  * before the first, twice the number of runs done after it, and one more within a run. */
 int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8_t *start_mode, int64_t budget) {
   static const Output none;
@@ -331,7 +329,8 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
       run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, start_mode, b->t0, 0);
     }
     *next |= 1;
-    if (go_on(r, &budget) == RUNNING) return 1;
+    int status = go_on(r, &budget);
+    if (status == RUNNING || status == NEEDS_PROGRAM) return status;
     keep(r, b, i);
   }
   return 0;
@@ -369,6 +368,9 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
     find_idle(r);
   }
   r->prepared = 1;
+  memset(r->letter, -1, r->width);
+  memcpy(r->x, b->x0 + i * r->n, sizeof(double) * r->n);
+  measure_time(r);
   memcpy(r->x, m->x, sizeof(double) * r->n);
   memcpy(r->letter, m->letter, r->width);
   if (r->s->sets) memcpy(r->unknowns, m->unknowns, sizeof(double) * r->width);

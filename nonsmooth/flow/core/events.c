@@ -8,7 +8,7 @@
 enum { LEVEL = 1, BY_JUMPS = 2, PERSISTENT = 4, AT_TRIGGER = 8 };
 
 static void serve(Run *r, int row);
-static void settle_in(Run *r);
+static int settle_in(Run *r);
 
 static int is_true(const int32_t *code, int count, const int8_t *side) {
   int8_t stack[MOST_CODES];
@@ -38,7 +38,7 @@ static void look(Run *r, const double *x) {
   Instant *i = &r->instant;
   double *weight = r->vector;
   values_at(&s->atoms, x, r->p, r->atom_work);
-  for (int k = 0; k < r->n; k++) weight[k] = r->size + fabs(x[k]);
+  for (int k = 0; k < r->n; k++) weight[k] = size_of_state(r, k) + fabs(x[k]);
   gradient_sums(r, &s->atoms, r->atom_work, s->rules.atoms, &s->atom_gradient, s->rules.atoms, weight, 1, i->noise);
   for (int a = 0; a < s->rules.atoms; a++) {
     i->value[a] = out_of(&s->atoms, r->atom_work, a);
@@ -361,9 +361,11 @@ static void settle_instant(Run *r) {
     if (r->status == RUNNING) after_jump(r, -1);
     return;
   }
-  if (jumped) settle_in(r);
+  if (jumped) keep_truths(r);
+  jumped = jumped && settle_in(r);
   i->unsettled = 0;
   if (r->status != RUNNING) return;
+  if (jumped) { after_jump(r, -1); return; }
   keep_truths(r);
   leave_zeros(r);
   if (r->status != RUNNING) return;

@@ -102,7 +102,7 @@ static void keep_rates(Run *r, Expansion *e) {
       rate += slope * e->states[(int64_t)g->column[to] * stride + 1];
       if (g->column[to] < r->s->dimension) size += slope * slope;
     }
-    if (i >= r->m || degree_of(r, i) > 1 || rate == 0 || !isfinite(rate / size)) continue;
+    if (i >= r->m || degree_of(r, i) != 1 || rate == 0 || !isfinite(rate / size)) continue;
     for (int q = from; q < to; q++)
       if (g->column[q] < r->s->dimension)
         e->states[(int64_t)g->column[q] * stride + 1] -= rate / size * out_of(&r->s->point, r->point, first + q);
@@ -219,7 +219,7 @@ static int invert_layer(Run *r, const Layout *l, const double *unknowns, double 
   if (is_regular || n < 2) return 1;
   for (int i = 0; i < n; i++) {
     int own = l->sliding[i];
-    size[i] = own < r->m ? fabs(factor_of(r, own)) : fabs(unknowns[own]);
+    size[i] = is_bounded(r, own) ? fabs(factor_of(r, own)) : fabs(unknowns[own]);
     most = larger(size[i], most);
   }
   for (int i = 0; i < n; i++) size[i] = larger(size[i], MERGED * (most > 0 ? most : 1));
@@ -246,6 +246,7 @@ static void allow_for_roots(Run *r, Expansion *e) {
 /* Jets of a mode at x, with the multipliers of what slides; inverses of the layer's slope. */
 static void expand(Run *r, const int8_t *letter, const double *x, const double *unknowns, Expansion *e) {
   int w = r->width, stride = r->stride;
+  e->end = 0;
   lay_out(r, letter, &e->l);
   aim(r, letter, x, unknowns);
   weigh_point(r, e, x, unknowns);

@@ -3,7 +3,16 @@
 static const Element *element(const Run *r, int i) { return r->s->element + i; }
 static int degree_of(const Run *r, int i) { return element(r, i)->degree; }
 static int is_scaled(const Run *r, int i) { return element(r, i)->flags & SCALED; }
+static int has_law(const Run *r, int i, int law) { return element(r, i)->law == law; }
 static int size_of(const Run *r, int i) { return element(r, i)->k; }
+
+/* Whether the multiplier of an element is not negative, and zero where it is open: contacts, complementarity. */
+static int is_half_line(const Run *r, int i) {
+  return element(r, i)->law == CONTACT_LAW || element(r, i)->law == COMPLEMENTARITY_LAW;
+}
+
+/* Whether an unknown is in a set of finite size: not reactions. */
+static int is_bounded(const Run *r, int i) { return !is_half_line(r, i) && !has_law(r, i, JOINT_LAW); }
 
 /* The set of a function, as its first one, or -1; all sets. */
 static int set_of(const Run *r, int i) { return element(r, i)->law == SET_LAW ? element(r, i)->first : -1; }
@@ -84,12 +93,27 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
 
 /* Letters as the multipliers that are known: +1 and -1, 0 for what slides, open and closed contacts. */
 static const double *held_of(Run *r, const int8_t *letter) {
-  for (int i = 0; i < r->width; i++) r->held[i] = i >= r->m ? 0 : letter[i] > 1 ? r->direction[i] : letter[i];
+  for (int i = 0; i < r->width; i++) r->held[i] = is_half_line(r, i) ? 0 : letter[i] > 1 ? r->direction[i] : letter[i];
   return r->held;
 }
 
 /* Whether a switching function is of a set off which the mode is. */
 static int is_moving(const Run *r, int i) { return r->s->sets && r->moving[i]; } /* a contact never is */
+
+/* Their number: states, unknowns, those of scaled elements once more. */
+static int moving_size(const Run *r) {
+  int size = r->n + r->width;
+  for (int i = 0; i < r->m; i++) size += is_scaled(r, i) != 0;
+  return size;
+}
+
+/* The unknown of an entry of what moves, after the states; -1 where the mode has it not. */
+static int unknown_at(const Run *r, int column) {
+  int i = column - r->n, nu = i - r->width;
+  if (nu < 0) return i >= r->m || is_moving(r, i) || !is_scaled(r, i) ? i : -1;
+  for (i = 0; i < r->m; i++) if (is_scaled(r, i) && nu-- == 0) return is_moving(r, i) ? -1 : i;
+  return -1;
+}
 
 /* The moving inputs: states, lambda and reactions, then nu. */
 static void set_inputs(Run *r, const double *x, const double *held, const double *unknowns) {
@@ -166,7 +190,8 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
   }
   for (int row = 0; row < l->rows; row++) {
     int atom = row - l->atoms;
-    result[row] = atom < 0 ? law_of(r, l->index[row])->rounding(r, e, row, &of) : atom < stops ? stop[atom] : worst;
+    result[row] = atom < 0 ? law_of(r, l->index[row])->rounding(r, e, row, &of) : atom < stops ? stop[atom]
+                  : worst * branch_scale(r, l, row);
   }
 }
 
@@ -193,21 +218,29 @@ static void weigh_again(Run *r, Expansion *e) {
   weigh_point(r, e, x, unknowns);
 }
 
+/* The largest of the coefficients k of the states, in units of states. */
+static double speed_of(const Run *r, const Expansion *e, int k) {
+  double speed = 0;
+  for (int i = 0; i < r->n; i++)
+    speed = larger(fabs(e->states[(int64_t)i * r->stride + k]) / unit_of_state(r, i), speed);
+  return speed;
+}
+
 /* Rounding in the guards is these times epsilon. */
 static const double *scales(Run *r, Expansion *e) {
   if (e->scaled) return e->scale;
   weigh_again(r, e);
-  for (int i = 0; i < r->n; i++) r->vector[i] = r->size + fabs(e->states[(int64_t)i * r->stride]);
+  for (int i = 0; i < r->n; i++) r->vector[i] = size_of_state(r, i) + fabs(e->states[(int64_t)i * r->stride]);
   guard_sums(r, e, r->vector, 1, e->scale);
   e->scaled = 1;
   return e->scale;
 }
 
-/* Sums of the magnitudes of the guards' slopes. */
+/* Sums of the magnitudes of the guards' slopes, all by units of states. */
 static const double *steepness(Run *r, Expansion *e) {
   if (e->steepened) return e->steep;
   weigh_again(r, e);
-  for (int i = 0; i < r->n; i++) r->vector[i] = 1;
+  for (int i = 0; i < r->n; i++) r->vector[i] = unit_of_state(r, i);
   guard_sums(r, e, r->vector, 0, e->steep);
   e->steepened = 1;
   return e->steep;

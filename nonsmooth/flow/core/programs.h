@@ -124,6 +124,8 @@ static void values_free(const Values *t, const double *x, const double *p, doubl
 #define FOUR(k) (double)1 / (k), (double)1 / ((k) + 1), (double)1 / ((k) + 2), (double)1 / ((k) + 3)
 #define SIXTEEN(k) FOUR(k), FOUR((k) + 4), FOUR((k) + 8), FOUR((k) + 12)
 static const double PART[] = {0, SIXTEEN(1), SIXTEEN(17), SIXTEEN(33)};
+#undef FOUR
+#undef SIXTEEN
 
 /* Sum of u_i v_(k-i), i from first to last, in four chains: the ends, which are known last, are added last. */
 static inline double convolve(const double *u, const double *v, int k, int first, int last) {

@@ -17,7 +17,7 @@ static void note_step(Run *r, const Expansion *e) {
   int64_t k = r->out.steps++, stride = r->stride;
   double *c = r->out.coefficients + k * r->n * stride, low = r->t_low;
   r->out.start[k] = r->t;
-  r->out.step_mode[k] = shown_mode(r);
+  r->out.step_mode[k] = shown_mode(r) | (e->end ? IMPLICIT_STEP : 0);
   memcpy(c, e->states, sizeof(double) * r->n * stride);
   if (fabs(low) <= EPSILON * larger(1, time_scale(r))) return;
   for (int i = 0; i < r->s->dimension; i++, c += stride)

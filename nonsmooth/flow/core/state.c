@@ -50,10 +50,12 @@ typedef struct {
    * the time, nothing to be checked; the latter: 0 if affine in states and time, polynomials are exact. */
   const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
-  int32_t sets, kept_rows; /* sets: of codimension two and more; kept_rows: see Element */
+  int32_t sets, kept_rows, impact_law, joints; /* sets: of codimension two and more; kept_rows: see Element */
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   Rules rules;
   Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
+  const Series *implicit; /* with those derivatives, for implicit steps, or none */
+  const int32_t *places; /* states in an order in which what is coupled is close, or none */
 } System;
 
 enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
@@ -82,6 +84,7 @@ typedef struct {
   double *states, *guards, *series, *allowed, *of_guards, *scale, *steep, *inverse;
   /* of sets: multipliers, h in units of |h|, its root, distances when leaving, slopes then, |h| at the start */
   double *lambda, *apart, *root, *rates, *slopes, *radius, *per_radius;
+  const double *end; /* the state at the end of an implicit step, or none */
 } Expansion;
 
 /* A mode that can continue, and the zeros of its guards. */
@@ -95,10 +98,15 @@ typedef struct { int8_t *state, *order, *before; int32_t terms; double *nu, *ser
  * (orders, count). */
 typedef struct {
   int32_t count, blocks, motions, branches, unstable, last; /* last: order that growth decides instead of coefficients */
+  int32_t is_imposed; /* whether states are given: those of a mode */
   const int8_t *letter;
+  /* Of vectors: rows of each, as in Block; the order at which their law is posed; directions u and speeds s of what
+   * leaves, by orders; axes. ``base`` has letters in which they are held. */
+  int8_t *base, *span, *began;
+  double *along, *speed, *axes;
   int32_t *own, *order, *first, *mark, *pivot, *proved;
   int8_t *is_contact, *is_idle, *is_touched, *is_known, *state, *block_state, *large_class;
-  double *matrix, *share, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
+  double *matrix, *share, *joint, *through, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
   double most, field, rate;
   Motion motion[SEVERAL];
 } Decision;
@@ -119,6 +127,8 @@ typedef struct { int kind, index, side; } Met;
 /* An event that may be one of many that accumulate: the time since the one before, and what was served. */
 typedef struct { double interval; int64_t pattern; int32_t kind; Met met; } Happened;
 
+typedef struct Collocation Collocation; /* collocation.c */
+
 typedef struct {
   Options o;
   const System *s;
@@ -130,15 +140,15 @@ typedef struct {
   double t, t_low, since, limit, at_t, *x, *at_x, *unknowns;
   const int8_t *remembered; /* letters from which elements with hysteresis go on, or none */
   int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
-  double *tried, *solutions, *of_defect, *laws; /* unknowns that enter nonlinearly; errors of guards; laws of sets */
+  double *tried, *solutions, *of_defect; /* unknowns that enter nonlinearly; errors of guards */
   Layout now; /* of the present mode */
   Met met;
   Instant instant;
   int32_t mode, status, reason, where, due_impact, falls, repelling, folded, *drop;
-  int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
+  int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
-  double size, length, shortened, hold; /* the last: the step's end before zeros of a guard that are not told apart */
+  double size, time_size, length, shortened, held_length, hold; /* hold: the step's end before zeros of a guard that are not told apart */
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
@@ -162,11 +172,17 @@ typedef struct {
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
   double *direction, *later, *aside, *heights_of;
   double *saved, *speed, *at_root; /* a state to return to; of each surface at its last zero */
+  double *jumped_from, *jump_work; /* the state before the last jump of complementarity conditions */
   int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
-  int32_t shown, has_roots;
+  int32_t shown, has_roots, held_steps, wants_program; /* held_steps: steps in a row that a decay rate held */
+  Collocation *collocation;
   const Expansion *expansion;
   void *arena;
 } Run;
+
+/* What a state has at least where rounding is weighed: of one, and of the time. */
+static double size_of_state(const Run *r, int i) { return i < r->s->dimension ? r->size : r->time_size; }
+static double unit_of_state(const Run *r, int i) { return i < r->s->dimension ? 1 : r->time_size / r->size; }
 
 /* Sums over the states of |gradient| times a vector: of layer, surfaces and gaps, stops and resets, factors; of
  * surfaces, gaps, stops and resets only where nothing slides. */
@@ -183,6 +199,7 @@ typedef struct {
 
 static const Law *law_of(const Run *r, int i);
 static void add_branches(const Run *r, Layout *l);
+static double branch_scale(const Run *r, const Layout *l, int row);
 static void branch_row(const Run *r, const Layout *l, int row, int count, double *g);
 static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns);
 static void aim_again(Run *r, const Expansion *e);
@@ -193,13 +210,23 @@ static void leave_sets(Run *r, Expansion *e, int k);
 static void close_sets(Run *r, Expansion *e, int k);
 static void direction_bounds(const Run *r, const Expansion *e, double *last, double *before);
 static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h);
-static int meets_sets(const Run *r);
 static void measure_limits(Run *r, Expansion *e);
 static void keep_carried(const Run *r, const int8_t *letter, double *unknowns);
 
 static void finish(Run *r, int status, int reason, int where) {
   if (r->status == RUNNING) { r->status = status; r->reason = reason; r->where = where; }
 }
+
+/* Where ``count`` objects of a size begin; with no base, how far one has come. */
+static void *place(char *base, size_t *used, size_t size, size_t count) {
+  *used = (*used + 15) & ~(size_t)15;
+  void *at = base ? base + *used : 0;
+  *used += size * (count + 1);
+  return at;
+}
+#define DOUBLES(count) place(base, &used, sizeof(double), (size_t)(count))
+#define INTEGERS(count) place(base, &used, sizeof(int32_t), (size_t)(count))
+#define LETTERS(count) place(base, &used, 1, (size_t)(count))
 
 /* Modes by number ------------------------------------------------------------------------------ */
 

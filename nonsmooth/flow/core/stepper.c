@@ -85,6 +85,15 @@ static double reach(const double *g, int k, double allowed, double rtol, int by_
   return h > 0 ? h : INFINITY;
 }
 
+/* The longest step for a series whose last terms are zero: where they are only too small for numbers, the last one that
+ * is not takes their place. */
+static double reach_of_held(const double *c, int order, double allowed) {
+  int k = order;
+  if (fabs(c[k]) > SMALLEST || fabs(c[k - 1]) > SMALLEST) return INFINITY;
+  while (k > 1 && fabs(c[k]) <= SMALLEST) k--;
+  return k == 1 || fabs(c[k]) * fabs(c[k] / c[k - 1]) > SMALLEST ? INFINITY : bound_at(fabs(c[k]) / allowed, k);
+}
+
 /* Shorten a step until the last two terms of each guard that are not zero, of the last four, are small. */
 static double reach_of_guards(const Run *r, const Expansion *e, double h) {
   int order = r->order, stride = r->stride;
@@ -101,20 +110,22 @@ static double reach_of_guards(const Run *r, const Expansion *e, double h) {
       double longest = reach(g, k, allowed, r->o.rtol, by_terms);
       if (longest < h) { h = longest; power = pow(h, order - 1); }
     }
+    h = smaller(h, reach_of_held(g, order, allowed));
   }
   return h;
 }
 
 static double step_size(const Run *r, const Expansion *e) {
   int order = r->order, stride = r->stride;
-  double last = 0, before = 0;
+  double last = 0, before = 0, held = INFINITY;
   for (int i = 0; i < r->s->dimension; i++) {
     const double *c = e->states + (int64_t)i * stride;
+    held = smaller(held, reach_of_held(c, order, e->allowed[i]));
     last = larger(fabs(c[order]) / e->allowed[i], last);
     before = larger(fabs(c[order - 1]) / e->allowed[i], before);
   }
   if (r->s->sets) direction_bounds(r, e, &last, &before);
-  double h = reach_of_guards(r, e, smaller(bound_at(last, order), bound_at(before, order - 1)));
+  double h = reach_of_guards(r, e, smaller(held, smaller(bound_at(last, order), bound_at(before, order - 1))));
   for (int j = 0; j < e->l.rows; j++) {
     const double *g = e->guards + (int64_t)j * stride;
     double a = e->of_guards[j] + r->o.rtol * fabs(g[0]);
@@ -133,7 +144,7 @@ static double safe_length(const Run *r, const Expansion *e, double h) {
   double natural = INFINITY;
   for (int i = 0; i < r->n; i++) {
     const double *c = e->states + (int64_t)i * r->stride;
-    natural = smaller((fabs(c[0]) + r->size) / fabs(c[1]), natural);
+    natural = smaller((fabs(c[0]) + size_of_state(r, i)) / fabs(c[1]), natural);
   }
   return h > FAR * natural ? FIRST * natural : INFINITY;
 }
@@ -267,11 +278,7 @@ static int leading(Run *r, Expansion *e, int row, int zeros, double *value) {
   for (int k = zeros; k <= r->order; k++) {
     double noise;
     if (k == 0) noise = scales(r, e)[row];
-    else {
-      double speed = 0;
-      for (int i = 0; i < r->n; i++) speed = larger(fabs(e->states[(int64_t)i * r->stride + k]), speed);
-      noise = steepness(r, e)[row] * speed * (k + 1);
-    }
+    else noise = steepness(r, e)[row] * speed_of(r, e, k) * (k + 1);
     if (fabs(g[k]) > VANISHES * noise) { *value = g[k]; return k; }
   }
   *value = 0;

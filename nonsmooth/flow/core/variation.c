@@ -29,22 +29,8 @@ typedef struct {
 
 enum { LEG_DONE, LEG_STUCK, LEG_NOT_UNIQUE };
 
-static int moving_size(const Run *r) {
-  int size = r->n + r->width;
-  for (int i = 0; i < r->m; i++) size += is_scaled(r, i) != 0;
-  return size;
-}
-
 static const double *derivative_row(const Run *r, int q) {
   return row_of(r, r->n + 3 * r->width + r->s->rules.atoms + r->s->slope_outputs + q);
-}
-
-/* The unknown of an entry of what moves, after the states; -1 where the mode has it not. */
-static int unknown_at(const Run *r, int column) {
-  int i = column - r->n, nu = i - r->width;
-  if (nu < 0) return i >= r->m || is_moving(r, i) || !is_scaled(r, i) ? i : -1;
-  for (i = 0; i < r->m; i++) if (is_scaled(r, i) && nu-- == 0) return is_moving(r, i) ? -1 : i;
-  return -1;
 }
 
 /* Whether an output's derivative is needed: by the series, and at a point also surfaces, gaps and factors. */
@@ -363,6 +349,7 @@ static int carry(Run *r, Leg *l, Columns *c) {
     for (int i = 0; i < r->s->dimension; i++) size = larger(fabs(r->x[i]), size);
     r->o.atol = r->o.rtol * (size > 0 ? size : 1);
     r->size = size;
+    r->time_size = l->duration;
     expand(r, r->letter, r->x, r->unknowns, e);
     for (int i = 0; i < r->s->dimension; i++)
       size = larger(fabs(e->states[(int64_t)i * r->stride + 1]) * l->duration, size);

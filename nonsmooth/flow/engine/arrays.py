@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem, Guard
-from ..constants import GUARDS, KINDS
+from ..constants import GUARDS, KINDS, METHODS
 from ..options import Options
 from ..results import Chunk
 from ..section import Hits
@@ -33,7 +33,7 @@ class OptionsStructure(ctypes.Structure):
         *[(name, _I64) for name in ("max_steps", "max_events", "max_jumps")],
         *[(name, _I32) for name in ("start_mode", "at_kind")],
         ("at_count", _I64),
-        *[(name, _I32) for name in ("dense", "hit_after")],
+        *[(name, _I32) for name in ("dense", "hit_after", "method", "pad")],
         *[(name, _I64) for name in ("hit_kinds", "hit_width", "hit_side", "hit_skip", "hit_every")],
         ("hit_count", _I64),
         ("hit_named", _POINTER),
@@ -116,14 +116,16 @@ class Run:
         What was noted about the decisions, as bits.
     unmet : int
         A stop or reset, in this order, that was true at the start and did not happen, or -1.
+    implicit_steps : int
+        How many steps were implicit.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
     motion : ndarray (w,)
         What a restart at the end needs besides the state.
     dense : bool
         Whether the following were kept.
-    starts, coefficients : ndarray (s,), (s, N, P+1)
-        Steps: start times, Taylor coefficients.
+    starts, coefficients, implicit : ndarray (s,), (s, N, P+1), (s,)
+        Steps: start times, coefficients of the states, whether they are implicit.
     sample_x : ndarray (K, n)
         States at the times before the end at which the run was to be read, unless it is dense.
     event_count : int
@@ -147,6 +149,7 @@ class Run:
     rates: Array
     facts: int
     unmet: int
+    implicit_steps: int
     t: Array
     x: Array
     motion: Array
@@ -154,6 +157,7 @@ class Run:
     dense: bool
     starts: Array
     coefficients: Array
+    implicit: NDArray[np.bool_]
     sample_x: Array
     event_count: int
     make_happened: Callable[[], Happened]
@@ -180,7 +184,7 @@ def guard_of(system: FilippovSystem, code: int) -> Guard:
     kind, side, i, m = GUARDS[code & 15], (code >> 4 & 3) - 1, code >> 6, system.surface_count
     if kind in ("stop", "reset"):
         return Guard(kind, i, (system.stops if kind == "stop" else system.resets)[i][1], i)
-    if kind in ("impact", "release"):
+    if kind in ("impact", "release") and i >= m:
         return Guard(kind, i - m, side, len(system.entries) + i - m)
     return Guard(kind, i, 0 if kind == "branch" else side, system.entry_of(i))
 
@@ -229,6 +233,7 @@ def options_of(
         min(count, limit),
         int(dense),
     )
+    made.method = METHODS.index(o.method)
     made.hit_every = 1
     if o.hits is not None:
         named = _named(system, o.hits)
@@ -248,11 +253,14 @@ def options_of(
 
 def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
     """Whether the guards of each kind have a name that is looked for."""
+    own = [name if i in system.half_lines else "" for i, name in enumerate(system.surface_names)]
+    half_lines = [*own, *system.impacts]
     names = {
         **dict.fromkeys(("surface", "near"), system.surface_names),
         "stop": [name for name, _ in system.stops],
         "reset": [name for name, _ in system.resets],
-        **dict.fromkeys(("impact", "release"), [""] * system.surface_count + [*system.impacts]),
+        "impact": half_lines,
+        "release": half_lines,
     }
     width = max(system.surface_count + 1, *map(len, names.values()))
     named = np.zeros((len(GUARDS), width), np.int8)
@@ -260,8 +268,8 @@ def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
         if hits.names is None:
             row[:] = 1
         else:
-            own = names.get(kind, ())
-            row[: len(own)] = [name in hits.names for name in own]
+            of_kind = names.get(kind, ())
+            row[: len(of_kind)] = [name in hits.names for name in of_kind]
     return named
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -30,7 +30,12 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         partial(_events, system, run), few and partial(_few_events, system, run)
     )
     rested = {e.name: None for e in events if e.kind == "rest_below"} if options.rest_below else ()
-    facts = Facts(bool(run.facts & DEPENDS_ON_WIDTHS), bool(run.facts & UNPROVED), tuple(rested))
+    facts = Facts(
+        bool(run.facts & DEPENDS_ON_WIDTHS),
+        bool(run.facts & UNPROVED),
+        tuple(rested),
+        run.implicit_steps,
+    )
     warn_of_facts(facts.depends_on_widths, facts.unproved)
     return Trajectory(
         system=system,
@@ -44,7 +49,7 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         status=status,
         message=f"{message_of(system, options, run)} {ADVICE[status]}{_unmet(system, run)}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
-        steps=Steps(run.starts, run.coefficients),
+        steps=Steps(run.starts, run.coefficients, run.implicit),
         continuations=[
             Continuation(system.spelled(mode), rates)
             for mode, rates in zip(run.several, run.rates, strict=True)
@@ -186,6 +191,8 @@ def message_of(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.accumulation(run.event_count, run.limit)
     if status is Status.TOO_MANY_EVENTS:
         return messages.too_many("events", options.max_events)
+    if status is Status.TOO_MANY_STEPS and REASONS[run.reason] == "decay":
+        return messages.held_by_decay(t, float(run.t[-1] - run.t[-2]), not system.sets)
     if status is Status.TOO_MANY_STEPS:
         return messages.too_many("steps", options.max_steps)
     if status is Status.STEP_TOO_SMALL and REASONS[run.reason] == "branch_point":
@@ -196,63 +203,76 @@ def message_of(system: FilippovSystem, options: Options, run: Run) -> str:
 
 
 def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
-    modes, t = [system.spelled(mode) for mode in run.letters], float(run.t[-1])
-    reason = REASONS[run.reason]
-    entries = [k for k, own in enumerate(system.entries) if any(i in run.active for i in own)]
-    if reason == "two_fold":
-        return messages.two_fold(system.entry_of(run.where))
-    if reason == "slid_to_two_fold":
-        return messages.slid_to_two_fold(system.entry_of(run.where))
-    if reason == "ambiguous":
-        return messages.ambiguous([system.spelled(mode) for mode in run.several])
-    if reason == "wrong_start":
-        return messages.wrong_start(str(options.start_mode), modes[run.where])
-    if reason == "start_solutions":
-        return messages.start_solutions(str(options.start_mode), run.where)
-    if reason == "impossible_start":
-        return messages.impossible_start(str(options.start_mode))
-    if reason == "several_directions":
-        return messages.several_directions(run.where)
-    if reason == "indefinite":
-        return messages.indefinite(system.surface_names[run.where])
-    if reason == "undetermined":
-        firsts = [i for i in run.active if i in system.set_of and i == system.set_of[i][0]]
-        return messages.undetermined([system.surface_names[i] for i in firsts])
-    if reason == "field":
-        return messages.field_not_finite(modes[run.mode], run.x[-1].tolist())
-    if reason == "state":
-        return messages.state_not_finite(t)
-    if reason == "multiple_zero":
-        return messages.multiple_zero(system.entry_of(run.where))
-    if reason == "two_sided":
-        return messages.two_sided(system.resets[run.where][0])
-    contacts = _contacts(system, run)
-    if reason == "behind":
-        return messages.behind(system.impacts[run.where], t)
-    if reason == "no_impulse":
-        return messages.no_impulse(system.impacts[run.where], t)
-    if reason == "restitution":
-        return messages.restitution(system.impacts[run.where], t)
-    if reason == "no_reaction":
-        return messages.no_reaction(contacts)
-    if reason == "no_stable_motion":
-        return messages.no_stable_motion(entries)
-    if reason == "undetermined_rates":
-        return messages.undetermined_rates(entries)
-    if reason == "stability_lost":
-        return messages.stability_lost(system.surface_names[run.where], t)
-    if reason == "high_degree":
-        return messages.high_degree(system.entry_of(run.where))
-    if reason == "possibly_several":
-        return messages.possibly_several(entries)
-    if reason == "discrete_value":
-        return messages.discrete_value(system.resets[run.where][0], t)
-    if reason == "reset_map":
-        return messages.reset_not_finite(system.resets[run.where][0], t)
-    return messages.surface_not_finite() if reason == "surface" else messages.degenerate()
+    found = _SENTENCES.get(REASONS[run.reason])
+    return found(system, options, run) if found else messages.degenerate()
+
+
+def _ambiguous(system: FilippovSystem, _: Options, run: Run) -> str:
+    names = [system.surface_names[members[0]] for members in system.entries]
+    several = [system.spelled(mode) for mode in run.several]
+    return messages.ambiguous(several, [*names, *system.impacts])
+
+
+def _off_constraint(system: FilippovSystem, _: Options, run: Run) -> str:
+    what = "Function" if run.where < system.surface_count else "Rate of the function"
+    name = system.constraints[system.joints.index(run.where % system.surface_count)]
+    return messages.off_constraint(name, what, run.limit, _end(run))
+
+
+def _undetermined(system: FilippovSystem, _: Options, run: Run) -> str:
+    firsts = [i for i in run.active if i in system.set_of and i == system.set_of[i][0]]
+    return messages.undetermined([system.surface_names[i] for i in firsts])
+
+
+def _end(run: Run) -> float:
+    return float(run.t[-1])
+
+
+def _entries(system: FilippovSystem, run: Run) -> list[int]:
+    """Entries of what was decided last."""
+    return [k for k, own in enumerate(system.entries) if any(i in run.active for i in own)]
+
+
+#: What is said of a run's end, by its reason.
+_SENTENCES: dict[str, Callable[[FilippovSystem, Options, Run], str]] = {
+    "two_fold": lambda s, o, run: messages.two_fold(s.entry_of(run.where)),
+    "slid_to_two_fold": lambda s, o, run: messages.slid_to_two_fold(s.entry_of(run.where)),
+    "ambiguous": _ambiguous,
+    "wrong_start": lambda s, o, run: messages.wrong_start(
+        str(o.start_mode), s.spelled(run.letters[run.where])
+    ),
+    "start_solutions": lambda s, o, run: messages.start_solutions(str(o.start_mode), run.where),
+    "impossible_start": lambda s, o, run: messages.impossible_start(str(o.start_mode)),
+    "several_directions": lambda s, o, run: messages.several_directions(run.where),
+    "indefinite": lambda s, o, run: messages.indefinite(s.surface_names[run.where]),
+    "undetermined": _undetermined,
+    "field": lambda s, o, run: messages.field_not_finite(
+        s.spelled(run.letters[run.mode]), run.x[-1].tolist()
+    ),
+    "state": lambda s, o, run: messages.state_not_finite(_end(run)),
+    "multiple_zero": lambda s, o, run: messages.multiple_zero(s.entry_of(run.where)),
+    "two_sided": lambda s, o, run: messages.two_sided(s.resets[run.where][0]),
+    "behind": lambda s, o, run: messages.behind(s.impacts[run.where], _end(run)),
+    "no_jump": lambda s, o, run: messages.no_jump(s.surface_names[run.where], _end(run)),
+    "off_constraint": _off_constraint,
+    "dead_point": lambda s, o, run: messages.dead_point(s.constraints, _end(run)),
+    "no_impulse": lambda s, o, run: messages.no_impulse(s.impacts[run.where], _end(run)),
+    "restitution": lambda s, o, run: messages.restitution(s.impacts[run.where], _end(run)),
+    "no_reaction": lambda s, o, run: messages.no_reaction(_contacts(s, run)),
+    "no_stable_motion": lambda s, o, run: messages.no_stable_motion(_entries(s, run)),
+    "undetermined_rates": lambda s, o, run: messages.undetermined_rates(_entries(s, run)),
+    "stability_lost": lambda s, o, run: messages.stability_lost(
+        s.surface_names[run.where], _end(run)
+    ),
+    "high_degree": lambda s, o, run: messages.high_degree(s.entry_of(run.where)),
+    "possibly_several": lambda s, o, run: messages.possibly_several(_entries(s, run)),
+    "discrete_value": lambda s, o, run: messages.discrete_value(s.resets[run.where][0], _end(run)),
+    "reset_map": lambda s, o, run: messages.reset_not_finite(s.resets[run.where][0], _end(run)),
+    "surface": lambda s, o, run: messages.surface_not_finite(),
+}
 
 
 def _contacts(system: FilippovSystem, run: Run) -> list[str]:
     """Names of the contacts at the last point that was decided."""
-    first = system.surface_count
-    return [system.impacts[i - first] for i in run.active if i >= first]
+    m, names = system.surface_count, [*system.surface_names, *system.impacts]
+    return [names[i] for i in run.active if i >= m or i in system.half_lines]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array
-from ..constants import KINDS
+from ..constants import IMPLICIT_STEP, KINDS
 from ..trajectory import Steps
 from .arrays import Happened, address
 
@@ -225,8 +225,12 @@ class Recorder:
             self._keep(self._end(now))
             found = {name: growing.array() for name, growing in self._kept.items()}
             whole = self._whole(found)
-        names = ("starts", "coefficients")
-        empty = {"starts": np.zeros(0), "coefficients": own["coefficients"]}
+        names = ("starts", "coefficients", "implicit")
+        empty = {
+            "starts": np.zeros(0),
+            "coefficients": own["coefficients"],
+            "implicit": np.zeros(0, bool),
+        }
         return {name: found.get(name, empty.get(name)) for name in ("t", "x", *names)} | {
             "sample_x": np.vstack(self._samples) if self._samples else found["x"][:0],
             "event_count": total[2],
@@ -269,13 +273,15 @@ class Recorder:
         """Points and steps before ``now``; without dense output the samples there."""
         found = {"t": own["point_t"], "x": own["point_x"][:, : self._n]}
         if self._dense:
-            return found | {"starts": own["start"], "coefficients": own["coefficients"]}
+            implicit = own["step_mode"] >= IMPLICIT_STEP
+            of_steps = {"starts": own["start"], "coefficients": own["coefficients"]}
+            return found | of_steps | {"implicit": implicit}
         self._sample(Steps(own["start"], own["coefficients"]), now)
         return found
 
     def _happened(self, own: dict[str, NDArray[Any]], x: Array) -> dict[str, NDArray[Any]]:
         """Events and changes of the mode, which follow on those before."""
-        modes, found = own["step_mode"], self._events(own, x)
+        modes, found = own["step_mode"] & ~IMPLICIT_STEP, self._events(own, x)
         changes = np.flatnonzero(modes[1:] != modes[:-1]) + 1
         if len(modes) and modes[0] != self._mode:
             changes = np.append(0, changes)

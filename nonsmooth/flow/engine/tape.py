@@ -21,7 +21,7 @@ from ...model.printing.tape import (
     derived_series_of,
     tape_of,
 )
-from ..constants import FULL, LAWS, RUNNING, SEVERAL
+from ..constants import FULL, IMPACT_LAWS, LAWS, NEEDS_PROGRAM, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
@@ -109,11 +109,17 @@ class _System(ctypes.Structure):
         *[(name, _POINTER) for name in ("slope_output", "slope_moves", "slope_symmetric")],
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
-        *[(name, _I32) for name in ("affine", "sets", "kept_rows")],
+        *[(name, _I32) for name in ("affine", "sets", "kept_rows", "impact_law", "joints")],
         ("mixed", _POINTER),
         ("rules", _Rules),
         ("derivatives", EntriesStructure),
+        ("implicit", _POINTER),
+        ("places", _POINTER),
     ]
+
+
+#: Steps by which a run is known to be stiff.
+_PROBED = 400
 
 
 @lru_cache(maxsize=1)
@@ -155,6 +161,7 @@ def _elements(coupled: Coupled) -> list[_Element]:
         i, k, further = members[0], len(members), len(coupled.lower[members[0]])
         flags = coupled.continuous[i] + 2 * coupled.scaled[i]
         law, degree = LAWS.index(name), 1 if i in system.remembering else further + 1
+        degree = 0 if i in system.algebraic else degree
         size = (system.layer_widths[i], coupled.powers[i])
         made += [_Element(law, i, k, degree, lower, flags, *size)] * k
         lower += further
@@ -204,6 +211,17 @@ class _Held:
         self.free(self.pointer)
 
 
+def _places(entries: Entries, n: int) -> NDArray[np.int32]:
+    """States in an order in which those that are coupled are close: reverse Cuthill-McKee."""
+    from scipy.sparse import coo_array  # slow to import
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    of_states = (entries.row < n) & (entries.column < n)
+    places = (entries.row[of_states], entries.column[of_states])
+    graph = coo_array((np.ones(len(places[0])), places), shape=(n, n)).tocsr()
+    return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int32)
+
+
 def _ends(parts: Sequence[Sequence[Any]]) -> list[int]:
     """Where parts of a row begin, and the end of the last."""
     return [0, *np.cumsum([len(part) for part in parts], dtype=int).tolist()]
@@ -226,10 +244,20 @@ class TapeEngine:
             self._c.derivatives = self._entries(entries)
         self._rooms: Rooms = rooms_of((0, 0, 0))
 
+    def add_implicit(self) -> None:
+        """Give the driver the field's derivatives, which implicit steps need."""
+        series, entries = self.system.cached("derived", lambda: derived_series_of(self.coupled))
+        implicit = self._series(series, 0)
+        self._c.derivatives = self._entries(entries)
+        self._c.places = self._at(_places(entries, self.system.extended_dimension))
+        self._c.implicit = ctypes.addressof(implicit)
+        self._implicit = implicit
+
+    def _series(self, series: Series, order: int) -> SeriesStructure:
+        return series_structure(series, self.system.extended_dimension, order, self._kept)
+
     def _structure(self, coupled: Coupled, tape: Tape) -> _System:
         system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
-        n = system.extended_dimension
-        rules = lambda series: series_structure(series, n, self.order, self._kept)
         made = _System(
             n=system.extended_dimension,
             dimension=system.dimension,
@@ -241,8 +269,8 @@ class TapeEngine:
             resets=len(system.resets),
             order=self.order,
             slope_outputs=tape.slope_outputs,
-            series=rules(tape.series),
-            free=rules(tape.free),
+            series=self._series(tape.series, self.order),
+            free=self._series(tape.free, self.order),
             affine=int(coupled.affine),
             linear=int(coupled.linearity.everywhere),
             linear_free=int(coupled.linearity.free),
@@ -268,6 +296,8 @@ class TapeEngine:
             "curved": coupled.linearity.curved_guards,
         }
         made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
+        made.joints = len(system.joints)
+        made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
         table = (_Element * (len(elements) + 1))(*elements)
         made.element = self._at(np.frombuffer(bytes(table), np.uint8))
         for name, values in tables.items():
@@ -353,9 +383,7 @@ class TapeEngine:
                 state, c_options, output.pointer, *given, options.t_start, address(motion)
             )
             while True:
-                # Python hears Ctrl-C between the calls.
-                while (status := library().run_continue(state, BURST)) == RUNNING:
-                    pass
+                status = self._continued(state)
                 numbers, counts, active, several, rates = self._read(state)
                 if status != FULL:
                     break
@@ -380,11 +408,24 @@ class TapeEngine:
             rates=rates[:, : self.system.dimension],
             facts=counts[12],
             unmet=counts[13],
+            implicit_steps=counts[14],
             motion=final,
             labels=labels,
             dense=dense,
             **recorded,
         )
+
+    def _continued(self, state: int) -> int:
+        """Go on until a run ends or its arrays are full; Python hears Ctrl-C between the calls."""
+        while (status := library().run_continue(state, BURST)) in (RUNNING, NEEDS_PROGRAM):
+            if status == NEEDS_PROGRAM:
+                self.add_implicit()
+        return int(status)
+
+    def is_stiff(self, x: Array, p: Array, options: Options) -> bool:
+        """Whether a run takes implicit steps soon."""
+        few = replace(options, max_steps=min(options.max_steps, _PROBED), hits=None)
+        return bool(np.isfinite(x).all()) and self.run(x, p, few, dense=False).implicit_steps > 0
 
     def _checked(self, motion: Array) -> Array:
         """What a run or event keeps for a restart, if it is of this system."""
@@ -420,7 +461,7 @@ class TapeEngine:
         return _Held(state, made.run_free)
 
     def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
-        numbers, counts = (_D * 3)(), (_I64 * 14)()
+        numbers, counts = (_D * 3)(), (_I64 * 15)()
         width = self.system.surface_count + len(self.system.impacts)
         active, several = (_I32 * (width + 1))(), (_I32 * SEVERAL)()
         rates = np.empty((SEVERAL, self.system.extended_dimension))
@@ -464,9 +505,11 @@ class TapeEngine:
 
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``core/state.c`` for those of sets."""
-        m = self.system.surface_count
-        surfaces = ("-s+*blli"[sign + 1] for sign in signs[:m])
-        return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
+        m, half_lines = self.system.surface_count, self.system.half_lines
+        letters = ["-s+*blli"[sign + 1] for sign in signs[:m]]
+        for i in half_lines:
+            letters[i] = "o" if signs[i] else "c"
+        return "".join([*letters, *("o" if sign else "c" for sign in signs[m:])])
 
     # many trajectories -------------------------------------------------------------------------
 
@@ -491,7 +534,9 @@ class TapeEngine:
         c_options = options_of(self.system, options, dense=False, at=at)
         with self.held_table() as table, self.held_run(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
-            while library().run_many(*call, address(start), BURST):
+            while status := library().run_many(*call, address(start), BURST):
+                if status == NEEDS_PROGRAM:
+                    self.add_implicit()
                 if stop():
                     raise Stopped
             used = np.flatnonzero(np.bincount(chunk.itinerary)).tolist()

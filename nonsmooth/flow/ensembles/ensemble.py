@@ -14,7 +14,7 @@ from ...model import FilippovSystem, OptionError, require_system
 from ..constants import KINDS
 from ..engine.building.compilers import ADVICE, CompilerError, find_compiler
 from ..engine.lanes import lanes_for
-from ..engine.tape import library
+from ..engine.tape import library, tape_for
 from ..options import Options, tolerances
 from ..results import Chunk, Collected, Ensemble
 from ..section import KINDS_OF_SECTIONS, read_sampling, sectioned
@@ -52,6 +52,7 @@ def ensemble(
     at: Any = None,
     work: Work | None = None,
     device: str | None = None,
+    method: str = "auto",
 ) -> Ensemble:
     """Integrate many trajectories and keep their ends.
 
@@ -67,7 +68,7 @@ def ensemble(
         Time at which every run starts; default 0.
     parameters : mapping, optional
         Values that replace defaults: numbers, or arrays that broadcast with the starts.
-    tol, rtol, atol, start_mode, max_step, max_steps, max_events, max_jumps, rest_below : optional
+    tol, rtol, atol, start_mode, max_step, max_steps, max_events, max_jumps, rest_below, method : optional
         As in :func:`simulate`; a start with another side than ``start_mode`` says gets the status
         NON_UNIQUE.
     at_event : (kind, k), optional
@@ -123,8 +124,9 @@ def ensemble(
         max_jumps=max_jumps,
         rest_below=rest_below,
         start_mode=start_mode,
+        method=method,
     )
-    require_system(system, sets=True, hysteresis=True)
+    require_system(system, sets=True, hysteresis=True, complementarity=True, joints=True)
     work = checked_work(work)
     if start_mode is not None:
         system.require_mode(start_mode)
@@ -144,15 +146,15 @@ def ensemble(
             "at=nonsmooth.Section(..., count=100) to keep up to 100 states of each run."
         )
     step = sampling.room is None and t_end > t_start and device is None
-    chosen = engine_for(system, options, starts.count, step)
+    chosen = engine_for(system, options, starts, step)
     job = Job(system, options, number, sampling.times, sampling.room, chosen)
-    if device is not None:
-        require_device(job, device, work.executor is not None)
     return _run(job, starts, work, device)
 
 
 def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     system, count = starts.system, starts.count
+    if device is not None:
+        require_device(job, device, work.executor is not None)
     away = (
         None
         if device is None
@@ -175,10 +177,11 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
         return results.ensemble(job.engine if away is None else str(device), codes)
 
 
-def engine_for(system: FilippovSystem, options: Options, count: int, step: bool) -> str:
+def engine_for(system: FilippovSystem, options: Options, starts: Starts, step: bool) -> str:
     """Return what runs all chunks, compiled here so that all use the same: lanes or core."""
     lanes = lanes_for(system, options) if step else None
-    if lanes is not None and count >= (_FEW_WITH_SETS if system.sets else _FEW):
+    enough = starts.count >= (_FEW_WITH_SETS if system.sets else _FEW)
+    if lanes is not None and enough and not _is_stiff(system, options, starts):
         try:
             if find_compiler() is not None and lanes.library:
                 return "lanes"
@@ -188,6 +191,18 @@ def engine_for(system: FilippovSystem, options: Options, count: int, step: bool)
             )
     library()
     return "core"
+
+
+def _is_stiff(system: FilippovSystem, options: Options, starts: Starts) -> bool:
+    """Whether some of the runs take implicit steps, which several in step do not."""
+    if options.method != "auto":
+        return options.method == "stiff"
+    tape = tape_for(system, options)
+    for first in {0, starts.count // 2, starts.count - 1}:
+        x, p = starts.part(first, first + 1)
+        if tape.is_stiff(x[0], p[0] if p.ndim > 1 else p, options):
+            return True
+    return False
 
 
 def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:

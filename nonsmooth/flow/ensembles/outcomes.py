@@ -173,14 +173,14 @@ def outcomes(
     """
     rtol, atol = tolerances(tol, rtol, atol)
     options = Options(t_end=t_end, t_start=t_start, rtol=rtol, atol=atol)
-    require_system(system, sets=True, hysteresis=True)
+    require_system(system, sets=True, hysteresis=True, complementarity=True, joints=True)
     work = checked_work(work)
     if work.store is not None:
         raise OptionError("work has a store, but outcomes keeps no runs. Leave out store=.")
     made = _Sums(system, _bins(system, ranges or {}, bins))
     starts = Starts(system, x0, parameters, t_start)
     step = t_end > t_start and device is None
-    job = Job(system, options, None, None, None, engine_for(system, options, starts.count, step))
+    job = Job(system, options, None, None, None, engine_for(system, options, starts, step))
     if device is None:
         most = work.largest(Chunk.empty(0, system, at=False).row_size)
         size = work.chunk or size_of_chunk(job, starts, work.workers, most)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...model import Array, FilippovSystem, OptionError, PointError, Surfaces, clock_periods
+from ...model.definition.discrete_states import require_allowed
 from ..constants import ON_SURFACE
 from ..options import Options
 from .lazy_starts import Grid, Index, LazyStarts, RandomStarts, part_of
@@ -157,10 +158,7 @@ def require_start(system: FilippovSystem, x: Array, p: Array) -> None:
         own, name = x[..., n - len(d.discrete) + k], system.state_names[n - len(d.discrete) + k]
         wrong = np.isfinite(own) & ~np.isin(own, values or own)
         if wrong.any():
-            raise PointError(
-                f"x0 has {name} = {np.extract(wrong, own)[0]:g}, but the discrete state {name} has the values "
-                f"{values}. Give one of them."
-            )
+            require_allowed(name, float(np.extract(wrong, own)[0]), values, "x0 has ")
     for k, (_, state) in enumerate(d.clocks):
         period = clock_periods(system, k, p)
         phase = x[..., state]

@@ -29,6 +29,7 @@ from ...model import (
 from ...model.checks import positive
 from ...model.laws.frozen import Frozen, frozen
 from ...model.laws.limit_directions import limit_directions_of
+from ..discrete_states import with_discrete_states_held
 from .surface_point import TOLERANCE
 
 
@@ -63,6 +64,7 @@ class LimitDirection:
         return f"LimitDirection([{parts}], {way}, rate {self.rate:.6g}, {kind})"
 
 
+@with_discrete_states_held
 def limit_directions(
     system: FilippovSystem,
     point: ArrayLike,

@@ -40,6 +40,7 @@ from ...model import (
 from ...model.checks import positive
 from ...model.laws import complementarity
 from ..checks import require_surface
+from ..discrete_states import with_discrete_states_held
 from .surface_point import TOLERANCE
 
 #: Up to this number of surfaces all 3^k modes are tried.
@@ -121,6 +122,7 @@ class Intersection:
         return f"{names} = 0 at {self.point.tolist()}: modes that can go on: {modes}{tail}."
 
 
+@with_discrete_states_held
 def intersection(
     system: FilippovSystem,
     point: ArrayLike,
@@ -355,6 +357,7 @@ class Meeting:
 # the range of Filippov's convex set --------------------------------------------------------------
 
 
+@with_discrete_states_held
 def intersection_range(
     system: FilippovSystem,
     point: ArrayLike,

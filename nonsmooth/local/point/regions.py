@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ...model import Array, FilippovSystem, Parameters, PointError, call, motion, require_system
 from ...model.checks import positive
 from ...model.laws.frozen import Frozen
+from ..discrete_states import with_discrete_states_held
 from .higher_codimension import law_at
 from .surface_point import TOLERANCE, Numbers, on_surface, surface_at
 
@@ -56,6 +57,7 @@ def region_of(numbers: Numbers, tol: float) -> Region:
     }.get((above, below), Region.TANGENT_ABOVE if above == 0 else Region.TANGENT_BELOW)
 
 
+@with_discrete_states_held
 def region(
     system: FilippovSystem,
     point: ArrayLike,
@@ -156,6 +158,7 @@ def _refuse_crossing(numbers: Numbers, found: Region, what: str) -> None:
         )
 
 
+@with_discrete_states_held
 def alpha(
     system: FilippovSystem,
     point: ArrayLike,
@@ -209,6 +212,7 @@ def alpha(
     return float(numbers.lie[0] / (numbers.lie[0] - numbers.lie[1]))
 
 
+@with_discrete_states_held
 def sliding_field(
     system: FilippovSystem,
     point: ArrayLike,

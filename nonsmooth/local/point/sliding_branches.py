@@ -23,6 +23,7 @@ from ...model import (
     sliding_multipliers,
 )
 from ..checks import require_surface
+from ..discrete_states import with_discrete_states_held
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +50,7 @@ class SlidingBranch:
         return bool(np.real(self.eigenvalues).max() < 0.0)
 
 
+@with_discrete_states_held
 def sliding_branches(
     system: FilippovSystem,
     point: ArrayLike,

@@ -40,15 +40,16 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class PlaneScan:
-    """A planar system with one surface in a box."""
+    """A planar system with one surface, or none, in a box."""
 
     where: LocalSurface
     box: Box
 
     @classmethod
     def of(cls, system: FilippovSystem, parameters: Mapping[str, float], box: Box) -> PlaneScan:
-        """Scan a system of two states, one surface and no explicit time."""
-        return cls(LocalSurface(system, 0, "s", system.parameter_vector(parameters)), box)
+        """Scan a system of two states, at most one surface and no explicit time."""
+        mode = "s" if system.surface_count else ""
+        return cls(LocalSurface(system, 0, mode, system.parameter_vector(parameters)), box)
 
     def at(self, points: Array) -> ManyNumbers:
         """Numbers at points (k, 2)."""
@@ -68,6 +69,8 @@ class PlaneScan:
     @cached_property
     def curves(self) -> list[Array]:
         """The surface as polylines (m, 2), with at most a grid step between neighbours."""
+        if not self.where.mode:
+            return []
         h = self.where.many_h(self.box.grid(_GRID))[0].reshape(_GRID, _GRID)
         found = zero_lines(self.box.lines(_GRID), h)
         return [self.project(refined(line, self.box.size, 1 / _GRID)) for line in found]
@@ -129,6 +132,8 @@ class PlaneScan:
     @cached_property
     def folds(self) -> list[Fold]:
         """Folds of both fields, those in one point where a force jumps; none of a continuous surface."""
+        if not self.where.mode:
+            return []
         soft = self.where.switching.kind == "continuous"
         return [] if soft else self._apart(self.tangencies)
 
@@ -151,7 +156,8 @@ class PlaneScan:
     def equilibria(self) -> list[Equilibrium]:
         """Equilibria of each field on its own side."""
         numbers = self.at(self.box.grid(_CELLS))
-        return [e for k, side in enumerate(SIDES) for e in self._equilibria(numbers, k, side)]
+        sides = SIDES if self.where.mode else SIDES[:1]
+        return [e for k, side in enumerate(sides) for e in self._equilibria(numbers, k, side)]
 
     def _equilibria(self, numbers: ManyNumbers, k: int, side: Side) -> list[Equilibrium]:
         field = numbers.fields[:, k].reshape(_CELLS, _CELLS, 2)

@@ -31,6 +31,7 @@ from ..checks import (
     require_autonomous,
     require_linear,
 )
+from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import (
     FIELDS,
     SIDES,
@@ -143,6 +144,7 @@ class BoundaryBifurcation:
         )
 
 
+@with_discrete_states_held
 def boundary_equilibrium(
     system: FilippovSystem,
     point: ArrayLike,
@@ -374,6 +376,7 @@ def fold_orbit_landing(rho: float, omega: float) -> float:
     return math.exp(min(q * root, 700.0)) * (rho * q + omega) * math.sin(root)
 
 
+@with_discrete_states_held
 def find_boundary_equilibrium(
     system: FilippovSystem,
     near: ArrayLike,

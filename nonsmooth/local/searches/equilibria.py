@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, Parameters
 from ..checks import require_autonomous
+from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import FIELDS, TOLERANCE, LocalSurface, Side, side_index, surface_at
 from .search import Found, search
 
@@ -100,6 +101,7 @@ def kind_of(eigenvalues: NDArray[Any], scale: float) -> tuple[str, float]:
     return (f"unstable {shape}", margin) if np.all(real > 0) else ("saddle", margin)
 
 
+@with_discrete_states_held
 def find_equilibrium(
     system: FilippovSystem,
     near: ArrayLike,

@@ -20,6 +20,7 @@ from ...model.checks import positive
 from ...notebook import card, quadrants
 from ...solvers.newton import solve_many
 from ..checks import require_generic
+from ..discrete_states import with_discrete_states_held
 from ..point.regions import coincide
 from ..point.surface_point import FIELDS, SIDES, LocalSurface, Numbers, on_surface, surface_at
 from ..read_only import ReadOnly
@@ -489,6 +490,7 @@ def _build(where: LocalSurface, found: Found) -> TwoFold:
     )
 
 
+@with_discrete_states_held
 def two_fold(
     system: FilippovSystem,
     point: ArrayLike,
@@ -554,6 +556,7 @@ def two_fold(
     return _build(where, Found(x))
 
 
+@with_discrete_states_held
 def find_two_fold(
     system: FilippovSystem,
     near: ArrayLike,

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, require_system
 from ...model.checks import positive
 from ..checks import MARGIN, relative_difference, require_generic
+from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import LocalSurface, Numbers, on_surface, surface_at
 from ..read_only import ReadOnly
 from .folds import bend
@@ -56,6 +57,7 @@ class FoldFold:
         return min(self.margins.values())
 
 
+@with_discrete_states_held
 def fold_fold(
     system: FilippovSystem,
     point: ArrayLike,

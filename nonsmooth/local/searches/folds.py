@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
 from ..checks import require_generic
+from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import (
     FIELDS,
     TOLERANCE,
@@ -142,6 +143,7 @@ def _check_order(max_order: int) -> None:
         raise DefinitionError(f"max_order: expected a whole number >= 2, received {max_order!r}.")
 
 
+@with_discrete_states_held
 def fold(
     system: FilippovSystem,
     point: ArrayLike,
@@ -203,6 +205,7 @@ def fold(
     return fold_at(where, Found(x, residual=residual), side, max_order, tol)
 
 
+@with_discrete_states_held
 def find_fold(
     system: FilippovSystem,
     near: ArrayLike,

@@ -25,6 +25,7 @@ from ...model import (
     require_system,
 )
 from ..checks import require_autonomous, require_generic, require_linear
+from ..discrete_states import with_discrete_states_held
 from ..point.intersections import Meeting
 from ..point.regions import Region, region_of
 from ..point.surface_point import TOLERANCE, LocalSurface, Numbers, surface_at
@@ -102,6 +103,7 @@ def pseudo_kind(kind: str, region: Region) -> str:
     return f"{stability} pseudo-{shape}" if stability == across else "pseudo-saddle"
 
 
+@with_discrete_states_held
 def find_pseudo_equilibrium(
     system: FilippovSystem,
     near: ArrayLike,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 
 from ..errors import DefinitionError
-from ..expressions.graph import require_smooth
+from ..expressions.graph import IN_A_GUARD, require_smooth
 from ..numbering import UNWATCHED
 
 #: Signs of an atom in the mask of a relation.
@@ -44,6 +44,13 @@ class Rule:
     def atoms(self) -> set[int]:
         """Atoms of its conditions."""
         return {code // 8 for tree in self.triggers for code in tree if code >= 0}
+
+    @property
+    def decided_by(self) -> set[int]:
+        """Atoms of its conditions and of its filter."""
+        return {
+            code // 8 for tree in (*self.triggers, self.when or ()) for code in tree if code >= 0
+        }
 
     @property
     def located(self) -> tuple[Tree, ...]:
@@ -79,6 +86,16 @@ def holds(tree: Sequence[int], sides: Sequence[int]) -> bool:
             two, one = stack.pop(), stack.pop()
             stack.append(one and two if code == AND else one or two)
     return stack[-1]
+
+
+def decides(rule: Rule, atom: int, sides: Sequence[int]) -> bool:
+    """Whether the sign of one atom decides if an event is due, for given signs of the others."""
+    own, due = list(sides), list[bool]()
+    for tree in rule.triggers:
+        for side in (-1, 1):
+            own[atom] = side
+            due.append(holds(tree, own) and (rule.when is None or holds(rule.when, own)))
+    return any(one != two for one, two in zip(due[::2], due[1::2], strict=True))
 
 
 def is_boolean(e: ca.SX) -> bool:
@@ -204,7 +221,7 @@ class Atoms:
                 f"{what}: == and != are for discrete states, received a comparison of {function}. A state "
                 "that moves is equal to a number at single instants only; write >= or <=."
             )
-        require_smooth(function, self.states, self.parameters, what)
+        require_smooth(function, self.states, self.parameters, what, IN_A_GUARD)
         if self.slot is not None:
             at, self.slot = self.slot, None
             self.functions[at] = function

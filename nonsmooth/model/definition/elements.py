@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 
 from ..errors import DefinitionError
-from ..reading import Expression, listed, scalar
+from ..reading import Expression, listed, scalar, symbols
 
 #: Largest codimension of a set: slip has two components, three with drilling.
 LARGEST = 3
@@ -84,6 +84,61 @@ class Relay(Element):
                 "it is a surface."
             )
         return Entry("relay", (signal - off,), (width,))
+
+
+@dataclass(frozen=True, eq=False)
+class Complementarity:
+    """A complementarity condition ``0 <= y``, ``multiplier >= 0``, one of them zero: an ideal diode, a projection.
+
+    Given in ``complementarity=``. Its letters are ``o`` (open: the multiplier is 0) and ``c`` (closed: y is 0);
+    closing is an event of kind ``contact``, opening one of kind ``release``. A start with y < 0, or a reset to
+    one, jumps along the multipliers' directions in the field to y >= 0: an event of kind ``jump``.
+
+    Parameters
+    ----------
+    y : expression
+        Of states, parameters and time, and of the multipliers of complementarity conditions, in which it is
+        linear. Its rate contains a multiplier unless y itself does.
+    multiplier : SX symbol
+        Of the field: the diode's current where y is its reverse voltage, or the other way round.
+    name : str, optional
+        Shown in events.
+
+    Raises
+    ------
+    DefinitionError
+        A multiplier that enters nonlinearly or nowhere; one that enters only the second derivative of y, which is a
+        contact (:class:`Impact`).
+
+    Notes
+    -----
+    Several conditions are solved together: the matrix of the derivatives of y, or of its rate, by the multipliers may
+    be any for which the motion is unique, as those of passive circuits.
+
+    Source: Acary, Bonnefon & Brogliato 2011, Nonsmooth Modeling and Simulation for Switched Circuits; Nagurney & Zhang
+    1996, Projected Dynamical Systems; Moreau 1977 for sweeping processes.
+
+    Examples
+    --------
+    A coil fed through a diode: the current i cannot be negative, and the diode blocks with the voltage u:
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> i, u, t = (ca.SX.sym(s) for s in ("i", "u", "t"))
+    >>> diode = ns.Complementarity(i, multiplier=u, name="diode")
+    >>> coil = ns.FilippovSystem([i], field=[ca.sin(t) - i + u], complementarity=diode, time=t)
+    >>> run = ns.simulate(coil, [0.0], t_end=20.0)
+    >>> run.itinerary, round(run.events[0].t, 8)
+    ('o c o c o c o', 3.94073313)
+    """
+
+    y: Expression
+    multiplier: Expression
+    name: str = "complementarity"
+
+    def entry(self) -> Entry:
+        """Read y and the multiplier."""
+        lam = symbols([self.multiplier], f"multiplier of {self.name!r}")
+        return Entry("complementarity", (scalar(self.y, f"y of {self.name!r}"),), (ca.SX(0),), lam)
 
 
 def read_entries(surface: Expression | None, surfaces: Sequence[Expression] | None) -> list[Entry]:

@@ -11,6 +11,7 @@ import casadi as ca
 from ..checks import real
 from ..errors import DefinitionError
 from ..reading import Expression, column, listed, scalar
+from .discrete_choices import without_choices
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ class Reset(_Conditional):
 
 @dataclass(frozen=True)
 class Impact:
-    """A unilateral contact: a gap that is never negative, with Newton's restitution.
+    """A unilateral contact: a gap that is never negative, with restitution.
 
     The contact is open (letter ``o``) or closed (``c``). Where the gap falls to zero with a rate v,
     an impulse along the reaction turns it into -restitution v. Impacts that accumulate end in the
@@ -132,13 +133,27 @@ class Impact:
     gap : expression
         Of states, parameters and time; not negative. Its rate must not depend on multipliers.
     restitution : expression or number, optional
-        Newton's coefficient, from 0 to 1.
+        The coefficient, from 0 to 1.
     reaction : SX symbol, optional
         A multiplier in the field, not negative and linear there: how the reaction acts. Unless given,
         one is added that acts along the gradient of the gap's rate (unit masses). Friction at the
         contact is a surface whose multiplier is multiplied with it.
     name : str, optional
         Shown in events and messages.
+    law : {"newton", "moreau", "poisson"}, optional
+        How several contacts share an impact; the same for all impacts of a system.
+
+    Notes
+    -----
+    Of closed contacts that act on one another, ``"newton"`` chooses a set of most contacts that can take an
+    impulse: each of them turns its rate v into -restitution v, the others open or stay closed without one.
+    ``"moreau"`` solves one complementarity problem: each contact parts with at least -restitution v, and with no
+    more where it takes an impulse. ``"poisson"`` first ends the approach, as with restitution 0, then returns at each
+    contact at least the restitution's part of the impulse that it took. Friction at the contacts is bounded by their
+    impulses in all three. One contact without friction has the same impact in each.
+
+    Source: Acary & Brogliato 2008, Numerical Methods for Nonsmooth Dynamical Systems, chapter 3; Glocker & Pfeiffer
+    1995.
 
     Examples
     --------
@@ -158,6 +173,7 @@ class Impact:
     restitution: Expression = 0.0
     reaction: Expression | None = None
     name: str = "impact"
+    law: str = field(default="newton", kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,9 +255,14 @@ def with_added_states(clocks: Any, discrete: Any, given: dict[str, Any]) -> dict
     result["discrete"] = [_values(symbol, given) for symbol, given in values.items()]
     if not clocks and not still:
         return result
+    allowed = dict(zip(still, result["discrete"], strict=True))
+    for name in ("surface", "surfaces"):
+        if still and given.get(name) is not None:
+            result[name] = without_choices(given[name], allowed, name)
     for name in ("above", "below", "field", "rhs"):
         if given.get(name) is not None:
             entries = column(given[name], name, n)
+            entries = without_choices(entries, allowed, name) if still else entries
             result[name] = [*ca.vertsplit(entries)[: entries.numel()], *[1.0] * len(clocks)]
             result[name] += [0.0] * len(still)
     resets = [given["resets"]] if isinstance(given["resets"], Reset) else listed(given["resets"])

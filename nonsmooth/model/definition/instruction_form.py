@@ -71,6 +71,7 @@ def written(system: FilippovSystem) -> dict[str, Any]:
         "renamed": [list(pair) for pair in d.renamed],
         "layer_widths": list(d.layer_widths),
         "laws": list(d.laws),
+        "complementarity": list(d.complementarity),
         "lifted": system.lifted,
     }
 
@@ -100,6 +101,7 @@ def read_system(plain: Any) -> FilippovSystem:
         renamed=tuple((a, b) for a, b in map(_pair, _list(plain, "renamed"))),
         layer_widths=tuple(map(float, widths)),
         laws=tuple(_texts(plain.get("laws", []), "laws")),
+        complementarity=tuple(_texts(plain.get("complementarity", []), "complementarity")),
     )
     _require_shapes(definition)
     require_consistent(definition, given=False)
@@ -367,5 +369,6 @@ def _require_shapes(d: Definition) -> None:
     known = [law in LAWS and law != "contact" for law in d.laws]
     _require(len(known) in (0, len(d.sizes or range(d.surfaces.numel()))) and all(known), "laws")
     _require(d.hysteresis.numel() in (0, d.surfaces.numel()), "a hysteresis of each surface")
-    names = [*(n for n, _ in (*d.stops, *d.resets)), *d.impacts]
+    _require(len(d.half_lines) == len(d.complementarity), "names of complementarity conditions")
+    names = [*(n for n, _ in (*d.stops, *d.resets)), *d.impacts, *d.complementarity]
     _require(len({*names}) == len(names), "events of different names")

@@ -32,6 +32,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import Any
 
 import casadi as ca
 
@@ -80,8 +81,12 @@ class Switches:
     def __getitem__(self, number: int) -> Switch:
         return self.all[number]
 
-    def find(self, h: ca.SX, origin: str) -> tuple[int | None, int]:
+    def find(self, h: ca.SX, origin: str) -> tuple[int | None, Any]:
         """Number of the surface h = 0 and the sign of h over its function; None, sgn h if constant."""
+        factor, rest = _factored(h, self.inputs[0])
+        if ca.symvar(factor):  # of parameters
+            number, side = self.find(rest, origin)
+            return number, ca.sign(factor) * side
         h = self._on_both_sides(simple_zeros(h, *self.inputs))
         forms = self._forms([h, *(s.h for s in self.all)])
         if all(monomial == () for monomial in forms[0]):
@@ -151,6 +156,19 @@ class _EvenPowers:
         return (args[0] * args[0]) ** (power / 2)
 
 
+def _factored(h: ca.SX, moving: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """A factor that does not depend on states and time, and the other one."""
+    if not ca.depends_on(h, moving):
+        return h, ca.SX(1)
+    if h.is_op(ca.OP_NEG):
+        factor, rest = _factored(h.dep(0), moving)
+        return -factor, rest
+    if h.is_op(ca.OP_MUL) or h.is_op(ca.OP_DIV):
+        (a, one), (b, two) = (_factored(h.dep(k), moving) for k in (0, 1))
+        return (a * b, one * two) if h.is_op(ca.OP_MUL) else (a / b, one / two)
+    return ca.SX(1), h
+
+
 def _prefixes() -> Iterator[str]:
     return ("lam" + "_" * k for k in range(100))
 
@@ -170,7 +188,8 @@ _MOST_NESTED = 6
 
 _INFINITELY_MANY = (
     "It switches on infinitely many surfaces. Declare those that the motion can reach, each as "
-    "sign(x - c) or as a surface with its multiplier; a jump of a state is a Reset."
+    "sign(x - c) or as a surface with its multiplier; a jump of a state is a Reset, and what is periodic in time "
+    "is a function of the phase of a Clock."
 )
 _EQUALITY = (
     "Equality holds on a surface only, and what a field is there does not matter in Filippov's "
@@ -341,14 +360,14 @@ class _Lifter:
     def _sign(self, h: ca.SX, origin: str, of_zero: int = 0) -> _Value:
         number, side = self.switches.find(h, origin)
         if number is None:
-            return _Value(ca.SX(side or of_zero))
+            return _Value(ca.SX(side or of_zero) if isinstance(side, int) else side)
         return _Value(side * self.switches[number].lam, frozenset([number]))
 
     def _choice(self, h: ca.SX, above: ca.SX, below: ca.SX, origin: str) -> _Value:
         """Return ``above`` where h > 0 and ``below`` where h < 0; they are equal on h = 0."""
         number, side = self.switches.find(h, origin)
         if number is None:
-            return _Value(above if side >= 0 else below)
+            return _Value(ca.if_else(side >= 0, above, below))
         lam = side * self.switches[number].even
         if ca.is_equal(above, -below, 20):
             return _Value(lam * above, frozenset([number]))

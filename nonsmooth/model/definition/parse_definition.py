@@ -18,7 +18,8 @@ import casadi as ca
 from ..checks import real
 from ..errors import DefinitionError, ParameterError
 from ..expressions.cancel import powers
-from ..expressions.graph import require_smooth
+from ..expressions.graph import IN_A_FIELD, IN_A_GAP, IN_A_GUARD, IN_A_SURFACE, require_smooth
+from ..numbering import IMPACT_LAWS
 from ..reading import (
     Expression,
     Parameters,
@@ -31,8 +32,17 @@ from ..reading import (
     symbols,
 )
 from ..values import Array, parameter_values
+from .complementarity import rate_of, require_complementarity
 from .conditions import Atoms, Rule, located, passages
-from .elements import functions_of, hysteresis_of, laws_of, multipliers_of, read_entries
+from .constraints import joints_of, read_constraints, require_constraints
+from .elements import (
+    Complementarity,
+    functions_of,
+    hysteresis_of,
+    laws_of,
+    multipliers_of,
+    read_entries,
+)
 from .events import Clock, Impact, Reset, Stop
 from .read_events import direction_of, read_maps, read_rules, read_when, require_no_endless_level
 
@@ -77,6 +87,9 @@ class Definition:
     layer_widths: tuple[float, ...] = ()
     laws: tuple[str, ...] = ()  # of the entries, where not all are surfaces and sets
     hysteresis: ca.SX = _NONE  # how much lower each function is where its multiplier is -1
+    complementarity: tuple[str, ...] = ()  # names of the conditions among the entries
+    impact_law: str = "newton"
+    constraints: tuple[str, ...] = ()  # names of the joints, the last entries
 
     @cached_property
     def plain(self) -> bool:
@@ -106,13 +119,26 @@ class Definition:
         """The states, followed by the time where the system depends on it."""
         return ca.vertcat(self.states, self.time)
 
+    @cached_property
+    def half_lines(self) -> tuple[int, ...]:
+        """Functions y of complementarity conditions, among the surfaces."""
+        sizes = self.sizes or (1,) * self.surfaces.numel()
+        firsts = [sum(sizes[:k]) for k in range(len(sizes))]
+        laws = zip(firsts, self.laws, strict=False)
+        return tuple(first for first, law in laws if law == "complementarity")
+
+    @property
+    def open_surfaces(self) -> ca.SX:
+        """The switching functions (m,) as functions of states alone, without multipliers."""
+        if not self.complementarity:
+            return self.surfaces
+        none = ca.SX.zeros(self.multipliers.numel(), 1)
+        return ca.substitute(self.surfaces, self.multipliers, none)
+
     @property
     def gap_rates(self) -> ca.SX:
         """Rates of the gaps (c,), in states, parameters and time."""
-        x = self.extended_states
-        free = ca.vertcat(self.field, ca.SX.ones(self.time.numel(), 1))
-        rates = ca.jtimes(self.gaps, x, free) if self.gaps.numel() else ca.SX(0, 1)
-        return ca.densify(rates)
+        return rate_of(self, self.gaps) if self.gaps.numel() else ca.SX(0, 1)
 
     @property
     def names(self) -> dict[str, list[str]]:
@@ -134,6 +160,8 @@ class Definition:
         some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed, "rules": self.rules}
         some |= {"clocks": self.clocks, "discrete": self.discrete}
         some |= {"layer_widths": self.layer_widths, "laws": self.laws}
+        some |= {"complementarity": self.complementarity, "constraints": self.constraints}
+        some |= {"impact_law": self.impact_law} if self.impact_law != "newton" else {}
         return {
             **{name: value for name, value in some.items() if value},
             "definition": ca.Function("definition", inputs, outputs).serialize(),
@@ -156,8 +184,11 @@ class Definition:
         rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
         parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=False))
         some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths", "laws")
-        tuples: dict[str, Any] = {name: tuple(state.get(name, ())) for name in some}
-        return cls(**parts, **rest, **tuples)
+        tuples: dict[str, Any] = {
+            name: tuple(state.get(name, ())) for name in (*some, "complementarity", "constraints")
+        }
+        law = state.get("impact_law", "newton")
+        return cls(**parts, **rest, **tuples, impact_law=law)
 
 
 _DIRECTIONS = (-1, 0, 1)
@@ -178,6 +209,8 @@ def read_definition(
     resets: Any,
     impacts: Any,
     hidden: bool,
+    complementarity: Any = (),
+    constraints: Any = (),
     clocks: Sequence[Clock] = (),
     discrete: Sequence[tuple[float, ...] | None] = (),
     layer_widths: Any = None,
@@ -190,6 +223,7 @@ def read_definition(
     p, defaults = _parameters(parameters)
     entries = read_entries(surface, surfaces)
     h, sizes = functions_of(entries), tuple(len(entry.functions) for entry in entries)
+    conditions = _items(complementarity, Complementarity, "complementarity")
     if above is not None or below is not None:
         lam, f = _two_fields(above, below, field, multipliers, h, x.numel())
     else:
@@ -198,9 +232,18 @@ def read_definition(
         lam = symbols([s for entry in listed(multipliers) for s in listed(entry)], "multipliers")
         f = column(field, "field", x.numel())
     _one_multiplier_each(lam, h)
+    widths = _widths(layer_widths, h.numel())
+    joined = read_constraints(constraints)
     kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
-    (stops, resets, impacts), renamed = _distinct([_items(*k) for k in kinds], _own_names(sizes))
-    reactions, f = _reactions(impacts, x, t, f)
+    items = [*[_items(*k) for k in kinds], conditions, joined]
+    (stops, resets, impacts, conditions, joined), renamed = _distinct(items, _own_names(sizes))
+    reactions, f = _reactions(impacts, "gap", x, t, f)
+    held, f = _reactions(joined, "function", x, t, f)
+    joints = joints_of(joined, listed(held), f)
+    own = [*[condition.entry() for condition in conditions], *joints.entries]
+    f, entries, sizes = joints.field, [*entries, *own], (*sizes, *[1] * len(own))
+    h, lam = functions_of(entries), ca.vertcat(lam, *[entry.multiplier for entry in own])
+    widths = (*widths, *[1.0] * len(own)) if widths else ()
     definition = Definition(
         states=x,
         time=t,
@@ -210,15 +253,18 @@ def read_definition(
         gaps=_of_impacts(impacts, "gap"),
         restitutions=_of_impacts(impacts, "restitution"),
         impacts=tuple(i.name for i in impacts),
+        impact_law=_law_of(impacts),
         field=f,
         surfaces=h,
         defaults=defaults,
         hidden=hidden or any(entry.hidden for entry in entries),
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
-        layer_widths=_widths(layer_widths, h.numel()),
+        layer_widths=widths,
+        constraints=joints.names,
         laws=laws_of(entries),
         hysteresis=hysteresis_of(entries),
+        complementarity=tuple(condition.name for condition in conditions),
         **_events(stops, resets, clocks, discrete, x, t, p),
     )
     require_consistent(definition)
@@ -257,6 +303,23 @@ def _events(
         "stops": tuple((s.name, direction_of(s)) for s in stops),
         "resets": tuple((r.name, direction_of(r)) for r in resets),
     }
+
+
+def _law_of(impacts: Sequence[Impact]) -> str:
+    """The law of impacts, one for all of them."""
+    for impact in impacts:
+        if impact.law not in IMPACT_LAWS:
+            raise DefinitionError(
+                f"law of {impact.name!r} is {impact.law!r}. Give one of {', '.join(IMPACT_LAWS)}."
+            )
+    laws = {impact.law: impact.name for impact in impacts}
+    if len(laws) > 1:
+        received = " and ".join(f"{law!r} for {name!r}" for law, name in laws.items())
+        raise DefinitionError(
+            f"impacts have different laws: {received}. Contacts that are struck together need one: give all "
+            "the same law=."
+        )
+    return next(iter(laws), "newton")
 
 
 def _of_impacts(impacts: Sequence[Any], what: str) -> ca.SX:
@@ -314,7 +377,7 @@ def _parameters(
 
 
 def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
-    """Read stops=, resets= or impacts=: one, or a sequence of them."""
+    """Read stops=, resets=, impacts= or complementarity=: one, or a sequence of them."""
     items = [values] if isinstance(values, kind) else listed(values)
     for i, item in enumerate(items):
         if not isinstance(item, kind):
@@ -323,7 +386,7 @@ def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
                 f"({type(item).__name__}). Write {what}=[nonsmooth.{kind.__name__}(function, "
                 "...)]."
             )
-        if kind is Impact:
+        if kind in (Impact, Complementarity):
             continue
         if isinstance(item.direction, bool) or item.direction not in _DIRECTIONS:
             raise DefinitionError(
@@ -381,15 +444,15 @@ def _two_fields(
     return lam, ca.vertcat(*entries)
 
 
-def _direction(impact: Impact, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
-    """Direction of a reaction that is not given: the gradient of the gap's rate by the velocities."""
+def _direction(name: str, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
+    """Direction of a reaction that is not given: the gradient of a function's rate by the velocities."""
     positions = _depends_on_each(gap, x)
     push = ca.densify(ca.gradient(rate, x))
     velocities = [i for i in range(x.numel()) if not positions[i] and not push[i].is_zero()]
     if velocities and not ca.is_linear(rate, ca.vertcat(*[x[i] for i in velocities])):
         raise DefinitionError(
-            f"reaction of {impact.name!r}: the rate {rate} of the gap is not linear in the states "
-            "that are not in the gap, so it does not give the direction of the reaction. Give "
+            f"reaction of {name!r}: the rate {rate} of {gap} is not linear in the states "
+            "that it does not hold itself, so it does not give the direction of the reaction. Give "
             "reaction=, a symbol in the field."
         )
     return ca.vertcat(*[push[i] if i in velocities else 0 for i in range(x.numel())])
@@ -400,17 +463,19 @@ def _depends_on_each(function: ca.SX, x: ca.SX) -> list[bool]:
     return [bool(ca.depends_on(function, x[i])) for i in range(x.numel())]
 
 
-def _reactions(impacts: Sequence[Impact], x: ca.SX, t: ca.SX, field: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Symbols of the reactions, and the field with those that were not in it."""
+def _reactions(
+    items: Sequence[Any], what: str, x: ca.SX, t: ca.SX, field: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    """Symbols of the reactions of impacts or constraints, and the field with those that were not in it."""
     given: list[ca.SX] = []
-    for j, impact in enumerate(impacts):
-        if impact.reaction is not None:
-            given.append(symbols([impact.reaction], f"reaction of {impact.name!r}"))
+    for j, item in enumerate(items):
+        if item.reaction is not None:
+            given.append(symbols([item.reaction], f"reaction of {item.name!r}"))
             continue
-        gap = column([impact.gap], f"gap of {impact.name!r}", 1)
+        gap = column([getattr(item, what)], f"{what} of {item.name!r}", 1)
         rate = ca.jtimes(gap, ca.vertcat(x, t), ca.vertcat(field, ca.SX.ones(t.numel(), 1)))
-        given.append(ca.SX.sym(f"reaction{j}"))
-        field = field + given[-1] * _direction(impact, gap, rate, x)
+        given.append(ca.SX.sym(f"reaction{j}" if what == "gap" else f"{item.name} reaction"))
+        field = field + given[-1] * _direction(item.name, gap, rate, x)
     return ca.vertcat(*given) if given else ca.SX(0, 1), field
 
 
@@ -455,21 +520,21 @@ def _require_linear_sets(d: Definition) -> None:
 def require_consistent(d: Definition, given: bool = True) -> None:
     """Refuse unknown symbols, functions that are not smooth, and multipliers that do not fit."""
     # Sections of derived systems may have multiple zeros; only ``given`` guards must have simple ones.
-    guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
-    atoms = [*guards, *["a condition"] * (d.guards.numel() - len(guards))]
+    atoms = _guard_names(d)
+    guards = atoms[: len(d.stops) + len(d.resets)]
+    functions = [*zip(_function_names(d), listed(d.surfaces), strict=True)]
+    gaps = [(f"gap of {name!r}", d.gaps[j]) for j, name in enumerate(d.impacts)]
     named = [("field", d.field, True)]
-    named += [(f"surface {i}", e, False) for i, e in enumerate(listed(d.surfaces))]
+    named += [(name, e, i in d.half_lines) for i, (name, e) in enumerate(functions)]
     named += [(name, d.guards[i], False) for i, name in enumerate(atoms)]
     switched = [(f"map of reset {n!r}", d.maps[:, j]) for j, (n, _) in enumerate(d.resets)]
     switched += [(f"when of {name}", d.whens[i]) for i, name in enumerate(guards)]
     switched += [(f"priority of {name}", d.priorities[i]) for i, name in enumerate(guards)]
     switched += [("period of a clock", e) for e in listed(d.periods)]
     for j, name in enumerate(d.impacts):
-        named += [(f"gap of {name!r}", d.gaps[j], False)]
-        named += [(f"restitution of {name!r}", d.restitutions[j], False)]
+        named += [(*gaps[j], False), (f"restitution of {name!r}", d.restitutions[j], False)]
     known = ca.vertcat(d.extended_states, d.parameters, d.multipliers, d.reactions)
     require_unique(known)
-    moving = ca.vertcat(d.extended_states, d.multipliers, d.reactions)
     for what, expression, multipliers in [*named, *[(w, e, False) for w, e in switched]]:
         require_known(expression, known, what, **d.names)
         if not multipliers and ca.depends_on(expression, ca.vertcat(d.multipliers, d.reactions)):
@@ -478,8 +543,7 @@ def require_consistent(d: Definition, given: bool = True) -> None:
                 "with a multiplier. Only the field may contain multipliers."
             )
         require_finite(expression, known, what)
-    for what, expression, _ in named:
-        require_smooth(expression, moving, d.parameters, what)
+    _require_smooth_functions(d, gaps, [(what, e) for what, e, _ in named])
     for period in listed(d.periods):
         if ca.depends_on(period, d.extended_states):
             raise DefinitionError(
@@ -490,15 +554,46 @@ def require_consistent(d: Definition, given: bool = True) -> None:
         _require_states(name, d.guards[i], d.extended_states, d)
         if given:
             _require_simple(name, d.guards[i], d)
-    for i, h in enumerate(listed(d.surfaces)):
-        _require_states(f"surface {i}", h, d.extended_states, d)
-        _require_simple(f"surface {i}", h, d)
+    for i, (name, h) in enumerate(functions):
+        if i in d.half_lines:
+            continue
+        _require_states(name, h, d.extended_states, d)
+        _require_simple(name, h, d)
     for j in range(len(d.impacts)):
         _check_impact(d, j)
+    require_complementarity(d)
+    require_constraints(d)
     if not d.hidden:
         _require_linear(d)
     _require_linear_sets(d)
     _require_hysteresis(d)
+
+
+def _require_smooth_functions(
+    d: Definition, gaps: list[tuple[str, ca.SX]], named: list[tuple[str, ca.SX]]
+) -> None:
+    """Refuse switches in functions of the states, and say what to write in place of each."""
+    moving = ca.vertcat(d.extended_states, d.multipliers, d.reactions)
+    advice = dict.fromkeys(_function_names(d), IN_A_SURFACE)
+    advice |= dict.fromkeys([name for name, _ in gaps], IN_A_GAP)
+    advice |= dict.fromkeys(_guard_names(d), IN_A_GUARD)
+    for what, expression in [*gaps, *named]:
+        require_smooth(expression, moving, d.parameters, what, advice.get(what, IN_A_FIELD))
+
+
+def _guard_names(d: Definition) -> list[str]:
+    """Names in messages of the functions of stops and resets."""
+    own = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
+    return [*own, *["a condition"] * (d.guards.numel() - len(own))]
+
+
+def _function_names(d: Definition) -> list[str]:
+    """Names of the switching functions in messages."""
+    first = d.surfaces.numel() - len(d.constraints)
+    names = [f"surface {i}" for i in range(first)] + [f"function of {n!r}" for n in d.constraints]
+    for i, name in zip(d.half_lines, d.complementarity, strict=True):
+        names[i] = f"y of {name!r}"
+    return names
 
 
 def _check_impact(d: Definition, j: int) -> None:
@@ -507,8 +602,9 @@ def _check_impact(d: Definition, j: int) -> None:
     _require_simple(what, gap, d)
     if ca.depends_on(rate, ca.vertcat(d.multipliers, d.reactions)):
         raise DefinitionError(
-            f"{what}: the rate {rate} of {gap} contains a multiplier. Forces act on velocities: a "
-            "gap is a function of positions and time."
+            f"{what}: the rate {rate} of {gap} contains a multiplier. Forces act on velocities: a gap is a "
+            "function of positions and time. An ideal diode, whose current is a state or a multiplier, is a "
+            "Complementarity."
         )
     effect = ca.mtimes(ca.jacobian(rate, d.states), ca.jacobian(d.field, d.reactions[j]))
     if effect.is_zero() or not ca.is_linear(d.field, d.reactions[j]):

@@ -64,6 +64,11 @@ def read_rules(
         tree = None
         if when is not None and (event.level or _is_condition(when)):
             tree = atoms.tree(when, f"when of {what}")
+        elif when is not None and not is_boolean(when) and ca.depends_on(when, atoms.moving):
+            raise DefinitionError(
+                f"when of {what}: expected a condition, received the function {when}, which is zero at single "
+                f"instants only. Write a comparison, such as {when} >= 0."
+            )
         if max(map(len, (*triggers[k], tree or ()))) > MOST_CODES:
             raise DefinitionError(
                 f"{what}: its condition has more than {MOST_CODES} comparisons and operations. Split it into "

@@ -37,18 +37,19 @@ class _Gated:
         for i, h in enumerate(self._surfaces):
             if vanish_on([base], h, self._x):
                 self.powers[i] = min(times * power, self.powers.get(i, times * power))
-                gate = _side(args[0], h) * self._gates[i]
-                return gate * (1 + gate) / 2 * result
+                side, gate = _side(args[0], h), self._gates[i]
+                result *= side * gate * (1 + side * gate) / 2 if side else gate * gate
         return result
 
 
 def _side(e: ca.SX, h: ca.SX) -> int:
-    """Whether an expression that vanishes with h is positive where h is (1), where -h is (-1)."""
+    """Whether an expression that vanishes with h is positive where h is (1), where -h is (-1), or neither (0)."""
     symbols = ca.vertcat(*ca.symvar(ca.vertcat(e, h)))
     value = ca.Function("side", [symbols], [e * h])
     generator = np.random.default_rng(0)
-    points = [float(value(generator.normal(size=symbols.numel()))) for _ in range(_DRAWS)]
-    return 1 if sum(np.sign(p) for p in points if p == p) >= 0.0 else -1
+    draws = [float(value(generator.normal(size=symbols.numel()))) for _ in range(_DRAWS)]
+    signs = {np.sign(p) for p in draws if np.isfinite(p)} - {0.0}
+    return int(signs.pop()) if len(signs) == 1 else 0
 
 
 def roots_of(field: ca.SX, surfaces: ca.SX, x: ca.SX) -> dict[int, float]:

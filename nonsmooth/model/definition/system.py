@@ -22,8 +22,13 @@ from ..errors import DefinitionError, PointError
 from ..expressions.mathml import equation, rate, symbol
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
+from .complementarity import holds
+from .constraints import Constraint
+from .discrete_states import held_values, with_values
+from .elements import Complementarity
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
+from .matrix_symbols import in_scalar_symbols, read_dae
 from .parse_definition import Definition, consistent_parameters, read_definition
 from .roots import roots_of
 from .switching import Switching, class_of
@@ -71,6 +76,10 @@ class FilippovSystem:
         Surfaces on which the state jumps.
     impacts : sequence of Impact, optional
         Contacts that cannot be passed.
+    complementarity : sequence of Complementarity, optional
+        Ideal diodes, projections and sweeping sets: ``0 <= y``, ``multiplier >= 0``, one of them zero.
+    constraints : sequence of Constraint, optional
+        Joints: functions that stay zero. Each has the letter ``s`` in a mode, after the surfaces.
     clocks : sequence of Clock, optional
         What is periodic in time; each adds its phase to the states.
     discrete : sequence of SX symbols or mapping, optional
@@ -122,6 +131,8 @@ class FilippovSystem:
         stops: Sequence[Stop] = (),
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
+        complementarity: Sequence[Complementarity] | Complementarity = (),
+        constraints: Sequence[Constraint] | Constraint = (),
         clocks: Sequence[Clock] | Clock = (),
         discrete: Discrete = (),
         hidden: bool = False,
@@ -140,9 +151,13 @@ class FilippovSystem:
             "stops": stops,
             "resets": resets,
             "impacts": impacts,
+            "complementarity": complementarity,
+            "constraints": constraints,
             "hidden": hidden,
             "layer_widths": layer_widths,
         }
+        given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
+        clocks, discrete = given.pop("clocks"), given.pop("discrete")
         self._adopt(read_definition(**with_added_states(clocks, discrete, given)))
 
     # construction ------------------------------------------------------------------------------
@@ -201,12 +216,15 @@ class FilippovSystem:
         >>> system.field("+"), system.field("-")
         (SX([v, (-(x+0.4))]), SX([v, (-(x+-0.3))]))
         """
-        column(rhs, "rhs", len(listed(states)))  # before clocks are added
         given = {"states": states, "rhs": rhs, "parameters": parameters, "time": time}
         given |= {"stops": stops, "resets": resets, "impacts": impacts, "hidden": hidden}
+        given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
+        clocks, discrete = given.pop("clocks"), given.pop("discrete")
+        column(given["rhs"], "rhs", len(listed(given["states"])))  # before clocks are added
         given = with_added_states(clocks, discrete, given)
         n, rhs = len(listed(given["states"])), given.pop("rhs")
-        frame = cls(given["states"], field=[0] * n, parameters=parameters, time=time).definition
+        own = {name: given[name] for name in ("parameters", "time")}
+        frame = cls(given["states"], field=[0] * n, **own).definition
         entries = column(rhs, "rhs", n)
         known = ca.vertcat(frame.extended_states, frame.parameters)
         require_known(entries, known, "rhs", **frame.names)
@@ -218,10 +236,98 @@ class FilippovSystem:
         system.lifted = found.switches
         return system
 
+    @classmethod
+    def from_dae(
+        cls,
+        dae: Mapping[str, Any],
+        *,
+        parameters: Mapping[Any, float] | None = None,
+        **events: Any,
+    ) -> FilippovSystem:
+        """Read CasADi's dictionary of an ordinary differential equation, as its ``integrator`` takes it.
+
+        Parameters
+        ----------
+        dae : mapping
+            ``x`` and ``ode``, and ``t`` and ``p`` where there are any: SX, or MX that expand to SX. Entries of a
+            vector ``x`` are named x_0, x_1, ...
+        parameters : mapping, optional
+            Values of entries of ``p``, by name or symbol.
+        **events
+            As for ``from_expression``: stops, resets, ...
+
+        Returns
+        -------
+        FilippovSystem
+            With the switches of ``ode`` as surfaces.
+
+        Raises
+        ------
+        DefinitionError
+            Algebraic equations or other entries; MX that call a table or another Function that is no graph.
+        NotSmoothError
+            As ``from_expression``.
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, p = ca.MX.sym("x", 2), ca.MX.sym("mu")
+        >>> ode = ca.vertcat(x[1], -x[0] - p * ca.sign(x[1]))
+        >>> ns.FilippovSystem.from_dae({"x": x, "p": p, "ode": ode}, parameters={"mu": 0.1})
+        FilippovSystem(2 states: x_0, x_1; 1 surface: x_1; parameters: mu)
+        """
+        return cls.from_expression(**read_dae(dae, parameters), **events)
+
+    def holding(self, values: Mapping[Any, float]) -> FilippovSystem:
+        """Hold the discrete states at values: the system between two events, without stops and resets.
+
+        Functions of a point, such as :func:`classify` and :func:`find_equilibrium`, do this themselves, with
+        the values in the point. Portraits, two-folds and manifolds take the system that this returns.
+
+        Parameters
+        ----------
+        values : mapping
+            A number for each discrete state; keys are symbols or names.
+
+        Returns
+        -------
+        FilippovSystem
+            Of the other states.
+
+        Raises
+        ------
+        DefinitionError
+            Other names than those of the discrete states.
+        PointError
+            A value that the discrete state does not have.
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, q = ca.SX.sym("x"), ca.SX.sym("q")
+        >>> on = ns.Reset(x - 18, {q: 1}, -1, level=True, when=q == 0, name="on")
+        >>> off = ns.Reset(x - 22, {q: 0}, 1, level=True, when=q == 1, name="off")
+        >>> room = ns.FilippovSystem([x], field=[30 * q - x], discrete={q: (0, 1)}, resets=[on, off])
+        >>> room.holding({q: 1})
+        FilippovSystem(1 state: x; 0 surfaces)
+        >>> ns.find_equilibrium(room, [20.0, 1]).eigenvalues
+        array([-1.])
+        """
+        key = tuple(held_values(self.definition, values))
+
+        def made() -> FilippovSystem:
+            system = type(self).__new__(type(self))
+            system._adopt(with_values(self.definition, list(key)))
+            system.lifted = self.lifted
+            return system
+
+        return self.cached(("holding", key), made)
+
     def _adopt(self, definition: Definition) -> None:
         self.definition = definition
         self.stops, self.resets = definition.stops, definition.resets
-        self.impacts = definition.impacts
+        self.impacts, self.constraints = definition.impacts, definition.constraints
+        self.complementarity = definition.complementarity
         self.hidden = definition.hidden
         field, multipliers = definition.field, listed(definition.multipliers)
         self.nonlinear = tuple(not ca.is_linear(field, lam) for lam in multipliers)
@@ -263,7 +369,7 @@ class FilippovSystem:
         own = self.definition
         parts = (own.extended_states, own.parameters, own.multipliers, own.reactions)
         known = [one for part in parts for one in listed(part)]
-        single = len(self.entries) == 1 and not self.sets and not self.hidden
+        single = len(self.entries) == 1 and not (self.sets or self.hidden or self.complementarity)
         fields = {f"field {where}": self.field(mode) for mode, where in _SIDES} if single else {}
         for where, field in (fields or {"field": self.definition.field}).items():
             pairs = list(zip(self.state_names, listed(field), strict=False))[:_EQUATIONS_SHOWN]
@@ -272,7 +378,12 @@ class FilippovSystem:
             written += [f"and {more} more"] * (more > 0)
             rows.append((where, Markup("<br>".join(written))))
         for k, function in enumerate(listed(own.surfaces)[:_EQUATIONS_SHOWN]):
-            rows.append((f"surface h{k}", Markup(equation(symbol(f"h{k}"), function, known))))
+            name, what = f"h{k}", f"surface h{k}"
+            if k in self.half_lines:
+                name, what = "y", f"complementarity {self.surface_names[k]}"
+            if k in self.joints:
+                name, what = "g", f"constraint {self.constraints[self.joints.index(k)]}"
+            rows.append((what, Markup(equation(symbol(name), function, known))))
         rows += [("parameters", ", ".join(self.parameter_names))]
         rows += [("stops", ", ".join(n for n, _ in self.stops))]
         rows += [("resets", ", ".join(n for n, _ in self.resets))]
@@ -284,8 +395,9 @@ class FilippovSystem:
             f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
         ]
         names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
-        surfaces = len(self.entries) - len(self.sets)
-        if surfaces or not self.sets:
+        others = len(self.complementarity) + len(self.constraints)
+        surfaces = len(self.entries) - len(self.sets) - others
+        if surfaces or not (self.sets or others):
             parts.append(f"{surfaces} surface{'s' * (surfaces != 1)}{self._classes()}{names}")
         parts += [f"root |{name}|^{power:g}" for name, power in self.roots.items()]
         parts += [f"set of codimension {len(members)}" for members in self.sets]
@@ -295,11 +407,14 @@ class FilippovSystem:
             parts.append(f"time {self.definition.time}")
         parts += [f"stop {n!r}" for n, _ in self.stops] + [f"reset {n!r}" for n, _ in self.resets]
         parts += [f"impact {n!r}" for n in self.impacts]
+        parts += [f"complementarity {n!r}" for n in self.complementarity]
+        parts += [f"constraint {n!r}" for n in self.constraints]
         return f"FilippovSystem({'; '.join(parts)})"
 
     def _classes(self) -> str:
         """The classes of surfaces, for people, where one is not generic."""
-        own = [members[0] for members in self.entries if len(members) == 1]
+        others = (*self.half_lines, *self.joints)
+        own = [i for i, *more in self.entries if not more and i not in others]
         if len(own) > _CLASSES_SHOWN:
             return ""
         words = [self.switching(i).name for i in own]
@@ -329,7 +444,8 @@ class FilippovSystem:
         {'h0': 0.5}
         """
         d = self.definition
-        found = roots_of(d.field, d.surfaces, self.extended_states)
+        surfaces = d.surfaces[: min((*self.half_lines, self.surface_count))]
+        found = roots_of(d.field, surfaces, self.extended_states)
         return {f"h{self.entry_of(i)}": power for i, power in sorted(found.items())}
 
     @cached_property
@@ -372,10 +488,31 @@ class FilippovSystem:
         widths = listed(self.definition.hysteresis)
         return tuple(i for i, width in enumerate(widths) if not width.is_zero())
 
+    @property
+    def half_lines(self) -> tuple[int, ...]:
+        """Functions y of complementarity conditions, among the switching functions."""
+        return self.definition.half_lines
+
+    @cached_property
+    def algebraic(self) -> tuple[int, ...]:
+        """Those of them that hold a multiplier: relative degree 0."""
+        d, states = self.definition, self.extended_states
+        own = d.multipliers[list(self.half_lines)]
+        return tuple(i for i in self.half_lines if holds(d.surfaces[i], own, states))
+
+    @cached_property
+    def joints(self) -> tuple[int, ...]:
+        """Functions of constraints, the last of the switching functions."""
+        m = self.surface_count
+        return tuple(range(m - len(self.constraints), m))
+
     @cached_property
     def surface_names(self) -> tuple[str, ...]:
-        """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set."""
-        return tuple(f"h{k}" for k, members in enumerate(self.entries) for _ in members)
+        """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set, or as given."""
+        names = [f"h{k}" for k, members in enumerate(self.entries) for _ in members]
+        for i, name in zip(self.half_lines, self.complementarity, strict=True):
+            names[i] = name
+        return tuple(names)
 
     def entry_of(self, function: int) -> int:
         """Number, in names and modes, of the surface or set of a switching ``function`` (index)."""
@@ -384,7 +521,9 @@ class FilippovSystem:
     @cached_property
     def coupled(self) -> bool:
         """Whether multipliers are solved for together: several, a nonlinear one, or reactions."""
-        return self.surface_count > 1 or any(self.nonlinear) or bool(self.impacts)
+        several = self.surface_count > 1 or bool(self.impacts) or bool(self.complementarity)
+        several = several or bool(self.constraints)
+        return several or any(self.nonlinear)
 
     def spelled(self, mode: str) -> str:
         """Shorten a ``mode`` to one letter for each surface, set and impact."""
@@ -429,9 +568,15 @@ class FilippovSystem:
         """The modes of one letter per surface in which at most one surface slides."""
         result = [""]
         for members in self.entries:
-            letters = "+-s" if len(members) == 1 else "*s"
+            letters = "*s" if len(members) > 1 else self._letters(members[0])
             result = [m + c for m in result for c in letters if not (c == "s" and "s" in m)]
         return tuple(result)
+
+    def _letters(self, i: int) -> str:
+        """Letters of a switching function; in runs those of sets are more."""
+        if i in self.joints:
+            return "s"
+        return "*sbli" if i in self.set_of else "oc" if i in self.half_lines else "+-s"
 
     def parse_mode(self, mode: str) -> tuple[int, ...]:
         """Turn the letters of the surfaces in a ``mode`` into signs: ``+`` 1, ``-`` -1, ``s`` 0.
@@ -449,6 +594,7 @@ class FilippovSystem:
         """Turn the letters of surfaces and impacts in a ``mode`` into signs.
 
         ``+`` and ``o`` are 1, ``-`` is -1, ``s`` and ``c`` are 0. Impacts without a letter are open.
+        Complementarity conditions come after the surfaces and before the impacts.
 
         Raises
         ------
@@ -461,29 +607,29 @@ class FilippovSystem:
         m, c, wide = self.surface_count, len(self.impacts), self.widened(mode)
         whole = wide + "o" * c if isinstance(wide, str) and len(wide) == m else wide
         fits = isinstance(whole, str) and len(whole) == m + c and not set(whole[m:]) - set("oc")
-        if not fits or any(
-            letter not in ("*sbli" if i in self.set_of else "+-s")
-            for i, letter in enumerate(whole[:m])
-        ):
+        if not fits or any(letter not in self._letters(i) for i, letter in enumerate(whole[:m])):
             raise DefinitionError(self._letters_expected(mode))
         return tuple(letters[letter] for letter in whole)
 
     def require_mode(self, mode: object) -> None:
         """Refuse a ``mode`` without one letter for each surface and set, or with letters of runs."""
-        known = ["*s" if len(members) > 1 else "+-s" for members in self.entries]
+        known = ["*s" if more else self._letters(i) for i, *more in self.entries]
         whole = [*known, *["oc"] * len(self.impacts)]
         fits = isinstance(mode, str) and len(mode) in (len(known), len(whole))
         if not fits or any(a not in b for a, b in zip(str(mode), whole, strict=False)):
             raise DefinitionError(self._letters_expected(mode))
 
     def _letters_expected(self, mode: object) -> str:
-        m, c, k = len(self.entries), len(self.impacts), len(self.sets)
+        m, c, k, y = len(self.entries), len(self.impacts), len(self.sets), len(self.complementarity)
         kinds = "each of + - s, one per surface"
         if k:
             kinds = "+ - s for a surface and * s for a set, in their order"
+        if y:
+            kinds += ", and o c, one per complementarity condition"
         contacts = f", and {c}, each of o c, one per impact" if c else ""
         set_letter = ", '*' is off a set" if k else ""
         contact_letters = "; 'o' is an open contact, 'c' a closed one" if c else ""
+        contact_letters += "; 'o' has the multiplier 0, 'c' has y = 0" if y else ""
         return (
             f"mode: expected {m} letter(s), {kinds}{contacts}, received {mode!r}. '+' is h > 0, '-' is "
             f"h < 0, 's' is sliding{set_letter}{contact_letters}."
@@ -544,10 +690,17 @@ class FilippovSystem:
         ('velocity continuous', 0)
         """
         i = self.surface_index(surface)
+        if i in self.half_lines:
+            name = self.surface_names[i]
+            raise DefinitionError(
+                f"surface {i} is the complementarity condition {name!r}, which has one side. Give the index of a "
+                "surface."
+            )
         if mode is not None:
             self.require_mode(mode)
-        if i in (*self.set_of, *self.remembering):
+        if i in (*self.set_of, *self.remembering, *self.joints):
             what = "as a set" if i in self.set_of else "with hysteresis"
+            what = "as a constraint" if i in self.joints else what
             return Switching("generic", None, None, f"its definition {what}")
         values = None if parameters is None else tuple(self.parameter_vector(parameters).tolist())
         key = ("switching", i, mode, values)
@@ -570,7 +723,9 @@ class FilippovSystem:
         signs = self.parse_mode(mode)
         if 0 in signs or 2 in signs:
             raise DefinitionError(f"field: expected a mode of + and -, received {mode!r}.")
-        return self.field_with(ca.DM(list(signs)))
+        return self.field_with(
+            ca.DM([0 if i in self.half_lines else s for i, s in enumerate(signs)])
+        )
 
     def field_with(self, multipliers: Any, reactions: Any = None) -> ca.SX:
         """Right-hand side for ``multipliers`` (values or expressions), time row included.
@@ -744,8 +899,14 @@ class FilippovSystem:
         return np.array([*values, moment]) if self.time_dependent else values
 
 
-def require_system(value: Any, sets: bool = False, hysteresis: bool = False) -> None:
-    """Refuse all but a FilippovSystem; ``sets`` allows vector multipliers, ``hysteresis`` relays with it."""
+def require_system(
+    value: Any,
+    sets: bool = False,
+    hysteresis: bool = False,
+    complementarity: bool = False,
+    joints: bool = False,
+) -> None:
+    """Refuse all but a FilippovSystem; flags allow vector multipliers, relays, complementarity and constraints."""
     if not isinstance(value, FilippovSystem):
         raise DefinitionError(
             f"system: expected a FilippovSystem, received {value!r} ({type(value).__name__}). "
@@ -763,6 +924,23 @@ def require_system(value: Any, sets: bool = False, hysteresis: bool = False) -> 
             f"system: {value!r} has elements with hysteresis, which this function does not support. They "
             "work in simulate, ensemble and outcomes."
         )
+    if value.complementarity and not complementarity:
+        raise DefinitionError(
+            f"system: {value!r} has complementarity conditions, which this function does not support. They work "
+            "in simulate, ensemble and outcomes."
+        )
+    if value.constraints and not joints:
+        raise DefinitionError(
+            f"system: {value!r} has constraints, which this function does not support. They work in simulate, "
+            "ensemble, outcomes and sensitivity. Write the motion in coordinates that satisfy them."
+        )
+
+
+def parted(system: FilippovSystem, point: ArrayLike) -> tuple[Array, dict[str, float]]:
+    """Split a state (n,) into the states that move and the values of the discrete ones."""
+    x, count = state_values(system.state_names, point), len(system.definition.discrete)
+    values = dict(zip(system.state_names[-count:], x[-count:].tolist(), strict=True))
+    return x[:-count], values
 
 
 def require_plain(system: FilippovSystem, what: str) -> None:
@@ -771,6 +949,17 @@ def require_plain(system: FilippovSystem, what: str) -> None:
         raise DefinitionError(
             f"system: {system!r} has conditions of events, when=, level=, or discrete states, which {what} "
             "does not support. Give guards that are passed."
+        )
+
+
+def require_continuous(system: FilippovSystem, what: str) -> None:
+    """Refuse a system with discrete states."""
+    count = len(system.definition.discrete)
+    if count:
+        values = ", ".join(f"{name!r}: 0" for name in system.state_names[-count:])
+        raise DefinitionError(
+            f"system: {system!r} has discrete states, which {what} does not support. Hold them, as in "
+            f"system.holding({{{values}}})."
         )
 
 

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ..cache import Content
+from ..definition.conditions import decides
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
 from ..expressions.graph import evaluate, instructions, operation
@@ -83,9 +84,15 @@ class AtEvent:
 
 
 def event_map(
-    system: FilippovSystem, mode: str, kind: str, element: int, side: int, letters: str = ""
+    system: FilippovSystem,
+    mode: str,
+    kind: str,
+    element: int,
+    side: int,
+    letters: str = "",
+    atom: int = -1,
 ) -> EventMap:
-    """The map of an event of a mode; built once."""
+    """The map of an event of a mode, with the function of an ``atom`` of its condition; built once."""
     if system.sets:
         return instant_map(system, system.widened(mode), kind, element, letters)
 
@@ -94,13 +101,14 @@ def event_map(
         for row, guard in enumerate(of_mode.guards):
             if guard.ends(kind, element, side):
                 after = _after(system, mode, guard, letters)
-                return EventMap(system, of_mode.states, of_mode.functions[row], guard, after)
+                function = of_mode.functions[row] if atom < 0 else system.definition.guards[atom]
+                return EventMap(system, of_mode.states, function, guard, after)
         raise DegenerateError(
             f"leg in mode {mode!r}: its {kind} is no zero of a function, as where a branch of hidden "
             "sliding ends, and has no derivative. End the run before it."
         )
 
-    return system.cached(("event map", mode, kind, element, side, letters), build)
+    return system.cached(("event map", mode, kind, element, side, letters, atom), build)
 
 
 def instant_map(
@@ -147,26 +155,56 @@ def _after(system: FilippovSystem, mode: str, guard: Guard, letters: str) -> ca.
     return None
 
 
+@dataclass(frozen=True)
+class Struck:
+    """Who may take part in the impact of a contact: friction that is carried, contacts that are closed."""
+
+    carried: tuple[int, ...]
+    closed: tuple[int, ...]
+
+    def choices(self, mode: str) -> list[str]:
+        """Letters of each, the present ones of friction and contacts that take an impulse first."""
+        friction = [mode[i] + "".join(c for c in "s+-" if c != mode[i]) for i in self.carried]
+        return [*friction, *["co"] * len(self.closed)]
+
+
+def struck_by(system: FilippovSystem, mode: str, contact: int) -> Struck:
+    """Who may take part in an impact."""
+    coupled, m = coupled_of(system), system.surface_count
+    signs = system.parse_letters(mode)
+    closed = [j for j in range(len(system.impacts)) if not signs[m + j] and j != contact]
+    carried = [i for i in range(m) if any(j in (contact, *closed) for j in coupled.carriers[i])]
+    return Struck(tuple(carried), tuple(closed))
+
+
 def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -> ca.SX:
     """The state after the impulses at a gap that closes (``contacts.c``)."""
-    # Contacts that are closed take part with the rate zero; friction on them acts with the impulse
-    # in the same proportion as with the reaction, and ``letters`` say to which side.
+    # Contacts that are closed take part with the rate zero, if ``letters`` say so, which also say to which side
+    # friction acts, with the impulse in the same proportion as with the reaction.
     coupled, m, d = coupled_of(system), system.surface_count, system.definition
-    signs = system.parse_letters(mode)
-    taking = [contact, *[j for j in range(len(system.impacts)) if not signs[m + j]]]
-    carried = [i for i in range(m) if any(j in taking for j in coupled.carriers[i])]
-    held = dict(zip(carried, letters or [mode[i] for i in carried], strict=True))
+    others = struck_by(system, mode, contact)
+    carried = others.carried
+    letters = letters or "".join(own[0] for own in others.choices(mode))
+    takes = zip(others.closed, letters[len(carried) :], strict=True)
+    taking = [contact, *[j for j, letter in takes if letter == "c"]]
+    held = dict(zip(carried, letters, strict=False))
     numbers = ca.SX([{"+": 1.0, "-": -1.0}.get(held.get(i, mode[i]), 0.0) for i in range(m)])
-    stuck = [i for i in carried if held[i] == "s"]
-    every = [*stuck, *[m + j for j in taking]]
+    kept = [*system.joints, *[i for i in carried if held[i] == "s"]]
+    every = [*kept, *[m + j for j in taking]]
     columns = ca.jacobian(coupled.field, coupled.symbols_of(every))
     columns = ca.substitute(columns, coupled.multipliers, numbers) if m else columns
-    kept = ca.vertcat(d.surfaces, d.gap_rates)
-    gradient = ca.jacobian(kept, system.extended_states)
-    wanted = [-d.surfaces[i] for i in stuck]
-    wanted += [-(1 + (d.restitutions[j] if j == contact else 0)) * d.gap_rates[j] for j in taking]
-    slope = ca.mtimes(gradient[every, :], columns)
-    impulses = solved(slope, ca.vertcat(*wanted))
+    own = [[d.surfaces[i], *coupled.lower[i]][-1] for i in kept]
+    rates = ca.vertcat(*own, d.gap_rates[taking])
+    slope = ca.mtimes(ca.jacobian(rates, system.extended_states), columns)
+    back, k = d.restitutions[taking], len(kept)
+    if d.impact_law == "poisson":  # what is kept by friction or joints is so in both parts
+        impulses = (1 + back) * solved(slope, -rates)[k:]
+        if k:
+            rest = -rates[:k] - ca.mtimes(slope[:k, k:], impulses)
+            impulses = ca.vertcat(solved(slope[:k, :k], rest), impulses)
+    else:
+        back = ca.vertcat(ca.SX.zeros(k), back[0], ca.SX.zeros(len(taking) - 1))
+        impulses = solved(slope, -(1 + back) * rates)
     return ca.densify(system.extended_states + ca.mtimes(columns, impulses))
 
 
@@ -180,14 +218,39 @@ def surface_map(system: FilippovSystem, surface: int) -> EventMap:
     return system.cached(("surface map", surface), build)
 
 
-def atoms_at(system: FilippovSystem, kind: str, element: int, x: Array, p: Array) -> list[float]:
+def atoms_at(
+    system: FilippovSystem, kind: str, element: int, x: Array, p: Array
+) -> dict[int, float]:
     """Values of the functions that decide when a stop or reset is due and that move along a motion."""
     d = system.definition
     rule = d.rules[element if kind == "stop" else len(d.stops) + element]
     own = {code // 8 for tree in rule.located for code in tree if code >= 0}
     atoms = [k for k, way in enumerate(d.located) if k in own and way != UNWATCHED]
     build = lambda: [d.guards[k] for k in atoms]
-    return _values_at(system, ("atoms of", kind, element), build, x, p)
+    values = _values_at(system, ("atoms of", kind, element), build, x, p)
+    return dict(zip(atoms, values, strict=True))
+
+
+def atom_of(system: FilippovSystem, guard: Guard) -> int:
+    """Index of the function of a guard of an event among those of all conditions."""
+    before = {"reset": len(system.stops), "atom": len(system.stops) + len(system.resets)}
+    return guard.element + before.get(guard.kind, 0)
+
+
+def is_due_at(system: FilippovSystem, guard: Guard, x: Array, p: Array) -> bool:
+    """Whether an event becomes due, or ceases to be, where a function of its condition passes zero at a state."""
+    d = system.definition
+    if d.plain:
+        return True
+    i = atom_of(system, guard)
+    build = lambda: [*ca.vertsplit(d.guards), *ca.vertsplit(d.whens)]
+    values = _values_at(system, ("conditions",), build, x, p)
+    count = d.guards.numel()
+    sides = [(v > 0.0) - (v < 0.0) for v in values[:count]]
+    rules = zip(d.rules, values[count:], strict=True)
+    return any(
+        (when != 0.0 or rule.when is not None) and decides(rule, i, sides) for rule, when in rules
+    )
 
 
 def choices_at(

@@ -182,7 +182,7 @@ def _require_first_degree(system: FilippovSystem, mode: str) -> None:
     if 0 not in letters:
         return
     for i, lower in enumerate(raised_of(system).lower):
-        if lower and letters[i] == 0:
+        if lower and letters[i] == 0 and i not in system.joints:
             raise DegenerateError(
                 f"Derivatives of rest on 'h{i}', whose multiplier enters the derivative "
                 f"{len(lower) + 1} of its function first, are not implemented. End the run before it rests, "

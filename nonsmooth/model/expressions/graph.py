@@ -201,7 +201,26 @@ def reached(
     return sorted(found)
 
 
-def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str) -> None:
+#: What to write in place of a switch in a field, and in other functions.
+IN_A_FIELD = (
+    "Let FilippovSystem.from_expression find the switches of a field, or declare each as a surface: give the smooth "
+    "pieces as above= and below= with surface= the argument whose sign decides, or write sign(h) as a multiplier "
+    "lam with surfaces=[h], multipliers=[lam] (fabs(h) is lam*h, fmax(a, b) is (a + b + lam*(a - b))/2 with h = a - b)."
+)
+IN_A_GUARD = (
+    "fmin and fmax of smooth functions are guards too; other choices are conditions, such as "
+    "casadi.logic_and(a > 0, b > 0)."
+)
+IN_A_SURFACE = (
+    "Make each smooth piece a surface with a multiplier of its own, or let FilippovSystem.from_expression find the "
+    "switches of the field."
+)
+IN_A_GAP = "Give each smooth piece of the gap an Impact of its own."
+
+
+def require_smooth(
+    expression: ca.SX, variables: ca.SX, others: ca.SX, what: str, advice: str = IN_A_FIELD
+) -> None:
     """Refuse an expression that is not smooth in ``variables``; in ``others`` it need not be."""
     nodes, _ = instructions([variables, others], [expression])
     moving = depends_on(nodes, [True, False])
@@ -211,12 +230,7 @@ def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str
         if found := NOT_SMOOTH.get(node.op) or _beside_zero(node, nodes):
             raise NotSmoothError(
                 f"{what}: expected an expression with derivatives of every order, received one "
-                f"with {found} of the states. Let FilippovSystem.from_expression find the switches of a field, or "
-                "declare each as a surface: "
-                "give the smooth pieces as above= and below= with surface= the argument whose "
-                "sign decides, or write sign(h) as a multiplier lam with surfaces=[h], "
-                "multipliers=[lam] (fabs(h) is lam*h, fmax(a, b) is (a + b + lam*(a - b))/2 with "
-                "h = a - b)."
+                f"with {found} of the states. {advice}"
             )
 
 

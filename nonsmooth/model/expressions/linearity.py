@@ -42,17 +42,15 @@ def linearity(
 ) -> Linearity:
     """Determine which parts of a system are affine."""
     outputs = [field, guards, layer, factors]
-    (rows, guard_rows, *others), (free_rows, *_) = (
-        _bent(outputs, x, unknowns, time, moves) for moves in (True, False)
-    )
-    bent_guards = bent(guards, x, time)
+    every = _bent(outputs, x, unknowns, time, True)
+    (rows, guard_rows, *_), free_rows = every, _bent(outputs, x, unknowns, time, False)[0]
     return Linearity(
-        everywhere=smooth and not any([*rows, *guard_rows, *(b for own in others for b in own)]),
-        free=smooth and not any(free_rows + bent_guards),
+        everywhere=smooth and not any(b for own in every for b in own),
+        free=smooth and not any(free_rows + guard_rows),
         bent_rows=rows if smooth else [True] * field.numel(),
         bent_free_rows=free_rows if smooth else [True] * field.numel(),
-        bent_guards=bent_guards,
-        curved_guards=bent(guards, x),
+        bent_guards=guard_rows,
+        curved_guards=_bent([guards], x, unknowns, _NO_TIME, True)[0],
     )
 
 

@@ -53,9 +53,11 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     factors, unknowns = [ca.SX(1)] * system.surface_count, [*ca.vertsplit(lam)][: lam.numel()]
     known, variables = ca.vertcat(p, lam), ca.vertcat(x, reactions)
     ones = [ca.SX(1)] * system.surface_count
-    roots = gate_roots(plain, system.definition.surfaces, x, ones)[1]
+    roots = gate_roots(plain, _surfaces(system), x, ones)[1]
     columns = ca.jacobian(plain, lam)
     for members in system.entries:  # a set has one factor
+        if members[0] in (*system.half_lines, *system.joints):
+            continue
         places = [(row, i) for i in members for row in columns[:, i].sparsity().row()]
         entries = [e for i in members for e in columns[:, i].nonzeros()]
         column = ca.vertcat(*entries)
@@ -115,13 +117,18 @@ class Coupled:
         extra = [n for n, scaled in zip(unknowns, self.scaled, strict=True) if scaled]
         self.moving = ca.vertcat(x, lam, d.reactions, *extra)
         self._symbols = [self.moving, system.parameter_symbols]
-        self.layer = ca.densify(ca.jtimes(ca.vertcat(d.surfaces, d.gap_rates), x, field))
+        h = ca.SX(d.surfaces)
+        if system.algebraic:
+            h = ca.substitute(h, d.multipliers, lam)
+        self.layer = ca.densify(ca.jtimes(ca.vertcat(h, d.gap_rates), x, field))
+        for i in system.algebraic:
+            self.layer[i] = h[i]
         #: Of each surface, derivatives that vanish while it rests; the layer has the next one.
         self.lower: list[tuple[ca.SX, ...]] = [()] * self._surfaces
-        if by_degree:
-            for i, found in enumerate(self.degrees(field, lam, unknowns)):
+        degrees = self.degrees(field, lam, unknowns) if by_degree or system.joints else []
+        for i, found in enumerate(degrees):
+            if by_degree or i in system.joints:
                 self.lower[i], self.layer[i] = found.lower, found.row
-        h = ca.SX(d.surfaces)
         for i in system.remembering:  # h at multiplier +1, the further function at -1
             self.lower[i] = (h[i] - d.hysteresis[i],)
             h[i] -= (1 - lam[i]) / 2 * d.hysteresis[i]
@@ -141,7 +148,8 @@ class Coupled:
 
     def _is_continuous(self, surface: int, column: Sequence[ca.SX]) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""
-        if surface in (*self.system.set_of, *self.system.remembering):
+        special = (*self.system.set_of, *self.system.remembering, *self.system.half_lines)
+        if surface in (*special, *self.system.joints):
             return False
         d, x = self.system.definition, self.system.extended_states
         pieces = [e for e in column if not e.is_zero()]
@@ -153,12 +161,13 @@ class Coupled:
         self, field: ca.SX, lam: ca.SX, factors: list[ca.SX], unknowns: list[ca.SX]
     ) -> ca.SX:
         """The field in which roots of switching functions are zero on their surfaces, where lambda_i is."""
-        d, x = self.system.definition, self.system.extended_states
+        x = self.system.extended_states
         gates = ca.SX.sym("gate", self._surfaces)
-        powers = roots_of(field, d.surfaces, x)
-        field = gate_roots(field, d.surfaces, x, ca.vertsplit(gates))[0]
+        surfaces = _surfaces(self.system)
+        powers = roots_of(field, surfaces, x)
+        field = gate_roots(field, surfaces, x, ca.vertsplit(gates))[0]
         for i, factor in enumerate(factors):
-            factors[i] = gate_roots(factor, d.surfaces, x, ca.vertsplit(gates))[0]
+            factors[i] = gate_roots(factor, surfaces, x, ca.vertsplit(gates))[0]
         for i, power in powers.items():
             if i in self.system.set_of:
                 continue
@@ -176,11 +185,16 @@ class Coupled:
         x, d, found = self.system.extended_states, self.system.definition, list[Degree]()
         scaled = [e for e, own in zip(unknowns, self.scaled, strict=True) if own]
         every = [*ca.vertsplit(lam), *scaled, *ca.vertsplit(d.reactions)]
+        joints = list(self.system.joints)
         for i in range(self._surfaces):
             found.append(Degree((), self.layer[i]))
+            if i in joints:
+                own, others = lam[joints], ca.vertcat(*every[: joints[0]], *every[self._surfaces :])
+                found[i] = degree_of(d.surfaces[i], self.layer[i], own, others, x, field)
+                continue
             if self.continuous[i] or self.system.nonlinear[i] or i in self.system.set_of:
                 continue
-            if i in self.system.remembering:
+            if i in (*self.system.remembering, *self.system.half_lines):
                 continue
             own = ca.vertcat(lam[i], unknowns[i]) if self.scaled[i] else lam[i]
             hashes = {e.element_hash() for e in ca.vertsplit(own)}
@@ -191,8 +205,8 @@ class Coupled:
     @property
     def kept(self) -> ca.SX:
         """What closed contacts and sliding surfaces keep at zero: h, gaps, their rates, lower derivatives."""
-        d = self.system.definition
-        return ca.vertcat(d.surfaces, d.gaps, d.gap_rates, *[e for own in self.lower for e in own])
+        d, lower = self.system.definition, [e for own in self.lower for e in own]
+        return ca.vertcat(d.open_surfaces, d.gaps, d.gap_rates, *lower)
 
     # shape -------------------------------------------------------------------------------------
 
@@ -200,7 +214,7 @@ class Coupled:
         """Multipliers that are known in a mode: +1 and -1; 0 for the others and open contacts."""
         signs = np.array(self.system.parse_letters(mode), float)
         signs[self._surfaces :] = 0.0
-        signs[list(self.system.set_of)] = 0.0
+        signs[[*self.system.set_of, *self.system.half_lines]] = 0.0
         return signs
 
     def known_multipliers(self, mode: str, x: Array, unknowns: Array, p: Array) -> Array:
@@ -244,11 +258,14 @@ class Coupled:
         result, contacts = list[Guard](), len(self.system.entries)
         for i, sign in enumerate(self.system.parse_letters(mode)):
             j = i - self._surfaces
-            if j >= 0:
+            if i in self.system.half_lines:
+                kind, entry = "surface" if sign else "release", self.system.entry_of(i)
+                result.append(Guard(kind, i, sign, entry))
+            elif j >= 0:
                 result.append(Guard("impact" if sign else "release", j, sign, contacts + j))
             elif sign:
                 result.append(Guard("surface", i, sign, self.system.entry_of(i)))
-            else:
+            elif i not in self.system.joints:
                 result += [Guard("exit", i, side, self.system.entry_of(i)) for side in (1, -1)]
         return (*result, *event_guards(self.system))
 
@@ -347,8 +364,12 @@ class Coupled:
         n, m, places = self.system.extended_dimension, self._surfaces, self.moving.numel()
         held: dict[int, tuple[float, ...]] = dict.fromkeys(range(n + m, places), (0.0,))
         for i in range(m):
-            signs = () if i in self.system.set_of else (1.0, -1.0)
+            signs: tuple[float, ...] = () if i in self.system.set_of else (1.0, -1.0)
+            if i in self.system.half_lines:
+                signs = (0.0,)
             held[n + i] = (*signs, 0.0) if self.scaled[i] else signs
+        for i in self.system.joints:
+            del held[n + i]
         return held
 
     @property
@@ -388,6 +409,11 @@ class Coupled:
         return self._evaluator(self.outputs)
 
 
+def _surfaces(system: FilippovSystem) -> ca.SX:
+    """The switching functions of surfaces and sets, before those of complementarity conditions."""
+    return system.definition.surfaces[: min((*system.half_lines, system.surface_count))]
+
+
 def coupled_of(system: FilippovSystem) -> Coupled:
     """Return the program of all modes of a system, built once."""
     return system.cached("coupled", lambda: Coupled(system))
@@ -401,7 +427,7 @@ def raised_of(system: FilippovSystem) -> Coupled:
         unknowns = [plain.unknown(i) for i in range(system.surface_count)]
         degrees = plain.degrees(plain.field, plain.multipliers, unknowns)
         d, ones = system.definition, [ca.SX(1)] * system.surface_count
-        roots = gate_roots(d.field, d.surfaces, system.extended_states, ones)[1]
+        roots = gate_roots(d.field, _surfaces(system), system.extended_states, ones)[1]
         raised = bool(roots) or any(own.lower for own in degrees)
         return Coupled(system, by_degree=True) if raised else plain
 

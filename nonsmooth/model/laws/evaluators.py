@@ -63,7 +63,7 @@ class Surfaces:
 
         def build() -> Sequence[ca.SX]:
             d = system.definition
-            h = ca.densify(ca.vertcat(d.surfaces, d.gaps, d.gap_rates))
+            h = ca.densify(ca.vertcat(d.open_surfaces, d.gaps, d.gap_rates))
             return [h, ca.jacobian(h, system.extended_states)]
 
         self.evaluator = Evaluator(system.function("surfaces", build))

@@ -67,6 +67,8 @@ class Solved:
                 functions.append(sign * heights[i])
             elif i >= m:
                 functions.append(self.values[sliding.index(i)])
+            elif i in self.system.joints:
+                continue
             elif i not in sliding:
                 functions += [-layer[i], layer[i]]
             else:
@@ -93,7 +95,7 @@ def solved(matrix: ca.SX, right: ca.SX) -> ca.SX:
 
 def explicit(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode as a field of the states, for any system; built once."""
-    require_system(system)
+    require_system(system, joints=True)
     if not system.coupled:
         return motion(system, mode)
 

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, Evaluator, FilippovSystem, Guard
-from ...model.derivatives.variational import guarded_field, variational_field
+from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import finite_return_map
-from ..runs.guards import LegGuards, watch
+from ..runs.guards import CONDITIONS, LegGuards, is_met, watch
 from ..runs.legs import Leg, surface_of
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
@@ -159,7 +159,7 @@ class _Tests:
                     state = at.by_leg[i].end
                     values = guard_values(self.system, self.legs[i].mode)(state, p)[1][:, 0]
                 found += [(condition, float(values[k])) for k, condition in others]
-            found += _interior(self.inside[i], rows)
+            found += _interior(self.inside[i], self.guards.fields[i], rows, p)
         return found
 
 
@@ -207,14 +207,15 @@ def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
 
 
 def _interior(
-    guards: Sequence[tuple[Condition, Guard]], rows: Array
+    guards: Sequence[tuple[Condition, Guard]], field: GuardedField, rows: Array, p: Array
 ) -> list[tuple[Condition, float]]:
-    """Smallest minimum of each guard inside a leg."""
+    """Smallest minimum of each guard inside a leg, where something happens at its zero."""
     least: dict[int, float] = {}
-    for number, _, value, bend in rows[:, :4].tolist():
+    for row in rows:
+        number, _, value, bend = row[:4].tolist()
         k = int(number)
         guard = guards[k][1]
-        if bend > 0.0 or (bend and guard.kind in ("stop", "reset")):
+        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_met(field, row, p):
             value = _signed(guard, value)
             least[k] = min(value, least.get(k, np.inf))
     return [(guards[k][0], value) for k, value in least.items()]

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...local.checks import parameter_index, require_autonomous, require_linear
+from ...local.discrete_states import with_discrete_states_held
 from ...local.point.surface_point import SIDES, LocalSurface, Side, side_index, surface_at
 from ...local.read_only import ReadOnly
 from ...local.searches.boundary_equilibria import boundary_equilibrium_of
@@ -346,6 +347,7 @@ def _leave(curve: Equilibria, u: Array, inward: float | Array) -> Departure | No
     return depart(curve, u, direction, _START, direction)
 
 
+@with_discrete_states_held
 def continue_equilibrium(
     system: FilippovSystem,
     near: ArrayLike,

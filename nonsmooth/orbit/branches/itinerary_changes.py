@@ -107,6 +107,9 @@ def rotated(before: ChangedItinerary, k: int, p: Array) -> ChangedItinerary:
     return ChangedItinerary(whole, u, (*before.origin[k:], *before.origin[:k]))
 
 
+#: Jump of the state at an event that is touched, relative to its size, below which there is none.
+_NEIGHBOURS = 1e-5
+
 #: Sine of the angle at which a field is tangent to a surface.
 _TANGENT = 1e-7
 
@@ -153,8 +156,8 @@ def _grazed(
 ) -> str:
     if guard.kind == "impact":
         return "impact grazing"
-    if guard.kind in ("reset", "stop"):
-        return f"grazing of a {guard.kind}"
+    if guard.kind in ("reset", "stop", "atom"):
+        return f"grazing of a {'stop' if guard.kind == 'stop' else 'reset'}"
     if guard.kind == "exit":
         return "adding-sliding"
     if guard.kind == "release":
@@ -287,8 +290,9 @@ def _added(
         free = with_letter(leg.mode, guard.element, "+" if guard.side > 0 else "-")
         return [leg_between(system, leg.mode, free), leg_between(system, free, leg.mode)], [y, y]
     if guard.kind in ("impact", "reset"):
-        hit = Leg(leg.mode, guard.kind, guard.element, guard.side)
-        return [hit], [hit.at_end(system, y, p).after]
+        hit = Leg(leg.mode, guard.kind, guard.element, guard.side, discrete=leg.discrete)
+        after = hit.at_end(system, y, p).after
+        return ([hit], [after]) if _stays(y, after) else None
     return None
 
 
@@ -330,8 +334,17 @@ def _shorter(
     return swapped(editor, i) if kind == "corner" and at.what == "duration" else None
 
 
-def _missed(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary:
-    """An impact or reset that is only touched, left out."""
+def _stays(y: Array, after: Array) -> bool:
+    """Whether an event that is touched leaves the state, so that orbits with and without it are neighbours."""
+    return bool(np.abs(after - y[: after.size]).max() <= _NEIGHBOURS * (1.0 + np.abs(y).max()))
+
+
+def _missed(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | None:
+    """An impact or reset that is only touched, left out; None where it moves the state."""
+    leg, (starts, durations) = before.problem.legs[i], before.problem.split(before.u)
+    flow = integrate_leg(before.problem.system, leg, starts[i], float(durations[i]), p)
+    if not _stays(flow.end, leg.at_end(before.problem.system, flow.end, p).after):
+        return None
     count = len(before.problem.legs)
     turned = rotated(before, i, p) if i + 1 == count > 1 else before
     i = 0 if turned is not before else i

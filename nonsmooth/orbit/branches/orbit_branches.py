@@ -37,7 +37,7 @@ from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, elimi
 from ..periodic.multipliers import leg_maps, return_map
 from ..periodic.orbit import PeriodicOrbit, faults_of, named
 from ..periodic.symmetry import halves, mirrored, prime_period, require_symmetric
-from ..runs.legs import Leg, integrate_leg
+from ..runs.legs import Leg, integrate_leg, shown_itinerary
 from .branch import (
     Branch,
     BranchCurve,
@@ -325,10 +325,11 @@ class OrbitCurve(OrbitEquations):
         kind = kind_of(self.problem, conditions[0], at, p)
         beyond = self._edited(kind, conditions, u, p)
         if beyond is None or not beyond.test:
-            itinerary = "" if beyond is None else _itinerary(beyond.problem)
+            legs = () if beyond is None else beyond.problem.legs
+            itinerary = shown_itinerary(self.system, legs)
             side = far_side(self.problem, kind, conditions[0], at, p, itinerary, beyond)
             return self._event(kind, self, zero.point, conditions[0].name, side)
-        itinerary = _itinerary(beyond.problem)
+        itinerary = shown_itinerary(self.system, beyond.problem.legs)
         curve = self.with_problem(beyond.problem, beyond.u)
         point = curve.located(np.append(beyond.u, u[-len(self.free) :]), beyond.test)
         if point is None:
@@ -460,10 +461,6 @@ class OrbitCurve(OrbitEquations):
                     step = (found - u) / self.scale
                     return Departure(self, [u, found], step / np.linalg.norm(step))
         return None
-
-
-def _itinerary(problem: BoundaryProblem) -> str:
-    return " ".join(leg.mode or "o" for leg in problem.legs)
 
 
 # Smooth bifurcations ------------------------------------------------------------------------------

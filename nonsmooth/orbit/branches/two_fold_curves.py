@@ -24,6 +24,7 @@ from ...model import (
     FilippovSystem,
     Parameters,
     PointError,
+    require_continuous,
     require_system,
 )
 from ...solvers.continuation import Curve, trace
@@ -106,6 +107,7 @@ def trace_two_folds(
     [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
     require_system(system)
+    require_continuous(system, "trace_two_folds")
     name, numbers = str(over), _values(values)
     state = name in system.state_names
     if not state and name not in system.parameter_names:

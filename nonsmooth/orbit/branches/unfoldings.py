@@ -35,7 +35,7 @@ _VERDICTS = {
     "switching-sliding": _SMOOTH,
     "adding-sliding": _SMOOTH,
     "impact grazing": "the return map has a square root: stability is lost at once",
-    "grazing of a reset": "the return map changes at once",
+    "grazing of a reset": "the reset happens on one side only, and the return map changes at once",
     "grazing of a stop": "the orbit ends at the stop",
     "grazing of a soft switch": _SMOOTH,
     "grazing of a jumping force": "the return map has a square root: stability is lost at once",
@@ -62,7 +62,12 @@ def far_side(
             return FarSide(
                 itinerary, _verdict(numbers, "with and without sliding"), ReadOnly(numbers)
             )
-        if kind in ("impact grazing", "grazing of a reset") and test.what == "interior":
+        of_reset = test.guard is not None and test.guard.kind in ("impact", "reset")
+        if (
+            kind in ("impact grazing", "grazing of a reset")
+            and test.what == "interior"
+            and of_reset
+        ):
             return _root(problem, kind, test, at, p, itinerary)
         if kind == "corner" and beyond is not None:
             numbers = _orders(problem, at, beyond, p)

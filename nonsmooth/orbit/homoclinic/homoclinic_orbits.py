@@ -29,6 +29,7 @@ from ...model import (
     PointError,
     Surfaces,
     real_array,
+    require_continuous,
     require_system,
 )
 from ...solvers.newton import Equations, converge, solve
@@ -466,6 +467,7 @@ def find_homoclinic(
     True
     """
     require_system(system)
+    require_continuous(system, "find_homoclinic")
     if system.coupled or system.time_dependent:
         raise OptionError(
             f"system {system!r} depends on time or has hidden dynamics. Give an autonomous one that is "

@@ -32,6 +32,7 @@ from ...model import (
     Surfaces,
     mode_field,
     real,
+    require_continuous,
     require_system,
     reversed_system,
     whole,
@@ -800,6 +801,7 @@ def manifold(
     (['+', '+ s'], array([[-0.77459667, -0.38729833]]))
     """
     require_system(system)
+    require_continuous(system, "manifold")
     if system.time_dependent:
         raise OptionError(
             f"system {system!r} depends on time, so its saddles move. Give an autonomous one."

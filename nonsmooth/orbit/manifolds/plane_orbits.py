@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -132,12 +133,14 @@ def _bounded(scan: PlaneScan, direction: int) -> FilippovSystem:
     dx, dy = 0.03 * box.size
     walls = [x - (box.x0 - dx), (box.x1 + dx) - x, y - (box.y0 - dy), (box.y1 + dy) - y]
     symbols = [system.parameter_symbols[k] for k in range(len(scan.where.parameters))]
-    above, below = ([direction * system.field(side)[k] for k in (0, 1)] for side in SIDES)
+    sides = SIDES if scan.where.mode else ("",)
+    fields = [[direction * system.field(side)[k] for k in (0, 1)] for side in sides]
+    law: dict[str, Any] = {"field": fields[0]}
+    if scan.where.mode:
+        law = {"surface": system.surface_function(0), "above": fields[0], "below": fields[1]}
     return FilippovSystem(
         [x, y],
-        surface=system.surface_function(0),
-        above=above,
-        below=below,
+        **law,
         parameters=dict(zip(symbols, scan.where.parameters.tolist(), strict=True)),
         stops=[Stop(wall, -1, f"wall {k}") for k, wall in enumerate(walls)],
     )

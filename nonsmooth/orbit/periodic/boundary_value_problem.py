@@ -147,7 +147,11 @@ class BoundaryProblem:
         """Give the discrete states the values of the following leg, whatever is perturbed."""
         if self.labels is not None:
             n, count = self.system.dimension, self.labels.shape[1]
-            flows.after[:, n - count : n] = np.roll(self.labels, -1, axis=0)
+            following = np.roll(self.labels, -1, axis=0)
+            if self.symmetry is not None:  # mapped to the first leg's
+                own = self.symmetry[n - count :, n - count :]
+                following[-1] = np.linalg.solve(own, following[-1])
+            flows.after[:, n - count : n] = following
             for slopes in (flows.after_state, flows.after_parameters):
                 slopes[:, n - count : n] = 0.0
             flows.by_start[:, :, n - count : n] = 0.0
@@ -367,7 +371,11 @@ def mirrored(problem: BoundaryProblem, leg: Leg) -> Leg:
     )
     surface = surface_of(problem.system, leg)
     side = -leg.side if surface >= 0 and turned[surface] else leg.side
-    return replace(leg, mode=mode, side=side)
+    discrete = leg.discrete
+    if discrete:
+        n, count = problem.system.dimension, len(discrete)
+        discrete = tuple((problem.symmetry[n - count : n, n - count : n] @ discrete).tolist())
+    return replace(leg, mode=mode, side=side, discrete=discrete)
 
 
 def _turning(problem: BoundaryProblem) -> list[bool]:

@@ -24,7 +24,7 @@ from ...model import (
 )
 from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
-from ..runs.legs import leg_name
+from ..runs.legs import leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
 from .guess import Start, about_of, is_about, start_of
 from .orbit import PeriodicOrbit, faults_of, named
@@ -366,7 +366,7 @@ class _Solver:
         if at is not None and not backward:
             backward = [self._largest(at)]
         where = f" At the last iterate {backward[0]}." if backward else ""
-        modes = " ".join(leg.mode or "o" for leg in legs[:40])
+        modes = shown_itinerary(self.problem.system, legs[:40])
         modes += f" ... ({len(legs)} legs)" * (len(legs) > 40)
         return ConvergenceError(
             f"periodic orbit: Newton's method did not converge with the itinerary {modes!r} in "

@@ -149,9 +149,10 @@ class PeriodicOrbit:
     @property
     def itinerary(self) -> str:
         """Modes of the whole orbit in order, separated by blanks."""
-        shown = [shown_mode(self.system, leg.mode, leg.discrete) for leg in self.problem.legs]
-        if len(shown) < len(self.legs):  # of a half orbit
-            return " ".join(leg.mode or "o" for leg in self.legs)
+        n, count = self.system.dimension, len(self.system.definition.discrete)
+        shown = [
+            shown_mode(self.system, leg.mode, leg.start[n - count :].tolist()) for leg in self.legs
+        ]
         return " ".join(mode or "o" for mode in shown)
 
     @cached_property
@@ -330,7 +331,8 @@ def _fault_of_run(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[st
 
 def _margins(orbit: PeriodicOrbit) -> list[Margin]:
     problem, at, p = orbit.problem, orbit.evaluation, orbit.parameter_vector
-    size = problem.scales(orbit.unknowns)[: problem.dimension]  # units of the states do not matter
+    inside = None if np.any(at.starts[:, : orbit.system.dimension]) else p
+    size = problem.scales(orbit.unknowns, inside)[: problem.dimension]  # units do not matter
     result: list[Margin] = []
     for i, leg in enumerate(problem.legs):
         duration, begins = float(at.durations[i]), orbit.legs[i].t

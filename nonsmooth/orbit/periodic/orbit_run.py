@@ -59,8 +59,10 @@ def orbit_run(
     """Integrate each leg over its duration, and join them."""
     times, states, starts = list[Array](), list[Array](), list[float]()
     coefficients: list[Array] = []
+    implicit: list[bool] = []
     events: list[Event] = []
     segments: list[Segment] = []
+    held = system.dimension - len(system.definition.discrete)
     for k, leg in enumerate(legs):
         if leg.duration <= 0.0:
             continue
@@ -78,8 +80,10 @@ def orbit_run(
         states.append(run.x)
         starts += run.steps.starts.tolist()
         coefficients += list(run.steps.coefficients)
+        implicit += run.steps.implicit.tolist()
         end, following = leg.t + leg.duration, legs[(k + 1) % len(legs)]
-        segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients)))
+        values = tuple(leg.start[held:].tolist())
+        segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients), values))
         if leg.event:
             modes, of = (leg.mode, following.mode), (leg.element, leg.side)
             after = following.start
@@ -95,5 +99,5 @@ def orbit_run(
         segments=Segments.of(segments),
         status=Status.REACHED_END,
         message="One period.",
-        steps=Steps(np.array(starts), coefficients),
+        steps=Steps(np.array(starts), coefficients, np.array(implicit, bool)),
     )

@@ -16,11 +16,15 @@ import numpy as np
 from ...flow.fixed import LegsWatch, passing, watched
 from ...flow.names import described, guard_name
 from ...model import Array, FilippovSystem, Guard
+from ...model.derivatives.event_maps import is_due_at
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from .legs import Leg, leg_name
 
 #: Part of a leg's duration beside its ends that belongs to the ends, where guards are zero.
 _ENDS = 1e-6
+
+#: Guards that are functions of conditions of events.
+CONDITIONS = ("stop", "reset", "atom")
 
 #: A guard is negative below this part of its scale.
 _NEGATIVE = 1e-9
@@ -52,12 +56,20 @@ def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array
     return Watch(_approaches(field, rows, p), _violations_along(field, rows, p))
 
 
+def is_met(field: GuardedField, row: Array, p: Array) -> bool:
+    """Whether something happens where the guard of a row of ``watched`` passes zero."""
+    guard, system = field.motion.guards[int(row[0])], field.motion.system
+    if guard.kind not in CONDITIONS:
+        return True
+    return is_due_at(system, guard, row[4 : 4 + system.extended_dimension], p)
+
+
 def _approaches(field: GuardedField, rows: Array, p: Array) -> list[Approach]:
     """Extrema at which guards come near to zero."""
     guards, found = field.motion.guards, list[Approach]()
     for row in rows:
         guard, (t, value, bend) = guards[int(row[0])], row[1:4].tolist()
-        if bend and (bend > 0.0 or guard.kind in ("stop", "reset")) and guard.kind != "atom":
+        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_met(field, row, p):
             slope = field.gradients.copied(row[4:], p)[0][int(row[0])]
             size = math.sqrt(float(slope @ slope))
             if size > 0.0:

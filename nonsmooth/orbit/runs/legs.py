@@ -29,6 +29,7 @@ from ...model.derivatives.event_maps import (
     deciding,
     event_map,
     instant_map,
+    struck_by,
     surface_map,
 )
 from ...model.derivatives.variational import VariationalField, variational_field
@@ -59,6 +60,10 @@ class Leg:
     further: tuple[Leg, ...] = ()
     #: Values of the discrete states in it.
     discrete: tuple[float, ...] = ()
+    #: The function of its event's condition that is zero there; -1 for the event's own.
+    atom: int = -1
+    #: Whether its event is a jump set in which the run starts: its time depends on nothing.
+    at_start: bool = False
     #: Switching functions of the sets on which it begins, and which it leaves.
     left: tuple[int, ...] = ()
 
@@ -106,7 +111,9 @@ class Leg:
         """The event's function and what it does to the state; None where a time ends the leg."""
         if self.timed:
             return None
-        return event_map(system, self.mode, self.kind, self.element, self.side, self.letters)
+        return event_map(
+            system, self.mode, self.kind, self.element, self.side, self.letters, self.atom
+        )
 
     def at_end(self, system: FilippovSystem, y: Array, p: Array) -> AtEvent:
         """Event function and state after the event, with derivatives; further resets included."""
@@ -118,6 +125,11 @@ class Leg:
             assert then is not None
             at = _composed(at, then(at.after, p))
         return at
+
+
+def shown_itinerary(system: FilippovSystem, legs: Sequence[Leg]) -> str:
+    """Modes of legs with the values of the discrete states, separated by blanks."""
+    return " ".join(shown_mode(system, leg.mode, leg.discrete) or "o" for leg in legs)
 
 
 def leg_name(system: FilippovSystem, leg: Leg) -> str:
@@ -195,6 +207,8 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
     system, p = run.system, run.system.parameter_vector(run.parameters)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
+    if len(system.joints) > 1:
+        _require_independent(system, run.events[0].mode_before, x, p)
     if system.sets:
         _require_held(system, run.events[0].mode_before, x, p)
     known: dict[tuple[object, ...], Leg] = {}
@@ -213,7 +227,7 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
                 _require_present_state(system, group)
             if not system.definition.plain:
                 if begins or first.t > t:
-                    _require_located(system, first, x_end, p, leg)
+                    leg = _located(system, first, x_end, p, leg, not result and first.t == t)
             further = [leg_of(system, e, p) for e in group[1:] if e.kind not in ("end", "stop")]
             if further:
                 leg = replace(leg, further=_caused(system, leg, further, x_end, p, first.t))
@@ -247,6 +261,17 @@ def sets_left(
         if all(abs(h.value) <= _ON_SET * float(np.abs(h.gradient) @ np.abs(x)) for h in at):
             found += members
     return tuple(found)
+
+
+def _require_independent(system: FilippovSystem, mode: str, x: Array, p: Array) -> None:
+    """Refuse constraints that depend on one another at a state (N,): their reactions have no derivatives."""
+    coupled, own = coupled_of(system), list(system.joints)
+    slope = coupled.layer_at(x, coupled.held(mode), np.zeros(coupled.count), p).slope[own][:, own]
+    if np.linalg.matrix_rank(slope, tol=_ON_SET * float(np.abs(slope).max()) * len(own)) < len(own):
+        raise DegenerateError(
+            f"Constraints {', '.join(map(repr, system.constraints))} depend on one another: derivatives are implemented "
+            "where their reactions are determined. Leave out those that follow from the others; the motion is the same."
+        )
 
 
 def _require_held(system: FilippovSystem, mode: str, x: Array, p: Array) -> None:
@@ -303,26 +328,31 @@ def _is_zero(at: AtEvent, y: Array) -> bool:
     return abs(at.value) <= _LOCATED * float(np.abs(at.gradient) @ (1.0 + np.abs(y)))
 
 
-def _require_located(system: FilippovSystem, event: Event, x: Array, p: Array, leg: Leg) -> None:
-    """Refuse an event whose time another function than its own guard determines."""
+def _located(
+    system: FilippovSystem, event: Event, x: Array, p: Array, leg: Leg, starts: bool
+) -> Leg:
+    """The leg with the function of its event's condition that determines when it happens."""
     if event.kind not in ("stop", "reset"):
-        return
-    y = leg.along(system).states_at(x, p)
+        return leg
     size = 1.0 + float(np.abs(x).max())
     values = atoms_at(system, event.kind, event.element, x, p)
-    vanishing = [value for value in values if abs(value) <= _LOCATED * size]
-    if _is_zero(leg.at_end(system, y, p), y) and len(vanishing) == 1:
-        return
-    if len(vanishing) > 1:
+    vanishing = [k for k, value in values.items() if abs(value) <= _LOCATED * size]
+    y = leg.along(system).states_at(x, p)
+    if len(vanishing) == 1:
+        found = leg if _is_zero(leg.at_end(system, y, p), y) else replace(leg, atom=vanishing[0])
+        if _is_zero(found.at_end(system, y, p), y):
+            return found
+    elif not vanishing and starts:
+        return replace(leg, at_start=True)
+    elif vanishing:
         raise DegenerateError(
             f"event at t = {event.t:.10g}: expected one function of the condition of {event.name!r} to "
             f"vanish, received {len(vanishing)} (a corner). Its derivatives are one-sided: move the start or "
             "a parameter."
         )
     raise DegenerateError(
-        f"event at t = {event.t:.10g}: expected {event.name!r} where its own guard passes zero, received "
-        "one whose condition another function, or the start, makes true; its derivatives are not "
-        "implemented. Start after it, or give the event the guard that passes zero there."
+        f"event at t = {event.t:.10g}: expected a function of the condition of {event.name!r} to pass zero "
+        "there, received none that does. Its derivatives are not known: start after it."
     )
 
 
@@ -398,17 +428,19 @@ def struck_letters(
     system: FilippovSystem, mode: str, element: int, struck: Callable[[str], AtEvent], after: Array
 ) -> str:
     """The sides with which friction acted at an impact, of those that are possible."""
-    m, coupled = system.surface_count, coupled_of(system)
-    signs, mode = system.parse_letters(mode), system.widened(mode)
-    contact = element - len(system.entries)
-    taking = [contact, *[j for j in range(len(system.impacts)) if not signs[m + j]]]
-    carried = [i for i in range(m) if any(j in taking for j in coupled.carriers[i])]
-    choices = [mode[i] + "".join(c for c in "s+-" if c != mode[i]) for i in carried]
+    mode, contact = system.widened(mode), element - len(system.entries)
     misses: list[tuple[float, str]] = []
-    for choice in product(*choices):
+    for choice in product(*struck_by(system, mode, contact).choices(mode)):
         letters = "".join(choice)
-        misses.append((float(np.abs(struck(letters).after - after).max()), letters))
-    return min(misses)[1]
+        miss = float(np.abs(struck(letters).after - after).max())
+        misses.append((miss if np.isfinite(miss) else np.inf, letters))
+    miss, letters = min(misses)
+    if miss > _LOCATED * (1.0 + float(np.abs(after).max())):
+        raise DegenerateError(
+            f"impact of {system.impacts[contact]!r}: its derivatives are implemented where one contact closes, "
+            "and friction acts in one way throughout the impact. Start after it."
+        )
+    return letters
 
 
 def _caused(

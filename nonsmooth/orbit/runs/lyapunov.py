@@ -135,7 +135,7 @@ def lyapunov_spectrum(
     Returns
     -------
     LyapunovSpectrum
-        Explicit time has no exponent; the phase of a :class:`Clock` has the exponent 0. After Ctrl-C the
+        Explicit time and discrete states have no exponent; the phase of a :class:`Clock` has the exponent 0. After Ctrl-C the
         exponents are those of the run so far.
 
     Raises
@@ -168,10 +168,11 @@ def lyapunov_spectrum(
     array([ 0.      , -0.443147, -1.      ])
     """
     require_system(system)
-    n = system.dimension
+    n = system.dimension - len(system.definition.discrete)
     count = n if k is None else whole(k, "k")
     if count > n:
-        raise OptionError(f"k = {k}, but the system has {n} states. Give at most that.")
+        moving = " that move" if system.definition.discrete else ""
+        raise OptionError(f"k = {k}, but the system has {n} states{moving}. Give at most that.")
     t_start, t_end = real(t_start, "t_start"), real(t_end, "t_end")
     wait = (t_end - t_start) / 10 if transient is None else real(transient, "transient", low=0.0)
     if not t_start + wait < t_end:
@@ -210,7 +211,8 @@ class _Frame:
     """Orthonormal directions along a run, and the logarithms of their growth."""
 
     def __init__(self, run: Trajectory, count: int, begin: float):
-        self.run, self.system, self.n = run, run.system, run.system.dimension
+        self.run, self.system = run, run.system
+        self.n = self.system.dimension - len(self.system.definition.discrete)
         self.p = run.system.parameter_vector(run.parameters)
         # Directions in general position: coordinate axes may lie in invariant subspaces.
         self.q = np.linalg.qr(np.random.default_rng(0).normal(size=(self.n, count)))[0]

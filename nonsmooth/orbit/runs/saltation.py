@@ -135,6 +135,8 @@ def saltations(
     with np.errstate(divide="ignore", invalid="ignore"):
         time_x = -ends.gradient / speed[:, None]
         time_p = -ends.value_parameters / speed[:, None]
+    if events is not None:
+        time_x[~events], time_p[~events] = 0.0, 0.0
     matrix, by_parameters = ends.after_state, ends.after_parameters
     if not kept.all():
         jump[kept] = 0.0

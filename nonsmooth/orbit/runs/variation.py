@@ -290,7 +290,8 @@ def _together(system: FilippovSystem, parts: Sequence[Stretch], flows: LegFlows)
     ends[-1] = True
     after[ends] = carried[ends]
     events = np.array([not part.leg.timed for part in parts])
-    found = saltations(flows, after, lambda k: _at(system, parts[k]), events)
+    free = events & ~np.array([part.leg.at_start for part in parts])
+    found = saltations(flows, after, lambda k: _at(system, parts[k]), free)
     rows = zip(
         parts,
         flows.by_leg,
@@ -354,6 +355,9 @@ def saltation_after(
         landed = integrate_leg(system, leg, at.after, 0.0, p, every)
         by_state, by_p = landed.by_start @ at.after_state, landed.by_start @ at.after_parameters
         at = replace(at, after_state=by_state, after_parameters=by_p + landed.by_parameters)
+    if part.leg.at_start:
+        still = np.zeros(flow.rate.size), np.zeros(len(p))
+        return Saltation(at.after_state, at.after_parameters, *still, 1.0)
     if part.leg.kind == "stop" or leg is None:
         return saltation(at, flow.rate, at.after_state @ flow.rate, _at(system, part))
     after = _rate_after(system, part, leg, at, p)

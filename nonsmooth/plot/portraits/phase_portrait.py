@@ -66,7 +66,7 @@ def phase_portrait(
     colors: Colors = None,
     **look: Any,
 ) -> Drawn:
-    """Draw the phase portrait of a planar system with one surface.
+    """Draw the phase portrait of a planar system with one surface, or of a smooth one.
 
     The directions of both fields, orbits through crossing and sliding, the surface in its
     attracting, repelling and crossing pieces, folds, equilibria, pseudo-equilibria and
@@ -76,7 +76,7 @@ def phase_portrait(
     Parameters
     ----------
     system : FilippovSystem
-        Two states, one surface, no explicit time.
+        Two states, one surface or none, no explicit time.
     box : (xmin, xmax, ymin, ymax) or ((xmin, xmax), (ymin, ymax))
         The window that is drawn, in the two states.
     parameters : mapping, optional
@@ -110,7 +110,7 @@ def phase_portrait(
     Raises
     ------
     DefinitionError
-        The system is not planar, depends on time, or has not exactly one surface.
+        The system is not planar, depends on time, or has several surfaces or discrete states.
     OptionError
         A box without an inside; a time or a size that is not positive; axes that are none.
     PointError
@@ -133,6 +133,7 @@ def phase_portrait(
         "phase_portrait",
         2,
         "Use two_fold for a two-fold in three states; trajectory for runs.",
+        smooth=True,
     )
     values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
     scan = PlaneScan.of(system, values, Box.read(box))

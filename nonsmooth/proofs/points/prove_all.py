@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ...local.point.surface_point import FIELDS, Side
-from ...model import FilippovSystem, OptionError, real, require_system, whole
+from ...model import FilippovSystem, OptionError, real, require_continuous, require_system, whole
 from ..arithmetic.decimals import given
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.flint import arb
@@ -104,6 +104,7 @@ def prove_all(
     (True, [...])
     """
     require_system(system)
+    require_continuous(system, "prove_all")
     if kind not in PROBLEMS:
         raise OptionError(f"kind={kind!r} is not one of {list(PROBLEMS)}.")
     limit = real(width, "width", low=5e-324, expected="a positive number")

@@ -50,6 +50,18 @@ def test_spiralling_sliding_at_the_limit_of_two_relays():
     assert run.itinerary == "ss" and run.x[-1].tolist() == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("growth", [1, -1, 0.2])
+def test_friction_that_changes_in_time_does_not_end_sliding(growth):
+    """h' = -exp(growth t) A lambda: both eigenvalues keep their signs, in whatever units the multipliers are."""
+    h, lam, t = ca.SX.sym("h", 2), ca.SX.sym("lam", 2), ca.SX.sym("t")
+    field = -ca.exp(growth * t) * ca.mtimes(ca.DM([[2, 0.3], [0.3, 1]]), lam)
+    system = ns.FilippovSystem(
+        h, field=field, surfaces=[h[0], h[1]], multipliers=[*ca.vertsplit(lam)], time=t
+    )
+    run = ns.simulate(system, [0.5, -0.1], 3.0)
+    assert run.itinerary.endswith("ss") and run.status is ns.Status.REACHED_END
+
+
 def test_an_intersection_that_repels_is_not_unique():
     system = ns.FilippovSystem([x, y], field=[lam, kap], multipliers=[lam, kap], surfaces=[x, y])
     run = ns.simulate(system, [0.0, 0.0], 1.0)

@@ -4,6 +4,7 @@ directions of slip however small; rotations and mirrors; dense output; what is r
 import casadi as ca
 import numpy as np
 import pytest
+import scipy.integrate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -226,8 +227,8 @@ def test_a_start_off_a_set_goes_on_from_a_surface_that_repels():
         assert found.itinerary == f"*{letter} s{letter}"
         assert found.events[0].t == pytest.approx(2.0, abs=1e-11)
         assert found.x[-1] == pytest.approx([0.0, 0.0, z_end], abs=1e-11)
-    held = run(start, "*s")  # to where the puck stops, and there either way is asked for again
-    assert held.itinerary == "*s" and held.status == ns.Status.NON_UNIQUE
+    held = run(start, "*s")  # the surface does not meet the puck, and goes on as it is
+    assert held.itinerary == "*s ss" and held.status == ns.Status.REACHED_END
     assert held.x[-1] == pytest.approx(np.zeros(3), abs=1e-11)
     for mode in ("s+", "ss"):
         with pytest.raises(ns.OptionError, match=r"^start_mode .*h0 = "):
@@ -399,6 +400,70 @@ def test_a_set_is_left_however_much_friction_depends_on_direction(seed, k):
     run = ns.simulate(system, np.zeros(k), 1.5, tol=1e-12)
     assert run.itinerary == "s *" and run.status is ns.Status.REACHED_END
     assert run.events[0].t == pytest.approx(1.0, abs=1e-12)
+
+
+T = ca.SX.sym("t")
+
+
+#: Pulls on a set at rest, and when it is left: roots of |pull| - 1, by hand or of its polynomial.
+PULLS = [
+    ([1 + T, T], 0),
+    ([1, T], 0),
+    ([1 - 0.4 * T**2, T], 0),
+    ([1 - 0.6 * T**2, T], (5 / 9) ** 0.5),
+    ([1 - T**2 / 2 - 0.1 * T**3, T], 0.6307977539091055),
+    ([1 - T**2 / 2 - T**4 / 10, T], 0),
+    ([1 - T**2 / 2 - T**4 / 5, T], 0.8138044360707209),
+    ([ca.cos(T), ca.sin(T)], None),
+    ([0.6, T], 0.8),
+]
+
+
+@pytest.mark.parametrize("skew", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("pull", "leaves", "load"),
+    # A direction of slip has no series where the load grows from zero.
+    [(*case, load) for case in PULLS for load in ((1,) if case[1] == 0 else (1, T, T**2))],
+)
+def test_a_set_is_held_or_left_by_the_first_order_that_says_so(pull, leaves, load, skew):
+    h, lam = ca.SX.sym("h", 2), ca.SX.sym("lam", 2)
+    m = ca.DM([[1, skew], [skew, 1]])
+    field = load * ca.mtimes(m, ca.vertcat(*pull) - lam)
+    system = ns.FilippovSystem(h, field=field, surfaces=[h], multipliers=[lam], time=T)
+    run = ns.simulate(system, [0.0, 0.0], 1.0)
+    assert run.status is ns.Status.REACHED_END
+    assert run.itinerary == ("*" if leaves == 0 else "s *" if leaves else "s")
+    if leaves:
+        assert run.events[0].t == pytest.approx(leaves, abs=1e-12)
+
+
+def test_sets_and_surfaces_that_act_on_one_another_in_any_units():
+    """Coupled symmetric friction is the gradient of a convex dissipation: w and the motion are unique."""
+    h, scale = ca.SX.sym("h", 5), 1 + 0.5 * ca.sin(2 * T)
+    lam = [ca.SX.sym("p", 2), ca.SX.sym("q", 2), ca.SX.sym("r")]
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(5, 5))
+    pull = rng.normal(size=5) * 3
+    m = root @ root.T / 5 + 0.3 * np.eye(5)
+    force = scale * ca.mtimes(ca.DM(m), ca.vertcat(*lam))
+    system = ns.FilippovSystem(
+        h,
+        field=pull * ca.cos(T) - force,
+        surfaces=[h[:2], h[2:4], h[4]],
+        multipliers=lam,
+        time=T,
+    )
+    run = ns.simulate(system, np.zeros(5), 3.0)
+    assert run.status is ns.Status.REACHED_END
+    # A law of width 1e-5 in place of the jump, by an integrator of its own.
+    norms = lambda v: np.concatenate(
+        [part / np.hypot(1e-5, np.linalg.norm(part)) for part in (v[:2], v[2:4], v[4:])]
+    )
+    rate = lambda t, v: pull * np.cos(t) - (1 + 0.5 * np.sin(2 * t)) * (m @ norms(v))
+    smooth = scipy.integrate.solve_ivp(
+        rate, (0.0, 3.0), np.zeros(5), method="Radau", rtol=1e-8, atol=1e-9
+    )
+    assert run.x[-1] == pytest.approx(smooth.y[:, -1], abs=1e-4)
 
 
 def test_a_tolerance_below_rounding_says_what_to_do():

@@ -135,3 +135,25 @@ def test_roots_that_were_found_are_named():
     assert set(terminal.roots.values()) == {0.5} and len(terminal.roots) == 1
     smooth = ns.FilippovSystem([x], surface=x, above=[-(x**2)], below=[1])
     assert smooth.roots == {} and "root" not in repr(smooth)
+
+
+@pytest.mark.parametrize("start", [1.0, -1.0])
+@pytest.mark.parametrize("power", [0.5, 1.5])
+@pytest.mark.parametrize("number", range(6))
+def test_a_power_of_a_magnitude_is_the_same_however_it_is_written(start, power, number):
+    """v' = -|v|^p sgn v: |v| = (|v0|^(1 - p) - (1 - p) t)^(1/(1 - p)); a parameter may be a factor inside."""
+    k, m = ca.SX.sym("k"), ca.SX.sym("m")
+    size = [
+        ca.fabs(v) ** power,
+        (v**2) ** (power / 2),
+        ca.sqrt(ca.fabs(v)) ** (2 * power),
+        ca.fabs(v) * ca.fabs(v) ** (power - 1),
+        ca.fabs(k * v * m) ** power,
+        (v**2 / k) ** (power / 2) * ca.fabs(v / m) ** (power - power),
+    ][number]
+    parameters = {k: 1.0, m: -1.0} if number > 3 else {}
+    system = ns.FilippovSystem.from_expression([v], [-ca.sign(v) * size], parameters=parameters)
+    run = ns.simulate(system, [start], 1.5)
+    expected = start * (1 - (1 - power) * 1.5) ** (1 / (1 - power))
+    assert run.x[-1, 0] == pytest.approx(expected, abs=1e-10)
+    assert system.surface_count == 1

@@ -40,6 +40,30 @@ def test_contact_closes_at_the_limit(restitution):
     assert run.status is ns.Status.REACHED_END and run.x[-1][:2].tolist() == [0, 0]
 
 
+@pytest.mark.parametrize(
+    ("restitution", "growth"), [(0.3, -4.0), (0.527, -2.3), (0.5, -2.4), (0.7, 20.0)]
+)
+@pytest.mark.parametrize("tol", [1e-7, 1e-9, 1e-11])
+def test_the_limit_of_flights_whose_ratio_still_changes(tol, restitution, growth):
+    """The load changes with time, so that flights are longer or shorter than the geometric series says."""
+    load = 2.0
+    system = ns.FilippovSystem(
+        [y, v],
+        field=[v, -(load + growth * t)],
+        impacts=ns.Impact(y, restitution=restitution),
+        time=t,
+    )
+    limit, speed = 0.0, 0.2
+    while speed > 1e-18:
+        pull = load + growth * limit
+        flight = 2 * speed / (pull / 2 + math.sqrt(pull**2 / 4 + 2 * growth * speed / 3))
+        speed = restitution * (flight * (pull + growth * flight / 2) - speed)
+        limit += flight
+    run = ns.simulate(system, [0, 0.2], limit + 0.02, tol=tol)
+    contact = [event.t for event in run.events if event.kind == "contact"]
+    assert contact == pytest.approx([limit], abs=tol)
+
+
 def test_run_that_ends_before_the_limit_does_not_reach_it():
     for early in (1e-2, 3e-6, 1e-9):
         run = _end(_ball(), [1, 0, 0], _LIMIT - early)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, assume, given, settings
+from hypothesis import HealthCheck, Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
 import nonsmooth as ns
@@ -167,7 +167,10 @@ def test_when_time_starts(shift, seed):
 
 
 @few
-@given(SEEDS, st.floats(-4, 4))
+@example(400, 13.08)
+@example(729, 13.08)
+@example(69, -16.0)  # what is small there is the slope of sliding
+@given(SEEDS, st.floats(-13.1, 13.1))
 def test_the_unit_of_time(seed, exponent):
     problem, unit = system_of(seed), 10.0**exponent
     named = renamed({"t": f"(t*{unit!r})"})

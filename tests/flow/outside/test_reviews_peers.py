@@ -95,20 +95,6 @@ def test_a_slider_crank_without_friction_is_never_inconsistent(tol):
     assert run.status == REACHED
 
 
-def test_fireflies_fire_one_another():
-    """From 4.2421 on both are at the same phase."""
-    flies = ns.FilippovSystem(
-        [p, q],
-        field=[1, 1],
-        resets=[
-            ns.Reset(p - 1, [0, 1.3 * q], direction=1),
-            ns.Reset(q - 1, [1.3 * p, 0], direction=1),
-        ],
-    )
-    run = ns.simulate(flies, [0.5, 0.0], 8.0)
-    assert run.status == REACHED and np.abs(run.x[-1] - 0.757906).max() < 1e-5
-
-
 @pytest.mark.parametrize("push", [0, 1])
 def test_a_tank_empties(push):
     """x = (1 - t/2)^2 until t = 2; a push below the surface changes nothing: it slides there."""

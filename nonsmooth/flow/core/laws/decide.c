@@ -23,7 +23,9 @@ typedef struct {
   double tie; /* part of terms that is zero */
   const int32_t *own;
   double *a, *b, *matrix, *share, *floor; /* share: bounds by the reactions in the block; floor: rounding of w */
+  double *room; /* rounding of nu where the diagonal does not say it, or NULL */
   int8_t *state, *is_contact;
+  const int8_t *span; /* of a vector multiplier the number of its rows, at the first, and -1 at the others; or none */
 } Block;
 
 /* Of a guard that ended the mode before so many coefficients vanish. */
@@ -137,13 +139,16 @@ static double rate_of(const Block *k, int i, const double *nu, double *terms) {
 static double zero_of(const Block *k, int i, double terms) { return larger(k->floor[i], k->tie * terms); }
 static double room_zero(const Block *k, int i, double zero, double bound) {
   double own = fabs(k->matrix[i * (k->size + 1)]), most = k->tie * fabs(bound);
+  if (k->room) return larger(k->room[i], most);
   return own > 0 ? larger(zero / own, most) : most;
 }
+
+static int span_of(const Block *k, int i) { return k->span ? k->span[i] : 0; }
 
 /* Whether a state allows a position; the position of those that are decided. */
 static int allows(const Block *k, int i, int position) {
   switch (k->state[i]) {
-    case UNDECIDED: return !k->is_contact[i] || position != TOP;
+    case UNDECIDED: return span_of(k, i) ? position != BOTTOM : !k->is_contact[i] || position != TOP;
     case AT_TOP: return position != BOTTOM;
     case AT_BOTTOM: return position != TOP;
     case INSIDE: return position == HELD;
@@ -152,7 +157,8 @@ static int allows(const Block *k, int i, int position) {
   }
 }
 
-/* nu of positions; 0 where there is none. ``work`` has room for 3 n^2 + 4 n. */
+/* nu of positions, with that of vectors at their bounds as it is; 0 where there is none. ``work`` has room for
+ * 3 n^2 + 4 n. */
 static int place_unknowns(const Block *k, const int8_t *position, double *nu, double *work, int32_t *pivot) {
   int n = k->size;
   double *m = work;
@@ -161,16 +167,27 @@ static int place_unknowns(const Block *k, const int8_t *position, double *nu, do
     if (position[i] == HELD) { memcpy(row, k->matrix + (int64_t)i * n, sizeof(double) * n); nu[i] = k->a[i]; continue; }
     double side = position[i] == TOP ? 1 : -1;
     for (int j = 0; j < n; j++) row[j] = i == j;
+    if (span_of(k, i)) continue;
     nu[i] = k->is_contact[i] ? 0 : side * k->b[i];
     if (k->is_coupled && !k->is_contact[i]) for (int j = 0; j < n; j++) row[j] -= side * k->share[i * n + j];
   }
   return solve_any(m, nu, n, TIED, work + (int64_t)n * n, pivot);
 }
 
+/* The position that a vector takes next, from its first row on: inside ``room``, or w along nu. */
+static int wanted_of_vector(const Block *k, int i, int position, const double *nu, double zero, double room) {
+  double along = 0, terms;
+  if (k->span[i] < 0 || !allows(k, i, position == HELD ? TOP : HELD)) return position;
+  if (position == HELD) return length_of(nu + i, k->span[i]) > room ? TOP : HELD;
+  for (int q = i; q < i + k->span[i]; q++) along += rate_of(k, q, nu, &terms) * nu[q];
+  return along < -zero ? HELD : TOP;
+}
+
 /* The position that an element takes next: its own where that is consistent. */
 static int wanted(const Block *k, int i, int position, const double *nu) {
   double terms, w = rate_of(k, i, nu, &terms), zero = zero_of(k, i, terms), bound = bound_of(k, i, nu);
   double low = k->is_contact[i] ? 0 : -bound, room = room_zero(k, i, zero, bound);
+  if (span_of(k, i)) return wanted_of_vector(k, i, position, nu, zero * bound, bound + room);
   if (position == HELD) {
     if (allows(k, i, TOP) && nu[i] > bound + room) return TOP;
     if (allows(k, i, BOTTOM) && nu[i] < low - room) return BOTTOM;
@@ -259,6 +276,22 @@ static int class_of(const Block *k, int i, const double *nu, double part) {
   if (state != AT_BOTTOM && bound - nu[i] <= room) return AT_TOP;
   if (state != AT_TOP && nu[i] + bound <= room) return AT_BOTTOM;
   return INSIDE;
+}
+
+/* The same of a vector, from its first row on. */
+static int class_of_vector(const Block *k, int i, const double *nu, double part) {
+  double w[3], terms, zero = 0, room = 0, bound = k->b[i];
+  int size = k->span[i];
+  for (int j = 0; j < size; j++) {
+    w[j] = rate_of(k, i + j, nu, &terms);
+    double own = larger(zero_of(k, i + j, terms), part * terms);
+    zero = larger(own, zero);
+    room = larger(larger(room_zero(k, i + j, own, bound), part * bound), room);
+  }
+  if (k->state[i] >= INSIDE) return k->state[i];
+  if (length_of(w, size) > zero) return ABOVE;
+  if (bound <= room) return UNDECIDED;
+  return bound - length_of(nu + i, size) <= room ? AT_TOP : INSIDE;
 }
 
 /* A point inside ------------------------------------------------------------------------------------ */
@@ -358,25 +391,60 @@ static int is_same(const Block *k, const double *one, const double *two, int onl
   return 1;
 }
 
+/* Solutions of positions; more than one where a vector is at its bound. */
+static int solutions_at(const Block *k, const int8_t *position, double *found, double *work, int32_t *pivot) {
+  int n = k->size, first = -1, size, count;
+  double base[MOST_ENUMERATED], moved[3][MOST_ENUMERATED], a[3], m[9], u[6][3], terms;
+  for (int i = 0; i < n; i++) {
+    if (span_of(k, i) <= 0 || position[i] == HELD) continue;
+    if (first >= 0) return 0;
+    first = i;
+  }
+  if (first < 0) return place_unknowns(k, position, found, work, pivot);
+  size = k->span[first];
+  for (int c = -1; c < size; c++) { /* w is affine in it */
+    double *nu = c < 0 ? base : moved[c];
+    for (int i = 0; i < size; i++) nu[first + i] = i == c ? k->b[first] : 0;
+    if (!place_unknowns(k, position, nu, work, pivot)) return 0;
+    for (int i = 0; i < size; i++) {
+      if (c < 0) a[i] = rate_of(k, first + i, nu, &terms);
+      else m[i * size + c] = a[i] - rate_of(k, first + i, nu, &terms);
+    }
+  }
+  count = limit_directions(a, m, size, u);
+  for (int q = 0; q < count; q++)
+    for (int i = 0; i < n; i++) {
+      found[q * n + i] = base[i];
+      for (int c = 0; c < size; c++) found[q * n + i] += u[q][c] * (moved[c][i] - base[i]);
+    }
+  return count;
+}
+
 /* All positions are tried; of solutions with the same w the mean. They are written to ``found`` (MOST_SOLUTIONS,
  * n); their number is returned. */
 static int enumerate(const Block *k, double *found, double *work, int32_t *pivot) {
   int n = k->size, count = 0, groups = 0, in_group[MOST_SOLUTIONS];
   int8_t position[MOST_ENUMERATED];
-  double all[MOST_FOUND * MOST_ENUMERATED], nu[MOST_ENUMERATED];
+  double all[MOST_FOUND * MOST_ENUMERATED], each[6 * MOST_ENUMERATED];
   int64_t total = 1;
   for (int i = 0; i < n; i++) total *= 3;
   for (int64_t number = 0; number < total && count < MOST_FOUND; number++) {
     int64_t rest = number;
     int fits = 1;
-    for (int i = 0; i < n && fits; i++, rest /= 3) fits = allows(k, i, position[i] = (int8_t)(rest % 3));
-    if (!fits || !place_unknowns(k, position, nu, work, pivot)) continue;
-    for (int i = 0; i < n && fits; i++) {
-      fits = wanted(k, i, position[i], nu) == position[i];
-      fits = fits && (k->is_contact[i] || bound_of(k, i, nu) >= -room_zero(k, i, k->floor[i], bound_of(k, i, nu)));
+    for (int i = 0; i < n && fits; i++, rest /= 3) {
+      fits = allows(k, i, position[i] = (int8_t)(rest % 3));
+      fits = fits && (span_of(k, i) >= 0 || position[i] == position[i - 1]);
     }
-    for (int q = 0; q < count && fits; q++) fits = !is_same(k, all + q * n, nu, 0);
-    if (fits) memcpy(all + n * count++, nu, sizeof(double) * n);
+    for (int some = fits ? solutions_at(k, position, each, work, pivot) : 0; some > 0 && count < MOST_FOUND; some--) {
+      const double *nu = each + (some - 1) * n;
+      fits = 1;
+      for (int i = 0; i < n && fits; i++) {
+        fits = wanted(k, i, position[i], nu) == position[i];
+        fits = fits && (k->is_contact[i] || bound_of(k, i, nu) >= -room_zero(k, i, k->floor[i], bound_of(k, i, nu)));
+      }
+      for (int q = 0; q < count && fits; q++) fits = !is_same(k, all + q * n, nu, 0);
+      if (fits) memcpy(all + n * count++, nu, sizeof(double) * n);
+    }
   }
   for (int q = 0; q < count; q++) {
     int g = 0;
@@ -389,10 +457,55 @@ static int enumerate(const Block *k, double *found, double *work, int32_t *pivot
   return groups;
 }
 
+/* The solution of a symmetric block with vectors: each element in turn, as the others are, from the smallest nu with
+ * w = 0 on (Gauss and Seidel). */
+static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
+  int n = k->size;
+  double *ones = work, *inverse = ones + n, change = INFINITY, last = INFINITY, most = 0;
+  for (int i = 0; i < n; i++) { ones[i] = 1; most = larger(fabs(k->b[i]), most); }
+  invert_any(k->matrix, n, ones, inverse, inverse + (int64_t)n * n, pivot);
+  for (int i = 0; i < n; i++) {
+    nu[i] = 0;
+    for (int j = 0; j < n; j++) nu[i] += inverse[i * n + j] * k->a[j];
+    most = larger(fabs(nu[i]), most);
+  }
+  for (int again = 0; again < 2000 && change > 4 * EPSILON * most && !(change >= last && last < TIED * most); again++) {
+    last = change;
+    change = 0;
+    for (int i = 0, size; i < n; i += size) {
+      double rest[3], y[3], own[9], bound = bound_of(k, i, nu), low = k->is_contact[i] ? 0 : -bound;
+      int state = k->state[i];
+      size = span_of(k, i) > 0 ? k->span[i] : 1;
+      for (int q = 0; q < size; q++) {
+        rest[q] = k->a[i + q];
+        for (int j = 0; j < n; j++) {
+          double of = k->matrix[(i + q) * n + j];
+          if (j >= i && j < i + size) own[q * size + j - i] = of; else rest[q] -= of * nu[j];
+        }
+      }
+      int is_inside = solve_vector(own, size, 0, rest, y);
+      if (span_of(k, i) > 0) {
+        if (state != INSIDE && (state == ABOVE || !is_inside || length_of(y, size) > bound)) {
+          for (int q = 0; q < size * size; q++) own[q] *= bound;
+          if (bound > 0 && !leaving_direction(rest, own, size, y)) return 0;
+          for (int q = 0; q < size; q++) y[q] = bound > 0 ? bound * y[q] : 0;
+        }
+      } else {
+        if (state == ABOVE || state == BELOW) y[0] = state == ABOVE ? bound : low;
+        if (state != INSIDE && state != AT_BOTTOM && !k->is_contact[i]) y[0] = smaller(y[0], bound);
+        if (state != INSIDE && state != AT_TOP) y[0] = larger(y[0], low);
+      }
+      for (int q = 0; q < size; q++) { change = larger(fabs(y[q] - nu[i + q]), change); nu[i + q] = y[q]; }
+    }
+  }
+  return finite_all(nu, n);
+}
+
 /* Solutions of a block that is not of one element: one where a certificate or the size says so. */
 static int solve_block_of_many(const Block *k, int certificate, int8_t *position, double *found, double *work,
                                int32_t *pivot) {
   if (certificate == NOTHING && k->size <= MOST_ENUMERATED) return enumerate(k, found, work, pivot);
+  if (k->span) return relax(k, found, work, pivot);
   int most = certificate >= UNIQUE ? 10000 : 20 + 4 * k->size;
   int solved = pivot_block(k, position, found, most, work, pivot) || lemke_block(k, found, work, pivot);
   if (solved && certificate < UNIQUE) move_inside(k, found, work, pivot);
@@ -437,6 +550,7 @@ static void turn_bound(Decision *d, int i, double *b) {
 
 /* Edges of the graph: row i of the law holds the unknown j. */
 static int holds(const Decision *d, int i, int j) {
+  if (abs(i - j) == 1 && d->span[i > j ? i : j] < 0) return 1;
   return i != j && (d->matrix[i * d->count + j] != 0 || d->share[i * d->count + j] != 0);
 }
 
@@ -468,22 +582,59 @@ static void find_blocks(Decision *d) {
   for (int i = 0; i < d->count; i++) if (!d->mark[i]) visit(d, i, &time, &top);
 }
 
+/* Reactions of joints follow from the other unknowns. Rows of the law have them eliminated: row i less these parts of
+ * those of the joints, (count, joints), at ``d->through``; ``d->joint`` is the inverse of the joints' own matrix. */
+static void read_joints(Run *r, Decision *d) {
+  int first = r->m - r->s->joints, n = r->s->joints, w = r->width, k = d->count;
+  double *m = d->work, *size = m + n * n, *rest = size + n;
+  if (!n) return;
+  for (int i = 0; i < n; i++) {
+    size[i] = 1;
+    for (int j = 0; j < n; j++) m[i * n + j] = r->slope[(first + i) * w + first + j];
+  }
+  invert_any(m, n, size, d->joint, rest, d->pivot);
+  for (int i = 0; i < k; i++)
+    for (int j = 0; j < n; j++) {
+      double *part = d->through + i * n + j;
+      *part = 0;
+      for (int q = 0; q < n; q++) *part += r->slope[d->own[i] * w + first + q] * d->joint[q * n + j];
+    }
+}
+
+/* Rounding of a row with that of the joints. */
+static double with_rounding(const Run *r, const Decision *d, int i, const double *of) {
+  int first = r->m - r->s->joints;
+  double sum = of[d->own[i]];
+  for (int j = 0; j < r->s->joints; j++) sum += fabs(d->through[i * r->s->joints + j]) * of[first + j];
+  return sum;
+}
+
+/* A row of the law from one of each element: its own less that of the joints, ``of`` being those of all. */
+static double beside_joints(const Run *r, const Decision *d, int i, const double *of, int64_t apart) {
+  int first = r->m - r->s->joints;
+  double sum = of[d->own[i] * apart];
+  for (int j = 0; j < r->s->joints; j++) sum -= d->through[i * r->s->joints + j] * of[(first + j) * apart];
+  return sum;
+}
+
 /* Rows and bounds at a point with all active unknowns zero, and rounding in both; 0 where they are no numbers. */
 static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b, double *floor, double *room) {
   int k = d->count, w = r->width;
   double *near = r->vector + r->n + w, *factor = r->small + w; /* not where inputs are put together */
-  aim(r, d->letter, x, r->unknowns);
-  held_of(r, d->letter);
+  aim(r, d->base, x, r->unknowns);
+  held_of(r, d->base);
   for (int i = 0; i < k; i++) r->held[r->active[i]] = 0;
   error_scales(r, x, r->held, r->none);
-  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
   gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
   for (int i = 0; i < r->n; i++) near[i] = fabs(x[i]);
   gradient_sums(r, &r->s->point, r->point, first_of_factors(r), &r->s->factor_gradient, w, near, 1, factor);
+  read_joints(r, d);
+  for (int i = 0; i < w; i++) r->lam[i] = layer_of(r, i);
   for (int i = 0; i < k; i++) {
     int own = r->active[i];
-    a[i] = d->turn[i] * layer_of(r, own);
-    floor[i] = VANISHES * r->small[own];
+    a[i] = d->turn[i] * beside_joints(r, d, i, r->lam, 1);
+    floor[i] = VANISHES * with_rounding(r, d, i, r->small);
     b[i] = d->is_contact[i] || d->is_idle[i] ? 0 : factor_of(r, own);
     room[i] = VANISHES * factor[own];
     if (fabs(b[i]) <= room[i]) b[i] = 0;
@@ -496,9 +647,13 @@ static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b,
 static int read_law(Run *r, Decision *d) {
   int k = d->count, w = r->width, carried = 0;
   memset(d->share, 0, sizeof(double) * k * k);
+  memcpy(d->base, d->letter, w);
   for (int i = 0; i < k; i++) {
-    int own = d->own[i] = r->active[i];
-    d->is_contact[i] = has_law(r, own, CONTACT_LAW);
+    int own = d->own[i] = r->active[i], set = set_of(r, own);
+    d->span[i] = (int8_t)(set < 0 ? 0 : own == set ? size_of(r, own) : -1);
+    d->began[i] = 0;
+    if (set >= 0) d->base[own] = 0;
+    d->is_contact[i] = (int8_t)is_half_line(r, own);
     d->turn[i] = d->is_contact[i] ? -1 : 1;
     d->is_idle[i] = element(r, own)->flags & CONTINUOUS;
     for (int j = 0; j < r->c && own < r->m; j++) carried |= r->s->carries[own * r->c + j];
@@ -506,7 +661,7 @@ static int read_law(Run *r, Decision *d) {
   if (!read_rows(r, d, r->x, d->a, d->b, d->floor, d->work)) return 0;
   for (int i = 0; i < k; i++)
     for (int j = 0; j < k; j++)
-      d->matrix[i * k + j] = d->is_idle[j] ? 0 : -d->turn[i] * r->slope[d->own[i] * w + d->own[j]];
+      d->matrix[i * k + j] = d->is_idle[j] ? 0 : -d->turn[i] * beside_joints(r, d, i, r->slope + d->own[j], w);
   for (int j = 0; carried && j < k; j++) { /* bounds are affine in the reactions */
     if (!d->is_contact[j]) continue;
     r->held[d->own[j]] = 1;
@@ -524,7 +679,7 @@ static void read_old(const Run *r, Decision *d, const int8_t *letter, const Know
   int k = d->count;
   for (int i = 0; i < k; i++) {
     d->is_known[i] = 0;
-    for (int q = 0; q < known_count; q++) if (known[q].index == d->own[i]) d->is_known[i] = 1;
+    for (int q = 0; q < known_count; q++) if (known[q].index == element(r, d->own[i])->first) d->is_known[i] = 1;
   }
   for (int contacts = 1; contacts >= 0; contacts--)
     for (int i = 0; i < k; i++) {
@@ -533,7 +688,8 @@ static void read_old(const Run *r, Decision *d, const int8_t *letter, const Know
       if (d->is_contact[i] != contacts) continue;
       for (int j = 0; j < k; j++) bound += d->share[i * k + j] * d->old[j];
       for (int q = 0; q < known_count; q++) if (known[q].index == own && known[q].kind == EXIT_GUARD) side = known[q].side;
-      d->old[i] = side == 0 && !d->is_known[i] ? d->sign[i] * r->unknowns[own] : d->is_contact[i] ? 0 : side * bound;
+      int is_old = side == 0 && (!d->is_known[i] || d->span[i]);
+      d->old[i] = is_old ? d->sign[i] * r->unknowns[own] : d->is_contact[i] || d->span[i] ? 0 : side * bound;
     }
 }
 
@@ -541,6 +697,7 @@ static void read_old(const Run *r, Decision *d, const int8_t *letter, const Know
 static int is_at_bound(const Decision *d, int i) {
   double bound = d->b[i];
   if (d->is_contact[i]) return d->old[i] <= TIED * d->room[i];
+  if (d->span[i]) return d->span[i] > 0 && bound - length_of(d->old + i, d->span[i]) <= TIED * d->room[i];
   for (int j = 0; j < d->count; j++) bound += d->share[i * d->count + j] * d->old[j];
   return bound - fabs(d->old[i]) <= TIED * d->room[i];
 }
@@ -567,6 +724,7 @@ static void find_touched(Decision *d, const int8_t *letter) {
 /* Coefficients of an order without its unknowns. */
 static void begin_order(Run *r, Expansion *e, int order) {
   for (int i = 0; i < r->active_count; i++) e->series[(int64_t)r->active[i] * r->stride + order] = 0;
+  for (int i = r->m - r->s->joints; i < r->m; i++) e->series[(int64_t)i * r->stride + order] = 0;
   open_order(r, e, order);
 }
 
@@ -595,7 +753,7 @@ static void read_noise(Run *r, Decision *d) {
   int k = d->count, w = r->width, all = r->kept_rows, first = 2 * w + r->s->slope.count;
   double *ones = r->vector + r->n + w, *steep = r->small, *height = r->rates + all;
   d->field = d->rate = 0;
-  for (int i = 0; i < r->n; i++) ones[i] = 1;
+  for (int i = 0; i < r->n; i++) ones[i] = unit_of_state(r, i);
   error_scales(r, r->x, r->held, r->none);
   gradient_sums(r, &r->s->point, r->point, first, &r->s->layer_gradient, w, ones, 1, steep);
   surface_values(r, r->x);
@@ -603,7 +761,7 @@ static void read_noise(Run *r, Decision *d) {
   for (int i = 0; i < k; i++) {
     int own = d->own[i];
     double of = height[degree_of(r, own) > 1 ? element(r, own)->lower + degree_of(r, own) - 2 : own];
-    d->steep[i] = steep[own];
+    d->steep[i] = with_rounding(r, d, i, steep);
     if (!(of > 0)) continue;
     d->field = larger(d->field, d->yard[i] / of);
     d->rate = larger(d->rate, d->steep[i] / of);
@@ -614,12 +772,12 @@ static void read_noise(Run *r, Decision *d) {
 static void read_order(Run *r, Decision *d, int order) {
   Expansion *e = &r->trial;
   int k = d->count, w = r->width;
-  double speed = 0, drift = VANISHES * d->field;
+  double speed = speed_of(r, e, order), drift = VANISHES * d->field;
   for (int i = 2; i <= order; i++) drift *= d->rate / i;
-  for (int i = 0; i < r->n; i++) speed = larger(fabs(e->states[(int64_t)i * r->stride + order]), speed);
+  for (int i = 0; i < w; i++) r->lam[i] = row_of(r, r->n + i)[order];
   for (int i = 0; i < k; i++) {
     int at = order * k + i;
-    d->a[at] = d->turn[i] * row_of(r, r->n + d->own[i])[order];
+    d->a[at] = d->turn[i] * beside_joints(r, d, i, r->lam, 1);
     d->b[at] = d->is_contact[i] || d->is_idle[i] ? 0 : d->sign[i] * row_of(r, r->n + 2 * w + d->own[i])[order];
     d->floor[at] = d->steep[i] * (VANISHES * (order + 1) * speed + drift);
     if (d->state[at] == UNDECIDED && !d->is_contact[i]) turn_bound(d, i, d->b + at);
@@ -641,7 +799,7 @@ static int read_growth(Run *r, Decision *d, int order) {
     double *c = e->states + (int64_t)i * r->stride;
     for (int q = 1; q <= order; q++) {
       if (!(fabs(c[q]) < INFINITY)) memset(c + q, 0, sizeof(double) * (order + 1 - q));
-      if (c[q] != 0) unit = smaller(unit, pow((fabs(c[0]) + r->size) / fabs(c[q]), 1.0 / q));
+      if (c[q] != 0) unit = smaller(unit, pow((fabs(c[0]) + size_of_state(r, i)) / fabs(c[q]), 1.0 / q));
     }
   }
   for (double part = SINGULAR_LONGEST; unit < INFINITY && part > SINGULAR_SHORTEST; part *= SINGULAR_SHORTER) {
@@ -667,10 +825,75 @@ static int read_growth(Run *r, Decision *d, int order) {
 /* Zeros of several elements tie to the wider tolerance; one element decides by all that is above rounding. */
 static double tie_of(const Decision *d) { return d->count > 1 ? TIED : VANISHES; }
 
+/* Sums of products of two coefficients of an order, without the first and the last of one. */
+static double middle(const double *one, const double *two, int apart, int other, int order) {
+  double sum = 0;
+  for (int q = 1; q < order; q++) sum += one[q * apart] * two[(order - q) * other];
+  return sum;
+}
+
+/* Coefficients of a vector that is at its bound, from the order at which that was decided: nu = b u, w = s u, |u| = 1.
+ * Of those of an order all that is known before it, the part along u of u itself is returned. */
+static double along_bound(const Decision *d, int i, int order, double *nu, double *w) {
+  int k = d->count, size = d->span[i], j = order - d->began[i];
+  const double *b = d->b + d->began[i] * k + i, *s = d->speed + d->began[i] * k + i, *u = d->along + d->began[i] * k + i;
+  double bend = 0;
+  for (int q = 0; q < size; q++) bend -= 0.5 * middle(u + q, u + q, k, k, j);
+  for (int q = 0; q < size; q++) {
+    nu[q] = b[j * k] * u[q] + middle(b, u + q, k, k, j) + b[0] * bend * u[q];
+    w[q] = middle(s, u + q, k, k, j) + s[0] * bend * u[q];
+  }
+  return bend;
+}
+
+/* Keep what an order says of a vector, from its first row on. */
+static void keep_vector(Decision *d, int i, int order) {
+  int k = d->count, size = d->span[i], at = order * k, state = d->state[at + k + i];
+  if (d->state[at + i] == UNDECIDED) d->began[i] = (int8_t)(order + (state == UNDECIDED));
+  if (state == UNDECIDED || state == INSIDE) return;
+  int begun = d->began[i] * k + i;
+  double w[3], known[3] = {0}, rest[3] = {0}, speed = 0, bend = 0, bound = d->b[begun], *first = d->along + begun;
+  for (int q = 0; q < size; q++) {
+    w[q] = d->a[at + i + q];
+    for (int c = 0; c < k; c++)
+      if (d->matrix[(i + q) * k + c] != 0) w[q] -= d->matrix[(i + q) * k + c] * d->nu[at + c];
+  }
+  if (order > d->began[i]) bend = along_bound(d, i, order, known, rest);
+  else { unit_of(bound > 0 ? d->nu + at + i : w, size, first); axes_of(first, size, d->axes + 3 * i); }
+  for (int q = 0; q < size; q++) speed += first[q] * (w[q] - rest[q]);
+  d->speed[at + i] = state == ABOVE ? speed : 0;
+  for (int q = 0; q < size && order > d->began[i]; q++) {
+    double across = bound > 0 ? (d->nu[at + i + q] - known[q]) / bound : (w[q] - rest[q] - speed * first[q]) / d->speed[begun];
+    d->along[at + i + q] = bend * first[q] + across;
+  }
+}
+
+/* Rows of a vector that is at its bound, in axes along and across it: its part along is at a bound, that across is
+ * where w keeps its direction. */
+static void turn_rows(const Decision *d, Block *b, int i, int order) {
+  int n = b->size, own = b->own[i], size = d->span[own];
+  const double *axes = d->axes + 3 * own, first = d->b[d->began[own] * d->count + own];
+  double nu[3], w[3], slope = first > 0 ? d->speed[d->began[own] * d->count + own] / first : 0;
+  along_bound(d, own, order, nu, w);
+  for (int c = 0; c < n; c++) turn_vector(axes, size, 1, b->matrix + i * n + c, n);
+  for (int c = 0; c < n; c++) turn_vector(axes, size, 1, b->matrix + c * n + i, 1);
+  turn_vector(axes, size, 1, b->a + i, 1);
+  turn_vector(axes, size, 1, nu, 1);
+  turn_vector(axes, size, 1, w, 1);
+  for (int q = 0; q < size; q++) {
+    b->b[i + q] = nu[q];
+    b->a[i + q] -= w[q] - (q ? slope * nu[q] : 0);
+    if (q == 0) continue;
+    b->matrix[(i + q) * (n + 1)] += slope;
+    b->state[i + q] = first > 0 ? INSIDE : ABOVE;
+  }
+}
+
 /* A block's part of the law at an order, with what blocks before it add. */
 static Block part_of_law(Decision *d, int order, int which) {
   int k = d->count, first = d->first[which], n = d->first[which + 1] - first, at = order * k;
   Block b = {.size = n, .tie = tie_of(d), .own = d->order + first, .a = d->block, .state = d->block_state, .is_contact = d->block_state + k};
+  int8_t *span = d->block_state + 3 * k;
   b.b = b.a + n; b.floor = b.b + n; b.matrix = b.floor + n; b.share = b.matrix + n * n;
   const double *nu = d->nu + at;
   for (int i = 0; i < n; i++) {
@@ -691,20 +914,97 @@ static Block part_of_law(Decision *d, int order, int which) {
       b.is_coupled |= b.share[i * n + j] != 0;
     }
   }
+  for (int i = 0; i < n; i++) {
+    int own = b.own[i], size = d->span[own];
+    if (size >= 0) span[i] = 0;
+    if (size <= 0) continue;
+    if (order > d->began[own]) { /* its rows are like those of other elements */
+      memset(span + i, 0, size);
+      if (b.state[i] != INSIDE) turn_rows(d, &b, i, order);
+      continue;
+    }
+    memset(span + i, -1, size);
+    span[i] = (int8_t)size;
+    b.span = span;
+  }
   return b;
 }
 
-/* What is proved of each block, once. */
+/* Rounding of the unknowns through an inverse of the matrix, and of the rates by them: a row may hold no own unknown,
+ * and no state, as those of a diode bridge. */
+static void add_rounding(Decision *d, Block *b) {
+  int n = b->size, any = 0;
+  double *room = b->share + n * n, *inverse = d->work, *ones = inverse + n * n;
+  for (int i = 0; i < n; i++) any |= b->is_contact[i] && b->matrix[i * (n + 1)] == 0;
+  if (n < 2 || !any) return;
+  for (int i = 0; i < n; i++) ones[i] = 1;
+  if (!invert_any(b->matrix, n, ones, inverse, ones + n, d->pivot)) return;
+  for (int i = 0; i < n; i++) {
+    room[i] = 0;
+    for (int j = 0; j < n; j++) room[i] += fabs(inverse[i * n + j]) * b->floor[j];
+  }
+  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) b->floor[i] += fabs(b->matrix[i * n + j]) * room[j];
+  b->room = room;
+}
+
+/* The first row of the element of a row. */
+static int first_row(const int8_t *span, int i) {
+  while (span[i] < 0) i--;
+  return i;
+}
+
+/* What is proved of a block with vectors, in units of its unknowns in which it is symmetric. */
+static int certificate_of_vectors(const Block *b, double *work, int32_t *pending) {
+  int n = b->size, count = 0;
+  const double *m = b->matrix;
+  double *unit = work, *size = unit + n, *a = size + n, *rest = a + n * n;
+  memset(unit, 0, sizeof(double) * n);
+  for (int root = 0; root < n; root++) {
+    if (unit[root] == 0) { unit[root] = 1; pending[count++] = root; }
+    while (count) {
+      int i = pending[--count];
+      for (int j = 0; j < n; j++) {
+        int is_one = first_row(b->span, i) == first_row(b->span, j);
+        if (unit[j] != 0 || !(is_one || m[i * n + j] * m[j * n + i] > 0)) continue;
+        unit[j] = unit[i] * (is_one ? 1 : m[j * n + i] / m[i * n + j]);
+        pending[count++] = j;
+      }
+    }
+  }
+  for (int i = 0; i < n; i++) size[i] = m[i * n + i] > 0 ? sqrt(m[i * n + i] * unit[i]) : 1;
+  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) a[i * n + j] = m[i * n + j] * unit[j] / (size[i] * size[j]);
+  for (int i = 0; i < n; i++) for (int j = 0; j < i; j++) if (!(fabs(a[i * n + j] - a[j * n + i]) <= SYMMETRIC)) return NOTHING;
+  memcpy(rest, a, sizeof(double) * n * n);
+  if (is_definite(rest, n, VANISHES * n)) return UNIQUE_AND_STABLE;
+  return is_definite(a, n, -SINGULAR * n) ? SEMIDEFINITE : NOTHING;
+}
+
+/* What is proved of each block, once, or after its vectors have been turned. */
 static int certificate_of(Decision *d, const Block *b, int which) {
-  if (d->proved[which] < 0)
-    d->proved[which] = b->is_coupled ? NOTHING : certificate(b->matrix, b->size, d->work, d->pivot);
+  int has_vectors = 0;
+  for (int i = 0; i < b->size; i++) has_vectors |= d->span[b->own[i]];
+  if (d->proved[which] < 0 || has_vectors)
+    d->proved[which] = b->is_coupled ? NOTHING : b->span ? certificate_of_vectors(b, d->work, d->pivot)
+                                                         : certificate(b->matrix, b->size, d->work, d->pivot);
   return d->proved[which];
+}
+
+/* The run ends where friction would push against slip in some direction. */
+static void refuse_negative(Run *r, const Block *b) {
+  double own[9];
+  for (int i = 0; i < b->size; i++) {
+    int size = b->span[i];
+    for (int j = 0; j < size * size; j++) own[j] = b->matrix[(i + j / size) * b->size + i + j % size];
+    if (size > 0 && b->b[i] > 0 && largest_of(own, size * size) > 0 && !is_vector_definite(own, size, -LAYER_ROUNDING))
+      finish(r, NON_UNIQUE, INDEFINITE, r->decision->own[b->own[i]]);
+  }
 }
 
 /* Solutions of a block at an order; where the old unknowns are one, what its guard says of an element is known. */
 static int solutions_of(Run *r, Decision *d, int order, int which, double *found, int8_t *class) {
   Block b = part_of_law(d, order, which);
   int n = b.size, count;
+  add_rounding(d, &b);
   int8_t *position = b.is_contact + d->count;
   for (int i = 0; i < n; i++) {
     int letter = d->letter[d->own[b.own[i]]], is_open = b.is_contact[i] && letter;
@@ -718,6 +1018,7 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
   count = n == 1 ? solve_single(&b, found)
                  : solve_block_of_many(&b, certificate_of(d, &b, which), position, found, d->work, d->pivot);
   if (n > MOST_ENUMERATED && d->proved[which] == NOTHING && order == 0) r->facts |= UNPROVED;
+  if (b.span && d->proved[which] == NOTHING && !d->is_imposed) refuse_negative(r, &b);
   for (int q = 0; q < count; q++) {
     double *nu = found + q * n, terms;
     int agrees = order == 0;
@@ -733,8 +1034,14 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
       contacts |= b.is_contact[i];
     }
     for (int i = 0; i < n; i++) {
-      int is_loose = agrees && (is_dependent ? contacts : d->is_known[b.own[i]]);
-      class[q * n + i] = (int8_t)class_of(&b, i, nu, is_loose ? KNOWN_TO * r->o.rtol : 0);
+      int is_loose = agrees && (is_dependent ? contacts : d->is_known[b.own[i]]), own = b.own[i], size = d->span[own];
+      double part = is_loose ? KNOWN_TO * r->o.rtol : 0;
+      class[q * n + i] = (int8_t)(size < 0 ? class[q * n + i - 1] : span_of(&b, i) ? class_of_vector(&b, i, nu, part)
+                                                                                   : class_of(&b, i, nu, part));
+    }
+    for (int i = 0; i < n; i++) { /* back from the axes in which it was solved */
+      int own = b.own[i];
+      if (d->span[own] > 0 && order > d->began[own] && b.state[i] != INSIDE) turn_vector(d->axes + 3 * own, d->span[own], 0, nu + i, 1);
     }
   }
   return count;
@@ -813,7 +1120,7 @@ static void lift_null_space(double *a, int n, double *work, int32_t *pivot) {
 /* Whether the sliding of a block is stable across its layers; what depends on their widths is noted. */
 static int is_stable_block(Run *r, Decision *d, int which, int orders) {
   int size = d->first[which + 1] - d->first[which];
-  if (!d->is_touched[d->order[d->first[which]]] || d->proved[which] == UNIQUE_AND_STABLE) return 1;
+  if (d->is_imposed || !d->is_touched[d->order[d->first[which]]] || d->proved[which] == UNIQUE_AND_STABLE) return 1;
   double *a = d->block, *weight = a + (int64_t)size * size, *scaled = weight + size, *rest = scaled + (int64_t)size * size;
   int n = layer_matrix(r, d, which, orders, a, weight), stable, falling = 0;
   if (n == 0) return 1;
@@ -829,7 +1136,7 @@ static int is_stable_block(Run *r, Decision *d, int which, int orders) {
   double determinant = n == 2 ? a[0] * a[3] - a[1] * a[2] : 1;
   lift_null_space(scaled, n, rest, d->pivot);
   stable = is_positive_stable(scaled, n, rest);
-  int for_all = n == 2 ? determinant <= 0 || (a[0] >= 0 && a[3] >= 0 && a[0] + a[3] > 0) || falling == 2 : !stable && falling == n;
+  int for_all = r->s->sets && element(r, d->own[d->order[d->first[which]]])->k == n ? 1 : n == 2 ? determinant <= 0 || (a[0] >= 0 && a[3] >= 0 && a[0] + a[3] > 0) || falling == 2 : !stable && falling == n;
   if (!for_all) r->facts |= DEPENDS_ON_WIDTHS;
   return stable;
 }
@@ -844,9 +1151,10 @@ static void add_motion(Run *r, Decision *d, int orders) {
     int order = 0;
     while (order < orders && d->state[(order + 1) * k + i] < INSIDE) order++;
     own->order[i] = (int8_t)(order < orders ? order : r->order + 1);
+    if (d->span[i] && d->state[orders * k + i] == INSIDE) own->order[i] = (int8_t)(own->order[i] + d->began[first_row(d->span, i)]); /* of squares */
     own->before[i] = order ? d->state[(order < orders ? order : orders) * k + i] : UNDECIDED;
     own->state[i] = (int8_t)final_state(d, i, orders);
-    own->nu[i] = d->sign[i] * d->nu[i];
+    own->nu[i] = d->span[i] && own->state[i] == ABOVE ? d->along[d->began[first_row(d->span, i)] * k + i] : d->sign[i] * d->nu[i];
   }
   orders -= d->last == orders - 1; /* what grew decided: it has no coefficients */
   own->terms = orders < COMPARED ? orders : COMPARED;
@@ -855,13 +1163,25 @@ static void add_motion(Run *r, Decision *d, int orders) {
       own->series[i * COMPARED + j - 1] = r->trial.states[(int64_t)i * r->stride + j];
 }
 
+/* Coefficients of the joints' reactions that keep them with the other unknowns. */
+static void hold_joints_in(Run *r, const Decision *d, Expansion *e, int order) {
+  int first = r->m - r->s->joints, n = r->s->joints;
+  for (int i = 0; i < n; i++) {
+    double sum = 0;
+    for (int j = 0; j < n; j++) sum += d->joint[i * n + j] * row_of(r, r->n + first + j)[order];
+    e->series[(int64_t)(first + i) * r->stride + order] = -sum;
+  }
+  close_order(r, e, order);
+}
+
 /* Close an order with the unknowns that were found. */
 static void close_with(Run *r, Decision *d, int order) {
   Expansion *e = &r->trial;
-  if (order == 0) { begin_orders(r, d, d->letter); begin_order(r, e, 0); }
+  if (order == 0) { begin_orders(r, d, d->base); begin_order(r, e, 0); }
   for (int i = 0; i < d->count; i++)
     e->series[(int64_t)d->own[i] * r->stride + order] = d->sign[i] * d->nu[order * d->count + i];
   close_order(r, e, order);
+  if (r->s->joints) hold_joints_in(r, d, e, order);
   if (r->s->sets) close_sets(r, e, order);
   next_states(r, e, order);
 }
@@ -903,6 +1223,10 @@ static void explore(Run *r, Decision *d, int order, int which) {
         d->nu[order * k + own] = nu[q * n + i];
         d->state[(order + 1) * k + own] = to[q * n + i];
       }
+      for (int i = d->first[which]; i < d->first[which + 1]; i++) {
+        int own = d->order[i];
+        if (d->span[own] > 0) keep_vector(d, own, order);
+      }
       if (count > 1) explore(r, d, order, which + 1);
     }
     if (count != 1) return;
@@ -928,7 +1252,7 @@ static void letters_of_motion(const Run *r, const Decision *d, const Motion *own
   memcpy(letter, d->letter, r->width);
   for (int i = 0; i < d->count; i++) {
     int side = own->state[i] == INSIDE ? 0 : own->state[i] == ABOVE ? 1 : -1;
-    letter[d->own[i]] = (int8_t)(d->is_contact[i] ? side != 0 : side);
+    letter[d->own[i]] = (int8_t)(d->span[i] && side ? LEAVING : d->is_contact[i] ? side != 0 : side);
   }
 }
 
@@ -964,6 +1288,25 @@ static int is_determined(Run *r, const Layout *l, const int8_t *letter) {
   return 1;
 }
 
+/* Note a mode whose unknowns are not determined; whether the motion is, in spite of that. */
+static int find_dependent(Run *r, const Layout *l, const int8_t *letter, const double *unknowns) {
+  error_scales(r, r->x, held_of(r, letter), unknowns);
+  if (l->slides < 2 || invert_layer(r, l, unknowns, r->matrix)) return 1;
+  r->dependent = l->mode;
+  return is_determined(r, l, letter);
+}
+
+/* Unknowns of a mode, which is laid out, that keep what it holds: bounds that were reached to a tolerance are exact then.
+ * 0 where the run ends. */
+static int hold(Run *r, Continuation *to, int may_depend) {
+  Layout *l = &r->trial.l;
+  lay_out(r, to->letter, l);
+  if ((may_depend || r->s->joints > 1) && !find_dependent(r, l, to->letter, to->unknowns))
+    finish(r, NON_UNIQUE, UNDETERMINED_RATES, 0);
+  if (l->slides && !improve(r, l, r->x, to->unknowns, 1) && r->s->joints) finish(r, INCONSISTENT, DEAD_POINT, 0);
+  return r->status == RUNNING;
+}
+
 /* The mode of a motion to r->chosen, with the zeros of its guards. */
 static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   Continuation *to = &r->chosen;
@@ -971,23 +1314,17 @@ static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   letters_of_motion(r, d, own, to->letter);
   keep_carried(r, to->letter, to->unknowns);
   for (int i = 0; i < d->count; i++)
-    if (to->letter[d->own[i]] == 0 && !is_idle(r, to->letter, d->own[i])) to->unknowns[d->own[i]] = own->nu[i];
-  lay_out(r, to->letter, l);
-  if (l->slides > 1 && may_depend(d)) {
-    error_scales(r, r->x, held_of(r, to->letter), to->unknowns);
-    if (!invert_layer(r, l, to->unknowns, r->matrix)) {
-      r->dependent = l->mode;
-      if (!is_determined(r, l, to->letter)) finish(r, NON_UNIQUE, UNDETERMINED_RATES, 0);
-    }
-  }
-  if (l->slides) improve(r, l, r->x, to->unknowns, 1); /* bounds that were reached to a tolerance are exact now */
+    if (to->letter[d->own[i]] == LEAVING || (to->letter[d->own[i]] == 0 && !is_idle(r, to->letter, d->own[i])))
+      to->unknowns[d->own[i]] = own->nu[i];
+  if (!hold(r, to, may_depend(d))) return;
   memset(to->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < l->rows; row++) {
-    int kind = l->kind[row], of = l->index[row], is_off = kind == SURFACE_GUARD || kind == IMPACT_GUARD;
+    int kind = l->kind[row], of = l->index[row], is_off = kind == SURFACE_GUARD || kind == IMPACT_GUARD || kind == NEAR_GUARD;
+    if (kind == NEAR_GUARD && to->letter[of] == 0) continue; /* ends steps only */
     for (int i = 0; i < d->count; i++) {
       if (row >= l->atoms || d->own[i] != of) continue;
       int both = kind == RELEASE_GUARD || own->before[i] == UNDECIDED || is_idle(r, to->letter, of);
-      int near = both || own->before[i] == (l->side[row] > 0 ? AT_TOP : AT_BOTTOM);
+      int near = both || own->before[i] == (l->side[row] < 0 ? AT_BOTTOM : AT_TOP);
       to->drop[row] = is_off ? own->order[i] + degree_of(r, of) : near ? own->order[i] : 0;
     }
   }
@@ -1025,9 +1362,10 @@ static int holds_its_own(const Run *r, int surface) {
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
   if (element(r, surface)->flags & CONTINUOUS || degree_of(r, surface) > 1 || !holds_its_own(r, surface)) return 0;
+  if (r->s->joints) return 0;
   double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(r->x[i]);
   for (int side = 1; side >= -1; side -= 2) {
     held_of(r, letter);
     r->held[surface] = side;
@@ -1046,10 +1384,10 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
 static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int own = r->active[0], w = r->width, exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
   double rate[2], *near = r->vector + r->n + w; /* not where inputs are put together */
-  if (!has_law(r, own, SURFACE_LAW) || !r->s->affine || is_scaled(r, own) || is_idle(r, letter, own)) return 0;
+  if (!has_law(r, own, SURFACE_LAW) || !r->s->affine || r->s->joints || is_scaled(r, own) || is_idle(r, letter, own)) return 0;
   if (known_count && !(exits && r->falls)) return 0;
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(r->x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(r->x[i]);
   for (int q = 0; q < 2; q++) {
     held_of(r, letter);
     r->held[own] = q ? 1 : -1;
@@ -1077,11 +1415,11 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
 
 /* Where no mode continues: stay where all orbits spiral in, or say why the run ends. */
 static int no_motion(Run *r, const int8_t *letter) {
-  int contacts = 0, k = r->active_count;
-  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
+  int contacts = 0, sets = 0, k = r->active_count;
+  for (int i = 0; i < k; i++) { contacts |= is_half_line(r, r->active[i]); sets |= set_of(r, r->active[i]) >= 0; }
   if (r->status != RUNNING) return 0;
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
-  else if (meets_sets(r)) finish(r, NON_UNIQUE, UNDETERMINED, 0);
+  else if (sets) finish(r, NON_UNIQUE, UNDETERMINED, 0);
   else if (k == 2 && spirals_in(r, letter) && hold_there(r, letter)) return 1;
   else if (k > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
   else finish(r, NON_UNIQUE, DEGENERATE, 0);
@@ -1091,32 +1429,38 @@ static int no_motion(Run *r, const int8_t *letter) {
 static int is_mixed(const Run *r, const int32_t *own, int count);
 static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count);
-static int decide_sets(Run *r, const int8_t *letter, const Known *known, int known_count);
+
+/* The law at the point of the active elements; 0 where it is no number. */
+static int begin_law(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  Decision *d = r->decision;
+  d->count = r->active_count;
+  d->letter = letter;
+  d->motions = d->branches = d->unstable = d->is_imposed = 0;
+  d->last = ORDERS;
+  if (!read_law(r, d)) return 0;
+  find_blocks(d);
+  begin_decision(d);
+  read_old(r, d, letter, known, known_count);
+  find_touched(d, letter);
+  return 1;
+}
 
 /* Choose, as r->chosen, the motion that continues from a point of the active elements; 0 if the run ends.
  * ``letter`` has those of the other elements. */
 static int decide(Run *r, const int8_t *letter, const Known *known, int known_count) {
   Decision *d = r->decision;
-  int k = r->active_count, contacts = 0, several = 0;
-  if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
+  int k = r->active_count, contacts = 0, several = 0, apart = 0;
   if (is_mixed(r, r->active, k)) return decide_in_layer(r, letter, known, known_count);
   if (k == 1 && decide_by_rates(r, letter, known, known_count)) return 1;
-  for (int i = 0; i < k; i++) contacts |= r->active[i] >= r->m;
+  for (int i = 0; i < k; i++) contacts |= is_half_line(r, r->active[i]);
   if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {
     finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);
     return 0;
   }
-  d->count = k;
-  d->letter = letter;
-  d->motions = d->branches = d->unstable = r->several_count = 0;
-  d->last = ORDERS;
-  if (!read_law(r, d)) return try_modes(r, letter, known, known_count);
-  find_blocks(d);
-  begin_decision(d);
-  read_old(r, d, letter, known, known_count);
-  find_touched(d, letter);
+  r->several_count = 0;
+  if (!begin_law(r, letter, known, known_count)) return try_modes(r, letter, known, known_count);
   explore(r, d, 0, 0);
-  if (!d->motions) return no_motion(r, letter);
+  if (!d->motions || r->status != RUNNING) return no_motion(r, letter);
   for (int i = 0; i < d->motions; i++) {
     int is_new = 1;
     for (int j = 0; j < i; j++) is_new &= !is_same_motion(r, d->motion + i, d->motion + j);
@@ -1125,8 +1469,9 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
     letters_of_motion(r, d, d->motion + i, r->found.letter);
     for (int q = 0; q < r->n; q++) r->rates_of_several[r->several_count * r->n + q] = d->motion[i].series[q * COMPARED];
     r->several[r->several_count++] = mode_number(r->table, r->found.letter);
+    apart |= r->several[r->several_count - 1] != r->several[0];
   }
-  if (several > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
+  if (several > 1) { finish(r, NON_UNIQUE, apart ? AMBIGUOUS : SEVERAL_DIRECTIONS, apart ? 0 : several); return 0; }
   choose_motion(r, d, d->motion);
   return r->status == RUNNING;
 }

@@ -1,9 +1,7 @@
 /* Elements: which of them the state is on, what they keep at zero, and their laws. The unknown nu is in [-n, n] for a
- * surface, in [0, inf) for a contact, |nu| <= n for vectors of a set (sets.c), and h^(degree) in its normal cone. What
+ * surface, in [0, inf) for a contact or a complementarity condition, |nu| <= n for vectors of a set (sets.c), and h^(degree) in its normal cone. What
  * differs between the laws stands in LAWS; bounds and signs where they are solved, in decide.c.
  */
-
-static int has_law(const Run *r, int i, int law) { return element(r, i)->law == law; }
 
 /* Surfaces, gaps, their rates and lower derivatives at x; gradients stay among the program's values. */
 static const double *surface_values(Run *r, const double *x) {
@@ -16,7 +14,7 @@ static const double *surface_values(Run *r, const double *x) {
 /* Rounding in each of them, times epsilon, after surface_values. */
 static const double *surface_scales(Run *r, const double *x) {
   double *near = r->vector, *scale = r->rates + r->kept_rows;
-  for (int i = 0; i < r->n; i++) near[i] = r->size + fabs(x[i]);
+  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
   gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, near, 1, scale);
   return scale;
 }
@@ -70,8 +68,11 @@ static void project(Run *r, const int32_t *which, int count) { project_to(r, whi
 static int lower_rows(const Run *r, int i, int32_t *which) {
   const Element *e = element(r, i);
   for (int k = 0; k < e->degree - 1; k++) which[k] = e->lower + k;
-  return e->degree - 1;
+  return e->degree > 1 ? e->degree - 1 : 0;
 }
+
+/* Whether an element keeps its function at zero, as one of the states. */
+static int keeps_height(const Run *r, int i) { return element(r, i)->degree > 0; }
 
 /* The side to which a motion on h = 0 passes by the first lower derivative that is not zero to rounding; 0 where all
  * are. After surface_values and surface_scales. */
@@ -91,30 +92,37 @@ static void take_sides(Run *r, int8_t *letter, int certain) {
   surface_values(r, r->x);
   const double *scale = surface_scales(r, r->x);
   for (int i = 0; i < r->m; i++) {
-    if (degree_of(r, i) == 1 || letter[i] == 0 || !(i == certain || fabs(r->rates[i]) <= ON_SURFACE * scale[i])) continue;
+    if (degree_of(r, i) <= 1 || letter[i] == 0 || !(i == certain || fabs(r->rates[i]) <= ON_SURFACE * scale[i])) continue;
     int side = passes_to(r, i, scale);
     if (side) letter[i] = (int8_t)side;
   }
 }
 
+/* The functions of joints, and derivatives. */
+static int with_joints(const Run *r, int32_t *which, int count) {
+  for (int i = 0; r->s->joints && i < r->m; i++) if (has_law(r, i, JOINT_LAW)) which[count++] = i;
+  for (int i = 0; r->s->joints && i < r->m; i++) if (has_law(r, i, JOINT_LAW)) count += lower_rows(r, i, which + count);
+  return count;
+}
+
 /* What the active elements below ``width`` keep at zero, contacts their gaps, and the ``certain`` one (or -1), also if
  * it is passed. */
 static int gather(const Run *r, int certain, int width, int32_t *which) {
-  int count = 0, found = certain < 0 || degree_of(r, certain) == 1;
+  int count = 0, found = certain < 0 || degree_of(r, certain) <= 1;
   for (int i = 0; i < r->active_count && r->active[i] < width; i++) {
-    which[count++] = r->active[i];
+    if (keeps_height(r, r->active[i])) which[count++] = r->active[i];
     found |= r->active[i] == certain;
   }
   if (!found) which[count++] = certain;
   for (int i = 0; i < r->active_count; i++)
     if (r->active[i] < r->m) count += lower_rows(r, r->active[i], which + count);
-  return count;
+  return with_joints(r, which, count);
 }
 
 /* Functions that a mode keeps at zero, and derivatives. */
 static int kept_by(const Run *r, const int8_t *letter, int32_t *which) {
   int count = 0;
-  for (int i = 0; i < r->width; i++) if (letter[i] == 0) which[count++] = i;
+  for (int i = 0; i < r->width; i++) if (letter[i] == 0 && keeps_height(r, i)) which[count++] = i;
   for (int i = 0; i < r->width; i++) if (letter[i] == 0) count += lower_rows(r, i, which + count);
   return count;
 }
@@ -153,9 +161,12 @@ static void leave_parallel(Run *r, int certain, const int8_t *letter) {
   int count = 0, kept = 0;
   for (int i = 0; i < r->active_count; i++) {
     int own = r->active[i];
-    if (letter[own] == 0 || own == certain) onto[kept++] = own; else count += has_law(r, own, SURFACE_LAW);
+    if (letter[own] == 0 || own == certain) {
+      if (keeps_height(r, own)) onto[kept++] = own;
+    } else count += has_law(r, own, SURFACE_LAW);
   }
   if (!count) return;
+  kept = with_joints(r, onto, kept);
   memcpy(x, r->x, sizeof(double) * r->n);
   project(r, onto, kept);
   memcpy(first, r->x, sizeof(double) * r->n);
@@ -174,6 +185,19 @@ static void leave_parallel(Run *r, int certain, const int8_t *letter) {
   memcpy(r->x, x, sizeof(double) * r->n);
 }
 
+/* The run ends where a state does not satisfy a joint, or does not move along it. */
+static void require_joints(Run *r, const double *scale) {
+  for (int i = 0; r->s->joints && i < r->m; i++) {
+    const Element *e = element(r, i);
+    for (int k = 0; has_law(r, i, JOINT_LAW) && k < e->degree; k++) {
+      int row = k ? e->lower + k - 1 : i;
+      if (fabs(r->rates[row]) <= CONSISTENT * scale[row] || r->status != RUNNING) continue;
+      r->limit = r->rates[row];
+      finish(r, INCONSISTENT, OFF_CONSTRAINT, k ? r->m + i : i);
+    }
+  }
+}
+
 static void active_surfaces(Run *r, int certain, const int8_t *letter) {
   r->active_count = 0;
   if (!r->width) return;
@@ -183,10 +207,12 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
     double gap = h[r->m + j];
     if (gap < 0 && !(fabs(gap) <= ON_SURFACE * scale[r->m + j])) finish(r, INCONSISTENT, BEHIND, j);
   }
+  require_joints(r, scale);
   int met = 0;
   for (int i = 0; i < r->width; i++) {
     int rests = fabs(h[i]) <= ON_SURFACE * scale[i], s = set_of(r, i), sure = i == certain;
-    if (has_law(r, i, RELAY_LAW)) continue; /* it switches, nothing is decided */
+    if (has_law(r, i, RELAY_LAW) || has_law(r, i, JOINT_LAW)) continue; /* nothing is decided */
+    rests |= !keeps_height(r, i); /* its function holds unknowns: it is decided with them */
     if (s >= 0) {
       if (i == s) met = letter[s] <= OFF && is_met(r, letter, s, h, scale);
       rests = met;
@@ -203,7 +229,8 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
 static void serve_surface(Run *r, int row);
 static void serve_contact(Run *r, int row);
 static void serve_set(Run *r, int row);
-static void settle_in(Run *r);
+static void serve_complementarity(Run *r, int row);
+static int settle_in(Run *r);
 static int change_kind(const Run *r, int before, int after);
 static void event(Run *r, int kind, int before, int guard, const double *x);
 
@@ -227,6 +254,11 @@ static void lay_out_surface(const Run *r, Layout *l, int i) {
   (void)r;
   if (l->letter[i]) add_row(l, SURFACE_GUARD, i, l->letter[i]);
   else { add_row(l, EXIT_GUARD, i, 1); add_row(l, EXIT_GUARD, i, -1); }
+}
+
+static void lay_out_complementarity(const Run *r, Layout *l, int i) {
+  (void)r;
+  add_row(l, l->letter[i] ? SURFACE_GUARD : RELEASE_GUARD, i, l->letter[i]);
 }
 
 static void lay_out_contact(const Run *r, Layout *l, int i) {
@@ -253,8 +285,9 @@ static void guard_of_surface(Run *r, const Layout *l, int row, const double *ser
   for (int k = 0; k < count; k++) g[k] = turn * (factor[k] - side * lam[k]);
 }
 
-static void guard_of_contact(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
-  if (l->kind[row] == IMPACT_GUARD) guard_of_height(r, l, row, count, g);
+/* Of contacts and complementarity: the function while open, the unknown while closed. */
+static void guard_of_half_line(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
+  if (l->letter[l->index[row]]) guard_of_height(r, l, row, count, g);
   else memcpy(g, series + (int64_t)l->index[row] * r->stride, sizeof(double) * count);
 }
 
@@ -270,7 +303,7 @@ static int8_t side_of_surface(const Run *r, int i, double h) {
   return h > 0 ? 1 : -1; /* what is on it counts as below until it is decided */
 }
 
-static int8_t side_of_contact(const Run *r, int i, double h) {
+static int8_t side_of_half_line(const Run *r, int i, double h) {
   (void)r, (void)i, (void)h;
   return 1;
 }
@@ -299,11 +332,22 @@ static void serve_relay(Run *r, int row) {
   if (r->status == RUNNING) event(r, change_kind(r, before, r->mode), before, row, r->x);
 }
 
+/* A joint holds its function at zero with a reaction of any size and sign: nothing ends that. */
+static void lay_out_joint(const Run *r, Layout *l, int i) { (void)r, (void)l, (void)i; }
+
+static int8_t side_of_joint(const Run *r, int i, double h) {
+  (void)r, (void)i, (void)h;
+  return 0;
+}
+
 static const Law LAWS[] = {
   [SURFACE_LAW] = {lay_out_surface, guard_of_surface, rounding_of_element, side_of_surface, serve_surface},
-  [CONTACT_LAW] = {lay_out_contact, guard_of_contact, rounding_of_element, side_of_contact, serve_contact},
+  [CONTACT_LAW] = {lay_out_contact, guard_of_half_line, rounding_of_element, side_of_half_line, serve_contact},
+  [COMPLEMENTARITY_LAW] = {lay_out_complementarity, guard_of_half_line, rounding_of_element, side_of_half_line,
+                           serve_complementarity},
   [SET_LAW] = {lay_out_set, guard_of_set, rounding_of_set, side_of_set, serve_set},
   [RELAY_LAW] = {lay_out_surface, guard_of_relay, rounding_of_element, side_of_relay, serve_relay},
+  [JOINT_LAW] = {.lay_out = lay_out_joint, .side = side_of_joint},
 };
 
 static const Law *law_of(const Run *r, int i) { return LAWS + element(r, i)->law; }

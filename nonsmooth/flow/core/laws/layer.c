@@ -14,8 +14,6 @@ static int choices_of(const int8_t *possible, int count) {
   return total <= TRIED ? total : TRIED + 1;
 }
 
-static void many_may_hold(Run *r) { finish(r, NON_UNIQUE, POSSIBLY_SEVERAL, 0); }
-
 /* Coefficients that are no numbers decide nothing. */
 static void keep_finite(Run *r, Expansion *e) {
   for (int i = 0; i < r->n * r->stride; i++) if (!(fabs(e->states[i]) < INFINITY)) e->states[i] = 0;
@@ -26,7 +24,7 @@ static void keep_finite(Run *r, Expansion *e) {
 static int is_stable(Run *r, const Layout *l) {
   int n = l->slides, rows = 0, w = r->width;
   double *a = r->decision->block, *m = r->work;
-  while (rows < n && l->sliding[rows] < r->m) rows++;
+  while (rows < n && is_bounded(r, l->sliding[rows])) rows++;
   for (int i = 0; i < n; i++) {
     double turn = i < rows ? -ns_sign(factor_of(r, l->sliding[i])) : 1;
     for (int j = 0; j < n; j++) m[i * n + j] = turn * r->slope[l->sliding[i] * w + l->sliding[j]];
@@ -111,6 +109,10 @@ static void spell_choice(const Run *r, const int8_t *letter, const int8_t *possi
     number /= bits(possible[i]);
     for (int bit = 0; bit < 3; bit++)
       if (possible[i] >> bit & 1 && which-- == 0) trial[r->active[i]] = bit == 0 ? 1 : bit == 1 ? -1 : 0;
+  }
+  for (int i = 0; i < r->active_count; i++) { /* a set has one letter, that of its first function */
+    int s = set_of(r, r->active[i]);
+    if (s >= 0) trial[r->active[i]] = trial[s] ? LEAVING : 0;
   }
 }
 
@@ -209,7 +211,7 @@ static void keep_solution(Run *r, const Layout *l, double *unknowns, int steps, 
     double slope = 0;
     for (int j = 0; j < l->slides; j++) slope += fabs(r->slope[own * w + l->sliding[j]]);
     if (!(fabs(layer_of(r, own)) <= LAYER_RESIDUAL * (1 + slope))) return;
-    if (own < r->m && !(fabs(unknowns[own]) <= fabs(factor_of(r, own)) * (1 + LAYER_BEYOND))) return;
+    if (is_bounded(r, own) && !(fabs(unknowns[own]) <= fabs(factor_of(r, own)) * (1 + LAYER_BEYOND))) return;
   }
   for (int k = 0; k < found->count; k++) {
     double apart = 0;
@@ -308,12 +310,12 @@ static void solve_products(Run *r, const Layout *l, double *unknowns, Solutions 
 /* The same for other laws, and with reactions: Newton's method from a grid. */
 static void solve_from_grid(Run *r, const Layout *l, double *unknowns, Solutions *found) {
   int surfaces = 0, points = 1;
-  for (int i = 0; i < l->slides; i++) surfaces += l->sliding[i] < r->m;
+  for (int i = 0; i < l->slides; i++) surfaces += is_bounded(r, l->sliding[i]);
   for (int i = 0; i < surfaces && points < LAYER_STARTS; i++) points *= LAYER_GRID;
   for (int number = 0; number < points; number++) {
     memset(unknowns, 0, sizeof(double) * r->width);
     for (int i = 0, rest = number; i < l->slides; i++)
-      if (l->sliding[i] < r->m) {
+      if (is_bounded(r, l->sliding[i])) {
         unknowns[l->sliding[i]] = (2.0 * (rest % LAYER_GRID) + 1) / LAYER_GRID - 1;
         rest /= LAYER_GRID;
       }
@@ -321,7 +323,29 @@ static void solve_from_grid(Run *r, const Layout *l, double *unknowns, Solutions
   }
 }
 
-static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found);
+/* All unknowns of a mode in which sets are left; as mode_solutions. */
+static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found) {
+  Decision *d = r->decision;
+  int kept = r->active_count, count = 0, w = r->width;
+  memcpy(r->involved, r->active, sizeof(int32_t) * kept);
+  for (int i = 0; i < w; i++)
+    if (l->letter[i] == LEAVING || (l->letter[i] == 0 && !is_idle(r, l->letter, i) && !has_law(r, i, JOINT_LAW)))
+      r->active[count++] = i;
+  r->active_count = count;
+  if (begin_law(r, l->letter, 0, 0)) {
+    for (int i = 0; i < count; i++) { d->is_touched[i] = 1; d->state[i] = l->letter[d->own[i]] ? ABOVE : INSIDE; }
+    d->is_imposed = 1;
+    explore(r, d, 0, 0);
+  }
+  memcpy(r->active, r->involved, sizeof(int32_t) * kept);
+  r->active_count = kept;
+  for (int q = 0; q < d->motions && r->status == RUNNING; q++) {
+    double *unknowns = found->each + found->count * w;
+    keep_carried(r, l->letter, unknowns);
+    for (int i = 0; i < count; i++) unknowns[d->own[i]] = d->motion[q].nu[i];
+    found->count += !l->slides || improve(r, l, r->x, unknowns, 2);
+  }
+}
 
 /* All unknowns with which a mode keeps what slides in it. */
 static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
@@ -340,7 +364,7 @@ static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
   }
   for (int i = 0; i < l->slides; i++) {
     bent |= r->s->mixed[l->sliding[i] * (w + 1)];
-    contacts |= l->sliding[i] >= r->m;
+    contacts |= !is_bounded(r, l->sliding[i]);
   }
   if (l->slides == 1) {
     int own = l->sliding[0], count = roots_along(r, l, unknowns, own, -1 - LAYER_BEYOND, 1 + LAYER_BEYOND, 0, root);
@@ -438,9 +462,12 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
   int8_t *trial = r->tried_letter, *possible = trial + r->width;
   Solutions all = {0};
   Tally tally = {0};
-  for (int i = 0; i < k; i++) possible[i] = r->active[i] < r->m ? 7 : 5;
+  for (int i = 0; i < k; i++) {
+    int own = r->active[i], s = set_of(r, own);
+    possible[i] = s >= 0 && own != s ? 4 : s == own || own >= r->m ? 5 : 7;
+  }
   int total = choices_of(possible, k);
-  if (total > TRIED) { many_may_hold(r); return 0; }
+  if (total > TRIED) { finish(r, NON_UNIQUE, POSSIBLY_SEVERAL, 0); return 0; }
   r->several_count = 0;
   for (int number = 0; number < total && r->status == RUNNING; number++) {
     spell_choice(r, letter, possible, number, trial);
@@ -458,7 +485,7 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
 /* The same where unknowns of the active elements enter nonlinearly. */
 static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int alone = r->active_count == 1, own = alone ? r->active[0] : moves_alone(r, letter), count = r->active_count;
-  if (own >= r->m) own = -1;
+  if (own >= r->m || r->s->joints) own = -1;
   if (own >= 0 && is_two_fold(r, letter, own, 0)) { finish(r, NON_UNIQUE, TWO_FOLD, own); return 0; }
   if (own >= 0) {
     int32_t first = r->active[0];
@@ -556,7 +583,7 @@ static int in_time(Run *r, Expansion *f, const double *rate, double s, double dt
     for (int q = 1; q < 4; q++) {
       double part = 0.25 * q * s, at = integral(rate, order, part);
       double off = fabs(horner(cubic, 3, at, &slope) - value_at(x, order, part));
-      if (off > f->allowed[i] + VANISHES * (r->size + fabs(x[0])) + (i < r->s->dimension ? 0 : TIE * fabs(x[0]))) return 0;
+      if (off > f->allowed[i] + VANISHES * (size_of_state(r, i) + fabs(x[0])) + (i < r->s->dimension ? 0 : TIE * fabs(x[0]))) return 0;
     }
     memset(x, 0, sizeof(double) * stride);
     memcpy(x, cubic, sizeof cubic);

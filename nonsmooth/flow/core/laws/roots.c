@@ -54,7 +54,7 @@ static int move_by(Run *r, const double *field, double dt) {
 /* How fast the rate of h without its root changes along a field. */
 static double change_of_rate(Run *r, int i, double bare, const double *field) {
   double time = INFINITY, *x = r->at_root + r->n, *other = x + r->n;
-  for (int k = 0; k < r->n; k++) if (field[k] != 0) time = smaller((r->size + fabs(r->x[k])) / fabs(field[k]), time);
+  for (int k = 0; k < r->n; k++) if (field[k] != 0) time = smaller((size_of_state(r, k) + fabs(r->x[k])) / fabs(field[k]), time);
   if (!(time < INFINITY)) return 0;
   time *= REACH;
   for (int k = 0; k < r->n; k++) x[k] = r->x[k] + time * field[k];

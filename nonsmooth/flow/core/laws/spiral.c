@@ -29,7 +29,7 @@ static int in_quadrant(Run *r, const int8_t *letter, const int *sign, double *ra
 static int spirals_in(Run *r, const int8_t *letter) {
   static const int turns[2][4][2] = {{{1, 1}, {-1, 1}, {-1, -1}, {1, -1}}, {{1, 1}, {1, -1}, {-1, -1}, {-1, 1}}};
   double ratio = 1, bend = 0, size = 0, f[2], d[4];
-  if (r->n != 2 || r->active_count != 2 || r->active[1] >= r->m) return 0;
+  if (r->n != 2 || r->active_count != 2 || !is_bounded(r, r->active[0]) || !is_bounded(r, r->active[1])) return 0;
   if (!in_quadrant(r, letter, turns[0][0], f, d)) return 0;
   int clockwise = !(f[0] < 0);
   for (int q = 0; q < 4; q++) { /* from the half axis where ``near`` is on its own side to that where it is zero */

@@ -59,7 +59,7 @@ static void add_branches(const Run *r, Layout *l) {
       continue;
     }
     for (int i = 0; i < n; i++) {
-      if (!r->s->slope_moves[own[i] * (w + 1)]) continue;
+      if (!r->s->slope_moves[own[i] * (w + 1)] || (own[i] < r->m && !is_bounded(r, own[i]))) continue;
       add_row(l, BRANCH_GUARD, own[i], OF_ONE);
       l->branches++;
     }
@@ -105,7 +105,7 @@ static void determinant_series(double *a, int n, int count, int stride, double *
   }
 }
 
-/* A of a group to ``to``, with rows times n / e or only turned by the sign of n. */
+/* A of a group to ``to``, with rows times n / e, both of a sign, or only turned by the sign of n. */
 static void group_matrix(const Run *r, const int32_t *own, int n, int count, int weighted, double *to) {
   int stride = r->stride;
   for (int i = 0; i < n; i++) {
@@ -116,7 +116,7 @@ static void group_matrix(const Run *r, const int32_t *own, int n, int count, int
       const double *slope = slope_row(r, own[i], own[j]);
       double *entry = to + (i * n + j) * stride;
       for (int q = 0; q < count; q++)
-        entry[q] = weighted ? -turn * convolve(factor, slope, q, 0, q) / element(r, own[i])->width : -turn * slope[q];
+        entry[q] = weighted ? -convolve(factor, slope, q, 0, q) / element(r, own[i])->width : -turn * slope[q];
     }
   }
 }
@@ -143,9 +143,33 @@ static void sums_matrix(const double *a, int n, int count, int stride, double *t
     }
 }
 
+/* The unknowns of a group, by its first one; their number. */
+static int group_of(const Layout *l, int first, int32_t *own) {
+  int group = 0, n = 0;
+  for (int i = 0; i < l->slides; i++) if (l->sliding[i] == first) group = l->group[i];
+  for (int i = 0; i < l->slides; i++) if (l->group[i] == group) own[n++] = l->sliding[i];
+  return n;
+}
+
+/* What a guard of stability is of the size of: a product of slopes, as r->slope has them. */
+static double branch_scale(const Run *r, const Layout *l, int row) {
+  int kind = l->side[row], first = l->index[row], w = r->width;
+  int32_t own[MOST_ENUMERATED];
+  if (kind == OF_ONE) return fabs(r->slope[first * (w + 1)]);
+  int n = group_of(l, first, own), count = kind == OF_GROUP ? n : n * (n - 1) / 2;
+  double most = 0, product = 1;
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) {
+      double weight = kind == OF_GROUP ? 1 : fabs(factor_of(r, own[i])) / element(r, own[i])->width;
+      most = larger(weight * fabs(r->slope[own[i] * w + own[j]]), most);
+    }
+  while (count--) product *= most;
+  return product;
+}
+
 /* One guard of stability; positive where the mode was entered. */
 static void branch_row(const Run *r, const Layout *l, int row, int count, double *g) {
-  int kind = l->side[row], first = l->index[row], group = 0, n = 0, stride = r->stride;
+  int kind = l->side[row], first = l->index[row], n, stride = r->stride;
   double turn = l->mode == r->turned_mode ? r->turned[row] : 1;
   if (kind == OF_ONE) {
     memcpy(g, slope_row(r, first, first), sizeof(double) * count);
@@ -155,8 +179,7 @@ static void branch_row(const Run *r, const Layout *l, int row, int count, double
   }
   if (l->mode == r->dependent) { memset(g, 0, sizeof(double) * count); return; }
   int32_t own[MOST_ENUMERATED];
-  for (int i = 0; i < l->slides; i++) if (l->sliding[i] == first) group = l->group[i];
-  for (int i = 0; i < l->slides; i++) if (l->group[i] == group) own[n++] = l->sliding[i];
+  n = group_of(l, first, own);
   double *a = r->layer_series, *sums = a + (int64_t)n * n * stride;
   group_matrix(r, own, n, count, kind == OF_SUMS, a);
   if (kind == OF_GROUP) determinant_series(a, n, count, stride, g);

@@ -28,6 +28,7 @@ def supports_set_lanes(coupled: Coupled) -> bool:
 def _has_only_plain_stops(system: FilippovSystem) -> bool:
     """Whether all events are stops at a guard, without conditions, and multipliers enter linearly."""
     others = system.resets or system.impacts or any(system.nonlinear) or system.remembering
+    others = others or system.complementarity or system.constraints
     return not others and system.definition.plain
 
 

@@ -20,9 +20,10 @@ MOST_ORDER = 48
 
 #: The driver in C, in the order in which it is read: one text.
 _FILES = """
-    programs.h pairs.h linear.h state.c modes.c jets.c laws/stability.c laws/sets.c stepper.c
-    near_zeros.c laws/elements.c record.c laws/spiral.c laws/decide.c laws/layer.c laws/contacts.c
-    laws/approach.c events.c driver.c accumulation.c laws/roots.c entry.c variation.c
+    programs.h pairs.h linear.h banded.h radau.h state.c modes.c jets.c laws/stability.c laws/sets.c stepper.c
+    near_zeros.c laws/elements.c record.c laws/spiral.c laws/vectors.c laws/decide.c laws/layer.c laws/contacts.c
+    laws/complementarity.c laws/approach.c events.c collocation.c stiffness.c driver.c accumulation.c laws/roots.c
+    entry.c variation.c
 """.split()
 
 
@@ -81,8 +82,10 @@ def facts_header() -> str:
     statuses = ", ".join(f"{s.name} = {s.value}" for s in Status)
     lines.append(f"enum {{ {statuses}, {', '.join(f'{n} = {numbers[n]}' for n in states)} }};")
     lines.append(f"enum {{ {', '.join(k.upper() for k in constants.KINDS)}, KINDS }};")
-    for ending, names in (("GUARD", constants.GUARDS), ("LAW", constants.LAWS)):
+    laws = (("LAW", constants.LAWS), ("IMPACTS", constants.IMPACT_LAWS))
+    for ending, names in (("GUARD", constants.GUARDS), *laws):
         lines.append(f"enum {{ {', '.join(f'{k.upper()}_{ending}' for k in names)} }};")
+    lines.append(f"enum {{ {', '.join(f'METHOD_{m.upper()}' for m in constants.METHODS)} }};")
     lines.append(f"enum {{ {', '.join(r.upper() or 'NO_REASON' for r in constants.REASONS)} }};")
     lines.append(_table("PRIORITY", [constants.PRIORITY[k] for k in constants.GUARDS]))
     lines.append(f"enum {{ LAG_COUNT = {len(constants.LAGS)} }};\n{_table('LAGS', constants.LAGS)}")

@@ -1,0 +1,113 @@
+/* Complementarity of relative degree one: 0 <= y(x, t), nu >= 0, y nu = 0, where nu enters the rate of y.
+ *
+ * A state with y < 0 jumps by impulses p of the unknowns, x+ = x + B(x+) p with 0 <= y(x+), p >= 0, y p = 0 and
+ * B = df/dnu: the projection onto y >= 0 in the metric in which B is the gradient of y. Newton's method makes a linear
+ * complementarity problem of it, once where y and B are affine.
+ *
+ * Source: Moreau 1977, Evolution problem associated with a moving convex set; Acary & Brogliato 2008, chapter 2.
+ */
+
+/* Conditions of degree one; whether one of them is negative. */
+static int find_jumping(Run *r, int32_t *own, int *is_due) {
+  int n = 0;
+  *is_due = 0;
+  for (int i = 0; i < r->m; i++) if (has_law(r, i, COMPLEMENTARITY_LAW) && degree_of(r, i) == 1) own[n++] = i;
+  if (!n) return 0;
+  const double *h = surface_values(r, r->x), *scale = surface_scales(r, r->x);
+  for (int i = 0; i < n; i++) *is_due |= h[own[i]] < 0 && fabs(h[own[i]]) > ON_SURFACE * scale[own[i]];
+  return n;
+}
+
+/* What impulses p add at a point. */
+static void impulses_at(Run *r, const double *x, const int32_t *own, int n, const double *p, double *change) {
+  memset(r->lam, 0, sizeof(double) * r->width);
+  for (int i = 0; i < n; i++) r->lam[own[i]] = p[i];
+  memset(change, 0, sizeof(double) * r->n);
+  add_impulses(r, x, r->letter, r->lam, change);
+}
+
+/* The inverse of what x - B(x) p changes with the states, by differences, in ``inverse``; 0 where there is none. */
+static int invert_change(Run *r, const int32_t *own, int n, const double *p, double *inverse) {
+  int nd = r->s->dimension;
+  double *a = inverse + (int64_t)nd * nd, *x = r->vector, *base = r->at_work, *moved = r->aside;
+  memcpy(x, r->x, sizeof(double) * r->n);
+  impulses_at(r, x, own, n, p, base);
+  for (int j = 0; j < nd; j++) {
+    double kept = x[j], step = DIFFERENCED * (r->size + fabs(kept));
+    x[j] += step;
+    impulses_at(r, x, own, n, p, moved);
+    for (int i = 0; i < nd; i++) a[i * nd + j] = (i == j) - (moved[i] - base[i]) / (x[j] - kept);
+    x[j] = kept;
+  }
+  return invert(a, nd, inverse);
+}
+
+/* One step of Newton's method to x = from + B(x) p, 0 <= y(x), p >= 0, y p = 0; whether x still changes, -1 where it
+ * fails. */
+static int step_jump(Run *r, const int32_t *own, int n, const double *from, double *p, int is_first) {
+  const Entries *g = &r->s->surface_gradient;
+  int nd = r->s->dimension, all = r->kept_rows, changes = 0;
+  double *q = r->decision->block, *m = q + n, *k = r->jump_work, *columns = k + 2 * (int64_t)nd * nd, *change = r->at_work;
+  double *rest = columns + (int64_t)n * nd, *rows = r->gradient_row, *one = r->small;
+  if (!is_first && !invert_change(r, own, n, p, k)) return -1;
+  for (int j = 0; j <= n; j++) { /* columns of B, then what the present point misses */
+    double *to = j < n ? columns + (int64_t)j * nd : rest;
+    for (int i = 0; i < n; i++) one[i] = i == j;
+    if (j < n) impulses_at(r, r->x, own, n, one, change);
+    for (int i = 0; i < nd; i++) if (j == n) change[i] = from[i] - r->x[i];
+    for (int i = 0; i < nd; i++) {
+      to[i] = is_first ? change[i] : 0;
+      for (int l = 0; l < nd && !is_first; l++) to[i] += k[i * nd + l] * change[l];
+    }
+  }
+  const double *h = surface_values(r, r->x);
+  memset(rows, 0, sizeof(double) * n * nd);
+  for (int i = 0; i < n; i++) {
+    for (int e = 0; e < g->count; e++)
+      if (g->row[e] == own[i] && g->column[e] < nd) rows[i * nd + g->column[e]] = out_of(&r->s->surfaces, r->heights, all + e);
+    q[i] = h[own[i]];
+    for (int l = 0; l < nd; l++) q[i] += rows[i * nd + l] * rest[l];
+    for (int j = 0; j < n; j++) {
+      m[i * n + j] = 0;
+      for (int l = 0; l < nd; l++) m[i * n + j] += rows[i * nd + l] * columns[(int64_t)j * nd + l];
+    }
+  }
+  if (!lemke_scaled(m, q, n, p, r->decision->work, r->decision->pivot)) return -1;
+  for (int i = 0; i < nd; i++) {
+    for (int j = 0; j < n; j++) rest[i] += columns[(int64_t)j * nd + i] * p[j];
+    changes |= !(fabs(rest[i]) <= VANISHES * (r->size + fabs(r->x[i])));
+    r->x[i] += rest[i];
+  }
+  return finite_all(r->x, nd) ? changes : -1;
+}
+
+/* Impulses of the conditions and the state to which they lead, as r->x; 0 where there are none. */
+static int find_jump(Run *r, const int32_t *own, int n, const double *from, double *p) {
+  for (int steps = 0; steps < JUMP_STEPS; steps++) {
+    int changes = step_jump(r, own, n, from, p, steps < 2);
+    if (changes <= 0) return !changes;
+  }
+  return 0;
+}
+
+/* Jump to y >= 0 where a condition is negative; whether it did. The state before is r->jumped_from. */
+static int become_consistent(Run *r) {
+  int due, count = 0;
+  int32_t *own = r->decision->own, *closed = r->involved;
+  double *p = r->decision->large;
+  int n = r->status == RUNNING ? find_jumping(r, own, &due) : 0;
+  if (!n || !due) return 0;
+  memcpy(r->jumped_from, r->x, sizeof(double) * r->n);
+  if (!find_jump(r, own, n, r->jumped_from, p)) {
+    memcpy(r->x, r->jumped_from, sizeof(double) * r->n);
+    const double *h = surface_values(r, r->x);
+    for (int i = 1; i < n; i++) if (h[own[i]] < h[own[0]]) own[0] = own[i];
+    finish(r, INCONSISTENT, NO_JUMP, own[0]);
+    return 0;
+  }
+  for (int i = 0; i < n; i++) if (p[i] > 0) closed[count++] = own[i];
+  project(r, closed, count);
+  r->met = (Met){SURFACE_GUARD, count ? closed[0] : own[0], 1};
+  note(r);
+  return 1;
+}

@@ -1,0 +1,267 @@
+"""Complementarity conditions: diodes, projections and sweeping sets against closed forms and exact modes."""
+
+import pickle
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+from ..independent.circuits import Circuit, driven
+
+REACHED = ns.Status.REACHED_END
+
+
+def circuit(a, b, c, d):
+    """The system of linear complementarity with these matrices."""
+    x, nu = ca.SX.sym("x", len(a)), ca.SX.sym("nu", len(c))
+    y = ca.SX(ca.DM(c)) @ x + ca.SX(ca.DM(d)) @ nu
+    conditions = [ns.Complementarity(y[i], multiplier=nu[i], name=f"d{i}") for i in range(len(c))]
+    field = ca.SX(ca.DM(a)) @ x + ca.SX(ca.DM(b)) @ nu
+    return ns.FilippovSystem(ca.vertsplit(x), field=ca.vertsplit(field), complementarity=conditions)
+
+
+SOURCE = [[0.0], [0.0]]
+BRIDGE = (
+    [[0, -1], [1, 0]],
+    [[0, 0, -1, 1], [0, 0, 0, 0]],
+    [[0, 0], [0, 0], [-1, 0], [1, 0]],
+    [[0.5, 0.5, -1, 0], [0.5, 0.5, 0, -1], [1, 0, 0, 0], [0, 1, 0, 0]],
+)
+CIRCUITS = {
+    "four diodes on a resonator": (BRIDGE, [1.0, 0.0], 0),
+    "four diodes from a voltage of zero": (BRIDGE, [0.0, 1.0], 0),
+    "peak rectifier": ((driven([[-0.1]], [0]), [[1], *SOURCE], [[1, -1, 0]], [[0]]), [0, 0, 1], 1),
+    "peak rectifier with a resistance": (
+        (driven([[-0.1]], [0]), [[1], *SOURCE], [[1, -1, 0]], [[0.1]]),
+        [0, 0, 1],
+        0,
+    ),
+    "two diodes side by side": (
+        (driven([[-0.1]], [0]), [[1, 1], [0, 0], [0, 0]], [[1, -1, 0]] * 2, 0.1 * np.ones((2, 2))),
+        [0, 0, 1],
+        0,
+    ),
+    "two ideal diodes side by side": (
+        (driven([[-0.1]], [0]), [[1, 1], [0, 0], [0, 0]], [[1, -1, 0]] * 2, np.zeros((2, 2))),
+        [0, 0, 1],
+        1,
+    ),
+    "full wave with a filter": (
+        (
+            driven([[-0.1]], [0]),
+            [[1, 1], [0, 0], [0, 0]],
+            [[1, -1, 0], [1, 1, 0]],
+            np.zeros((2, 2)),
+        ),
+        [0, 0, 1],
+        1,
+    ),
+    "voltage doubler": (
+        (
+            driven([[0, 0], [0, -0.02]], [0, 0]),
+            [[-1, 1], [0, 1], [0, 0], [0, 0]],
+            [[-1, 0, 1, 0], [1, 1, -1, 0]],
+            np.zeros((2, 2)),
+        ),
+        [0, 0, 0, 1],
+        1,
+    ),
+    "voltage doubler with resistances": (
+        (
+            driven([[0, 0], [0, -0.02]], [0, 0]),
+            [[-1, 1], [0, 1], [0, 0], [0, 0]],
+            [[-1, 0, 1, 0], [1, 1, -1, 0]],
+            0.05 * np.eye(2),
+        ),
+        [0, 0, 0, 1],
+        0,
+    ),
+    "coil behind a diode": (
+        (driven([[-1]], [1]), [[1], *SOURCE], [[1, 0, 0]], [[0]]),
+        [0, 0, 1],
+        1,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CIRCUITS)
+def test_a_circuit_is_that_of_its_exact_modes(name):
+    matrices, start, degree = CIRCUITS[name]
+    system = circuit(*matrices)
+    assert len(system.algebraic) == (0 if degree else len(system.complementarity))
+    run = ns.simulate(system, start, t_end=20.0, tol=1e-10)
+    assert run.status is REACHED, run.message
+    assert len(run.events) > 4
+    assert abs(run.x[-1] - Circuit(*matrices).run(start, 20.0)).max() < 1e-9
+
+
+def test_capacitors_that_are_joined_share_their_charge():
+    """2 at 3 V and 1 at 1 V: 7/3 V, an event named after the diode."""
+    u, v, i = (ca.SX.sym(name) for name in "uvi")
+    diode = ns.Complementarity(v - u, multiplier=i, name="diode")
+    system = ns.FilippovSystem([u, v], field=[-i / 2, i], complementarity=diode)
+    run = ns.simulate(system, [3.0, 1.0], t_end=1.0)
+    jump = run.events[0]
+    assert (jump.kind, jump.name, jump.t, jump.element, jump.side) == ("jump", "diode", 0, 0, 1)
+    assert (jump.mode_before, jump.mode_after) == ("o", "c")
+    assert jump.x.tolist() == [3.0, 1.0]
+    assert abs(jump.x_after - 7 / 3).max() < 1e-14
+    assert abs(run.x[-1] - 7 / 3).max() < 1e-14
+    assert run.itinerary == "c"
+
+
+def test_a_reset_to_a_forbidden_state_jumps_on():
+    """A charge that is put on the first capacitor is shared at once; level stops see where the jump led."""
+    u, v, i, t = (ca.SX.sym(name) for name in "uvit")
+    system = ns.FilippovSystem(
+        [u, v],
+        field=[-i / 2, i],
+        complementarity=ns.Complementarity(v - u, multiplier=i, name="diode"),
+        resets=ns.Reset(t - 1, {u: u + 3}, 1, "charge"),
+        stops=ns.Stop(v - 1.9, 1, "full"),
+        time=t,
+    )
+    run = ns.simulate(system, [0.0, 0.0], t_end=3.0)
+    kinds = [(event.kind, event.name, event.t) for event in run.events]
+    assert kinds == [("reset", "charge", 1), ("jump", "diode", 1), ("stop", "full", 1)]
+    assert abs(run.x[-1] - 2).max() < 1e-14
+
+
+def test_a_sweeping_interval_carries_the_point():
+    """Play: the point is pushed by an interval of half width 1 round 2 sin t; extremes are those of 2 sin t -+ 1."""
+    x, low, high, t = (ca.SX.sym(name) for name in ("x", "low", "high", "t"))
+    centre = 2 * ca.sin(t)
+    system = ns.FilippovSystem(
+        [x],
+        field=[low - high],
+        complementarity=[
+            ns.Complementarity(x - centre + 1, multiplier=low, name="low"),
+            ns.Complementarity(centre + 1 - x, multiplier=high, name="high"),
+        ],
+        time=t,
+    )
+    run = ns.simulate(system, [0.0], t_end=7.5)
+    assert run.itinerary == "oo co oo oc oo co"
+    assert [event.kind for event in run.events[:4]] == ["contact", "release"] * 2
+    times = [event.t for event in run.events[:4]]
+    assert times == pytest.approx([np.pi / 6, np.pi / 2, np.pi, 3 * np.pi / 2])
+    assert abs(run(2.0) - 1) < 1e-12
+    assert abs(run(5.0) + 1) < 1e-12
+    assert run(4.0)[0] == pytest.approx(2 * np.sin(4.0) + 1, abs=1e-10)
+
+
+def test_an_inconsistent_start_is_projected():
+    """From outside a disc to its nearest point, and from outside a corner to the corner."""
+    x, y, a, b = (ca.SX.sym(name) for name in "xyab")
+    disc = ns.FilippovSystem(
+        [x, y],
+        field=[1 - a * x, -a * y],
+        complementarity=ns.Complementarity((1 - x**2 - y**2) / 2, multiplier=a),
+    )
+    jump = ns.simulate(disc, [3.0, 4.0], t_end=1.0).events[0]
+    assert (jump.kind, jump.mode_after) == ("jump", "c")
+    assert abs(jump.x_after - [0.6, 0.8]).max() < 1e-12
+    corner = ns.FilippovSystem(
+        [x, y],
+        field=[a - 1, b - 1],
+        complementarity=[ns.Complementarity(x, multiplier=a), ns.Complementarity(y, multiplier=b)],
+    )
+    run = ns.simulate(corner, [-1.0, -2.0], t_end=1.0)
+    assert run.events[0].x_after.tolist() == [0, 0]
+    assert run.itinerary == "cc"
+
+
+def test_a_projected_field_slides_into_a_corner_and_out():
+    """In x, y >= 0 a field presses on one edge, then on both, and leaves one after the other."""
+    x, y, a, b, t = (ca.SX.sym(name) for name in "xyabt")
+    system = ns.FilippovSystem(
+        [x, y],
+        field=[ca.cos(t) + a, ca.cos(t - 0.5) + b],
+        complementarity=[
+            ns.Complementarity(x, multiplier=a, name="left"),
+            ns.Complementarity(y, multiplier=b, name="bottom"),
+        ],
+        time=t,
+    )
+    run = ns.simulate(system, [0.0, 0.0], t_end=2 * np.pi, tol=1e-12)
+    assert run.itinerary == "oo co cc oc oo"
+    times = [np.pi, np.pi + 1, 1.5 * np.pi, 1.5 * np.pi + 0.5]
+    assert run.events.t[:4] == pytest.approx(times, abs=1e-10)
+    assert run.events.column("name").tolist()[:4] == ["left", "bottom"] * 2
+    assert abs(run(4.5)).max() < 1e-14
+    assert abs(run.x[-1] - [1, 1 - np.sin(0.5)]).max() < 1e-10
+
+
+def test_a_system_says_what_it_has():
+    i, u, t = (ca.SX.sym(name) for name in "iut")
+    diode = ns.Complementarity(i, multiplier=u, name="diode")
+    system = ns.FilippovSystem([i], field=[ca.sin(t) - i + u], complementarity=diode, time=t)
+    assert repr(system) == "FilippovSystem(1 state: i; time t; complementarity 'diode')"
+    assert (system.complementarity, system.modes) == (("diode",), ("o", "c"))
+    again = pickle.loads(pickle.dumps(system))
+    assert again == system
+    assert again.complementarity == ("diode",)
+    assert "diode" in system._repr_html_()
+    assert system.field("o")[0].__str__() == str(ca.sin(t) - i)
+    with pytest.raises(ns.DefinitionError, match="one per complementarity condition"):
+        system.parse_letters("+")
+
+
+def test_start_modes_and_sections():
+    i, u, t = (ca.SX.sym(name) for name in "iut")
+    diode = ns.Complementarity(i, multiplier=u, name="diode")
+    system = ns.FilippovSystem([i], field=[ca.sin(t) - i + u], complementarity=diode, time=t)
+    options = {"t_end": 20.0, "t_start": 4.5}
+    assert ns.simulate(system, [0.0], start_mode="c", **options).itinerary == "c o c o c o"
+    assert ns.simulate(system, [0.0], start_mode="o", **options).status is ns.Status.NON_UNIQUE
+    closing = ns.simulate(system, [0.0], t_end=20.0, at=ns.Section("diode", direction=-1))
+    opening = ns.simulate(system, [0.0], t_end=20.0, at=ns.Section("diode", direction=1))
+    assert opening.sample_t == pytest.approx([2 * np.pi, 4 * np.pi, 6 * np.pi])
+    assert closing.sample_t == pytest.approx([3.94073313, 10.2239184, 16.5071037])
+
+
+def test_files_and_ensembles(tmp_path):
+    matrices, start, _ = CIRCUITS["full wave with a filter"]
+    system = circuit(*matrices)
+    run = ns.simulate(system, start, t_end=10.0)
+    run.save(tmp_path / "run.npz")
+    loaded = ns.load(tmp_path / "run.npz")
+    assert loaded.system == system
+    assert loaded.events == run.events
+    voltages = [0.0, 0.5, -0.5, 2.0]
+    many = ns.ensemble(system, [[v, 0.0, 1.0] for v in voltages], t_end=10.0)
+    for k, v in enumerate(voltages):
+        alone = ns.simulate(system, [v, 0.0, 1.0], t_end=10.0)
+        assert (many.x[k] == alone.x[-1]).all()
+        assert many.itinerary[k] == alone.itinerary
+    assert many.events["jump"].tolist() == [0, 0, 1, 0]
+
+
+REFUSED = {
+    "second derivative": (["v", "-x + lam"], "x", "Impact"),
+    "nowhere": (["v", "-x"], "x", "not in the field"),
+    "never": (["v + lam", "-x"], "v**2*0 + 1", "never changes"),
+    "bent": (["v + lam", "-x"], "x + lam**2", "not linear"),
+    "product": (["v + lam*v + lam**2", "-x"], "x", "linear in all multipliers"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_no_complementarity_is_refused_by_name(name):
+    field, y, match = REFUSED[name]
+    x, v, lam = (ca.SX.sym(s) for s in ("x", "v", "lam"))
+    known = {"x": x, "v": v, "lam": lam}
+    with pytest.raises(ns.DefinitionError, match=match):
+        ns.FilippovSystem(
+            [x, v],
+            field=[eval(f, {}, known) for f in field],
+            complementarity=ns.Complementarity(eval(y, {}, known), multiplier=lam),
+        )
+
+
+def test_functions_for_surfaces_refuse_it():
+    matrices, start, _ = CIRCUITS["peak rectifier"]
+    with pytest.raises(ns.DefinitionError, match="complementarity conditions"):
+        ns.classify(circuit(*matrices), start)

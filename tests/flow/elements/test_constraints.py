@@ -1,0 +1,445 @@
+"""Joints: motions with constraints against minimal coordinates, closed forms and an index reduction with scipy."""
+
+import pickle
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import nonsmooth as ns
+
+x, y, u, v, r, lam, t = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "r", "lam", "t"))
+angle, rate = ca.SX.sym("angle"), ca.SX.sym("rate")
+ROD = (x**2 + y**2 - 1) / 2
+
+
+def pendulum(drag=0.0, **others):
+    """A bob of unit mass on a rod, with dry friction ``drag`` at the pivot if it is given."""
+    force = [-drag * lam * -y, -drag * lam * x]
+    friction = {"surfaces": [x * v - y * u], "multipliers": [lam]} if drag else {}
+    return ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, r * x + force[0], r * y - 1 + force[1]],
+        constraints=ns.Constraint(ROD, reaction=r, name="rod"),
+        **friction,
+        **others,
+    )
+
+
+def by_angle(drag=0.0, **others):
+    """The same pendulum by its angle from the horizontal."""
+    friction = {"surfaces": [rate], "multipliers": [lam]} if drag else {}
+    field = [rate, -ca.cos(angle) - drag * lam]
+    return ns.FilippovSystem([angle, rate], field=field, **friction, **others)
+
+
+def placed(state):
+    """Position and velocity of the bob."""
+    a, w = state
+    return np.array([np.cos(a), np.sin(a), -w * np.sin(a), w * np.cos(a)])
+
+
+class Mechanism:
+    """Particles joined by rods, some to points that are fixed."""
+
+    def __init__(self, masses, rods, fixed, start, gravity=9.81):
+        self.masses, self.rods, self.fixed = np.array(masses, float), rods, fixed
+        self.start, self.gravity = np.array(start, float), gravity
+        self.lengths = [
+            np.linalg.norm(self._end(i, self.start) - self._end(j, self.start)) for i, j in rods
+        ]
+
+    def _end(self, i, q):
+        return np.array(self.fixed[-i - 1]) if i < 0 else q[2 * i : 2 * i + 2]
+
+    def system(self, **others):
+        n = len(self.masses)
+        q, w, f = ca.SX.sym("q", 2 * n), ca.SX.sym("w", 2 * n), ca.SX.sym("f", len(self.rods))
+        end = lambda i: ca.DM(self.fixed[-i - 1]) if i < 0 else q[2 * i : 2 * i + 2]
+        force = ca.SX.zeros(2 * n)
+        constraints = []
+        for k, (i, j) in enumerate(self.rods):
+            apart = end(i) - end(j)
+            g = (ca.dot(apart, apart) - self.lengths[k] ** 2) / 2
+            force += ca.gradient(g, q) * f[k]
+            constraints.append(ns.Constraint(g, reaction=f[k], name=f"rod{k}"))
+        field = [*ca.vertsplit(w)]
+        for i, mass in enumerate(self.masses):
+            field += [force[2 * i] / mass, force[2 * i + 1] / mass - self.gravity]
+        states = [*ca.vertsplit(q), *ca.vertsplit(w)]
+        return ns.FilippovSystem(states, field=field, constraints=constraints, **others)
+
+    def by_scipy(self, velocity, t_end):
+        """Accelerations by least squares, integrated without projection."""
+        n = 2 * len(self.masses)
+        weight = np.repeat(1 / self.masses, 2)
+        load = np.tile([0.0, -self.gravity], len(self.masses))
+
+        def field(_, z):
+            q, w = z[:n], z[n:]
+            rows, right = np.zeros((len(self.rods), n)), np.zeros(len(self.rods))
+            for k, (i, j) in enumerate(self.rods):
+                apart = self._end(i, q) - self._end(j, q)
+                moved = np.zeros(2)
+                for end, sign in ((i, 1), (j, -1)):
+                    if end >= 0:
+                        rows[k, 2 * end : 2 * end + 2] += sign * apart
+                        moved += sign * w[2 * end : 2 * end + 2]
+                right[k] = -(moved @ moved) - rows[k] @ load
+            force = np.linalg.lstsq(rows * weight @ rows.T, right, rcond=1e-12)[0]
+            return np.r_[w, load + weight * (rows.T @ force)]
+
+        start = np.r_[self.start, velocity]
+        solved = solve_ivp(field, (0, t_end), start, method="DOP853", rtol=1e-12, atol=1e-13)
+        return solved.y[:, -1]
+
+
+def test_a_pendulum_swings_as_by_its_angle():
+    run = ns.simulate(pendulum(), placed((0.3, 1.5)), 20.0, tol=1e-11)
+    plain = ns.simulate(by_angle(), [0.3, 1.5], 20.0, tol=1e-11)
+    assert run.status is ns.Status.REACHED_END and run.itinerary == "s"
+    np.testing.assert_allclose(run.x[-1], placed(plain.x[-1]), atol=1e-8)
+    assert abs((run.x[:, :2] ** 2).sum(1) - 1).max() < 1e-14
+    assert abs((run.x[:, :2] * run.x[:, 2:]).sum(1)).max() < 1e-14
+
+
+@pytest.mark.parametrize(
+    "mechanism",
+    [
+        pytest.param(
+            Mechanism([1.0, 2.0], [(-1, 0), (0, 1)], [(0, 0)], [1, 0, 1.6, 0.8]), id="two rods"
+        ),
+        pytest.param(
+            Mechanism(
+                [1.0, 0.5], [(-1, 0), (0, 1), (1, -2)], [(0, 0), (2, 0)], [0.2, 0.9, 1.7, 1.4]
+            ),
+            id="four-bar linkage",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            Mechanism(
+                [1.0, 0.7, 0.4],
+                [(-1, 0), (-2, 1), (-3, 2), (0, 1), (1, 2)],
+                [(0, 0), (1, 0), (2, 0)],
+                [0.6, -0.8, 1.6, -0.8, 2.6, -0.8],
+            ),
+            id="parallel links",
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_a_mechanism_moves_as_its_index_reduction(mechanism):
+    n = len(mechanism.start)
+    system, start = mechanism.system(), np.r_[mechanism.start, np.zeros(n)]
+    run = ns.simulate(system, start, 3.0, tol=1e-11)
+    assert run.status is ns.Status.REACHED_END, run.message
+    np.testing.assert_allclose(run.x[-1], mechanism.by_scipy(np.zeros(n), 3.0), atol=1e-7)
+    for (i, j), length in zip(mechanism.rods, mechanism.lengths, strict=True):
+        apart = mechanism._end(i, run.x[-1]) - mechanism._end(j, run.x[-1])
+        np.testing.assert_allclose(np.linalg.norm(apart), length, rtol=1e-14)
+
+
+@pytest.mark.parametrize("links", [1, 3, pytest.param(5, marks=pytest.mark.slow)])
+def test_a_table_hangs_on_parallel_links(links):
+    """Three or more depend on one another; the table swings as a pendulum without turning (one link: turned fast)."""
+    turn, spin = ca.SX.sym("turn"), ca.SX.sym("spin")
+    f, places = ca.SX.sym("f", links), np.linspace(-1, 1, links) if links > 1 else [0.0]
+    force, moment, constraints = ca.SX.zeros(2), ca.SX(0), []
+    for k, place in enumerate(places):
+        arm = place * ca.vertcat(ca.cos(turn), ca.sin(turn))
+        link = ca.vertcat(x, y) + arm - ca.vertcat(place, 0)
+        constraints.append(ns.Constraint(ca.dot(link, link) - 1, reaction=f[k], name=f"link{k}"))
+        force += f[k] * link
+        moment += f[k] * (arm[0] * link[1] - arm[1] * link[0])
+    table = ns.FilippovSystem(
+        [x, y, turn, u, v, spin],
+        field=[u, v, spin, force[0], force[1] - 1, 3 * moment],
+        constraints=constraints,
+    )
+    a, w = -1.2, 0.4
+    px, py, pu, pv = placed((a, w))
+    run = ns.simulate(table, [px, py, 0, pu, pv, 0], 6.0, tol=1e-11)
+    assert run.status is ns.Status.REACHED_END, run.message
+    want = placed(ns.simulate(by_angle(), [a, w], 6.0, tol=1e-11).x[-1])
+    np.testing.assert_allclose(run.x[-1, [0, 1, 3, 4]], want, atol=1e-8)
+    np.testing.assert_allclose(run.x[-1, [2, 5]], 0.0, atol=1e-8)
+
+
+def test_a_knife_edge_on_a_slope_runs_along_a_cycloid():
+    """A constraint of velocities: y = g (wt)^2/(2w)^2 ... from rest, x = g (t/(2w) - sin(2wt)/(4w^2))/..."""
+    g, w = 2.0, 1.5
+    turn, spin = ca.SX.sym("turn"), ca.SX.sym("spin")
+    edge = ns.FilippovSystem(
+        [x, y, turn, u, v, spin],
+        field=[u, v, spin, g - r * ca.sin(turn), r * ca.cos(turn), 0],
+        constraints=ns.Constraint(v * ca.cos(turn) - u * ca.sin(turn), reaction=r),
+    )
+    run = ns.simulate(edge, [0, 0, 0, 0, 0, w], 4.0, tol=1e-11)
+    a = w * 4.0
+    np.testing.assert_allclose(run.x[-1, 0], g * np.sin(a) ** 2 / (2 * w**2), atol=1e-9)
+    np.testing.assert_allclose(run.x[-1, 1], g * (a - np.sin(2 * a) / 2) / (2 * w**2), atol=1e-9)
+
+
+def test_a_constraint_that_holds_its_reaction_gives_it_at_once():
+    """x' = r with 0 = r + 2 x - b and b = y + r/2 ... two of them determine two reactions."""
+    other = ca.SX.sym("other")
+    system = ns.FilippovSystem(
+        [x, y],
+        field=[r, -other],
+        constraints=[
+            ns.Constraint(r + 2 * x + other / 2, reaction=r),
+            ns.Constraint(other - y - r, reaction=other),
+        ],
+    )
+    run = ns.simulate(system, [1.0, 2.0], 1.0, tol=1e-11)
+    matrix = np.array([[-4 / 3, -1 / 3], [4 / 3, -2 / 3]])
+    values, vectors = np.linalg.eig(matrix)
+    end = vectors @ (np.exp(values) * np.linalg.solve(vectors, [1.0, 2.0]))
+    np.testing.assert_allclose(run.x[-1], end.real, atol=1e-10)
+    assert system.constraints == () and system.surface_count == 0
+
+
+def test_a_moving_pivot_drives_the_bob():
+    """The pivot moves as 0.1 sin 3t along x."""
+    pivot = 0.1 * ca.sin(3 * t)
+    system = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, r * (x - pivot), r * y - 1],
+        constraints=ns.Constraint(((x - pivot) ** 2 + y**2 - 1) / 2, reaction=r),
+        time=t,
+    )
+    plain = ns.FilippovSystem(
+        [angle, rate],
+        field=[rate, -ca.cos(angle) - 0.9 * ca.sin(3 * t) * ca.sin(angle)],
+        time=t,
+    )
+    start = [np.cos(0.2), np.sin(0.2), 0.3, 0.0]  # with the pivot's speed
+    run = ns.simulate(system, start, 8.0, tol=1e-11)
+    end = ns.simulate(plain, [0.2, 0.0], 8.0, tol=1e-11).x[-1]
+    np.testing.assert_allclose(run.x[-1, 1], np.sin(end[0]), atol=1e-8)
+    np.testing.assert_allclose(run.x[-1, 0], np.cos(end[0]) + 0.1 * np.sin(24.0), atol=1e-8)
+    assert ns.simulate(system, [*start[:2], 0, 0], 8.0).status is ns.Status.INCONSISTENT
+
+
+@pytest.mark.parametrize("drag", [0.1, 0.5])
+def test_friction_at_a_pivot_stops_the_swing(drag):
+    system, plain = pendulum(drag), by_angle(drag)
+    run = ns.simulate(system, placed((0.0, 2.0)), 12.0, tol=1e-11)
+    want = ns.simulate(plain, [0.0, 2.0], 12.0, tol=1e-11)
+    assert run.status is ns.Status.REACHED_END, run.message
+    assert [mode[:1] for mode in run.itinerary.split()] == want.itinerary.split()
+    np.testing.assert_allclose(
+        [e.t for e in run.events], [e.t for e in want.events], rtol=1e-8, atol=1e-8
+    )
+    np.testing.assert_allclose(run.x[-1], placed(want.x[-1]), atol=1e-8)
+
+
+@pytest.mark.parametrize("law", ["newton", "moreau", "poisson"])
+def test_a_bob_strikes_a_wall_through_its_rod(law):
+    """The wall x = -0.4 stops the bob: the rate of x turns round, along the rod."""
+    wall = ns.Impact(x + 0.4, restitution=0.6, name="wall", law=law)
+    own = ns.Impact(angle - (2 * np.pi - np.arccos(-0.4)), restitution=0.6)
+    start = (2 * np.pi - 0.1, 0.0)
+    run = ns.simulate(pendulum(impacts=wall), placed(start), 20.0, tol=1e-11)
+    want = ns.simulate(by_angle(impacts=own), start, 20.0, tol=1e-11)
+    assert run.status is ns.Status.REACHED_END, run.message
+    assert [e.kind for e in run.events] == [e.kind for e in want.events]
+    np.testing.assert_allclose(run.x[-1], placed(want.x[-1]), atol=1e-7)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_bob_comes_to_rest_on_a_floor_and_is_lifted(restitution):
+    """The floor y = -1/2 carries it until a load that turns it upwards has grown."""
+    lift = 0.1 * t
+    system = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, r * x - lift * y, r * y - 1 + lift * x],
+        constraints=ns.Constraint(ROD, reaction=r),
+        impacts=ns.Impact(y + 0.5, restitution=restitution),
+        time=t,
+    )
+    plain = ns.FilippovSystem(
+        [angle, rate],
+        field=[rate, lift - ca.cos(angle)],
+        impacts=ns.Impact(angle + np.pi / 6, restitution=restitution),
+        time=t,
+    )
+    run = ns.simulate(system, placed((0.3, 0.0)), 10.0, tol=1e-11)
+    want = ns.simulate(plain, [0.3, 0.0], 10.0, tol=1e-11)
+    assert run.status is ns.Status.REACHED_END, run.message
+    assert [e.kind for e in run.events if e.kind != "impact"] == ["contact", "release", "end"][
+        restitution == 0 :
+    ]
+    for event, true in zip(run.events[-2:], want.events[-2:], strict=True):
+        assert abs(event.t - true.t) < 1e-9
+    np.testing.assert_allclose(run.x[-1], placed(want.x[-1]), atol=1e-7)
+
+
+def test_kicks_along_the_rod_are_taken_and_others_refused():
+    turn = 0.3
+    along = ns.Reset(x, {u: u - turn * y, v: v + turn * x}, 1, name="kick")
+    across = ns.Reset(x, {u: u + 0.1, v: v + 0.1}, 1, name="kick")
+    plain = ns.Reset(angle + np.pi / 2, {rate: rate + turn}, 1, name="kick")
+    run = ns.simulate(pendulum(resets=along), placed((-2.5, 0.0)), 6.0, tol=1e-11)
+    want = ns.simulate(by_angle(resets=plain), [-2.5, 0.0], 6.0, tol=1e-11)
+    np.testing.assert_allclose(run.x[-1], placed(want.x[-1]), atol=1e-8)
+    lost = ns.simulate(pendulum(resets=across), placed((-2.5, 0.0)), 6.0)
+    assert lost.status is ns.Status.INCONSISTENT
+    assert "Rate of the function of 'rod' is -0.1" in lost.message
+
+
+@pytest.mark.parametrize(
+    ("start", "text"),
+    [
+        ([1.0, 0.1, 0.0, 0.0], "Function of 'rod' is 0.005 at t = 0"),
+        ([1.0, 0.0, -0.2, 0.0], "Rate of the function of 'rod' is -0.2 at t = 0"),
+    ],
+)
+def test_a_start_off_a_constraint_is_refused(start, text):
+    run = ns.simulate(pendulum(), start, 1.0)
+    assert run.status is ns.Status.INCONSISTENT and text in run.message
+
+
+def test_a_start_that_is_off_by_rounding_is_projected():
+    run = ns.simulate(pendulum(), [1.0 + 3e-10, 0.0, 2e-10, 0.5], 1.0)
+    assert run.status is ns.Status.REACHED_END
+    assert abs(run.x[0, :2] @ run.x[0, :2] - 1) < 1e-15 and abs(run.x[0, :2] @ run.x[0, 2:]) < 1e-15
+    np.testing.assert_allclose(run.x[0], [1.0, 0.0, 0.0, 0.5], atol=1e-9)
+
+
+def test_constraints_that_contradict_one_another_are_found_where_they_do():
+    """Both hold where y = 0, and no reaction keeps both as y grows."""
+    system = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, r + lam, 1],
+        constraints=[
+            ns.Constraint(x, reaction=r, name="here"),
+            ns.Constraint(x - y**3, reaction=lam, name="there"),
+        ],
+    )
+    run = ns.simulate(system, [0.0, 0.0, 0.0, 0.0], 1.0)
+    assert run.status is ns.Status.INCONSISTENT, run.message
+    assert "No reactions keep 'here' and 'there'" in run.message
+
+
+def test_a_reaction_that_is_not_given_acts_along_the_gradient():
+    field = [u, v, 0, -1]
+    system = ns.FilippovSystem([x, y, u, v], field=field, constraints=ns.Constraint(ROD))
+    run, own = (ns.simulate(s, placed((0.3, 0.0)), 4.0) for s in (system, pendulum()))
+    np.testing.assert_allclose(run.x[-1], own.x[-1], atol=1e-9)
+
+
+def test_a_system_with_constraints_keeps_its_definition():
+    system = pendulum(0.1)
+    again = pickle.loads(pickle.dumps(system))
+    assert again == system and again.constraints == ("rod",) and again.joints == (1,)
+    assert repr(system).endswith("1 surface; constraint 'rod')")
+    run = ns.simulate(again, placed((0.0, 1.0)), 2.0)
+    np.testing.assert_array_equal(run.x[-1], ns.simulate(system, placed((0.0, 1.0)), 2.0).x[-1])
+    starts = np.array([placed((a, 0.0)) for a in np.linspace(-3, 3, 7)])
+    many = ns.ensemble(system, starts, 5.0)
+    for start, end in zip(starts, many.x, strict=True):
+        np.testing.assert_allclose(end, ns.simulate(system, start, 5.0).x[-1], atol=1e-12)
+
+
+def test_a_run_goes_on_from_its_events():
+    system = pendulum(0.2)
+    whole = ns.simulate(system, placed((0.0, 2.0)), 10.0)
+    first = ns.simulate(system, placed((0.0, 2.0)), 3.0)
+    rest = ns.simulate(system, start=first, t_end=10.0)
+    np.testing.assert_allclose(rest.x[-1], whole.x[-1], atol=1e-9)
+    mode = whole.events[0].mode_after
+    again = ns.simulate(
+        system, whole.events[0].x_after, 10.0, t_start=whole.events[0].t, start_mode=mode
+    )
+    np.testing.assert_allclose(again.x[-1], whole.x[-1], atol=1e-9)
+
+
+def test_derivatives_are_those_by_the_angle():
+    """Through friction, a stop of the slip and a wall."""
+    g = ca.SX.sym("g")
+    wall = ns.Impact(x + 0.4, restitution=0.6, name="wall")
+    own = ns.Impact(angle - (2 * np.pi - np.arccos(-0.4)), restitution=0.6, name="wall")
+    system = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, r * x + 0.1 * lam * y, r * y - g - 0.1 * lam * x],
+        surfaces=[x * v - y * u],
+        multipliers=[lam],
+        constraints=ns.Constraint(ROD, reaction=r),
+        impacts=wall,
+        parameters={g: 1.0},
+    )
+    plain = ns.FilippovSystem(
+        [angle, rate],
+        field=[rate, -g * ca.cos(angle) - 0.1 * lam],
+        surfaces=[rate],
+        multipliers=[lam],
+        impacts=own,
+        parameters={g: 1.0},
+    )
+    start = np.array([2 * np.pi - 0.1, -0.3])
+    run = ns.simulate(system, placed(start), 5.0, tol=1e-11)
+    want = ns.simulate(plain, start, 5.0, tol=1e-11)
+    assert [e.kind for e in run.events] == [e.kind for e in want.events]
+    assert "impact" in [e.kind for e in run.events] and "crossing" in [e.kind for e in run.events]
+    a, w = want.x[-1]
+    outer = np.array(
+        [[-np.sin(a), 0], [np.cos(a), 0], [-w * np.cos(a), -np.sin(a)], [-w * np.sin(a), np.cos(a)]]
+    )
+    a, w = start
+    inner = np.array(
+        [[-np.sin(a), 0], [np.cos(a), 0], [-w * np.cos(a), -np.sin(a)], [-w * np.sin(a), np.cos(a)]]
+    )
+    found, true = ns.sensitivity(run), ns.sensitivity(want)
+    np.testing.assert_allclose(found.dx_dp, outer @ true.dx_dp, atol=1e-8)
+    np.testing.assert_allclose(found.dx_dx0 @ inner, outer @ true.dx_dx0, atol=1e-8)
+
+
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+def test_constraints_that_are_given_twice_change_nothing(law):
+    """Impulses act through both; derivatives ask for one of them."""
+    wall = ns.Impact(x + 0.4, restitution=0.6, name="wall", law=law)
+    twice = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, (r + lam) * x, (r + lam) * y - 1],
+        constraints=[ns.Constraint(ROD, reaction=r), ns.Constraint(2 * ROD, reaction=lam)],
+        impacts=wall,
+    )
+    start = placed((2 * np.pi - 0.1, 0.0))
+    run, own = (ns.simulate(s, start, 20.0, tol=1e-11) for s in (twice, pendulum(impacts=wall)))
+    assert [e.kind for e in run.events] == [e.kind for e in own.events]
+    np.testing.assert_allclose(run.x[-1], own.x[-1], atol=1e-8)
+    with pytest.raises(ns.DegenerateError, match="Leave out those that follow from the others"):
+        ns.sensitivity(run)
+
+
+@pytest.mark.parametrize(
+    ("constraints", "field", "text"),
+    [
+        (ns.Constraint(ROD, reaction=r), [u, v, 0, -1], "r is not in the field"),
+        (ns.Constraint(ROD, reaction=r), [u, v, r**2, -1], "r is multiplied with r"),
+        (ns.Constraint(x, reaction=r), [u, v, 0, r], "two derivatives without a reaction"),
+        (ns.Constraint(x + r**2, reaction=r), [u, v, r, 0], "reaction enters nonlinearly"),
+        (ns.Impact(x), [u, v, 0, 0], "expected a Constraint"),
+    ],
+)
+def test_what_is_no_joint_is_refused(constraints, field, text):
+    with pytest.raises(ns.DefinitionError, match=text.replace("(", r"\(").replace("*", r"\*")):
+        ns.FilippovSystem([x, y, u, v], field=field, constraints=constraints)
+
+
+def test_friction_by_the_reaction_of_a_joint_is_refused_with_what_to_write():
+    with pytest.raises(ns.DefinitionError, match="friction at it is that of two contacts"):
+        ns.FilippovSystem(
+            [x, y, u, v],
+            field=[u, v, -0.3 * lam * r, r - 1],
+            surfaces=[u],
+            multipliers=[lam],
+            constraints=ns.Constraint(y, reaction=r),
+        )
+
+
+def test_functions_for_other_systems_refuse_constraints():
+    with pytest.raises(ns.DefinitionError, match="has constraints, which this function"):
+        ns.classify(pendulum(0.1), [1.0, 0.0, 0.0, 0.0])

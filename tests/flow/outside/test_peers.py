@@ -1,0 +1,57 @@
+"""Problems of other tools' collections (``tests/cases/peers.json``): closed forms and integrators of their own."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+from ..peers import Problem, cases
+
+every = pytest.mark.parametrize(
+    "data",
+    [
+        pytest.param(own, id=own["id"], marks=[pytest.mark.slow] * own.get("slow", False))
+        for own in cases()
+    ],
+)
+
+
+@every
+def test_a_problem_is_as_known(data):
+    problem = Problem(data)
+    problem.check(problem.run())
+
+
+@pytest.mark.slow
+@every
+def test_an_ensemble_ends_as_known(data):
+    if "end" not in data:
+        pytest.skip("nothing is known of its end")
+    problem = Problem(data)
+    many = ns.ensemble(
+        problem.system,
+        np.tile(problem.start, (5, 1)),
+        problem.t_end,
+        **{"tol": 1e-10, **data.get("options", {})},
+        work=ns.Work(threads=1, progress=False),
+    )
+    assert ns.Status(int(many.status[2])).name == data.get("status", "REACHED_END")
+    assert problem.error(many.x[2], data["end"]) <= problem.within
+
+
+def test_time_does_not_run_backward():
+    u = ca.SX.sym("u")
+    with pytest.raises(ns.OptionError, match="t_end"):
+        ns.simulate(ns.FilippovSystem([u], field=[u]), [5.0], t_start=2.0, t_end=0.0)
+
+
+def test_derivatives_of_a_bounce():
+    """SciML test/AD/autodiff_events.jl: one bounce within 1; derivatives by gravity and restitution."""
+    y, v, g, e = (ca.SX.sym(name) for name in "yvge")
+    floor = ns.Reset(y, {v: -e * v}, direction=-1)
+    system = ns.FilippovSystem([y, v], field=[v, -g], parameters={g: 9.8, e: 0.8}, resets=floor)
+    found = ns.sensitivity(ns.simulate(system, [1.0, 0.0], t_end=1.0, tol=1e-12))
+    speed = np.sqrt(2 * 9.8)
+    expected = [[1.8 / speed - 0.5, speed - 2], [1.8 / speed - 1, speed]]
+    assert np.allclose(found.dx_dp, expected, rtol=0, atol=1e-10)

@@ -1,0 +1,219 @@
+"""Implicit steps: cases with 22 digits from collocation in 66 digits, closed forms, and when they are taken."""
+
+import json
+import re
+from pathlib import Path
+
+import casadi as ca
+import mpmath as mp
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+CASES = {
+    case["id"]: case
+    for case in json.loads((Path("tests") / "cases" / "stiff.json").read_text())["cases"]
+}
+x, v, f, t, lam = (ca.SX.sym(name) for name in ("x", "v", "f", "t", "lam"))
+RATE = 1e6
+
+
+def system_of(case):
+    """The system of a case, and where the time is among its states."""
+    names = [*case["states"], *case["multipliers"]]
+    of = {name: ca.SX.sym(name) for name in names}
+    scope = of | {name: getattr(ca, name) for name in ("sin", "cos", "exp", "tanh", "sqrt")}
+    read = lambda text: ca.SX(eval(text, {"__builtins__": {}}, scope))  # the text is ours
+    states = [name for name in case["states"] if name != "t"]
+    rates = dict(zip(case["states"], case["field"], strict=True))
+    return ns.FilippovSystem(
+        [of[name] for name in states],
+        field=[read(rates[name]) for name in states],
+        surfaces=[read(text) for text in case["surfaces"]],
+        multipliers=[of[name] for name in case["multipliers"]],
+        time=of["t"] if "t" in case["states"] else None,
+    )
+
+
+def states_in(case, numbers):
+    """Numbers of the states but the time."""
+    of = zip(case["states"], numbers, strict=True)
+    return np.array([float(number) for name, number in of if name != "t"])
+
+
+@pytest.mark.parametrize("tol", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("name", CASES)
+def test_a_case(name, tol):
+    case = CASES[name]
+    system, start, end = (
+        system_of(case),
+        states_in(case, case["start"]),
+        states_in(case, case["end"]),
+    )
+    run = ns.simulate(system, start, float(case["t_end"]), tol=tol)
+    assert run.status is ns.Status.REACHED_END and len(run.t) < 1000
+    if name != "tanh_limit":
+        assert run.facts.implicit_steps == run.steps.implicit.sum() > 0
+    events = [event for event in run.events if event.kind != "end"]
+    assert len(events) == len(case["events"])
+    for found, true in zip(events, case["events"], strict=True):
+        assert abs(found.t - float(true["t"])) <= 100 * tol * max(1.0, found.t)
+        assert found.mode_after == "".join("-s+"[k + 1] for k in true["letters"])
+    size = np.maximum(np.abs(end), 1.0)
+    assert np.max(np.abs(run.x[-1] - end) / size) <= 100 * tol
+
+
+def actuator(**more):
+    return ns.FilippovSystem(
+        [x, v, f],
+        field=[v, f - x - 0.4 * lam, RATE * (1.5 * ca.cos(0.7 * t) - f)],
+        surface=v,
+        multipliers=lam,
+        time=t,
+        **more,
+    )
+
+
+def test_explicit_steps_say_what_holds_them():
+    run = ns.simulate(actuator(), [0.0, 0.0, 1.5], 10.0, method="taylor", max_steps=500)
+    assert run.status is ns.Status.TOO_MANY_STEPS and run.facts.implicit_steps == 0
+    assert "a decay rate of about" in run.message and "method='auto'" in run.message
+    with pytest.raises(ns.OptionError, match="method is 'radau'"):
+        ns.simulate(actuator(), [0.0, 0.0, 1.5], 10.0, method="radau")
+
+
+def test_a_run_is_the_same_whoever_ran_before():
+    """The program of derivatives is made within the first run that needs it."""
+    system = actuator()
+    runs = [ns.simulate(system, [0.0, 0.0, 1.5], 10.0) for _ in range(2)]
+    assert np.array_equal(runs[0].t, runs[1].t) and np.array_equal(runs[0].x, runs[1].x)
+    many = ns.ensemble(system, np.tile([0.0, 0.0, 1.5], (70, 1)), 10.0)
+    assert many.engine == "core" and np.array_equal(many.x, np.tile(runs[0].x[-1], (70, 1)))
+    half = ns.simulate(system, [0.0, 0.0, 1.5], 5.0)
+    rest = ns.simulate(system, start=half, t_end=10.0)
+    assert np.allclose(rest.x[-1], runs[0].x[-1], rtol=0, atol=1e-9)
+
+
+def test_samples_and_saved_steps(tmp_path):
+    run = ns.simulate(actuator(), [0.0, 0.0, 1.5], 10.0)
+    times = np.linspace(0.0, 10.0, 301)
+    read = ns.simulate(actuator(), [0.0, 0.0, 1.5], 10.0, t_eval=times, dense=False)
+    assert np.array_equal(read.sample_x, run(times))
+    run.save(tmp_path / "run.npz")
+    again = ns.load(tmp_path / "run.npz")
+    assert np.array_equal(again.steps.implicit, run.steps.implicit) and again.facts == run.facts
+
+
+def test_stops_resets_and_clocks_end_implicit_steps():
+    """A sensor of rate 1e7 follows T' = -T/2 + 8 q; the relay switches by the sensor: T = 18 and 22 but 1e-6."""
+    temperature, sensor, q = (ca.SX.sym(name) for name in ("T", "S", "q"))
+    rate = 1e7
+    system = ns.FilippovSystem(
+        [temperature, sensor],
+        discrete={q: (0, 1)},
+        field=[-0.5 * (temperature - 10) + 8 * q, rate * (temperature - sensor)],
+        resets=[
+            ns.Reset(sensor - 18, {q: 1}, direction=-1, level=True, when=q == 0),
+            ns.Reset(sensor - 22, {q: 0}, direction=+1, level=True, when=q == 1),
+        ],
+        stops=[ns.Stop(t - 9.5, 1, "late")],
+        time=t,
+    )
+    run = ns.simulate(system, [20.0, 20.0, 1], 20.0)
+    assert run.t[-1] == 9.5 and run.facts.implicit_steps > 0
+    # the sensor lags behind a slope s by s/rate: T = 22 + s/rate where it says 22
+    times, level = [0.0], 20.0
+    for k in range(len(run.events) - 1):
+        limit, bound = (26.0, 22.0) if k % 2 == 0 else (10.0, 18.0)
+        lag = -0.5 * (bound - limit) / rate
+        times.append(times[-1] + 2 * np.log((level - limit) / (bound + lag - limit)))
+        level = bound + lag
+    assert np.allclose([e.t for e in run.events[:-1]], times[1:], rtol=0, atol=1e-9)
+
+
+def test_a_ball_bounces_on_a_table_beside_a_fast_state():
+    """Impacts at 2 v0 r^k: the fast state does not disturb them."""
+    y, w, fast = (ca.SX.sym(name) for name in ("y", "w", "fast"))
+    system = ns.FilippovSystem(
+        [y, w, fast],
+        field=[w, -1, 1e7 * (ca.sin(y) - fast)],
+        impacts=[ns.Impact(y, restitution=0.8)],
+    )
+    run = ns.simulate(system, [0.0, 1.0, 0.0], 7.0)
+    impacts = [event.t for event in run.events if event.kind == "impact"]
+    assert np.allclose(impacts, 2 * np.cumsum(0.8 ** np.arange(len(impacts))), rtol=0, atol=1e-9)
+    assert run.facts.implicit_steps > 10
+
+
+def test_many_coupled_states():
+    """The heat equation on 200 points: u_k = sin(pi k h) exp(-mu t) is a mode of the difference matrix."""
+    n = 200
+    u = [ca.SX.sym(f"u{k}") for k in range(n)]
+    h = 1 / (n + 1)
+    rates = [
+        ((u[k - 1] if k else 0) - 2 * u[k] + (u[k + 1] if k < n - 1 else 0)) / h**2
+        for k in range(n)
+    ]
+    system = ns.FilippovSystem(u, field=rates)
+    start, mu = np.sin(np.pi * h * np.arange(1, n + 1)), 4 / h**2 * np.sin(np.pi * h / 2) ** 2
+    run = ns.simulate(system, start, 0.5, tol=1e-9)
+    assert np.allclose(run.x[-1], start * np.exp(-0.5 * mu), rtol=0, atol=1e-8) and len(run.t) < 200
+
+
+@pytest.mark.parametrize("rate", [1.0, 1e3, 1e7])
+def test_fast_growth_is_no_decay(rate):
+    """x' = rate (x - cos t) - sin t from cos 0: the exact solution is unstable, and steps stay explicit."""
+    system = ns.FilippovSystem([x], field=[rate * (x - ca.cos(t)) - ca.sin(t)], time=t)
+    run = ns.simulate(system, [1.0], 3.0 / rate)
+    assert run.facts.implicit_steps == 0 and abs(run.x[-1, 0] - np.cos(3.0 / rate)) < 1e-7
+
+
+def test_fast_oscillations_are_resolved():
+    """An oscillator of frequency 1e4 without damping decays nowhere."""
+    system = ns.FilippovSystem([x, v], field=[v, -1e8 * x])
+    run = ns.simulate(system, [1.0, 0.0], 0.01, atol=1e-6)
+    assert run.facts.implicit_steps == 0 and abs(run.x[-1, 0] - np.cos(100.0)) < 1e-6
+
+
+def numbers(name):
+    text = Path("nonsmooth/flow/core/radau.h").read_text()
+    table = re.search(name + r"\[\] = \{(.*?)\}", text, re.DOTALL).group(1)
+    return [mp.mpf(word) for word in re.findall(r"[-+0-9.e]+", table)]
+
+
+def pairs(name):
+    return [mp.mpc(*row) for row in zip(*[iter(numbers(name))] * 2, strict=True)]
+
+
+def radau_polynomial(z, s):
+    """Of degree s, by the recurrence of Legendre's polynomials."""
+    before, now = mp.mpf(1), 2 * z - 1
+    for n in range(1, s):
+        before, now = now, ((2 * n + 1) * (2 * z - 1) * now - n * before) / (n + 1)
+    return now - before
+
+
+@pytest.mark.parametrize("s", [5, 7])
+def test_tables_of_radau(s):
+    """Nodes and matrices anew in 60 digits."""
+    with mp.workdps(60):
+        given = numbers(f"NODES_{s}")
+        nodes = [mp.findroot(lambda z: radau_polynomial(z, s), near) for near in given]
+        assert max(abs(a - b) for a, b in zip(nodes, given, strict=True)) < 1e-18
+        values, slopes = mp.matrix(s, s), mp.matrix(s, s)
+        for i in range(s):
+            for k in range(1, s + 1):
+                values[i, k - 1], slopes[i, k - 1] = nodes[i] ** k, k * nodes[i] ** (k - 1)
+        powers = values**-1
+        matrix, whole = slopes * powers, mp.matrix(s, s)
+        for name, true in (("POWERS", powers), ("SLOPES", matrix)):
+            for found, exact in zip(numbers(f"{name}_{s}"), true, strict=True):
+                assert abs(found - exact) < 1e-18 * (1 + abs(exact))
+        left, right = pairs(f"LEFT_{s}"), pairs(f"RIGHT_{s}")
+        for q, eigenvalue in enumerate(pairs(f"EIGENVALUES_{s}")):
+            for i in range(s):
+                for j in range(s):
+                    term = right[q * s + i] * eigenvalue * left[q * s + j]
+                    whole[i, j] += mp.re(term) * (2 if q else 1)
+        assert max(abs(a - b) for a, b in zip(whole, matrix, strict=True)) < 1e-15

@@ -1,0 +1,196 @@
+"""Orbits, branches and derivatives of hybrid automata: discrete states, conditions and jump sets."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import nonsmooth as ns
+
+x, y, v, q, g, t = (ca.SX.sym(s) for s in ("x", "y", "v", "q", "g", "t"))
+a, b, c = (ca.SX.sym(s) for s in ("a", "b", "c"))
+
+
+def thermostat():
+    on = ns.Reset(x - 18, {q: 1}, -1, level=True, when=q == 0, name="on")
+    off = ns.Reset(x - 22, {q: 0}, 1, level=True, when=q == 1, name="off")
+    return ns.FilippovSystem(
+        [x], field=[a * q - x], discrete={q: (0, 1)}, resets=[on, off], parameters={a: 30.0}
+    )
+
+
+def converter(*more):
+    """A buck converter whose current is kept within a band: i' = q E - v, v' = (i - v)/2."""
+    i, out, width, supply = (ca.SX.sym(s) for s in ("i", "out", "width", "supply"))
+    on = ns.Reset(i - 1 + width, {q: 1}, -1, level=True, when=q == 0, name="on")
+    off = ns.Reset(i - 1 - width, {q: 0}, 1, level=True, when=q == 1, name="off")
+    return ns.FilippovSystem(
+        [i, out],
+        field=[q * supply - out, (i - out) / 2],
+        discrete={q: (0, 1)},
+        resets=[on, off, *(make(i, out) for make in more)],
+        parameters={supply: 2.0, width: 0.2},
+    )
+
+
+def test_the_orbit_of_a_thermostat_has_its_multipliers_in_the_temperature():
+    system = thermostat()
+    run = ns.simulate(system, [20.0, 0], 10.0)
+    assert run.itinerary.startswith("q=0 q=1 q=0")
+    orbit = ns.periodic_orbit(system, run)
+    assert orbit.period == pytest.approx(np.log(12 / 8 * 22 / 18), abs=1e-13)
+    assert orbit.multipliers.tolist() == [1.0] and orbit.itinerary in ("q=1 q=0", "q=0 q=1")
+    assert orbit.trajectory.itinerary == orbit.itinerary
+    by_heat = 1 / 12 - 1 / 8
+    assert orbit.derivative("a").period == pytest.approx(by_heat, abs=1e-13)
+    assert ns.lyapunov_spectrum(system, [20.0, 0], 100.0).exponents.shape == (1,)
+
+
+def test_a_branch_of_a_thermostat_ends_where_the_heat_does_not_suffice():
+    orbit = ns.periodic_orbit(thermostat(), ns.simulate(thermostat(), [20.0, 0], 10.0))
+    branch = ns.continue_orbit(orbit, "a", bounds=(10.0, 60.0))
+    assert branch.ends[0] is not branch.ends[1] and not branch.events
+    assert branch.ends[0].name == "PERIOD_DIVERGES" and branch.values.min() < 22.2
+    for value in (25.0, 50.0):
+        (at,) = branch.at(value)
+        expected = np.log((value - 18) / (value - 22) * 22 / 18)
+        assert at.period == pytest.approx(expected, abs=1e-12)
+
+
+def test_the_multiplier_of_a_converter_is_that_of_its_flows_and_jumps():
+    system = converter()
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [1.0, 1.0, 1], 60.0))
+    linear, product = np.array([[0.0, -1.0], [0.5, -0.5]]), np.eye(2)
+    for leg, following in zip(orbit.legs, np.roll(orbit.legs, -1), strict=True):
+        before = linear @ following.start[:2] + [2.0 * leg.start[2], 0.0]
+        after = linear @ following.start[:2] + [2.0 * following.start[2], 0.0]
+        jump = np.eye(2) + np.outer(after - before, [1.0, 0.0]) / before[0]
+        product = jump @ expm(linear * leg.duration) @ product
+    expected = sorted(np.linalg.eigvals(product), key=abs)[::-1]
+    np.testing.assert_allclose(orbit.multipliers, expected, atol=1e-12)
+    exponents = ns.lyapunov_spectrum(system, orbit.start, 300 * orbit.period).exponents
+    np.testing.assert_allclose(exponents[1], np.log(abs(expected[1])) / orbit.period, atol=2e-3)
+    with pytest.raises(ns.OptionError, match="2 states that move"):
+        ns.lyapunov_spectrum(system, orbit.start, 10.0, k=3)
+
+
+NEVER = [
+    lambda i, out: ns.Reset(out - 1.05, {q: 0}, 1, level=True, when=q == 2, name="never"),
+    lambda i, out: ns.Reset(out - 1.05, {q: 0}, 1, when=ca.logic_and(q == 0, i > 5), name="never"),
+    lambda i, out: ns.Reset(ca.logic_and(out > 1.05, q == 2), {q: 0}, name="never"),
+    lambda i, out: ns.Reset(ca.logic_and(i > 5, out > 1.05), {q: 0}, name="never"),
+]
+
+
+@pytest.mark.parametrize("number", range(len(NEVER)))
+def test_a_guard_that_makes_nothing_due_is_no_bifurcation(number):
+    """The output voltage touches 1.05 as the band becomes wider, which matters to nobody."""
+    system = converter(NEVER[number])
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [1.0, 1.0, 1], 60.0))
+    branch = ns.continue_orbit(orbit, "width", bounds=(0.1, 0.8))
+    assert not branch.events and [e.name for e in branch.ends] == ["REACHED_BOUND"] * 2
+    assert min(o.trajectory.x[:, 1].max() for o in branch.orbits) < 1.05
+    assert max(o.trajectory.x[:, 1].max() for o in branch.orbits) > 1.05
+    assert all("never" not in m.what for m in orbit.margins)
+
+
+@pytest.mark.parametrize("condition", [False, True])
+def test_a_guard_that_makes_something_due_ends_the_branch_where_it_is_touched(condition):
+    def more(i, out):
+        when = ca.logic_and(out > 1.05, i > 0)
+        if condition:
+            return ns.Reset(when, {q: 1 - q, i: 1}, name="trip")
+        return ns.Reset(out - 1.05, {q: 1 - q, i: 1}, 1, when=i > 0, name="trip")
+
+    system = converter(more)
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [1.0, 1.0, 1], 60.0))
+    branch = ns.continue_orbit(orbit, "width", bounds=(0.1, 0.8))
+    assert [e.kind for e in branch.events] == ["grazing of a reset"]
+    at = branch.events[0].orbit.trajectory
+    times = np.linspace(0, at.t[-1], 20001)
+    assert at(times)[:, 1].max() == pytest.approx(1.05, abs=1e-8)
+
+
+def test_a_relay_that_is_odd_has_half_orbits():
+    up = ns.Reset(x - b, {q: 1}, 1, level=True, when=q == -1, name="up")
+    down = ns.Reset(x + b, {q: -1}, -1, level=True, when=q == 1, name="down")
+    system = ns.FilippovSystem(
+        [x, v],
+        field=[v, -0.3 * v - x - q],
+        discrete={q: (-1, 1)},
+        resets=[up, down],
+        parameters={b: 0.2},
+    )
+    run = ns.simulate(system, [1.0, 0.0, 1], 80.0)
+    whole = ns.periodic_orbit(system, run)
+    half = ns.periodic_orbit(system, run, symmetry="odd")
+    assert half.period == pytest.approx(whole.period, abs=1e-12)
+    np.testing.assert_allclose(half.multipliers, whole.multipliers, atol=1e-10)
+    assert set(half.itinerary.split()) == {"q=1", "q=-1"} and half.residual < 1e-12
+    branch = ns.continue_orbit(half, "b", bounds=(0.1, 1.0))
+    (at,) = branch.at(0.5)
+    given = ns.simulate(system, [1.0, 0.0, 1], 80.0, parameters={b: 0.5})
+    assert at.period == pytest.approx(ns.periodic_orbit(system, given).period, abs=1e-11)
+
+
+def test_two_neurons_that_inhibit_each_other_fire_in_turn():
+    """After a spike the other is at u - e; the half map is u -> I (1 - (I - 1)/(I - u + e))."""
+    current, kick = 1.3, 0.1
+    spikes = [
+        ns.Reset(x - 1, {x: 0, y: y - b}, 1, name="first"),
+        ns.Reset(y - 1, {y: 0, x: x - b}, 1, name="second"),
+    ]
+    system = ns.FilippovSystem(
+        [x, y], field=[a - x, a - y], resets=spikes, parameters={a: 1.3, b: 0.1}
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 0.4], 60.0))
+    u = 0.5
+    for _ in range(200):
+        u = current * (1 - (current - 1) / (current - u + kick))
+    slope = -current * (current - 1) / (current - u + kick) ** 2
+    period = 2 * np.log((current - u + kick) / (current - 1))
+    assert orbit.period == pytest.approx(period, abs=1e-12)
+    assert orbit.multipliers[1] == pytest.approx(slope**2, abs=1e-11)
+
+
+def test_a_condition_of_several_functions_has_the_derivative_of_the_one_that_passes():
+    system = ns.FilippovSystem(
+        [x, y],
+        field=[1.0, 2.0],
+        resets=ns.Reset(ca.logic_and(x > 1, y > a), [0, 0], name="both"),
+        parameters={a: 1.0},
+    )
+    late_x = ns.sensitivity(ns.simulate(system, [0.2, 0.3], 1.0))  # x passes last, at t = 0.8
+    np.testing.assert_allclose(late_x.dt_dx0, [[-1.0, 0.0]], atol=1e-12)
+    late_y = ns.sensitivity(ns.simulate(system, [0.9, -0.5], 1.0))  # y, at t = 0.75
+    np.testing.assert_allclose(late_y.dt_dx0, [[0.0, -0.5]], atol=1e-12)
+    np.testing.assert_allclose(late_y.dt_dp, [[0.5]], atol=1e-12)
+    np.testing.assert_allclose(late_y.dx_dx0, [[0.0, 0.5], [0.0, 1.0]], atol=1e-12)
+    np.testing.assert_allclose(late_y.dx_dp, [[-0.5], [-1.0]], atol=1e-12)
+
+
+def test_a_start_in_a_jump_set_has_the_derivative_of_its_map():
+    cut = ns.Reset(x - 1, {x: x / 2 + a, y: y + x}, 1, level=True, name="cut")
+    system = ns.FilippovSystem([x, y], field=[-x, 0], resets=cut, parameters={a: 0.1})
+    found = ns.sensitivity(ns.simulate(system, [1.5, 0.0], 1.0))
+    decay = np.exp(-1.0)
+    np.testing.assert_allclose(found.dx_dx0, [[decay / 2, 0], [1, 1]], atol=1e-12)
+    np.testing.assert_allclose(found.dx_dp, [[decay], [0]], atol=1e-12)
+    assert not found.dt_dx0[0].any() and not found.dt_dp[0].any()
+
+
+def test_a_gearbox_shifts_at_the_speeds_of_the_closed_form():
+    """w' = (u - w)/g up to the shift: the time in gear g is g log((u - low)/(u - high))."""
+    up = ns.Reset(x - (0.5 + g), {g: g + 1}, 1, level=True, when=g <= 2, name="up")
+    down = ns.Reset(x - 0.5 * g, {g: g - 1}, -1, level=True, when=g >= 2, name="down")
+    system = ns.FilippovSystem(
+        [x], field=[(a - x) / g], discrete={g: (1, 2, 3)}, resets=[up, down], parameters={a: 4.0}
+    )
+    run = ns.simulate(system, [0.0, 1], 10.0)
+    first, second = np.log(4.0 / 2.5), 2 * np.log(2.5 / 1.5)
+    assert [e.name for e in run.events[:-1]] == ["up", "up"]
+    np.testing.assert_allclose([e.t for e in run.events[:-1]], [first, first + second], atol=1e-12)
+    found = ns.sensitivity(run)
+    by_force = 1 / 4.0 - 1 / 2.5 + 2 * (1 / 2.5 - 1 / 1.5)
+    np.testing.assert_allclose(found.dt_dp[1], [by_force], atol=1e-12)
+    assert ns.find_equilibrium(system, [4.0, 3]).eigenvalues[0] == pytest.approx(-1 / 3)

@@ -29,7 +29,12 @@ from .elements import Complementarity
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .matrix_symbols import in_scalar_symbols, read_dae
-from .parse_definition import Definition, consistent_parameters, read_definition
+from .parse_definition import (
+    Definition,
+    consistent_parameters,
+    enters_nonlinearly,
+    read_definition,
+)
 from .roots import roots_of
 from .switching import Switching, class_of
 
@@ -329,8 +334,7 @@ class FilippovSystem:
         self.impacts, self.constraints = definition.impacts, definition.constraints
         self.complementarity = definition.complementarity
         self.hidden = definition.hidden
-        field, multipliers = definition.field, listed(definition.multipliers)
-        self.nonlinear = tuple(not ca.is_linear(field, lam) for lam in multipliers)
+        self.nonlinear = enters_nonlinearly(definition)
         names = definition.names
         self.state_names = tuple(names["states"])
         self.parameter_names = tuple(names["parameters"])

@@ -70,18 +70,16 @@ def instructions(
 ) -> tuple[list[Node], list[list[int]]]:
     """Value-number the graph of dense ``outputs`` over ``inputs``, unless not ``merged``."""
     outputs = [_dense(o) for o in outputs]
-    key = (
-        merged,
-        len(inputs),
-        *(tuple(e.element_hash() for e in ca.vertsplit(ca.vec(o))) for o in (*inputs, *outputs)),
-    )
-    for known, found, _ in _READ:
-        if known == key:
-            return [*found[0]], [*map(list, found[1])]
-    read = _read(ca.Function("graph", list(inputs), outputs), merged)
+    read = lambda: _read(ca.Function("graph", list(inputs), outputs), merged)
+    own, given = (sum(e.numel() for e in some) for some in (outputs, inputs))
+    if 4 * own < given:  # small, and sooner read than compared
+        return read()
     kept = [*inputs, *outputs]  # so that the hashes stay theirs
-    _READ[:] = [(key, read, kept), *_READ[:1]]
-    return [*read[0]], [*map(list, read[1])]
+    hashes = (tuple(e.element_hash() for e in ca.vertsplit(ca.vec(o))) for o in kept)
+    key = (merged, len(inputs), *hashes)
+    found = next((own for known, own, _ in _READ if known == key), None) or read()
+    _READ[:] = [(key, found, kept), *(one for one in _READ if one[0] != key)][:2]
+    return [*found[0]], [*map(list, found[1])]
 
 
 #: The graphs that were read last: some are read several times.

@@ -189,7 +189,8 @@ class Coupled:
         for i in range(self._surfaces):
             found.append(Degree((), self.layer[i]))
             if i in joints:
-                own, others = lam[joints], ca.vertcat(*every[: joints[0]], *every[self._surfaces :])
+                rest = ca.vertcat(*every[: joints[0]], *every[self._surfaces :])
+                own, others = lam[joints], lambda rest=rest: rest
                 found[i] = degree_of(d.surfaces[i], self.layer[i], own, others, x, field)
                 continue
             if self.continuous[i] or self.system.nonlinear[i] or i in self.system.set_of:
@@ -197,8 +198,7 @@ class Coupled:
             if i in (*self.system.remembering, *self.system.half_lines):
                 continue
             own = ca.vertcat(lam[i], unknowns[i]) if self.scaled[i] else lam[i]
-            hashes = {e.element_hash() for e in ca.vertsplit(own)}
-            others = ca.vertcat(*[e for e in every if e.element_hash() not in hashes])
+            others = lambda own=own: ca.vertcat(*[e for e in every if not ca.depends_on(own, e)])
             found[i] = degree_of(d.surfaces[i], self.layer[i], own, others, x, field)
         return found
 

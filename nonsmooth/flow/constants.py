@@ -297,6 +297,11 @@ EIGHTFOLD = 8.0
 IDLE_STEPS = 5
 MOST_STATES = 1500
 
+#: The same of flows of known durations: the relative tolerance; after so many steps, and if there are so many times as
+#: long ahead, a decay rate is looked for.
+IMPLICIT_FLOW = 1e-13
+LOOK_AGAIN, FAR_AWAY = 16, 64.0
+
 #: Not a status: the run continues in the next call, after its arrays were emptied, in another driver, or once the
 #: program of its derivatives is given.
 RUNNING, FULL, HAND_OVER, NEEDS_PROGRAM = -1, -2, -3, -4

@@ -138,27 +138,29 @@ class Event:
 
     Attributes
     ----------
-    kind : {"crossing", "entry", "exit", "stop", "reset", "zero", "end"}
-        ``entry`` and ``exit`` are of sliding; ``zero`` is a zero found by ``follow``.
+    kind : {"crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "jump", "zero", "end"}
+        ``entry`` and ``exit`` are of sliding; contacts and complementarity conditions close (``contact``) and open
+        (``release``); ``jump`` leads from a forbidden state; ``zero`` is a zero found by ``follow``.
     t : float
         Time of the event.
     x : ndarray (n,)
-        State before a reset, on the surface otherwise.
+        State before a reset or jump, on the surface otherwise.
     mode_before, mode_after : str
         Equal at a stop, a zero and the end. After a reset the mode that starts there, also where
         the jump went through a surface.
     name : str
-        Of the surface (``h0``, ``h1``, ...), the limit of a multiplier at which sliding ends
+        Of the surface (``h0``, ``h1``, ...), the complementarity condition, the limit of a multiplier at which sliding ends
         (``lambda0 = 1``, ``lambda0 = -1``, ``|lambda0| = 1`` of a set), the stop, reset, impact or
         function.
     x_after : ndarray (n,)
-        State after a reset, ``x`` otherwise.
+        State after a reset, impact or jump, ``x`` otherwise.
     element : int
         What it belongs to: position of the surface, set or contact among the letters of the modes;
         number of the stop or reset, clocks counted after the resets; -1 for none.
     side : int
         Of a crossing or entry the side, +1 or -1, from which the motion comes; of the end of sliding
-        the one to which it goes; of a stop or reset its direction; of an impact 1; otherwise 0.
+        the one to which it goes; of a stop or reset its direction; of an impact, or a condition that closes, 1;
+        otherwise 0.
     motion : ndarray or None
         Sides of all conditions and what else is due then, for ``simulate(system, start=event)``.
     """

@@ -104,7 +104,7 @@ def follow(
     >>> run.status.name, run.x[-1].round(12) + 0.0
     ('STOPPED', array([-2.,  0.]))
     """
-    require_system(system)
+    require_system(system, complementarity=True)
     t_start, t_end = real(t_start, "t_start"), real(t_end, "t_end")
     rtol, atol = tolerances(tol, rtol, atol)
     backward = t_end < t_start

@@ -230,9 +230,13 @@ def no_jump(name: str, t: float) -> str:
     return f"y of {name!r} is negative at t = {t:.10g}, and no impulses of the multipliers lead to y >= 0."
 
 
-def no_reaction(names: Sequence[str]) -> str:
+def no_reaction(names: Sequence[str], algebraic: bool = False) -> str:
     """No reactions are consistent with closed or opening contacts."""
-    return f"At {' and '.join(map(repr, names))} neither the closed contact nor an open one holds."
+    advice = (
+        " Where a resistance is 0 or a sign is wrong, the multiplier does not raise its y: write y without it "
+        "for a resistance of 0."
+    )
+    return f"At {' and '.join(map(repr, names))} neither the closed contact nor an open one holds.{advice * algebraic}"
 
 
 def pressed(name: str, t: float) -> str:

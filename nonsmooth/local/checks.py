@@ -17,9 +17,9 @@ def require_surface(system: FilippovSystem) -> None:
         )
 
 
-def require_autonomous(system: FilippovSystem, what: str) -> None:
-    """Refuse explicit time."""
-    require_system(system)
+def require_autonomous(system: FilippovSystem, what: str, complementarity: bool = False) -> None:
+    """Refuse explicit time; a flag allows complementarity conditions."""
+    require_system(system, complementarity=complementarity)
     if system.time_dependent:
         raise DefinitionError(
             f"{what}: expected a system without explicit time, received one that depends on "

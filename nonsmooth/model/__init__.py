@@ -29,12 +29,12 @@ from .errors import (
     PointError,
     explain,
 )
-from .laws import complementarity
 from .laws.coupled import Coupled, coupled_of, raised_of
 from .laws.evaluators import Evaluator, Surfaces, evaluator
+from .laws.explicit import mode_field
 from .laws.followed import Followed, followed
-from .laws.layer import Layer, LayerNumbers, Loop, layer_of, loop_at
-from .laws.motion import Motion, mode_field, motion, watched_functions
+from .laws.layer import Layer, LayerNumbers, layer_of
+from .laws.motion import Motion, motion, watched_functions
 from .laws.multipliers import sliding_multipliers
 from .laws.switches import Guard
 from .reading import Parameters
@@ -56,7 +56,6 @@ __all__ = [
     "Layer",
     "LayerNumbers",
     "LiftedSwitch",
-    "Loop",
     "Motion",
     "NonsmoothError",
     "NotSmoothError",
@@ -71,7 +70,6 @@ __all__ = [
     "Switching",
     "call",
     "clock_periods",
-    "complementarity",
     "coupled_of",
     "evaluator",
     "explain",
@@ -80,7 +78,6 @@ __all__ = [
     "is_function",
     "is_real",
     "layer_of",
-    "loop_at",
     "mode_field",
     "motion",
     "multiplier_enters",

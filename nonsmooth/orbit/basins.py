@@ -448,7 +448,7 @@ def basins(
 
     From rest on the edge, $x = 0$, two motions are possible: the label -1.
     """
-    require_system(system)
+    require_system(system, complementarity=True)
     starts, axes = _starts(system, grid)
     _require_finite(starts)
     search = Search(

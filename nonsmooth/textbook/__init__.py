@@ -18,7 +18,24 @@ from types import MappingProxyType
 
 from ..model import OptionError
 from ..notebook import add_cards
+from .control import (
+    abs_brake,
+    drill_string,
+    resonant_converter,
+    super_twisting,
+    tank_cascade,
+    twisting,
+)
 from .friction import dry_friction, leine_stick_slip, stick_slip_exponential
+from .hybrid import (
+    gearbox,
+    glacial_cycles,
+    integrate_and_fire,
+    integrate_and_fire_network,
+    integrate_and_fire_pair,
+    rocking_block,
+    thermostat,
+)
 from .impacts import bouncing_ball, impact_oscillator, kelvin_voigt_bounce
 from .models import harvested_prey_predator, state_dependent_jump, welander_box
 from .periodic import (
@@ -47,6 +64,8 @@ from .plane_friction import (
 )
 from .problem import Problem, Reference
 from .several_surfaces import ambiguous_exit, glass_loop, hidden_dynamics, two_relay_spiral
+from .springs import backlash, bilinear_oscillator, chua_circuit, mckean_neuron, soft_stop
+from .thresholds import sir_threshold, stommel_box, threshold_harvesting
 from .two_folds import TWO_FOLDS, two_fold
 
 __all__ = [
@@ -54,36 +73,57 @@ __all__ = [
     "TWO_FOLDS",
     "Problem",
     "Reference",
+    "abs_brake",
     "ambiguous_exit",
+    "backlash",
     "belt_oscillator",
+    "bilinear_oscillator",
     "block_on_belt",
     "block_on_disc",
     "block_on_incline",
     "bouncing_ball",
     "buck_converter",
     "by_name",
+    "chua_circuit",
     "cue_ball",
+    "drill_string",
     "dry_friction",
     "forced_dry_friction",
+    "gearbox",
+    "glacial_cycles",
     "glass_loop",
     "harvested_prey_predator",
     "hidden_dynamics",
     "impact_oscillator",
+    "integrate_and_fire",
+    "integrate_and_fire_network",
+    "integrate_and_fire_pair",
     "kelvin_voigt_bounce",
     "leine_stick_slip",
+    "mckean_neuron",
     "multi_sliding_relay",
     "piecewise_cycle",
     "pivoting_disc",
     "planar_relay",
     "pseudo_hopf",
+    "resonant_converter",
+    "rocking_block",
     "scalar_repelling",
     "scalar_sliding",
     "shaken_block",
     "simplest_walker",
+    "sir_threshold",
+    "soft_stop",
     "spiral_oscillator",
     "state_dependent_jump",
     "stick_slip_exponential",
+    "stommel_box",
+    "super_twisting",
+    "tank_cascade",
+    "thermostat",
+    "threshold_harvesting",
     "turntable",
+    "twisting",
     "two_fold",
     "two_relay_spiral",
     "welander_box",
@@ -124,6 +164,27 @@ _FUNCTIONS: tuple[Callable[[], Problem], ...] = (
     turntable,
     pivoting_disc,
     shaken_block,
+    soft_stop,
+    bilinear_oscillator,
+    backlash,
+    chua_circuit,
+    mckean_neuron,
+    thermostat,
+    gearbox,
+    glacial_cycles,
+    integrate_and_fire,
+    integrate_and_fire_pair,
+    integrate_and_fire_network,
+    rocking_block,
+    twisting,
+    super_twisting,
+    abs_brake,
+    drill_string,
+    resonant_converter,
+    tank_cascade,
+    threshold_harvesting,
+    sir_threshold,
+    stommel_box,
 )
 
 #: Every problem by name, in the order of the catalogue.

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 import nonsmooth as ns
 from nonsmooth import textbook
 from nonsmooth.model import motion
+from tests.textbook import checks
 
 TOL = 1e-13
 CHECKS = {}
@@ -606,6 +607,8 @@ read_off(OF_BOUNCE, lambda _, reference: (bounce(reference),))
 read_off(OF_CYCLE, lambda problem, reference: cycle(problem.name, tuple(reference.at.items())))
 read_off(OF_ORBIT, lambda problem, reference: (orbit_for(problem, reference),))
 
+
+CHECKS |= checks.CHECKS
 
 ALL = [(name, r) for name, make in textbook.PROBLEMS.items() for r in make().references]
 

@@ -309,7 +309,10 @@ static int advance(Run *r, const Expansion *e, double dt) {
   memcpy(r->x, x, sizeof(double) * r->s->dimension);
   pass_time(r, dt);
   r->since += dt;
-  if (e->end) go_on_implicitly(r);
+  if (e->end) {
+    go_on_from(&r->implicit->c, r->implicit->is_end_known);
+    r->implicit_count++;
+  }
   r->step_count++;
   r->segment_steps++;
   kept = kept_by(r, r->letter, r->involved);
@@ -394,13 +397,13 @@ static int taylor_piece(Run *r, double left, Piece *q) {
 /* An implicit step; 0 where none could be made. */
 static int implicit_piece(Run *r, double left, Piece *q) {
   Expansion *e = &r->e;
-  double h = collocate(r, e, smaller(left, r->o.max_step)), dt = 0;
+  double h = implicit_step(r, e, smaller(left, r->o.max_step)), dt = 0;
   watch_cost(r, h);
   if (h == 0) return 0;
   int last = h == left, row = first_hit(r, e, last ? h + AT_END * (time_scale(r) + h) : h, &dt);
   dt = row >= 0 ? smaller(dt, h) : h;
   if (r->hold < dt) { dt = r->hold; row = -1; } else r->hold = INFINITY;
-  if (dt < h && dt > 0 && !end_at(r, e, row, &dt)) { r->collocation->h = 0.5 * dt; return 0; }
+  if (dt < h && dt > 0 && !end_at(r, e, row, &dt)) { r->implicit->c.h = 0.5 * dt; return 0; }
   r->length_mode = -1;
   *q = (Piece){dt, row, last && dt == h};
   return 1;

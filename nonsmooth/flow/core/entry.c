@@ -166,6 +166,37 @@ double polynomial_crossing(const double *c, int32_t n, double h, int32_t directi
   return first_crossing(c, n, h, direction);
 }
 
+/* What is proved of -dw/dnu of surfaces, of n rows. */
+int32_t law_certificate(const double *m, int32_t n) {
+  double *work = malloc(sizeof(double) * (4 * (size_t)n * n + 4 * n) + sizeof(int32_t) * n);
+  int32_t found = work ? certificate(m, n, work, (int32_t *)(work + 4 * (int64_t)n * n + 4 * n)) : NOTHING;
+  free(work);
+  return found;
+}
+
+/* The multipliers in [-1, 1] of surfaces with the rates a - m nu, where that is unique; whether it is found. */
+int32_t law_solution(const double *a, const double *m, int32_t n, double *nu) {
+  size_t square = (size_t)n * n, doubles = 60 * square + 100 * (size_t)n;
+  double *work = calloc(doubles, sizeof(double));
+  int32_t *pivot = calloc(8 * (size_t)n + 8, sizeof(int32_t)), found = 0;
+  int8_t *letter = calloc(3 * (size_t)n, 1); /* states, contacts, positions */
+  if (work && pivot && letter) {
+    Block b = {.size = n, .tie = VANISHES, .a = work, .b = work + n, .floor = work + 2 * n, .share = work + 3 * n,
+               .matrix = work + 3 * n + square, .state = letter, .is_contact = letter + n};
+    memcpy(b.a, a, sizeof(double) * n);
+    memcpy(b.matrix, m, sizeof(double) * square);
+    for (int i = 0; i < n; i++) b.b[i] = 1;
+    found = solve_block_of_many(&b, UNIQUE, letter + 2 * n, nu, work + 3 * n + 2 * square, pivot);
+  }
+  free(work); free(pivot); free(letter);
+  return found;
+}
+
+/* As go_round: of four quadrants rates (4, 2) and slopes (4, 2, 2). */
+int32_t law_round(double *rates, double *slopes, double *ratio, double *bend) {
+  return go_round((double (*)[2])rates, (double (*)[4])slopes, ratio, bend);
+}
+
 Run *run_new(const System *s, Table *table) {
   Run *r = calloc(1, sizeof(Run));
   if (!r) return 0;
@@ -181,7 +212,7 @@ Run *run_new(const System *s, Table *table) {
   r->now.mode = r->e.l.mode = r->trial.l.mode = -1;
   return r;
 }
-void run_free(Run *r) { end_collocation(r); free(r->arena); free(r); }
+void run_free(Run *r) { end_implicit(r); free(r->arena); free(r); }
 
 /* Times at which the run is read: no approximation of the motion may span one of them. */
 void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = times; r->read_count = count; }
@@ -219,7 +250,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->length = r->shortened = 0;
   r->held_steps = r->wants_program = 0;
   r->held_length = 0;
-  end_collocation(r);
+  end_implicit(r);
   r->hold = INFINITY;
   r->begun = t;
   r->t = t.high;

@@ -14,7 +14,7 @@ int64_t field_work(const Field *f) {
 double fixed_flow(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
                   double *work) {
   Flow w = flow_of(f, p, duration, tol, work);
-  run_flow(&w, z, most_steps);
+  run_whole_flow(&w, z, most_steps);
   return w.left;
 }
 
@@ -39,7 +39,7 @@ int64_t fly_legs(const Legs *l, double *a, double tol, int64_t most_steps, doubl
     double *z = a + l->states + i * l->width, *found = a + l->events + i * l->results, *work = a + l->work;
     Flow w = flow_of(f, a, a[l->durations + i], tol, work);
     field_at(&w, z, a + l->before + i * l->width);
-    run_flow(&w, z, most_steps);
+    run_whole_flow(&w, z, most_steps);
     *left = w.left;
     if (w.left > 0 || w.left != w.left) return i;
     field_at(&w, z, a + l->after + i * l->width);
@@ -141,7 +141,7 @@ static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin,
   int64_t stride = f->order + 1, width = 4 + f->n, count = 0;
   double root[P + 2];
   for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
-    double h = expand_flow(w, z) ? flow_step(w) : 0, t = w->whole - w->left, slope;
+    double h = next_step(w, z, step), t = w->whole - w->left, slope;
     if (step == 0 && begin) first_terms(w, begin);
     if (!(h > 0)) break;
     for (int j = 0; j < f->watched; j++) {
@@ -159,8 +159,9 @@ static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin,
         count++;
       }
     }
-    advance_flow(w, h, z);
+    make_step(w, h, z);
   }
+  end_flow(w);
   return count;
 }
 
@@ -214,15 +215,16 @@ int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, cons
 static double march_flow(Flow *w, double *z, int64_t most_steps, int32_t row, int32_t direction, double still) {
   int order = w->field->order;
   for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
-    double h = expand_flow(w, z) ? flow_step(w) : 0;
-    if (!(h > 0)) return -2;
+    double h = next_step(w, z, step);
+    if (!(h > 0)) break;
     const double *c = w->watched + (int64_t)row * (order + 1);
     int drop = 0;
     while (step == 0 && drop < order && !(fabs(c[drop]) > still)) drop++;
     double t = first_crossing(c + drop, order - drop, h, direction);
-    if (t >= 0 && w->whole - w->left + t > 0) return w->whole - w->left + t;
-    advance_flow(w, h, z);
+    if (t >= 0 && w->whole - w->left + t > 0) { end_flow(w); return w->whole - w->left + t; }
+    make_step(w, h, z);
   }
+  end_flow(w);
   return w->left > 0 ? -2 : -1;
 }
 

@@ -18,6 +18,7 @@ typedef struct {
   double *rules, *states, *watched, *input, *columns;
   int32_t *terms, *bend;
   double whole, left, sign, tol;
+  void *implicit; /* implicit_flow.c */
 } Flow;
 
 static Flow flow_of(const Field *f, const double *p, double duration, double tol, double *work) {

@@ -127,7 +127,7 @@ typedef struct { int kind, index, side; } Met;
 /* An event that may be one of many that accumulate: the time since the one before, and what was served. */
 typedef struct { double interval; int64_t pattern; int32_t kind; Met met; } Happened;
 
-typedef struct Collocation Collocation; /* collocation.c */
+typedef struct Implicit Implicit; /* implicit.c */
 
 typedef struct {
   Options o;
@@ -175,7 +175,7 @@ typedef struct {
   double *jumped_from, *jump_work; /* the state before the last jump of complementarity conditions */
   int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
   int32_t shown, has_roots, held_steps, wants_program; /* held_steps: steps in a row that a decay rate held */
-  Collocation *collocation;
+  Implicit *implicit;
   const Expansion *expansion;
   void *arena;
 } Run;

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...model import Array, FilippovSystem, Guard
 from .. import messages
-from ..constants import DEPENDS_ON_WIDTHS, KINDS, REASONS, UNPROVED
+from ..constants import DEPENDS_ON_WIDTHS, IMPLICIT_STEP, KINDS, REASONS, UNPROVED
 from ..events import NOT_KEPT, Event, Events, Label, Segment, Segments, ShownMode
 from ..names import guard_name
 from ..options import Options
@@ -129,7 +129,8 @@ def _label(system: FilippovSystem, kind: int, before: str, after: str, code: int
 def _few_segments(system: FilippovSystem, run: Run) -> list[Segment]:
     """Segments of a short run, one by one."""
     own = run.few or {}
-    modes, starts, end = own["step_mode"].tolist(), own["start"].tolist(), float(run.t[-1])
+    modes = (own["step_mode"] & ~IMPLICIT_STEP).tolist()
+    starts, end = own["start"].tolist(), float(run.t[-1])
     shown, discrete = run.letters, len(system.definition.discrete)
     if not modes:
         return [_only_segment(system, run)]
@@ -258,7 +259,7 @@ _SENTENCES: dict[str, Callable[[FilippovSystem, Options, Run], str]] = {
     "dead_point": lambda s, o, run: messages.dead_point(s.constraints, _end(run)),
     "no_impulse": lambda s, o, run: messages.no_impulse(s.impacts[run.where], _end(run)),
     "restitution": lambda s, o, run: messages.restitution(s.impacts[run.where], _end(run)),
-    "no_reaction": lambda s, o, run: messages.no_reaction(_contacts(s, run)),
+    "no_reaction": lambda s, o, run: messages.no_reaction(_contacts(s, run), bool(s.algebraic)),
     "no_stable_motion": lambda s, o, run: messages.no_stable_motion(_entries(s, run)),
     "undetermined_rates": lambda s, o, run: messages.undetermined_rates(_entries(s, run)),
     "stability_lost": lambda s, o, run: messages.stability_lost(

@@ -141,6 +141,9 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     for name in ("table_modes", "table_size", "table_free", "run_free", "lanes_tree"):
         getattr(made, name).argtypes = [_POINTER]
     made.table_read.argtypes = [_POINTER] * 4
+    made.law_certificate.argtypes = [_POINTER, _I32]
+    made.law_solution.argtypes = [_POINTER, _POINTER, _I32, _POINTER]
+    made.law_round.argtypes = [_POINTER] * 4
     made.run_new.argtypes = [_POINTER] * 2
     made.run_read_at.argtypes = [_POINTER, _POINTER, _I64]
     made.run_remember.argtypes = [_POINTER, _POINTER]

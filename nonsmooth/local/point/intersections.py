@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...flow import point_law
 from ...model import (
     Array,
     DefinitionError,
@@ -32,13 +33,11 @@ from ...model import (
     PointError,
     coupled_of,
     layer_of,
-    loop_at,
     read_function,
     require_system,
     sliding_multipliers,
 )
 from ...model.checks import positive
-from ...model.laws import complementarity
 from ..checks import require_surface
 from ..discrete_states import with_discrete_states_held
 from .surface_point import TOLERANCE
@@ -249,8 +248,8 @@ class Meeting:
             found = self.at(self.held)
             a = found.rates[self.surfaces]
             m = found.rates_l[np.ix_(self.surfaces, self.surfaces)]
-            if k > _TRIED and complementarity.is_unique(m):
-                lam = complementarity.solve(a, m, np.zeros(k))
+            if k > _TRIED and point_law.is_unique(m):
+                lam = point_law.solve(a, m)
                 if lam is not None:
                     letters = np.where(np.abs(lam) < 1.0, 0.0, lam)
                     return [(self._mode(letters), self._with(lam))], True
@@ -320,15 +319,28 @@ class Meeting:
         if self._shrinks(lam, m, 1.0):
             return "repelling"
         if k == 2 and self.system.extended_dimension == 2:
-            loop = loop_at(self.layer, self.x, chosen, self.held, self.p)
-            if loop is not None and loop.attracts is not None:
-                return "spiralling in" if loop.attracts else "spiralling out"
+            ratio, bend = self._return_map() or (1.0, 0.0)
+            if (ratio, bend) != (1.0, 0.0):
+                inward = ratio < 1.0 or (ratio == 1.0 and bend < 0.0)
+                return "spiralling in" if inward else "spiralling out"
         growth = float(np.linalg.eigvals(m).real.max())
         return "unstable across" if growth > _NEUTRAL * np.abs(m).max() else "not shown"
 
+    def _return_map(self) -> tuple[float, float] | None:
+        """How an orbit comes back that runs once round a point of the plane: ratio and bend."""
+        rates, slopes = [], []
+        for quadrant in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
+            found = self.at(self._with(np.array(quadrant, float)))
+            h_x = found.h_x[self.surfaces]
+            if np.linalg.det(h_x) == 0.0:
+                return None
+            rates.append(found.rates[self.surfaces])
+            slopes.append(found.rates_x[self.surfaces] @ np.linalg.inv(h_x))
+        return point_law.go_round(np.array(rates), np.array(slopes))
+
     def _shrinks(self, lam: Array, m: Array, sign: float) -> bool:
         """Whether V = sum_i d_i abs(h_i) (1 - lambda_i sgn h_i) falls (-1) or rises (+1) beside it."""
-        if self.layer.affine and complementarity.attracts(-sign * m):
+        if self.layer.affine and point_law.attracts(-sign * m):
             return True
         if len(self.surfaces) > _TRIED:
             return False

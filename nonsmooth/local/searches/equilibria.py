@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, Parameters
+from ...model.derivatives.mode_equations import mode_equations
 from ..checks import require_autonomous
 from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import FIELDS, TOLERANCE, LocalSurface, Side, side_index, surface_at
@@ -65,8 +66,9 @@ class Equilibrium:
         values = ", ".join(f"{v:.6g}" for v in self.eigenvalues)
         if not self.mode:
             return f"{self.kind} at {self.point.tolist()}, eigenvalues {values}."
+        where = f"mode {self.mode!r}" if set(self.mode) & set("ocs") else FIELDS[self.side]
         return (
-            f"{self.status} {self.kind} of {FIELDS[self.side]} at {self.point.tolist()}, h = {self.h:.6g}, "
+            f"{self.status} {self.kind} of {where} at {self.point.tolist()}, h = {self.h:.6g}, "
             f"eigenvalues {values}."
         )
 
@@ -118,7 +120,8 @@ def find_equilibrium(
     Parameters
     ----------
     system, parameters, surface, mode
-        As in :func:`region`; the point need not be on the surface. A smooth system has none.
+        As in :func:`region`; the point need not be on the surface. A smooth system has none. With
+        complementarity conditions ``mode`` has all letters, also those of what slides or is closed.
     near : array_like (n,)
         Where the search starts.
     side : {"+", "-"}
@@ -157,6 +160,8 @@ def find_equilibrium(
     (array([0.5, 0.5]), 'real', 'stable node')
     """
     k = side_index(side)
+    if isinstance(system, FilippovSystem) and system.complementarity:
+        return _of_mode(system, near, mode, parameters, tol, max_iterations)
     require_autonomous(system, "equilibrium")
     where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True)
     if not system.surface_count and side != "+":
@@ -170,6 +175,45 @@ def find_equilibrium(
     what = f"equilibrium of {FIELDS[side]}" if where.mode else "equilibrium"
     found = search(equations, x, tol=tol, max_iterations=max_iterations, what=what)
     return equilibrium_at(where, found, side)
+
+
+def _of_mode(
+    system: FilippovSystem,
+    near: ArrayLike,
+    mode: str | None,
+    parameters: Parameters | None,
+    tol: float,
+    max_iterations: int,
+) -> Equilibrium:
+    """An equilibrium of the field of a mode, whose conditions keep some functions at zero."""
+    require_autonomous(system, "equilibrium", complementarity=True)
+    if mode is None:
+        raise OptionError(
+            f"mode: expected letters, received none. Give one of {list(system.modes)}: in which mode the "
+            "equilibrium is."
+        )
+    p, n = system.parameter_vector(parameters), system.dimension
+    numbers = mode_equations(system, mode)
+
+    def equations(u: Array) -> tuple[Array, Array]:
+        field, slope, h, gradient, _ = numbers.copied(u, p)
+        return np.concatenate([field.ravel(), h.ravel()]), np.vstack(
+            [slope, gradient.reshape(-1, n)]
+        )
+
+    start = system.extended_point(near, 0.0)
+    what = f"equilibrium of mode {mode!r}"
+    found = search(equations, start, tol=tol, max_iterations=max_iterations, what=what)
+    _, slope, _, gradient, guards = numbers.copied(found.x, p)
+    along = np.linalg.svd(gradient)[2][len(gradient) :].T if gradient.size else np.eye(n)
+    eigenvalues = by_real_part(along.T @ slope @ along)
+    scale = float(np.max(np.abs(eigenvalues), initial=0.0))
+    kind, margin = kind_of(eigenvalues, scale) if eigenvalues.size else ("stable node", 1.0)
+    least = float(guards.min(initial=np.inf))
+    near_zero = abs(least) <= TOLERANCE * (1 + float(np.linalg.norm(found.x)))
+    status = "boundary" if near_zero else "real" if least > 0.0 else "virtual"
+    numbers_of = (found.distance, found.residual, found.iterations)
+    return Equilibrium(found.x, "+", status, kind, eigenvalues, least, margin, *numbers_of, mode)
 
 
 def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium:

@@ -170,6 +170,13 @@ def multipliers_of(entries: Sequence[Entry], given: Any) -> list[Any]:
     return [next(following) if own is None else own for own in brought]
 
 
+def multipliers_of_conditions(conditions: Any) -> ca.SX:
+    """Multipliers of complementarity conditions."""
+    given = [conditions] if isinstance(conditions, Complementarity) else listed(conditions)
+    own = [c.entry().multiplier for c in given if isinstance(c, Complementarity)]
+    return ca.vertcat(*own) if own else ca.SX(0, 1)
+
+
 def functions_of(entries: Sequence[Entry]) -> ca.SX:
     """All switching functions."""
     found = [e for entry in entries for e in entry.functions]

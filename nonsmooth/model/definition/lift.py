@@ -169,6 +169,21 @@ def _factored(h: ca.SX, moving: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.SX(1), h
 
 
+def _terms(e: ca.SX) -> list[tuple[int, ca.SX]]:
+    """The terms of a sum with their signs, in their order."""
+    found, left = list[tuple[int, ca.SX]](), [(1, e)]
+    while left:
+        sign, term = left.pop()
+        if term.is_op(ca.OP_ADD) or term.is_op(ca.OP_SUB):
+            second = sign if term.is_op(ca.OP_ADD) else -sign
+            left += [(second, term.dep(1)), (sign, term.dep(0))]
+        elif term.is_op(ca.OP_NEG):
+            left.append((-sign, term.dep(0)))
+        else:
+            found.append((sign, term))
+    return found
+
+
 def _prefixes() -> Iterator[str]:
     return ("lam" + "_" * k for k in range(100))
 
@@ -386,10 +401,23 @@ class _Lifter:
             if ca.is_linear(written, s.lam) or (self.hidden and i in hidden):
                 f = written
                 continue
-            above, below = self._at(f, {i: 1}), self._at(f, {i: -1})
-            same = ca.is_equal(above, below, 20)
-            f = above if same else (1 + s.lam) / 2 * above + (1 - s.lam) / 2 * below
+            f = self._joined(f, i)
         return f
+
+    def _joined(self, f: ca.SX, i: int) -> ca.SX:
+        """The affine function of a multiplier with the values of an expression at +1 and -1, term by term."""
+        lam, own = self.switches[i].lam, ca.vertcat(self.switches[i].lam, self.switches[i].even)
+        above, below = self._at(f, {i: 1}), self._at(f, {i: -1})
+        if ca.is_equal(above, below, 20):
+            return above
+        result = ca.SX(0)
+        for sign, term in _terms(f):
+            if ca.depends_on(term, own):
+                above, below = self._at(term, {i: 1}), self._at(term, {i: -1})
+                same = ca.is_equal(above, below, 20)
+                term = above if same else (1 + lam) / 2 * above + (1 - lam) / 2 * below
+            result = result + term if sign > 0 else result - term
+        return result
 
     def _entry_of(self, number: int) -> str:
         """Name the first entry of the right-hand side that uses a node."""

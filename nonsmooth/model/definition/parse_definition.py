@@ -625,16 +625,17 @@ def _check_impact(d: Definition, j: int) -> None:
     _require_simple(what, gap, d)
     if ca.depends_on(rate, ca.vertcat(d.multipliers, d.reactions)):
         raise DefinitionError(
-            f"{what}: the rate {rate} of {gap} contains a multiplier. Forces act on velocities: a gap is a "
-            "function of positions and time. An ideal diode, whose current is a state or a multiplier, is a "
-            "Complementarity."
+            f"{what}: the rate {rate} of {gap} contains a multiplier. Forces act on velocities: a "
+            "gap is a function of positions and time. A diode, or a bound on a state whose rate the multiplier "
+            "changes, is Complementarity(y, multiplier=...)."
         )
     effect = ca.mtimes(ca.jacobian(rate, d.states), ca.jacobian(d.field, d.reactions[j]))
     if effect.is_zero() or not ca.is_linear(d.field, d.reactions[j]):
         fault = "does not change the gap's rate" if effect.is_zero() else "enters nonlinearly"
         raise DefinitionError(
             f"reaction of {d.impacts[j]!r}: {d.reactions[j]} {fault}. Write the force that opens the "
-            "contact as reaction times its direction."
+            "contact as reaction times its direction. A diode, or a bound on a state whose own rate is changed, is "
+            "Complementarity(y, multiplier=...)."
         )
     e = d.restitutions[j]
     if e.is_constant() and not 0.0 <= float(e) <= 1.0:

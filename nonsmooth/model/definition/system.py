@@ -25,7 +25,7 @@ from ..values import Array, state_values
 from .complementarity import holds
 from .constraints import Constraint
 from .discrete_states import held_values, with_values
-from .elements import Complementarity
+from .elements import Complementarity, multipliers_of_conditions
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .matrix_symbols import in_scalar_symbols, read_dae
@@ -178,6 +178,7 @@ class FilippovSystem:
         stops: Sequence[Stop] = (),
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
+        complementarity: Sequence[Complementarity] | Complementarity = (),
         clocks: Sequence[Clock] | Clock = (),
         discrete: Discrete = (),
         hidden: bool = False,
@@ -191,8 +192,8 @@ class FilippovSystem:
 
         Parameters
         ----------
-        states, parameters, time, stops, resets, impacts, clocks, discrete
-            As for the class. Gaps must be smooth.
+        states, parameters, time, stops, resets, impacts, complementarity, clocks, discrete
+            As for the class. Gaps and y must be smooth.
         rhs : sequence of n expressions
             In states, parameters and time, with switches.
         hidden : bool, optional
@@ -223,6 +224,7 @@ class FilippovSystem:
         """
         given = {"states": states, "rhs": rhs, "parameters": parameters, "time": time}
         given |= {"stops": stops, "resets": resets, "impacts": impacts, "hidden": hidden}
+        given["complementarity"] = complementarity
         given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
         clocks, discrete = given.pop("clocks"), given.pop("discrete")
         column(given["rhs"], "rhs", len(listed(given["states"])))  # before clocks are added
@@ -231,9 +233,10 @@ class FilippovSystem:
         own = {name: given[name] for name in ("parameters", "time")}
         frame = cls(given["states"], field=[0] * n, **own).definition
         entries = column(rhs, "rhs", n)
-        known = ca.vertcat(frame.extended_states, frame.parameters)
+        held = ca.vertcat(frame.parameters, multipliers_of_conditions(given["complementarity"]))
+        known = ca.vertcat(frame.extended_states, held)
         require_known(entries, known, "rhs", **frame.names)
-        found = lift(entries, frame.states, frame.time, frame.parameters, hidden=hidden)
+        found = lift(entries, frame.states, frame.time, held, hidden=hidden)
         given |= {"field": found.field, "multipliers": found.multipliers, "surface": None}
         given |= {"surfaces": found.surfaces, "above": None, "below": None}
         system = cls.__new__(cls)
@@ -931,12 +934,12 @@ def require_system(
     if value.complementarity and not complementarity:
         raise DefinitionError(
             f"system: {value!r} has complementarity conditions, which this function does not support. They work "
-            "in simulate, ensemble and outcomes."
+            "in simulate, ensemble, outcomes, sensitivity, find_equilibrium, periodic_orbit and continue_orbit."
         )
     if value.constraints and not joints:
         raise DefinitionError(
             f"system: {value!r} has constraints, which this function does not support. They work in simulate, "
-            "ensemble, outcomes and sensitivity. Write the motion in coordinates that satisfy them."
+            "ensemble, outcomes, sensitivity, periodic_orbit and continue_orbit. Write the motion in coordinates that satisfy them."
         )
 
 

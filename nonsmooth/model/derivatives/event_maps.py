@@ -7,16 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import casadi as ca
 import numpy as np
+from scipy.optimize import nnls
 
 from ..cache import Content
 from ..definition.conditions import decides
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
 from ..expressions.graph import evaluate, instructions, operation
+from ..expressions.identity import vanish_on
 from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
 from ..laws.explicit import explicit, solved
@@ -98,6 +100,9 @@ def event_map(
 
     def build() -> EventMap:
         of_mode = explicit(system, mode)
+        if kind == "jump":
+            function, after = jumped(system, element, letters)
+            return EventMap(system, of_mode.states, function, Guard("zero", 0, 0, element), after)
         for row, guard in enumerate(of_mode.guards):
             if guard.ends(kind, element, side):
                 after = _after(system, mode, guard, letters)
@@ -125,7 +130,7 @@ def instant_map(
             function = d.gaps[i]
         else:
             i = system.entries[element][0]
-            function = d.surfaces[i]
+            function = d.open_surfaces[i]
         guard = Guard("surface" if kind in ("crossing", "entry") else kind, i, 0, element)
         after = _after(system, mode, guard, letters)
         return EventMap(system, system.extended_states, function, guard, after)
@@ -193,7 +198,7 @@ def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -
     every = [*kept, *[m + j for j in taking]]
     columns = ca.jacobian(coupled.field, coupled.symbols_of(every))
     columns = ca.substitute(columns, coupled.multipliers, numbers) if m else columns
-    own = [[d.surfaces[i], *coupled.lower[i]][-1] for i in kept]
+    own = [[d.open_surfaces[i], *coupled.lower[i]][-1] for i in kept]
     rates = ca.vertcat(*own, d.gap_rates[taking])
     slope = ca.mtimes(ca.jacobian(rates, system.extended_states), columns)
     back, k = d.restitutions[taking], len(kept)
@@ -208,6 +213,44 @@ def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -
     return ca.densify(system.extended_states + ca.mtimes(columns, impulses))
 
 
+def jumping(system: FilippovSystem, x: Array, after: Array, p: Array) -> str:
+    """Letters of the complementarity conditions: closed (c) where one takes an impulse in a jump to ``after``."""
+    coupled, own = coupled_of(system), [i for i in system.half_lines if i not in system.algebraic]
+    columns = lambda: [ca.jacobian(coupled.field, coupled.symbols_of(own))]
+    made = lambda: Evaluator(system.function(("columns of conditions",), columns))
+    b = system.cached(("columns of conditions",), made).copied(after, p)[0]
+    impulses = nnls(b, after - x)[0]
+    taking = {i for i, impulse in zip(own, impulses, strict=True) if impulse > 0.0}
+    return "".join("c" if i in taking else "o" for i in system.half_lines)
+
+
+def jumped(system: FilippovSystem, element: int, letters: str) -> tuple[ca.SX, ca.SX]:
+    """y of a complementarity condition, and the state after the impulses of those that ``letters`` say (c)."""
+    coupled, d, x = coupled_of(system), system.definition, system.extended_states
+    own = [i for i, letter in zip(system.half_lines, letters, strict=True) if letter == "c"]
+    columns, y = ca.jacobian(coupled.field, coupled.symbols_of(own)), d.open_surfaces[own]
+    gradient = ca.jacobian(y, x)
+    if ca.depends_on(gradient, x) or ca.depends_on(columns, x):
+        raise DegenerateError(
+            f"jump of {system.surface_names[system.entries[element][0]]!r}: its derivatives are implemented where "
+            "y and the field are linear in the states. Start after it."
+        )
+    impulses = solved(ca.mtimes(gradient, columns), -y)
+    return d.open_surfaces[system.entries[element][0]], x + ca.mtimes(columns, impulses)
+
+
+def keeps_zero(system: FilippovSystem, surface: int, reset: int) -> bool:
+    """Whether the map of a reset leads to zeros of a switching function from its zeros."""
+    d = system.definition
+
+    def build() -> bool:
+        h = d.open_surfaces[surface]
+        after = ca.substitute(h, d.states, d.maps[:, reset])
+        return bool(ca.is_equal(h, after, 10)) or vanish_on([after], h, d.extended_states)
+
+    return system.cached(("keeps zero", surface, reset), build)
+
+
 def surface_map(system: FilippovSystem, surface: int) -> EventMap:
     """A switching function as a map on the extended states, with its gradients."""
 
@@ -216,6 +259,17 @@ def surface_map(system: FilippovSystem, surface: int) -> EventMap:
         return EventMap(system, system.extended_states, system.surface_function(surface), guard)
 
     return system.cached(("surface map", surface), build)
+
+
+def kept_maps(system: FilippovSystem, surfaces: Sequence[int]) -> list[EventMap]:
+    """What is zero while surfaces slide, as maps on the extended states: with the rates of joints."""
+    x, found = system.extended_states, list[EventMap]()
+    for i in surfaces:
+        found.append(surface_map(system, i))
+        for k, rate in enumerate(coupled_of(system).lower[i] if i in system.joints else ()):
+            build = partial(EventMap, system, x, rate, Guard("zero", i, 0, i))
+            found.append(system.cached(("rate map", i, k), build))
+    return found
 
 
 def atoms_at(

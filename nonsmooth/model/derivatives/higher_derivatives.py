@@ -6,7 +6,7 @@ import casadi as ca
 
 from ..definition.system import FilippovSystem
 from ..laws.evaluators import Evaluator, evaluator
-from ..laws.motion import mode_field
+from ..laws.explicit import mode_field
 from ..laws.switches import Guard
 from .variational import guarded_field
 
@@ -32,9 +32,14 @@ def contact_expansion(system: FilippovSystem, mode: str, surface: int, side: int
     """x, p -> the field F of a mode, the field across one of its surfaces, and grad L_F h."""
 
     def build() -> list[ca.SX]:
+        own, d, (i, *_) = mode_field(system, mode), system.definition, system.entries[surface]
+        rate = ca.mtimes(system.gradient(d.open_surfaces[i]), own)
+        if (
+            i in system.half_lines
+        ):  # with any multiplier: what follows depends on its direction alone
+            push = ca.densify(ca.jacobian(d.field, d.multipliers[i]))
+            return [own, own + ca.vertcat(push, ca.SX.zeros(d.time.numel())), system.gradient(rate)]
         turned = mode[:surface] + ("-" if side > 0 else "+") + mode[surface + 1 :]
-        own = mode_field(system, mode)
-        rate = ca.mtimes(system.gradient(system.surface_function(surface)), own)
         return [own, mode_field(system, turned), system.gradient(rate)]
 
     return evaluator(system, ("contact", mode, surface, side), build)

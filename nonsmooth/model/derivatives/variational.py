@@ -116,7 +116,7 @@ class VariationalField(PlainField):
         law, p = self.motion.law, self.parameters
         x, u = self.motion.states[: self.by_start], self.motion.states[self.by_start :]
         (layer,) = coupled_of(self.motion.system).held_at(self.motion.mode, [law.coupled.layer])  # type: ignore[attr-defined]
-        residual = layer[list(law.unknowns)]  # type: ignore[attr-defined]
+        residual = layer[list(law.unknowns)]
         right = ca.horzcat(ca.jacobian(residual, x), ca.jacobian(residual, p)[:, list(self.chosen)])
         outputs = [ca.densify(-solved(ca.jacobian(residual, u), right))]
         return Evaluator(ca.Function("multipliers", [self.motion.states, p], outputs))
@@ -147,7 +147,7 @@ class VariationalField(PlainField):
 
     def _unknowns(self, x: Array, p: Array, near: Array | None) -> Array:
         system, mode = self.motion.system, self.motion.mode
-        coupled, which = coupled_of(system), list(self.motion.law.unknowns)  # type: ignore[attr-defined]
+        coupled, which = coupled_of(system), list(self.motion.law.unknowns)
         if near is not None:
             guess = np.zeros(coupled.count)
             guess[which] = near

@@ -9,24 +9,28 @@ multipliers are further states, with the rate that keeps the equations.
 from __future__ import annotations
 
 import casadi as ca
+import numpy as np
 
 from ..definition.system import FilippovSystem, require_system
+from ..errors import DefinitionError
 from .coupled import coupled_of
 from .motion import Motion, motion
 from .switches import Guarded
+
+#: Rows of a matrix that are dependent to this part of its entries are so.
+_DEPENDENT = 1e-10
 
 #: Determinants of more unknowns than these are not written out.
 _WRITTEN_OUT = 3
 
 
 class Solved:
-    """The law of a mode of coupled surfaces and contacts (see ``switches.Sliding``)."""
+    """The law of a mode of coupled surfaces and contacts (see ``switches.Law``)."""
 
     def __init__(self, system: FilippovSystem, mode: str):
         coupled, x = coupled_of(system), system.extended_states
         self.system, self.mode, self.coupled = system, mode, coupled
         sliding = coupled.sliding(mode)
-        self.surfaces = tuple(i for i in sliding if i < system.surface_count)
         own = [coupled.unknown(i) for i in sliding]
         symbols = ca.vertcat(*own) if own else ca.SX(0, 1)
         field, layer = coupled.held_at(mode, [coupled.field, coupled.layer])
@@ -37,21 +41,14 @@ class Solved:
             return
         slope = ca.jacobian(residual, symbols)
         if not ca.depends_on(slope, symbols):
-            self.values = -solved(slope, ca.substitute(residual, symbols, 0))
+            rest, dependent = ca.substitute(residual, symbols, 0), bool(system.complementarity)
+            self.values = -(least_norm if dependent else solved)(slope, rest)
             self.field = ca.substitute(field, symbols, self.values)
             return
         self.unknowns = tuple(sliding)
         self.states = ca.vertcat(x, symbols)
         drift = ca.mtimes(ca.jacobian(residual, x), field)
         self.field = ca.vertcat(field, -solved(slope, drift))
-
-    def exits(self, surface: int) -> Guarded:
-        """Return the guards of a sliding surface."""
-        return [(g, f) for g, f in self.guarded() if g.kind == "exit" and g.index == surface]
-
-    def stability(self) -> Guarded:
-        """Return none: a leg of known duration leaves no branch."""
-        return []
 
     def guarded(self) -> Guarded:
         """Guards of the mode, in the order of ``Coupled.guards``, and their functions."""
@@ -65,7 +62,7 @@ class Solved:
         for i, sign in enumerate(signs):
             if sign:
                 functions.append(sign * heights[i])
-            elif i >= m:
+            elif i >= m or i in self.system.half_lines:
                 functions.append(self.values[sliding.index(i)])
             elif i in self.system.joints:
                 continue
@@ -93,9 +90,27 @@ def solved(matrix: ca.SX, right: ca.SX) -> ca.SX:
     return ca.solve(matrix, right)
 
 
+def least_norm(matrix: ca.SX, right: ca.SX) -> ca.SX:
+    """The least solution of linear equations, some of which may follow from others, as those of diodes side by side."""
+    symbols, rng = ca.symvar(matrix), np.random.default_rng(1)
+    at = ca.Function("at", [ca.vertcat(*symbols)], [ca.densify(matrix)])
+    values = np.array(at(rng.uniform(0.2, 0.9, len(symbols))), float)
+    rows: list[int] = []
+    for i in range(len(values)):
+        more = [*rows, i]
+        if np.linalg.matrix_rank(values[more], tol=_DEPENDENT * float(np.abs(values).max())) == len(
+            more
+        ):
+            rows = more
+    if len(rows) == len(values):
+        return solved(matrix, right)
+    own = matrix[rows, :]
+    return ca.mtimes(own.T, solved(ca.mtimes(own, own.T), right[rows]))
+
+
 def explicit(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode as a field of the states, for any system; built once."""
-    require_system(system, joints=True)
+    require_system(system, complementarity=True, joints=True)
     if not system.coupled:
         return motion(system, mode)
 
@@ -104,3 +119,43 @@ def explicit(system: FilippovSystem, mode: str) -> Motion:
         return Motion(system, mode, law, law.guarded(), "explicit")
 
     return system.cached(("explicit", mode), build)
+
+
+def mode_field(system: FilippovSystem, mode: str) -> ca.SX:
+    """Right-hand side of any mode, sliding included, time row included (SX, extended dimension).
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    mode : str
+        One letter for each surface; at most one ``s``, of a surface whose multiplier is linear. Any mode of a
+        system with complementarity conditions.
+
+    Returns
+    -------
+    SX
+        While sliding Filippov's field, with the factor cancelled that makes it 0/0 where both
+        fields coincide.
+
+    Raises
+    ------
+    DefinitionError
+        A mode whose multipliers are only known implicitly.
+
+    Examples
+    --------
+    >>> import casadi as ca
+    >>> import nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> system = ns.FilippovSystem([x, y], surface=y, above=[1, -1], below=[3, 1])
+    >>> ns.local.mode_field(system, "s")
+    SX([2, 0])
+    """
+    require_system(system, complementarity=True)
+    found = explicit(system, mode) if system.complementarity else motion(system, mode)
+    if found.states.numel() != system.extended_dimension:
+        raise DefinitionError(
+            f"mode {mode!r} has no explicit field: on several surfaces, or with a nonlinear multiplier, "
+            "there is only an equation. Use sliding_branches."
+        )
+    return found.field

@@ -12,7 +12,7 @@ from ..definition.events import Stop
 from ..definition.system import FilippovSystem
 from .explicit import explicit
 from .motion import watched_functions
-from .switches import Guard, Implicit
+from .switches import Guard
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,4 @@ def _made(
         time=time,
         stops=list(stops.values()),
     )
-    law = of_mode.law
-    unknowns = law.surfaces if isinstance(law, Implicit) else getattr(law, "unknowns", ())
-    return Followed(made, guards, tuple(stops), tuple(unknowns))
+    return Followed(made, guards, tuple(stops), of_mode.law.unknowns)

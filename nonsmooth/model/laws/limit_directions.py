@@ -11,8 +11,6 @@ Dyn. Syst. 17.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..values import Array
@@ -33,27 +31,6 @@ def limit_directions_of(a: Array, m: Array) -> list[tuple[float, Array]]:
         found = _of_roots(_secular(a, m), a, m)
     found.sort(key=lambda pair: -pair[0])
     return [(s * size, u + 0.0) for s, u in found]
-
-
-def leaving_direction(a: Array, m: Array) -> tuple[float, Array]:
-    """The largest rate s and its direction u, for M symmetric and positive definite or zero."""
-    # Newton's method on 1/|(M + s)^-1 a| = 1 from the left, where it is monotone: the function is concave, so
-    # that a step from the right may lead beyond a pole.
-    w, axes = np.linalg.eigh(0.5 * (m + m.T))
-    c = axes.T @ a
-    present = c != 0.0
-    w, c, axes = w[present], c[present], axes[:, present]
-    if not c.size:
-        return math.nan, np.full(len(a), np.nan)
-    s = float(np.max(np.abs(c) - w))
-    for _ in range(100):
-        d = c / (w + s)
-        n = float(np.linalg.norm(d))
-        s += (n - 1.0) * n * n / float(np.sum(d * d / (w + s)))
-        if not abs(n - 1.0) > 4e-16:
-            break
-    u = axes @ (c / (w + s))
-    return s, u / np.linalg.norm(u)
 
 
 def _is_symmetric(m: Array) -> bool:

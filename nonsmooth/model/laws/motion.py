@@ -16,9 +16,8 @@ import casadi as ca
 
 from ..definition.parse_definition import read_function
 from ..definition.system import FilippovSystem, require_system
-from ..errors import DefinitionError
 from ..expressions.jets import taylor
-from .switches import Guarded, Sliding, guards_of, sliding
+from .switches import Guarded, Law, guards_of, kind_of
 
 
 class Motion:
@@ -28,7 +27,7 @@ class Motion:
         self,
         system: FilippovSystem,
         mode: str,
-        law: Sliding,
+        law: Law,
         guarded: Guarded,
         key: Hashable = (),
     ):
@@ -63,9 +62,10 @@ class Motion:
 
 def motion(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode, built once per system."""
+    require_system(system)
 
     def build() -> Motion:
-        law = sliding(system, mode)
+        law = kind_of(system, mode)
         return Motion(system, mode, law, guards_of(system, mode, law))
 
     return system.cached(("motion", mode), build)
@@ -107,11 +107,4 @@ def mode_field(system: FilippovSystem, mode: str) -> ca.SX:
     >>> ns.local.mode_field(system, "s")
     SX([2, 0])
     """
-    require_system(system)
-    found = motion(system, mode)
-    if found.states.numel() != system.extended_dimension:
-        raise DefinitionError(
-            f"mode {mode!r} has no explicit field: on several surfaces, or with a nonlinear multiplier, "
-            "there is only an equation. Use sliding_branches."
-        )
-    return found.field
+    return motion(system, mode).field

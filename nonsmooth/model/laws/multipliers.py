@@ -60,7 +60,9 @@ def _is_solution(
 
 def is_stable(of: Coupled, sliding: Sequence[int], slope: Array, factors: Array) -> bool:
     """Whether sliding is stable across the layer, from the slope dG/d(unknowns) of what slides."""
-    own = [k for k, i in enumerate(sliding) if i < of.system.surface_count]
+    system = of.system
+    surfaces = {*range(system.surface_count)} - {*system.half_lines}
+    own = [k for k, i in enumerate(sliding) if i in surfaces]
     stable = slope[np.ix_(own, own)] * np.sign(factors)[np.array(sliding, int)[own]]
     return not own or bool(np.linalg.eigvals(stable).real.max() < 0.0)
 

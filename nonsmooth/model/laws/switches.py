@@ -1,8 +1,8 @@
 """The kinds of sliding of a mode, each with its field, exits and letters.
 
 ``Free`` has no sliding surface. ``Affine`` slides on one surface whose multiplier enters linearly:
-the multiplier is eliminated symbolically. ``Implicit`` slides on several surfaces, or on one whose
-multiplier enters nonlinearly: the multipliers are further states.
+the multiplier is eliminated symbolically. What slides on several surfaces, or on one whose multiplier enters
+nonlinearly, is ``explicit.Solved``.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from typing import Protocol
 
 import casadi as ca
 
-from ..definition.system import FilippovSystem, require_system
+from ..definition.system import FilippovSystem
+from ..errors import DefinitionError
 from ..expressions.cancel import cancel_common_factor, normal_forms
 from ..expressions.identity import vanish_on
 
@@ -50,40 +51,23 @@ class Guard:
 Guarded = list[tuple[Guard, ca.SX]]
 
 
-class Sliding(Protocol):
-    """What a kind of sliding gives to the motion of a mode."""
+class Law(Protocol):
+    """What a mode's motion is made of."""
 
-    @property
-    def surfaces(self) -> tuple[int, ...]: ...
     @property
     def states(self) -> ca.SX: ...
     @property
     def field(self) -> ca.SX: ...
-
-    def exits(self, surface: int) -> Guarded:
-        """Functions that are positive while a surface slides."""
+    @property
+    def unknowns(self) -> tuple[int, ...]:
+        """Multipliers that are states."""
         ...
-
-    def stability(self) -> Guarded:
-        """Functions that are positive while the sliding is stable across its layer."""
-        ...
-
-
-def sliding(system: FilippovSystem, mode: str) -> Sliding:
-    """Return the kind of sliding that a mode has."""
-    require_system(system)
-    surfaces = [i for i, s in enumerate(system.parse_mode(mode)) if s == 0]
-    if not surfaces:
-        return Free(system, mode)
-    if len(surfaces) == 1 and not system.nonlinear[surfaces[0]]:
-        return Affine(system, mode, surfaces[0])
-    return Implicit(system, mode)
 
 
 class Free:
     """No surface slides."""
 
-    surfaces: tuple[int, ...] = ()
+    unknowns: tuple[int, ...] = ()
 
     def __init__(self, system: FilippovSystem, mode: str):
         self.states = system.extended_states
@@ -93,23 +77,21 @@ class Free:
         """Return none."""
         return []
 
-    def stability(self) -> Guarded:
-        """Return none."""
-        return []
-
 
 class Affine:
     """One surface slides and its multiplier enters linearly."""
 
+    unknowns: tuple[int, ...] = ()
+
     def __init__(self, system: FilippovSystem, mode: str, surface: int):
-        self.system, self.mode, self.surfaces = system, mode, (surface,)
+        self.system, self.mode = system, mode
         self.states = system.extended_states
         multipliers, lam = ca.SX([float(s) for s in system.parse_mode(mode)]), ca.SX.sym("lambda")
         multipliers[surface] = lam
         field = system.field_with(multipliers)
         middle = ca.substitute(field, lam, 0)
         entries = ca.vertsplit(ca.densify(ca.jacobian(field, lam)))
-        if self._continuous(entries):
+        if self._continuous(entries, surface):
             self.field = middle
             return
         gradient = ca.jacobian(system.surface_function(surface), self.states)
@@ -133,13 +115,9 @@ class Affine:
             for side in (1, -1)
         ]
 
-    def stability(self) -> Guarded:
-        """Return none: attracting sliding is stable."""
-        return []
-
-    def _continuous(self, difference: list[ca.SX]) -> bool:
+    def _continuous(self, difference: list[ca.SX], surface: int) -> bool:
         """Whether the two fields are one field on the surface."""
-        h, p = self.system.surface_function(self.surfaces[0]), self.system.parameter_symbols
+        h, p = self.system.surface_function(surface), self.system.parameter_symbols
         forms = normal_forms([self.states, p], difference)[1]  # to rounding of the coefficients
         pieces = [e for e, form in zip(difference, forms, strict=True) if form[0]]
         if not pieces:
@@ -152,49 +130,21 @@ def _with_letter(mode: str, surface: int, letter: str) -> str:
     return mode[:surface] + letter + mode[surface + 1 :]
 
 
-class Implicit:
-    """Sliding whose multipliers solve grad h_i . f(x, lambda) = 0 implicitly."""
-
-    def __init__(self, system: FilippovSystem, mode: str):
-        self.system, self.mode = system, mode
-        signs = system.parse_mode(mode)
-        self.surfaces = tuple(i for i, s in enumerate(signs) if s == 0)
-        self.multipliers = ca.vertcat(*[ca.SX.sym(f"lambda{i}") for i in self.surfaces])
-        values = ca.SX([float(s) for s in signs])
-        for k, i in enumerate(self.surfaces):
-            values[i] = self.multipliers[k]
-        field = system.field_with(values)
-        x = system.extended_states
-        h = ca.vertcat(*[system.surface_function(i) for i in self.surfaces])
-        self.layer = ca.densify(ca.mtimes(ca.jacobian(h, x), field))
-        self.slope = ca.densify(ca.jacobian(self.layer, self.multipliers))
-        self.states = ca.vertcat(x, self.multipliers)
-        self._plain = field
-
-    @property
-    def field(self) -> ca.SX:
-        """The states' rates, and those of the multipliers."""
-        drift = ca.mtimes(ca.jacobian(self.layer, self.system.extended_states), self._plain)
-        return ca.vertcat(self._plain, -ca.solve(self.slope, drift))
-
-    def exits(self, surface: int) -> Guarded:
-        """Return 1 - lambda and 1 + lambda."""
-        lam = self.multipliers[self.surfaces.index(surface)]
-        return [(Guard("exit", surface, side, surface), 1 - side * lam) for side in (1, -1)]
-
-    def stability(self) -> Guarded:
-        """Return the signed determinant and the trace of the layer problem's slope."""
-        k = len(self.surfaces)
-        # At a simple fold of one multiplier the field is singular before its guard is zero.
-        functions = [(-1.0) ** k * ca.det(self.slope)]
-        if k > 1:
-            functions.append(-ca.trace(self.slope))
-        first = self.surfaces[0]
-        return [(Guard("branch", first, 0, first), f) for f in functions]
+def kind_of(system: FilippovSystem, mode: str) -> Free | Affine:
+    """Return the kind of sliding that a mode has, for a field that is explicit."""
+    surfaces = [i for i, s in enumerate(system.parse_mode(mode)) if s == 0]
+    if not surfaces:
+        return Free(system, mode)
+    if len(surfaces) == 1 and not system.nonlinear[surfaces[0]]:
+        return Affine(system, mode, surfaces[0])
+    raise DefinitionError(
+        f"mode {mode!r} has no explicit field: on several surfaces, or with a nonlinear multiplier, "
+        "there is only an equation. Use sliding_branches."
+    )
 
 
-def guards_of(system: FilippovSystem, mode: str, law: Sliding) -> Guarded:
-    """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""
+def guards_of(system: FilippovSystem, mode: str, law: Free | Affine) -> Guarded:
+    """Guards of a mode: surfaces and exits, stops and resets."""
     result: Guarded = []
     for i, sign in enumerate(system.parse_mode(mode)):
         if sign:
@@ -203,7 +153,7 @@ def guards_of(system: FilippovSystem, mode: str, law: Sliding) -> Guarded:
             result += law.exits(i)
     functions = system.definition.guards
     of_events = zip(event_guards(system), ca.vertsplit(functions)[: functions.numel()], strict=True)
-    return [*result, *of_events, *law.stability()]
+    return [*result, *of_events]
 
 
 def event_guards(system: FilippovSystem) -> list[Guard]:

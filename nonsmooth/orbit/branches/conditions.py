@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, Evaluator, FilippovSystem, Guard
+from ...model.derivatives.event_maps import keeps_zero
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import finite_return_map
@@ -168,12 +169,34 @@ def _starting(
 ) -> list[tuple[int, int, Condition]]:
     """Guards that are not zero by construction at the start of a leg, of those to order 3."""
     guards = guarded_field(system, leg.mode).motion.guards
-    orders = [(k, guard, _order(system, guard, before)) for k, guard in enumerate(guards)]
+    orders = [(k, guard, _order(system, guard, before, leg)) for k, guard in enumerate(guards)]
     return [(k, order, Condition("start", i, g)) for k, g, order in orders if order is not None]
 
 
-def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
+def _leaves_zero(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> bool:
+    """Whether a function that the leg before kept at zero is zero where this leg begins, which it leaves at a rate."""
+    k = guard.element
+    if guard.kind != "surface" or before.timed or before.mode[k] not in "sc" or leg.mode[k] in "sc":
+        return False
+    i, *more = system.entries[k]
+    if more or i in system.algebraic or before.kind in ("impact", "jump"):
+        return False
+    return before.kind != "reset" or keeps_zero(system, i, before.element)
+
+
+def _changes(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> bool:
+    """Whether a guard is of a complementarity condition whose letter changes at the event before a leg."""
+    k = guard.element
+    if guard.kind not in ("surface", "release") or k >= len(system.entries):
+        return False
+    jumps = before.kind in ("reset", "impact", "jump") or before.timed
+    return not jumps and system.entries[k][0] in system.half_lines and before.mode[k] != leg.mode[k]
+
+
+def _order(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> int | None:
     """Order at which a guard is positive after the event of the leg before; None without a test."""
+    if _changes(system, guard, before, leg):
+        return None
     # A crossing leaves the guard zero and its rate positive. After an exit or release the rate is zero
     # too, and its positive second derivative is the transversality of that event.
     if guard.kind not in ("surface", "exit", "impact", "release"):
@@ -182,6 +205,8 @@ def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
         return None  # the rate after it is that before it, the transversality of the event
     if guard.kind == "surface" and surface_of(system, before) == guard.element:
         return 1 if before.kind == "crossing" else None
+    if _leaves_zero(system, guard, before, leg):
+        return 1
     if guard.kind == "impact" and guard.ends(before.kind, before.element, before.side):
         return None
     return 0

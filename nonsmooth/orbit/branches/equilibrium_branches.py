@@ -21,7 +21,7 @@ from ...local.checks import parameter_index, require_autonomous, require_linear
 from ...local.discrete_states import with_discrete_states_held
 from ...local.point.surface_point import SIDES, LocalSurface, Side, side_index, surface_at
 from ...local.read_only import ReadOnly
-from ...local.searches.boundary_equilibria import boundary_equilibrium_of
+from ...local.searches.boundary_equilibria import boundary_equilibrium_at
 from ...local.searches.equilibria import Equilibrium, by_real_part, equilibrium_at, find_equilibrium
 from ...local.searches.pseudo_equilibria import (
     find_pseudo_equilibrium,
@@ -40,6 +40,15 @@ _START = 1e-4
 
 #: Relative error of a state.
 _ROUNDING = 1e-13
+
+
+#: What meets at a boundary equilibrium, and what continues the branch, by the class of the surface.
+_MEETS = {
+    "generic": ("equilibrium and pseudo-equilibrium", "pseudo-equilibrium"),
+    "continuous": ("the equilibria of both sides", "equilibrium"),
+    "velocity continuous": ("equilibrium and rest between the two forces", ""),
+    "undecided": ("equilibrium and pseudo-equilibrium", ""),
+}
 
 
 class Equilibria(BranchCurve):
@@ -147,16 +156,15 @@ class Equilibria(BranchCurve):
         """The boundary equilibrium of F1 (k = 0) or F2 (k = 1) on this curve."""
         x, here = zero.point.u[: self.n], self.local_surface(zero.point.u)
         numbers = here.finite_at(x)
-        found = boundary_equilibrium_of(
-            x, k, numbers.gradient, numbers.fields[1 - k], here.jacobians(x)[k]
-        )
+        kind = here.switching.kind
+        found = boundary_equilibrium_at(here, numbers, k, here.jacobians(x))
+        pair, onward = _MEETS[kind]
+        if isinstance(self, _PseudoEquilibriumCurve):
+            onward = "equilibrium"
         verdict = {
             "persistence": "persistence: one continues the other",
-            "nonsmooth fold": "nonsmooth fold: equilibrium and pseudo-equilibrium annihilate",
+            "nonsmooth fold": f"nonsmooth fold: {pair} annihilate",
         }.get(found.unfolding, "degenerate")
-        onward = (
-            "equilibrium" if isinstance(self, _PseudoEquilibriumCurve) else "pseudo-equilibrium"
-        )
         side = FarSide(onward, verdict, found.numbers)
         event = self.described(zero, "boundary equilibrium", far_side=side)
         return replace(event, solution=found)
@@ -229,6 +237,12 @@ class EquilibriumCurve(Equilibria):
     def ends(self, name: str) -> bool:
         return name.startswith("boundary equilibrium")
 
+    def entered(self, start: Array) -> Departure | None:
+        """Leave a boundary equilibrium to the field's own side."""
+        here, x, own = self.local_surface(start), start[: self.n], 1.0 - 2.0 * self.k
+        dh = here.parameter_derivatives(x)[0][list(self.free)]
+        return _leave(self, start, own * np.append(here.at(x).gradient, dh))
+
     def describe(self, u: Array) -> Equilibrium:
         return equilibrium_at(self.local_surface(u), Found(u[: self.n]), self.side)
 
@@ -240,8 +254,14 @@ class EquilibriumCurve(Equilibria):
         return self.smooth_event(zero, "fold")
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
-        """Pseudo-equilibria with 0 < alpha < 1."""
+        """Pseudo-equilibria with 0 < alpha < 1, or where the field is continuous equilibria on the other side."""
         x, value, near = zero.point.u[: self.n], zero.point.u[-1], self._on(zero.name)
+        kind = near.local_surface(zero.point.u).switching.kind
+        if kind == "continuous":
+            beyond = EquilibriumCurve(near.where, self.free, self.scale, SIDES[1 - near.k])
+            return beyond.entered(zero.point.u)
+        if kind != "generic":
+            return None
         scale = np.append(self.scale[: self.n], [1.0, self.scale[-1]])
         curve = _PseudoEquilibriumCurve(near.where, self.free, scale)
         return _leave(curve, np.concatenate([x, [float(near.k), value]]), 1.0 - 2.0 * near.k)
@@ -322,10 +342,7 @@ class _PseudoEquilibriumCurve(Equilibria):
         k, u = _ALPHA[zero.name], zero.point.u
         scale = np.append(self.scale[: self.n], self.scale[-1])
         curve = EquilibriumCurve(self.where, self.free, scale, SIDES[k])
-        start = np.append(u[: self.n], u[-1])
-        gradient = curve.local_surface(start).at(start[: self.n]).gradient
-        dh = curve.local_surface(start).parameter_derivatives(start[: self.n])[0][list(self.free)]
-        return _leave(curve, start, np.append((1.0 - 2.0 * k) * gradient, (1.0 - 2.0 * k) * dh))
+        return curve.entered(np.append(u[: self.n], u[-1]))
 
 
 def _critical_pair(values: NDArray[Any]) -> list[int]:

@@ -82,11 +82,17 @@ class LegEditor:
 
 def mode_after(leg: Leg) -> str:
     """The mode that follows the event of a leg, if its letters determine it; else empty."""
+    if leg.kind in ("contact", "release"):
+        return with_letter(leg.mode, leg.element, _OTHER[leg.mode[leg.element]])
     if leg.kind not in ("crossing", "entry", "exit"):
         return ""
     turned = leg.mode[leg.element].translate(TURNED)
     letter = {"crossing": turned, "entry": "s"}.get(leg.kind, "+" if leg.side > 0 else "-")
     return with_letter(leg.mode, leg.element, letter)
+
+
+#: The letter of an element beyond a touch of its function, or of its multiplier while it is closed.
+_OTHER = {"+": "-", "-": "+", "o": "c", "c": "o"}
 
 
 def with_letter(mode: str, surface: int, letter: str) -> str:
@@ -136,7 +142,13 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
             "impact": "impact grazing",
             "reset": "grazing of a reset",
             "exit": "adding-sliding",
+            "release": "adding-sliding",
         }.get(leg.kind, "grazing, escaping")
+    if {before.kind, leg.kind} == {"contact", "release"} and before.element == leg.element:
+        name = _touch(
+            problem, leg.element, "adding-sliding" if leg.kind == "contact" else "grazing-sliding"
+        )
+        return name if before.mode == mode_after(leg) else "corner"
     if before.kind == "entry" and leg.kind == "exit":
         came, left = before.mode, mode_after(leg)
         return "grazing-sliding" if came == left else "crossing-sliding"
@@ -160,6 +172,12 @@ def _grazed(
         return f"grazing of a {'stop' if guard.kind == 'stop' else 'reset'}"
     if guard.kind == "exit":
         return "adding-sliding"
+    if is_condition(problem, guard):
+        return _touch(
+            problem,
+            guard.element,
+            "grazing-sliding" if guard.kind == "surface" else "adding-sliding",
+        )
     if guard.kind == "release":
         return "release"
     t = touching(problem.system, leg, guard, at.starts[test.leg], float(at.durations[test.leg]), p)
@@ -180,6 +198,12 @@ def _grazed(
             return "grazing, escaping"
         return soft or "two-fold"  # both fields touch there
     return "grazing-sliding" if across > 0.0 else "grazing, escaping"
+
+
+def _touch(problem: BoundaryProblem, element: int, of_degree_one: str) -> str:
+    """What a touch of a complementarity condition is: of degree 0 the field is continuous there."""
+    system = problem.system
+    return SOFT if system.entries[element][0] in system.algebraic else of_degree_one
 
 
 def _leads_away(problem: BoundaryProblem, mode: str, surface: int, y: Array, p: Array) -> bool:
@@ -229,6 +253,8 @@ def _longer(
     if kind in ("crossing-sliding", "switching-sliding"):
         return _inserted(editor, kind, i, p)
     if kind == "corner" and at.what == "start" and at.guard is not None:
+        if is_condition(before.problem, at.guard) and at.guard.kind == "surface":
+            return closed_before(editor, i, at.guard, p)
         return round_corner(editor, i, at.guard, p)
     if at.guard is None or at.what != "interior" or kind == "grazing, escaping":
         return None
@@ -280,6 +306,9 @@ def _added(
 ) -> tuple[list[Leg], list[Array]] | None:
     """Legs that come before the rest of a leg that is touched, and the starts after the first."""
     system = problem.system
+    if is_condition(problem, guard):
+        other = with_letter(leg.mode, guard.element, _OTHER[leg.mode[guard.element]])
+        return [leg_between(system, leg.mode, other), leg_between(system, other, leg.mode)], [y, y]
     if kind == "grazing-sliding":
         slide = with_letter(leg.mode, guard.element, "s")
         return [leg_between(system, leg.mode, slide), leg_between(system, slide, leg.mode)], [y, y]
@@ -304,6 +333,12 @@ def _shorter(
 ) -> ChangedItinerary | None:
     if kind in ("impact grazing", "grazing of a reset"):
         return _missed(before, at.leg, p)
+    if (
+        kind == "corner"
+        and at.what == "duration"
+        and before.problem.legs[at.leg - 1].kind == "contact"
+    ):
+        return never_closed(before, at.leg, p)
     if kind == "corner" and at.what == "duration":
         cut = cut_corner(before, at.leg, p)
         if cut is not None:
@@ -422,6 +457,46 @@ def swapped(editor: LegEditor, i: int) -> ChangedItinerary | None:
     editor.legs[i - 1] = leg_between(system, first.mode, between)
     editor.legs[i] = leg_between(system, between, with_letter(between, a, second.mode[a]))
     return editor.done(i)
+
+
+def is_condition(problem: BoundaryProblem, guard: Guard) -> bool:
+    """Whether a guard is y or the multiplier of a complementarity condition."""
+    system, k = problem.system, guard.element
+    own = guard.kind in ("surface", "release") and k < len(system.entries)
+    return own and system.entries[k][0] in system.half_lines
+
+
+def closed_before(editor: LegEditor, i: int, guard: Guard, p: Array) -> ChangedItinerary | None:
+    """A complementarity condition closes before the event that leads to leg ``i``, where it is open again."""
+    system, k = editor.problem.system, (i - 1) % len(editor.legs)
+    before, own = editor.legs[k], guard.element
+    if before.mode[own] != "o" or editor.legs[i].mode[own] != "o" or before.kind == "contact":
+        return None
+    end = integrate_leg(system, before, editor.starts[k], editor.durations[k], p).end
+    closed = replace(before, mode=with_letter(before.mode, own, "c"))
+    editor.legs[k] = replace(
+        before, kind="contact", element=own, side=1, letters="", further=(), atom=-1
+    )
+    editor.insert(k + 1, closed, end[: editor.problem.dimension])
+    return editor.done(k + 1)
+
+
+def never_closed(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | None:
+    """A leg on which a complementarity condition is closed, until an event that opens it, left out."""
+    turned = _turned(before, i, p)
+    i = turned.origin.index(before.origin[i])
+    editor = LegEditor(turned.problem, turned.u, turned.origin)
+    first, closed, count = editor.legs[i - 1], editor.legs[i], len(editor.legs)
+    own = first.element
+    if count < 2 or closed.timed or editor.legs[(i + 1) % count].mode[own] != "o":
+        return None
+    editor.legs[i - 1] = replace(closed, mode=first.mode)
+    editor.remove(i)
+    guards = guarded_field(
+        editor.problem.system, editor.legs[i % len(editor.legs)].mode
+    ).motion.guards
+    guard = next(g for g in guards if g.kind == "surface" and g.element == own)
+    return editor.done(test=Condition("start", i % len(editor.legs), guard))
 
 
 def round_corner(editor: LegEditor, i: int, guard: Guard, p: Array) -> ChangedItinerary | None:

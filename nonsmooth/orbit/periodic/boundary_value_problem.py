@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ...flow.fixed import TOLERANCE
 from ...model import Array, FilippovSystem
-from ...model.derivatives.event_maps import AtEvent, surface_map
+from ...model.derivatives.event_maps import AtEvent, EventMap, kept_maps
 from ...model.derivatives.forcing import Forcing
 from ..runs.leg_integration import LegFlows, LegIntegrator, leg_integrator
 from ..runs.legs import Leg, LegFlow, integrate_leg, surface_of
@@ -81,6 +81,8 @@ class Evaluation:
     starts: Array
     #: (N,)
     durations: Array
+    #: (n, n) or None: The projector at the first start onto what constraints allow.
+    allowed: Array | None = None
 
     @property
     def jacobian(self) -> Array:
@@ -131,6 +133,11 @@ class BoundaryProblem:
             if all(leg.mode[i] == "s" for leg in self.legs)
         ]
         object.__setattr__(self, "kept", tuple(sliding))
+
+    @cached_property
+    def held(self) -> list[EventMap]:
+        """Functions that are zero all the time."""
+        return kept_maps(self.system, self.kept)
 
     @cached_property
     def dimension(self) -> int:
@@ -236,7 +243,15 @@ class BoundaryProblem:
             self._phased(residual, jacobian, by_parameters, flows, starts[0])
         if self.kept:
             self._keep(residual, jacobian, by_parameters, starts[0], p, chosen)
-        return Evaluation(residual, whole, flows, starts, durations)
+        return Evaluation(residual, whole, flows, starts, durations, self._allowed(starts[0], p))
+
+    def _allowed(self, start: Array, p: Array) -> Array | None:
+        if not self.system.joints:
+            return None
+        rows = np.array(
+            [own(start, p).gradient for own in kept_maps(self.system, self.system.joints)]
+        )
+        return np.asarray(np.eye(self.dimension) - np.linalg.pinv(rows) @ rows)
 
     def residual(self, u: Array, p: Array, extended: bool = False) -> Array | None:
         """Residual without derivatives, or in extended precision; None where the legs do not allow it."""
@@ -286,15 +301,14 @@ class BoundaryProblem:
         p: Array,
         columns: Sequence[int],
     ) -> None:
-        """Replace the redundant equations of surfaces that are never left by h = 0."""
+        """Replace the redundant equations of what is zero all the time by that."""
         n = self.dimension
         first = (len(self.legs) - 1) * n
-        taken: list[int] = []
-        for surface in self.kept:
-            at = surface_map(self.system, surface)(start, p)
-            free = [k for k in range(self.system.dimension) if k not in taken]
-            k = max(free, key=lambda k: abs(float(at.gradient[k])))
-            taken.append(k)
+        maps = [own(start, p) for own in self.held]
+        rest = np.array([at.gradient[: self.system.dimension] for at in maps])
+        for i, at in enumerate(maps):
+            k = int(np.argmax(np.abs(rest[i])))  # of what the rows before leave
+            rest[i + 1 :] -= np.outer(rest[i + 1 :, k] / rest[i, k], rest[i])
             residual[first + k] = at.value
             jacobian[first + k] = 0.0
             jacobian[first + k, :n] = at.gradient

@@ -641,7 +641,10 @@ def _recurring(
 def _mode(system: FilippovSystem, x: Array, p: Array) -> str:
     """The mode of a state that is on no surface."""
     h = Surfaces(system).values(x, p)[0][: system.surface_count]
-    return "".join("+" if v > 0 else "-" for v in h) + "o" * len(system.impacts)
+    letters = ["+" if v > 0 else "-" for v in h]
+    for i in system.half_lines:
+        letters[i] = "o"
+    return "".join(letters) + "o" * len(system.impacts)
 
 
 def _natural_time(system: FilippovSystem, x: Array, p: Array, mode: str | None = None) -> float:

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array
-from ...model.derivatives.event_maps import surface_map
 from ..runs.legs import leg_name
 from ..runs.saltation import passages, saltations
 from .boundary_value_problem import BoundaryProblem, Evaluation, jacobian_indices
@@ -56,7 +55,8 @@ class Multipliers:
     @cached_property
     def error(self) -> float:
         """Distance of the structural multipliers of ``matrix`` from 1 and 0."""
-        whole, held = np.linalg.eigvals(self.matrix), len(self.problem.kept)
+        whole, joints = np.linalg.eigvals(self.matrix), self.problem.system.joints
+        held = sum(i not in joints for i in self.problem.kept)
         # the sliding field keeps h whatever it is: off a surface that is never left its matrix has a 1
         ones = np.argsort(np.abs(whole - 1.0))[: 1 + held]
         rest = np.sort(np.abs(np.delete(whole, ones)))
@@ -93,6 +93,8 @@ def leg_maps(problem: BoundaryProblem, at: Evaluation) -> Array:
     maps = flows.after_state @ across
     if problem.symmetry is not None:
         maps[-1] = problem.wrap @ maps[-1]
+    if at.allowed is not None:
+        maps[-1] = at.allowed @ maps[-1]
     return np.asarray(maps)
 
 
@@ -158,7 +160,7 @@ def _sliding_directions(problem: BoundaryProblem, at: Evaluation, p: Array, unit
     """Directions that remain on the surfaces on which the orbit slides all the time, in given units."""
     if not problem.kept:
         return np.eye(problem.dimension)
-    rows = [surface_map(problem.system, i)(at.starts[0], p).gradient for i in problem.kept]
+    rows = [own(at.starts[0], p).gradient for own in problem.held]
     return np.asarray(np.linalg.svd(np.array(rows) * units)[2][len(rows) :].T)
 
 
@@ -183,7 +185,8 @@ def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
     product: Array = np.eye(problem.dimension)
     for step in jumps @ at.flows.by_start:
         product = step @ product
-    return np.asarray(problem.wrap @ product, float)
+    product = problem.wrap @ product
+    return product if at.allowed is None else np.asarray(at.allowed @ product, float)
 
 
 def stability(values: NDArray[np.complex128], error: float) -> str:

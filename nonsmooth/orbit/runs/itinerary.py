@@ -97,7 +97,9 @@ def leg_between(system: FilippovSystem, mode: str, following: str, name: str = "
         return Leg(mode, events[name].kind, events[name].element, events[name].side)
     if name in system.impacts:
         return _of_contact(system, mode, system.impacts.index(name))
-    names = [*events, *system.impacts]
+    if name in system.complementarity:
+        return _of_condition(system, mode, system.surface_names.index(name))
+    names = [*events, *system.complementarity, *system.impacts]
     leg = _by_letters(system, mode, following, names)
     names.append(leg.name(system))
     if name not in ("", names[-1]):
@@ -133,8 +135,15 @@ def _by_letters(system: FilippovSystem, mode: str, following: str, named: list[s
     before, after = mode[i], following[i]
     if i >= system.surface_count:
         return _of_contact(system, mode, i - system.surface_count)
+    if i in system.half_lines:
+        return _of_condition(system, mode, i)
     kind = "exit" if before == "s" else "entry" if after == "s" else "crossing"
     return Leg(mode, kind, i, 1 if (after if kind == "exit" else before) == "+" else -1)
+
+
+def _of_condition(system: FilippovSystem, mode: str, i: int) -> Leg:
+    side = system.parse_letters(mode)[i]
+    return Leg(mode, "contact" if side else "release", system.entry_of(i), side)
 
 
 def _of_contact(system: FilippovSystem, mode: str, contact: int) -> Leg:
@@ -184,7 +193,7 @@ class FixedItinerary:
     modes: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        require_system(self.system)
+        require_system(self.system, complementarity=True)
         object.__setattr__(self, "modes", tuple(read_word(self.system, self.word)))
 
     def arrive(self, start: ArrayLike, t_start: float = 0.0) -> Arrival:

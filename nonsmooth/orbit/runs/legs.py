@@ -29,6 +29,7 @@ from ...model.derivatives.event_maps import (
     deciding,
     event_map,
     instant_map,
+    jumping,
     struck_by,
     surface_map,
 )
@@ -215,7 +216,7 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
     discrete = len(system.definition.discrete)
     for group in _instants(run.events):
         first, last = group[0], group[-1]
-        _require_countable(group)
+        _require_countable(group, len(system.entries))
         x_end = _extended(system, first.x, first.t)
         if len(group) == 1 and first.kind in ("crossing", "entry", "exit"):
             key = (first.mode_before, first.kind, first.element, first.side, first.mode_after)
@@ -225,6 +226,8 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
             if system.resets or not system.definition.plain:
                 _require_smooth_choices(system, group, p)
                 _require_present_state(system, group)
+            if first.kind == "jump":
+                leg = replace(leg, at_start=True)
             if not system.definition.plain:
                 if begins or first.t > t:
                     leg = _located(system, first, x_end, p, leg, not result and first.t == t)
@@ -299,14 +302,14 @@ def _instants(events: Sequence[Event]) -> list[list[Event]]:
     return groups
 
 
-def _require_countable(group: Sequence[Event]) -> None:
+def _require_countable(group: Sequence[Event], contacts: int) -> None:
     for event in group:
         if event.kind == "rest":
             raise DegenerateError(
                 f"event at t = {event.t:.10g}: expected finitely many events before {event.name!r} rests, "
                 "received events that accumulate. Infinitely many legs have no fixed itinerary: end the run before."
             )
-        if event.kind == "contact":
+        if event.kind == "contact" and event.element >= contacts:
             raise DegenerateError(
                 f"event at t = {event.t:.10g}: expected finitely many impacts before a contact "
                 f"closes, received impacts on {event.name!r} that accumulate. Infinitely many legs "
@@ -318,8 +321,11 @@ def leg_of(system: FilippovSystem, event: Event, p: Array) -> Leg:
     """The leg that an event of a run ends."""
     if event.kind == "end":
         return Leg(event.mode_before)
-    _require_one_surface(system, event)
+    _require_one_surface(system, event, p)
     letters = _letters(system, event, p) if event.kind == "impact" else ""
+    if event.kind == "jump":
+        x, after = (_extended(system, v, event.t) for v in (event.x, event.x_after))
+        letters = jumping(system, x, after, p)
     return Leg(event.mode_before, event.kind, event.element, event.side, letters)
 
 
@@ -387,8 +393,10 @@ def _require_present_state(system: FilippovSystem, group: Sequence[Event]) -> No
             )
 
 
-def _require_one_surface(system: FilippovSystem, event: Event) -> None:
+def _require_one_surface(system: FilippovSystem, event: Event, p: Array) -> None:
     """Refuse an event on two surfaces at once."""
+    if event.kind in ("crossing", "entry", "exit", "contact", "release"):
+        _require_one_condition(system, event, p)
     if event.kind not in ("crossing", "entry", "exit", *["release"] * bool(system.sets)):
         return
     letters = zip(event.mode_before, event.mode_after, strict=False)
@@ -402,6 +410,21 @@ def _require_one_surface(system: FilippovSystem, event: Event) -> None:
     if others:
         other = event_name(system, event.mode_before, event.kind, others[0])
         raise DegenerateError(corner(event.t, event.name, other))
+
+
+def _require_one_condition(system: FilippovSystem, event: Event, p: Array) -> None:
+    """Refuse an event at which a complementarity condition closes that another function does not close with it."""
+    letters = zip(event.mode_before, event.mode_after, strict=True)
+    closed = [k for k, pair in enumerate(letters) if pair == ("o", "c") and k != event.element]
+    closed = [i for i in system.half_lines if system.entry_of(i) in closed]
+    x = _extended(system, event.x, event.t)
+    for i in closed:
+        if i in system.algebraic:
+            continue  # the field is continuous there
+        y = Leg(event.mode_before).along(system).states_at(x, p)
+        own = event_map(system, event.mode_before, event.kind, event.element, event.side)(y, p)
+        if not parallel(surface_map(system, i)(x, p).gradient, own.gradient[: len(x)]):
+            raise DegenerateError(corner(event.t, event.name, system.surface_names[i]))
 
 
 def corner(t: float, one: str, other: str) -> str:
@@ -456,6 +479,9 @@ def _caused(
         start = then.along(system).initial(at.after, p)
         other = then.at_end(system, start[:, 0], p)
         n = len(at.after)
+        if then.kind == "jump":
+            kept = (*kept, then)
+            continue
         if then.kind in ("reset", "stop") and not _is_zero(other, start[:, 0]):
             kept = (*kept, then) if then.kind == "reset" else kept
             continue  # a jump led clearly to its other side: it follows, whatever the times are

@@ -167,7 +167,7 @@ def lyapunov_spectrum(
     >>> ns.lyapunov_spectrum(decay, [1.0, 1.0, 0.5], t_end=100.0, transient=60.0).exponents.round(6)
     array([ 0.      , -0.443147, -1.      ])
     """
-    require_system(system)
+    require_system(system, complementarity=True)
     n = system.dimension - len(system.definition.discrete)
     count = n if k is None else whole(k, "k")
     if count > n:

@@ -207,7 +207,7 @@ def poincare(
     >>> returns.jacobian(2)[0, 0].round(9), returns.points[2, 0] / returns.points[1, 0].round(9)
     (np.float64(0.533488091), np.float64(0.53348809...))
     """
-    require_system(system, joints=True)
+    require_system(system, complementarity=True, joints=True)
     count, t_start = whole(count, "count"), real(t_start, "t_start")
     if isinstance(section, Section):
         wanted = replace(section, count=count, skip=section.skip + whole(skip, "skip", least=0))

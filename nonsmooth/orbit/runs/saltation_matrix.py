@@ -77,7 +77,7 @@ def saltation_matrix(
     array([[ 1. , -1. ],
            [ 0. ,  0.5]])
     """
-    require_system(system)
+    require_system(system, complementarity=True)
     p, x = system.parameter_vector(parameters), system.extended_point(point, t)
     for mode in (before, after):
         system.parse_letters(mode)  # raises for an invalid mode

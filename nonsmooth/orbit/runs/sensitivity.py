@@ -80,7 +80,7 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
            [3.  , 1.  ]]), array([[0.25],
            [1.  ]]), array([0.5]), array([[1. , 0.5]]))
     """
-    require_system(_require_run(run).system, sets=True, joints=True)
+    require_system(_require_run(run).system, sets=True, complementarity=True, joints=True)
     _, result = along(run, _names(run, wrt))
     return result
 

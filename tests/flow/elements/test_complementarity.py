@@ -5,6 +5,7 @@ import pickle
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
 
@@ -91,10 +92,10 @@ def test_a_circuit_is_that_of_its_exact_modes(name):
     matrices, start, degree = CIRCUITS[name]
     system = circuit(*matrices)
     assert len(system.algebraic) == (0 if degree else len(system.complementarity))
-    run = ns.simulate(system, start, t_end=20.0, tol=1e-10)
+    run = ns.simulate(system, start, t_end=14.0, tol=1e-10)
     assert run.status is REACHED, run.message
     assert len(run.events) > 4
-    assert abs(run.x[-1] - Circuit(*matrices).run(start, 20.0)).max() < 1e-9
+    assert abs(run.x[-1] - Circuit(*matrices).run(start, 14.0)).max() < 1e-9
 
 
 def test_capacitors_that_are_joined_share_their_charge():
@@ -239,6 +240,114 @@ def test_files_and_ensembles(tmp_path):
     assert many.events["jump"].tolist() == [0, 0, 1, 0]
 
 
+def test_a_buck_converter_with_a_clock_and_a_switch_that_is_a_state():
+    """Linear between ticks, ends of the switch and zeros of the current, each found by an integrator of its own."""
+    i, v, u, s = (ca.SX.sym(name) for name in "ivus")
+    clock = ns.Clock(0.2, map={s: 1.0}, name="tick")
+    system = ns.FilippovSystem(
+        [i, v],
+        field=[10 * (s - v + u), i - v / 5],
+        complementarity=ns.Complementarity(i, multiplier=u, name="diode"),
+        discrete={s: (0, 1)},
+        clocks=clock,
+        resets=ns.Reset(clock.phase - 0.08, {s: 0}, 1, name="off"),
+    )
+    run = ns.simulate(system, [0.0, 0.5, 0.0, 1.0], t_end=2.0, tol=1e-10)
+    assert run.status is REACHED, run.message
+    x = np.array([0.0, 0.5])
+    for _ in range(10):
+        for on, left in ((1, 0.08), (0, 0.12)):
+            while left > 1e-14:
+                x, passed = conducted(x, on, left) if x[0] > 0 or on > x[1] else blocked(x, left)
+                left -= passed
+    assert abs(run.x[-1, :2] - x).max() < 1e-9
+    assert {event.name for event in run.events} > {"tick", "off", "diode"}
+
+
+def conducted(x, on, left):
+    ends = lambda t, y: y[0] if t > 1e-12 else 1.0
+    ends.terminal, ends.direction = True, -1
+    field = lambda t, y: [10 * (on - y[1]), y[0] - y[1] / 5]
+    found = solve_ivp(field, (0, left), x, method="DOP853", rtol=1e-11, atol=1e-13, events=ends)
+    return np.array(
+        [max(found.y[0, -1], 0.0) if found.status == 0 else 0.0, found.y[1, -1]]
+    ), found.t[-1]
+
+
+def blocked(x, left):
+    return np.array([0.0, x[1] * np.exp(-left / 5)]), left
+
+
+@pytest.mark.parametrize("resistance", [1e-3, 1e-6])
+def test_a_small_resistance_is_close_to_none(resistance):
+    v, i, t = (ca.SX.sym(name) for name in "vit")
+    ends = []
+    for r in (0, resistance):
+        diode = ns.Complementarity(v + r * i - ca.sin(t), multiplier=i)
+        system = ns.FilippovSystem([v], field=[i - v / 10], complementarity=diode, time=t)
+        run = ns.simulate(system, [0.0], t_end=8.0, tol=1e-10)
+        assert run.status is REACHED, run.message
+        ends.append(run.x[-1, 0])
+    assert abs(ends[1] - ends[0]) < resistance**2 + 1e-11  # the end of conduction is a maximum of v
+
+
+def test_a_set_that_vanishes_ends_the_run():
+    x, low, high, t = (ca.SX.sym(name) for name in ("x", "low", "high", "t"))
+    walls = [
+        ns.Complementarity(x - t, multiplier=low, name="low"),
+        ns.Complementarity(1 - x, multiplier=high, name="high"),
+    ]
+    system = ns.FilippovSystem([x], field=[low - high], complementarity=walls, time=t)
+    run = ns.simulate(system, [0.5], t_end=2.0)
+    assert run.status is ns.Status.INCONSISTENT
+    assert run.t[-1] == pytest.approx(1)
+    assert "'low' and 'high'" in run.message
+    run = ns.simulate(system, [0.5], t_end=3.0, t_start=2.0)
+    assert run.status is ns.Status.INCONSISTENT
+    assert "y of 'low' is negative" in run.message
+
+
+def test_conditions_beside_contacts_friction_and_constraints():
+    """Parts that do not act on one another are what each is alone."""
+    x, y, i, u, v, lam, t = (ca.SX.sym(name) for name in ("x", "y", "i", "u", "v", "lam", "t"))
+    diode = ns.Complementarity(i, multiplier=u, name="diode")
+    coil = ns.FilippovSystem([i], field=[ca.sin(t) - i + u], complementarity=diode, time=t)
+    body = ns.FilippovSystem(
+        [x, y, v],
+        field=[y, -9.81, ca.sin(2 * t) - 0.6 * lam],
+        surfaces=[v],
+        multipliers=[lam],
+        impacts=ns.Impact(x, 0.5, name="floor"),
+        time=t,
+    )
+    both = ns.FilippovSystem(
+        [x, y, v, i],
+        field=[y, -9.81, ca.sin(2 * t) - 0.6 * lam, ca.sin(t) - i + u],
+        surfaces=[v],
+        multipliers=[lam],
+        impacts=ns.Impact(x, 0.5, name="floor"),
+        complementarity=diode,
+        time=t,
+    )
+    run = ns.simulate(both, [1.0, 0.0, 0.5, 0.3], t_end=8.0)
+    assert run.status is REACHED, run.message
+    assert abs(run.x[-1, :3] - ns.simulate(body, [1.0, 0.0, 0.5], t_end=8.0).x[-1]).max() < 1e-8
+    assert abs(run.x[-1, 3:] - ns.simulate(coil, [0.3], t_end=8.0).x[-1]).max() < 1e-8
+    assert {len(mode) for mode in run.itinerary.split()} == {3}
+    assert {mode[1] for mode in run.itinerary.split()} == {"o", "c"}
+
+
+def test_switches_in_a_right_hand_side_go_with_conditions():
+    x, lam = ca.SX.sym("x"), ca.SX.sym("lam")
+    clip = ns.Complementarity(lam - (x - 1), multiplier=lam, name="clip")
+    system = ns.FilippovSystem.from_expression(
+        [x], [2 * ca.sign(x + 0.5) - x - 3 * lam], complementarity=clip
+    )
+    run = ns.simulate(system, [0.0], t_end=1.0, tol=1e-10)
+    assert run.itinerary == "+o +c"
+    assert abs(run.x[-1, 0] - 1.1767374444450632788) < 1e-9  # as degree-zero-diode of the cases
+
+
 REFUSED = {
     "second derivative": (["v", "-x + lam"], "x", "Impact"),
     "nowhere": (["v", "-x"], "x", "not in the field"),
@@ -259,6 +368,12 @@ def test_what_is_no_complementarity_is_refused_by_name(name):
             field=[eval(f, {}, known) for f in field],
             complementarity=ns.Complementarity(eval(y, {}, known), multiplier=lam),
         )
+
+
+def test_an_impact_that_is_a_diode_names_complementarity():
+    i = ca.SX.sym("i")
+    with pytest.raises(ns.DefinitionError, match="Complementarity"):
+        ns.FilippovSystem([i], field=[1 - i], impacts=ns.Impact(i))
 
 
 def test_functions_for_surfaces_refuse_it():

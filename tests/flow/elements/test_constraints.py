@@ -396,6 +396,36 @@ def test_derivatives_are_those_by_the_angle():
     np.testing.assert_allclose(found.dx_dx0 @ inner, outer @ true.dx_dx0, atol=1e-8)
 
 
+@pytest.mark.parametrize(("drag", "e"), [(0.1, 0.5), pytest.param(0, None, marks=pytest.mark.slow)])
+def test_orbits_and_their_multipliers_are_those_by_the_angle(drag, e):
+    """A forced pendulum with dry friction and a wall; each function that is held adds a zero multiplier."""
+    a = ca.SX.sym("a")
+    push, own = a * ca.cos(t), {"time": t, "parameters": {a: 0.5}}
+    torque = push - 0.2 * (x * v - y * u) - drag * lam
+    friction = lambda slip: {"surfaces": [slip], "multipliers": [lam]} if drag else {}
+    system = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, r * x - torque * y, r * y - 1 + torque * x],
+        constraints=ns.Constraint(ROD, reaction=r),
+        impacts=ns.Impact(x + 0.2, restitution=e) if e else (),
+        **friction(x * v - y * u),
+        **own,
+    )
+    plain = ns.FilippovSystem(
+        [angle, rate],
+        field=[rate, push - ca.cos(angle) - 0.2 * rate - drag * lam],
+        impacts=ns.Impact(angle + np.arccos(-0.2), restitution=e) if e else (),
+        **friction(rate),
+        **own,
+    )
+    starts = ((system, placed((-1.5, 0))), (plain, [-1.5, 0]))
+    found, want = (ns.periodic_orbit(s, ns.simulate(s, start, 150.0)) for s, start in starts)
+    assert found.stability == want.stability == "asymptotically stable"
+    np.testing.assert_allclose(found.multipliers, [*want.multipliers, 0.0, 0.0], atol=1e-9)
+    branch = ns.continue_orbit(found, "a", bounds=(0.48, 0.52))
+    assert not branch.events and {end.name for end in branch.ends} == {"REACHED_BOUND"}
+
+
 @pytest.mark.parametrize("law", ["newton", "poisson"])
 def test_constraints_that_are_given_twice_change_nothing(law):
     """Impulses act through both; derivatives ask for one of them."""

@@ -217,3 +217,53 @@ def test_tables_of_radau(s):
                     term = right[q * s + i] * eigenvalue * left[q * s + j]
                     whole[i, j] += mp.re(term) * (2 if q else 1)
         assert max(abs(a - b) for a, b in zip(whole, matrix, strict=True)) < 1e-15
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if "d_end_d_start" in CASES[name]])
+def test_derivatives_of_a_case(name):
+    case = CASES[name]
+    true = np.array(case["d_end_d_start"], float)
+    run = ns.simulate(
+        system_of(case), states_in(case, case["start"]), float(case["t_end"]), tol=1e-12
+    )
+    assert np.max(np.abs(ns.sensitivity(run).dx_dx0 - true)) < 1e-10 * np.max(np.abs(true))
+
+
+@pytest.mark.parametrize("rate", [1e4, 1e6, 1e8])
+def test_derivatives_and_orbits_through_stiff_legs(rate):
+    """To order 1/rate the actuator's force is 1.5 cos(0.7 (t - 1/rate)): an oscillator alone, shifted in time."""
+    mu = ca.SX.sym("mu")
+    slow = ns.FilippovSystem(
+        [x, v],
+        field=[v, 1.5 * ca.cos(0.7 * (t - 1 / rate)) - x - mu * lam],
+        surface=v,
+        multipliers=lam,
+        time=t,
+        parameters={mu: 0.4},
+    )
+    fast = ns.FilippovSystem(
+        [x, v, f],
+        field=[v, f - x - mu * lam, rate * (1.5 * ca.cos(0.7 * t) - f)],
+        surface=v,
+        multipliers=lam,
+        time=t,
+        parameters={mu: 0.4},
+    )
+    force = lambda time: 1.5 * np.cos(0.7 * (time - 1 / rate))
+    runs = [ns.simulate(slow, [1.0, 0.3], 9.0), ns.simulate(fast, [1.0, 0.3, force(0.0)], 9.0)]
+    known, found = (ns.sensitivity(run) for run in runs)
+    assert np.allclose(found.dx_dx0[:2, :2], known.dx_dx0, rtol=0, atol=10 / rate**2 + 1e-8)
+    assert np.allclose(found.dx_dp[:2], known.dx_dp, rtol=0, atol=10 / rate**2 + 1e-8)
+    assert np.max(np.abs(found.dx_dx0[2])) < 1e-12  # the force forgets its start
+    begun = ns.simulate(slow, [1.0, 0.3], 100.0, t_start=0.0)
+    orbit = ns.periodic_orbit(slow, begun, period=2 * np.pi / 0.7)
+    stiff = ns.simulate(fast, [*begun.x[-1], force(100.0)], 200.0, t_start=100.0)
+    again = ns.periodic_orbit(fast, stiff, period=2 * np.pi / 0.7)
+    multipliers = sorted(again.multipliers, key=abs)
+    assert abs(multipliers[0]) < 1e-12
+    assert np.allclose(
+        sorted(multipliers[1:], key=np.imag),
+        sorted(orbit.multipliers, key=np.imag),
+        rtol=0,
+        atol=1e-7,
+    )

@@ -237,3 +237,37 @@ def test_a_pseudo_equilibrium_that_meets_another_surface_ends_there():
         ("intersection", 0.0)
     ]
     assert branch.ends[0] is ns.orbit.BranchEnd.EVENT
+
+
+def test_equilibria_of_a_continuous_field_go_on_or_meet_on_its_surface():
+    """x' = mu - |x|: +mu and -mu meet at 0; with a spring of 4 beyond 1 the equilibrium goes on as (mu + 3)/4."""
+    x, v, mu = (ca.SX.sym(s) for s in ("x", "v", "mu"))
+    fold = ns.FilippovSystem.from_expression([x, v], [mu - ca.fabs(x), -v], parameters={mu: 0.5})
+    branch = ns.continue_equilibrium(fold, [0.5, 0.0], "mu", bounds=(-1, 1))
+    (event,) = branch.events
+    assert abs(event.parameter) < 1e-12 and event.far_side.verdict.startswith("nonsmooth fold")
+    assert event.solution.unfolding == "nonsmooth fold"
+    np.testing.assert_allclose(sorted(e.point[0] for e in branch.at(0.7)), [-0.7, 0.7], atol=1e-12)
+    force = mu - x - v - 3 * ca.fmax(x - 1, 0)
+    stop = ns.FilippovSystem.from_expression([x, v], [v, force], parameters={mu: 0.5})
+    branch = ns.continue_equilibrium(stop, [0.5, 0.0], "mu", bounds=(0, 5), side="-")
+    (event,) = branch.events
+    assert event.parameter == pytest.approx(1.0, abs=1e-12)
+    assert event.far_side.verdict == "persistence: one continues the other"
+    for value, at in ((0.3, 0.3), (4.0, 1.75)):
+        (found,) = branch.at(value)
+        assert found.point[0] == pytest.approx(at, abs=1e-12) and found.status == "real"
+
+
+def test_an_equilibrium_ends_where_a_force_jumps():
+    x, v, mu = (ca.SX.sym(s) for s in ("x", "v", "mu"))
+    preload = ns.FilippovSystem(
+        [x, v],
+        surface=x - 1,
+        above=[v, mu - x - v - 1],
+        below=[v, mu - x - v],
+        parameters={mu: 0.5},
+    )
+    branch = ns.continue_equilibrium(preload, [0.5, 0.0], "mu", bounds=(0, 5), side="-")
+    assert [e.kind for e in branch.events] == ["boundary equilibrium"]
+    assert branch.ends[1].name == "EVENT" and branch.values.max() == pytest.approx(1.0)

@@ -1,5 +1,7 @@
-/* Orbits of the plane round the point where two surfaces meet (nonsmooth/model/laws/layer.py has the same with its
- * derivation): r -> ratio r (1 + bend r) in a turn. Where they spiral in, the point is reached and held. */
+/* Orbits of the plane round the point where two surfaces meet: r -> ratio r (1 + bend r) in a turn. Where they spiral
+ * in, the point is reached and held. A quarter begins at distance r from one surface, on the other, which is reached
+ * again after the time first r + second r^2.
+ */
 
 /* Rates of two surfaces in a quadrant, and their derivatives by the surfaces; 0 where these are dependent. */
 static int in_quadrant(Run *r, const int8_t *letter, const int *sign, double *rate, double *slope) {
@@ -25,30 +27,42 @@ static int in_quadrant(Run *r, const int8_t *letter, const int *sign, double *ra
   return finite_all(slope, 4) && finite_all(rate, 2);
 }
 
-/* Whether orbits run round the point of the two active surfaces, and towards it. */
-static int spirals_in(Run *r, const int8_t *letter) {
-  static const int turns[2][4][2] = {{{1, 1}, {-1, 1}, {-1, -1}, {1, -1}}, {{1, 1}, {1, -1}, {-1, -1}, {-1, 1}}};
-  double ratio = 1, bend = 0, size = 0, f[2], d[4];
-  if (r->n != 2 || r->active_count != 2 || !is_bounded(r, r->active[0]) || !is_bounded(r, r->active[1])) return 0;
-  if (!in_quadrant(r, letter, turns[0][0], f, d)) return 0;
-  int clockwise = !(f[0] < 0);
+/* How an orbit comes back that runs once round, from rates and slopes in the quadrants ++, -+, --, +-; 0 where none
+ * does. A ratio that is 1 to rounding is 1, a bend that is rounding 0. */
+static int go_round(double (*rate)[2], double (*slope)[4], double *ratio, double *bend) {
+  static const int sign[4][2] = {{1, 1}, {-1, 1}, {-1, -1}, {1, -1}};
+  int clockwise = !(rate[0][0] < 0);
+  double size = 0;
+  *ratio = 1;
+  *bend = 0;
   for (int q = 0; q < 4; q++) { /* from the half axis where ``near`` is on its own side to that where it is zero */
-    const int *s = turns[clockwise][q];
+    int at = clockwise ? (4 - q) % 4 : q;
+    const int *s = sign[at];
+    double d[4], accel[2], *f = rate[at];
     int near = (s[0] * s[1] > 0) == !clockwise ? 0 : 1, far = 1 - near;
-    if (!in_quadrant(r, letter, s, f, d)) return 0;
-    double u = f[near] * s[near], v = f[far] * s[far], accel[2];
+    double u = f[near] * s[near], v = f[far] * s[far];
     if (!(u < 0 && 0 < v)) return 0;
-    for (int i = 0; i < 2; i++) for (int j = 0; j < 2; j++) d[2 * i + j] *= s[i] * s[j];
+    for (int i = 0; i < 2; i++) for (int j = 0; j < 2; j++) d[2 * i + j] = slope[at][2 * i + j] * s[i] * s[j];
     for (int i = 0; i < 2; i++) accel[i] = d[2 * i] * f[0] * s[0] + d[2 * i + 1] * f[1] * s[1];
     double first = -1 / u, second = -(d[3 * near] * first + 0.5 * accel[near] * first * first) / u, factor = v * first;
     double grown = (v * second + d[2 * far + near] * first + 0.5 * accel[far] * first * first) / factor;
-    bend += grown * ratio;
-    size += fabs(grown) * ratio;
-    ratio *= factor;
+    *bend += grown * *ratio;
+    size += fabs(grown) * *ratio;
+    *ratio *= factor;
   }
-  if (!(fabs(ratio * size) < INFINITY)) return 0;
-  if (fabs(ratio - 1) > TURN_ROUNDING) return ratio < 1;
-  return fabs(bend) > TURN_ROUNDING * size && bend < 0;
+  if (!(fabs(*ratio * size) < INFINITY)) return 0;
+  if (fabs(*ratio - 1) <= TURN_ROUNDING) *ratio = 1;
+  if (fabs(*bend) <= TURN_ROUNDING * size) *bend = 0;
+  return 1;
+}
+
+/* Whether orbits run round the point of the two active surfaces, and towards it. */
+static int spirals_in(Run *r, const int8_t *letter) {
+  static const int sign[4][2] = {{1, 1}, {-1, 1}, {-1, -1}, {1, -1}};
+  double ratio, bend, rate[4][2], slope[4][4];
+  if (r->n != 2 || r->active_count != 2 || is_half_line(r, r->active[0]) || is_half_line(r, r->active[1])) return 0;
+  for (int q = 0; q < 4; q++) if (!in_quadrant(r, letter, sign[q], rate[q], slope[q])) return 0;
+  return go_round(rate, slope, &ratio, &bend) && (ratio < 1 || (ratio == 1 && bend < 0));
 }
 
 /* Stay where two surfaces meet though no layer attracts: all orbits spiral in, so none leaves. */

@@ -22,7 +22,7 @@ MOST_ORDER = 48
 _FILES = """
     programs.h pairs.h linear.h banded.h radau.h state.c modes.c jets.c laws/stability.c laws/sets.c stepper.c
     near_zeros.c laws/elements.c record.c laws/spiral.c laws/vectors.c laws/decide.c laws/layer.c laws/contacts.c
-    laws/complementarity.c laws/approach.c events.c collocation.c stiffness.c driver.c accumulation.c laws/roots.c
+    laws/complementarity.c laws/approach.c events.c collocation.c implicit.c stiffness.c driver.c accumulation.c laws/roots.c
     entry.c variation.c
 """.split()
 
@@ -49,7 +49,7 @@ def core_source() -> str:
     sizes = f"#define UNFUSED\n#define P {MOST_ORDER}\n"
     driver = [driver_text(f"core/{name}") for name in _FILES]
     flows = [driver_text("core/flow.c"), _extended("programs.h", "flow.c")]
-    fixed = driver_text("core/fixed.c")
+    fixed = driver_text("core/implicit_flow.c") + driver_text("core/fixed.c")
     return "".join(
         [facts_header(), sizes, head, driver_text("core/common.h"), *driver, *flows, fixed]
     )

@@ -1,0 +1,36 @@
+"""Equations of the equilibria of a mode: its field, what it keeps at zero, and its guards."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..definition.system import FilippovSystem
+from ..errors import DefinitionError
+from ..laws.evaluators import Evaluator
+from ..laws.explicit import explicit
+
+
+def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
+    """(x, p) -> field, its derivative, functions that are kept at zero, theirs, and guards without events."""
+
+    def build() -> Evaluator:
+        of_mode, x = explicit(system, mode), system.extended_states
+        if of_mode.states.numel() != x.numel():
+            raise DefinitionError(
+                f"mode {mode!r}: its multipliers are no functions of the states, so that it has no field."
+            )
+        d, letters = system.definition, system.parse_letters(mode)
+        every = ca.vertcat(d.open_surfaces, d.gaps)
+        kept = [i for i, s in enumerate(letters) if s == 0 and i not in system.algebraic]
+        guards = [
+            k
+            for k, guard in enumerate(of_mode.guards)
+            if guard.kind in ("surface", "exit", "impact", "release")
+        ]
+        field, h, functions = of_mode.field, every[kept], of_mode.functions[guards]
+        rows = [field, ca.jacobian(field, x), h, ca.jacobian(h, x), functions]
+        shapes = [ca.densify(e) if e.numel() else ca.SX(*e.shape) for e in rows]
+        made = ca.Function("equations", [x, system.parameter_symbols], shapes, {"cse": True})
+        return Evaluator(made)
+
+    return system.cached(("equations of a mode", mode), build)

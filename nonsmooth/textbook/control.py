@@ -105,7 +105,7 @@ def abs_brake() -> Problem:
         surface=s - 0.2,
         multipliers=lam,
         field=[-9.81 * grip, 30 / v * (0.4 - 0.8 * lam - grip / 2)],
-        stops=Stop(v - 1, -1, "slow"),
+        stops=[Stop(v - 1, -1, "slow")],
     )
     return problem(
         "abs_brake",

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,9 +13,6 @@ import numpy as np
 import nonsmooth as ns
 
 CASES = Path(__file__).parents[1] / "cases" / "inclusions.json"
-
-#: Constructs that the library does not have.
-MISSING = ("vector_multipliers",)
 
 #: Functions that the strings use.
 FUNCTIONS = {n: getattr(ca, n) for n in ("sin", "cos", "sqrt", "exp", "log", "fabs")}
@@ -38,19 +36,28 @@ class Case:
         names = [self.data.get(key, "") for key in ("states", "multipliers", "reactions", "time")]
         self.names = [name.split() for name in names]
         own = [condition["lam"] for condition in self.data.get("complementarity", [])]
-        own += [constraint["reaction"] for constraint in self.data.get("constraints", [])]
+        own += [
+            one["reaction"]
+            for key in ("constraints", "impacts")
+            for one in self.data.get(key, [])
+            if "reaction" in one
+        ]
+        own += re.findall(r"\w+", self.data.get("vector_multipliers", ""))
         self.symbols = {n: ca.SX.sym(n) for names in [*self.names, own] for n in names}
 
     def parse(self, text: str) -> list:
         value = eval(
             f"[{text}]", {"__builtins__": {}}, {**FUNCTIONS, **self.symbols}
         )  # our own text
-        return [ca.SX(v) for v in value]
+        return [[*map(ca.SX, v)] if isinstance(v, list) else ca.SX(v) for v in value]
 
     @cached_property
     def system(self) -> ns.FilippovSystem:
         data = self.data
         states, multipliers, _, time = ([self.symbols[n] for n in own] for own in self.names)
+        surfaces = self.parse(data.get("surfaces", ""))
+        multipliers += self.parse(data.get("vector_multipliers", ""))
+        surfaces += self.parse(data.get("vector_surfaces", ""))
         impacts = [
             ns.Impact(
                 self.parse(own["gap"])[0],
@@ -75,7 +82,7 @@ class Case:
             above=self.parse(data["above"]) if "above" in data else None,
             below=self.parse(data["below"]) if "below" in data else None,
             surface=self.parse(data["surface"])[0] if "surface" in data else None,
-            surfaces=self.parse(data.get("surfaces", "")) or None,
+            surfaces=surfaces or None,
             multipliers=multipliers or None,
             impacts=impacts or None,
             constraints=constraints,

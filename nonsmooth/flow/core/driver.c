@@ -1,8 +1,8 @@
 /* The loop: expand, locate, check, advance, serve ------------------------------------------------------- */
 
 static int change_kind(const Run *r, int before, int after) {
-  const int8_t *one = r->table->letter + (int64_t)before * r->width;
-  const int8_t *two = r->table->letter + (int64_t)after * r->width;
+  const int8_t *one = r->table->letter + (int64_t)before * r->table->width;
+  const int8_t *two = r->table->letter + (int64_t)after * r->table->width;
   int closed = 0, slides = 0;
   for (int i = 0; i < r->width; i++)
     if (is_half_line(r, i)) closed += (two[i] == 0) - (one[i] == 0);
@@ -56,8 +56,9 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
     if (leaves_by_root(r)) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
   } else {
     memcpy(r->chosen.letter, letter, r->width);
+    if (r->s->sets) idle_sets(r, r->chosen.letter, 0);
     memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
-    keep_carried(r, letter, r->chosen.unknowns);
+    keep_carried(r, r->chosen.letter, r->chosen.unknowns);
     if (r->s->joints && !hold(r, &r->chosen, 0)) return 0;
   }
   adopt(r, &r->chosen);
@@ -70,6 +71,7 @@ static int letters_of(Run *r, int8_t *letter) {
   const double *h = surface_values(r, r->x);
   int finite = finite_all(h, r->m + 2 * r->c);
   for (int i = 0; i < r->width; i++) letter[i] = law_of(r, i)->side(r, i, h[i]);
+  if (r->s->sets && r->c) idle_sets(r, letter, surface_scales(r, r->x));
   take_sides(r, letter, -1);
   return finite;
 }
@@ -138,6 +140,7 @@ static void start_in(Run *r, const int8_t *asked) {
     if (set_of(r, i) >= 0 && asked[i] == OFF) letter[i] = active ? LEAVING : r->letter[i] == IDLE ? IDLE : OFF;
     if (!active && letter[i] != r->letter[i]) { finish(r, NON_UNIQUE, WRONG_START, r->mode); return; }
   }
+  if (r->s->sets) idle_sets(r, letter, 0);
   memcpy(r->letter, letter, r->width);
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;

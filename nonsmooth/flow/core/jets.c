@@ -206,6 +206,11 @@ static int is_finite(const Run *r, const Expansion *e) {
   return one + two + three == 0;
 }
 
+/* Whether a mode's unknowns may be such that some make no difference. */
+static int may_be_singular(const Run *r, const Layout *l) {
+  return l->slides > 1 || (l->slides && is_half_line(r, l->sliding[0]));
+}
+
 /* Inverse of the layer's slope in a mode. Where it has none, as for two contacts whose slips are one function, one
  * with which the unknowns change as little as can be, in units of their bounds; the motion does not depend on it. */
 static int invert_layer(Run *r, const Layout *l, const double *unknowns, double *inverse) {
@@ -216,7 +221,7 @@ static int invert_layer(Run *r, const Layout *l, const double *unknowns, double 
   is_regular = invert(a, n, inverse);
   for (int i = 0; n > 1 && i < n; i++) /* the same in all units of rows and columns */
     for (int j = 0; j < n; j++) is_regular &= fabs(m[i * n + j] * inverse[j * n + i]) < 1 / SINGULAR;
-  if (is_regular || n < 2) return 1;
+  if (is_regular || !may_be_singular(r, l)) return 1;
   for (int i = 0; i < n; i++) {
     int own = l->sliding[i];
     size[i] = is_bounded(r, own) ? fabs(factor_of(r, own)) : fabs(unknowns[own]);
@@ -274,7 +279,7 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
 static int step_dependent(Run *r, const Layout *l, const double *unknowns, double *b) {
   int n = l->slides, w = r->width;
   double *rates = r->small + w;
-  if (n < 2) return 0;
+  if (!may_be_singular(r, l)) return 0;
   invert_layer(r, l, unknowns, r->matrix);
   for (int i = 0; i < n; i++) rates[i] = layer_of(r, l->sliding[i]);
   for (int i = 0; i < n; i++) {

@@ -1,7 +1,8 @@
 /* The driver: all that a run is. The system is data, not code.
  *
  * Read in the order of core_source.py: programs.h, pairs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c,
- * near_zeros.c, elements.c, decide.c, events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
+ * near_zeros.c, elements.c, vectors.c, blocks.c, decide.c, events.c, driver.c; sets.c and approach.c are how sets of
+ * codimension two and more move and are met.
  */
 
 
@@ -106,7 +107,7 @@ typedef struct {
   double *along, *speed, *axes;
   int32_t *own, *order, *first, *mark, *pivot, *proved;
   int8_t *is_contact, *is_idle, *is_touched, *is_known, *state, *block_state, *large_class;
-  double *matrix, *share, *joint, *through, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
+  double *matrix, *share, *bound, *joint, *through, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
   double most, field, rate;
   Motion motion[SEVERAL];
 } Decision;
@@ -151,7 +152,7 @@ typedef struct {
   double size, time_size, length, shortened, held_length, hold; /* hold: the step's end before zeros of a guard that are not told apart */
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
-  Continuation chosen, one, first, rest, found;
+  Continuation chosen, found;
   Decision *decision;
   int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
   int32_t turned_mode; /* the mode of start_mode, whose guards of stability begin with these signs */

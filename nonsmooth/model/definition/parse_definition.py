@@ -17,7 +17,7 @@ import casadi as ca
 
 from ..checks import real
 from ..errors import DefinitionError, ParameterError
-from ..expressions.cancel import powers
+from ..expressions.cancel import cancel_common_factor, powers
 from ..expressions.graph import IN_A_FIELD, IN_A_GAP, IN_A_GUARD, IN_A_SURFACE, require_smooth
 from ..expressions.linearity import bent
 from ..numbering import IMPACT_LAWS
@@ -217,59 +217,77 @@ def read_definition(
     layer_widths: Any = None,
 ) -> Definition:
     """Read and check the arguments of FilippovSystem."""
-    x = symbols(states, "states")
-    if x.numel() == 0:
-        raise DefinitionError("states: expected at least one symbol, received none.")
+    x = _states(states)
     t = symbols([time], "time") if time is not None else ca.SX(0, 1)
     p, defaults = _parameters(parameters)
     entries = read_entries(surface, surfaces)
-    h, sizes = functions_of(entries), tuple(len(entry.functions) for entry in entries)
-    conditions = _items(complementarity, Complementarity, "complementarity")
-    if above is not None or below is not None:
-        lam, f = _two_fields(above, below, field, multipliers, h, x.numel())
-    else:
-        multipliers = multipliers_of(entries, multipliers)
-        _require_alike(sizes, multipliers)
-        lam = symbols([s for entry in listed(multipliers) for s in listed(entry)], "multipliers")
-        f = column(field, "field", x.numel())
-    _one_multiplier_each(lam, h)
-    widths = _widths(layer_widths, h.numel())
-    joined = read_constraints(constraints)
-    kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
-    items = [*[_items(*k) for k in kinds], conditions, joined]
+    sizes = tuple(len(entry.functions) for entry in entries)
+    lam, f = _multipliers_and_field(entries, above, below, field, multipliers, x.numel())
+    widths = _widths(layer_widths, sum(sizes))
+    given = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
+    given.append((complementarity, Complementarity, "complementarity"))
+    items = [*[_items(*one) for one in given], read_constraints(constraints)]
     (stops, resets, impacts, conditions, joined), renamed = _distinct(items, _own_names(sizes))
     reactions, f = _reactions(impacts, "gap", x, t, f)
     held, f = _reactions(joined, "function", x, t, f)
     joints = joints_of(joined, listed(held), f)
     own = [*[condition.entry() for condition in conditions], *joints.entries]
-    f, entries, sizes = joints.field, [*entries, *own], (*sizes, *[1] * len(own))
-    h, lam = functions_of(entries), ca.vertcat(lam, *[entry.multiplier for entry in own])
-    widths = (*widths, *[1.0] * len(own)) if widths else ()
+    sizes, entries = (*sizes, *[1] * len(own)), [*entries, *own]
     definition = Definition(
         states=x,
         time=t,
         parameters=p,
-        multipliers=lam,
+        multipliers=ca.vertcat(lam, *[entry.multiplier for entry in own]),
         reactions=reactions,
-        gaps=_of_impacts(impacts, "gap"),
-        restitutions=_of_impacts(impacts, "restitution"),
-        impacts=tuple(i.name for i in impacts),
-        impact_law=_law_of(impacts),
-        field=f,
-        surfaces=h,
+        field=joints.field,
+        surfaces=functions_of(entries),
         defaults=defaults,
         hidden=hidden or any(entry.hidden for entry in entries),
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
-        layer_widths=widths,
+        layer_widths=(*widths, *[1.0] * len(own)) if widths else (),
         constraints=joints.names,
         laws=laws_of(entries),
         hysteresis=hysteresis_of(entries),
         complementarity=tuple(condition.name for condition in conditions),
+        **_contacts(impacts),
         **_events(stops, resets, clocks, discrete, x, t, p),
     )
     require_consistent(definition)
     return definition
+
+
+def _multipliers_and_field(
+    entries: Sequence[Any], above: Any, below: Any, field: Any, multipliers: Any, n: int
+) -> tuple[ca.SX, ca.SX]:
+    """Multipliers of the given surfaces and sets, and the field of n states in them."""
+    h = functions_of(entries)
+    if above is not None or below is not None:
+        lam, f = _two_fields(above, below, field, multipliers, h, n)
+    else:
+        multipliers = multipliers_of(entries, multipliers)
+        _require_alike(tuple(len(entry.functions) for entry in entries), multipliers)
+        lam = symbols([s for entry in listed(multipliers) for s in listed(entry)], "multipliers")
+        f = column(field, "field", n)
+    _one_multiplier_each(lam, h)
+    return lam, f
+
+
+def _states(states: Any) -> ca.SX:
+    x = symbols(states, "states")
+    if x.numel() == 0:
+        raise DefinitionError("states: expected at least one symbol, received none.")
+    return x
+
+
+def _contacts(impacts: Sequence[Impact]) -> dict[str, Any]:
+    """Parts of a definition that contacts make."""
+    return {
+        "gaps": _of_impacts(impacts, "gap"),
+        "restitutions": _of_impacts(impacts, "restitution"),
+        "impacts": tuple(i.name for i in impacts),
+        "impact_law": _law_of(impacts),
+    }
 
 
 def _events(
@@ -495,7 +513,7 @@ def _require_alike(sizes: Sequence[int], multipliers: Any) -> None:
 
 
 def _require_linear_sets(d: Definition) -> None:
-    """Refuse sets whose multipliers enter nonlinearly or are multiplied by a reaction."""
+    """Refuse sets whose multipliers enter nonlinearly or whose components have different loads."""
     first = 0
     for i, size in enumerate(d.sizes):
         lam = d.multipliers[first : first + size]
@@ -507,11 +525,17 @@ def _require_linear_sets(d: Definition) -> None:
                 f"multiplier {lam}: expected a field linear in all of its components together, "
                 "received a nonlinear one. Hidden dynamics has one multiplier for each surface."
             )
-        if d.reactions.numel() and ca.depends_on(ca.jacobian(d.field, lam), d.reactions):
+        entries = ca.jacobian(d.field, lam).nonzeros()
+        if not any(ca.depends_on(e, d.reactions) for e in entries):
+            continue
+        variables, known = ca.vertcat(d.extended_states, d.reactions), ca.vertcat(d.parameters, lam)
+        if any(
+            ca.depends_on(e, d.reactions)
+            for e in cancel_common_factor(entries, variables, known)[0]
+        ):
             raise DefinitionError(
-                f"multiplier {lam} of surface {i}: it is multiplied by the reaction of an impact, "
-                "and impulses with friction in the plane are not implemented. Give the contact a "
-                "compliance, whose force is the load, or friction in one direction."
+                f"multiplier {lam} of surface {i}: its friction has no common bound {', '.join(map(str, entries))}. Write "
+                "each component as multiplier times one coefficient times one sum of reactions, the load."
             )
 
 

@@ -208,6 +208,10 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
     system, p = run.system, run.system.parameter_vector(run.parameters)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
+    if any(coupled_of(system).carriers[i] for i in system.set_of):
+        raise DegenerateError(
+            "run: derivatives of friction in space that the reaction of a contact bounds are not implemented."
+        )
     if len(system.joints) > 1:
         _require_independent(system, run.events[0].mode_before, x, p)
     if system.sets:

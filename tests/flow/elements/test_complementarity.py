@@ -291,6 +291,36 @@ def test_a_small_resistance_is_close_to_none(resistance):
     assert abs(ends[1] - ends[0]) < resistance**2 + 1e-11  # the end of conduction is a maximum of v
 
 
+def test_the_node_between_two_diodes_in_series_floats_while_both_block():
+    """One carries its current, the other its voltage; blocking, any part of the voltage may be at either."""
+    v, i, u, t = (ca.SX.sym(name) for name in "viut")
+    one = ns.Complementarity(v - ca.sin(t) - u + 0.1 * i, multiplier=i, name="one")
+    two = ns.Complementarity(i, multiplier=u, name="two")
+    alone = ns.Complementarity(v - ca.sin(t) + 0.1 * i, multiplier=i)
+    ends = []
+    for conditions in ([one, two], alone):
+        system = ns.FilippovSystem([v], field=[i - v / 10], complementarity=conditions, time=t)
+        run = ns.simulate(system, [0.3], t_end=10.0, tol=1e-10)
+        assert run.status is REACHED, run.message
+        assert len(run.events) == 5
+        ends.append(run.x[-1])
+    assert abs(ends[0] - ends[1]).max() < 1e-12
+
+
+def test_capacities_joined_by_a_bridge_need_a_y_of_the_states():
+    """Four diodes with currents and voltages mixed do not see when they join them; it is said at that time."""
+    a = [[0, -1, 0], [1, 0, 0], [0, 0, -0.2]]
+    b, c = [[0, 0, -1, 1], [0] * 4, [1, 0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 1], [1, 0, 0]]
+    four = circuit(a, b, c, [[0, -1, 0, 0], [1, 0, 1, -1], [0, -1, 0, 0], [0, 1, 0, 0]])
+    pairs = circuit(a, [[-1, 1], [0, 0], [1, 1]], [[-1, 0, 1], [1, 0, 1]], np.zeros((2, 2)))
+    run = ns.simulate(pairs, [1.0, 0.0, 2.0], t_end=20.0)
+    assert run.status is REACHED
+    lost = ns.simulate(four, [1.0, 0.0, 2.0], t_end=20.0)
+    assert lost.status is ns.Status.INCONSISTENT
+    assert "capacities that diodes join" in lost.message
+    assert lost.t[-1] == pytest.approx(run.events[0].t)
+
+
 def test_a_set_that_vanishes_ends_the_run():
     x, low, high, t = (ca.SX.sym(name) for name in ("x", "low", "high", "t"))
     walls = [

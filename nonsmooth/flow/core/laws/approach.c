@@ -16,16 +16,21 @@ static int freeze(Run *r, const int8_t *letter, const double *x, const double *u
     if (mine) r->held[i] = 0;
     else if (letter[i] == 0 && !is_idle(r, letter, i)) others[count++] = i;
   }
+  double factor[3];
+  for (int i = r->m; i < w; i++) if (letter[i] == 0) r->held[i] = unknowns[i]; /* loads of friction */
   error_scales(r, x, r->held, r->none);
+  for (int i = 0; i < k; i++) factor[i] = factor_of(r, own[i]);
+  for (int i = r->m; i < w; i++) r->held[i] = 0;
+  if (r->c) error_scales(r, x, r->held, r->none);
   for (int i = 0; i < k; i++) {
     a[i] = layer_of(r, own[i]);
-    for (int j = 0; j < k; j++) m[i * k + j] = -r->slope[own[i] * w + own[j]] * factor_of(r, own[j]);
+    for (int j = 0; j < k; j++) m[i * k + j] = -r->slope[own[i] * w + own[j]] * factor[j];
   }
   for (int column = 0; count && column <= k; column++) {
     double *d = r->work, *b = d + (int64_t)count * count;
     for (int i = 0; i < count; i++) {
       for (int j = 0; j < count; j++) d[i * count + j] = r->slope[others[i] * w + others[j]];
-      b[i] = column == k ? layer_of(r, others[i]) : r->slope[others[i] * w + own[column]] * factor_of(r, own[column]);
+      b[i] = column == k ? layer_of(r, others[i]) : r->slope[others[i] * w + own[column]] * factor[column];
     }
     if (!solve_any(d, b, count, INFINITY, b + count, r->decision->pivot)) return 0;
     for (int i = 0; i < k; i++) {
@@ -101,12 +106,22 @@ static int is_met(Run *r, const int8_t *letter, int f, const double *h, const do
   return radius < shortest(r) * (length_of(a, k) + sqrt(speed));
 }
 
+/* a of a set that is not zero from its present rates: loads that are not determined are the present ones. */
+static void keep_loads(Run *r, const int32_t *own, int k, double *a, const double *m) {
+  aim(r, r->letter, r->x, r->unknowns);
+  error_scales(r, r->x, held_of(r, r->letter), r->unknowns);
+  for (int i = 0; i < k; i++) {
+    a[i] = layer_of(r, own[i]);
+    for (int j = 0; j < k; j++) a[i] += m[i * k + j] * r->direction[own[j]];
+  }
+}
+
 /* |h| has fallen tenfold, or is small: the set is reached or passed now, or the test is repeated nearer. What has
  * fallen to rounding is zero, whatever its direction says. */
 static void near_set(Run *r, int row, int fell) {
   int f = r->now.index[row], k = size_of(r, f), n = r->n, before = r->mode;
   int32_t own[3];
-  double h[3], a[3], m[9], u[3], b[3], mean[3], scale = 0, dt, c = 0;
+  double h[3], a[3], m[9], u[3], b[3], mean[3], frozen[3], scale = 0, dt, c = 0;
   r->met = (Met){NEAR_GUARD, f, 0};
   if (r->letter[f] == 0) return; /* friction's limit has fallen: the next step sees its digits */
   const double *height = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
@@ -117,6 +132,8 @@ static void near_set(Run *r, int row, int fell) {
   }
   double radius = unit_of(h, k, u);
   if (!freeze(r, r->letter, r->x, r->unknowns, own, k, a, m)) { finish(r, NOT_FINITE, FIELD, 0); return; }
+  memcpy(frozen, a, sizeof a);
+  if (r->c && radius > 0) keep_loads(r, own, k, a, m);
   int at_floor = radius <= VANISHES * scale;
   int hits = is_vector_definite(m, k, VANISHES * k) && solve_vector(m, k, 0, a, b);
   hits = hits && length_of(b, k) < 1;
@@ -151,7 +168,7 @@ static void near_set(Run *r, int row, int fell) {
     for (int i = 0; i < n; i++) end[i] = r->x[i] + dt * field[i];
     good = good && freeze(r, r->letter, end, r->unknowns, own, k, a2, m2);
     if (!good) { finish(r, NOT_FINITE, FIELD, 0); return; }
-    for (int i = 0; i < k; i++) bend += fabs(a2[i] - a[i]);
+    for (int i = 0; i < k; i++) bend += fabs(a2[i] - frozen[i]);
     for (int i = 0; i < k * k; i++) bend += fabs(m2[i] - m[i]);
     bend *= dt;
     if (!at_floor) {
@@ -167,6 +184,7 @@ static void near_set(Run *r, int row, int fell) {
     }
     if (bend <= radius) jump(r, field, smaller(dt, r->o.t_end - r->t - r->t_low));
   }
+  if (r->s->sets > 1) project(r, own, k); /* others may be zero there too */
   active_surfaces(r, f, r->letter);
   if (r->status != RUNNING) return;
   int kept = 0;

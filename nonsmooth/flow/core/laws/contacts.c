@@ -90,6 +90,7 @@ static int strike_by_law(Run *r, const int32_t *own, int n, const Strike *of, co
   int w = r->width, m = r->m, solved;
   int32_t *which = d->own;
   int8_t *letter = (int8_t *)(r->pending + 2 * w), *position = d->block_state + 2 * w;
+  int8_t *span = d->block_state + 3 * w;
   double all[MOST_SOLUTIONS * MOST_ENUMERATED];
   Block b = {.size = n, .tie = TIED, .own = which, .a = d->block, .state = d->block_state, .is_contact = d->block_state + w};
   b.b = b.a + n; b.floor = b.b + n; b.matrix = b.floor + n; b.share = b.matrix + n * n;
@@ -102,6 +103,9 @@ static int strike_by_law(Run *r, const int32_t *own, int n, const Strike *of, co
   error_scales(r, of->x, r->held, r->none);
   for (int i = 0; i < n; i++) {
     int contact = which[i] >= m, joint = has_law(r, which[i], JOINT_LAW), at = rate_row(r, which[i]);
+    int set = set_of(r, which[i]);
+    span[i] = (int8_t)(set < 0 ? 0 : which[i] == set ? size_of(r, set) : -1);
+    if (set >= 0) b.span = span;
     b.is_contact[i] = (int8_t)contact;
     b.state[i] = joint ? INSIDE : UNDECIDED;
     position[i] = contact || joint || r->letter[which[i]] == 0 ? HELD : r->letter[which[i]] > 0 ? TOP : BOTTOM;
@@ -130,8 +134,9 @@ static int strike_by_law(Run *r, const int32_t *own, int n, const Strike *of, co
     for (int j = 0; j < n; j++) { b.share[i * n + j] *= -1; b.matrix[j * n + i] *= -1; }
   }
   double *found = d->large, *every = r->lam;
-  solved = pivot_block(&b, position, found, 20 + 4 * n, d->work, d->pivot) || lemke_block(&b, found, d->work, d->pivot);
-  if (!solved && n <= MOST_ENUMERATED && enumerate(&b, all, d->work, d->pivot)) { found = all; solved = 1; }
+  if (b.span) solved = relax(&b, found, d->work, d->pivot);
+  else solved = pivot_block(&b, position, found, 20 + 4 * n, d->work, d->pivot) || lemke_block(&b, found, d->work, d->pivot);
+  if (!solved && !b.span && n <= MOST_ENUMERATED && enumerate(&b, all, d->work, d->pivot)) { found = all; solved = 1; }
   if (!solved) return 0;
   memset(every, 0, sizeof(double) * w);
   for (int i = 0; i < n; i++) every[which[i]] = d->sign[i] < 0 ? -found[i] : found[i];
@@ -208,7 +213,9 @@ static int strike_groups(Run *r, const double *x, const int32_t *involved, int c
     for (int i = 0; i < n; i++) if (own[i] >= m) of.contact[of.contacts++] = own[i] - m;
     for (int i = 0; i < n; i++) if (own[i] < m && !has_law(r, own[i], JOINT_LAW)) of.carried[of.carries++] = own[i];
     for (int i = 0; i < n; i++) if (has_law(r, own[i], JOINT_LAW)) of.carried[of.carries + of.joints++] = own[i];
-    if (!of.contacts || (!by_law && strike_by_subsets(r, &of, after))) continue;
+    int in_space = 0;
+    for (int i = 0; i < n; i++) in_space |= set_of(r, own[i]) >= 0;
+    if (!of.contacts || (!by_law && !in_space && strike_by_subsets(r, &of, after))) continue;
     if (!strike_by_law(r, own, n, &of, before, taken, after)) return 0;
   }
   return 1;

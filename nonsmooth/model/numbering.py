@@ -15,7 +15,7 @@ OPERATIONS = ("const", "input", *UNARY, *BINARY)
 #: of what is chosen by a factor that does not move.
 TAPE_RULES = tuple(
     "constant input apply sum div sqrt power integral quotient atan2 chosen "
-    "linear1 linear2 linear3 linear4 linear product square over under turn pair turns gated".split()
+    "linear1 linear2 linear3 linear4 linear over under turn pair turns gated".split()
 )
 
 #: Laws of elements, by number in C.

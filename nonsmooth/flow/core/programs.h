@@ -265,8 +265,6 @@ static void series_rules(const Series *t, const List *list, int first, int last,
         for (int32_t i = 4; i < q->to - q->from; i++) sum += TERM(i);
         w[k] = sum;
       } break;
-      case RULE_product: EACH w[k] = e->factor * convolve(s + e->a, s + e->b, k, 0, k); break;
-      case RULE_square: EACH w[k] = e->factor * square_of(s + e->a, k); break;
       case RULE_sum: EACH {
         double sum = 0;
         for (int32_t i = 0; i < q->to - q->from; i++) {

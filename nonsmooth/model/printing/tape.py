@@ -370,12 +370,9 @@ def _sum_named(kinds: Sequence[int]) -> tuple[str, int, int]:
     """By which rule later coefficients of a sum follow, and from which of its terms."""
     moving = [k for k, kind in enumerate(kinds) if kind]
     first, last = (moving[0], moving[-1] + 1) if moving else (0, 0)
-    own = set(kinds[first:last])
-    if own == {1}:
-        return ("linear" if last - first > 4 else f"linear{last - first}"), first, last
-    if len(kinds[first:last]) == 1:
-        return ("product" if own == {2} else "square"), first, last
-    return "sum", first, last
+    if set(kinds[first:last]) != {1}:
+        return "sum", first, last
+    return ("linear" if last - first > 4 else f"linear{last - first}"), first, last
 
 
 #: Name of a rule where its first, or its second, argument does not move.

@@ -91,8 +91,8 @@ static size_t place_run(Run *r, char *base) {
   used = place_layout(&r->now, base, used, w, g);
   used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets ? r->m : 0);
   used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets ? r->m : 0);
-  Continuation *each[] = {&r->chosen, &r->found};
-  for (int i = 0; i < 2; i++) used = place_continuation(each[i], base, used, w, g);
+  Continuation *each[] = {&r->chosen, &r->one, &r->first, &r->rest, &r->found};
+  for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, w, g);
   used = place_decision(r, base, used);
   r->letter = LETTERS(w);
   r->start = LETTERS(w);

@@ -152,7 +152,7 @@ typedef struct {
   double size, time_size, length, shortened, held_length, hold; /* hold: the step's end before zeros of a guard that are not told apart */
   int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
-  Continuation chosen, found;
+  Continuation chosen, one, first, rest, found;
   Decision *decision;
   int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
   int32_t turned_mode; /* the mode of start_mode, whose guards of stability begin with these signs */

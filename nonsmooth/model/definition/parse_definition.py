@@ -19,7 +19,7 @@ from ..checks import real
 from ..errors import DefinitionError, ParameterError
 from ..expressions.cancel import cancel_common_factor, powers
 from ..expressions.graph import IN_A_FIELD, IN_A_GAP, IN_A_GUARD, IN_A_SURFACE, require_smooth
-from ..expressions.linearity import bent
+from ..expressions.linearity import bent, enters_nonlinearly
 from ..numbering import IMPACT_LAWS
 from ..reading import (
     Expression,
@@ -699,22 +699,15 @@ def consistent_parameters(
 
 
 def _require_linear(d: Definition) -> None:
-    for lam, is_bent in zip(listed(d.multipliers), enters_nonlinearly(d), strict=True):
-        if is_bent:
+    found = enters_nonlinearly(d.field, d.multipliers)
+    for lam, is_nonlinear in zip(listed(d.multipliers), found, strict=True):
+        if is_nonlinear:
             raise DefinitionError(
                 f"multiplier {lam}: expected a field linear in it (Filippov's convex "
                 "combination), received a nonlinear one. Nonlinear multipliers are hidden "
                 "dynamics (Jeffrey 2018): say hidden=True if they are meant. Products of "
                 "different multipliers are fine."
             )
-
-
-def enters_nonlinearly(d: Definition) -> tuple[bool, ...]:
-    """Whether the field is not linear in each multiplier."""
-    count = d.multipliers.numel()
-    if not count or ca.is_linear(d.field, d.multipliers):
-        return (False,) * count
-    return tuple(not ca.is_linear(d.field, lam) for lam in listed(d.multipliers))
 
 
 def _require_locally_constant(d: Definition) -> None:

@@ -19,6 +19,7 @@ from ..cache import Cache, Content
 from ..calls import call
 from ..checks import real
 from ..errors import DefinitionError, PointError
+from ..expressions.linearity import enters_nonlinearly
 from ..expressions.mathml import equation, rate, symbol
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
@@ -32,7 +33,6 @@ from .matrix_symbols import in_scalar_symbols, read_dae
 from .parse_definition import (
     Definition,
     consistent_parameters,
-    enters_nonlinearly,
     read_definition,
 )
 from .roots import roots_of
@@ -337,7 +337,7 @@ class FilippovSystem:
         self.impacts, self.constraints = definition.impacts, definition.constraints
         self.complementarity = definition.complementarity
         self.hidden = definition.hidden
-        self.nonlinear = enters_nonlinearly(definition)
+        self.nonlinear = enters_nonlinearly(definition.field, definition.multipliers)
         names = definition.names
         self.state_names = tuple(names["states"])
         self.parameter_names = tuple(names["parameters"])

@@ -77,11 +77,28 @@ static void copy_continuation(const Run *r, Continuation *to, const Continuation
   to->strict = from->strict;
 }
 
-/* Count r->found, of r->trial, as one that can continue. */
-static void count_found(Run *r, int *strict) {
-  if (!r->found.strict) return;
-  if ((*strict)++ == 0) copy_continuation(r, &r->chosen, &r->found);
-  if (r->several_count < SEVERAL) r->several[r->several_count++] = r->trial.l.mode;
+static int rests(const Run *r, const int8_t *letter) {
+  for (int i = 0; i < r->width; i++) if (letter[i] == 0) return 1;
+  return 0;
+}
+
+/* Modes that can continue, so far. */
+typedef struct { int strict, found, resting; } Tally;
+
+/* Count r->found, of r->trial. */
+static void count_found(Run *r, Tally *t) {
+  if (r->found.strict && t->strict++ == 0) copy_continuation(r, &r->one, &r->found);
+  if (r->found.strict && r->several_count < SEVERAL) r->several[r->several_count++] = r->trial.l.mode;
+  if (t->found++ == 0) copy_continuation(r, &r->first, &r->found);
+  if (rests(r, r->found.letter) && t->resting++ == 0) copy_continuation(r, &r->rest, &r->found);
+}
+
+/* The one that continues to r->chosen; 0 where there is none, or more than one and the run ends. */
+static int choose_of(Run *r, const Tally *t) {
+  if (t->strict > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
+  if (!t->found || (!t->strict && t->found > 1 && !t->resting)) return 0;
+  copy_continuation(r, &r->chosen, t->strict ? &r->one : t->found == 1 ? &r->first : &r->rest);
+  return 1;
 }
 
 /* Letters of the active elements by the number of a choice of those that are possible. */
@@ -444,7 +461,7 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
   int k = r->active_count;
   int8_t *trial = r->tried_letter, *possible = trial + r->width;
   Solutions all = {0};
-  int strict = 0;
+  Tally tally = {0};
   for (int i = 0; i < k; i++) {
     int own = r->active[i], s = set_of(r, own);
     possible[i] = s >= 0 && own != s ? 4 : s == own || own >= r->m ? 5 : 7;
@@ -459,11 +476,10 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
     for (int q = 0; q < all.count && r->status == RUNNING; q++) {
       memcpy(r->found.unknowns, all.each + q * r->width, sizeof(double) * r->width);
       if (is_folded(r, trial, r->found.unknowns)) continue;
-      if (continues(r, trial, known, known_count, &r->found)) count_found(r, &strict);
+      if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
     }
   }
-  if (r->status == RUNNING && strict > 1) finish(r, NON_UNIQUE, AMBIGUOUS, 0);
-  return r->status == RUNNING && (strict || no_motion(r, letter));
+  return r->status == RUNNING && (choose_of(r, &tally) || no_motion(r, letter));
 }
 
 /* The same where unknowns of the active elements enter nonlinearly. */

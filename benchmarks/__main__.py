@@ -42,7 +42,7 @@ def sections(folder: Path, quick: bool) -> dict[str, Callable[[], Any]]:
         "long runs": lambda: long_runs.run(quick),
         "elsewhere": lambda: other_interpreters.run(quick),
         "chain": lambda: burridge_knopoff.run(quick),
-        gpu.NAME: lambda: gpu.run(quick),
+        gpu.NAME: lambda: gpu.run(quick, folder),
         "orbits": lambda: periodic_orbits.run(quick),
         "two-folds": lambda: two_folds.run(quick),
         "proofs": lambda: proof_times.run(quick),

@@ -41,6 +41,8 @@ GALLERY = (
     "relay",
     "plane_friction",
     "harvest",
+    "stommel",
+    "hybrid",
     "buck",
     "walker",
     "impact",

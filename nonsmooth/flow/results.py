@@ -166,7 +166,8 @@ class Ensemble(
         Names of the states, in their order on the last axis.
     engine : str
         What ran: ``"lanes"``, several trajectories in step, ``"core"``, one at a time, or ``"cuda"``.
-        Itineraries are the same with each, and numbers within the tolerance.
+        Itineraries are the same with each, and numbers within the tolerance; of more than 30 modes on a card the
+        first 30 are kept, and ``...``.
     """
 
     x: Array

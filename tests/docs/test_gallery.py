@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from scipy.optimize import brentq
 
+import nonsmooth as ns
 from papers.pictures import faults
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -27,7 +29,7 @@ PERIOD = 6.736837191765135
 #: Programs that take seconds: they run among the slow tests.
 DEAR = {
     *("atlas", "basins", "belt", "buck", "friction_drive", "harvest", "impact", "plane_friction"),
-    *("relay", "walker", "wells"),
+    *("hybrid", "relay", "walker", "wells"),
 }
 EACH = [
     pytest.param(name, marks=[pytest.mark.slow] if name in DEAR else [])
@@ -273,6 +275,29 @@ def test_chaos_beyond_the_touch_grows_in_proportion():
     sizes = np.array(sizes) / beyond[chosen][::6]
     assert np.ptp(sizes) < 0.02 * sizes.mean()
     assert "chaos of size linear" in touch.far_side.verdict
+
+
+def test_stommel_boxes_have_two_stable_states_between_the_folds():
+    """By roots of the equilibrium's equation on both sides of T = S."""
+    found = ran("stommel")
+    for e in (0.7, 1.0, 1.3):
+        flows = []
+        for sign in (1.0, -1.0):
+            f = lambda q, e=e, sign=sign: (0.3 + sign * q) * (3 / (1 + sign * q) - q) - e
+            grid = np.linspace(0, sign * 3, 3001)
+            values = np.array([f(q) for q in grid])
+            changes = np.flatnonzero(values[1:] * values[:-1] < 0)
+            flows += [brentq(f, grid[k], grid[k + 1], xtol=1e-14) for k in changes]
+        own = sorted(at.point[0] - at.point[1] for at in found["branch"].at(e))
+        np.testing.assert_allclose(own, sorted(flows), atol=1e-9)
+
+
+@pytest.mark.slow
+def test_the_cycle_of_the_hybrid_pendulum_is_that_of_a_run():
+    orbit = ran("hybrid")["orbit"]
+    run = ns.simulate(ran("hybrid")["pendulum"], orbit.start, 10 * orbit.period, tol=1e-12)
+    np.testing.assert_allclose(run.x[-1], orbit.start, atol=1e-9)
+    assert set(orbit.itinerary.split()) == {"+,q=-1", "+,q=1", "-,q=1", "-,q=-1"}
 
 
 @pytest.mark.slow

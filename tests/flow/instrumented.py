@@ -30,7 +30,16 @@ BUILDS = {
 }
 
 #: Files that decide: what the second command lists.
-DECISIONS = ("decide.c", "events.c", "layer.c", "accumulation.c", "stability.c", "spiral.c")
+DECISIONS = (
+    "blocks.c",
+    "vectors.c",
+    "decide.c",
+    "events.c",
+    "layer.c",
+    "accumulation.c",
+    "stability.c",
+    "spiral.c",
+)
 
 
 def marked_source() -> str:

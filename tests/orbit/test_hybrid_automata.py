@@ -194,3 +194,47 @@ def test_a_gearbox_shifts_at_the_speeds_of_the_closed_form():
     by_force = 1 / 4.0 - 1 / 2.5 + 2 * (1 / 2.5 - 1 / 1.5)
     np.testing.assert_allclose(found.dt_dp[1], [by_force], atol=1e-12)
     assert ns.find_equilibrium(system, [4.0, 3]).eigenvalues[0] == pytest.approx(-1 / 3)
+
+
+def test_nothing_has_a_derivative_by_a_discrete_state():
+    """The gear enters the field as a number would."""
+    up = ns.Reset(x - 1.5, {g: g + 1}, 1, level=True, when=g <= 1, name="up")
+    system = ns.FilippovSystem(
+        [x], field=[(a - x) / g], discrete={g: (1, 2)}, resets=up, parameters={a: 4.0}
+    )
+    run = ns.simulate(system, [0.0, 1], 2.0)
+    found = ns.sensitivity(run)
+    shift = np.log(4.0 / 2.5)
+    slope = np.exp(-(2.0 - shift) / 2) / 2 * 2.5 / 4.0
+    np.testing.assert_allclose(found.dx_dx0, [[slope, 0], [0, 0]], atol=1e-12)
+    np.testing.assert_allclose(found.dt_dx0, [[-1 / 4.0, 0]], atol=1e-12)
+    back, by_parameters = ns.vjp(run, [1.0, 1.0])
+    np.testing.assert_allclose(back, [slope, 0], atol=1e-12)
+    np.testing.assert_allclose(by_parameters, found.dx_dp[0], atol=1e-12)
+
+
+def test_an_orbit_crosses_surfaces_beside_its_discrete_states():
+    """A mass with friction that a relay pushes: x'' = -x - 0.3 sgn x' - 2 q; one multiplier from the flows."""
+    right = ns.Reset(x - 1, {q: 1}, 1, level=True, when=q == -1, name="right")
+    left = ns.Reset(x + 1, {q: -1}, -1, level=True, when=q == 1, name="left")
+    system = ns.FilippovSystem(
+        [x, v],
+        surface=v,
+        above=[v, -x - 0.3 - 2 * q],
+        below=[v, -x + 0.3 - 2 * q],
+        discrete={q: (-1, 1)},
+        resets=[right, left],
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 1.0, -1], 60.0))
+    assert [leg.kind for leg in orbit.legs].count("crossing") == 2
+    product = np.eye(2)
+    for leg, following in zip(orbit.legs, np.roll(orbit.legs, -1), strict=True):
+        fields = []
+        for one in (leg, following):
+            at, side = following.start, 1 if one.mode == "+" else -1
+            fields.append(np.array([at[1], -at[0] - 0.3 * side - 2 * one.start[2]]))
+        normal = np.array([0.0, 1.0] if leg.kind == "crossing" else [1.0, 0.0])
+        jump = np.eye(2) + np.outer(fields[1] - fields[0], normal) / (normal @ fields[0])
+        product = jump @ expm(np.array([[0, 1], [-1, 0]]) * leg.duration) @ product
+    expected = sorted(np.linalg.eigvals(product), key=abs)[::-1]
+    np.testing.assert_allclose(orbit.multipliers.real, expected, atol=1e-11)

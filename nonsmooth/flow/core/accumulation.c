@@ -248,7 +248,7 @@ static int come_to_rest(Run *r, double left, const double *near, int block) {
 /* Rest that rounding has let begin a little before the limit of events that accumulate: go on to the limit. 0 where that
  * is no such event. */
 static int rest_at_limit(Run *r, int before) {
-  const int8_t *letter = r->table->letter + (int64_t)before * r->width;
+  const int8_t *letter = r->table->letter + (int64_t)before * r->table->width;
   double left, error, *near = r->before;
   int rests = 0, block = block_of(r, &left, &error);
   for (int i = 0; i < r->m; i++) rests |= r->letter[i] == 0 && letter[i] != 0 && degree_of(r, i) > 1;

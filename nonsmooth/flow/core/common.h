@@ -70,6 +70,19 @@ typedef struct {
   int64_t random; /* not 0: every other step is given to the driver, at random, which changes no result */
 } Core;
 
+/* What a run is between two steps of a card, as words of 64 bits: ``begun`` is 0 where its start is not clear. The
+ * states follow, with time, then the sides of stops. */
+typedef struct {
+  int64_t index;
+  double t, since, length, shortest;
+  int64_t steps, events, entered, shrinking, code, letter, drop, begun, kinds[SIMPLE_KINDS - 1];
+} Left;
+
+/* Itineraries of a card are numbers in base 4, digits from 1, the last mode lowest; one whose further modes have no
+ * room is FROZEN too. */
+#define MOST_MODES 30
+#define FROZEN (1LL << 62)
+
 #ifndef ON_DEVICE
 /* Sizes of what Python and C share, compared when a library is loaded. */
 int64_t options_size(void) { return sizeof(Options); }

@@ -1,8 +1,8 @@
 /* The loop: expand, locate, check, advance, serve ------------------------------------------------------- */
 
 static int change_kind(const Run *r, int before, int after) {
-  const int8_t *one = r->table->letter + (int64_t)before * r->width;
-  const int8_t *two = r->table->letter + (int64_t)after * r->width;
+  const int8_t *one = r->table->letter + (int64_t)before * r->table->width;
+  const int8_t *two = r->table->letter + (int64_t)after * r->table->width;
   int closed = 0, slides = 0;
   for (int i = 0; i < r->width; i++)
     if (is_half_line(r, i)) closed += (two[i] == 0) - (one[i] == 0);

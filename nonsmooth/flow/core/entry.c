@@ -403,6 +403,8 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   memcpy(r->x, b->x0 + i * r->n, sizeof(double) * r->n);
   measure_time(r);
   memcpy(r->x, m->x, sizeof(double) * r->n);
+  r->t = m->t;
+  set_time_state(r);
   memcpy(r->letter, m->letter, r->width);
   if (r->s->sets) memcpy(r->unknowns, m->unknowns, sizeof(double) * r->width);
   lay_out(r, r->letter, &r->now);
@@ -415,8 +417,6 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   memset(r->instant.residual, 0, sizeof(double) * r->s->stops);
   memset(r->instant.pending, 0, r->s->rules.triggers);
   memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
-  r->t = m->t;
-  set_time_state(r);
   r->since = m->since;
   r->length = m->length;
   r->shortened = m->shortened;
@@ -475,14 +475,18 @@ void core_begin(void *run, const Batch *b, const Options *o, int64_t i, Suspende
   go_on_until_plain(r, b, i, m);
 }
 
+/* The event that is kept, if it has happened. */
+static void read_kept(Run *r, const Batch *b, int64_t i) {
+  if (!b->at_x) return;
+  r->at_t = b->at_t[i];
+  memcpy(r->at_x, b->at_x + i * r->s->dimension, sizeof(double) * r->s->dimension);
+}
+
 /* Make the step that is not clear to lanes. */
 void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m) {
   Run *r = run;
   take(r, b, o, i, m);
-  if (b->at_x) {
-    r->at_t = b->at_t[i];
-    memcpy(r->at_x, b->at_x + i * r->s->dimension, sizeof(double) * r->s->dimension);
-  }
+  read_kept(r, b, i);
   if (m->since == 0 && m->history) see_limit(r); /* the last event was a lane's */
   if (r->status == RUNNING && m->near) near_set(r, 0, m->near == 2);
   else if (r->status == RUNNING) step(r);
@@ -498,4 +502,86 @@ Tree *lanes_tree(Run *r) {
     mode_number(r->table, r->start);
   }
   return &r->table->tree;
+}
+
+/* Runs that a card leaves -------------------------------------------------------------------------- */
+
+static int32_t node_of(Tree *tree, int64_t code) {
+  int32_t node = 0;
+  for (int shift = 2 * MOST_MODES - 2; shift >= 0; shift -= 2)
+    if (code >> shift & 3) node = tree_child(tree, node, (int)(code >> shift & 3) - 1);
+  return node;
+}
+
+static int64_t code_of(const Tree *tree, int32_t node) {
+  int64_t code = 0, count = 0;
+  for (int32_t k = node; k > 0; k = tree->node[k].parent) count++;
+  int64_t kept = count < MOST_MODES ? count : MOST_MODES;
+  for (int32_t k = node; k > 0; k = tree->node[k].parent, count--)
+    if (count <= kept) code |= (int64_t)(tree->node[k].mode + 1) << 2 * (kept - count);
+    else code |= FROZEN;
+  return code;
+}
+
+/* A run of a card as the driver takes it over; ``past``, ``letter`` and ``side`` have room for it. */
+static Suspended suspended_of(Run *r, Left *left, Recent *past, int8_t *letter, int8_t *side) {
+  double *x = (double *)(left + 1);
+  const int64_t *above = (const int64_t *)(x + r->n);
+  *letter = (int8_t)left->letter;
+  for (int j = 0; j < r->s->stops; j++) side[j] = above[j] ? 1 : -1;
+  return (Suspended){
+      .t = left->t, .since = left->since, .length = left->length, .steps = left->steps, .events = left->events,
+      .segment_steps = left->steps - left->entered, .kinds = left->kinds, .x = x, .letter = letter, .side = side,
+      .past = past, .drop = (int32_t)left->drop, .itinerary = node_of(&r->table->tree, left->code)};
+}
+
+/* Make the step that is not clear on a card: the record is that of its end, or the status is where the run ended. */
+static void step_left(Run *r, const Batch *b, const Options *o, int64_t i, Left *left) {
+  Recent past[HISTORY];
+  int8_t letter, side[r->s->stops + 1];
+  Suspended m = suspended_of(r, left, past, &letter, side);
+  (left->begun ? core_step : core_begin)(r, b, o, i, &m);
+  if (m.status != RUNNING) return;
+  int64_t *above = (int64_t *)((double *)(left + 1) + r->n);
+  for (int j = 0; j < r->s->stops; j++) above[j] = -(int64_t)(side[j] > 0);
+  left->t = m.t;
+  left->since = m.since;
+  left->length = m.length;
+  left->steps = m.steps;
+  left->events = m.events;
+  left->entered = m.steps - m.segment_steps;
+  left->letter = letter;
+  left->drop = m.drop;
+  left->begun = 1;
+  if (!(left->code & FROZEN)) left->code = code_of(&r->table->tree, m.itinerary);
+  b->status[i] = HAND_OVER;
+}
+
+/* Continue the runs of a batch whose starts are records of ``width`` words that a card left: for a step, so that
+ * those with the status HAND_OVER go on from their records, or to their ends, ``budget`` steps at most. ``next`` and
+ * the result as in run_many. */
+int run_left(Run *r, int64_t *next, const Batch *b, const Options *o, int64_t *records, int64_t width, int to_end,
+             int64_t budget) {
+  static const Output none;
+  for (; *next / 2 < b->count; *next += 1) {
+    int64_t i = *next / 2;
+    Left *left = (Left *)(records + i * width);
+    if (!to_end) {
+      if (--budget < 0) return 1;
+      step_left(r, b, o, i, left);
+      *next |= 1;
+      continue;
+    }
+    if (*next % 2 == 0 && left->begun) {
+      Recent past[HISTORY];
+      int8_t letter, side[r->s->stops + 1];
+      Suspended m = suspended_of(r, left, past, &letter, side);
+      take(r, b, o, i, &m);
+      read_kept(r, b, i);
+    } else if (*next % 2 == 0) run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, 0, b->t0, 0);
+    *next |= 1;
+    if (go_on(r, &budget) == RUNNING) return 1;
+    keep(r, b, i);
+  }
+  return 0;
 }

@@ -1,7 +1,8 @@
 /* The driver: all that a run is. The system is data, not code.
  *
  * Read in the order of core_source.py: programs.h, pairs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c,
- * near_zeros.c, elements.c, decide.c, events.c, driver.c; sets.c and approach.c are the law of sets of codimension two and more.
+ * near_zeros.c, elements.c, vectors.c, blocks.c, decide.c, events.c, driver.c; sets.c and approach.c are how sets of
+ * codimension two and more move and are met.
  */
 
 

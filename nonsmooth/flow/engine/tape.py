@@ -141,6 +141,7 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     made.run_read.argtypes = [_POINTER] * 6
     made.run_resume.argtypes = [_POINTER] * 2
     made.run_many.argtypes = [*[_POINTER] * 5, _I64]
+    made.run_left.argtypes = [*[_POINTER] * 5, _I64, _I32, _I64]
     return made
 
 

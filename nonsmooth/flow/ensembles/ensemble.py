@@ -80,7 +80,7 @@ def ensemble(
     work : Work, optional
         Threads or an executor, size of a chunk, progress bar, store; see :class:`Work`.
     device : {None, "cuda"}, optional
-        ``"cuda"`` runs on an NVIDIA card; rare cases fall back to the processor. It needs the
+        ``"cuda"`` runs on an NVIDIA card; steps that are not clear fall back to the processor. It needs the
         packages of ``nonsmooth-dynamics[cuda]``, and a system of at most one surface without resets and contacts.
 
     Returns
@@ -158,7 +158,7 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     away = (
         None
         if device is None
-        else lambda first, out: run_on_device(job, device, starts, first, out)
+        else lambda first, out: run_on_device(job, device, starts, first, out, work.workers)
     )
     none = Chunk.empty(0, system, job.at is not None, job.room)
     most = work.largest(none.row_size)

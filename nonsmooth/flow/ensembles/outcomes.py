@@ -16,7 +16,7 @@ from ..engine.device.kernel import Bins, Reduced
 from ..options import Options, tolerances
 from ..results import Chunk
 from ..status import Status
-from .chunks import Job, run_chunk
+from .chunks import Job
 from .ensemble import engine_for
 from .lazy_starts import LazyStarts
 from .on_device import CHUNK, reduce_on_device, require_device
@@ -188,18 +188,17 @@ def outcomes(
     else:
         require_device(job, device, work.executor is not None)
         size = work.chunk or CHUNK
-        for first in range(0, starts.count, size):
-            count = min(size, starts.count - first)
-            found = reduce_on_device(job, device, starts, first, count, made.bins)
-            made.add(found)
-            if found.rest.size:
-                made.put(first, run_chunk(job, *starts.rows(first + found.rest)))
+        for found in reduce_on_device(job, device, starts, size, made.bins, work.workers):
+            if isinstance(found, Chunk):
+                made.put(0, found)
+            else:
+                made.add(found)
     return made.outcomes(ranges or {})
 
 
 def _bins(system: FilippovSystem, ranges: Mapping[str, tuple[float, float]], bins: int) -> Bins:
     names = (*system.state_names, "t")
-    low, high = np.zeros(len(names)), np.ones(len(names))
+    low, high = np.full((2, len(names)), math.nan)  # without a range there are no bins
     for name, given in ranges.items():
         try:
             k = names.index(name)

@@ -2,8 +2,14 @@
  * After lanes.c. Numbers are counted from 0 over the whole call; arrays hold those from ``first`` on.
  */
 
-/* Where starts come from: rows; axes whose last runs fastest, of a length or 0 for a single number; a box. */
-enum { ROWS_OF_STATES, GRID, BOX };
+/* Where starts come from: rows; axes whose last runs fastest, of a length or 0 for a single number; a box; records of
+ * runs that go on. */
+enum { ROWS_OF_STATES, GRID, BOX, RECORDS };
+
+/* Words of a record: Left, the states, the sides of stops. */
+#define WORDS ((int)(sizeof(Left) / 8) + N + STOPS)
+
+typedef unsigned long long Count;
 
 struct Given {
   int64_t count, first, kind;
@@ -17,9 +23,12 @@ struct Given {
 
 struct Results {
   double *x, *t;
-  int32_t *status, *kinds, *steps;
+  int8_t *status;
+  int32_t *kinds, *steps;
   int64_t *code;
   double *at_x, *at_t;
+  int64_t *left; /* records of the runs with the status HAND_OVER */
+  Count *left_count;
 };
 
 struct Work {
@@ -62,18 +71,81 @@ static inline void store(Lanes *s, Work *w, int, int status) {
   w->alive = 0;
   UNROLL for (int k = 0; k < ND; k++) out->x[i * ND + k] = s->x[k].v;
   out->t[i] = s->t.v;
-  out->status[i] = status;
+  out->status[i] = (int8_t)status;
   out->code[i] = s->code.v;
   UNROLL for (int k = 0; k < LAST_KIND; k++) out->kinds[i * SIMPLE_KINDS + k] = (int32_t)s->kinds[k].v;
   out->kinds[i * SIMPLE_KINDS + LAST_KIND] = status == REACHED_END;
   out->steps[i] = (int32_t)s->steps.v;
 }
 
-/* More modes than a number holds. */
-static inline void shorten_codes(Lanes *s, Work *w) { finish_lanes(s, w, I(-1), HAND_OVER); }
+/* The first modes are kept: a further one moves FROZEN out, and is taken away again. */
+static inline void shorten_codes(Lanes *s, Work *) {
+  if (!(s->code.v & FROZEN)) s->code = (s->code >> 2) | FROZEN;
+}
 
-static inline void begin_elsewhere(Lanes *s, Work *w, I which) { finish_lanes(s, w, which, HAND_OVER); }
-INLINE I by_chance(const Lanes *, const Work *) { return NONE; }
+static inline void write_record(const Lanes *s, int begun, int64_t *record) {
+  Left *to = (Left *)record;
+  double *x = (double *)(to + 1);
+  int64_t *above = (int64_t *)(x + N);
+  to->index = s->index.v;
+  to->t = s->t.v;
+  to->since = s->since.v;
+  to->length = s->length.v;
+  to->shortest = s->shortest.v;
+  to->steps = s->steps.v;
+  to->events = s->events.v;
+  to->entered = s->entered.v;
+  to->shrinking = s->shrinking.v;
+  to->code = s->code.v;
+  to->letter = s->slides.v ? 0 : s->above.v ? 1 : -1;
+  to->drop = s->drop.v;
+  to->begun = begun;
+  UNROLL for (int k = 0; k < LAST_KIND; k++) to->kinds[k] = s->kinds[k].v;
+  UNROLL for (int k = 0; k < N; k++) x[k] = s->x[k].v;
+  UNROLL for (int k = 0; k < STOPS; k++) above[k] = s->above_stop[k].v;
+}
+
+static inline void read_record(Lanes *s, const Work *w, const int64_t *record, int64_t index) {
+  const Left *from = (const Left *)record;
+  const double *x = (const double *)(from + 1);
+  const int64_t *above = (const int64_t *)(x + N);
+  s->index = I(index);
+  s->q = (const T *)(w->given.q + index * w->given.q_stride);
+  s->t = BC(from->t);
+  s->since = BC(from->since);
+  s->length = BC(from->length);
+  s->shortest = BC(from->shortest);
+  s->steps = I(from->steps);
+  s->events = I(from->events);
+  s->entered = I(from->entered);
+  s->shrinking = I(from->shrinking);
+  s->code = I(from->code);
+  s->slides = I(-(int64_t)(M > 0 && from->letter == 0));
+  s->above = I(-(int64_t)(from->letter > 0));
+  s->drop = I(from->drop);
+  UNROLL for (int k = 0; k < LAST_KIND; k++) s->kinds[k] = I(from->kinds[k]);
+  UNROLL for (int k = 0; k < N; k++) s->x[k] = BC(x[k]);
+  UNROLL for (int k = 0; k < STOPS; k++) s->above_stop[k] = I(above[k]);
+  set_lambda(s);
+  s->live = I(-1);
+}
+
+/* The driver takes the run from here. */
+SELDOM void leave(Lanes *s, Work *w, int begun) {
+  write_record(s, begun, w->out.left + (int64_t)atomicAdd(w->out.left_count, 1ULL) * WORDS);
+  w->out.status[s->index.v] = HAND_OVER;
+  w->alive = 0;
+  s->live = NONE;
+}
+
+static inline void begin_elsewhere(Lanes *s, Work *w, I which) {
+  if (any(which)) leave(s, w, 0);
+}
+
+/* Tests leave runs at random. */
+INLINE I by_chance(const Lanes *s, const Work *) {
+  return RANDOM ? I(-(int64_t)(split_mix(RANDOM, (uint64_t)(bits_of(s->x[0].v) ^ bits_of(s->t.v) ^ s->steps.v)) >> 63)) : NONE;
+}
 
 INLINE void count(Lanes *s, Work *w, int kind, I which) {
   s->kinds[kind] -= which;
@@ -90,6 +162,15 @@ static inline int load(Lanes *s, Work *w) {
   if (w->next >= g->count) return 0;
   int64_t i = w->next, left = g->first + i;
   w->next += w->stride;
+  w->alive = 1;
+  if (w->out.at_x) {
+    w->out.at_t[i] = NAN;
+    UNROLL for (int k = 0; k < ND; k++) w->out.at_x[i * ND + k] = NAN;
+  }
+  if (g->kind == RECORDS) {
+    read_record(s, w, (const int64_t *)g->values + i * WORDS, i);
+    return 1;
+  }
   T wrong = BC(0);
   UNROLL for (int k = ND - 1; k >= 0; k--) {
     s->x[k] = BC(start_of(g, i, k, &left));
@@ -107,12 +188,8 @@ static inline int load(Lanes *s, Work *w) {
   UNROLL for (int k = 0; k < STOPS; k++) s->above_stop[k] = I(0);
   s->index = I(i);
   s->live = I(-1);
-  w->alive = 1;
-  if (w->out.at_x) {
-    w->out.at_t[i] = NAN;
-    UNROLL for (int k = 0; k < ND; k++) w->out.at_x[i * ND + k] = NAN;
-  }
-  if (!any(wrong == 0)) {
+  if (any(wrong == 0)) begin(s, w, s->live);
+  else {
     finish_lanes(s, w, s->live, NOT_FINITE);
     w->out.kinds[i * SIMPLE_KINDS + LAST_KIND] = 1;
   }
@@ -124,31 +201,40 @@ static inline void step(Lanes *s, Work *w) {
   expand_step(s, w, &e);
   sort_step(s, &e);
   first_hits(1, s, &e);
-  I unclear = take_step(s, w, &e);
-  finish_lanes(s, w, unclear, HAND_OVER);
+  if (any(take_step(s, w, &e))) leave(s, w, 1);
 }
 
 /* A thread whose run has ended takes its next start at once: its neighbours wait for that, and all make their step
- * together. */
-static inline void run_all(Work *w) {
+ * together. What is left of ``budget`` steps of a launch goes on in the next one, from ``own``. */
+static inline void run_all(Work *w, int64_t budget, int64_t *own, Count *running) {
   Lanes s;
   s.size = w->o.atol / w->o.rtol;
   w->alive = 0;
-  for (;;) {
-    while (!w->alive) {
-      if (!load(&s, w)) return;
-      if (w->alive) begin(&s, w, s.live);
-    }
-    step(&s, w);
+  if (w->next < 0) {
+    w->next = own[0];
+    w->alive = (int)own[1];
+    if (w->alive) read_record(&s, w, own + 2, ((const Left *)(own + 2))->index);
   }
+  for (;; budget--) {
+    while (!w->alive && load(&s, w)) continue;
+    if (!ANY_OF_GROUP(w->alive) || budget <= 0) break;
+    if (w->alive) step(&s, w);
+  }
+  own[0] = w->next;
+  own[1] = w->alive;
+  if (w->alive) write_record(&s, 1, own + 2);
+  if (w->alive || w->next < w->given.count) atomicAdd(running, 1ULL);
 }
 
-/* Numbers are of 64 bits each, so that what launches this needs no structure. */
+/* Numbers are of 64 bits each, so that what launches this needs no structure. ``own``: a record and two more words for
+ * each thread, which are read unless this launch is the first; ``counts``: records that are left, and threads that go
+ * on in a further launch. */
 KERNEL BOUNDS trajectories(
     int64_t count, int64_t first, int64_t kind, int64_t seed, const double *values, const int64_t *lengths,
     const double *q, int64_t q_stride, double t0, double t_end, double rtol, double atol, double max_step,
-    int64_t max_steps, int64_t max_events, int64_t at_kind, int64_t at_count, double *x, double *t, int32_t *status,
-    int32_t *kinds, int32_t *steps, int64_t *code, double *at_x, double *at_t) {
+    int64_t max_steps, int64_t max_events, int64_t at_kind, int64_t at_count, double *x, double *t, int8_t *status,
+    int32_t *kinds, int32_t *steps, int64_t *code, double *at_x, double *at_t, int64_t *left, int64_t *own,
+    Count *counts, int64_t is_first, int64_t budget) {
   Work w;
   w.o.t_end = t_end;
   w.o.rtol = rtol;
@@ -159,10 +245,11 @@ KERNEL BOUNDS trajectories(
   w.o.at_kind = (int32_t)at_kind;
   w.o.at_count = at_count;
   w.given = {count, first, kind, (uint64_t)seed, values, lengths, q, q_stride, t0};
-  w.out = {x, t, status, kinds, steps, code, at_x, at_t};
-  w.next = (int64_t)blockIdx.x * blockDim.x + threadIdx.x;
+  w.out = {x, t, status, kinds, steps, code, at_x, at_t, left, counts};
+  int64_t thread = (int64_t)blockIdx.x * blockDim.x + threadIdx.x;
+  w.next = is_first ? thread : -1;
   w.stride = (int64_t)gridDim.x * blockDim.x;
-  run_all(&w);
+  run_all(&w, budget, own + thread * (WORDS + 2), counts + 1);
 }
 
 /* What the parameters alone decide, for each row of them. */
@@ -174,44 +261,57 @@ KERNEL parameters(int64_t count, int64_t size, const double *p, double *q) {
 
 /* Results reduced where they are ------------------------------------------------------------------ */
 
-typedef unsigned long long Count;
-
-/* Count a code in a table of a power of two places, 0 for an empty one; 0 if there is no room. */
-static inline int counted(int64_t code, int64_t size, Count *keys, Count *counts) {
+/* Where a code is in a table of a power of two places, 0 for an empty one; -1 if there is no room. */
+static inline int64_t place_of(int64_t code, int64_t size, Count *keys) {
   Count key = (Count)code + 1, at = key * 0x9e3779b97f4a7c15ULL >> 20;
-  for (int64_t tried = 0; tried < size; tried++, at++) {
+  for (int64_t tried = 0; tried < size && tried < LONGEST_SEARCH; tried++, at++) {
     int64_t place = (int64_t)(at & (Count)(size - 1));
-    Count found = atomicCAS(keys + place, 0ULL, key);
-    if (found != 0 && found != key) continue;
-    atomicAdd(counts + place, 1ULL);
-    return 1;
+    Count found = keys[place] == key ? key : atomicCAS(keys + place, 0ULL, key);
+    if (found == 0 || found == key) return place;
   }
-  return 0;
+  return -1;
+}
+
+/* Itineraries as places in a table; the steps and the events of runs that have ended here. */
+KERNEL numbered(int64_t count, const int8_t *status, const int32_t *kinds, const int32_t *steps, const int64_t *code,
+                int64_t size, Count *keys, int32_t *place, Count *totals) {
+  int64_t stride = (int64_t)gridDim.x * blockDim.x, all_steps = 0, all_events = 0;
+  for (int64_t i = (int64_t)blockIdx.x * blockDim.x + threadIdx.x; i < count; i += stride) {
+    place[i] = 0;
+    if (status[i] == HAND_OVER) continue;
+    place[i] = (int32_t)place_of(code[i], size, keys);
+    all_steps += steps[i];
+    for (int k = 0; k < LAST_KIND; k++) all_events += kinds[i * SIMPLE_KINDS + k];
+  }
+  atomicAdd(totals, (Count)all_steps);
+  atomicAdd(totals + 1, (Count)all_events);
 }
 
 /* Statuses and itineraries counted; states and times of runs that are complete summed, their squares too, by each
- * thread for itself, and put into bins. Those of ``rest``, which are
- * ``left``, are another's. */
-KERNEL outcomes(int64_t count, const double *x, const double *t, const int32_t *status, const int64_t *code,
+ * thread for itself, and put into bins. Runs whose itinerary has no room in the table are listed in ``rest``, of which
+ * there are ``rest_count``. */
+KERNEL outcomes(int64_t count, const double *x, const double *t, const int8_t *status, const int64_t *code,
                 int64_t bins, const double *low, const double *high, Count *histogram, double *sums, int64_t size,
-                Count *keys, Count *counts, Count *statuses, Count *left, int64_t *rest) {
+                Count *keys, Count *counts, Count *statuses, Count *rest_count, int64_t *rest) {
   int64_t thread = (int64_t)blockIdx.x * blockDim.x + threadIdx.x, stride = (int64_t)gridDim.x * blockDim.x;
   double *own = sums + thread * 2 * (ND + 1);
-  for (int k = 0; k < 2 * (ND + 1); k++) own[k] = 0;
   for (int64_t i = thread; i < count; i += stride) {
-    if (status[i] == HAND_OVER || !counted(code[i], size, keys, counts)) {
-      rest[atomicAdd(left, 1ULL)] = i;
+    if (status[i] == HAND_OVER) continue;
+    int64_t place = place_of(code[i], size, keys);
+    if (place < 0) {
+      rest[atomicAdd(rest_count, 1ULL)] = i;
       continue;
     }
+    atomicAdd(counts + place, 1ULL);
     atomicAdd(statuses + status[i], 1ULL);
     if (status[i] != REACHED_END && status[i] != STOPPED) continue;
     for (int k = 0; k <= ND; k++) {
       double v = k < ND ? x[i * ND + k] : t[i];
       own[2 * k] += v;
       own[2 * k + 1] += v * v;
-      double place = product(sum(v, -low[k]), (double)bins / sum(high[k], -low[k]));
-      if (v == high[k]) place = (double)(bins - 1);
-      if (place >= 0 && place < (double)bins) atomicAdd(histogram + k * bins + (int64_t)place, 1ULL);
+      double at = product(sum(v, -low[k]), (double)bins / sum(high[k], -low[k]));
+      if (v == high[k]) at = (double)(bins - 1);
+      if (at >= 0 && at < (double)bins) atomicAdd(histogram + k * bins + (int64_t)at, 1ULL);
     }
   }
 }

@@ -1,6 +1,7 @@
 /* What NVRTC has no headers for, and what a compiler of C++ has no words for. */
 #define ON_DEVICE 1
 #define restrict __restrict__
+#define LONGEST_SEARCH 64 /* places of a table that are tried */
 #ifdef __CUDACC_RTC__
 typedef signed char int8_t;
 typedef int int32_t;
@@ -12,6 +13,8 @@ typedef unsigned long long uint64_t;
 #define INT64_MIN (-0x7fffffffffffffffLL - 1)
 #define KERNEL extern "C" __global__ void
 #define BOUNDS __launch_bounds__(THREADS, RESIDENT)
+/* Whether one thread of a warp is; all wait for each other there, or they drift apart and a step is made once for each. */
+#define ANY_OF_GROUP(one) __any_sync(0xffffffffu, one)
 #define INLINE_MEMBER
 #define UNROLL _Pragma("unroll")
 static inline int64_t bits_of(double a) { return __double_as_longlong(a); }
@@ -25,6 +28,7 @@ static inline double product(double a, double b) { return __dmul_rn(a, b); }
 #include <string.h>
 #define KERNEL extern "C" void
 #define BOUNDS
+#define ANY_OF_GROUP(one) (one)
 #define INLINE_MEMBER inline
 #define UNROLL
 struct Place { int x; };

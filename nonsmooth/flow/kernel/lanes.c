@@ -4,7 +4,7 @@
  * lanes at once: expansion, step size, roots, projection, the decision at a surface where both
  * fields are clearly transversal. Whatever is rare (tangency, repelling sliding, ties, accumulating
  * events, limits, points that are not finite) is not clear: the lane gives its trajectory to the driver for that
- * step and takes it back (on a GPU it runs again from its start there). No lane's result depends on its neighbours.
+ * step and takes it back. No lane's result depends on its neighbours.
  *
  * The generated text defines, besides what common.h needs: N states with time, ND without, M surfaces,
  * TIMED whether time is a state, W, SLOTS guards (surface or exit to +, exit to -, stops), STOPS, DIRECTION[STOPS],
@@ -15,7 +15,7 @@
 #define S1 (SLOTS > 0 ? SLOTS : 1)
 #define FIRST_STOP (SLOTS - STOPS)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
-#define LONG_CODE (1LL << 60)
+#define LONG_CODE (1LL << 2 * MOST_MODES)
 #define LETTERS 1
 #define OF_POOLS int alive;
 
@@ -48,7 +48,7 @@ typedef struct {
 #endif
 } Lanes;
 
-/* What feeds the lanes and takes their results: batch.c, or device.c on a GPU. */
+/* What feeds the lanes and takes their results: batch.c, or cuda.c on a GPU. */
 typedef struct Work Work;
 INLINE const Options *limits(const Work *w);
 static void store(Lanes *s, Work *w, int l, int status);
@@ -639,7 +639,6 @@ INLINE void sort_step(Lanes *s, Step *e) {
   if (any(hard)) e->unclear |= resolve(&e->v);
 }
 
-#if RARE_CASES_HERE
 /* What a step may have changed in the lanes ``which`` is again as at its start. */
 SELDOM void undo_step(Lanes *s, const Step *e, I which) {
   UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(which, e->c[i][0], s->x[i]);
@@ -652,10 +651,6 @@ SELDOM void undo_step(Lanes *s, const Step *e, I which) {
   s->above = (s->above & ~which) | (e->above & which);
   set_lambda(s);
 }
-#else
-/* The driver begins again from the trajectory's start. */
-INLINE void undo_step(Lanes *, const Step *, I) {}
-#endif
 
 /* Take the step where it is clear; the lanes are returned where it is not. */
 INLINE I take_step(Lanes *s, Work *w, Step *e) {

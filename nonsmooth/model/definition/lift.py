@@ -37,10 +37,8 @@ from typing import Any
 import casadi as ca
 
 from ..errors import DefinitionError, NotSmoothError
-from ..expressions.cancel import Sum, normal_forms, simple_zeros
+from ..expressions.cancel import NormalForms, Sum, ratio, simple_zeros
 from ..expressions.graph import NOT_SMOOTH, POWERS, evaluate, instructions, operation, power_of
-
-_ROUNDING = 16 * 2.220446049250313e-16
 
 
 @dataclass(frozen=True)
@@ -65,6 +63,7 @@ class Switch:
     h: ca.SX
     lam: ca.SX
     even: ca.SX  # the multiplier inside continuous switches, which becomes ``lam`` at the end
+    form: Sum = field(default_factory=dict)
     origins: list[str] = field(default_factory=list)
     hidden: bool = False
 
@@ -75,6 +74,7 @@ class Switches:
     def __init__(self, states: ca.SX, inputs: list[ca.SX]):
         self.states, self.inputs = states, inputs
         self.all: list[Switch] = []
+        self._forms = NormalForms(inputs)
         names = {str(s) for s in ca.vertsplit(ca.vertcat(*inputs))}
         self.prefix = next(p for p in _prefixes() if not any(n.startswith(p) for n in names))
 
@@ -88,16 +88,16 @@ class Switches:
             number, side = self.find(rest, origin)
             return number, ca.sign(factor) * side
         h = self._on_both_sides(simple_zeros(h, *self.inputs))
-        forms = self._forms([h, *(s.h for s in self.all)])
-        if all(monomial == () for monomial in forms[0]):
-            c = forms[0].get((), 0.0)
+        form = self._forms.of(h)
+        if all(monomial == () for monomial in form):
+            c = form.get((), 0.0)
             return None, int(c > 0) - int(c < 0)
-        for i, form in enumerate(forms[1:]):
-            ratio = _ratio([forms[0], form])
-            if ratio:
+        for i, other in enumerate(self.all):
+            c = ratio(form, other.form)
+            if c:
                 if origin not in self.all[i].origins:
                     self.all[i].origins.append(origin)
-                return i, 1 if ratio > 0 else -1
+                return i, 1 if c > 0 else -1
         if not ca.depends_on(h, self.inputs[0]):
             raise DefinitionError(
                 f"a switch: {origin} of {h} depends neither on the states nor on the time. Give a number "
@@ -105,7 +105,7 @@ class Switches:
             )
         k = len(self.all)
         lam, even = ca.SX.sym(f"{self.prefix}{k}"), ca.SX.sym(f"{self.prefix}{k}_even")
-        self.all.append(Switch(h, lam, even, [origin]))
+        self.all.append(Switch(h, lam, even, form, [origin]))
         return k, 1
 
     def _on_both_sides(self, h: ca.SX) -> ca.SX:
@@ -117,11 +117,8 @@ class Switches:
 
     def is_found(self, g: ca.SX) -> bool:
         """Whether a function is a multiple of one that has been found."""
-        form, *forms = self._forms([g, *(s.h for s in self.all)])
-        return any(_ratio([form, other]) for other in forms)
-
-    def _forms(self, expressions: list[ca.SX]) -> list[Sum]:
-        return [row[0] for row in normal_forms(self.inputs, expressions)[1]]
+        form = self._forms.of(g)
+        return any(ratio(form, other.form) for other in self.all)
 
     def report(self, f: ca.SX) -> tuple[list[Switch], tuple[LiftedSwitch, ...]]:
         """Return the switches of a field in the order of their states, and their descriptions."""
@@ -186,16 +183,6 @@ def _terms(e: ca.SX) -> list[tuple[int, ca.SX]]:
 
 def _prefixes() -> Iterator[str]:
     return ("lam" + "_" * k for k in range(100))
-
-
-def _ratio(forms: Sequence[Sum]) -> float:
-    """Return c with forms[0] = c forms[1], or 0 if they are not proportional."""
-    first, second = forms
-    if first.keys() != second.keys():
-        return 0.0
-    ratios = [first[monomial] / second[monomial] for monomial in first]
-    c = ratios[0]
-    return c if all(abs(r - c) <= _ROUNDING * abs(c) for r in ratios) else 0.0
 
 
 #: A switch that depends on more switches than this is refused: 2^n copies of it would be needed.
@@ -392,9 +379,21 @@ class _Lifter:
 
     def _affine(self, value: _Value) -> ca.SX:
         """Make one entry of the field affine in every multiplier, exactly off the surfaces."""
-        f = value.e
-        hidden = {i for i in value.inside if not ca.is_linear(f, self.switches[i].lam)}
-        for i in sorted(value.inside):
+        f, inside = value.e, set(value.inside)
+        own = [self.switches[i] for i in sorted(inside)]
+        if own:  # most switches enter linearly, all of them together
+            lam, even = (ca.vertcat(*[getattr(s, name) for s in own]) for name in ("lam", "even"))
+            curved = ca.which_depends(ca.substitute(f, even, lam), lam, 2, False)
+            plain = [s for s, bent in zip(own, curved, strict=True) if not bent]
+            inside = {i for i, bent in zip(sorted(inside), curved, strict=True) if bent}
+            if plain:
+                evens, lams = (
+                    ca.vertcat(*[s.even for s in plain]),
+                    ca.vertcat(*[s.lam for s in plain]),
+                )
+                f = ca.substitute(f, evens, lams)
+        hidden = {i for i in inside if not ca.is_linear(f, self.switches[i].lam)}
+        for i in sorted(inside):
             s = self.switches[i]
             s.hidden = s.hidden or i in hidden
             written = ca.substitute(f, s.even, s.lam)

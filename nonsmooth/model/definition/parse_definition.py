@@ -19,6 +19,7 @@ from ..checks import real
 from ..errors import DefinitionError, ParameterError
 from ..expressions.cancel import cancel_common_factor, powers
 from ..expressions.graph import IN_A_FIELD, IN_A_GAP, IN_A_GUARD, IN_A_SURFACE, require_smooth
+from ..expressions.linearity import enters_nonlinearly
 from ..numbering import IMPACT_LAWS
 from ..reading import (
     Expression,
@@ -676,8 +677,9 @@ def consistent_parameters(
 
 
 def _require_linear(d: Definition) -> None:
-    for lam in listed(d.multipliers):
-        if not ca.is_linear(d.field, lam):
+    bent = enters_nonlinearly(d.field, d.multipliers)
+    for lam, is_nonlinear in zip(listed(d.multipliers), bent, strict=True):
+        if is_nonlinear:
             raise DefinitionError(
                 f"multiplier {lam}: expected a field linear in it (Filippov's convex "
                 "combination), received a nonlinear one. Nonlinear multipliers are hidden "

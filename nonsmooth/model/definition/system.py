@@ -19,6 +19,7 @@ from ..cache import Cache, Content
 from ..calls import call
 from ..checks import real
 from ..errors import DefinitionError, PointError
+from ..expressions.linearity import enters_nonlinearly
 from ..expressions.mathml import equation, rate, symbol
 from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
@@ -332,8 +333,7 @@ class FilippovSystem:
         self.impacts, self.constraints = definition.impacts, definition.constraints
         self.complementarity = definition.complementarity
         self.hidden = definition.hidden
-        field, multipliers = definition.field, listed(definition.multipliers)
-        self.nonlinear = tuple(not ca.is_linear(field, lam) for lam in multipliers)
+        self.nonlinear = enters_nonlinearly(definition.field, definition.multipliers)
         names = definition.names
         self.state_names = tuple(names["states"])
         self.parameter_names = tuple(names["parameters"])

@@ -147,6 +147,27 @@ class _Normal:
         return _Value(_combine(self.forms, op, [a.form for a in args], expression), expression)
 
 
+class NormalForms:
+    """Normal forms of expressions of the same symbols, one after the other, over the same atoms."""
+
+    def __init__(self, inputs: Sequence[ca.SX]):
+        self._inputs, self._algebra = list(inputs), _Normal(inputs)
+
+    def of(self, expression: ca.SX) -> Sum:
+        """The sum of coefficients times monomials of a scalar."""
+        nodes, rows = instructions(self._inputs, [expression])
+        return evaluate(nodes, self._algebra)[rows[0][0]].form
+
+
+def ratio(first: Sum, second: Sum) -> float:
+    """The number c with first = c second to rounding, or 0 if there is none."""
+    if first.keys() != second.keys() or not first:
+        return 0.0
+    ratios = [first[monomial] / second[monomial] for monomial in first]
+    c = ratios[0]
+    return c if all(abs(r - c) <= 2 * _ROUNDING * abs(c) for r in ratios) else 0.0
+
+
 def normal_forms(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
 ) -> tuple[Forms, list[list[Sum]]]:

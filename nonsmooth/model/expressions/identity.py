@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..values import Array
+from .cancel import NormalForms, ratio
 from .float_arithmetic import BINARY, UNARY
 from .graph import Node, evaluate, instructions
 
@@ -107,6 +108,10 @@ def _small(b: int) -> int | None:
 
 def vanish_on(expressions: Sequence[ca.SX], surface: ca.SX, variables: ca.SX) -> bool:
     """Whether all expressions are zero wherever ``surface`` is."""
+    forms = NormalForms([ca.vertcat(*ca.symvar(ca.vertcat(surface, *expressions)))])
+    own = forms.of(surface)
+    if all(ratio(forms.of(e), own) for e in expressions):
+        return True  # visible multiples of it
     return _modular(expressions, [surface], variables) is True
 
 

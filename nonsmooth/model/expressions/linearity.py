@@ -30,6 +30,15 @@ class Linearity:
     curved_guards: list[bool]  # not affine in states and time
 
 
+def enters_nonlinearly(expressions: ca.SX, variables: ca.SX) -> tuple[bool, ...]:
+    """Which variables enter a vector of expressions nonlinearly, each for itself: products of two are linear."""
+    together = ca.which_depends(expressions, variables, 2, False) if variables.numel() else []
+    return tuple(
+        bool(bent) and not ca.is_linear(expressions, variables[i])
+        for i, bent in enumerate(together)
+    )
+
+
 def linearity(
     field: ca.SX,
     layer: ca.SX,

@@ -452,8 +452,9 @@ def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Reduced
     starts = np.zeros((count, n, few + 1))
     starts[:, :, n:] = np.concatenate([np.zeros((1, n, few + 1 - n)), rest[:-1]])
     starts[0, :, :n] = np.eye(n)
-    for i in range(count - 1):
-        starts[i + 1] += steps[i] @ starts[i]
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
+        for i in range(count - 1):
+            starts[i + 1] += steps[i] @ starts[i]
     durations = (slope[:, None, :] @ starts)[:, 0]
     durations[:, n:] += by_rest
     small = np.zeros((few, few + 1))

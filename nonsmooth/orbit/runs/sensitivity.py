@@ -23,7 +23,7 @@ from ...model import (
     require_system,
 )
 from ...model.derivatives.event_maps import EventMap, function_map
-from .variation import Passage, Sensitivity, along, passages
+from .variation import Passage, Sensitivity, along, discrete_places, passages
 
 
 def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameters")) -> Sensitivity:
@@ -155,7 +155,7 @@ def gradient(
     p = system.parameter_vector(run.parameters)
     last = parts[-1]
     at = _cost(system, last.stretch.leg.mode, cost)(last.flow.end, p)
-    row, by_parameters = _pulled(parts, at.gradient, chosen, stopped=_stopped(last))
+    row, by_parameters = _pulled(system, parts, at.gradient, chosen, stopped=_stopped(last))
     by_parameters = by_parameters + at.by_parameters[list(chosen)]
     numbers = dict(zip(names, by_parameters.tolist(), strict=True))
     return _finite(Gradient(at.value, row[:n] + 0.0, numbers), run)
@@ -227,7 +227,7 @@ def vjp(
     parts = passages(run, chosen)
     whole = np.zeros(len(parts[-1].flow.end))
     whole[:n] = row
-    back, by_parameters = _pulled(parts, whole, chosen, stopped=_stopped(parts[-1]))
+    back, by_parameters = _pulled(system, parts, whole, chosen, stopped=_stopped(parts[-1]))
     return back[:n], by_parameters
 
 
@@ -236,7 +236,11 @@ def _stopped(last: Passage) -> bool:
 
 
 def _pulled(
-    parts: Sequence[Passage], row: Array, chosen: Sequence[int], stopped: bool
+    system: FilippovSystem,
+    parts: Sequence[Passage],
+    row: Array,
+    chosen: Sequence[int],
+    stopped: bool,
 ) -> tuple[Array, Array]:
     """Pull a row at the end of the flow of the last leg back to the start."""
     by_parameters = np.zeros(len(chosen))
@@ -255,6 +259,7 @@ def _pulled(
     for part in reversed(parts[:-1]):
         row, more = part.backward(row, chosen)
         by_parameters = by_parameters + more
+    row[discrete_places(system)] = 0.0
     return row, by_parameters
 
 

@@ -256,6 +256,11 @@ class Passage:
         return cotangent @ self.flow.by_start, by_parameters
 
 
+def discrete_places(system: FilippovSystem) -> slice:
+    """Where the discrete states are among the states: nothing has a derivative by them."""
+    return slice(system.dimension - len(system.definition.discrete), system.dimension)
+
+
 def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     """Legs and events of a run, with derivatives by the start of each and by chosen parameters."""
     system = run.system
@@ -393,7 +398,7 @@ class Sensitivity:
     Attributes
     ----------
     dx_dx0 : ndarray (n, n)
-        Derivatives of the final state by the start.
+        Derivatives of the final state by the start; zero by discrete states, and of them.
     dx_dp : ndarray (n, q)
         Derivatives of the final state by the parameters ``names``.
     event_times : ndarray (m,)
@@ -467,6 +472,7 @@ def along(run: Trajectory, names: Sequence[str]) -> tuple[list[Passage], Sensiti
     chosen = tuple(system.parameter_names.index(name) for name in names)
     parts = passages(run, chosen)
     dx, dp = np.eye(system.extended_dimension), np.zeros((system.extended_dimension, len(chosen)))
+    dx[:, discrete_places(system)] = 0.0
     times, by_start, by_parameters = list[float](), list[Array](), list[Array]()
     end_x, end_p = np.zeros(system.extended_dimension), np.zeros(len(chosen))
     for part in parts:

@@ -33,6 +33,7 @@ def falling():
         (falling(), {}, "resets"),
         (pair(), {"start_mode": "s"}, "start_mode"),
         (pair(), {"t_eval": [0.5]}, "t_eval"),
+        (pair(), {"rest_below": 0.1}, "rest_below"),
         (pair(), {"t_end": 0.0}, "t_end"),
     ],
 )

@@ -342,3 +342,15 @@ def test_a_triple_zero_is_one_passage():
     system = ns.FilippovSystem([x, y, v], field=[1, 3 * (x - 1) ** 2, 0], resets=count)
     run = ns.simulate(system, [0.0, -1.0, 0.0], 2.0)
     assert run.status is REACHED and run.x[-1, 2] == 1.0
+
+
+@pytest.mark.parametrize("value", [0, 1, -1, 0.3])
+def test_events_of_surfaces_have_their_kinds_beside_discrete_states(value):
+    """Bytes of discrete states in a mode are no letters."""
+    friction = {"surface": v, "above": [v, -x - 0.3], "below": [v, -x + 0.3]}
+    plain = ns.FilippovSystem([x, v], **friction)
+    system = ns.FilippovSystem([x, v], **friction, discrete=[q, p])
+    expected = ns.simulate(plain, [1.0, 0.1], 20.0).events
+    found = ns.simulate(system, [1.0, 0.1, value, 2], 20.0).events
+    assert [e.kind for e in found] == [e.kind for e in expected]
+    assert {"crossing", "entry"} <= {e.kind for e in found}

@@ -1,4 +1,4 @@
-/* Stability of sliding across layers: nonsmooth/flow/core/decide.c has the law at a point.
+/* Stability of sliding across layers: decide.c has the law at a point.
  *
  * In layers of widths e_i, e_i u_i' = a_i - A_ij n_j sat(u_j). With A the matrix of the surfaces that slide in a group,
  * sliding is stable while all eigenvalues of n A / e have positive real parts. From a stable start the first of two

@@ -63,7 +63,7 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
 def device_source(system: FilippovSystem, order: int, threads: int, resident: int = 1) -> str:
     """C++ source of the same engine with a trajectory for each thread, for CUDA or any compiler."""
     head, program = _lanes_head(system, order)
-    sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n"
+    sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n#define RANDOM 0\n"
     texts = map(
         driver_text, ("core/common.h", "kernel/lane.h", "kernel/sines.h", "kernel/polynomials.h")
     )

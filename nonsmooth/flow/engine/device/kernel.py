@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-import threading
-from collections.abc import Sequence
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,18 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....model import Array, FilippovSystem
-from ...constants import HAND_OVER, SIMPLE_KINDS
+from ...constants import SIMPLE_KINDS
 from ...options import Options
 from ...results import Chunk
 from ...status import Status
 from ..building.codegen import device_source
 from .machine import Machine
+from .records import Records, record_type, word_of
 
-#: Kinds of starts, by number in kernel.c.
-_ROWS, _GRID, _BOX = 0, 1, 2
+#: Kinds of starts, by number in cuda.c.
+_ROWS, _GRID, _BOX, _RECORDS = 0, 1, 2, 3
 
 #: What may count without end, in a number of 64 bits.
 _MOST = 2**62
+
+#: Seconds of a launch, so that Python hears Ctrl-C between them; steps of each thread in the first one.
+_SECONDS, _FIRST_STEPS = 0.1, 1000
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,11 @@ class Source:
         signed = seed - (1 << 64) if seed >= 1 << 63 else seed
         return cls(_BOX, signed, np.concatenate([low, high]), np.zeros(1, np.int64))
 
+    @classmethod
+    def records(cls, left: Records) -> Source:
+        """Runs that go on where a step was not clear."""
+        return cls(_RECORDS, 0, np.ascontiguousarray(left).view(np.float64), np.zeros(1, np.int64))
+
 
 @dataclass(frozen=True)
 class Bins:
@@ -77,7 +86,6 @@ class Reduced:
     status: dict[int, int]
     sums: Array
     histogram: NDArray[np.int64]
-    rest: NDArray[np.int64]
 
 
 class Kernel:
@@ -85,19 +93,29 @@ class Kernel:
 
     def __init__(self, system: FilippovSystem, order: int, machine: Machine):
         self.system, self.order, self.machine = system, order, machine
+        self.record = record_type(system)
+        self.steps = _FIRST_STEPS  # of a launch
         self._compiled: tuple[Any, int] | None = None
-        self._lock = threading.Lock()
+        self.lock = machine.lock
 
     @property
     def compiled(self) -> tuple[Any, int]:
         """The kernels, and how many numbers are prepared from the parameters."""
-        with self._lock:
+        with self.lock:
             if self._compiled is None:
                 source = device_source(self.system, self.order, self.machine.threads)
                 size = re.search(r"^#define NQ (\d+)$", source, re.MULTILINE)
                 assert size is not None
                 self._compiled = self.machine.compile(source), int(size[1])
             return self._compiled
+
+    def memory(self, name: str, size: int) -> Any:
+        """Memory of at least so many bytes, which later calls use again."""
+        kept = self.machine.kept
+        if name not in kept or kept[name][0] < size:
+            kept.pop(name, None)  # before there is more
+            kept[name] = size, self.machine.empty(size)
+        return kept[name][1]
 
     def run(
         self,
@@ -108,14 +126,33 @@ class Kernel:
         options: Options,
         at: tuple[int, int] | None,
         out: Chunk,
-    ) -> None:
-        """Run ``count`` trajectories, the first of which has the number ``first`` in its source."""
-        # Those that are rare keep the status HAND_OVER and have no results.
-        memory = self.start(source, first, count, p, options, at)
-        found = _results(count, self.system.dimension, at is not None)
-        for name, array in found.items():
-            self.machine.read(memory[name], array)
-        _fill(out, found, self.system.modes)
+    ) -> Records:
+        """Run ``count`` trajectories, the first of which has the number ``first`` in its source.
+
+        Those that need a step of the driver have the status HAND_OVER; their records are returned.
+        """
+        with self.lock:
+            machine, (kernels, _) = self.machine, self.compiled
+            memory, left = self.start(source, first, count, p, options, at)
+            keys, totals = np.zeros(PLACES, np.int64), np.zeros(2, np.int64)
+            there = [machine.write(keys), self.memory("place", 4 * count), machine.write(totals)]
+            arrays = [memory[name] for name in ("status", "kinds", "steps", "code")]
+            machine.launch(kernels, "numbered", [count, *arrays, PLACES, *there])
+            for name in _READ:
+                if name in memory:
+                    machine.read(memory[name], getattr(out, name))
+            machine.read(there[0], keys)
+            machine.read(there[1], out.itinerary)
+            machine.read(there[2], totals)
+            words = {
+                int(k): word_of(int(keys[k]) - 1, self.system.modes) for k in keys.nonzero()[0]
+            }
+            if out.itinerary.min(initial=0) < 0:
+                words = self._beyond(memory["code"], out, words)
+            out.rename(words)
+            out.totals[:2] += totals
+            out.totals[2] += left
+            return self._records(memory["left"], left)
 
     def start(
         self,
@@ -125,16 +162,17 @@ class Kernel:
         p: Array,
         options: Options,
         at: tuple[int, int] | None,
-    ) -> dict[str, Any]:
-        """Launch them, as :meth:`run` does, and return the memory where their results will be."""
+    ) -> tuple[dict[str, Any], int]:
+        """Run them, as :meth:`run` does: the memory where their results are, and the number of records."""
         machine, n = self.machine, self.system.dimension
         kernels, width = self.compiled
         rows = np.atleast_2d(np.ascontiguousarray(p, float))
-        q = machine.empty(8 * width * len(rows))
+        q = self.memory("q", 8 * width * len(rows))
         given = [len(rows), rows.shape[1], machine.write(rows), q]
         machine.launch(kernels, "parameters", given)
-        sizes = {name: array.nbytes for name, array in _results(count, n, at is not None).items()}
-        memory = {name: machine.empty(size) for name, size in sizes.items()}
+        sizes = _sizes(count, n, at is not None) | {"left": self.record.itemsize * count}
+        memory = {name: self.memory(name, size) for name, size in sizes.items()}
+        own = self.memory("own", (self.record.itemsize + 16) * machine.blocks * machine.threads)
         kind, number = at or (-1, 0)
         arguments = [
             *(count, first, source.kind, source.seed),
@@ -145,88 +183,115 @@ class Kernel:
             *(kind, number),
             *(memory.get(name) for name in _ORDER),
         ]
-        machine.launch(kernels, "trajectories", arguments)
-        return memory
+        counts, is_first = np.zeros(2, np.int64), 1
+        while True:
+            counts[1] = 0
+            there, began = machine.write(counts), time.perf_counter()
+            more = [own, there, is_first, self.steps]
+            machine.launch(kernels, "trajectories", [*arguments, *more])
+            machine.read(there, counts)
+            if not counts[1]:
+                return memory, int(counts[0])
+            is_first = 0
+            faster = _SECONDS / max(time.perf_counter() - began, 1e-9)
+            self.steps = max(1, int(self.steps * min(max(faster, 0.25), 8.0)))
 
-    def reduced(
-        self, source: Source, first: int, count: int, p: Array, options: Options, bins: Bins
-    ) -> Reduced:
-        """Run trajectories as :meth:`run` does, and return what becomes of them."""
-        machine, n, kernels = self.machine, self.system.dimension, self.compiled[0]
-        memory = self.start(source, first, count, p, options, None)
-        sums = np.empty((machine.blocks * machine.threads, n + 1, 2))
-        arrays: dict[str, NDArray[Any]] = {
+    def _records(self, memory: Any, count: int) -> Records:
+        """Records of the runs that were left, in the order of their numbers."""
+        found = np.empty(count, self.record)
+        self.machine.read(memory, found.view(np.int64))
+        return found[np.argsort(found["index"])]
+
+    def _beyond(self, memory: Any, out: Chunk, words: dict[int, str]) -> dict[int, str]:
+        """Itineraries that found no room in a table too."""
+        code = np.empty(len(out.t), np.int64)
+        self.machine.read(memory, code)
+        rows = np.flatnonzero(out.itinerary < 0)
+        more, place = np.unique(code[rows], return_inverse=True)
+        out.itinerary[rows] = PLACES + place
+        modes = self.system.modes
+        return words | {PLACES + k: word_of(c, modes) for k, c in enumerate(more.tolist())}
+
+
+class Reduction:
+    """Sums over runs, kept on the machine."""
+
+    def __init__(self, kernel: Kernel, bins: Bins):
+        self.kernel, self.bins = kernel, bins
+        machine, n = kernel.machine, kernel.system.dimension
+        self._arrays: dict[str, NDArray[Any]] = {
             "histogram": np.zeros((n + 1, bins.count), np.int64),
+            "sums": np.zeros((machine.blocks * machine.threads, n + 1, 2)),
             "keys": np.zeros(PLACES, np.int64),
             "counts": np.zeros(PLACES, np.int64),
             "status": np.zeros(len(Status), np.int64),
-            "left": np.zeros(1, np.int64),
         }
-        there = {name: machine.write(array) for name, array in arrays.items()}
-        there["sums"], there["rest"] = machine.empty(sums.nbytes), machine.empty(8 * count)
-        results = [memory[name] for name in ("x", "t", "status", "code")]
-        ranges = [bins.count, machine.write(bins.low), machine.write(bins.high)]
-        table = [PLACES, *(there[name] for name in ("keys", "counts", "status", "left", "rest"))]
-        arguments = [count, *results, *ranges, there["histogram"], there["sums"], *table]
-        machine.launch(kernels, "outcomes", arguments)
-        arrays["sums"] = sums
+        self._there = {name: machine.write(array) for name, array in self._arrays.items()}
+        self._ranges = [bins.count, machine.write(bins.low), machine.write(bins.high)]
+
+    def add(
+        self, source: Source, first: int, count: int, p: Array, options: Options
+    ) -> tuple[Records, Chunk | None]:
+        """Run trajectories and add what becomes of them, except that of the records and of the chunk."""
+        # The chunk has the runs whose itineraries have no room in the table.
+        kernel, machine, there = self.kernel, self.kernel.machine, self._there
+        with kernel.lock:
+            memory, left = kernel.start(source, first, count, p, options, None)
+            number = np.zeros(1, np.int64)
+            rest = [machine.write(number), kernel.memory("rest", 8 * count)]
+            results = [memory[name] for name in ("x", "t", "status", "code")]
+            sums = [there["histogram"], there["sums"], PLACES]
+            table = [there[name] for name in ("keys", "counts", "status")]
+            arguments = [count, *results, *self._ranges, *sums, *table, *rest]
+            machine.launch(kernel.compiled[0], "outcomes", arguments)
+            machine.read(rest[0], number)
+            others = self._others(memory, rest[1], count, int(number[0])) if number[0] else None
+            return kernel._records(memory["left"], left), others
+
+    def _others(self, memory: Mapping[str, Any], rest: Any, count: int, number: int) -> Chunk:
+        system, machine = self.kernel.system, self.kernel.machine
+        rows, code = np.empty(number, np.int64), np.empty(count, np.int64)
+        machine.read(rest, rows)
+        machine.read(memory["code"], code)
+        whole = Chunk.empty(count, system, False)
+        for name in ("x", "t", "status"):
+            machine.read(memory[name], getattr(whole, name))
+        rows.sort()
+        made = Chunk.empty(number, system, False)
+        made.x[:], made.t[:], made.status[:] = whole.x[rows], whole.t[rows], whole.status[rows]
+        made.kinds[:] = 0
+        more, place = np.unique(code[rows], return_inverse=True)
+        made.itinerary[:] = place
+        made.rename({k: word_of(c, system.modes) for k, c in enumerate(more.tolist())})
+        return made
+
+    def read(self) -> Reduced:
+        """Return the sums."""
+        arrays, modes = self._arrays, self.kernel.system.modes
         for name, array in arrays.items():
-            machine.read(there[name], array)
-        rest = np.empty(int(arrays["left"][0]), np.int64)
-        machine.read(there["rest"], rest)
+            self.kernel.machine.read(self._there[name], array)
         used = np.flatnonzero(arrays["counts"])
         codes, counts = arrays["keys"][used] - 1, arrays["counts"][used]
-        modes = self.system.modes
         words = zip(codes.tolist(), counts.tolist(), strict=True)
         return Reduced(
             words={word_of(code, modes): number for code, number in words},
             status={k: m for k, m in enumerate(arrays["status"].tolist()) if m},
-            sums=sums.sum(axis=0),
+            sums=arrays["sums"].sum(axis=0),
             histogram=arrays["histogram"],
-            rest=np.sort(rest),
         )
 
 
-#: Different itineraries that a card counts at once, a power of two; what finds no room runs elsewhere.
+#: Different itineraries that a card counts at once, a power of two.
 PLACES = 1 << 14
 
-#: Results, in the order in which the kernel takes them.
-_ORDER = ("x", "t", "status", "kinds", "steps", "code", "at_x", "at_t")
+#: Results, in the order in which the kernel takes them; those that have their names in a chunk.
+_ORDER = ("x", "t", "status", "kinds", "steps", "code", "at_x", "at_t", "left")
+_READ = ("x", "t", "status", "kinds", "at_x", "at_t")
 
 
-def _results(count: int, n: int, at: bool) -> dict[str, NDArray[Any]]:
-    """Arrays for what a kernel writes."""
-    found: dict[str, NDArray[Any]] = {
-        "x": np.empty((count, n)),
-        "t": np.empty(count),
-        "status": np.empty(count, np.int32),
-        "kinds": np.empty((count, SIMPLE_KINDS), np.int32),
-        "steps": np.empty(count, np.int32),
-        "code": np.empty(count, np.int64),
-    }
-    return found | ({"at_x": np.empty((count, n)), "at_t": np.empty(count)} if at else {})
-
-
-def _fill(out: Chunk, found: dict[str, NDArray[Any]], modes: Sequence[str]) -> None:
-    """Put results into a chunk, with the itineraries as words."""
-    for name in ("x", "t", "status", "kinds"):
-        getattr(out, name)[...] = found[name]
-    if out.at_x is not None and out.at_t is not None:
-        out.at_x[...], out.at_t[...] = found["at_x"], found["at_t"]
-    handed = out.status == HAND_OVER
-    code = np.where(handed, 0, found["code"])
-    codes, place = np.unique(code, return_inverse=True)
-    out.itinerary[...] = place.reshape(-1)
-    out.rename({k: word_of(c, modes) for k, c in enumerate(codes.tolist())})
-    out.totals[0] += int(found["steps"].sum(dtype=np.int64))
-    out.totals[1] += int(found["kinds"][:, :-1].sum(dtype=np.int64))
-    out.totals[2] += int(handed.sum())
-
-
-def word_of(code: int, modes: Sequence[str]) -> str:
-    """Return an itinerary from its code: digits from 1 to base 4, the last mode lowest."""
-    letters = []
-    while code:
-        letters.append(modes[(code & 3) - 1] or "o")
-        code >>= 2
-    return " ".join(reversed(letters))
+def _sizes(count: int, n: int, at: bool) -> dict[str, int]:
+    """Bytes of what a kernel writes, but the records."""
+    each = {"x": 8 * n, "t": 8, "status": 1, "kinds": 4 * SIMPLE_KINDS, "steps": 4, "code": 8}
+    if at:
+        each |= {"at_x": 8 * n, "at_t": 8}
+    return {name: size * count for name, size in each.items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -17,11 +18,14 @@ DEVICES = ("cuda",)
 
 
 class DeviceError(NonsmoothError, RuntimeError):
-    """There is no GPU to run on, or what drives it is missing; the message says what to install."""
+    """There is no GPU to run on, what drives it is missing, or it failed; the message says what to do."""
 
 
 class Machine(Protocol):
-    """Where kernels run."""
+    """Where kernels run; ``kept`` is memory that all calls use, one after the other under the ``lock``."""
+
+    lock: threading.RLock
+    kept: dict[str, tuple[int, Any]]
 
     @property
     def name(self) -> str:
@@ -51,11 +55,7 @@ class Machine(Protocol):
         ...
 
     def read(self, memory: Any, array: NDArray[Any]) -> None:
-        """Fill an array from memory, after all that was launched."""
-        ...
-
-    def wait(self) -> None:
-        """Return when all that was launched is done."""
+        """Fill an array from the beginning of memory, after all that was launched."""
         ...
 
     def launch(self, kernels: Any, name: str, arguments: Sequence[Argument]) -> None:

@@ -1,6 +1,7 @@
 """The kernels' text as C++ on this processor, block by block and thread by thread, in the place of a card."""
 
 import ctypes
+import threading
 
 import numpy as np
 
@@ -20,17 +21,20 @@ FLAGS = ("-march=native", "-x", "c++", "-std=gnu++17", "-fno-exceptions", "-fno-
 class Shim:
     """A device whose threads run one after the other, each what would be its share.
 
-    ``fused``: whether the compiler may fuse products and sums; ``flags``: more for the compiler.
+    ``fused``: whether the compiler may fuse products and sums; ``flags``: more for the compiler; ``random``: a number
+    for which every other step, at random, is the driver's.
     """
 
     name = "this processor, as a GPU"
 
-    def __init__(self, fused=True, blocks=2, threads=3, flags=()):
+    def __init__(self, fused=True, blocks=2, threads=3, flags=(), random=0):
+        self.random, self.lock, self.kept = random, threading.RLock(), {}
         self.blocks, self.threads = blocks, threads
         self.flags = (*FLAGS, f"-ffp-contract={'fast' if fused else 'off'}", *flags)
 
     def compile(self, source):
         fast_tests = ("-O0",) if "-O0" in engine.FLAGS else ()
+        source = source.replace("#define RANDOM 0\n", f"#define RANDOM {self.random}\n")
         return build(source + STAND, (*self.flags, *fast_tests))
 
     def empty(self, size):
@@ -41,9 +45,6 @@ class Shim:
 
     def read(self, memory, array):
         array[...] = memory[: array.nbytes].view(array.dtype).reshape(array.shape)
-
-    def wait(self):
-        pass
 
     def launch(self, kernels, name, arguments):
         values = []

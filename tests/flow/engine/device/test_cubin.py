@@ -1,5 +1,6 @@
 """The kernels compile to machine code of three generations of cards, with the registers and the stack that they are
-known to need: what spills more than that was made slower by a change."""
+known to need. On an H200 the same kernels with 168 and 128 registers, which spill 1.8 to 2.6 and 2.5 to 4.6 times
+as many bytes, made 0.47 to 0.63 and 0.31 to 0.38 times the bounces a second of those with 255."""
 
 import ctypes
 import importlib.util
@@ -12,6 +13,7 @@ import pytest
 from benchmarks.problems import bounce_system
 from nonsmooth.flow.engine.building.codegen import device_source
 from nonsmooth.flow.engine.device.card import Card
+from nonsmooth.flow.ensembles.on_device import device_order
 from nonsmooth.flow.options import Options
 
 
@@ -83,22 +85,22 @@ pytestmark = [
 
 #: Bytes of stack, and of spills written and read, of NVRTC 13.5 and at most an eighth more.
 CEILINGS = {
-    ("linear", "sm_80"): (850, 970, 900),
-    ("linear", "sm_90"): (820, 955, 910),
-    ("linear", "sm_100"): (640, 640, 730),
-    ("nonlinear", "sm_80"): (985, 1155, 1090),
-    ("nonlinear", "sm_90"): (1045, 1210, 1285),
-    ("nonlinear", "sm_100"): (1115, 1260, 1330),
+    ("linear", "sm_80"): (655, 675, 690),
+    ("linear", "sm_90"): (690, 710, 725),
+    ("linear", "sm_100"): (360, 360, 380),
+    ("nonlinear", "sm_80"): (825, 875, 865),
+    ("nonlinear", "sm_90"): (825, 850, 945),
+    ("nonlinear", "sm_100"): (835, 890, 945),
 }
 
 
 @pytest.mark.parametrize(("name", "arch"), CEILINGS)
 def test_registers_and_stack(name, arch):
-    source = device_source(bounce_system(name), Options(t_end=1.0).order, Card.threads)
+    source = device_source(bounce_system(name), device_order(Options(t_end=1.0)), Card.threads)
     found = compiled(source, arch, "trajectories")
     assert found.code[:4] == b"\x7fELF"
-    # Two blocks of a card fill its registers: 65,536 of a multiprocessor.
-    assert found.registers <= 255 and 2 * Card.threads * 256 <= 65536
+    # A block fills the registers of a multiprocessor, 65,536.
+    assert found.registers <= 255 and Card.threads * 256 <= 65536
     stack, stores, loads = CEILINGS[name, arch]
     assert (found.stack <= stack, found.stores <= stores, found.loads <= loads) == (True,) * 3, (
         found

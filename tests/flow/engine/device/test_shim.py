@@ -10,9 +10,12 @@ from benchmarks.problems import bounce_system, random_starts
 from nonsmooth.flow.constants import HAND_OVER
 from nonsmooth.flow.engine import find_compiler
 from nonsmooth.flow.engine import lanes as engine
-from nonsmooth.flow.engine.device.kernel import word_of
+from nonsmooth.flow.engine.device import kernel as kernel_module
+from nonsmooth.flow.engine.device.kernel import Kernel, Source
+from nonsmooth.flow.engine.device.records import FROZEN, word_of
 from nonsmooth.flow.ensembles import on_device
 from nonsmooth.flow.options import Options
+from nonsmooth.flow.results import Chunk
 from tests.flow.engine.device.cases import TAKEN, block_on_a_belt, ends
 from tests.flow.engine.device.shim import Shim
 
@@ -76,8 +79,8 @@ def test_same_bits_with_parameters_of_each_start(system, shim, monkeypatch):
 
 
 def test_an_ensemble_there_is_the_ensemble_here(system, as_card):
-    """All starts, with what is handed over: itineraries and events equal, states to the tolerance's rounding."""
-    options = dict(t_end=3.0, tol=1e-5, at_event=("entry", 1))
+    """All starts, with those that fall back: itineraries and events equal, states to the tolerance."""
+    options = dict(t_end=3.0, tol=1e-8, at_event=("entry", 1))
     x = STARTS.copy()
     x[7] = np.nan
     there = ns.ensemble(system, x, device="cuda", **options)
@@ -87,7 +90,7 @@ def test_an_ensemble_there_is_the_ensemble_here(system, as_card):
     for kind, count in here.events.items():
         assert np.array_equal(there.events[kind], count), kind
     for name in ("x", "t", "event_x", "event_t"):
-        np.testing.assert_allclose(getattr(there, name), getattr(here, name), rtol=0, atol=1e-7)
+        np.testing.assert_allclose(getattr(there, name), getattr(here, name), rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -120,19 +123,105 @@ def test_a_share_of_threads_changes_nothing(system):
         assert np.array_equal(results[0].itinerary, other.itinerary)
 
 
-def test_itineraries_too_long_for_a_number_are_run_here(as_card):
+def clock():
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    clock = ns.FilippovSystem([x, y], surface=x, above=[y, -1 - x], below=[y, 1 - x])
-    there = ns.ensemble(clock, [[1.0, 0.0], [0.01, 0.0]], 10.0, tol=1e-6, device="cuda")
-    here = ns.ensemble(clock, [[1.0, 0.0], [0.01, 0.0]], 10.0, tol=1e-6)
-    assert len(here.itinerary[1].split()) > 30
+    return ns.FilippovSystem([x, y], surface=x, above=[y, -1 - x], below=[y, 1 - x])
+
+
+@pytest.mark.parametrize("random", [0, 5])
+def test_of_long_itineraries_the_first_modes_are_kept(monkeypatch, random):
+    monkeypatch.setattr(on_device, "machine_for", lambda device: Shim(fused=False, random=random))
+    starts, options = [[1.0, 0.0], [0.01, 0.0], [0.1, 0.0]], dict(t_end=10.0, tol=1e-6)
+    there, here = (ns.ensemble(clock(), starts, device=d, **options) for d in ("cuda", None))
+    words = here.itinerary.tolist()
+    counts = [len(word.split()) for word in words]
+    assert counts[0] < 30 < counts[1]
+    words = [word if len(word) < 60 else word[:60] + "..." for word in words]
+    assert there.itinerary.tolist() == words
+    assert np.array_equal(there.events["crossing"], here.events["crossing"])
+    np.testing.assert_allclose(there.x, here.x, rtol=0, atol=1e-6)
+    found = ns.outcomes(clock(), starts, device="cuda", **options)
+    assert found.itineraries == dict.fromkeys(words, 1)
+
+
+def test_modes_that_are_kept_stay_where_a_step_is_not_clear(as_card):
+    """The run falls back at its last event, after many modes for which there was no room."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    spiral = ns.FilippovSystem([x, y], surface=x, above=[y, -1 - 2 * y], below=[y, 1 - 2 * y])
+    runs = ns.ensemble(spiral, [[-1.0, 0.3]], 40.0, tol=1e-8, max_events=100, device="cuda")
+    assert runs.status == [ns.Status.TOO_MANY_EVENTS]
+    assert runs.itinerary[0] == "- + " * 15 + "..."
+
+
+@pytest.mark.parametrize(("name", "random"), [("belt", 1), ("belt", 2), ("linear", 3)])
+def test_runs_go_on_where_the_card_left_them(name, random, monkeypatch):
+    """Every other step is the driver's: events and itineraries are equal, and numbers to the tolerance."""
+    belt = name == "belt"
+    system = block_on_a_belt() if belt else bounce_system(name)
+    x = STARTS[:100].copy() if belt else random_starts(100, seed=5)
+    x[3], x[5] = np.nan, 0.0
+    p = {"friction": np.linspace(0.2, 0.5, 100)} if belt else {}
+    options = dict(tol=1e-7, parameters=p, at_event=("entry", 1), t_end=3.0 if belt else 100.0)
+    here = ns.ensemble(system, x, **options)
+    shim = Shim(random=random)
+    monkeypatch.setattr(on_device, "machine_for", lambda device: shim)
+    there = ns.ensemble(system, x, device="cuda", **options)
     assert there.itinerary.tolist() == here.itinerary.tolist()
+    assert np.array_equal(there.status, here.status)
+    for kind, count in here.events.items():
+        assert np.array_equal(there.events[kind], count), kind
+    for one in ("x", "t", "event_x", "event_t"):
+        np.testing.assert_allclose(getattr(there, one), getattr(here, one), rtol=0, atol=1e-5)
+    assert np.isfinite(there.event_t).sum() > 10
+    # Which runs go on together changes nothing.
+    pieces = ns.ensemble(system, x, device="cuda", work=ns.Work(chunk=7, threads=3), **options)
+    assert np.array_equal(pieces.x, there.x, equal_nan=True)
+    assert np.array_equal(pieces.event_t, there.event_t, equal_nan=True)
+    assert pieces.itinerary.tolist() == there.itinerary.tolist()
+
+
+def test_launches_are_bounded(system, monkeypatch):
+    """What a launch has no steps for goes on in the next one, to the same bits."""
+    p, found = system.parameter_vector(), []
+    for steps in (10**6, 1, 3):
+        shim = Shim(fused=False)
+        launched = []
+        monkeypatch.setattr(
+            shim, "launch", lambda *a, f=shim.launch, n=launched: (n.append(a[1]), f(*a))
+        )
+        kernel = Kernel(system, LOOSE.order, shim)
+        kernel.steps = steps
+        monkeypatch.setattr(kernel_module, "_SECONDS", 0.0)  # the number of steps does not grow
+        chunk = Chunk.empty(len(STARTS), system, True)
+        left = kernel.run(Source.rows(STARTS), 0, len(STARTS), p, LOOSE, (2, 1), chunk)
+        found.append((chunk, left))
+        assert (launched.count("trajectories") > 20) == (steps < 4)
+    for chunk, left in found[1:]:
+        for name, array in found[0][0].arrays().items():
+            assert np.array_equal(getattr(chunk, name), array, equal_nan=name.startswith("at")), (
+                name
+            )
+        assert np.array_equal(left, found[0][1]) and left.size
+
+
+def test_codes_beyond_the_table(system, as_card, monkeypatch):
+    options = dict(t_end=3.0, tol=1e-5)
+    whole = ns.ensemble(system, STARTS, device="cuda", **options)
+    counted = ns.outcomes(system, STARTS, device="cuda", ranges={"x": (-1, 1)}, **options)
+    monkeypatch.setattr(kernel_module, "PLACES", 2)
+    few = ns.ensemble(system, STARTS, device="cuda", **options)
+    assert few.itinerary.tolist() == whole.itinerary.tolist()
+    again = ns.outcomes(system, STARTS, device="cuda", ranges={"x": (-1, 1)}, **options)
+    assert again.itineraries == counted.itineraries and again.status == counted.status
+    assert np.array_equal(again.histogram["x"], counted.histogram["x"])
+    assert again.mean["v"] == pytest.approx(counted.mean["v"])
 
 
 def test_codes_are_read_from_the_first_mode_on():
     assert word_of(0, "+-s") == ""
     assert word_of(4 * (4 * 1 + 3) + 2, ("+", "-", "s")) == "+ s -"
     assert word_of(1, ("",)) == "o"
+    assert word_of(FROZEN + 1, "+-s") == "+ ..."
 
 
 @pytest.mark.slow

@@ -98,6 +98,21 @@ def test_steps_made_by_the_driver_at_random(width, name, monkeypatch):
     assert 0.45 < mixed.totals[2] / mixed.totals[0] < 0.6
 
 
+def test_runs_that_begin_late(monkeypatch):
+    """The time of a state is since the start in the driver, and that of the clock in lanes."""
+    above, below = [y, -x - 0.4], [y, -x + 0.4]
+    system = ns.FilippovSystem(
+        [x, y], surface=y - 0.3 * ca.sin(t), above=above, below=below, time=t
+    )
+    options, p = Options(t_start=1e3, t_end=1e3 + 9, rtol=1e-9), system.parameter_vector()
+    start = starts_of(system, 2.0, 40) + np.array([0, 0, 1e3])
+    scalar = tape_for(system, options).run_many(start, p, options, (1, 1))
+    assert (scalar.status == ns.Status.REACHED_END).all()
+    lanes = lanes_of(system, options.order, 4, monkeypatch)
+    lanes.random = 5
+    same(lanes.run_many(start, p, options, (1, 1)), scalar, 1e-7)
+
+
 def test_parameters_of_each_start(monkeypatch):
     a = ca.SX.sym("a")
     fields = {"above": [y, -x - a], "below": [y, -x + a]}

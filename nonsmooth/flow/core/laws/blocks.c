@@ -283,6 +283,7 @@ static int class_of_vector(const Block *k, int i, const double *nu, double part)
     room = larger(larger(room_zero(k, i + j, own, bound), part * bound), room);
   }
   if (k->state[i] >= INSIDE) return k->state[i];
+  if (k->is_coupled) room = VANISHES * bound; /* loads are shared anew until all are at their bounds */
   if (length_of(w, size) > zero) return ABOVE;
   if (bound <= room) return UNDECIDED;
   return bound - length_of(nu + i, size) <= room ? AT_TOP : INSIDE;
@@ -503,24 +504,35 @@ static int relax_from(const Block *k, double *nu, double most) {
   return finite_all(nu, n) && (!k->is_coupled || change <= TIED * most);
 }
 
-/* The solution of a block with vectors, symmetric but for loads, from the smallest nu with w = 0 on, in units of bounds
- * where these are loads: then what depends on one another shares. */
+/* Whether w = 0 of all, which nu is to keep, needs no element to leave its bounds. */
+static int needs_no_bound(const Block *k, const double *nu) {
+  for (int i = 0; i < k->size; i++) {
+    int size = span_of(k, i), ends = k->state[i] == ABOVE || k->state[i] == BELOW;
+    if (ends || (k->is_contact[i] ? nu[i] < 0 : size > 0 ? length_of(nu + i, size) > (1 + TIED) * bound_of(k, i, nu) : 0)) return 0;
+  }
+  return 1;
+}
+
+/* The solution of a block with vectors, symmetric but for loads, from the smallest nu with w = 0 on. Loads that are not
+ * determined are shared in proportion to the bounds, in units of whose roots nu is the smallest. */
 static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
   int n = k->size;
-  double *unit = work, *inverse = unit + n;
+  double *unit = work, *inverse = unit + n, *last = inverse + 4 * (int64_t)n * n + n, most = 0, change = INFINITY;
   for (int i = 0; i < n; i++) unit[i] = 1;
-  for (int pass = 0; pass <= k->is_coupled; pass++) {
-    double most = 0;
+  for (int pass = 0; pass < (k->is_coupled ? 60 : 1) && change > VANISHES * most; pass++) {
+    most = change = 0;
     invert_any(k->matrix, n, unit, inverse, inverse + (int64_t)n * n, pivot);
     for (int i = 0; i < n; i++) {
       nu[i] = 0;
       for (int j = 0; j < n; j++) nu[i] += inverse[i * n + j] * k->a[j];
       most = larger(larger(fabs(k->b[i]), fabs(nu[i])), most);
+      change = pass ? larger(fabs(nu[i] - last[i]), change) : INFINITY;
+      last[i] = nu[i];
     }
-    if (!relax_from(k, nu, most)) return 0;
-    for (int i = 0; i < n; i++) unit[i] = larger(k->is_contact[i] ? nu[i] : bound_of(k, i, nu), MERGED * (most > 0 ? most : 1));
+    for (int i = 0; i < n; i++)
+      unit[i] = sqrt(larger(k->is_contact[i] ? nu[i] : bound_of(k, i, nu), MERGED * (most > 0 ? most : 1)));
   }
-  return 1;
+  return (k->is_coupled && needs_no_bound(k, nu)) || relax_from(k, nu, most);
 }
 
 /* Solutions of a block that is not of one element: one where a certificate or the size says so. */
@@ -531,6 +543,11 @@ static int solve_block_of_many(const Block *k, int certificate, int8_t *position
   if (k->span) return relax(k, found, work, pivot);
   int most = certificate >= UNIQUE ? 10000 : 20 + 4 * k->size;
   int solved = pivot_block(k, position, found, most, work, pivot) || lemke_block(k, found, work, pivot);
+  if (!solved && k->is_coupled) { /* those at a bound keep it */
+    for (int i = 0; i < k->size; i++)
+      position[i] = k->state[i] == AT_TOP ? TOP : k->state[i] == AT_BOTTOM ? BOTTOM : position[i];
+    solved = pivot_block(k, position, found, most, work, pivot);
+  }
   if (solved && certificate < UNIQUE) move_inside(k, found, work, pivot);
   return solved;
 }

@@ -228,6 +228,7 @@ static int invert_layer(Run *r, const Layout *l, const double *unknowns, double 
     most = larger(size[i], most);
   }
   for (int i = 0; i < n; i++) size[i] = larger(size[i], MERGED * (most > 0 ? most : 1));
+  for (int i = 0; r->s->sets && r->c && i < n; i++) size[i] = sqrt(size[i]); /* shares in proportion to the bounds */
   return invert_any(m, n, size, inverse, size + n, r->pending) && 0;
 }
 

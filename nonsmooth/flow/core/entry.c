@@ -115,8 +115,8 @@ static size_t place_run(Run *r, char *base) {
   r->active = INTEGERS(w);
   r->involved = INTEGERS(3 * w + 4 * all + 1);
   r->p = DOUBLES(s->parameters);
-  r->series = DOUBLES(pair_room(s->series.size, stride));
-  r->rounding = DOUBLES(s->series.size);
+  r->series = DOUBLES(series_room(&s->series, stride));
+  r->rounding = DOUBLES(s->series.size * stride);
   r->point = DOUBLES(pair_room(s->point.size, 1));
   r->heights = DOUBLES(pair_room(s->surfaces.size, 1));
   r->maps = DOUBLES(pair_room(s->maps.size, 1));
@@ -226,7 +226,7 @@ static void set_parameters(Run *r, const double *p) {
   const Values *program[] = {&s->point, &s->surfaces, &s->maps, &s->restitution, &s->columns, &s->atoms, &s->choices};
   double *work[] = {r->point, r->heights, r->maps, r->restitution, r->columns, r->atom_work, r->choice_work};
   memcpy(r->p, p, sizeof(double) * s->parameters);
-  series_prepare(&s->series, r->stride, r->p, r->series);
+  series_prepare(&s->series, r->p, r->series);
   pairs_begin(s->series.size, r->stride, r->begun, r->series);
   for (int k = 0; k < 7; k++) {
     values_prepare(program[k], r->p, work[k]);

@@ -53,8 +53,6 @@ typedef struct {
   int32_t affine; /* whether all unknowns enter linearly together */
   int32_t sets, kept_rows, impact_law, joints; /* sets: of codimension two and more; kept_rows: see Element */
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
-  const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
-  int32_t early_count, early_free_count;
   Rules rules;
   Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
   const Series *implicit; /* with those derivatives, for implicit steps, or none */

@@ -154,7 +154,7 @@ static void rate_along(Run *r, const Layout *l, const double *unknowns, int own,
     if (k == 0) memcpy(lam, unknowns, sizeof(double) * r->width);
     if (k == 1) lam[own] = 1;
     set_inputs(r, x, k ? r->none : r->held, lam);
-    series_at(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
+    series_at(t, k ? &t->later : &t->moving, k, r->stride, r->input, r->series);
     g[k] = row_of(r, r->n + own)[k];
   }
 }
@@ -537,7 +537,7 @@ static void rules_of(Run *r, const Expansion *f, int k) {
   for (int i = 0; i < r->n; i++) x[i] = f->states[(int64_t)i * r->stride + k];
   for (int i = 0; i < r->width; i++) lam[i] = f->series[(int64_t)i * r->stride + k];
   set_inputs(r, x, k ? r->none : r->held, lam);
-  series_at(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, r->stride, r->input, r->series);
+  series_at(t, k ? &t->later : &t->moving, k, r->stride, r->input, r->series);
 }
 
 /* Series in the multiplier of sliding[lead], which moves in a direction, of states, of the others and of the rate

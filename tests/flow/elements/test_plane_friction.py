@@ -437,6 +437,31 @@ def test_a_set_is_held_or_left_by_the_first_order_that_says_so(pull, leaves, loa
         assert run.events[0].t == pytest.approx(leaves, abs=1e-12)
 
 
+@pytest.mark.parametrize("beside", [0, 1])
+@pytest.mark.parametrize("k", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_friction_without_symmetry_leaves_along_its_direction(seed, k, beside):
+    """(M + s) u = a and |u| = 1: h = s t u is a straight line, also beside a surface that it drives and is held."""
+    rng = np.random.default_rng(seed)
+    n = k + beside
+    m = np.diag(rng.uniform(1, 2, n))
+    m += 0.6 * np.triu(rng.normal(size=(n, n)), 1) - 0.4 * np.tril(rng.normal(size=(n, n)), -1)
+    u, speed = rng.normal(size=k), 0.7
+    u /= np.linalg.norm(u)
+    h, lam, held = ca.SX.sym("h", n), ca.SX.sym("lam", k), ca.SX.sym("held", beside)
+    force = ca.vertcat(lam, held)
+    a = m @ np.append(u, [0.3] * beside) + speed * np.append(u, [0.0] * beside)
+    system = ns.FilippovSystem(
+        h,
+        field=ca.DM(a) - ca.mtimes(ca.DM(m), force),
+        surfaces=[h[:k], *ca.vertsplit(h[k:])[:beside]],
+        multipliers=[lam, *ca.vertsplit(held)[:beside]],
+    )
+    run = ns.simulate(system, np.zeros(n), 2.0)
+    assert run.itinerary == "*" + "s" * beside and run.status is ns.Status.REACHED_END
+    assert run.x[-1] == pytest.approx(np.append(2.0 * speed * u, [0.0] * beside), abs=1e-12)
+
+
 def test_sets_and_surfaces_that_act_on_one_another_in_any_units():
     """Coupled symmetric friction is the gradient of a convex dissipation: w and the motion are unique."""
     h, scale = ca.SX.sym("h", 5), 1 + 0.5 * ca.sin(2 * T)

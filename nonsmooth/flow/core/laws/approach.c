@@ -3,36 +3,45 @@
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int change_kind(const Run *r, int before, int after);
 
-/* h' = a - M lambda of the functions ``own``, with what else slides eliminated; 0 where that is impossible. */
-static int freeze(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
-                  double *a, double *m) {
+/* The law at a state with multipliers of the functions ``own`` (or 0) that are given; what slides beside them is listed
+ * as r->pending. Their number. */
+static int beside(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
+                  const double *lam) {
   int w = r->width, count = 0;
-  int32_t *others = r->pending;
   aim(r, letter, x, unknowns);
   held_of(r, letter);
   for (int i = 0; i < w; i++) {
-    int mine = 0;
-    for (int j = 0; j < k; j++) mine |= own[j] == i;
-    if (mine) r->held[i] = 0;
-    else if (letter[i] == 0 && !is_idle(r, letter, i)) others[count++] = i;
+    int mine = -1;
+    for (int j = 0; j < k; j++) if (own[j] == i) mine = j;
+    if (mine >= 0) r->held[i] = lam ? lam[mine] : 0;
+    else if (letter[i] == 0 && !is_idle(r, letter, i)) r->pending[count++] = i;
   }
-  double factor[3];
-  for (int i = r->m; i < w; i++) if (letter[i] == 0) r->held[i] = unknowns[i]; /* loads of friction */
   error_scales(r, x, r->held, r->none);
-  for (int i = 0; i < k; i++) factor[i] = factor_of(r, own[i]);
-  for (int i = r->m; i < w; i++) r->held[i] = 0;
-  if (r->c) error_scales(r, x, r->held, r->none);
+  return count;
+}
+
+/* The unknowns of what slides beside, in place of rates b that they take away; 0 where there are none. */
+static int balance(Run *r, int count, double *b) {
+  double *d = r->work;
+  for (int i = 0; i < count; i++)
+    for (int j = 0; j < count; j++) d[i * count + j] = r->slope[r->pending[i] * r->width + r->pending[j]];
+  return !count || solve_any(d, b, count, INFINITY, d + (int64_t)count * count, r->decision->pivot);
+}
+
+/* h' = a - M lambda of the functions ``own``, with what else slides eliminated; 0 where that is impossible. */
+static int freeze(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
+                  double *a, double *m) {
+  int w = r->width, count = beside(r, letter, x, unknowns, own, k, 0);
+  const int32_t *others = r->pending;
+  double *b = r->later;
   for (int i = 0; i < k; i++) {
     a[i] = layer_of(r, own[i]);
-    for (int j = 0; j < k; j++) m[i * k + j] = -r->slope[own[i] * w + own[j]] * factor[j];
+    for (int j = 0; j < k; j++) m[i * k + j] = -r->slope[own[i] * w + own[j]] * factor_of(r, own[j]);
   }
   for (int column = 0; count && column <= k; column++) {
-    double *d = r->work, *b = d + (int64_t)count * count;
-    for (int i = 0; i < count; i++) {
-      for (int j = 0; j < count; j++) d[i * count + j] = r->slope[others[i] * w + others[j]];
-      b[i] = column == k ? layer_of(r, others[i]) : r->slope[others[i] * w + own[column]] * factor[column];
-    }
-    if (!solve_any(d, b, count, INFINITY, b + count, r->decision->pivot)) return 0;
+    for (int i = 0; i < count; i++)
+      b[i] = column == k ? layer_of(r, others[i]) : r->slope[others[i] * w + own[column]] * factor_of(r, own[column]);
+    if (!balance(r, count, b)) return 0;
     for (int i = 0; i < k; i++) {
       double through = 0;
       for (int j = 0; j < count; j++) through += r->slope[own[i] * w + others[j]] * b[j];
@@ -43,28 +52,14 @@ static int freeze(Run *r, const int8_t *letter, const double *x, const double *u
 }
 
 /* The field with given multipliers of a set, and what slides elsewhere in balance. */
-static int field_with(Run *r, const int8_t *letter, const double *x, const double *unknowns, int first, int k,
+static int field_with(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
                       const double *lam, double *field) {
-  int w = r->width, count = 0;
-  int32_t *others = r->pending;
-  double *acting = r->later;
-  aim(r, letter, x, unknowns);
-  held_of(r, letter);
-  for (int i = 0; i < k; i++) r->held[first + i] = lam[i];
-  for (int i = 0; i < w; i++) {
-    acting[i] = 0;
-    if (letter[i] == 0 && (i < first || i >= first + k) && !is_idle(r, letter, i)) others[count++] = i;
-  }
-  if (count) {
-    double *d = r->work, *b = d + (int64_t)count * count;
-    error_scales(r, x, r->held, r->none);
-    for (int i = 0; i < count; i++) {
-      for (int j = 0; j < count; j++) d[i * count + j] = r->slope[others[i] * w + others[j]];
-      b[i] = -layer_of(r, others[i]);
-    }
-    if (!solve_any(d, b, count, INFINITY, b + count, r->decision->pivot)) return 0;
-    for (int i = 0; i < count; i++) acting[others[i]] = b[i];
-  }
+  int count = beside(r, letter, x, unknowns, own, k, lam);
+  double *acting = r->later, *b = r->small;
+  for (int i = 0; i < count; i++) b[i] = -layer_of(r, r->pending[i]);
+  if (!balance(r, count, b)) return 0;
+  memset(acting, 0, sizeof(double) * r->width);
+  for (int i = 0; i < count; i++) acting[r->pending[i]] = b[i];
   set_inputs(r, x, r->held, acting);
   first_values(r, 0);
   for (int i = 0; i < r->n; i++) field[i] = row_of(r, i)[0];
@@ -164,7 +159,7 @@ static void near_set(Run *r, int row, int fell) {
       for (int i = 0; i < k; i++) b[i] = a[i] + h[i] / dt;
       solve_vector(m, k, 0, b, mean);
     }
-    int good = field_with(r, r->letter, r->x, r->unknowns, f, k, mean, field);
+    int good = field_with(r, r->letter, r->x, r->unknowns, own, k, mean, field);
     for (int i = 0; i < n; i++) end[i] = r->x[i] + dt * field[i];
     good = good && freeze(r, r->letter, end, r->unknowns, own, k, a2, m2);
     if (!good) { finish(r, NOT_FINITE, FIELD, 0); return; }
@@ -172,9 +167,9 @@ static void near_set(Run *r, int row, int fell) {
     for (int i = 0; i < k * k; i++) bend += fabs(m2[i] - m[i]);
     bend *= dt;
     if (!at_floor) {
-      field_with(r, r->letter, r->x, r->unknowns, f, k, u, other);
+      field_with(r, r->letter, r->x, r->unknowns, own, k, u, other);
       for (int i = 0; i < n; i++) turn[i] = fabs(field[i] - other[i]);
-      field_with(r, r->letter, end, r->unknowns, f, k, mean, other);
+      field_with(r, r->letter, end, r->unknowns, own, k, mean, other);
       for (int i = 0; i < n; i++) {
         double allowed = i < r->s->dimension ? REACHED * SAFETY * (r->o.atol + r->o.rtol * fabs(r->x[i])) : 0;
         allowed += EPSILON * (r->size + fabs(r->x[i]));

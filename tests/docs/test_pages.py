@@ -32,7 +32,7 @@ def check_block(name, line, source, wanted, namespace):
         assert agrees, f"{name}:{line}: expected\n{wanted}\nprinted\n{printed.getvalue()}"
 
 
-@pytest.mark.slow_cases("branches", "coming_from", "golf", "recipes", "start")
+@pytest.mark.slow_cases("branches", "coming_from", "golf", "recipes", "start", "trades")
 @pytest.mark.parametrize(
     "page",
     [

@@ -427,6 +427,7 @@ static void step(Run *r) {
   if (q.row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
   if (q.dt > 0) note_sides(r, e, q.dt);
   r->falls = q.row >= 0 && is_steep(r, e, q.row, q.dt);
+  if (q.row >= 0 && r->now.kind[q.row] != IMPACT_GUARD) note_hidden(r, e, q.row); /* slow impacts accumulate */
   if (!advance(r, e, q.dt)) return;
   if (q.last) {
     r->t = r->o.t_end;

@@ -140,6 +140,20 @@ def test_a_table_that_slides_stops_where_a_block_does(feet, mu):
     np.testing.assert_allclose(run.x[-1], [*velocity * stop / 2, *[0] * 10], atol=1e-11)
 
 
+@pytest.mark.parametrize("feet", [THREE, FOUR])
+def test_a_table_that_is_pulled_slips_where_a_block_does(feet):
+    """No foot slips before all do, however they share the load."""
+    t, mu, end = ca.SX.sym("t"), 0.3, 2.0
+    system = table(mu, feet, pull=(2 * t, t), time=t)
+    run = ns.simulate(system, [0] * 12, end)
+    slips, n = mu * G / np.sqrt(5), len(feet)
+    assert run.itinerary == f"{'s' * n}{'c' * n} {'*' * n}{'c' * n}"
+    assert abs(run.events[0].t - slips) < 1e-9
+    speed = np.sqrt(5) / 2 * (end**2 - slips**2) - mu * G * (end - slips)
+    np.testing.assert_allclose(run.x[-1, 6:8], speed * np.array([2, 1]) / np.sqrt(5), atol=1e-8)
+    np.testing.assert_allclose(run.x[-1, 8:], 0.0, atol=1e-8)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.3, 0.2), (1.0, 0.5)])
 def test_a_table_falls_on_four_feet_and_slides_on(velocity):

@@ -12,7 +12,7 @@ enum { UNDECIDED, AT_TOP, AT_BOTTOM, INSIDE, ABOVE, BELOW };
 /* Where nu is in a trial: inside its set with w = 0, or at a bound. */
 enum { HELD, TOP, BOTTOM };
 
-enum { MOST_SOLUTIONS = 16, MOST_FOUND = 64 };
+enum { MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4 };
 
 /* One block of elements that act on one another, with copies of its part of the law at one order. */
 typedef struct {
@@ -40,9 +40,8 @@ static int leaves_first(const double *t, int width, int n, int i, int j, int col
 
 /* z >= 0 with w = M z + q >= 0 and z w = 0; 0 where the method ends on a ray. The tableau is of n (2 n + 2), m is
  * (n, n). */
-static int lemke(const double *m, const double *q, int n, double *z, double *t, int32_t *basis) {
+static int lemke(const double *m, const double *q, int n, uint32_t seed, double *z, double *t, int32_t *basis) {
   int width = 2 * n + 2, row = -1, column = 2 * n;
-  uint32_t seed = 1;
   for (int i = 0; i < n; i++) {
     double *own = t + (int64_t)i * width;
     memset(own, 0, sizeof(double) * width);
@@ -103,7 +102,8 @@ static int lemke_scaled(double *m, double *q, int n, double *z, double *work, in
   }
   for (int i = 0; i < n; i++) largest = larger(fabs(q[i]), largest);
   if (largest > 0) for (int i = 0; i < n; i++) q[i] /= largest;
-  if (!lemke(m, q, n, z, work + n, basis)) return 0;
+  uint32_t seed = 1; /* of the covering vector: rounding in ties may lead to a ray */
+  while (!lemke(m, q, n, seed, z, work + n, basis)) if (seed++ == COVERINGS) return 0;
   for (int j = 0; j < n; j++) z[j] *= largest / unit[j];
   return 1;
 }
@@ -283,6 +283,7 @@ static int class_of_vector(const Block *k, int i, const double *nu, double part)
     room = larger(larger(room_zero(k, i + j, own, bound), part * bound), room);
   }
   if (k->state[i] >= INSIDE) return k->state[i];
+  if (k->is_coupled) room = VANISHES * bound; /* loads are shared anew until all are at their bounds */
   if (length_of(w, size) > zero) return ABOVE;
   if (bound <= room) return UNDECIDED;
   return bound - length_of(nu + i, size) <= room ? AT_TOP : INSIDE;
@@ -324,6 +325,22 @@ static int distances(const Block *k, const double *nu, const int8_t *is_moving, 
   return rows;
 }
 
+/* How large the unknown of a distance can be where it has no bound: it takes what others bring. */
+static double reach_of(const Block *k, const double *nu, const int8_t *is_moving, int row) {
+  double reach = 0, own = 0;
+  int i = 0;
+  for (int rows = 0; i < k->size; i++) {
+    if (!is_moving[i] || k->state[i] == INSIDE) continue;
+    rows += (!k->is_contact[i] && k->state[i] != AT_BOTTOM) + (k->state[i] != AT_TOP);
+    if (rows > row) break;
+  }
+  if (!k->is_contact[i]) return 0;
+  for (int l = 0; l < k->size; l++) own = larger(fabs(k->matrix[l * k->size + i]), own);
+  for (int j = 0; j < k->size && own > 0; j++)
+    for (int l = 0; l < k->size; l++) reach = larger(fabs(k->matrix[l * k->size + j] * nu[j]) / own, reach);
+  return reach;
+}
+
 /* Move a solution, whose w is the only one, inside all solutions: the mean of those that are farthest from a bound.
  * Room as lemke_block's and 40 n^2 + 40 n. The dimension of the solutions is returned. */
 static int move_inside(const Block *k, double *nu, double *work, int32_t *pivot) {
@@ -358,7 +375,7 @@ static int move_inside(const Block *k, double *nu, double *work, int32_t *pivot)
   for (int q = 0; q < rows; q++) {
     distances(k, mean, is_moving, shifted);
     if (shifted[q] > TIED * cap || !(cap > 0)) continue;
-    if (!maximise(g, s, g + (int64_t)q * d, cap, rows, d, y, rest, pivot)) continue;
+    if (!maximise(g, s, g + (int64_t)q * d, larger(cap, reach_of(k, nu, is_moving, q)), rows, d, y, rest, pivot)) continue;
     found++;
     for (int i = 0; i < n; i++) {
       trial[i] = nu[i];
@@ -487,24 +504,35 @@ static int relax_from(const Block *k, double *nu, double most) {
   return finite_all(nu, n) && (!k->is_coupled || change <= TIED * most);
 }
 
-/* The solution of a block with vectors, symmetric but for loads, from the smallest nu with w = 0 on, in units of bounds
- * where these are loads: then what depends on one another shares. */
+/* Whether w = 0 of all, which nu is to keep, needs no element to leave its bounds. */
+static int needs_no_bound(const Block *k, const double *nu) {
+  for (int i = 0; i < k->size; i++) {
+    int size = span_of(k, i), ends = k->state[i] == ABOVE || k->state[i] == BELOW;
+    if (ends || (k->is_contact[i] ? nu[i] < 0 : size > 0 ? length_of(nu + i, size) > (1 + TIED) * bound_of(k, i, nu) : 0)) return 0;
+  }
+  return 1;
+}
+
+/* The solution of a block with vectors, symmetric but for loads, from the smallest nu with w = 0 on. Loads that are not
+ * determined are shared in proportion to the bounds, in units of whose roots nu is the smallest. */
 static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
   int n = k->size;
-  double *unit = work, *inverse = unit + n;
+  double *unit = work, *inverse = unit + n, *last = inverse + 4 * (int64_t)n * n + n, most = 0, change = INFINITY;
   for (int i = 0; i < n; i++) unit[i] = 1;
-  for (int pass = 0; pass <= k->is_coupled; pass++) {
-    double most = 0;
+  for (int pass = 0; pass < (k->is_coupled ? 60 : 1) && change > VANISHES * most; pass++) {
+    most = change = 0;
     invert_any(k->matrix, n, unit, inverse, inverse + (int64_t)n * n, pivot);
     for (int i = 0; i < n; i++) {
       nu[i] = 0;
       for (int j = 0; j < n; j++) nu[i] += inverse[i * n + j] * k->a[j];
       most = larger(larger(fabs(k->b[i]), fabs(nu[i])), most);
+      change = pass ? larger(fabs(nu[i] - last[i]), change) : INFINITY;
+      last[i] = nu[i];
     }
-    if (!relax_from(k, nu, most)) return 0;
-    for (int i = 0; i < n; i++) unit[i] = larger(k->is_contact[i] ? nu[i] : bound_of(k, i, nu), MERGED * (most > 0 ? most : 1));
+    for (int i = 0; i < n; i++)
+      unit[i] = sqrt(larger(k->is_contact[i] ? nu[i] : bound_of(k, i, nu), MERGED * (most > 0 ? most : 1)));
   }
-  return 1;
+  return (k->is_coupled && needs_no_bound(k, nu)) || relax_from(k, nu, most);
 }
 
 /* Solutions of a block that is not of one element: one where a certificate or the size says so. */
@@ -515,6 +543,11 @@ static int solve_block_of_many(const Block *k, int certificate, int8_t *position
   if (k->span) return relax(k, found, work, pivot);
   int most = certificate >= UNIQUE ? 10000 : 20 + 4 * k->size;
   int solved = pivot_block(k, position, found, most, work, pivot) || lemke_block(k, found, work, pivot);
+  if (!solved && k->is_coupled) { /* those at a bound keep it */
+    for (int i = 0; i < k->size; i++)
+      position[i] = k->state[i] == AT_TOP ? TOP : k->state[i] == AT_BOTTOM ? BOTTOM : position[i];
+    solved = pivot_block(k, position, found, most, work, pivot);
+  }
   if (solved && certificate < UNIQUE) move_inside(k, found, work, pivot);
   return solved;
 }

@@ -354,7 +354,9 @@ static void turn_rows(const Decision *d, Block *b, int i, int order) {
   along_bound(d, own, order, nu, w);
   for (int c = 0; c < n; c++) turn_vector(axes, size, 1, b->matrix + i * n + c, n);
   for (int c = 0; c < n; c++) turn_vector(axes, size, 1, b->matrix + c * n + i, 1);
+  double terms = length_of(b->a + i, size);
   turn_vector(axes, size, 1, b->a + i, 1);
+  for (int q = 0; q < size; q++) if (fabs(b->a[i + q]) <= VANISHES * terms) b->a[i + q] = 0;
   turn_vector(axes, size, 1, nu, 1);
   turn_vector(axes, size, 1, w, 1);
   for (int q = 0; q < size; q++) {
@@ -514,7 +516,7 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
     }
     for (int i = 0; i < n; i++) {
       int is_loose = agrees && (is_dependent ? contacts : d->is_known[b.own[i]]), own = b.own[i], size = d->span[own];
-      double part = is_loose ? KNOWN_TO * r->o.rtol : 0;
+      double part = is_loose && !(is_dependent && b.span) ? KNOWN_TO * r->o.rtol : 0; /* loads are shared anew */
       class[q * n + i] = (int8_t)(size < 0 ? class[q * n + i - 1] : span_of(&b, i) ? class_of_vector(&b, i, nu, part)
                                                                                    : class_of(&b, i, nu, part));
     }

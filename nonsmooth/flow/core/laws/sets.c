@@ -153,7 +153,8 @@ static void leave_sets(Run *r, Expansion *e, int k) {
     }
     column++;
   }
-  if (!solve(a, b, all)) for (int i = 0; i < all; i++) b[i] = NAN;
+  int is_solved = r->c ? solve_any(a, b, all, INFINITY, r->decision->work, r->decision->pivot) : solve(a, b, all);
+  if (!is_solved) for (int i = 0; i < all; i++) b[i] = NAN;
   for (int i = 0; i < slides; i++) e->series[(int64_t)which[i] * stride + k] = b[i];
   for (int i = slides; i < n; i++) e->lambda[(int64_t)which[i] * stride + k] = b[i];
   at = n;

@@ -206,6 +206,26 @@ def test_a_branch_goes_from_discontinuous_to_continuous_conduction():
     assert min(leg.start[0] for leg in beyond.legs) == pytest.approx(least_current(0.79), rel=1e-8)
 
 
+def test_a_slide_that_a_clock_ends_is_no_corner_of_a_branch():
+    """A ramp that rises by 1 while on, falls by 1 and rests at 0: its legs last 1 - 2a, a, a, with no event below 1/2."""
+    i, a, s, lam = (ca.SX.sym(name) for name in ("i", "a", "s", "lam"))
+    clock, on = ns.Clock(1.0), (1 - s) / 2
+    ramp = ns.FilippovSystem(
+        [i],
+        field=[on - (1 - on) * lam],
+        surfaces=[clock.phase - a, i],
+        multipliers=[s, lam],
+        clocks=clock,
+        parameters={a: 0.2},
+    )
+    orbit = ns.periodic_orbit(ramp, ns.simulate(ramp, [0.3, 0.0], 20.0))
+    branch = ns.continue_orbit(orbit, "a", bounds=(0.05, 0.49))
+    assert not branch.events
+    assert [str(end) for end in branch.ends] == ["REACHED_BOUND", "REACHED_BOUND"]
+    (last,) = branch.at(0.45)
+    assert sorted(leg.duration for leg in last.legs) == pytest.approx([0.1, 0.45, 0.45])
+
+
 @pytest.mark.parametrize("start", [0.5, 0.9])
 def test_a_branch_passes_the_touch_of_a_diode(start):
     """Without the diode i = b + sin(t - pi/4)/sqrt 2, which touches zero at b = 1/sqrt 2."""

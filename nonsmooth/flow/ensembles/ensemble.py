@@ -21,7 +21,7 @@ from ..section import KINDS_OF_SECTIONS, read_sampling, sectioned
 from ..warn import warn_once
 from .chunks import Job
 from .lazy_starts import LazyStarts
-from .on_device import CHUNK, require_device, run_on_device
+from .on_device import CHUNK, device_chunk, require_device, run_on_device
 from .starts import Starts, require_start
 from .store import Store
 from .work import Work, checked_work, run_all, size_of_chunk
@@ -163,7 +163,8 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     none = Chunk.empty(0, system, job.at is not None, job.room)
     most = work.largest(none.row_size)
     size = lambda: (
-        work.chunk or (size_of_chunk(job, starts, work.workers, most) if away is None else CHUNK)
+        work.chunk
+        or (device_chunk(system) if away else size_of_chunk(job, starts, work.workers, most))
     )
     collected = lambda arrays: Collected(system, starts.shape, job.at is not None, job.room, arrays)
     if work.store is None:

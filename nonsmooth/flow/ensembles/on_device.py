@@ -15,15 +15,15 @@ from ..constants import SAFETY
 from ..engine.building.codegen import supports_lanes
 from ..engine.device.card import machine_for
 from ..engine.device.kernel import Bins, Kernel, Reduced, Reduction, Source
-from ..engine.device.records import Records, continued
+from ..engine.device.records import Records, continued, record_type
 from ..options import Options
 from ..results import Chunk
 from .chunks import Job
 from .lazy_starts import Grid, RandomStarts
 from .starts import Starts
 
-#: Trajectories of one call; each needs some 100 bytes of memory on the host, and 300 on the device.
-CHUNK = 1 << 22
+#: Largest number of trajectories of one call, and bytes of the device's memory for them.
+CHUNK, _MEMORY = 1 << 22, 1 << 31
 
 #: Order by the logarithm of the tolerance; ``Options.order`` has a quarter more. Measured on an H200 at tol=1e-10, order
 #: 14 against 17: 1.36 times the runs a second of a linear system and 1.28 times those of a nonlinear one, and less than
@@ -63,6 +63,8 @@ def _unsupported(system: FilippovSystem, options: Options) -> str:
         return "a start_mode"
     if options.rest_below is not None:
         return "rest_below"
+    if options.method == "stiff":
+        return "implicit steps"
     if options.begins_late:
         return "times whose rounding is above the tolerance"
     return "" if options.t_end > options.t_start else "t_end = t_start"
@@ -73,6 +75,11 @@ def _kernel(job: Job, device: str) -> Kernel:
     assert isinstance(system, FilippovSystem)
     key = ("device", order, machine)
     return system.cached(key, lambda: Kernel(system, order, machine))
+
+
+def device_chunk(system: FilippovSystem) -> int:
+    """Trajectories of one call: results and records of all of them are on the device."""
+    return min(CHUNK, _MEMORY // (record_type(system).itemsize + 16 * system.dimension + 64))
 
 
 def device_order(options: Options) -> int:

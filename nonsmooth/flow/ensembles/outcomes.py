@@ -19,7 +19,7 @@ from ..status import Status
 from .chunks import Job
 from .ensemble import engine_for
 from .lazy_starts import LazyStarts
-from .on_device import CHUNK, reduce_on_device, require_device
+from .on_device import device_chunk, reduce_on_device, require_device
 from .starts import Starts
 from .work import Work, checked_work, run_all, size_of_chunk
 
@@ -187,7 +187,7 @@ def outcomes(
         run_all(job, starts, made, work, size, None)
     else:
         require_device(job, device, work.executor is not None)
-        size = work.chunk or CHUNK
+        size = work.chunk or device_chunk(system)
         for found in reduce_on_device(job, device, starts, size, made.bins, work.workers):
             if isinstance(found, Chunk):
                 made.put(0, found)

@@ -98,6 +98,39 @@ def test_a_circuit_is_that_of_its_exact_modes(name):
     assert abs(run.x[-1] - Circuit(*matrices).run(start, 14.0)).max() < 1e-9
 
 
+def random_circuit(seed):
+    """Passive parts drawn at random: conditions of degree 1 or 0, the latter with gyrators, and of both degrees."""
+    rng = np.random.default_rng(seed)
+    n, m, kind = *rng.integers(2, 5, 2), seed % 4
+    m = min(m, n)
+    a = driven(rng.normal(size=(n, n)) - np.eye(n), 2 * rng.normal(size=n), rng.uniform(0.5, 3))
+    c = rng.normal(size=(m, n))
+    b = np.vstack([rng.uniform(0.3, 3, (n, 1)) * c.T, np.zeros((2, m))])
+    c = np.hstack([c, rng.normal(size=(m, 2))])
+    k, d = (0, m, m, m // 2)[kind], np.zeros((m, m))
+    q, turn = rng.normal(size=(2, k, k))
+    d[:k, :k] = 0.3 * q @ q.T + 0.1 * np.eye(k) + (turn - turn.T) * (kind == 2)
+    return (a, b, c, d), np.array([*rng.normal(size=n), 0, 1])
+
+
+def proportional_circuit(seed):
+    """Diodes side by side whose currents and voltages count in different units: one number of rank 1."""
+    (a, b, c, _), start = random_circuit(4 * seed)
+    q = abs(np.random.default_rng(seed).normal(size=4)) + 0.02
+    return (a, np.outer(b[:, 0], q), np.outer(q, c[0]), np.outer(q, q) / 2), start
+
+
+@pytest.mark.parametrize("draw", [random_circuit, proportional_circuit])
+@pytest.mark.parametrize("seed", range(8))
+def test_random_circuits_are_those_of_their_exact_modes(draw, seed):
+    matrices, start = draw(seed)
+    run = ns.simulate(circuit(*matrices), start, t_end=5.0, tol=1e-10)
+    assert run.status is REACHED, run.message
+    first = run.events[0]
+    exact = Circuit(*matrices).run(first.x_after if first.kind == "jump" else start, 5.0, 200)
+    assert abs(run.x[-1] - exact).max() < 1e-8 * (1 + abs(exact).max())
+
+
 def test_capacitors_that_are_joined_share_their_charge():
     """2 at 3 V and 1 at 1 V: 7/3 V, an event named after the diode."""
     u, v, i = (ca.SX.sym(name) for name in "uvi")

@@ -8,6 +8,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.flow.engine.device import card, machine
+from nonsmooth.flow.ensembles.on_device import device_chunk
 
 
 def pair(**more):
@@ -34,12 +35,20 @@ def falling():
         (pair(), {"start_mode": "s"}, "start_mode"),
         (pair(), {"t_eval": [0.5]}, "t_eval"),
         (pair(), {"rest_below": 0.1}, "rest_below"),
+        (pair(), {"method": "stiff"}, "implicit steps"),
         (pair(), {"t_end": 0.0}, "t_end"),
     ],
 )
 def test_refusals(system, options, said):
     with pytest.raises(ns.OptionError, match=f"^device .*{said}"):
         ns.ensemble(system, [[1.0, 1.0]], device="cuda", **{"t_end": 1.0, **options})
+
+
+@pytest.mark.parametrize(("n", "least"), [(2, 1 << 22), (300, 1 << 17)])
+def test_memory_of_a_call_is_bounded(n, least):
+    x = ca.SX.sym("x", n)
+    count = device_chunk(ns.FilippovSystem(x, surface=x[0], above=-x, below=x))
+    assert least <= count <= min(1 << 22, (1 << 31) / (3 * 8 * n))
 
 
 def test_other_devices_are_refused():

@@ -12,7 +12,7 @@ enum { UNDECIDED, AT_TOP, AT_BOTTOM, INSIDE, ABOVE, BELOW };
 /* Where nu is in a trial: inside its set with w = 0, or at a bound. */
 enum { HELD, TOP, BOTTOM };
 
-enum { MOST_SOLUTIONS = 16, MOST_FOUND = 64 };
+enum { MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4 };
 
 /* One block of elements that act on one another, with copies of its part of the law at one order. */
 typedef struct {
@@ -40,9 +40,8 @@ static int leaves_first(const double *t, int width, int n, int i, int j, int col
 
 /* z >= 0 with w = M z + q >= 0 and z w = 0; 0 where the method ends on a ray. The tableau is of n (2 n + 2), m is
  * (n, n). */
-static int lemke(const double *m, const double *q, int n, double *z, double *t, int32_t *basis) {
+static int lemke(const double *m, const double *q, int n, uint32_t seed, double *z, double *t, int32_t *basis) {
   int width = 2 * n + 2, row = -1, column = 2 * n;
-  uint32_t seed = 1;
   for (int i = 0; i < n; i++) {
     double *own = t + (int64_t)i * width;
     memset(own, 0, sizeof(double) * width);
@@ -103,7 +102,8 @@ static int lemke_scaled(double *m, double *q, int n, double *z, double *work, in
   }
   for (int i = 0; i < n; i++) largest = larger(fabs(q[i]), largest);
   if (largest > 0) for (int i = 0; i < n; i++) q[i] /= largest;
-  if (!lemke(m, q, n, z, work + n, basis)) return 0;
+  uint32_t seed = 1; /* of the covering vector: rounding in ties may lead to a ray */
+  while (!lemke(m, q, n, seed, z, work + n, basis)) if (seed++ == COVERINGS) return 0;
   for (int j = 0; j < n; j++) z[j] *= largest / unit[j];
   return 1;
 }
@@ -329,6 +329,22 @@ static int distances(const Block *k, const double *nu, const int8_t *is_moving, 
   return rows;
 }
 
+/* How large the unknown of a distance can be where it has no bound: it takes what others bring. */
+static double reach_of(const Block *k, const double *nu, const int8_t *is_moving, int row) {
+  double reach = 0, own = 0;
+  int i = 0;
+  for (int rows = 0; i < k->size; i++) {
+    if (!is_moving[i] || k->state[i] == INSIDE) continue;
+    rows += (!k->is_contact[i] && k->state[i] != AT_BOTTOM) + (k->state[i] != AT_TOP);
+    if (rows > row) break;
+  }
+  if (!k->is_contact[i]) return 0;
+  for (int l = 0; l < k->size; l++) own = larger(fabs(k->matrix[l * k->size + i]), own);
+  for (int j = 0; j < k->size && own > 0; j++)
+    for (int l = 0; l < k->size; l++) reach = larger(fabs(k->matrix[l * k->size + j] * nu[j]) / own, reach);
+  return reach;
+}
+
 /* Move a solution, whose w is the only one, inside all solutions: the mean of those that are farthest from a bound.
  * Room as lemke_block's and 40 n^2 + 40 n. The dimension of the solutions is returned. */
 static int move_inside(const Block *k, double *nu, double *work, int32_t *pivot) {
@@ -363,7 +379,7 @@ static int move_inside(const Block *k, double *nu, double *work, int32_t *pivot)
   for (int q = 0; q < rows; q++) {
     distances(k, mean, is_moving, shifted);
     if (shifted[q] > TIED * cap || !(cap > 0)) continue;
-    if (!maximise(g, s, g + (int64_t)q * d, cap, rows, d, y, rest, pivot)) continue;
+    if (!maximise(g, s, g + (int64_t)q * d, larger(cap, reach_of(k, nu, is_moving, q)), rows, d, y, rest, pivot)) continue;
     found++;
     for (int i = 0; i < n; i++) {
       trial[i] = nu[i];
@@ -439,7 +455,8 @@ static int enumerate(const Block *k, double *found, double *work, int32_t *pivot
       fits = 1;
       for (int i = 0; i < n && fits; i++) {
         fits = wanted(k, i, position[i], nu) == position[i];
-        fits = fits && (k->is_contact[i] || bound_of(k, i, nu) >= -room_zero(k, i, k->floor[i], bound_of(k, i, nu)));
+        double bound = bound_of(k, i, nu);
+        fits = fits && (k->is_contact[i] || k->state[i] != UNDECIDED || bound >= -room_zero(k, i, k->floor[i], bound));
       }
       for (int q = 0; q < count && fits; q++) fits = !is_same(k, all + q * n, nu, 0);
       if (fits) memcpy(all + n * count++, nu, sizeof(double) * n);

@@ -581,6 +581,8 @@ def require_consistent(d: Definition, given: bool = True) -> None:
             _require_simple(name, d.guards[i], d)
     for i, (name, h) in enumerate(functions):
         if i in d.half_lines:
+            if not ca.depends_on(h, d.multipliers):
+                _require_simple(name, h, d)
             continue
         _require_states(name, h, d.extended_states, d)
         _require_simple(name, h, d)

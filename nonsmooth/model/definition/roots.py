@@ -70,6 +70,6 @@ def gate_roots(
     nodes, rows = instructions([symbols], [field])
     if not any(node.op in POWERS for node in nodes):
         return field, {}
-    algebra = _Gated(symbols, ca.vertsplit(surfaces), x, gates)
+    algebra = _Gated(symbols, ca.vertsplit(surfaces)[: surfaces.numel()], x, gates)
     values = evaluate(nodes, algebra)
     return ca.vertcat(*[values[k] for k in rows[0]]), algebra.powers

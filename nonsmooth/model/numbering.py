@@ -10,12 +10,12 @@ from .expressions.float_arithmetic import BINARY, UNARY
 #: Operations by number, as in the C enumeration.
 OPERATIONS = ("const", "input", *UNARY, *BINARY)
 
-#: Rules by number. Where one argument does not move, sums are ``shift``, differences ``lower`` and ``below`` it,
-#: products ``scale``, quotients ``over`` and ``under`` it; an ``integral`` over what is affine in the time, as in
-#: cos(omega t), is a ``turn``, and what is ``chosen`` by a factor that does not move is ``gated``.
+#: Rules by number, then those by which later coefficients follow: of sums with a kind of terms; of quotients of which one
+#: argument does not move; of integrals over what is affine in the time, as in cos(omega t); of a sine with its cosine;
+#: of what is chosen by a factor that does not move.
 TAPE_RULES = tuple(
-    "constant input apply add sub neg twice mul sq div sqrt power affine integral quotient atan2 chosen "
-    "shift lower below scale over under turn gated".split()
+    "constant input apply sum div sqrt power integral quotient atan2 chosen "
+    "linear1 linear2 linear3 linear4 linear over under turn pair turns gated".split()
 )
 
 #: Laws of elements, by number in C.

@@ -115,8 +115,8 @@ static size_t place_run(Run *r, char *base) {
   r->active = INTEGERS(w);
   r->involved = INTEGERS(3 * w + 4 * all + 1);
   r->p = DOUBLES(s->parameters);
-  r->series = DOUBLES(pair_room(s->series.size, stride));
-  r->rounding = DOUBLES(s->series.size);
+  r->series = DOUBLES(series_room(&s->series, stride));
+  r->rounding = DOUBLES(s->series.size * stride);
   r->point = DOUBLES(pair_room(s->point.size, 1));
   r->heights = DOUBLES(pair_room(s->surfaces.size, 1));
   r->maps = DOUBLES(pair_room(s->maps.size, 1));
@@ -153,6 +153,7 @@ static size_t place_run(Run *r, char *base) {
   r->of_defect = DOUBLES(g);
   r->key = LETTERS(w + 8 * s->rules.discrete);
   r->met_at = DOUBLES(g);
+  r->hidden = DOUBLES(g);
   return used;
 }
 
@@ -225,7 +226,7 @@ static void set_parameters(Run *r, const double *p) {
   const Values *program[] = {&s->point, &s->surfaces, &s->maps, &s->restitution, &s->columns, &s->atoms, &s->choices};
   double *work[] = {r->point, r->heights, r->maps, r->restitution, r->columns, r->atom_work, r->choice_work};
   memcpy(r->p, p, sizeof(double) * s->parameters);
-  series_prepare(&s->series, r->stride, r->p, r->series);
+  series_prepare(&s->series, r->p, r->series);
   pairs_begin(s->series.size, r->stride, r->begun, r->series);
   for (int k = 0; k < 7; k++) {
     values_prepare(program[k], r->p, work[k]);
@@ -265,6 +266,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->reason = NO_REASON;
   r->where = 0;
   r->facts = 0;
+  r->t_error = 0;
   r->dependent = r->turned_mode = -1;
   r->segment_mode = r->due_impact = r->length_mode = -1;
 }
@@ -310,6 +312,7 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
   numbers[0] = r->t;
   numbers[1] = r->limit;
   numbers[2] = r->at_t;
+  numbers[3] = r->t_error;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
                     r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts,
                     unmet_event(r), r->implicit_count};

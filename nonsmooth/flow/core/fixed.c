@@ -6,7 +6,7 @@ int64_t field_size(void) { return sizeof(Field); }
 int64_t field_work(const Field *f) {
   int64_t stride = f->order + 1;
   int64_t numbers = f->columns * f->n + 2 * f->derivatives.count;
-  return f->series.size * stride + (f->n * (1 + f->columns) + f->watched) * stride + f->n + numbers / 2 + 1;
+  return series_room(&f->series, stride) + (f->n * (1 + f->columns) + f->watched) * stride + f->n + numbers / 2 + 1;
 }
 
 /* Move z (n) along a smooth field by a duration of either sign. The time that is left where the field is not
@@ -178,8 +178,9 @@ static void watched_at(Flow *w, const double *z, double *values) {
   const Field *f = w->field;
   const Series *t = &f->series;
   int64_t stride = f->order + 1;
-  series_rules(t, t->moving, t->moving_count, 0, stride, z, w->rules);
-  for (int j = 0; j < f->watched; j++) values[j] = w->rules[t->output[f->n + j] * stride];
+  series_inputs(t, 0, z, w->rules);
+  series_values(t, t->values.rule, t->values.count, stride, w->rules);
+  for (int j = 0; j < f->watched; j++) values[j] = w->rules[t->output[f->n + j]];
 }
 
 /* The same of many, with the margin ``ends`` times the duration: rows of all with the same width, their numbers in

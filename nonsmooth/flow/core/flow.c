@@ -26,14 +26,14 @@ static Flow flow_of(const Field *f, const double *p, double duration, double tol
   Flow w = {.field = f, .rules = work, .whole = fabs(duration), .left = fabs(duration)};
   w.sign = duration < 0 ? -1 : 1;
   w.tol = tol;
-  w.states = work + f->series.size * stride;
+  w.states = work + series_room(&f->series, stride);
   w.watched = w.states + f->n * stride;
   w.input = w.watched + f->watched * stride;
   w.columns = w.input + f->n;
   w.terms = (int32_t *)(w.columns + (int64_t)f->columns * f->n * stride);
   w.bend = w.terms + f->columns * f->n;
-  memset(w.rules, 0, sizeof(double) * f->series.size * stride);
-  series_prepare(&f->series, stride, p, w.rules);
+  memset(w.rules, 0, sizeof(double) * series_room(&f->series, stride));
+  series_prepare(&f->series, p, w.rules);
   return w;
 }
 
@@ -41,8 +41,9 @@ static Flow flow_of(const Field *f, const double *p, double duration, double tol
 static void field_at(Flow *w, const double *z, double *rate) {
   const Series *t = &w->field->series;
   int64_t stride = w->field->order + 1;
-  series_rules(t, t->moving, t->moving_count, 0, stride, z, w->rules);
-  for (int i = 0; i < w->field->n; i++) rate[i] = w->rules[t->output[i] * stride];
+  series_inputs(t, 0, z, w->rules);
+  series_values(t, t->moving.rule, t->moving.count, stride, w->rules);
+  for (int i = 0; i < w->field->n; i++) rate[i] = w->rules[t->output[i]];
 }
 
 /* Series of a column of derivatives: sums of products with those of the field. */
@@ -64,18 +65,16 @@ static void expand_column(Flow *w, int column, const double *z) {
     if (w->bend[q] && (g->column[q] < n || of_p)) active[count++] = q;
   }
   for (int k = 0; moves && k < order; k++) {
-    double part = 1;
-    part /= k + 1;
     for (int a = 0; a < count;) {
       int row = g->row[active[a]];
       double sum = 0;
       for (; a < count && g->row[active[a]] == row; a++) {
         int q = active[a], j = g->column[q];
-        const double *c = w->rules + f->series.output[n + f->watched + q] * stride;
+        const double *c = w->rules + f->series.output[n + f->watched + q];
         sum += j >= n ? c[k] : product_of(own + j * stride, terms[j], c, w->bend[q], k);
       }
       if (sum == 0) continue;
-      own[row * stride + k + 1] = sum * part;
+      own[row * stride + k + 1] = sum * PART[k + 1];
       terms[row] = k + 2;
     }
   }
@@ -90,13 +89,15 @@ static int expand_flow(Flow *w, const double *z) {
   for (int i = 0; i < n; i++) w->states[i * stride] = z[i];
   for (int k = 0; k < order + (f->watched > 0); k++) {
     for (int i = 0; i < n; i++) w->input[i] = w->states[i * stride + k];
-    series_rules(t, t->moving, t->moving_count, k, stride, w->input, w->rules);
+    series_inputs(t, k, w->input, w->rules);
+    if (k) series_rules(t, &t->later, k, k, stride, w->rules);
+    else series_values(t, t->moving.rule, t->moving.count, stride, w->rules);
     if (k < order)
-      for (int i = 0; i < n; i++) w->states[i * stride + k + 1] = w->rules[t->output[i] * stride + k] / (k + 1);
-    for (int j = 0; j < f->watched; j++) w->watched[j * stride + k] = w->rules[t->output[n + j] * stride + k];
+      for (int i = 0; i < n; i++) w->states[i * stride + k + 1] = w->rules[t->output[i] + k] * PART[k + 1];
+    for (int j = 0; j < f->watched; j++) w->watched[j * stride + k] = w->rules[t->output[n + j] + k];
   }
   for (int q = 0; q < f->derivatives.count; q++)
-    w->bend[q] = terms_of(w->rules + t->output[n + f->watched + q] * stride, order);
+    w->bend[q] = terms_of(w->rules + t->output[n + f->watched + q], order);
   for (int column = 0; column < f->columns; column++) expand_column(w, column, z);
   double zero = 0;
   for (int64_t i = 0; i < n * stride; i++) zero += 0 * w->states[i];

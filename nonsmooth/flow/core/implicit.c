@@ -21,7 +21,7 @@ static size_t place_implicit(Implicit *m, const Run *r, char *base) {
   size_t n = r->n, w = r->width, s = m->c.method->s, used = place_collocation(&m->c, base, 0);
   m->unknowns = DOUBLES((s + 1) * w);
   m->guards = DOUBLES(2 * s * (w > (size_t)r->guards ? w : (size_t)r->guards));
-  m->program = DOUBLES(pair_room(r->s->implicit ? r->s->implicit->size : 0, 1));
+  m->program = DOUBLES(r->s->implicit ? series_room(r->s->implicit, 1) : 0);
   m->layer = DOUBLES(w * n);
   m->by_unknown = DOUBLES(w * n);
   m->slope = DOUBLES(w * w);
@@ -55,7 +55,7 @@ static int jacobian_at_stage(void *of, int stage, const double *x, double *jacob
   for (int i = 0; i < slides; i++) where[l->sliding[i]] = i;
   aim(r, l->letter, x, unknowns);
   set_inputs(r, x, held_of(r, l->letter), unknowns);
-  series_at(t, t->moving, t->moving_count, 0, 1, r->input, m->program);
+  series_at(t, &t->values, 0, 1, r->input, m->program);
   memset(jacobian, 0, sizeof(double) * n * n);
   memset(m->layer, 0, sizeof(double) * slides * n);
   memset(m->by_unknown, 0, sizeof(double) * slides * n);
@@ -102,7 +102,7 @@ static int begin_implicit(Run *r) {
   if (!m->arena) { free(m); return 0; }
   place_implicit(m, r, m->arena);
   if (r->s->implicit) {
-    series_prepare(r->s->implicit, 1, r->p, m->program);
+    series_prepare(r->s->implicit, r->p, m->program);
     pairs_begin(r->s->implicit->size, 1, r->begun, m->program);
   }
   m->wait = HELD_STEPS;

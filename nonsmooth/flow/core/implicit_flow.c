@@ -17,11 +17,11 @@ typedef struct {
 static void flow_derivatives(const Flow *w, double *to) {
   const Field *f = w->field;
   const Entries *g = &f->derivatives;
-  int n = f->n, order = f->order, width = n + f->columns - f->starts;
+  int n = f->n, width = n + f->columns - f->starts;
   memset(to, 0, sizeof(double) * n * width);
   for (int q = 0; q < g->count; q++)
     if (g->column[q] < width)
-      to[(int64_t)g->row[q] * width + g->column[q]] = w->rules[(int64_t)f->series.output[n + f->watched + q] * (order + 1)];
+      to[(int64_t)g->row[q] * width + g->column[q]] = w->rules[f->series.output[n + f->watched + q]];
 }
 
 static int flow_rate_at(void *of, int stage, const double *x, double *rate) {
@@ -150,9 +150,10 @@ static void interpolate_watched(ImplicitFlow *m, const double *z, double h) {
   double *values = m->changes, *x = m->c.work;
   for (int i = 0; i <= s; i++) {
     for (int k = 0; k < f->n; k++) x[k] = z[k] + (i ? m->c.z[(i - 1) * f->n + k] : 0);
-    series_rules(&f->series, f->series.moving, f->series.moving_count, 0, stride, x, w->rules);
+    series_inputs(&f->series, 0, x, w->rules);
+    series_values(&f->series, f->series.values.rule, f->series.values.count, stride, w->rules);
     for (int j = 0; j < f->watched; j++) {
-      double value = w->rules[(int64_t)f->series.output[f->n + j] * stride], *begun = w->watched + (int64_t)j * stride;
+      double value = w->rules[f->series.output[f->n + j]], *begun = w->watched + (int64_t)j * stride;
       if (i) values[(i - 1) * f->watched + j] = value - *begun; else *begun = value;
     }
   }

@@ -1,7 +1,7 @@
 /* Series of a mode: nonsmooth/model/laws/coupled.py ---------------------------------------------------------- */
 
 static const double *row_of(const Run *r, int output) {
-  return r->series + (int64_t)r->s->series.output[output] * r->stride;
+  return r->series + r->s->series.output[output];
 }
 
 static const double *slope_row(const Run *r, int i, int j) {
@@ -60,8 +60,7 @@ static int only_state(const Run *r, int surface) {
 
 /* States of which a root is taken do not move at all where that is zero. */
 static void next_states(Run *r, Expansion *e, int k) {
-  double part = 1.0 / (k + 1);
-  for (int i = 0; i < r->n; i++) e->states[(int64_t)i * r->stride + k + 1] = row_of(r, i)[k] * part;
+  for (int i = 0; i < r->n; i++) e->states[(int64_t)i * r->stride + k + 1] = row_of(r, i)[k] * PART[k + 1];
   for (int j = 0; r->has_roots && j < e->l.slides; j++) {
     int i = e->l.sliding[j], state = i < r->m && element(r, i)->power > 0 && degree_of(r, i) == 1 ? only_state(r, i) : -1;
     if (state >= 0) e->states[(int64_t)state * r->stride + k + 1] = 0;
@@ -71,24 +70,20 @@ static void next_states(Run *r, Expansion *e, int k) {
 /* Coefficients k of all that is known without unknowns of that order, directions of sets with them. */
 static void open_order(Run *r, Expansion *e, int k) {
   const Series *t = r->s->sets && e->l.is_free ? &r->s->free : &r->s->series;
-  int stride = r->stride;
   inputs_of(r, e, k);
-  if (k == 0 || !r->s->sets) {
-    series_at(t, k ? t->later : t->moving, k ? t->later_count : t->moving_count, k, stride, r->input, r->series);
-    if (!r->s->sets) return;
-  } else if (e->l.is_free) series_at(t, r->s->early_free, r->s->early_free_count, k, stride, r->input, r->series);
-  else series_at(t, r->s->early, r->s->early_count, k, stride, r->input, r->series);
+  series_at(t, !k ? &t->moving : r->s->sets ? &t->early : &t->later, k, r->stride, r->input, r->series);
+  if (!r->s->sets) return;
   follow_sets(r, e, k);
   if (k == 0) return;
   inputs_of(r, e, k);
-  series_at(t, t->late, t->late_count, k, stride, r->input, r->series);
+  series_at(t, &t->late, k, r->stride, r->input, r->series);
 }
 
 /* What the unknowns of order k add. */
 static void close_order(Run *r, Expansion *e, int k) {
   const Series *t = r->s->sets && e->l.is_free ? &r->s->free : &r->s->series;
   inputs_of(r, e, k);
-  series_at(t, k ? t->late : t->moving, k ? t->late_count : t->moving_count, k, r->stride, r->input, r->series);
+  series_at(t, k ? &t->late : &t->moving, k, r->stride, r->input, r->series);
 }
 
 /* Rounding in the multipliers leaves functions that are kept at zero a rate, which a state at rest would follow for as
@@ -114,61 +109,84 @@ static void keep_rates(Run *r, Expansion *e) {
   }
 }
 
-/* Coefficients of all that a mode needs in which something slides, or with sets; ``start`` are places in the inverse. */
-static void mode_series(Run *r, Expansion *e, const int32_t *start) {
+/* Coefficients of all that a mode with sets needs; ``start`` are places in the inverse. */
+static void set_series(Run *r, Expansion *e, const int32_t *start) {
   int leaving = begin_directions(r, e);
   for (int k = 0; k <= r->order; k++) {
     open_order(r, e, k);
     if (leaving) leave_sets(r, e, k);
     else if (k && e->l.slides) follow_layer(r, e, k, start);
     if (k && (leaving || e->l.slides)) close_order(r, e, k);
-    if (r->s->sets) close_sets(r, e, k);
+    close_sets(r, e, k);
     if (k < r->order) next_states(r, e, k);
     if (k == 0 && e->l.slides) keep_rates(r, e);
   }
 }
 
-/* The same where nothing slides. */
-static void free_series(Run *r, Expansion *e) {
-  const Series *t = &r->s->free;
-  int n = r->n, order = r->order, stride = r->stride;
+/* The same without sets: states' coefficients go from the field's rows to those of the inputs. */
+static void mode_series(Run *r, Expansion *e, const int32_t *start) {
+  const Series *t = e->l.is_free ? &r->s->free : &r->s->series;
+  int order = r->order, stride = r->stride, slides = e->l.slides;
+  double *s = r->series;
   inputs_of(r, e, 0);
-  series_at(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
+  series_at(t, &t->moving, 0, stride, r->input, s);
   next_states(r, e, 0);
-  memset(r->input + n, 0, sizeof(double) * 2 * r->width);
-  for (int k = 1; k <= order; k++) {
-    for (int i = 0; i < n; i++) r->input[i] = e->states[(int64_t)i * stride + k];
-    series_at(t, t->later, t->later_count, k, stride, r->input, r->series);
-    if (k < order) next_states(r, e, k);
+  if (slides) keep_rates(r, e);
+  for (int32_t l = 0; l < t->inputs; l++) {
+    int i = t->place[l];
+    s[t->input[l] + 1] = i < r->n ? e->states[(int64_t)i * stride + 1] : 0;
+    for (int k = 2; i >= r->s->dimension && k <= order; k++) s[t->input[l] + k] = 0;
   }
+  if (r->s->timed) series_rules(t, &t->before, 1, order, stride, s);
+  for (int k = 1; k <= order; k++) {
+    series_rules(t, &t->loop, k, k, stride, s);
+    if (slides) {
+      follow_layer(r, e, k, start);
+      inputs_of(r, e, k);
+      for (int32_t l = t->states; l < t->inputs; l++) s[t->input[l] + k] = r->input[t->place[l]];
+      series_rules(t, &t->loop_late, k, k, stride, s);
+    }
+    if (k == order) break;
+    if (r->has_roots) next_states(r, e, k);
+    for (int32_t l = 0; l < t->states; l++) {
+      int i = t->place[l];
+      s[t->input[l] + k + 1] = r->has_roots ? e->states[(int64_t)i * stride + k + 1] : row_of(r, i)[k] * PART[k + 1];
+    }
+  }
+  for (int i = 0; i < r->n && !r->has_roots; i++) {
+    const double *field = row_of(r, i);
+    double *x = e->states + (int64_t)i * stride;
+    for (int k = 1; k < order; k++) x[k + 1] = field[k] * PART[k + 1];
+  }
+  series_rules(t, &t->after, 1, order, stride, s);
 }
 
-/* First coefficients, values, from r->input. */
+/* First coefficients, values of the outputs, from r->input. */
 static void first_values(Run *r, int is_free) {
   const Series *t = is_free ? &r->s->free : &r->s->series;
-  series_at(t, t->moving, t->moving_count, 0, r->stride, r->input, r->series);
+  series_at(t, &t->values, 0, r->stride, r->input, r->series);
 }
 
-/* Rounding of the values that were computed last, in units of EPSILON. */
+/* Rounding of the values at r->input, in units of EPSILON. */
 static void weigh_rounding(Run *r, int is_free, double size) {
   const Series *t = is_free ? &r->s->free : &r->s->series;
-  series_rounding(t, t->moving, t->moving_count, r->stride, size, r->series, r->rounding);
+  series_at(t, &t->moving, 0, r->stride, r->input, r->series);
+  series_rounding(t, size, r->series, r->rounding);
 }
 
 static void jets(Run *r, Expansion *e) {
   int slides = e->l.slides;
   int32_t *start = r->sparse, *column = start + slides + 1, count = 0;
   r->expansion = e;
-  if (e->l.is_free && !r->s->sets) free_series(r, e);
-  else {
-    for (int i = 0; i < slides; i++) {
-      start[i] = count;
-      for (int j = 0; j < slides; j++) if (e->inverse[i * slides + j] != 0) column[count++] = j;
-    }
-    start[slides] = count;
-    mode_series(r, e, start);
-    if (r->s->sets) measure_limits(r, e);
+  for (int i = 0; i < slides; i++) {
+    start[i] = count;
+    for (int j = 0; j < slides; j++) if (e->inverse[i * slides + j] != 0) column[count++] = j;
   }
+  start[slides] = count;
+  if (r->s->sets) {
+    set_series(r, e, start);
+    measure_limits(r, e);
+  } else mode_series(r, e, start);
   guard_rows(r, &e->l, e->series, r->order + 1, e->guards);
 }
 

@@ -104,23 +104,41 @@ static void values_free_at(const Values *t, const double *x, const double *p, do
   else values_free(t, x, p, w);
 }
 
-static Pair pair_rule(const Series *t, int32_t j, Pair u, Pair v) {
-  if (t->rule[j] != RULE_affine) return pair_operate(t->op[j], u, v);
-  return pair_sum((Pair){t->first[j], 0}, pair_product((Pair){t->second[j], 0}, u));
+/* The value of a rule in two numbers; ``low`` are the second ones. */
+static Pair pair_rule(const Series *t, const Rule *q, int stride, const double *s, const double *low) {
+  Pair total = {0, 0};
+#define PAIR(row) ((Pair){s[row], low[(row) / stride]})
+  if (q->rule != RULE_sum) return pair_operate(q->op, PAIR(q->a), PAIR(q->b));
+  for (const Term *e = t->term + q->begin, *end = t->term + q->end; e < end; e++)
+    total = pair_sum(total, pair_product((Pair){e->factor, 0}, pair_product(PAIR(e->a), PAIR(e->b))));
+#undef PAIR
+  return total;
+}
+
+static void series_pairs(const Series *t, const List *list, int stride, const double *x, double *s) {
+  double *low = s + (int64_t)t->size * stride;
+  Pair start = {low[t->size], low[t->size + 1]};
+  for (int32_t l = 0; l < t->inputs; l++) {
+    int32_t row = t->input[l];
+    if (!t->rule[row / stride].paired) continue;
+    Pair value = pair_sum(start, (Pair){x[t->place[l]], 0});
+    s[row] = value.high;
+    low[row / stride] = value.low;
+  }
+  for (int32_t l = 0; l < list->count; l++) {
+    const Rule *q = t->rule + list->rule[l];
+    series_values(t, list->rule + l, 1, stride, s);
+    if (!q->paired) continue;
+    Pair value = pair_rule(t, q, stride, s, low);
+    s[q->w] = value.high;
+    low[q->w / stride] = value.low;
+  }
 }
 
 /* Coefficient k of some rules in a run. */
-static void series_at(const Series *t, const int32_t *which, int32_t count, int k, int stride, const double *x, double *s) {
-  if (k || !has_pairs(t->timed, t->size, stride, s)) { series_rules(t, which, count, k, stride, x, s); return; }
-  double *low = s + (int64_t)t->size * stride;
-  const double *start = low + t->size;
-  for (int32_t l = 0; l < count; l++) {
-    int32_t j = which[l], a = t->a[j], b = t->b[j];
-    if (!t->paired[j]) { series_rules(t, which + l, 1, 0, stride, x, s); continue; }
-    Pair value;
-    if (t->rule[j] == RULE_input) value = pair_sum((Pair){start[0], start[1]}, (Pair){x[b], 0});
-    else value = pair_rule(t, j, (Pair){s[(int64_t)a * stride], low[a]}, (Pair){s[(int64_t)b * stride], low[b]});
-    s[(int64_t)j * stride] = value.high;
-    low[j] = value.low;
-  }
+static void series_at(const Series *t, const List *list, int k, int stride, const double *x, double *s) {
+  series_inputs(t, k, x, s);
+  if (k) series_rules(t, list, k, k, stride, s);
+  else if (has_pairs(t->timed, t->size, stride, s)) series_pairs(t, list, stride, x, s);
+  else series_values(t, list->rule, list->count, stride, s);
 }

@@ -12,13 +12,29 @@ typedef struct {
   const double *constant;
 } Values;
 
-/* Power series by rules (nonsmooth/model/expressions/taylor_rules.py), order by order. Those of ``moving`` have a coefficient
- * zero, those of ``later`` further ones; ``late`` are those of them that unknown multipliers enter, which
- * follow from the equations of the same order. */
+/* A rule (nonsmooth/model/expressions/taylor_rules.py): its value, how later coefficients follow, its own row and those
+ * of its arguments, as places of their first coefficients; the operation of its value; whether that is two numbers if
+ * the time is (pairs.h). A sum has terms from ``begin`` to ``end``, of which those from ``from`` to ``to`` have later
+ * coefficients: a factor times the product of rows a and b, by their kind: neither moves, a alone does, both do, both
+ * are one. */
+typedef struct { int32_t rule, later, op, w, a, b, c, paired, begin, from, to, end; double first, second; } Rule;
+typedef struct { double factor; int32_t a, b, kind, pad; } Term;
+enum { AT_REST, LINEAR, PRODUCT, SQUARE };
+
+/* Rules that are evaluated one after the other. */
+typedef struct { int32_t count, pad; const int32_t *rule; } List;
+
+/* Power series by rules, order by order. Inputs of the vector that moves are given; ``still`` are known once the
+ * parameters are, ``moving`` have a coefficient zero, of which ``values`` suffice for those of the outputs, ``later``
+ * further ones; ``late`` are those of them that unknown multipliers enter, which follow from the equations of the
+ * same order, ``early`` the others. Of ``later``, the field and the layer follow from ``loop``, of which multipliers
+ * enter ``loop_late``; ``before`` depend on the time alone, and ``after`` can wait until all orders of these are known. */
 typedef struct {
-  int32_t size, still_count, moving_count, later_count, late_count, output_count, timed, pad;
-  const int32_t *rule, *a, *b, *c, *op, *still, *moving, *later, *late, *output, *paired;
-  const double *first, *second;
+  int32_t size, terms, inputs, states, outputs, timed; /* states: inputs that are states, the first ones */
+  const Rule *rule;
+  const Term *term;
+  const int32_t *input, *place, *output; /* rows of inputs, and their places in the vector */
+  List still, values, moving, later, late, early, loop, loop_late, before, after;
 } Series;
 
 /* Not inlined: the same code whoever calls, which no compiler replaces by other arithmetic. */
@@ -104,29 +120,32 @@ static void values_free(const Values *t, const double *x, const double *p, doubl
   values_nodes(t, t->free, t->free_count, x, p, w);
 }
 
-/* Sums of u_i v_(k-i) and of i u_i v_(k-i), i from first to last, in four chains. */
+/* PART[k] is 1/k. */
+#define FOUR(k) (double)1 / (k), (double)1 / ((k) + 1), (double)1 / ((k) + 2), (double)1 / ((k) + 3)
+#define SIXTEEN(k) FOUR(k), FOUR((k) + 4), FOUR((k) + 8), FOUR((k) + 12)
+static const double PART[] = {0, SIXTEEN(1), SIXTEEN(17), SIXTEEN(33)};
+#undef FOUR
+#undef SIXTEEN
+
+/* Sum of u_i v_(k-i), i from first to last, in four chains: the ends, which are known last, are added last. */
 static inline double convolve(const double *u, const double *v, int k, int first, int last) {
-  int count = last - first + 1, i = 4;
-  if (count <= 0) return 0;
+  int count = last - first, i = 1;
+  if (count < 0) return 0;
   u += first;
   v += k - first;
-  double a = u[0] * v[0], b, c, d;
-  if (count == 1) return a;
-  b = u[1] * v[-1];
-  if (count == 2) return a + b;
-  c = u[2] * v[-2];
-  if (count == 3) return (a + b) + c;
-  d = u[3] * v[-3];
+  double ends = u[0] * v[0], a = 0, b = 0, c = 0, d = 0;
+  if (count == 0) return ends;
+  ends += u[count] * v[-count];
   for (; i + 3 < count; i += 4) {
-    a = MULADD(u[i], v[-i], a);
-    b = MULADD(u[i + 1], v[-i - 1], b);
-    c = MULADD(u[i + 2], v[-i - 2], c);
-    d = MULADD(u[i + 3], v[-i - 3], d);
+    a += u[i] * v[-i];
+    b += u[i + 1] * v[-i - 1];
+    c += u[i + 2] * v[-i - 2];
+    d += u[i + 3] * v[-i - 3];
   }
-  if (i < count) a = MULADD(u[i], v[-i], a);
-  if (i + 1 < count) b = MULADD(u[i + 1], v[-i - 1], b);
-  if (i + 2 < count) c = MULADD(u[i + 2], v[-i - 2], c);
-  return (a + b) + (c + d);
+  if (i < count) a += u[i] * v[-i];
+  if (i + 1 < count) b += u[i + 1] * v[-i - 1];
+  if (i + 2 < count) c += u[i + 2] * v[-i - 2];
+  return ((a + b) + (c + d)) + ends;
 }
 
 /* Terms up to the last that is not zero. */
@@ -141,29 +160,30 @@ static inline double product_of(const double *u, int u_terms, const double *v, i
   if (first < last) return convolve(u, v, k, first, last);
   return first == last ? u[first] * v[k - first] : 0;
 }
-static inline double weigh(const double *u, const double *v, int k, int first, int last) {
-  int count = last - first + 1, i = 4;
-  if (count <= 0) return 0;
-  double x = first;
-  u += first;
-  v += k - first;
-  double a = x * u[0] * v[0], b, c, d;
-  if (count == 1) return a;
-  b = (x + 1) * u[1] * v[-1];
-  if (count == 2) return a + b;
-  c = (x + 2) * u[2] * v[-2];
-  if (count == 3) return (a + b) + c;
-  d = (x + 3) * u[3] * v[-3];
-  for (; i + 3 < count; i += 4) {
-    a = MULADD((x + i) * u[i], v[-i], a);
-    b = MULADD((x + i + 1) * u[i + 1], v[-i - 1], b);
-    c = MULADD((x + i + 2) * u[i + 2], v[-i - 2], c);
-    d = MULADD((x + i + 3) * u[i + 3], v[-i - 3], d);
+
+/* Sums of i u_i v_(k-i) and of i u_i w_(k-i), i from 1 to ``last``, which is added last. */
+static inline double weigh_both(const double *u, const double *v, const double *w, int k, int last, double *other) {
+  double a = 0, b = 0, c = 0, d = 0, x = 1;
+  if (last < 1) return *other = 0;
+  for (int i = 1; i + 1 < last; i += 2, x += 2) {
+    double one = x * u[i], two = (x + 1) * u[i + 1];
+    a += one * v[k - i];
+    b += two * v[k - i - 1];
+    c += one * w[k - i];
+    d += two * w[k - i - 1];
   }
-  if (i < count) a = MULADD((x + i) * u[i], v[-i], a);
-  if (i + 1 < count) b = MULADD((x + i + 1) * u[i + 1], v[-i - 1], b);
-  if (i + 2 < count) c = MULADD((x + i + 2) * u[i + 2], v[-i - 2], c);
-  return (a + b) + (c + d);
+  if (last % 2 == 0) {
+    double one = (last - 1) * u[last - 1];
+    a += one * v[k - last + 1];
+    c += one * w[k - last + 1];
+  }
+  double end = last * u[last];
+  *other = (c + d) + end * w[k - last];
+  return (a + b) + end * v[k - last];
+}
+static inline double weigh(const double *u, const double *v, int k, int last) {
+  double other;
+  return weigh_both(u, v, v, k, last, &other);
 }
 
 /* A coefficient that is zero stays so, whatever it is divided by: a square root of zero at rest. */
@@ -192,107 +212,144 @@ static double power_coefficient(const double *u, const double *w, double exponen
   if (u[0] == 0) return power_at_zero(u, exponent, k);
   double sum = exponent * k * (u[k] * w[0]);
   for (int j = 1; j < k; j++) sum = MULADD(exponent * (k - j) - j, u[k - j] * w[j], sum);
-  return settled(over(sum, u[0]) * (1.0 / k), w[0], u[0]);
+  return settled(over(sum, u[0]) * PART[k], w[0], u[0]);
 }
 
-/* Coefficient k of some rules; coefficient i of rule j is s[j * stride + i], of input x[i] x[k]. */
-static void series_rules(const Series *t, const int32_t *which, int32_t count, int k, int stride, const double *x,
-                         double *s) {
+/* After the rows come second numbers, then the time of the start (pairs.h), then coefficients of terms. */
+static size_t series_room(const Series *t, int stride) { return (size_t)t->size * (stride + 1) + 2 + t->terms; }
+#define COEFFICIENTS(t, stride, s) ((s) + (int64_t)(t)->size * ((stride) + 1) + 2)
+
+/* Coefficients of order zero. */
+static void series_values(const Series *t, const int32_t *which, int32_t count, int stride, double *s) {
+  double *coefficient = COEFFICIENTS(t, stride, s);
   for (int32_t l = 0; l < count; l++) {
-    int32_t j = which[l];
-    const double *u = s + (int64_t)t->a[j] * stride, *v = s + (int64_t)t->b[j] * stride;
-    double *w = s + (int64_t)j * stride;
-    switch (t->rule[j]) {
-      case RULE_input: w[k] = x[t->b[j]]; break;
-      case RULE_add: w[k] = u[k] + v[k]; break;
-      case RULE_shift: w[k] = k ? u[k] : u[0] + v[0]; break;
-      case RULE_sub: w[k] = u[k] - v[k]; break;
-      case RULE_lower: w[k] = k ? u[k] : u[0] - v[0]; break;
-      case RULE_below: w[k] = k ? -v[k] : u[0] - v[0]; break;
-      case RULE_neg: w[k] = -u[k]; break;
-      case RULE_twice: w[k] = u[k] + u[k]; break;
-      case RULE_scale: w[k] = u[k] * v[0]; break;
-      case RULE_over: w[k] = k ? over(u[k], v[0]) : ratio(u[0], v[0]); break;
-      case RULE_mul: w[k] = convolve(u, v, k, 0, k); break;
-      case RULE_sq: {
-        double half = 2 * convolve(u, u, k, 0, (k + 1) / 2 - 1);
-        w[k] = k % 2 ? half : k ? MULADD(u[k / 2], u[k / 2], half) : u[0] * u[0];
+    const Rule *q = t->rule + which[l];
+    double w = 0;
+    switch (q->rule) {
+      case RULE_sum:
+        for (int32_t i = q->begin; i < q->end; i++) {
+          const Term *e = t->term + i;
+          coefficient[i] = e->factor * s[e->b];
+          w += coefficient[i] * s[e->a];
+        }
         break;
-      }
-      case RULE_div:
-        w[k] = k ? settled(over(u[k] - convolve(w, v, k, 0, k - 1), v[0]), w[0], v[0]) : ratio(u[0], v[0]);
-        break;
-      case RULE_under:
-        w[k] = k ? settled(over(-convolve(w, v, k, 0, k - 1), v[0]), w[0], v[0]) : ratio(u[0], v[0]);
-        break;
-      case RULE_sqrt: w[k] = k ? over(0.5 * (u[k] - convolve(w, w, k, 1, k - 1)), w[0]) : sqrt(u[0]); break;
-      case RULE_power: w[k] = k ? power_coefficient(u, w, v[0], k) : operate(OP_pow, u[0], v[0]); break;
-      case RULE_affine: w[k] = k ? t->second[j] * u[k] : MULADD(t->second[j], u[0], t->first[j]); break;
-      case RULE_integral:
-        w[k] = k ? t->first[j] / k * weigh(u, v, k, 1, k) : operate(t->op[j], u[0], 0);
-        break;
-      case RULE_turn:
-        w[k] = k ? t->first[j] / k * (u[1] * v[k - 1]) : operate(t->op[j], u[0], 0);
-        break;
-      case RULE_quotient:
-        w[k] = k ? over(t->first[j] * k * u[k] - weigh(w, v, k, 1, k - 1), v[0]) * (1.0 / k)
-                 : operate(t->op[j], u[0], 0);
-        break;
-      case RULE_atan2: {
-        const double *r = s + (int64_t)t->c[j] * stride;
-        if (k == 0) { w[0] = operate(OP_atan2, u[0], v[0]); break; }
-        double top = weigh(u, v, k, 1, k) - weigh(v, u, k, 1, k) - weigh(w, r, k, 1, k - 1);
-        w[k] = over(top, r[0]) * (1.0 / k);
-        break;
-      }
-      /* A term that the mode leaves out has a factor that is zero; its other factors are not evaluated. */
-      case RULE_gated: w[k] = u[0] != 0 ? v[k] : 0; break;
-      case RULE_chosen: {
-        int i = 0;
-        while (i < k && u[i] == 0) i++;
-        w[k] = u[i] != 0 ? v[k] : 0;
-        break;
-      }
-      default: w[k] = NAN;
+      case RULE_div: w = ratio(s[q->a], s[q->b]); break;
+      default: w = operate(q->op, s[q->a], s[q->b]);
     }
+    s[q->w] = w;
   }
 }
 
-/* Rounding of the values of some rules, in units of EPSILON, from that of their inputs, of the ``size`` that
- * these have at least: 0 for none. */
-static void series_rounding(const Series *t, const int32_t *which, int32_t count, int stride, double size,
-                            const double *s, double *error) {
-  for (int32_t l = 0; l < count; l++) {
-    int32_t j = which[l];
-    double u = s[(int64_t)t->a[j] * stride], v = s[(int64_t)t->b[j] * stride], w = s[(int64_t)j * stride];
-    double of_u = error[t->a[j]], of_v = error[t->b[j]], sum = 0;
-    switch (t->rule[j]) {
-      case RULE_input: error[j] = size > 0 ? size + fabs(w) : 0; continue;
-      case RULE_add: case RULE_shift: case RULE_sub: case RULE_lower: case RULE_below: sum = of_u + of_v; break;
-      case RULE_neg: error[j] = of_u; continue;
-      case RULE_twice: error[j] = 2 * of_u; continue;
-      case RULE_scale: case RULE_mul: sum = fabs(u) * of_v + fabs(v) * of_u; break;
-      case RULE_over: case RULE_div: case RULE_under: sum = over(of_u + fabs(w) * of_v, fabs(v)); break;
-      case RULE_sq: sum = 2 * fabs(u) * of_u; break;
+static inline double square_of(const double *u, int k) {
+  double half = 2 * convolve(u, u, k, 0, (k + 1) / 2 - 1);
+  return k % 2 ? half : MULADD(u[k / 2], u[k / 2], half);
+}
+
+/* Coefficients of orders from ``first``, above zero, to ``last``. */
+static void series_rules(const Series *t, const List *list, int first, int last, int stride, double *s) {
+  const double *coefficient = COEFFICIENTS(t, stride, s);
+#define EACH for (int k = first; k <= last; k++)
+#define TERM(i) (f[i] * s[e[i].a + k])
+  for (int32_t l = 0; l < list->count; l++) {
+    const Rule *q = t->rule + list->rule[l];
+    const Term *e = t->term + q->from;
+    const double *u = s + q->a, *v = s + q->b, *f = coefficient + q->from;
+    double *w = s + q->w;
+    switch (q->later) {
+      case RULE_linear1: EACH w[k] = TERM(0); break;
+      case RULE_linear2: EACH w[k] = TERM(0) + TERM(1); break;
+      case RULE_linear3: EACH w[k] = TERM(0) + TERM(1) + TERM(2); break;
+      case RULE_linear4: EACH w[k] = TERM(0) + TERM(1) + TERM(2) + TERM(3); break;
+      case RULE_linear: EACH {
+        double sum = TERM(0) + TERM(1) + TERM(2) + TERM(3);
+        for (int32_t i = 4; i < q->to - q->from; i++) sum += TERM(i);
+        w[k] = sum;
+      } break;
+      case RULE_sum: EACH {
+        double sum = 0;
+        for (int32_t i = 0; i < q->to - q->from; i++) {
+          if (e[i].kind == LINEAR) sum += TERM(i);
+          else if (e[i].kind == PRODUCT) sum += e[i].factor * convolve(s + e[i].a, s + e[i].b, k, 0, k);
+          else if (e[i].kind == SQUARE) sum += e[i].factor * square_of(s + e[i].a, k);
+        }
+        w[k] = sum;
+      } break;
+      case RULE_over: EACH w[k] = over(u[k], v[0]); break;
+      case RULE_div: EACH w[k] = settled(over(u[k] - convolve(w, v, k, 0, k - 1), v[0]), w[0], v[0]); break;
+      case RULE_under: EACH w[k] = settled(over(-convolve(w, v, k, 0, k - 1), v[0]), w[0], v[0]); break;
+      case RULE_sqrt: EACH w[k] = over(0.5 * (u[k] - convolve(w, w, k, 1, k - 1)), w[0]); break;
+      case RULE_power: EACH w[k] = power_coefficient(u, w, v[0], k); break;
+      case RULE_integral: EACH w[k] = q->first * PART[k] * weigh(u, v, k, k); break;
+      case RULE_turn: EACH w[k] = q->first * PART[k] * (u[1] * v[k - 1]); break;
+      case RULE_pair: EACH { /* row b is written too */
+        double other, own = weigh_both(u, v, w, k, k, &other);
+        w[k] = q->first * PART[k] * own;
+        s[q->b + k] = q->second * PART[k] * other;
+      } break;
+      case RULE_turns: EACH {
+        w[k] = q->first * PART[k] * (u[1] * v[k - 1]);
+        s[q->b + k] = q->second * PART[k] * (u[1] * w[k - 1]);
+      } break;
+      case RULE_quotient: EACH w[k] = over(q->first * k * u[k] - weigh(w, v, k, k - 1), v[0]) * PART[k]; break;
+      case RULE_atan2: EACH {
+        const double *r = s + q->c;
+        double top = weigh(u, v, k, k) - weigh(v, u, k, k) - weigh(w, r, k, k - 1);
+        w[k] = over(top, r[0]) * PART[k];
+      } break;
+      /* A term that the mode leaves out has a factor that is zero; its other factors are not evaluated. */
+      case RULE_gated: EACH w[k] = u[0] != 0 ? v[k] : 0; break;
+      case RULE_chosen: EACH {
+        int i = 0;
+        while (i < k && u[i] == 0) i++;
+        w[k] = u[i] != 0 ? v[k] : 0;
+      } break;
+      default: EACH w[k] = NAN;
+    }
+  }
+#undef EACH
+#undef TERM
+}
+
+/* Coefficients k of the inputs. */
+static void series_inputs(const Series *t, int k, const double *x, double *s) {
+  for (int32_t l = 0; l < t->inputs; l++) s[t->input[l] + k] = x[t->place[l]];
+}
+
+/* Rounding of the values of all rules that move, in units of EPSILON, from that of their inputs, of the ``size`` that
+ * these have at least: 0 for none. Each stands where the coefficient of order zero of its row would. */
+static void series_rounding(const Series *t, double size, const double *s, double *error) {
+  for (int32_t l = 0; l < t->inputs; l++) error[t->input[l]] = size > 0 ? size + fabs(s[t->input[l]]) : 0;
+  for (int32_t l = 0; l < t->moving.count; l++) {
+    const Rule *q = t->rule + t->moving.rule[l];
+    double u = s[q->a], v = s[q->b], w = s[q->w], of_u = error[q->a], of_v = error[q->b], sum = 0, partial = 0;
+    switch (q->rule) {
+      case RULE_sum:
+        for (int32_t i = q->begin; i < q->end; i++) {
+          const Term *e = t->term + i;
+          double y = s[e->a], z = s[e->b], term = e->factor * z * y;
+          sum += fabs(e->factor) * (fabs(y) * error[e->b] + fabs(z) * error[e->a]);
+          if (e->b || !(e->factor == 1 || e->factor == -1)) sum += fabs(term); /* row 0 is one */
+          partial += term;
+          if (i > q->begin) sum += fabs(partial);
+        }
+        error[q->w] = sum;
+        continue;
+      case RULE_div: sum = over(of_u + fabs(w) * of_v, fabs(v)); break;
       case RULE_sqrt: sum = over(0.5 * of_u, w); break;
       case RULE_power: sum = over(fabs(w * v) * of_u, fabs(u)); break;
-      case RULE_affine: sum = fabs(t->second[j]) * of_u + fabs(t->first[j]); break;
-      case RULE_integral: case RULE_turn: sum = fabs(t->first[j] * v) * of_u; break;
-      case RULE_quotient: sum = over(fabs(t->first[j]) * of_u, fabs(v)); break;
-      case RULE_atan2: sum = over(fabs(u) * of_v + fabs(v) * of_u, s[(int64_t)t->c[j] * stride]); break;
-      case RULE_gated: case RULE_chosen: error[j] = of_v; continue;
+      case RULE_integral: sum = fabs(q->first * v) * of_u; break;
+      case RULE_quotient: sum = over(fabs(q->first) * of_u, fabs(v)); break;
+      case RULE_atan2: sum = over(fabs(u) * of_v + fabs(v) * of_u, s[q->c]); break;
+      case RULE_chosen: error[q->w] = of_v; continue;
     }
-    error[j] = sum + fabs(w);
+    error[q->w] = sum + fabs(w);
   }
 }
 
 /* What does not move: constants, parameters and operations of them; later coefficients stay zero. */
-static void series_prepare(const Series *t, int stride, const double *p, double *s) {
-  for (int32_t l = 0; l < t->still_count; l++) {
-    int32_t j = t->still[l];
-    double *w = s + (int64_t)j * stride, u = s[(int64_t)t->a[j] * stride], v = s[(int64_t)t->b[j] * stride];
-    if (t->rule[j] == RULE_constant) w[0] = t->first[j];
-    else if (t->rule[j] == RULE_input) w[0] = p[t->b[j]];
-    else w[0] = operate(t->op[j], u, v);
+static void series_prepare(const Series *t, const double *p, double *s) {
+  for (int32_t l = 0; l < t->still.count; l++) {
+    const Rule *q = t->rule + t->still.rule[l];
+    s[q->w] = q->rule == RULE_constant ? q->first : q->rule == RULE_input ? p[q->begin] : operate(q->op, s[q->a], s[q->b]);
   }
 }

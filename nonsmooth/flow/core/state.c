@@ -53,8 +53,6 @@ typedef struct {
   int32_t affine; /* whether all unknowns enter linearly together */
   int32_t sets, kept_rows, impact_law, joints; /* sets: of codimension two and more; kept_rows: see Element */
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
-  const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
-  int32_t early_count, early_free_count;
   Rules rules;
   Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
   const Series *implicit; /* with those derivatives, for implicit steps, or none */
@@ -169,7 +167,8 @@ typedef struct {
   double *series, *rounding, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope;
   double *vector, *sample;
   double *atom_work, *choice_work;
-  double *met_at; /* root of each guard in the step, or -1 */
+  double *met_at, *hidden; /* root of each guard in the step, or -1; how long before it rounding may hide its zero */
+  double t_error; /* the largest of those of events that move a state by more than the tolerance */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */

@@ -39,7 +39,7 @@ static int is_implicit(Run *r) {
 
 /* Operations of a Taylor step over those of an implicit one. */
 static double cost_ratio(const Run *r) {
-  double n = r->n, s = r->implicit->c.method->s, band = r->implicit->c.band, rules = r->s->series.moving_count;
+  double n = r->n, s = r->implicit->c.method->s, band = r->implicit->c.band, rules = r->s->series.moving.count + r->s->series.terms;
   double taylor = rules * (r->order + 1) * (r->order + 2) / 2;
   double linear = 0.5 * (s + 1) * n * (8 * band * band + 32 * band + 8);
   return taylor / (30 * rules + linear + 4 * s * s * n);

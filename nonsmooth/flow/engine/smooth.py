@@ -75,7 +75,7 @@ class SmoothProgram:
         n, groups = len(group), int(group.max(initial=-1)) + 1
         self.size, count = n * (1 + columns), len(derivatives.row)
         self.watched = watched = len(series.outputs) - n - count
-        rules = series_structure(series, self._kept)
+        rules = series_structure(series, n, order, self._kept)
         self._kept += [derivatives.row, derivatives.column]
         places = EntriesStructure(count, 0, *[a.ctypes.data for a in self._kept[-2:]])
         sizes = (n, watched, order, groups, starts, columns)

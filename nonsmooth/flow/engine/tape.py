@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
-from ...model.printing.tape import Entries, Series, Tape, Values, derived_series_of, tape_of
+from ...model.printing.tape import (
+    LISTS,
+    Entries,
+    Series,
+    Tape,
+    Values,
+    derived_series_of,
+    tape_of,
+)
 from ..constants import FULL, IMPACT_LAWS, LAWS, NEEDS_PROGRAM, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
@@ -47,14 +55,19 @@ class ValuesStructure(ctypes.Structure):
     ]
 
 
+class ListStructure(ctypes.Structure):
+    """Numbers of rules as C reads them."""
+
+    _fields_ = [("count", _I32), ("pad", _I32), ("rule", _POINTER)]
+
+
 class SeriesStructure(ctypes.Structure):
     """Rules of series as C reads them."""
 
     _fields_ = [
-        *[(name, _I32) for name in ("size", "still_count", "moving_count", "later_count")],
-        *[(name, _I32) for name in ("late_count", "output_count", "timed", "pad")],
-        *[(name, _POINTER) for name in ("rule", "a", "b", "c", "op", "still", "moving", "later")],
-        *[(name, _POINTER) for name in ("late", "output", "paired", "first", "second")],
+        *[(name, _I32) for name in ("size", "terms", "inputs", "states", "outputs", "timed")],
+        *[(name, _POINTER) for name in ("rule", "term", "input", "place", "output")],
+        *[(name, ListStructure) for name in LISTS],
     ]
 
 
@@ -97,8 +110,7 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets", "kept_rows", "impact_law", "joints")],
-        *[(name, _POINTER) for name in ("mixed", "early", "early_free")],
-        *[(name, _I32) for name in ("early_count", "early_free_count")],
+        ("mixed", _POINTER),
         ("rules", _Rules),
         ("derivatives", EntriesStructure),
         ("implicit", _POINTER),
@@ -167,13 +179,19 @@ def tape_for(system: FilippovSystem, options: Options) -> TapeEngine:
     return system.cached(("tape", order), lambda: TapeEngine(system, order))
 
 
-def series_structure(s: Series, kept: list[NDArray[Any]]) -> SeriesStructure:
-    """Rules as C reads them; what it points to is added to ``kept``."""
-    lists = (s.still, s.moving, s.later, s.late, s.outputs)
-    arrays = (s.rule, s.a, s.b, s.c, s.op, *lists, s.paired, s.first, s.second)
-    kept += arrays
-    sizes = (len(s.rule), *map(len, lists), int(s.paired.any()), 0)
-    return SeriesStructure(*sizes, *[a.ctypes.data for a in arrays])
+def series_structure(s: Series, n: int, order: int, kept: list[NDArray[Any]]) -> SeriesStructure:
+    """Rules for n states at an order as C reads them; what it points to is added to ``kept``."""
+    stride, rule, term = order + 1, s.rule.copy(), s.term.copy()
+    for table, names in ((rule, "wabc"), (term, "ab")):
+        for name in names:
+            table[name] *= stride
+    arrays = (rule, term, s.input * stride, s.place, s.outputs * stride)
+    lists = [s.lists[name] for name in LISTS]
+    kept += (*arrays, *lists)
+    states, paired = int((s.place < n).sum()), int(rule["paired"].any())
+    sizes = (len(rule), len(term), len(s.input), states, len(s.outputs), paired)
+    own = [ListStructure(len(a), 0, a.ctypes.data) for a in lists]
+    return SeriesStructure(*sizes, *[a.ctypes.data for a in arrays], *own)
 
 
 def values_structure(v: Values, kept: list[NDArray[Any]]) -> ValuesStructure:
@@ -233,11 +251,14 @@ class TapeEngine:
     def add_implicit(self) -> None:
         """Give the driver the field's derivatives, which implicit steps need."""
         series, entries = self.system.cached("derived", lambda: derived_series_of(self.coupled))
-        implicit = series_structure(series, self._kept)
+        implicit = self._series(series, 0)
         self._c.derivatives = self._entries(entries)
         self._c.places = self._at(_places(entries, self.system.extended_dimension))
         self._c.implicit = ctypes.addressof(implicit)
         self._implicit = implicit
+
+    def _series(self, series: Series, order: int) -> SeriesStructure:
+        return series_structure(series, self.system.extended_dimension, order, self._kept)
 
     def _structure(self, coupled: Coupled, tape: Tape) -> _System:
         system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
@@ -252,8 +273,8 @@ class TapeEngine:
             resets=len(system.resets),
             order=self.order,
             slope_outputs=tape.slope_outputs,
-            series=series_structure(tape.series, self._kept),
-            free=series_structure(tape.free, self._kept),
+            series=self._series(tape.series, self.order),
+            free=self._series(tape.free, self.order),
             affine=int(coupled.affine),
             linear=int(coupled.linearity.everywhere),
             linear_free=int(coupled.linearity.free),
@@ -277,15 +298,12 @@ class TapeEngine:
             "bent_free": coupled.linearity.bent_free_rows,
             "bent_guards": coupled.linearity.bent_guards,
             "curved": coupled.linearity.curved_guards,
-            "early": tape.series.early,
-            "early_free": tape.free.early,
         }
         made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
         made.joints = len(system.joints)
         made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
         table = (_Element * (len(elements) + 1))(*elements)
         made.element = self._at(np.frombuffer(bytes(table), np.uint8))
-        made.early_count, made.early_free_count = len(tape.series.early), len(tape.free.early)
         for name, values in tables.items():
             setattr(made, name, self._at(np.array([*values, 0], np.int32)))
         made.rules = self._rules()
@@ -393,6 +411,7 @@ class TapeEngine:
             several=[modes[k] for k in several],
             rates=rates[:, : self.system.dimension],
             facts=counts[12],
+            t_error=numbers[3],
             unmet=counts[13],
             implicit_steps=counts[14],
             motion=final,
@@ -447,7 +466,7 @@ class TapeEngine:
         return _Held(state, made.run_free)
 
     def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
-        numbers, counts = (_D * 3)(), (_I64 * 15)()
+        numbers, counts = (_D * 4)(), (_I64 * 15)()
         width = self.system.surface_count + len(self.system.impacts)
         active, several = (_I32 * (width + 1))(), (_I32 * SEVERAL)()
         rates = np.empty((SEVERAL, self.system.extended_dimension))

@@ -8,7 +8,7 @@ k = 2, with drilling friction k = 3. With k = 1 the set is a surface.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -19,7 +19,7 @@ from ..checks import real
 from ..errors import DefinitionError, ParameterError
 from ..expressions.cancel import cancel_common_factor, powers
 from ..expressions.graph import IN_A_FIELD, IN_A_GAP, IN_A_GUARD, IN_A_SURFACE, require_smooth
-from ..expressions.linearity import enters_nonlinearly
+from ..expressions.linearity import bent, enters_nonlinearly
 from ..numbering import IMPACT_LAWS
 from ..reading import (
     Expression,
@@ -559,15 +559,12 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     for j, name in enumerate(d.impacts):
         named += [(*gaps[j], False), (f"restitution of {name!r}", d.restitutions[j], False)]
     known = ca.vertcat(d.extended_states, d.parameters, d.multipliers, d.reactions)
+    x = d.extended_states
     require_unique(known)
-    for what, expression, multipliers in [*named, *[(w, e, False) for w, e in switched]]:
-        require_known(expression, known, what, **d.names)
-        if not multipliers and ca.depends_on(expression, ca.vertcat(d.multipliers, d.reactions)):
-            raise DefinitionError(
-                f"{what}: expected an expression in states, time and parameters, received one "
-                "with a multiplier. Only the field may contain multipliers."
-            )
-        require_finite(expression, known, what)
+    every, names = [*named, *[(w, e, False) for w, e in switched]], d.names
+    _of_all(lambda what, e: require_known(e, known, what, **names), [own[:2] for own in every])
+    _of_all(lambda what, e: _require_bare(what, e, d), [(w, e) for w, e, has in every if not has])
+    _of_all(lambda what, e: require_finite(e, known, what), [own[:2] for own in every])
     _require_smooth_functions(d, gaps, [(what, e) for what, e, _ in named])
     for period in listed(d.periods):
         if ca.depends_on(period, d.extended_states):
@@ -579,13 +576,16 @@ def require_consistent(d: Definition, given: bool = True) -> None:
         _require_states(name, d.guards[i], d.extended_states, d)
         if given:
             _require_simple(name, d.guards[i], d)
-    for i, (name, h) in enumerate(functions):
+    moves = ca.which_depends(d.surfaces, d.extended_states, 1, True) if functions else []
+    for i, ((name, h), curved) in enumerate(zip(functions, bent(d.surfaces, x), strict=True)):
         if i in d.half_lines:
             if not ca.depends_on(h, d.multipliers):
                 _require_simple(name, h, d)
             continue
-        _require_states(name, h, d.extended_states, d)
-        _require_simple(name, h, d)
+        if not moves[i]:
+            _require_states(name, h, d.extended_states, d)
+        if curved:
+            _require_simple(name, h, d)
     for j in range(len(d.impacts)):
         _check_impact(d, j)
     require_complementarity(d)
@@ -596,6 +596,26 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     _require_hysteresis(d)
 
 
+def _of_all(check: Callable[[str, ca.SX], None], named: Sequence[tuple[str, ca.SX]]) -> None:
+    """Check expressions together, and one by one only to name what is refused."""
+    try:
+        if named:
+            check("", ca.vertcat(*[ca.vec(e) for _, e in named]))
+    except DefinitionError:
+        for what, expression in named:
+            check(what, expression)
+        raise
+
+
+def _require_bare(what: str, expression: ca.SX, d: Definition) -> None:
+    """Refuse multipliers."""
+    if ca.depends_on(expression, ca.vertcat(d.multipliers, d.reactions)):
+        raise DefinitionError(
+            f"{what}: expected an expression in states, time and parameters, received one "
+            "with a multiplier. Only the field may contain multipliers."
+        )
+
+
 def _require_smooth_functions(
     d: Definition, gaps: list[tuple[str, ca.SX]], named: list[tuple[str, ca.SX]]
 ) -> None:
@@ -604,8 +624,10 @@ def _require_smooth_functions(
     advice = dict.fromkeys(_function_names(d), IN_A_SURFACE)
     advice |= dict.fromkeys([name for name, _ in gaps], IN_A_GAP)
     advice |= dict.fromkeys(_guard_names(d), IN_A_GUARD)
-    for what, expression in [*gaps, *named]:
-        require_smooth(expression, moving, d.parameters, what, advice.get(what, IN_A_FIELD))
+    check = lambda what, e: require_smooth(
+        e, moving, d.parameters, what, advice.get(what, IN_A_FIELD)
+    )
+    _of_all(check, [*gaps, *named])
 
 
 def _guard_names(d: Definition) -> list[str]:
@@ -679,8 +701,8 @@ def consistent_parameters(
 
 
 def _require_linear(d: Definition) -> None:
-    bent = enters_nonlinearly(d.field, d.multipliers)
-    for lam, is_nonlinear in zip(listed(d.multipliers), bent, strict=True):
+    found = enters_nonlinearly(d.field, d.multipliers)
+    for lam, is_nonlinear in zip(listed(d.multipliers), found, strict=True):
         if is_nonlinear:
             raise DefinitionError(
                 f"multiplier {lam}: expected a field linear in it (Filippov's convex "

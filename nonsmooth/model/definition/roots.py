@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ..expressions.graph import POWERS, evaluate, instructions, operation, power_of
+from ..expressions.graph import POWERS, evaluate, instructions, operation, power_of, uses
 from ..expressions.identity import vanish_on
 
 #: Random points at which signs are compared.
@@ -66,10 +66,10 @@ def gate_roots(
 ) -> tuple[ca.SX, dict[int, float]]:
     """Multiply each root of a switching function by its gate; also the smallest exponent for each surface."""
     # A gate is 1 or -1, the side, or 0; a root is multiplied by 1 on the side where it is defined, else by 0.
-    symbols = ca.vertcat(*ca.symvar(field)) if field.numel() else ca.SX(0, 1)
-    nodes, rows = instructions([symbols], [field])
-    if not any(node.op in POWERS for node in nodes):
+    if not field.numel() or not uses(field, POWERS):
         return field, {}
+    symbols = ca.vertcat(*ca.symvar(field))
+    nodes, rows = instructions([symbols], [field])
     algebra = _Gated(symbols, ca.vertsplit(surfaces)[: surfaces.numel()], x, gates)
     values = evaluate(nodes, algebra)
     return ca.vertcat(*[values[k] for k in rows[0]]), algebra.powers

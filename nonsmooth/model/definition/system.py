@@ -30,7 +30,11 @@ from .elements import Complementarity, multipliers_of_conditions
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .matrix_symbols import in_scalar_symbols, read_dae
-from .parse_definition import Definition, consistent_parameters, read_definition
+from .parse_definition import (
+    Definition,
+    consistent_parameters,
+    read_definition,
+)
 from .roots import roots_of
 from .switching import Switching, class_of
 

@@ -7,8 +7,7 @@ codes are used here only.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
-from typing import Protocol, TypeVar, cast
+from typing import NamedTuple, Protocol, TypeVar, cast
 
 import casadi as ca
 
@@ -53,8 +52,7 @@ _BESIDE_ZERO: dict[str, str] = {
 }
 
 
-@dataclass(frozen=True)
-class Node:
+class Node(NamedTuple):
     """One operation: its name, its arguments (node numbers) and a payload."""
 
     op: str
@@ -71,39 +69,66 @@ def instructions(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], merged: bool = True
 ) -> tuple[list[Node], list[list[int]]]:
     """Value-number the graph of dense ``outputs`` over ``inputs``, unless not ``merged``."""
-    function = ca.Function("graph", list(inputs), [_dense(o) for o in outputs])
+    outputs = [_dense(o) for o in outputs]
+    read = lambda: _read(ca.Function("graph", list(inputs), outputs), merged)
+    own, given = (sum(e.numel() for e in some) for some in (outputs, inputs))
+    if 4 * own < given:  # small, and sooner read than compared
+        return read()
+    kept = [*inputs, *outputs]  # so that the hashes stay theirs
+    hashes = (tuple(e.element_hash() for e in ca.vertsplit(ca.vec(o))) for o in kept)
+    key = (merged, len(inputs), *hashes)
+    found = next((own for known, own, _ in _READ if known == key), None) or read()
+    _READ[:] = [(key, found, kept), *(one for one in _READ if one[0] != key)][:2]
+    return [*found[0]], [*map(list, found[1])]
+
+
+#: The graphs that were read last: some are read several times.
+_READ: list[tuple[Hashable, tuple[list[Node], list[list[int]]], list[ca.SX]]] = []
+
+
+def _read(function: ca.Function, merged: bool) -> tuple[list[Node], list[list[int]]]:
     nodes: list[Node] = []
     known: dict[Node, int] = {}
     register: dict[int, int] = {}
     rows: list[list[int]] = [[-1] * function.numel_out(k) for k in range(function.n_out())]
-
-    def number(node: Node) -> int:
-        if not merged or node not in known:
-            known[node] = len(nodes)
-            nodes.append(node)
-        return known[node]
-
+    code, source_of, target_of = (
+        function.instruction_id,
+        function.instruction_input,
+        function.instruction_output,
+    )
     for k in range(function.n_instructions()):
-        op = OPERATIONS[function.instruction_id(k)]
-        source, target = function.instruction_input(k), function.instruction_output(k)
+        op, source, target = OPERATIONS[code(k)], source_of(k), target_of(k)
         if op == "const":
-            register[target[0]] = number(Node(op, (), float(function.instruction_constant(k))))
+            node = Node(op, (), float(function.instruction_constant(k)))
         elif op == "input":
-            register[target[0]] = number(Node(op, (), (source[0], source[1])))
+            node = Node(op, (), (source[0], source[1]))
         elif op == "output":
             rows[target[0]][target[1]] = register[source[0]]
+            continue
         elif op == "call":
             refuse_call(function.instructions_sx()[k].which_function(), "expression")
         elif op == "printme":  # prints its second argument where CasADi evaluates it
             register[target[0]] = register[source[0]]
+            continue
         elif op not in UNARY and op not in BINARY:
             raise DefinitionError(
                 f"expression: CasADi's operation {op!r} is not supported. Write it with "
                 f"arithmetic and elementary functions: {', '.join((*UNARY, *BINARY))}."
             )
         else:
-            register[target[0]] = number(Node(op, tuple(register[a] for a in source)))
+            node = Node(op, tuple([register[a] for a in source]))
+        number = known.setdefault(node, len(nodes)) if merged else len(nodes)
+        if number == len(nodes):
+            nodes.append(node)
+        register[target[0]] = number
     return nodes, rows
+
+
+def uses(expression: ca.SX, operations: Sequence[str]) -> bool:
+    """Whether an expression has some operations."""
+    function = ca.Function("graph", [ca.vertcat(*ca.symvar(expression))], [_dense(expression)])
+    codes = {code for code, op in OPERATIONS.items() if op in operations}
+    return any(function.instruction_id(k) in codes for k in range(function.n_instructions()))
 
 
 def _dense(output: ca.SX) -> ca.SX:

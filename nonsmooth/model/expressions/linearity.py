@@ -50,17 +50,16 @@ def linearity(
     time: ca.SX = _NO_TIME,
 ) -> Linearity:
     """Determine which parts of a system are affine."""
-    every = ca.vertcat(x, unknowns)
-    bent_rows, bent_guards = bent(field, every, time), bent(guards, every, time)
-    bent_free_rows = bent(field, x, time)
-    others = bent(ca.vertcat(layer, guards, factors), every, time)
+    outputs = [field, guards, layer, factors]
+    every = _bent(outputs, x, unknowns, time, True)
+    (rows, guard_rows, *_), free_rows = every, _bent(outputs, x, unknowns, time, False)[0]
     return Linearity(
-        everywhere=smooth and not any(bent_rows + others),
-        free=smooth and not any(bent_free_rows + bent_guards),
-        bent_rows=bent_rows if smooth else [True] * field.numel(),
-        bent_free_rows=bent_free_rows if smooth else [True] * field.numel(),
-        bent_guards=bent_guards,
-        curved_guards=bent(guards, every),
+        everywhere=smooth and not any(b for own in every for b in own),
+        free=smooth and not any(free_rows + guard_rows),
+        bent_rows=rows if smooth else [True] * field.numel(),
+        bent_free_rows=free_rows if smooth else [True] * field.numel(),
+        bent_guards=guard_rows,
+        curved_guards=_bent([guards], x, unknowns, _NO_TIME, True)[0],
     )
 
 
@@ -77,16 +76,16 @@ class _Kind(IntEnum):
 class _Kinds:
     """The algebra of kinds."""
 
-    def __init__(self, time: int | None):
-        self._time = time
+    def __init__(self, time: int | None, moves: bool):
+        self._time, self._moves = time, moves
 
     def constant(self, value: float) -> _Kind:
         return _Kind.CONSTANT
 
     def symbol(self, vector: int, position: int) -> _Kind:
-        if vector:
+        if vector == 2 or (vector and not self._moves):
             return _Kind.CONSTANT
-        return _Kind.LINE if position == self._time else _Kind.AFFINE
+        return _Kind.LINE if (vector, position) == (0, self._time) else _Kind.AFFINE
 
     def apply(self, op: str, args: Sequence[_Kind]) -> _Kind:
         most = max(args)
@@ -96,17 +95,26 @@ class _Kinds:
             return most
         if op == "div" and args[1] is _Kind.CONSTANT:
             return most
+        if op == "if_else_zero" and args[0] is _Kind.CONSTANT:
+            return most
         return _Kind.WAVE if op in ("sin", "cos") and most is _Kind.LINE else _Kind.BENT
 
 
 def bent(expressions: ca.SX, x: ca.SX, time: ca.SX = _NO_TIME) -> list[bool]:
     """Which expressions are not affine in states, with sines of the time added."""
-    found = [not ca.is_linear(e, x) for e in ca.vertsplit(ca.vec(ca.densify(expressions)))]
-    if not time.numel() or not any(found):
-        return found
-    positions = {s.element_hash(): i for i, s in enumerate(ca.vertsplit(x))}
-    position = positions.get(time.element_hash())
-    others = [s for s in ca.symvar(expressions) if s.element_hash() not in positions]
-    nodes, rows = instructions([x, ca.vertcat(*others)], [expressions])
-    kinds = evaluate(nodes, _Kinds(position))
-    return [kinds[j] is _Kind.BENT for j in rows[0]]
+    return _bent([expressions], x, ca.SX(0, 1), time, False)[0]
+
+
+def _bent(
+    outputs: Sequence[ca.SX], x: ca.SX, unknowns: ca.SX, time: ca.SX, moves: bool
+) -> list[list[bool]]:
+    """The same of several, in unknowns too where these move."""
+    places = {s.element_hash(): i for i, s in enumerate(ca.vertsplit(x))}
+    known = {*places, *(s.element_hash() for s in ca.vertsplit(unknowns))}
+    symbols = ca.symvar(ca.vertcat(*map(ca.vec, outputs)))
+    others = ca.vertcat(*[s for s in symbols if s.element_hash() not in known])
+    nodes, rows = instructions([x, unknowns, others], outputs)
+    kinds = evaluate(
+        nodes, _Kinds(places.get(time.element_hash()) if time.numel() else None, moves)
+    )
+    return [[kinds[j] is _Kind.BENT for j in row] for row in rows]

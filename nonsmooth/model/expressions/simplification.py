@@ -114,7 +114,10 @@ class _Reader:
                 b = {product: -c for product, c in b.items()}
             one, two = self._side(a), self._side(b)
             joined = self._joined(one, two) if one and two else None
-            return _add(a, b) if joined is None else joined
+            if joined is not None:
+                return joined
+            own = self._users[args[0]] == 1 and self._nodes[args[0]].op in ("add", "sub")
+            return _add(a if own else dict(a), b)  # a long sum is not copied for each term
         if node.op in ("neg", "twice"):
             return self._scaled(args[0], ca.SX(-1.0 if node.op == "neg" else 2.0))
         if node.op == "mul" and not all(self._moving[a] for a in args):
@@ -152,7 +155,7 @@ class _Reader:
                 continue
             c, d = a.get(product, ca.SX(0)), b.get(product, ca.SX(0))
             mean, half = c + d, c - d
-            if ca.is_equal(c, d, _DEPTH):
+            if _are_equal(c, d):
                 mean, half = 2.0 * c, ca.SX(0)
             elif ca.simplify(mean).is_zero():
                 mean, half = ca.SX(0), 2.0 * c
@@ -170,7 +173,7 @@ class _Reader:
     def _scaled(self, j: int, factor: ca.SX) -> Sum:
         """One scaling of a sum instead of one for each of its terms."""
         coefficient, product = self._single(j)
-        new = coefficient * factor
+        new = _times(coefficient, factor)
         if _is_extreme(new) and not factor.is_zero():
             return {self._inside(j): factor}
         return {} if new.is_zero() else {product: new}
@@ -179,13 +182,13 @@ class _Reader:
         total, factors = ca.SX(1), Product()
         (c, product), (d, _) = self._single(a), self._single(b)
         # The powers of a coefficient overflow or underflow before those of what it belongs to.
-        if _is_extreme(c * d) or (a == b and len(product) > 1 and not c.is_one()):
+        if _is_extreme(_times(c, d)) or (a == b and len(product) > 1 and not c.is_one()):
             return {tuple(sorted(self._inside(a) + self._inside(b))): ca.SX(1)}
         for coefficient, product in (self._single(a), self._single(b)):
             # A square costs half as much as a product.
             whole = len(product) > 1 and (a == b or product in self._several)
             factors += self._as_factor(product) if whole else product
-            total = total * coefficient
+            total = _times(total, coefficient)
         return {} if total.is_zero() else {tuple(sorted(factors)): total}
 
     def _single(self, j: int) -> tuple[ca.SX, Product]:
@@ -223,19 +226,33 @@ def _is_extreme(coefficient: ca.SX) -> bool:
     return not _LEAST < abs(float(coefficient)) < 1.0 / _LEAST
 
 
-def _add(a: Sum, b: Sum) -> Sum:
-    result = dict(a)
+def _add(result: Sum, b: Sum) -> Sum:
+    """Add to a sum."""
     for product, coefficient in b.items():
         old = result.pop(product, None)
-        new = coefficient if old is None else old + coefficient
+        new = coefficient if old is None else ca.SX.binary(ca.OP_ADD, old, coefficient)
         if not new.is_zero():
             result[product] = new
     return result
 
 
+def _times(a: ca.SX, b: ca.SX) -> ca.SX:
+    """A product; CasADi's own operator takes ten times as long."""
+    return ca.SX.binary(ca.OP_MUL, a, b)
+
+
+def _are_equal(a: ca.SX, b: ca.SX) -> bool:
+    """Whether coefficients are equal."""
+    if a.is_constant() and b.is_constant():
+        return float(a) == float(b)
+    return bool(ca.is_equal(a, b, _DEPTH))
+
+
 def _power(u: ca.SX, n: int) -> ca.SX:
-    half = _power(u * u, n // 2) if n > 1 else ca.SX(1)
-    return u * half if n % 2 else half
+    if n == 1:
+        return u
+    half = _power(_times(u, u), n // 2)
+    return _times(u, half) if n % 2 else half
 
 
 class _Writer:
@@ -273,7 +290,7 @@ class _Writer:
         plus = self._sums[where[0]][product]
         minus = -plus
         return tuple(
-            int(ca.is_equal(plus, c, _DEPTH)) - int(ca.is_equal(minus, c, _DEPTH))
+            int(_are_equal(plus, c)) - int(_are_equal(minus, c))
             for c in (self._sums[k][product] for k in where)
         )
 
@@ -314,16 +331,19 @@ class _Writer:
     def _write(self, terms: Sum) -> ca.SX:
         total = ca.SX(0)
         for product, coefficient in terms.items():
-            if coefficient.is_minus_one():
-                total = total - self._multiply(product)
-            else:
-                total = total + coefficient * self._multiply(product)
+            code = ca.OP_SUB if coefficient.is_minus_one() else ca.OP_ADD
+            term = self._multiply(product)
+            if code == ca.OP_ADD and not coefficient.is_one():
+                term = _times(coefficient, term)
+            total = ca.SX.binary(code, total, term)
         return total
 
     def _multiply(self, product: Product) -> ca.SX:
         result = ca.SX(1)
-        for factor, n in Counter(product).items():
-            result = result * _power(self._expressions[factor], n)
+        for factor, n in (
+            Counter(product).items() if len(product) > 1 else [(f, 1) for f in product]
+        ):
+            result = _times(result, _power(self._expressions[factor], n))
         return result
 
     def _take_out(self, terms: Sum) -> Sum:

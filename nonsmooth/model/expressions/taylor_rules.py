@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import cast
+from typing import NamedTuple, cast
 
 from ..errors import NotSmoothError
 from .graph import Node
 
 
-@dataclass(frozen=True)
-class Rule:
+class Rule(NamedTuple):
     """How one series follows from others."""
 
     rule: str

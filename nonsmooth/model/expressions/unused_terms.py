@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
-from .graph import evaluate, instructions, operation
+from .graph import Node, evaluate, instructions, operation
 
 #: Operations that have a finite value wherever their arguments have one of moderate size.
 _SAFE = frozenset(
@@ -53,7 +53,7 @@ def without_unused_terms(
     if not held:
         return list(outputs)
     nodes, rows = instructions(inputs, outputs)
-    if all(node.op in _SAFE or node.op in ("const", "input") for node in nodes):
+    if all(_is_safe(node, nodes) for node in nodes):
         return list(outputs)
     algebra = _Sides(inputs, held)
     terms = evaluate(nodes, algebra)
@@ -66,6 +66,13 @@ def without_unused_terms(
             result[k] = terms[j].e
         results.append(result)
     return results
+
+
+def _is_safe(node: Node, nodes: Sequence[Node]) -> bool:
+    """Whether a node has a finite value wherever its arguments have one of moderate size."""
+    divisor = nodes[node.args[1]] if node.op == "div" else None
+    by_number = divisor is not None and divisor.op == "const" and divisor.payload != 0.0
+    return by_number or node.op in _SAFE or node.op in ("const", "input")
 
 
 class _Sides:

@@ -110,7 +110,10 @@ class Coupled:
             [j for j in range(len(system.impacts)) if ca.depends_on(f, d.reactions[j])]
             for f in factors
         )
-        self.continuous = tuple(self._is_continuous(i) for i in range(self._surfaces))
+        columns = ca.jacobian(d.field, d.multipliers)
+        self.continuous = tuple(
+            self._is_continuous(i, columns[:, i].nonzeros()) for i in range(self._surfaces)
+        )
         extra = [n for n, scaled in zip(unknowns, self.scaled, strict=True) if scaled]
         self.moving = ca.vertcat(x, lam, d.reactions, *extra)
         self._symbols = [self.moving, system.parameter_symbols]
@@ -143,14 +146,13 @@ class Coupled:
         self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)
 
-    def _is_continuous(self, surface: int) -> bool:
+    def _is_continuous(self, surface: int, column: Sequence[ca.SX]) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""
         special = (*self.system.set_of, *self.system.remembering, *self.system.half_lines)
         if surface in (*special, *self.system.joints):
             return False
         d, x = self.system.definition, self.system.extended_states
-        column = ca.jacobian(d.field, d.multipliers[surface])
-        pieces = [e for e in ca.vertsplit(ca.densify(column)) if not e.is_zero()]
+        pieces = [e for e in column if not e.is_zero()]
         return all(ca.depends_on(e, x) for e in pieces) and vanish_on(
             pieces, d.surfaces[surface], x
         )
@@ -187,7 +189,8 @@ class Coupled:
         for i in range(self._surfaces):
             found.append(Degree((), self.layer[i]))
             if i in joints:
-                own, others = lam[joints], ca.vertcat(*every[: joints[0]], *every[self._surfaces :])
+                rest = ca.vertcat(*every[: joints[0]], *every[self._surfaces :])
+                own, others = lam[joints], lambda rest=rest: rest
                 found[i] = degree_of(d.surfaces[i], self.layer[i], own, others, x, field)
                 continue
             if self.continuous[i] or self.system.nonlinear[i] or i in self.system.set_of:
@@ -195,7 +198,7 @@ class Coupled:
             if i in (*self.system.remembering, *self.system.half_lines):
                 continue
             own = ca.vertcat(lam[i], unknowns[i]) if self.scaled[i] else lam[i]
-            others = ca.vertcat(*[e for e in every if not ca.depends_on(own, e)])
+            others = lambda own=own: ca.vertcat(*[e for e in every if not ca.depends_on(own, e)])
             found[i] = degree_of(d.surfaces[i], self.layer[i], own, others, x, field)
         return found
 
@@ -269,10 +272,11 @@ class Coupled:
     @cached_property
     def slope_moves(self) -> NDArray[np.bool_]:
         """Which derivatives of the layer's rates by the unknowns change along a motion (m, m)."""
-        moves = np.zeros((self.count, self.count), bool)
-        sparsity = self.slope.sparsity()
-        for i, j in zip(sparsity.row(), sparsity.get_col(), strict=True):
-            moves[i, j] = ca.depends_on(self.slope[i, j], self.moving)
+        moves, sparsity = np.zeros((self.count, self.count), bool), self.slope.sparsity()
+        if sparsity.nnz():
+            own = ca.vertcat(*self.slope.nonzeros())
+            found = ca.which_depends(own, self.moving, 1, True)
+            moves[sparsity.row(), sparsity.get_col()] = found
         return moves
 
     @cached_property

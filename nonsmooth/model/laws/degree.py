@@ -5,7 +5,7 @@ Source: Isidori 1995, Nonlinear Control Systems, chapter 4; Levant 1993 for slid
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -24,7 +24,9 @@ class Degree:
     row: ca.SX
 
 
-def degree_of(h: ca.SX, rate: ca.SX, own: ca.SX, others: ca.SX, x: ca.SX, field: ca.SX) -> Degree:
+def degree_of(
+    h: ca.SX, rate: ca.SX, own: ca.SX, others: Callable[[], ca.SX], x: ca.SX, field: ca.SX
+) -> Degree:
     """Relative degree of ``h``, of this ``rate``, for the unknowns ``own``; 1 where others enter first."""
     first, lower = Degree((), rate), list[ca.SX]()
     if not ca.depends_on(rate, own) and _distance(h, own, x, field) > _MOST:
@@ -34,7 +36,7 @@ def degree_of(h: ca.SX, rate: ca.SX, own: ca.SX, others: ca.SX, x: ca.SX, field:
             if not _vanishes(ca.jacobian(rate, own), h, x):
                 return Degree(tuple(lower), rate)
             rate = ca.substitute(rate, own, ca.SX.zeros(own.numel(), 1))
-        if ca.depends_on(rate, others):
+        if ca.depends_on(rate, others()):
             return first
         lower.append(rate)
         rate = ca.densify(ca.jtimes(rate, x, field))

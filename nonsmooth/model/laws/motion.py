@@ -76,35 +76,3 @@ def watched_functions(system: FilippovSystem, watched: Sequence[ca.SX]) -> list[
     return [
         read_function(system.definition, w, f"watched function {k}") for k, w in enumerate(watched)
     ]
-
-
-def mode_field(system: FilippovSystem, mode: str) -> ca.SX:
-    """Right-hand side of any mode, sliding included, time row included (SX, extended dimension).
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-        One letter for each surface; at most one ``s``, of a surface whose multiplier is linear.
-
-    Returns
-    -------
-    SX
-        While sliding Filippov's field, with the factor cancelled that makes it 0/0 where both
-        fields coincide.
-
-    Raises
-    ------
-    DefinitionError
-        A mode whose multipliers are only known implicitly.
-
-    Examples
-    --------
-    >>> import casadi as ca
-    >>> import nonsmooth as ns
-    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    >>> system = ns.FilippovSystem([x, y], surface=y, above=[1, -1], below=[3, 1])
-    >>> ns.local.mode_field(system, "s")
-    SX([2, 0])
-    """
-    return motion(system, mode).field

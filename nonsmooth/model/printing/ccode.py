@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..expressions.graph import Node, reached
 from .terms import MASKS, Graph, Terms
@@ -90,7 +90,7 @@ class Program:
         nodes, roots = self._graph.nodes, [j for row in self._rows for j in row]
         kept = reached([node.args for node in nodes], [True] * len(nodes), roots)
         number = {j: k for k, j in enumerate(kept)}
-        own = [replace(nodes[j], args=tuple(number[a] for a in nodes[j].args)) for j in kept]
+        own = [nodes[j]._replace(args=tuple(number[a] for a in nodes[j].args)) for j in kept]
         rows = [[number[j] for j in row] for row in self._rows]
         printed = _Printed(own, rows, self._types)
         parts = [printed.prepare()]

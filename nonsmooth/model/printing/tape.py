@@ -6,9 +6,9 @@ that a driver calls, in any mode (``model.coupled``).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import NamedTuple, cast
 
 import casadi as ca
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..expressions.graph import Node, depends_on, instructions, reached
 from ..expressions.simplification import simplified
+from ..expressions.sums import summed
 from ..expressions.taylor_rules import Rule, entered, lower
 from ..laws.coupled import Coupled
 from ..numbering import OPERATIONS, TAPE_RULES
@@ -58,33 +59,27 @@ class Values:
     nodes: Sequence[Node]
 
 
+#: A rule and a term of a sum as C reads them; see ``flow/core/programs.h``.
+_INTEGERS = "rule later op w a b c paired begin from to end".split()
+RULE = np.dtype([(name, np.int32) for name in _INTEGERS] + [("first", float), ("second", float)])
+TERM = np.dtype([("factor", float), *[(name, np.int32) for name in ("a", "b", "kind", "pad")]])
+
+#: Lists of rules; see ``flow/core/programs.h``.
+LISTS = "still values moving later late early loop loop_late before after".split()
+
+
 @dataclass(frozen=True)
 class Series:
-    """Rules of power series."""
+    """Rules of power series as C reads them; ``rules`` and ``rows`` before products are summed, to be printed."""
 
-    #: Rule, its arguments (vector and position of an input in a and b), its operation.
-    rule: Integers
-    a: Integers
-    b: Integers
-    c: Integers
-    op: Integers
-    #: first, second: Its numbers.
-    first: Array
-    second: Array
-    #: still, moving, later, late: Rules that are known once the parameters are, those of which a
-    #: first coefficient is needed, of which further ones are, and those of the last that unknown
-    #: multipliers enter.
-    still: Integers
-    moving: Integers
-    later: Integers
-    late: Integers
-    #: Those of ``later`` that are not in ``late``.
-    early: Integers
+    rule: NDArray[np.void]
+    term: NDArray[np.void]
+    input: Integers
+    place: Integers
     outputs: Integers
-    #: Whether each is evaluated in two numbers where the time is two.
-    paired: Integers
-    #: The same rules, to be printed.
+    lists: Mapping[str, Integers]
     rules: Sequence[Rule]
+    rows: Sequence[Sequence[int]]
 
 
 @dataclass(frozen=True)
@@ -208,7 +203,7 @@ def values_of(
 
 #: Operations and rules with two numbers; others have one, of two arguments.
 _KEEP_PAIRS = frozenset(
-    "assign neg twice sq inv add sub mul div fabs fmin fmax fmod if_else_zero affine chosen".split()
+    "assign neg twice sq inv add sub mul div fabs fmin fmax fmod if_else_zero sum chosen".split()
 )
 
 
@@ -226,32 +221,40 @@ def _paired(
 
 def series_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Series:
     """Write the Taylor rules of expressions in two vectors, of which the first moves."""
-    rules, rows = _rules_of(inputs, outputs)
-    return _series(rules, rows, range(len(rows)), lambda _: True, lambda _: False)
+    program = _rules_of(inputs, outputs)
+    return _series(program, range(len(outputs)), lambda _: True, lambda _: False)
 
 
 def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
     """Rules of all that a mode needs: in any, and in one where nothing slides. They are numbered alike."""
     n, m = coupled.system.extended_dimension, coupled.system.surface_count
     inputs = [coupled.moving, coupled.system.parameter_symbols]
-    rules, rows = _rules_of(inputs, coupled.awake([*coupled.outputs, slopes]))
+    program = _rules_of(inputs, coupled.awake([*coupled.outputs, slopes]))
     of_sets = {n + i for i in coupled.system.set_of}
     held = {n + i for i in range(m) if coupled.scaled[i]} - of_sets
     time = _time_of(coupled)
-    every = _series(rules, rows, range(6), lambda k: k not in held, lambda k: k >= n, time)
+    every = _series(program, range(6), lambda k: k not in held, lambda k: k >= n, time)
     free = (0, 1, 2, 4) if of_sets else (0, 2, 4)
     follow = lambda k: k in of_sets
-    return every, _series(rules, rows, free, lambda k: k < n or follow(k), follow, time)
+    return every, _series(program, free, lambda k: k < n or follow(k), follow, time)
 
 
-def _rules_of(
-    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
-) -> tuple[list[Rule], list[list[int]]]:
-    """Rules of expressions, and the numbers of those of each output."""
+class _Rules(NamedTuple):
+    """Rules of expressions and the numbers of those of each output, and the same with sums."""
+
+    plain: list[Rule]
+    plain_rows: list[list[int]]
+    rules: list[Rule]
+    rows: list[list[int]]
+
+
+def _rules_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> _Rules:
+    """Rules of expressions."""
     outputs = [ca.densify(o) for o in outputs]
     nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
     rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
-    return rules, [[rule_of[j] for j in row] for row in rows]
+    rows = [[rule_of[j] for j in row] for row in rows]
+    return _Rules(rules, rows, *summed(rules, rows))
 
 
 def derived_series_of(coupled: Coupled) -> tuple[Series, Entries]:
@@ -260,66 +263,142 @@ def derived_series_of(coupled: Coupled) -> tuple[Series, Entries]:
     derivatives, entries = sparse_entries(coupled.derivatives)
     outputs = [*coupled.outputs, _moving_slopes(coupled)[2], derivatives]
     inputs = [coupled.moving, coupled.system.parameter_symbols]
-    rules, rows = _rules_of(inputs, coupled.awake(outputs))
+    program = _rules_of(inputs, coupled.awake(outputs))
     held = {n + i for i, own in enumerate(coupled.scaled) if own} - {
         n + i for i in coupled.system.set_of
     }
     moves, unknown = lambda k: k not in held, lambda k: n <= k < size
-    return _series(rules, rows, range(len(rows)), moves, unknown, _time_of(coupled)), entries
+    return _series(program, range(len(outputs)), moves, unknown, _time_of(coupled)), entries
 
 
 def _series(
-    rules: Sequence[Rule],
-    rows: Sequence[Sequence[int]],
+    program: _Rules,
     wanted: Sequence[int],
     moves: Callable[[int], bool],
     unknown: Callable[[int], bool],
     time: int | None = None,
 ) -> Series:
     """Rules as the interpreter reads them."""
+    rules, rows = program.rules, program.rows
     still = [_is_still(rule) for rule in rules]
+    change = [not own for own in still]
     moving, late = entered(rules, moves), entered(rules, lambda k: unknown(k) and moves(k))
-    operations = {op: k for k, op in enumerate(OPERATIONS)}
-    args, first, second, names = np.zeros((len(rules), 3), np.int32), [], [], []
-    lines = _lines(rules, still, time)
-    for j, rule in enumerate(rules):
-        name, own = _specialised(rule, moving)
-        if name == "integral" and lines[own[0]]:
-            name = "turn"
-        names.append(TAPE_RULES.index(name))
-        args[j, : len(own)] = own
-        numbers = (*rule.numbers, 0.0, 0.0)
-        first.append(numbers[0])
-        second.append(numbers[1])
+    timed = entered(rules, lambda k: k == time)
+    varied = entered(rules, lambda k: k != time and moves(k))
+    is_input = [rule.rule == "input" and rule.source[0] == 0 for rule in rules]
+    is_time = [rule.source == (0, time) for rule in rules]
+    arguments = [rule.args for rule in rules]
     roots = [j for k in wanted for j in rows[k]]
-    arguments = [rule.args if rule.rule != "input" else () for rule in rules]
-    change = [not s for s in still]
-    is_time = [rule.rule == "input" and rule.source == (0, time) for rule in rules]
-    reached = _reached(arguments, change, roots)
+    found = reached(arguments, change, roots)
     # What does not move has later coefficients, zeros, only where they are read.
-    read = [
-        *roots,
-        *(a for j in reached.tolist() if rules[j].rule == "atan2" for a in rules[j].args),
-    ]
-    zeros = _reached(arguments, change, [j for j in read if not moving[j]])
-    needed = {*zeros.tolist(), *(j for j in reached.tolist() if moving[j])}
-    return Series(
-        rule=_integers(names),
-        a=_integers(args[:, 0]),
-        b=_integers(args[:, 1]),
-        c=_integers(args[:, 2]),
-        op=_integers([operations.get(_operation(rule), 0) for rule in rules]),
-        first=np.array(first),
-        second=np.array(second),
-        still=_where(still, True),
-        moving=reached,
-        later=_integers(sorted(needed)),
-        late=_integers(sorted(j for j in needed if late[j])),
-        early=_integers(sorted(j for j in needed if not late[j])),
-        outputs=_integers([j for row in rows for j in row]),
-        paired=_paired([rule.rule for rule in rules], arguments, is_time),
-        rules=rules,
+    read = [*roots, *(a for j in found if rules[j].rule == "atan2" for a in rules[j].args)]
+    zeros = reached(arguments, change, [j for j in read if not moving[j]])
+    needed = {*zeros, *(j for j in found if moving[j])}
+    term = _terms(rules, moving)
+    rule, second = _written(rules, term["kind"], moving, _lines(rules, still, is_time), needed)
+    rule["paired"] = _paired([rule.rule for rule in rules], arguments, is_time)
+    later = [j for j in sorted(needed) if not is_input[j] and j not in second]
+    looped = set(reached(arguments, change, [j for k in wanted if k < 2 for j in rows[k]]))
+    before = {j for j in later if timed[j] and not varied[j]}
+    after = {*later} - looped - before
+    before, after = (
+        set() if _are_knotted(rules, some, second) else some for some in (before, after)
     )
+    loop = [j for j in later if j not in before and j not in after]
+    values = reached([_valued(rule) for rule in rules], change, roots)
+    lists = {
+        "still": [j for j, own in enumerate(still) if own],
+        "values": [j for j in values if not is_input[j]],
+        "moving": [j for j in found if not is_input[j]],
+        "later": later,
+        "late": [j for j in later if late[j]],
+        "early": [j for j in later if not late[j]],
+        "loop": loop,
+        "loop_late": [j for j in loop if late[j]],
+        "before": sorted(before),
+        "after": sorted(after),
+    }
+    inputs = sorted((rules[j].source[1], j) for j in found if is_input[j])
+    return Series(
+        rule=rule,
+        term=term,
+        input=_integers([j for _, j in inputs]),
+        place=_integers([k for k, _ in inputs]),
+        outputs=_integers([j for row in rows for j in row]),
+        lists={name: _integers(own) for name, own in lists.items()},
+        rules=program.plain,
+        rows=program.plain_rows,
+    )
+
+
+def _written(
+    rules: Sequence[Rule],
+    kinds: Integers,
+    moving: Sequence[bool],
+    lines: Sequence[bool],
+    needed: set[int],
+) -> tuple[NDArray[np.void], set[int]]:
+    """Rules by number, and which of them are written with the one before: a sine and its cosine."""
+    operations = {op: k for k, op in enumerate(OPERATIONS)}
+    numbers_of = {name: k for k, name in enumerate(TAPE_RULES)}
+    made, begin, second = [], 0, set[int]()
+    for j, rule in enumerate(rules):
+        name, args, numbers = rule.rule, rule.args, rule.numbers
+        places = (begin, begin, begin, begin)
+        if name == "sum":
+            end = begin + len(numbers)
+            name, first, last = _sum_named(kinds[begin:end].tolist())
+            args, numbers, places = (), (), (begin, begin + first, begin + last, end)
+            begin = end
+        elif name == "input":
+            args, places = (), (rule.source[1],) * 4
+        elif name == "integral":
+            name = "turn" if lines[args[0]] else name
+            if args[1] == j + 1 in needed and rules[j + 1].args == (args[0], j):
+                name = "pair" if name == "integral" else "turns"
+                numbers = (*numbers, *rules[j + 1].numbers)
+                second.add(j + 1)
+        elif name in _SPECIAL:
+            at_rest = (s for s, a in zip(_SPECIAL[name], args, strict=True) if s and not moving[a])
+            name = next(at_rest, name)
+        own = numbers_of[rule.rule], numbers_of[name], operations.get(_operation(rule), 0), j
+        made.append((*own, *(*args, 0, 0, 0)[:3], 0, *places, *(*numbers, 0.0, 0.0)[:2]))
+    return np.array(made, RULE), second
+
+
+def _sum_named(kinds: Sequence[int]) -> tuple[str, int, int]:
+    """By which rule later coefficients of a sum follow, and from which of its terms."""
+    moving = [k for k, kind in enumerate(kinds) if kind]
+    first, last = (moving[0], moving[-1] + 1) if moving else (0, 0)
+    if set(kinds[first:last]) != {1}:
+        return "sum", first, last
+    return ("linear" if last - first > 4 else f"linear{last - first}"), first, last
+
+
+#: Name of a rule where its first, or its second, argument does not move.
+_SPECIAL = {"div": ("under", "over"), "chosen": ("gated", "")}
+
+
+def _terms(rules: Sequence[Rule], moving: Sequence[bool]) -> NDArray[np.void]:
+    """Terms of all sums; what does not move is the second factor."""
+    made = []
+    for rule in rules:
+        if rule.rule == "sum":
+            for factor, a, b in zip(rule.numbers, rule.args[::2], rule.args[1::2], strict=True):
+                first, other = (a, b) if moving[a] else (b, a)
+                kind = moving[a] + moving[b] + (moving[a] and a == b)
+                made.append((factor, first, other, kind, 0))
+    return np.array(made, TERM)
+
+
+def _are_knotted(rules: Sequence[Rule], some: set[int], second: set[int]) -> bool:
+    """Whether some rules need coefficients of one another, so that their orders follow one after the other."""
+    return any(a > j and a not in second for j in some for a in rules[j].args)
+
+
+def _valued(rule: Rule) -> tuple[int, ...]:
+    """What the value of a rule follows from."""
+    return rule.args[: {"integral": 1, "quotient": 1, "atan2": 2}.get(rule.rule, len(rule.args))]
 
 
 def _operation(rule: Rule) -> str:
@@ -337,36 +416,18 @@ def _is_still(rule: Rule) -> bool:
     return rule.rule in ("constant", "apply") or (rule.rule == "input" and rule.source[0] == 1)
 
 
-def _lines(rules: Sequence[Rule], still: Sequence[bool], time: int | None) -> list[bool]:
+def _lines(rules: Sequence[Rule], still: Sequence[bool], is_time: Sequence[bool]) -> list[bool]:
     """Which rules are affine in the time: their series end with the second coefficient."""
     found: list[bool] = []
     for j, rule in enumerate(rules):
-        sums = rule.rule in ("add", "sub", "neg", "twice", "affine")
-        scaled = rule.rule == "mul" and any(still[a] for a in rule.args)
-        scaled |= rule.rule == "div" and still[rule.args[1]]
-        own = rule.rule == "input" and rule.source == (0, time)
-        found.append(still[j] or own or ((sums or scaled) and all(found[a] for a in rule.args)))
+        line = still[j] or is_time[j]
+        if rule.rule == "sum":
+            pairs = zip(rule.args[::2], rule.args[1::2], strict=True)
+            line = all((still[a] and found[b]) or (found[a] and still[b]) for a, b in pairs)
+        elif rule.rule == "div":
+            line = line or (found[rule.args[0]] and still[rule.args[1]])
+        found.append(line)
     return found
-
-
-#: Name of a rule where its first, or its second, argument does not move; whether they change places.
-_SPECIAL = {
-    "add": (("shift", True), ("shift", False)),
-    "sub": (("below", False), ("lower", False)),
-    "mul": (("scale", True), ("scale", False)),
-    "div": (("under", False), ("over", False)),
-    "chosen": (("gated", False),),
-}
-
-
-def _specialised(rule: Rule, moving: Sequence[bool]) -> tuple[str, tuple[int, ...]]:
-    """Name and arguments of a rule: with what does not move nothing is convolved."""
-    if rule.rule == "input":
-        return rule.rule, rule.source
-    for k, (name, turned) in enumerate(_SPECIAL.get(rule.rule, ())):
-        if not moving[rule.args[k]] and moving[rule.args[1 - k]]:
-            return name, rule.args[::-1] if turned else rule.args
-    return rule.rule, rule.args
 
 
 def sparse_entries(matrix: ca.SX) -> tuple[ca.SX, Entries]:

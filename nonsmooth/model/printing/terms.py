@@ -276,9 +276,8 @@ class OfTape:
 
     def expansion(self, outputs: Sequence[int]) -> Expansion:
         """The series of some of field, layer, heights, factors, stops."""
-        series, sizes = self.tape.series, (self.n, *[self.m] * 3, self.coupled.stops.numel())
-        ends = [sum(sizes[: i + 1]) for i in range(5)]
-        rows = [series.outputs[ends[i] - sizes[i] : ends[i]].tolist() for i in outputs]
+        series = self.tape.series
+        rows = [series.rows[i] for i in outputs]
         return Expansion(series.rules, rows, self.p, self.graph)
 
     def point(self, acting: Terms) -> Point:

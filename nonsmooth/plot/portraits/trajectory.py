@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from ...flow import Segment, Trajectory
+from ...flow.names import shown_mode
 from ...model import Array, DefinitionError, FilippovSystem, OptionError, whole
 from .. import style
 from ..arguments import results
@@ -192,17 +193,21 @@ class _Picture:
 
     def _looks(self) -> tuple[dict[str, dict[str, Any]], dict[str, str]]:
         """Properties of the lines of each mode, and its explanation, in order of appearance."""
-        modes = list(dict.fromkeys(part.segment.mode for part in self.parts))
-        several = any(len(mode) > 1 for mode in modes)
+        modes = {self._name(part.segment): part.segment.mode for part in self.parts}
+        several = any(len(name) > 1 for name in modes)
         looks, texts = dict[str, dict[str, Any]](), dict[str, str]()
-        for k, mode in enumerate(modes):
+        for k, (name, mode) in enumerate(modes.items()):
             color, dashes, width, text = _MODES.get(mode, _MODES["*"])
             if several:
-                width, text = (3.0 if "s" in mode else 1.5), mode.replace("-", "−")
+                width, text = (3.0 if "s" in mode else 1.5), name.replace("-", "−")
                 color, dashes = _CYCLE[k % 6], "-" if "s" in mode else _DASHES[k % 4]
-            looks[mode] = self.page.look(mode, color=color, linestyle=dashes, linewidth=width)
-            texts[mode] = text
+            looks[name] = self.page.look(name, color=color, linestyle=dashes, linewidth=width)
+            texts[name] = text
         return looks, texts
+
+    def _name(self, segment: Segment) -> str:
+        """The mode of a segment, with the values of the discrete states."""
+        return shown_mode(self.run.system, segment.mode, segment.discrete)
 
     def time_column(self, grid: Any, column: int, names: list[str]) -> None:
         """Panels of states below a strip with the modes."""
@@ -233,7 +238,7 @@ class _Picture:
         index = [self.run.system.state_names.index(name) for name in names]
         for part in self.parts:
             for k in index:
-                ax.plot(part.t, part.x[:, k], **self.looks[part.segment.mode])
+                ax.plot(part.t, part.x[:, k], **self.looks[self._name(part.segment)])
             if "s" in part.segment.mode:
                 ax.axvspan(part.segment.t_start, part.segment.t_end, color="#EDEDED", zorder=0)
         for k in index:
@@ -251,13 +256,16 @@ class _Picture:
         for segment in self.run.segments:
             low, high = sorted((segment.t_start, segment.t_end))
             hatch = "///" if "s" in segment.mode else None
-            look: Any = {"facecolor": self.looks[segment.mode]["color"], "edgecolor": "white"}
+            look: Any = {
+                "facecolor": self.looks[self._name(segment)]["color"],
+                "edgecolor": "white",
+            }
             box = Rectangle((low, 0.0), high - low, 1.0, **look, linewidth=0.5, hatch=hatch)
             box.set_alpha(0.3)
             ax.add_patch(box)
-            if (high - low) / span > letter * max(len(segment.mode), 1):
+            text = self._name(segment).replace("-", "−")
+            if (high - low) / span > letter * max(len(text), 1):
                 name: Any = {"fontsize": style.points(9), "fontweight": "bold"}
-                text = segment.mode.replace("-", "−")
                 halo = style.halo(2.0)
                 style.write(ax, ((low + high) / 2, 0.45), text, path_effects=halo, **name)
         ax.set(ylim=(0, 1), yticks=[])
@@ -276,7 +284,7 @@ class _Picture:
     def phase_plane(self, ax: Axes) -> None:
         """The runs in the plane of both states, with the surface."""
         for part in self.parts:
-            line = {"zorder": 3, **self.looks[part.segment.mode]}
+            line = {"zorder": 3, **self.looks[self._name(part.segment)]}
             ax.plot(*part.x.T, **line)
             if "s" not in part.segment.mode and np.all(np.isfinite(part.x)):
                 style.arrowhead(ax, part.x, 0.5, line["color"], mutation_scale=11, zorder=4)

@@ -154,3 +154,11 @@ def test_a_run_of_very_many_events_marks_its_end_and_shortens_its_title():
         line for ax in figure.axes for line in ax.lines if str(line.get_gid()).startswith("event")
     ]
     assert all(len(line.get_xdata()) == 1 for line in marks)
+
+
+def test_a_run_of_a_hybrid_automaton_shows_its_discrete_states():
+    figure = ns.plot.trajectory(ns.textbook.gearbox().run())
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels[:3] == ["g=1", "g=2", "g=3"]
+    colors = {line.get_color() for line in figure.axes[1].lines[:3]}
+    assert len(colors) == 3

@@ -1,0 +1,73 @@
+"""What a large system costs before its first step grows as the system, not as its square."""
+
+import sys
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.flow.engine import tape_for
+from nonsmooth.flow.options import Options
+from nonsmooth.model.expressions import graph
+
+
+def lattice(size):
+    """Oscillators in a row, of which the first meets a surface."""
+    u, v = ca.SX.sym("u", size), ca.SX.sym("v", size)
+    left, right = ca.vertcat(0, u[:-1]), ca.vertcat(u[1:], 0)
+    rest = ca.vertcat(v, left + right - 2 * u - ca.sin(u) - 0.1 * (u - left) ** 3)
+    push = ca.DM.zeros(2 * size)
+    push[size] = 0.5
+    states = [*ca.vertsplit(u), *ca.vertsplit(v)]
+    return ns.FilippovSystem(states, surface=v[0] - 0.3, above=rest - push, below=rest + push)
+
+
+def blocks(size):
+    """Blocks in a row with a friction surface each."""
+    q, v, lam = (ca.SX.sym(name, size) for name in ("q", "v", "lam"))
+    left, right = ca.vertcat(0, q[:-1]), ca.vertcat(q[1:], 0)
+    force = left + right - 2.1 * q - (1 + 0.3 * np.sin(np.arange(size))) * lam + 0.1 * v
+    return ns.FilippovSystem(
+        [*ca.vertsplit(q), *ca.vertsplit(v)],
+        field=[*ca.vertsplit(v), *ca.vertsplit(force)],
+        surfaces=[v[i] - 0.3 for i in range(size)],
+        multipliers=ca.vertsplit(lam),
+    )
+
+
+def calls(work):
+    """How many functions of Python and C are called."""
+    count = 0
+
+    def seen(frame, event, argument):
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(seen)
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def test_calls_grow_as_the_number_of_surfaces():
+    tape_for(blocks(3), Options(t_end=1.0))
+    one, four = (calls(lambda n=n: tape_for(blocks(n), Options(t_end=1.0))) for n in (30, 120))
+    assert four < 4.2 * one
+
+
+@pytest.mark.parametrize("make", [lattice, blocks])
+def test_graphs_are_read_a_few_times(make, monkeypatch):
+    """Nodes that are read, beside those of the field; nothing is asked of one row of many."""
+    read, linear, found = graph._read, ca.is_linear, []
+    system = make(60)
+    d = system.definition
+    own = ca.Function("field", [d.states, d.multipliers], [d.field]).n_instructions()
+    monkeypatch.setattr(
+        graph, "_read", lambda f, merged: found.append(f.n_instructions()) or read(f, merged)
+    )
+    monkeypatch.setattr(ca, "is_linear", lambda *args: found.append(own) or linear(*args))
+    tape_for(system, Options(t_end=1.0))
+    assert sum(found) < 9 * own

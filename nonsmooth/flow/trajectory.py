@@ -130,12 +130,16 @@ class Facts:
         Names of what ``rest_below=`` put to rest: the run is off by its speed there.
     implicit_steps : int
         How many steps were implicit, because a decay rate held explicit ones.
+    t_error : float
+        Largest error of the time of an event that rounding of its switching function hides, as near a multiple zero:
+        0 where none of them moves a state by more than the tolerance.
     """
 
     depends_on_widths: bool = False
     unproved: bool = False
     rested_below: tuple[str, ...] = ()
     implicit_steps: int = 0
+    t_error: float = 0.0
 
 
 def _require_whole(run: Trajectory) -> None:

@@ -18,7 +18,7 @@ class DecisionWarning(UserWarning):
     """A decision of a run rests on a convention, or is not proved."""
 
 
-def warn_of_facts(depends_on_widths: bool, unproved: bool) -> None:
+def warn_of_facts(depends_on_widths: bool, unproved: bool, t_error: float) -> None:
     """Warn of what the decisions of a run rest on."""
     if depends_on_widths:
         warn_once(
@@ -30,6 +30,12 @@ def warn_of_facts(depends_on_widths: bool, unproved: bool) -> None:
         warn_once(
             "One motion was found for more than eight elements that act on one another; no test shows that it is "
             "the only one (run.facts.unproved).",
+            DecisionWarning,
+        )
+    if t_error > 0.0:
+        warn_once(
+            "Rounding of a switching function hides when it passes zero, by more than the tolerance (run.facts.t_error "
+            "says how long). Write it with a simple zero, x - 1 instead of an expanded (x - 1)**3.",
             DecisionWarning,
         )
 

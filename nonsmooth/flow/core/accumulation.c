@@ -16,14 +16,15 @@ static int block_of(const Run *r, double *left, double *error) {
   if (at_once) return AT_ONCE;
   for (int l = 0; l < LAG_COUNT; l++) {
     int lag = LAGS[l], need = BLOCKS * lag, same = 1;
-    if (r->history < need + lag) return 0;
-    for (int k = 1; k <= need && same; k++) same = back(r, k)->pattern == back(r, k + lag)->pattern;
-    if (!same) continue;
     double block[BLOCKS], low = INFINITY, high = 0, ratio = 0, change = 0, before = 0;
-    for (int b = 0; b < BLOCKS; b++) {
+    if (r->history < need + lag) return 0;
+    for (int b = BLOCKS - 1; b >= 0 && same; b--) { /* most events do not accumulate: the last blocks say so */
       block[b] = 0;
       for (int k = 0; k < lag; k++) block[b] += back(r, need - b * lag - k)->interval;
+      same = b == BLOCKS - 1 || block[b + 1] < SHRINKS * block[b];
     }
+    for (int k = 1; k <= need && same; k++) same = back(r, k)->pattern == back(r, k + lag)->pattern;
+    if (!same) continue;
     for (int b = 1; b < BLOCKS; b++) {
       before = change;
       change = block[b] - *left;

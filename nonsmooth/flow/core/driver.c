@@ -20,6 +20,7 @@ static int is_alike(const Run *r, const int8_t *letter) {
 }
 
 static void adopt(Run *r, const Continuation *c) {
+  r->due_impact = -1; /* a row of the mode before */
   int alike = is_alike(r, c->letter);
   memcpy(r->letter, c->letter, r->width);
   memcpy(r->drop, c->drop, sizeof(int32_t) * r->guards);
@@ -427,6 +428,7 @@ static void step(Run *r) {
   if (q.row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
   if (q.dt > 0) note_sides(r, e, q.dt);
   r->falls = q.row >= 0 && is_steep(r, e, q.row, q.dt);
+  if (q.row >= 0 && r->now.kind[q.row] != IMPACT_GUARD) note_hidden(r, e, q.row); /* slow impacts accumulate */
   if (!advance(r, e, q.dt)) return;
   if (q.last) {
     r->t = r->o.t_end;

@@ -153,6 +153,7 @@ static size_t place_run(Run *r, char *base) {
   r->of_defect = DOUBLES(g);
   r->key = LETTERS(w + 8 * s->rules.discrete);
   r->met_at = DOUBLES(g);
+  r->hidden = DOUBLES(g);
   return used;
 }
 
@@ -265,6 +266,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->reason = NO_REASON;
   r->where = 0;
   r->facts = 0;
+  r->t_error = 0;
   r->dependent = r->turned_mode = -1;
   r->segment_mode = r->due_impact = r->length_mode = -1;
 }
@@ -310,6 +312,7 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
   numbers[0] = r->t;
   numbers[1] = r->limit;
   numbers[2] = r->at_t;
+  numbers[3] = r->t_error;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
                     r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts,
                     unmet_event(r), r->implicit_count};

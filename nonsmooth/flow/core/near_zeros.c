@@ -46,6 +46,7 @@ static double sure_root(Run *r, const Expansion *e, int row, const double *c, in
     if (floor > 0) low = first_low(c, n, end, LOW, floor);
   }
   if (low < 0 || passes_once(c, n, end, low, floor, exact)) return root;
+  double hidden = low;
   double before = first_low(c, n, low, FAR_FROM_LOW * LOW, floor);
   if (before > NEARER * low && low - before > SEPARATE / LOCATED * exact) {
     r->hold = smaller(r->hold, from + before);
@@ -57,6 +58,7 @@ static double sure_root(Run *r, const Expansion *e, int row, const double *c, in
     root = first_root(b, n, h);
     if (root > 0) root = polish_late(c, n, root, h);
   }
+  r->hidden[row] = larger(root - hidden, 0);
   return root;
 }
 

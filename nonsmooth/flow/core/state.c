@@ -167,7 +167,8 @@ typedef struct {
   double *series, *rounding, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope;
   double *vector, *sample;
   double *atom_work, *choice_work;
-  double *met_at; /* root of each guard in the step, or -1 */
+  double *met_at, *hidden; /* root of each guard in the step, or -1; how long before it rounding may hide its zero */
+  double t_error; /* the largest of those of events that move a state by more than the tolerance */
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
   int32_t *pending, *sparse, *involved;
   /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */

@@ -430,12 +430,19 @@ static double atom_root(Run *r, Expansion *e, int atom, double h) {
   return guard_root(r, e, row, r->drop[row], h);
 }
 
+/* Keep for the facts how uncertain the time of an event is, where that moves a state by more than the tolerance. */
+static void note_hidden(Run *r, const Expansion *e, int row) {
+  for (int i = 0; r->hidden[row] > r->t_error && i < r->s->dimension; i++)
+    if (r->hidden[row] * fabs(e->states[(int64_t)i * r->stride + 1]) > e->allowed[i] / SAFETY) r->t_error = r->hidden[row];
+}
+
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->met_at;
   int first = -1, found = 0, rows = e->l.rows;
   r->hold = INFINITY;
   if (r->repelling) turn_exits(r, e);
+  memset(r->hidden, 0, sizeof(double) * rows);
   for (int j = 0; j < rows; j++) {
     time[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);
     if (time[j] < 0) continue;

@@ -114,6 +114,8 @@ class Run:
         Rates of the states in them.
     facts : int
         What was noted about the decisions, as bits.
+    t_error : float
+        Largest error of the time of an event that rounding hides; see ``Facts``.
     unmet : int
         A stop or reset, in this order, that was true at the start and did not happen, or -1.
     implicit_steps : int
@@ -148,6 +150,7 @@ class Run:
     several: list[str]
     rates: Array
     facts: int
+    t_error: float
     unmet: int
     implicit_steps: int
     t: Array

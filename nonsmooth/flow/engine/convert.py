@@ -35,8 +35,9 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         bool(run.facts & UNPROVED),
         tuple(rested),
         run.implicit_steps,
+        run.t_error,
     )
-    warn_of_facts(facts.depends_on_widths, facts.unproved)
+    warn_of_facts(facts.depends_on_widths, facts.unproved, facts.t_error)
     return Trajectory(
         system=system,
         parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),

@@ -411,6 +411,7 @@ class TapeEngine:
             several=[modes[k] for k in several],
             rates=rates[:, : self.system.dimension],
             facts=counts[12],
+            t_error=numbers[3],
             unmet=counts[13],
             implicit_steps=counts[14],
             motion=final,
@@ -465,7 +466,7 @@ class TapeEngine:
         return _Held(state, made.run_free)
 
     def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
-        numbers, counts = (_D * 3)(), (_I64 * 15)()
+        numbers, counts = (_D * 4)(), (_I64 * 15)()
         width = self.system.surface_count + len(self.system.impacts)
         active, several = (_I32 * (width + 1))(), (_I32 * SEVERAL)()
         rates = np.empty((SEVERAL, self.system.extended_dimension))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
-from ..laws.coupled import coupled_of, raised_of
+from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
 from ..laws.explicit import explicit, solved
 from ..laws.motion import Motion
@@ -170,24 +170,9 @@ def variational_field(
     """Return the variational field of a mode, built once per system."""
 
     def build() -> VariationalField:
-        _require_first_degree(system, mode)
         return VariationalField(explicit(system, mode), chosen)
 
     return system.cached(("variational field", mode, chosen), build)
-
-
-def _require_first_degree(system: FilippovSystem, mode: str) -> None:
-    """Refuse rest on a surface whose multiplier enters a higher derivative of its function first."""
-    letters = system.parse_letters(mode)[: system.surface_count]
-    if 0 not in letters:
-        return
-    for i, lower in enumerate(raised_of(system).lower):
-        if lower and letters[i] == 0 and i not in system.joints:
-            raise DegenerateError(
-                f"Derivatives of rest on 'h{i}', whose multiplier enters the derivative "
-                f"{len(lower) + 1} of its function first, are not implemented. End the run before it rests, "
-                "or start after it."
-            )
 
 
 class GuardedField(PlainField):

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..definition.system import FilippovSystem, require_system
 from ..errors import DefinitionError
-from .coupled import coupled_of
+from .coupled import coupled_of, raised_of
 from .motion import Motion, motion
 from .switches import Guarded
 
@@ -28,7 +28,8 @@ class Solved:
     """The law of a mode of coupled surfaces and contacts (see ``switches.Law``)."""
 
     def __init__(self, system: FilippovSystem, mode: str):
-        coupled, x = coupled_of(system), system.extended_states
+        coupled = raised_of(system) if rests_on(system, mode) else coupled_of(system)
+        x = system.extended_states
         self.system, self.mode, self.coupled = system, mode, coupled
         sliding = coupled.sliding(mode)
         own = [coupled.unknown(i) for i in sliding]
@@ -41,7 +42,8 @@ class Solved:
             return
         slope = ca.jacobian(residual, symbols)
         if not ca.depends_on(slope, symbols):
-            rest, dependent = ca.substitute(residual, symbols, 0), bool(system.complementarity)
+            rest = ca.substitute(residual, symbols, 0)
+            dependent = system.complementarity or rests_on(system, mode)
             self.values = -(least_norm if dependent else solved)(slope, rest)
             self.field = ca.substitute(field, symbols, self.values)
             return
@@ -90,6 +92,17 @@ def solved(matrix: ca.SX, right: ca.SX) -> ca.SX:
     return ca.solve(matrix, right)
 
 
+def rests_on(system: FilippovSystem, mode: str) -> tuple[int, ...]:
+    """Surfaces that rest in a mode: their multipliers enter a higher derivative of their functions first."""
+    letters = system.parse_letters(mode)[: system.surface_count]
+    if 0 not in letters:
+        return ()
+    lower = raised_of(system).lower
+    return tuple(
+        i for i, own in enumerate(lower) if own and not letters[i] and i not in system.joints
+    )
+
+
 def least_norm(matrix: ca.SX, right: ca.SX) -> ca.SX:
     """The least solution of linear equations, some of which may follow from others, as those of diodes side by side."""
     symbols, rng = ca.symvar(matrix), np.random.default_rng(1)
@@ -111,7 +124,7 @@ def least_norm(matrix: ca.SX, right: ca.SX) -> ca.SX:
 def explicit(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode as a field of the states, for any system; built once."""
     require_system(system, complementarity=True, joints=True)
-    if not system.coupled:
+    if not system.coupled and not rests_on(system, mode):
         return motion(system, mode)
 
     def build() -> Motion:

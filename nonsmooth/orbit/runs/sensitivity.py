@@ -49,9 +49,8 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
     Raises
     ------
     DegenerateError
-        An event that is grazed, two independent events at one instant, events that accumulate, rest on a
-        surface whose multiplier enters a higher derivative of its function first, a derivative that is not
-        finite at the zero of a root, a status without an end.
+        An event that is grazed, two independent events at one instant, events that accumulate, a derivative that
+        is not finite at the zero of a root, a status without an end.
     ParameterError
         An unknown name in ``wrt``.
     OptionError
@@ -60,7 +59,7 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
     Notes
     -----
     A run that starts on a sliding surface has the derivatives of the sliding field: they hold along the
-    surface, not for starts off it. Where a reset happens exactly at the end of the run, they hold for
+    surface, not for starts off it; of a run that starts at rest, for starts that rest too. Where a reset happens exactly at the end of the run, they hold for
     neighbours that have jumped.
 
     Aizerman & Gantmakher 1958; Leine & Nijmeijer 2004, ch. 7.

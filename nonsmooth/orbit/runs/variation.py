@@ -27,7 +27,9 @@ from ...model import (
     FilippovSystem,
     require_plain,
 )
-from ...model.derivatives.event_maps import AtEvent
+from ...model.derivatives.event_maps import AtEvent, function_map
+from ...model.laws.coupled import raised_of
+from ...model.laws.explicit import rests_on
 from .guards import watch
 from .leg_integration import LegFlows, LegIntegrator
 from .legs import Leg, LegFlow, Stretch, integrate_leg, leg_name, sets_left, stretches
@@ -263,6 +265,33 @@ def discrete_places(system: FilippovSystem) -> slice:
 
 def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     """Legs and events of a run, with derivatives by the start of each and by chosen parameters."""
+    first, *others = _passages(run, chosen)
+    at_rest = _rest_at(run.system, first.stretch, run.system.parameter_vector(run.parameters))
+    if at_rest is not None:
+        by_start, flow = first.flow.by_start, first.flow
+        by_p = flow.by_parameters + by_start @ at_rest[1][:, list(chosen)]
+        flow = replace(flow, by_start=by_start @ at_rest[0], by_parameters=by_p)
+        first = replace(first, flow=flow)
+    return [first, *others]
+
+
+def _rest_at(system: FilippovSystem, part: Stretch, p: Array) -> tuple[Array, Array] | None:
+    """Derivatives, by start (N,) and parameters, of the nearest state at which a mode rests; None where none does."""
+    resting = rests_on(system, part.leg.mode)
+    if not resting:
+        return None
+    n, mode = system.extended_dimension, part.leg.mode
+    kept = [
+        e for i in resting for e in (system.definition.surfaces[i], *raised_of(system).lower[i])
+    ]
+    y = part.leg.along(system).states_at(part.start, p)
+    at = [function_map(system, mode, e)(y, p) for e in kept]
+    rows = np.array([row.gradient[:n] for row in at])
+    back = np.linalg.pinv(rows)
+    return np.eye(n) - back @ rows, -back @ np.array([row.by_parameters for row in at])
+
+
+def _passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     system = run.system
     p = system.parameter_vector(run.parameters)
     parts = stretches(run)

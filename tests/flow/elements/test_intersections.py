@@ -50,6 +50,23 @@ def test_spiralling_sliding_at_the_limit_of_two_relays():
     assert run.itinerary == "ss" and run.x[-1].tolist() == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("damping", [0.5, 0.0, -0.5])
+def test_orbits_round_an_intersection_that_no_layer_attracts_to(damping):
+    """x' = -sgn y - c x, y' = sgn x - c y: squares for c = 0, which only a bend of second order closes in on."""
+    system = ns.FilippovSystem(
+        [x, y],
+        field=[-kap - damping * x, lam - damping * y],
+        multipliers=[lam, kap],
+        surfaces=[x, y],
+    )
+    run = ns.simulate(system, [0.0, 0.0], 1.0)
+    assert run.status is (ns.Status.REACHED_END if damping > 0 else ns.Status.INTERSECTION)
+    assert damping <= 0 or (run.itinerary == "ss" and run.x[-1].tolist() == [0, 0])
+    # of |x| + |y| = s, s' = -c s between the axes
+    run = ns.simulate(system, [0.3, 0.1], 2.0, tol=1e-12)
+    assert np.abs(run.x[-1]).sum() == pytest.approx(0.4 * np.exp(-2 * damping), abs=1e-10)
+
+
 @pytest.mark.parametrize("growth", [1, -1, 0.2])
 def test_friction_that_changes_in_time_does_not_end_sliding(growth):
     """h' = -exp(growth t) A lambda: both eigenvalues keep their signs, in whatever units the multipliers are."""
@@ -60,6 +77,26 @@ def test_friction_that_changes_in_time_does_not_end_sliding(growth):
     )
     run = ns.simulate(system, [0.5, -0.1], 3.0)
     assert run.itinerary.endswith("ss") and run.status is ns.Status.REACHED_END
+
+
+def test_sliding_that_repels_is_kept_until_its_multiplier_is_at_the_bound():
+    """h' = lambda - t is zero for lambda = t, until t = 1; then x' = -1 - t."""
+    t = ca.SX.sym("t")
+    system = ns.FilippovSystem([x], field=[lam - t], surfaces=[x], multipliers=[lam], time=t)
+    run = ns.simulate(system, [0.0], 2.0, start_mode="s")
+    assert run.itinerary == "s -" and run.events[0].t == pytest.approx(1, abs=1e-12)
+    assert run.x[-1, 0] == pytest.approx(-2.5, abs=1e-12)
+
+
+def test_more_modes_than_are_tried_may_hold():
+    """Six surfaces with a product of multipliers: of 3^6 modes none is ruled out."""
+    h, m = ca.SX.sym("h", 6), ca.SX.sym("m", 6)
+    field = -m + 0.05 * m[0] * m[1]
+    system = ns.FilippovSystem(
+        h, field=field, surfaces=ca.vertsplit(h), multipliers=ca.vertsplit(m)
+    )
+    run = ns.simulate(system, [0.0] * 6, 1.0)
+    assert run.status is ns.Status.NON_UNIQUE and "may hold" in run.message
 
 
 def test_an_intersection_that_repels_is_not_unique():

@@ -137,6 +137,34 @@ def test_roots_that_were_found_are_named():
     assert smooth.roots == {} and "root" not in repr(smooth)
 
 
+def _two_roots(a, b):
+    """Stable in finite time, and homogeneous where b = a/(2 - a) (Bhat & Bernstein 2000)."""
+    sign_v, sign_x = ca.sign(v), ca.sign(x)
+    return ns.FilippovSystem.from_expression(
+        [x, v], [v, -sign_v * ca.fabs(v) ** a - sign_x * ca.fabs(x) ** b]
+    )
+
+
+@pytest.mark.parametrize("a", [0.5, 0.6])
+@pytest.mark.parametrize("start", [[0.1, 0.0], [0.0, 0.2], [-1.0, 0.3]])
+def test_two_roots_come_to_rest_at_the_limit_of_their_turns(a, start):
+    run = ns.simulate(_two_roots(a, a / (2 - a)), start, 30.0)
+    times = [event.t for event in run.events if event.name == "h0" and event.kind == "crossing"]
+    one, two, three = times[:3]
+    limit = one + (two - one) / (1 - (three - two) / (two - one))
+    assert run.status == ns.Status.REACHED_END and run.x[-1].tolist() == [0, 0]
+    assert run.itinerary.endswith("ss")
+    # that long a motion takes from twenty tolerances
+    assert run.events[-2].t == pytest.approx(limit, abs=(20 * 1e-9) ** (1 - a))
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.5, 1 / 3), (0.3, 0.5), (0.5, 0.5)])
+def test_two_roots_that_start_at_rest_stay_there(a, b):
+    run = ns.simulate(_two_roots(a, b), [0.0, 0.0], 5.0)
+    assert run.status == ns.Status.REACHED_END and run.itinerary == "ss"
+    assert run.x[-1].tolist() == [0, 0]
+
+
 @pytest.mark.parametrize("start", [1.0, -1.0])
 @pytest.mark.parametrize("power", [0.5, 1.5])
 @pytest.mark.parametrize("number", range(6))

@@ -451,7 +451,8 @@ static int enumerate(const Block *k, double *found, double *work, int32_t *pivot
       fits = 1;
       for (int i = 0; i < n && fits; i++) {
         fits = wanted(k, i, position[i], nu) == position[i];
-        fits = fits && (k->is_contact[i] || bound_of(k, i, nu) >= -room_zero(k, i, k->floor[i], bound_of(k, i, nu)));
+        double bound = bound_of(k, i, nu);
+        fits = fits && (k->is_contact[i] || k->state[i] != UNDECIDED || bound >= -room_zero(k, i, k->floor[i], bound));
       }
       for (int q = 0; q < count && fits; q++) fits = !is_same(k, all + q * n, nu, 0);
       if (fits) memcpy(all + n * count++, nu, sizeof(double) * n);

@@ -38,6 +38,15 @@ static int is_stable(Run *r, const Layout *l) {
   return rows == 0 || is_positive_stable(a, rows, r->decision->work);
 }
 
+/* Whether all active elements but one have the letters of the mode before: what its guard says of it holds only then. */
+static int others_stay(const Run *r, const int8_t *letter, int but) {
+  for (int i = 0; i < r->active_count; i++) {
+    int own = r->active[i], set = set_of(r, own);
+    if (own != but && (set < 0 || set != set_of(r, but)) && letter[own] != r->letter[own]) return 0;
+  }
+  return 1;
+}
+
 /* Whether the motion can continue in a mode with given unknowns: its guards that vanish here become positive. */
 static int continues(Run *r, const int8_t *letter, const Known *known, int known_count, Continuation *result) {
   Expansion *e = &r->trial;
@@ -58,7 +67,8 @@ static int continues(Run *r, const int8_t *letter, const Known *known, int known
     for (int i = 0; i < r->active_count; i++) active |= r->active[i] == index;
     if (!active) continue;
     for (int i = 0; i < known_count; i++)
-      if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row]) zeros = known[i].zeros;
+      if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row] && others_stay(r, letter, index))
+        zeros = known[i].zeros;
     int least = kind == SURFACE_GUARD || kind == NEAR_GUARD || kind == IMPACT_GUARD ? degree_of(r, index) : 0;
     if (zeros < least) zeros = least;
     double value;

@@ -61,10 +61,19 @@ static double change_of_rate(Run *r, int i, double bare, const double *field) {
   return (field_at_root(r, i, x, 0, other) - bare) / time;
 }
 
+/* Whether a line would lead to the other side of another surface with a root: the field is not the same beyond it. */
+static int leads_beyond(Run *r, int i, const double *field, double dt) {
+  double *x = r->at_root + r->n;
+  for (int k = 0; k < r->n; k++) x[k] = r->x[k] + dt * field[k];
+  const double *h = surface_values(r, x);
+  for (int j = 0; j < r->m; j++) if (j != i && element(r, j)->power > 0 && r->letter[j] && !(h[j] * r->letter[j] >= 0)) return 1;
+  return 0;
+}
+
 /* Pass the zero of what balances a root: h is below the tolerance before and after it. Whether the surface is reached. */
 static int pass_balance(Run *r, int i, double bare, const double *field, double left) {
   double change = change_of_rate(r, i, bare, field), dt = -2 * bare / change;
-  if (!(change * bare < 0)) return 0;
+  if (!(change * bare < 0) || leads_beyond(r, i, field, dt)) return 0;
   move_by(r, field, smaller(dt, left));
   return dt < left;
 }
@@ -80,6 +89,7 @@ static int grow_off_root(Run *r, int i, double rate, const double *bare, double 
   own = fabs(field_at_root(r, i, r->x, 1, with) - rate); /* what the root is there */
   memcpy(r->x, r->saved, sizeof(double) * r->n);
   dt = larger((own - fabs(rate)) / fabs(change), sqrt(2 * level / fabs(change)));
+  if (leads_beyond(r, i, bare, dt)) return 0;
   if (!move_by(r, bare, smaller(dt, left))) return 1;
   project_to(r, &which, 1, &height);
   renote(r);
@@ -108,7 +118,7 @@ static double power_law(Run *r, int i, double *mean) {
 
 /* Go to a surface with a root that is near; whether it is reached. */
 static int approach_root(Run *r, int i, double h, double level, double left) {
-  double p = element(r, i)->power, *with = r->before, *mean = r->at_root, own, bare, share = 0, dt;
+  double p = element(r, i)->power, *with = r->before, *mean = r->at_root, own, bare, share = 0, rate, dt;
   if ((dt = power_law(r, i, mean)) > 0) {
     move_by(r, mean, smaller(dt, left));
     return dt < left;
@@ -133,7 +143,9 @@ static int approach_root(Run *r, int i, double h, double level, double left) {
   else if (fabs(h) <= level && degree_of(r, i) == 1) share = 1;
   if (share == 0) return 0;
   for (int k = 0; k < r->n; k++) mean[k] += share * (with[k] - mean[k]);
-  dt = -h / (bare + share * (own - bare));
+  rate = bare + share * (own - bare);
+  dt = -h / rate;
+  if (fabs(change_of_rate(r, i, bare, mean)) * dt > ROOT_SHARE * fabs(rate) || leads_beyond(r, i, mean, dt)) return 0;
   move_by(r, mean, smaller(dt, left));
   return dt < left;
 }
@@ -147,7 +159,11 @@ static int leave_root(Run *r, int i, double near, double level, double left) {
     for (int k = 0; k < r->n; k++) x[k] = r->x[k] + dt * bare[k];
     if (fabs(field_at_root(r, i, x, 1, with) - rate) <= ROOT_SHARE * fabs(rate)) break;
   }
-  if (degree_of(r, i) == 1 && dt * fabs(rate) < level && grow_off_root(r, i, rate, bare, level, left)) return 1;
+  if (degree_of(r, i) == 1 && dt * fabs(rate) < level) {
+    if (grow_off_root(r, i, rate, bare, level, left)) return 1;
+    for (int k = 0; k < r->n; k++) x[k] = r->x[k] + dt * bare[k];
+    field_at_root(r, i, x, 1, with);
+  }
   for (int k = 0; k < r->n; k++) mean[k] = bare[k] + (with[k] - bare[k]) / (1 + p);
   move_by(r, mean, smaller(dt, left));
   return 1;

@@ -73,6 +73,8 @@ def test_a_branch_of_equilibria_holds_the_discrete_state():
     [
         ({"p": 1}, ns.DefinitionError, r"discrete state of \['q'\], received \['p'\]"),
         ({}, ns.DefinitionError, "Write holding"),
+        ([1], ns.DefinitionError, "expected a mapping"),
+        ({"q": float("nan")}, ns.PointError, "finite"),
         ({"q": 3}, ns.PointError, "the discrete state q has the values"),
     ],
 )
@@ -133,6 +135,12 @@ def test_a_field_may_compare_discrete_states(number):
 def test_a_field_that_compares_needs_the_values():
     with pytest.raises(ns.DefinitionError, match=r"discrete=\{q: \(0, 1\)\}"):
         ns.FilippovSystem([x], field=[ca.if_else(q == 1, 30, 0) - x], discrete=[q])
+
+
+@pytest.mark.parametrize("wrong", [q + 1, "q", 1.0])
+def test_discrete_states_are_symbols(wrong):
+    with pytest.raises(ns.DefinitionError, match="scalar symbol"):
+        ns.FilippovSystem([x], field=[q - x], discrete={wrong: (0, 1)})
 
 
 def test_a_filter_is_a_condition():

@@ -20,6 +20,7 @@ static int is_alike(const Run *r, const int8_t *letter) {
 }
 
 static void adopt(Run *r, const Continuation *c) {
+  r->due_impact = -1; /* a row of the mode before */
   int alike = is_alike(r, c->letter);
   memcpy(r->letter, c->letter, r->width);
   memcpy(r->drop, c->drop, sizeof(int32_t) * r->guards);

@@ -30,6 +30,9 @@ from .work import Work, checked_work, run_all, size_of_chunk
 #: systems with a set, which take longer to compile.
 _FEW, _FEW_WITH_SETS = 64, 4000
 
+#: Of more trajectories than these three are looked at, not one, to see whether they are stiff.
+_MANY = 100_000
+
 
 def ensemble(
     system: FilippovSystem,
@@ -199,7 +202,10 @@ def _is_stiff(system: FilippovSystem, options: Options, starts: Starts) -> bool:
     if options.method != "auto":
         return options.method == "stiff"
     tape = tape_for(system, options)
-    for first in {0, starts.count // 2, starts.count - 1}:
+    probed = (
+        {starts.count // 2} if starts.count < _MANY else {0, starts.count // 2, starts.count - 1}
+    )
+    for first in sorted(probed):
         x, p = starts.part(first, first + 1)
         if tape.is_stiff(x[0], p[0] if p.ndim > 1 else p, options):
             return True

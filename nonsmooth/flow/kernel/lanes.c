@@ -224,25 +224,6 @@ INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 
 
 /* Roots: polynomials.h --------------------------------------------------------------------------- */
 
-#if RARE_CASES_HERE
-/* The root of one lane of any polynomial: isolation by subdivision. NAN where errors hide which is the first. */
-static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, int flipped,
-                                                  double *slope) {
-  double c[P + 1], d = 0;
-  for (int k = 0; k <= P; k++) c[k] = LANE(a[k], l);
-  double s = c[0] > 0 ? first_root(c, P, 1) : 0;
-  if (s != 0 && hides_roots(c, P, 1, s)) return NAN;
-  if (slot < FIRST_STOP) {
-    for (int k = P; k > 0; k--) d = d * s + k * c[k];
-    *slope = d;
-    return s;
-  }
-  int direction = flipped ? -DIRECTION[slot - FIRST_STOP] : DIRECTION[slot - FIRST_STOP];
-  double met = c[0] > 0 && direction <= 0 ? s : first_crossing(c, P, 1, direction);
-  return s > 0 && met > s ? NAN : met;
-}
-#endif
-
 /* After a crossing the guard's first coefficient is zero, after a fold its first two. */
 INLINE void drop_zeros(const Lanes *s, T *a) {
   I by_one = s->drop == 1, by_two = s->drop == 2;
@@ -324,7 +305,7 @@ SELDOM I resolve(Guards *v) {
       v->one[j] |= one;
 #if RARE_CASES_HERE
       for EACH(l, deep) {
-        double r = hard_root(v->a[j], l, j, LANE_I(v->flipped[j], l) != 0, &LANE(v->slope[j], l));
+        double r = hard_root(v->a[j], l, j - FIRST_STOP, LANE_I(v->flipped[j], l) != 0, 1, &LANE(v->slope[j], l));
         if (r >= 0) LANE(v->root[j], l) = r;
         else if (r != r) LANE_I(lost, l) = ~(int64_t)0;
       }

@@ -195,3 +195,18 @@ static __attribute__((noinline)) void resolve_step(const T *g, I active, T *h) {
   }
 }
 #endif
+
+#if RARE_CASES_HERE
+/* The root of one lane of any polynomial, and the slope there: of a stop that is passed in its direction, or of another
+ * guard (a negative number). NAN where errors hide which root is the first, or a stop has an earlier one. */
+static __attribute__((noinline)) double hard_root(const T *a, int l, int stop, int flipped, int hides, double *slope) {
+  double c[P + 1], d = 0;
+  for (int k = 0; k <= P; k++) c[k] = LANE(a[k], l);
+  double s = c[0] > 0 ? first_root(c, P, 1) : 0, met = s;
+  if (hides && s != 0 && hides_roots(c, P, 1, s)) return NAN;
+  if (stop >= 0) met = first_crossing(c, P, 1, flipped ? -DIRECTION[stop] : DIRECTION[stop]);
+  for (int k = P; k > 0; k--) d = d * met + k * c[k];
+  *slope = d;
+  return stop >= 0 && s > 0 && met > s ? NAN : met;
+}
+#endif

@@ -155,19 +155,6 @@ INLINE T series_size(const Lanes *s, const Work *w, Step *e, int mode, I *finite
 
 /* Roots ------------------------------------------------------------------------------------------ */
 
-/* NAN where errors hide which root of a stop is the first. */
-static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, int flipped, double *slope) {
-  double c[P + 1], d = 0;
-  for (int k = 0; k <= P; k++) c[k] = LANE(a[k], l);
-  int stops = slot > 0 && slot <= STOPS, direction = stops ? DIRECTION[slot - 1] : 0;
-  double s = c[0] > 0 ? first_root(c, P, 1) : 0, met = s;
-  if (stops && s != 0 && hides_roots(c, P, 1, s)) return NAN;
-  if (stops) met = first_crossing(c, P, 1, flipped ? -direction : direction);
-  for (int k = P; k > 0; k--) d = d * met + k * c[k];
-  *slope = d;
-  return stops && s > 0 && met > s ? NAN : met;
-}
-
 /* Hard cases by sign changes of all Bernstein coefficients: those with one become ``one``, those without are
  * none, the others stay. */
 static __attribute__((noinline)) void count_changes(const T *a, I wrong_way, I *one, I *hard) {
@@ -220,7 +207,7 @@ INLINE I first_hit(const Lanes *s, Step *e, int mode, T *steps, T *dt, I *slot, 
     T root = BC(INFINITY), d = BC(0);
     if (any(hard[j])) count_changes(a[j], turned[j], &one[j], &hard[j]);
     for EACH(l, hard[j]) {
-      double at = hard_root(a[j], l, j, LANE_I(flipped[j], l) != 0, &LANE(d, l));
+      double at = hard_root(a[j], l, j <= STOPS ? j - 1 : -1, LANE_I(flipped[j], l) != 0, j > 0 && j <= STOPS, &LANE(d, l));
       if (at >= 0) LANE(root, l) = at;
       else if (at != at) LANE_I(unclear, l) = ~(int64_t)0;
     }

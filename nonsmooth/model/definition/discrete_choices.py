@@ -31,6 +31,8 @@ def without_choices(expression: Any, values: Values, what: str) -> Any:
         return expression
     if not isinstance(expression, ca.SX):
         return [without_choices(one, values, what) for one in expression]
+    if not all(isinstance(s, ca.SX) and s.is_symbolic() for s in values):
+        return expression  # the definition refuses them
     still = ca.vertcat(*values)
     if not ca.depends_on(expression, still):
         return expression

@@ -18,7 +18,13 @@ _NONE = ca.SX(0, 1)
 def held_values(d: Definition, values: Mapping[Any, float]) -> list[float]:
     """Numbers for all discrete states, in their order; keys are symbols or names."""
     names = d.names["states"][d.states.numel() - len(d.discrete) :]
-    given = {str(key): real(v, f"discrete state {key}") for key, v in values.items()}
+    if not isinstance(values, Mapping):
+        raise DefinitionError(
+            f"values: expected a mapping of discrete states to numbers, received {values!r}. Write holding({{'q': 0}})."
+        )
+    given = {
+        str(key): real(v, f"discrete state {key}", error=PointError) for key, v in values.items()
+    }
     if not names or set(given) != set(names):
         raise DefinitionError(
             f"values: expected a number for each discrete state of {names}, received {sorted(given)}."

@@ -579,6 +579,8 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     moves = ca.which_depends(d.surfaces, d.extended_states, 1, True) if functions else []
     for i, ((name, h), curved) in enumerate(zip(functions, bent(d.surfaces, x), strict=True)):
         if i in d.half_lines:
+            if not ca.depends_on(h, d.multipliers):
+                _require_simple(name, h, d)
             continue
         if not moves[i]:
             _require_states(name, h, d.extended_states, d)

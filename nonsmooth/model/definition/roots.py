@@ -70,6 +70,6 @@ def gate_roots(
         return field, {}
     symbols = ca.vertcat(*ca.symvar(field))
     nodes, rows = instructions([symbols], [field])
-    algebra = _Gated(symbols, ca.vertsplit(surfaces), x, gates)
+    algebra = _Gated(symbols, ca.vertsplit(surfaces)[: surfaces.numel()], x, gates)
     values = evaluate(nodes, algebra)
     return ca.vertcat(*[values[k] for k in rows[0]]), algebra.powers

@@ -207,6 +207,37 @@ def test_an_inconsistent_start_is_projected():
     assert run.itinerary == "cc"
 
 
+def test_a_jump_from_outside_an_ellipse_is_to_its_nearest_point():
+    """The direction of the multiplier is that of the normal where the jump ends."""
+    x, y, lam = (ca.SX.sym(name) for name in ("x", "y", "lam"))
+    inside = (1 - x**2 / 4 - y**2) / 2
+    system = ns.FilippovSystem(
+        [x, y],
+        field=[-lam * x / 4, -lam * y],
+        complementarity=ns.Complementarity(inside, multiplier=lam),
+    )
+    found = ns.simulate(system, [5.0, 4.0], t_end=0.1).events[0].x_after
+    normal = np.array([found[0] / 4, found[1]])
+    away = np.array([5.0, 4.0]) - found
+    assert abs(found[0] ** 2 / 4 + found[1] ** 2 - 1) < 1e-13
+    assert abs(normal[0] * away[1] - normal[1] * away[0]) < 1e-12
+    assert normal @ away > 0
+
+
+def test_roots_in_the_field_beside_a_condition():
+    """A tank that fills and empties over a floor: x' = q - sqrt(x + 1), which is not negative at 0."""
+    x, lam, t = ca.SX.sym("x"), ca.SX.sym("lam"), ca.SX.sym("t")
+    floor = ns.Complementarity(x, multiplier=lam, name="floor")
+    system = ns.FilippovSystem(
+        [x], field=[0.5 - ca.sqrt(x + 1) + lam], complementarity=floor, time=t
+    )
+    run = ns.simulate(system, [1.0], t_end=5.0)
+    s0, s1 = np.sqrt(2), 1.0  # s = sqrt(x + 1): 2 s s' = 1/2 - s
+    empty = 2 * (s0 - s1) + np.log((s0 - 0.5) / (s1 - 0.5))
+    assert run.itinerary == "o c"
+    assert run.events[0].t == pytest.approx(empty, abs=1e-8)
+
+
 def test_a_projected_field_slides_into_a_corner_and_out():
     """In x, y >= 0 a field presses on one edge, then on both, and leaves one after the other."""
     x, y, a, b, t = (ca.SX.sym(name) for name in "xyabt")
@@ -415,6 +446,7 @@ REFUSED = {
     "second derivative": (["v", "-x + lam"], "x", "Impact"),
     "nowhere": (["v", "-x"], "x", "not in the field"),
     "never": (["v + lam", "-x"], "v**2*0 + 1", "never changes"),
+    "multiple zero": (["v + lam", "-x"], "x**3", "3 times"),
     "bent": (["v + lam", "-x"], "x + lam**2", "not linear"),
     "product": (["v + lam*v + lam**2", "-x"], "x", "linear in all multipliers"),
 }

@@ -10,6 +10,9 @@ import nonsmooth as ns
 
 G = 9.81
 
+#: A table has more unknowns than are tried one by one.
+pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.flow.warn.DecisionWarning")
+
 
 def sphere(mu=0.1, e=0.0, law="newton", pull=(0, 0), **others):
     """A ball of radius 1: position, height, velocities, spins in the units of the slip; inertia 2/5."""
@@ -166,6 +169,56 @@ def test_a_table_falls_on_four_feet_and_slides_on(velocity):
     way = speed * fall / G + left**2 / (2 * mu * G)
     np.testing.assert_allclose(run.x[-1, :2], way * np.array(velocity) / (speed or 1.0), atol=1e-10)
     np.testing.assert_allclose(run.x[-1, 2:], 0.0, atol=1e-10)
+
+
+def corner(mu, e=0.0, law="newton"):
+    """A particle between a floor and a wall that presses with 1, with friction at both."""
+    x, y, z, u, v, w, r, s = (ca.SX.sym(name) for name in "xyzuvwrs")
+    floor, wall = ca.SX.sym("floor", 2), ca.SX.sym("wall", 2)
+    along = -mu * r * floor[1] - mu * s * wall[0]
+    return ns.FilippovSystem(
+        [x, y, z, u, v, w],
+        field=[u, v, w, s - mu * r * floor[0] - 1, along, r - mu * s * wall[1] - G],
+        surfaces=[ca.vertcat(u, v), ca.vertcat(v, w)],
+        multipliers=[floor, wall],
+        impacts=[
+            ns.Impact(z, reaction=r, restitution=e, name="floor", law=law),
+            ns.Impact(x, reaction=s, restitution=e, name="wall", law=law),
+        ],
+    )
+
+
+def test_a_particle_slides_along_an_edge_and_stops():
+    run = ns.simulate(corner(0.2), [0, 0, 0, 0, 2.0, 0], 2.0)
+    stop = 2.0 / (0.2 * (G + 1))
+    assert run.itinerary == "**cc sscc" and abs(run.events[0].t - stop) < 1e-11
+    np.testing.assert_allclose(run.x[-1], [0, stop, 0, 0, 0, 0], atol=1e-11)
+
+
+@pytest.mark.parametrize("law", ["newton", "moreau", "poisson"])
+def test_a_particle_falls_into_an_edge(law):
+    run = ns.simulate(corner(0.2, law=law), [0.5, 0, 0.5, -1, 2, 0], 5.0)
+    assert run.status is ns.Status.REACHED_END, run.message
+    assert run.itinerary.endswith("sscc") or run.itinerary.endswith("s*co")
+    np.testing.assert_allclose(run.x[-1, 3:], 0.0, atol=1e-12)
+
+
+def test_a_particle_on_a_rod_slides_round_and_stops():
+    """A joint beside friction in space: the speed falls at mu g."""
+    x, y, z, u, v, w, r, f = (ca.SX.sym(name) for name in "xyzuvwrf")
+    lam = ca.SX.sym("lam", 2)
+    system = ns.FilippovSystem(
+        [x, y, z, u, v, w],
+        field=[u, v, w, f * x - 0.2 * r * lam[0], f * y - 0.2 * r * lam[1], r - G],
+        surfaces=[ca.vertcat(u, v)],
+        multipliers=[lam],
+        impacts=ns.Impact(z, reaction=r),
+        constraints=ns.Constraint((x**2 + y**2 - 1) / 2, reaction=f),
+    )
+    run = ns.simulate(system, [1, 0, 0, 0, 3.0, 0], 3.0, tol=1e-11)
+    turned = 3.0**2 / (0.4 * G)
+    assert run.itinerary == "*sc ssc" and abs(run.events[0].t - 3.0 / (0.2 * G)) < 1e-11
+    np.testing.assert_allclose(run.x[-1, :2], [np.cos(turned), np.sin(turned)], atol=1e-11)
 
 
 def test_what_is_not_determined_is_said():

@@ -6,6 +6,7 @@ import pytest
 
 import nonsmooth as ns
 
+from ..independent.contacts import follow
 from ..peers import Problem, cases
 
 every = pytest.mark.parametrize(
@@ -38,6 +39,18 @@ def test_an_ensemble_ends_as_known(data):
     )
     assert ns.Status(int(many.status[2])).name == data.get("status", "REACHED_END")
     assert problem.error(many.x[2], data["end"]) <= problem.within
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "data", [own for own in cases() if "mechanism" in own], ids=lambda own: own["id"]
+)
+def test_an_integrator_of_contacts_ends_there_too(data):
+    problem, start = Problem(data), np.array(Problem(data).start)
+    half = len(start) // 2
+    step = problem.t_end / 150
+    end = follow(problem.mechanism(), start[:half], start[half:], problem.t_end, step)
+    assert problem.error(end, data["end"]) < 1e-6
 
 
 def test_time_does_not_run_backward():

@@ -1,5 +1,5 @@
-"""Problems of other tools' collections on which a run once ended early or fired nothing: dependent friction,
-a slider-crank, fireflies, a tank, second-order sliding, loads fed by slip, a hump of friction."""
+"""Problems on which a run once ended early or fired nothing: dependent friction, a tank, second-order sliding,
+loads fed by slip, a hump of friction."""
 
 import math
 
@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-
-#: Tests that fail, and why; a repair deletes its line.
-OPEN = {}
 
 x, y, u, v, w, p, q, t = (ca.SX.sym(name) for name in "xyuvwpqt")
 th, a, b, r1, r2 = (ca.SX.sym(name) for name in ("th", "a", "b", "r1", "r2"))
@@ -48,51 +45,6 @@ def test_a_flat_block_on_two_feet_slides_and_stays(feet, speed):
     assert run.status == REACHED
     assert abs(run.x[-1, 0] - 0.185809 * (speed > 0)) < 1e-6
     assert np.abs(run.x[-1, 1:]).max() < 1e-12
-
-
-def slider_crank():
-    """Without friction, from the data of an example of Siconos."""
-    long1, long2, half_a, half_b, channel = 0.153, 0.306, 0.05, 0.025, 0.052
-    m1, m2, m3, j1, j2, j3, g = 0.038, 0.038, 0.076, 7.4e-5, 5.9e-4, 2.7e-6, 9.81
-    angle = [ca.SX.sym(f"q{i}") for i in range(3)]
-    speed = [ca.SX.sym(f"v{i}") for i in range(3)]
-    force = [ca.SX.sym(f"r{i}") for i in range(4)]
-    rod = (0.5 * m2 + m3) * long1 * long2
-    m11, m22 = j1 + (0.25 * m1 + m2 + m3) * long1**2, j2 + (0.25 * m2 + m3) * long2**2
-    m12 = rod * ca.cos(angle[1] - angle[0])
-    pin = long1 * ca.sin(angle[0]) + long2 * ca.sin(angle[1])
-    gaps = [
-        0.5 * channel - s * (pin + end * half_a * ca.sin(angle[2]) + s * half_b * ca.cos(angle[2]))
-        for s in (1, -1)
-        for end in (-1, 1)
-    ]
-    turn = rod * ca.sin(angle[0] - angle[1])
-    torque = [
-        -turn * speed[1] ** 2 - (0.5 * m1 + m2 + m3) * g * long1 * ca.cos(angle[0]),
-        turn * speed[0] ** 2 - (0.5 * m2 + m3) * g * long2 * ca.cos(angle[1]),
-        0,
-    ]
-    for i in range(3):
-        torque[i] += sum(force[k] * ca.jacobian(gaps[k], angle[i]) for k in range(4))
-    det = m11 * m22 - m12**2
-    acceleration = [
-        (m22 * torque[0] - m12 * torque[1]) / det,
-        (m11 * torque[1] - m12 * torque[0]) / det,
-        torque[2] / j3,
-    ]
-    corners = [
-        ns.Impact(gap, restitution=0.4, reaction=force[k], name=f"corner{k + 1}")
-        for k, gap in enumerate(gaps)
-    ]
-    return ns.FilippovSystem(angle + speed, field=speed + acceleration, impacts=corners)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("tol", [1e-8, 1e-10, 1e-12, 1e-13])
-def test_a_slider_crank_without_friction_is_never_inconsistent(tol):
-    """Independent normals: a solution of the contact problem always exists and is unique."""
-    run = ns.simulate(slider_crank(), [0, 0, 0, 150.0, -75.0, -0.01], 0.2, tol=tol)
-    assert run.status == REACHED
 
 
 @pytest.mark.parametrize("push", [0, 1])

@@ -161,10 +161,10 @@ static void near_set(Run *r, int row, int fell) {
     }
     int good = field_with(r, r->letter, r->x, r->unknowns, own, k, mean, field);
     for (int i = 0; i < n; i++) end[i] = r->x[i] + dt * field[i];
-    good = good && freeze(r, r->letter, end, r->unknowns, own, k, a2, m2);
-    if (!good) { finish(r, NOT_FINITE, FIELD, 0); return; }
-    for (int i = 0; i < k; i++) bend += fabs(a2[i] - frozen[i]);
-    for (int i = 0; i < k * k; i++) bend += fabs(m2[i] - m[i]);
+    int is_known = good && freeze(r, r->letter, end, r->unknowns, own, k, a2, m2);
+    if (!good || !(is_known || (at_floor && r->s->sets > 1))) { finish(r, NOT_FINITE, FIELD, 0); return; }
+    for (int i = 0; is_known && i < k; i++) bend += fabs(a2[i] - frozen[i]); /* others may be zero there, without directions */
+    for (int i = 0; is_known && i < k * k; i++) bend += fabs(m2[i] - m[i]);
     bend *= dt;
     if (!at_floor) {
       field_with(r, r->letter, r->x, r->unknowns, own, k, u, other);

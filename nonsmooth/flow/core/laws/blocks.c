@@ -16,7 +16,7 @@ enum { MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4 };
 
 /* One block of elements that act on one another, with copies of its part of the law at one order. */
 typedef struct {
-  int size, first, is_coupled;
+  int size, first, is_coupled, is_joined; /* is_joined: its rows may depend on one another by joints */
   double tie; /* part of terms that is zero */
   const int32_t *own;
   double *a, *b, *matrix, *share, *floor; /* share: bounds by the reactions in the block; floor: rounding of w */
@@ -158,7 +158,11 @@ static int place_unknowns(const Block *k, const int8_t *position, double *nu, do
   double *m = work;
   for (int i = 0; i < n; i++) {
     double *row = m + (int64_t)i * n;
-    if (position[i] == HELD) { memcpy(row, k->matrix + (int64_t)i * n, sizeof(double) * n); nu[i] = k->a[i]; continue; }
+    if (position[i] == HELD) {
+      memcpy(row, k->matrix + (int64_t)i * n, sizeof(double) * n);
+      nu[i] = k->is_joined && fabs(k->a[i]) <= k->floor[i] ? 0 : k->a[i];
+      continue;
+    }
     double side = position[i] == TOP ? 1 : -1;
     for (int j = 0; j < n; j++) row[j] = i == j;
     if (span_of(k, i)) continue;
@@ -451,7 +455,8 @@ static int enumerate(const Block *k, double *found, double *work, int32_t *pivot
       fits = 1;
       for (int i = 0; i < n && fits; i++) {
         fits = wanted(k, i, position[i], nu) == position[i];
-        fits = fits && (k->is_contact[i] || bound_of(k, i, nu) >= -room_zero(k, i, k->floor[i], bound_of(k, i, nu)));
+        double bound = bound_of(k, i, nu);
+        fits = fits && (k->is_contact[i] || k->state[i] != UNDECIDED || bound >= -room_zero(k, i, k->floor[i], bound));
       }
       for (int q = 0; q < count && fits; q++) fits = !is_same(k, all + q * n, nu, 0);
       if (fits) memcpy(all + n * count++, nu, sizeof(double) * n);
@@ -504,11 +509,14 @@ static int relax_from(const Block *k, double *nu, double most) {
   return finite_all(nu, n) && (!k->is_coupled || change <= TIED * most);
 }
 
-/* Whether w = 0 of all, which nu is to keep, needs no element to leave its bounds. */
+/* Whether w is zero with nu inside all bounds, to rounding. */
 static int needs_no_bound(const Block *k, const double *nu) {
   for (int i = 0; i < k->size; i++) {
-    int size = span_of(k, i), ends = k->state[i] == ABOVE || k->state[i] == BELOW;
-    if (ends || (k->is_contact[i] ? nu[i] < 0 : size > 0 ? length_of(nu + i, size) > (1 + TIED) * bound_of(k, i, nu) : 0)) return 0;
+    int size = span_of(k, i), state = k->state[i];
+    double terms, w = rate_of(k, i, nu, &terms), most = (1 + TIED) * bound_of(k, i, nu);
+    if ((state != UNDECIDED && state != INSIDE) || fabs(w) > zero_of(k, i, terms)) return 0;
+    if (state == INSIDE || size < 0) continue;
+    if (k->is_contact[i] ? nu[i] < 0 : size ? length_of(nu + i, size) > most : fabs(nu[i]) > most) return 0;
   }
   return 1;
 }
@@ -532,7 +540,7 @@ static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
     for (int i = 0; i < n; i++)
       unit[i] = sqrt(larger(k->is_contact[i] ? nu[i] : bound_of(k, i, nu), MERGED * (most > 0 ? most : 1)));
   }
-  return (k->is_coupled && needs_no_bound(k, nu)) || relax_from(k, nu, most);
+  return ((k->is_coupled || k->is_joined) && needs_no_bound(k, nu)) || relax_from(k, nu, most);
 }
 
 /* Solutions of a block that is not of one element: one where a certificate or the size says so. */

@@ -485,6 +485,7 @@ static void refuse_negative(Run *r, const Block *b) {
 static int solutions_of(Run *r, Decision *d, int order, int which, double *found, int8_t *class) {
   Block b = part_of_law(d, order, which);
   int n = b.size, count;
+  b.is_joined = r->s->joints > 0;
   add_rounding(d, &b);
   int8_t *position = b.is_contact + d->count;
   for (int i = 0; i < n; i++) {

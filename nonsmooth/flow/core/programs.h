@@ -316,9 +316,11 @@ static void series_inputs(const Series *t, int k, const double *x, double *s) {
 }
 
 /* Rounding of the values of all rules that move, in units of EPSILON, from that of their inputs, of the ``size`` that
- * these have at least: 0 for none. Each stands where the coefficient of order zero of its row would. */
-static void series_rounding(const Series *t, double size, const double *s, double *error) {
-  for (int32_t l = 0; l < t->inputs; l++) error[t->input[l]] = size > 0 ? size + fabs(s[t->input[l]]) : 0;
+ * these have at least, or of that of the input ``time``: 0 for none. Each stands where the coefficient of order zero of
+ * its row would. */
+static void series_rounding(const Series *t, double size, int32_t time, double time_size, const double *s, double *error) {
+  for (int32_t l = 0; l < t->inputs; l++)
+    error[t->input[l]] = size > 0 ? (t->place[l] == time ? time_size : size) + fabs(s[t->input[l]]) : 0;
   for (int32_t l = 0; l < t->moving.count; l++) {
     const Rule *q = t->rule + t->moving.rule[l];
     double u = s[q->a], v = s[q->b], w = s[q->w], of_u = error[q->a], of_v = error[q->b], sum = 0, partial = 0;

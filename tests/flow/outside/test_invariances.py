@@ -170,6 +170,7 @@ def test_when_time_starts(shift, seed):
 @example(400, 13.08)
 @example(729, 13.08)
 @example(69, -16.0)  # what is small there is the slope of sliding
+@example(6117, 13.0)  # an impact was taken for a touch
 @given(SEEDS, st.floats(-13.1, 13.1))
 def test_the_unit_of_time(seed, exponent):
     problem, unit = system_of(seed), 10.0**exponent

@@ -132,7 +132,8 @@ def require_constraints(d: Definition) -> None:
         if ca.depends_on(effect, every):
             raise DefinitionError(
                 f"reaction of {name!r}: {reaction} is multiplied with {reaction} or another unknown. A joint's reaction enters "
-                "linearly; friction at it is that of two contacts, nonsmooth.Impact(gap, reaction=) on either side."
+                "linearly. Give friction at a joint a load of its own, nonsmooth.Friction(slip, load=), or make the joint of "
+                "contacts with a clearance."
             )
         if effect.is_zero():
             raise DefinitionError(

@@ -229,7 +229,13 @@ def read_definition(
     items = [*[_items(*one) for one in given], read_constraints(constraints)]
     (stops, resets, impacts, conditions, joined), renamed = _distinct(items, _own_names(sizes))
     reactions, f = _reactions(impacts, "gap", x, t, f)
+    if above is not None and any(own.reaction is not None for own in joined):
+        raise DefinitionError(
+            "constraints: their reactions are in above= and below=, of which one holds at a time. Give field= with "
+            "multipliers= and surfaces=, which holds them once."
+        )
     held, f = _reactions(joined, "function", x, t, f)
+    require_unique(ca.vertcat(x, t, p, lam, reactions, held))
     joints = joints_of(joined, listed(held), f)
     own = [*[condition.entry() for condition in conditions], *joints.entries]
     sizes, entries = (*sizes, *[1] * len(own)), [*entries, *own]

@@ -459,8 +459,17 @@ def test_what_is_no_joint_is_refused(constraints, field, text):
         ns.FilippovSystem([x, y, u, v], field=field, constraints=constraints)
 
 
+def test_reactions_are_given_once():
+    joints = [ns.Constraint(ROD, reaction=r), ns.Constraint(2 * ROD, reaction=r)]
+    with pytest.raises(ns.DefinitionError, match="more than once"):
+        ns.FilippovSystem([x, y, u, v], field=[u, v, r * x, r * y - 1], constraints=joints)
+    sides = {"above": [u, v, r * x - 1, r * y], "below": [u, v, r * x + 1, r * y]}
+    with pytest.raises(ns.DefinitionError, match="Give field= with multipliers="):
+        ns.FilippovSystem([x, y, u, v], surface=u, **sides, constraints=joints[0])
+
+
 def test_friction_by_the_reaction_of_a_joint_is_refused_with_what_to_write():
-    with pytest.raises(ns.DefinitionError, match="friction at it is that of two contacts"):
+    with pytest.raises(ns.DefinitionError, match="Give friction at a joint a load of its own"):
         ns.FilippovSystem(
             [x, y, u, v],
             field=[u, v, -0.3 * lam * r, r - 1],

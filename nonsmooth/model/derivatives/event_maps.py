@@ -11,7 +11,6 @@ from functools import cached_property, partial
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import nnls
 
 from ..cache import Content
 from ..definition.conditions import decides
@@ -215,6 +214,8 @@ def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -
 
 def jumping(system: FilippovSystem, x: Array, after: Array, p: Array) -> str:
     """Letters of the complementarity conditions: closed (c) where one takes an impulse in a jump to ``after``."""
+    from scipy.optimize import nnls  # slow to import
+
     coupled, own = coupled_of(system), [i for i in system.half_lines if i not in system.algebraic]
     columns = lambda: [ca.jacobian(coupled.field, coupled.symbols_of(own))]
     made = lambda: Evaluator(system.function(("columns of conditions",), columns))

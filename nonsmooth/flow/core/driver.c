@@ -366,7 +366,7 @@ static int taylor_piece(Run *r, double left, Piece *q) {
   if (!e->finite) { leave_singular(r, e, left); return 0; }
   double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
   if (h <= SHORTEST * time_scale(r) && h < left) {
-    finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
+    if (!ends_at_singular(r)) finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
     return 0;
   }
   if (is_fold_ahead(r, e, by_series)) {

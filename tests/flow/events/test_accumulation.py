@@ -174,3 +174,22 @@ def test_a_surface_without_a_series_at_the_limit_ends_the_run_there():
 def test_a_run_that_is_read_at_the_limit_does_not_stand_still_there():
     run = ns.simulate(_turning(), [0, 0], 2.0, t_eval=[1.0], max_steps=2000)
     assert run.status in (ns.Status.STEP_TOO_SMALL, ns.Status.ACCUMULATION)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.7, 1.4, 2.9])
+@pytest.mark.parametrize("kind", ["reset", "crossing"])
+def test_events_end_where_the_field_has_no_series(kind, phase):
+    """cos(log x + phase) is zero at exp(-pi (k + 1/2) - phase); v' is infinite at the limit."""
+    x = ca.SX.sym("x")
+    guard, steep = ca.cos(ca.log(x) + phase), 1 / ca.sqrt(x)
+    if kind == "reset":
+        resets = ns.Reset(guard, [x, -v])
+        system = ns.FilippovSystem([x, v], field=[-1, steep], resets=resets)
+    else:
+        system = ns.FilippovSystem([x, v], surface=guard, above=[-1, steep], below=[-1, -steep])
+    run = ns.simulate(system, [1, 0.5], 2.0)
+    assert run.status is ns.Status.ACCUMULATION
+    assert run.accumulation_time == pytest.approx(1, abs=1e-12)
+    times = [event.t for event in run.events if event.kind == kind]
+    zeros = [math.exp(-math.pi * (k + 0.5) - phase) for k in range(-1, len(times))]
+    assert times == pytest.approx([1 - at for at in zeros if at < 1][: len(times)], abs=1e-12)

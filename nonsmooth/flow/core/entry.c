@@ -132,7 +132,7 @@ static size_t place_run(Run *r, char *base) {
   r->gradient_row = DOUBLES((size_t)all * n + 2 * all);
   r->rates = DOUBLES(2 * all + 2 * c);
   r->lam = DOUBLES(2 * w);
-  r->matrix = DOUBLES(square + 8 * w + all + 2 * c);
+  r->matrix = DOUBLES(square + 9 * w + all + 2 * c);
   r->small = DOUBLES(4 * w + s->rules.atoms);
   r->atom_work = DOUBLES(pair_room(s->atoms.size, 1));
   r->choice_work = DOUBLES(pair_room(s->choices.size, 1));

@@ -150,7 +150,8 @@ class Impact:
     ``"moreau"`` solves one complementarity problem: each contact parts with at least -restitution v, and with no
     more where it takes an impulse. ``"poisson"`` first ends the approach, as with restitution 0, then returns at each
     contact at least the restitution's part of the impulse that it took. Friction at the contacts is bounded by their
-    impulses in all three. One contact without friction has the same impact in each.
+    impulses in all three. One contact without friction has the same impact in each. Friction at several contacts may leave no impulse that
+    fits, and then the run ends, and Poisson's law may depend on impulses that are not determined.
 
     Source: Acary & Brogliato 2008, Numerical Methods for Nonsmooth Dynamical Systems, chapter 3; Glocker & Pfeiffer
     1995.

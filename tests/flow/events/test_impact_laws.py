@@ -151,6 +151,32 @@ def test_a_cradle_with_gaps_hands_the_speed_on(law):
     np.testing.assert_allclose(run.x[-1, 5:], [0, 0, 0, 0, 1], atol=1e-12)
 
 
+@pytest.mark.parametrize(("seed", "fits"), [(1008, False), (1019, True), (1028, False)])
+def test_three_contacts_with_friction_part_after_an_impact_or_have_none(seed, fits):
+    """Sticking at all of them is more than three coordinates allow: it has no impulse of its own."""
+    rng = np.random.default_rng(seed)
+    v, normals = np.zeros(3), np.eye(3)
+    while not (normals @ v < 0).all():
+        points, angles = rng.uniform(-1, 1, (3, 2)), rng.uniform(0, 2 * np.pi, 3)
+        n = np.c_[np.cos(angles), np.sin(angles)]
+        t = np.c_[-n[:, 1], n[:, 0]]
+        turn = lambda d, p=points: p[:, 0] * d[:, 1] - p[:, 1] * d[:, 0]
+        normals, tangents = np.c_[n, turn(n)], np.c_[t, turn(t)]
+        for _ in range(30):
+            v = rng.normal(size=3)
+            if (normals @ v < 0).all():
+                break
+    inertia = float(rng.uniform(0.2, 0.6))
+    system = body("newton", normals, tangents, inertia, np.full(3, 0.6), 0.8)
+    run = ns.simulate(system, [0, 0, 0, *v], 1e-9)
+    if fits:
+        assert (normals @ run.events[0].x_after[3:]).min() > -1e-9
+    else:  # nor by Moreau's law, of all letters
+        assert run.status is ns.Status.INCONSISTENT and "No impulse fits" in run.message
+        weight = np.diag([1, 1, 1 / inertia])
+        assert not struck("moreau", normals, tangents, weight, v, np.full(3, 0.6), 0.8)
+
+
 def slope_by(system, start, t_end, name, value, small=1e-6):
     ends = [
         ns.simulate(system, start, t_end, parameters={name: value + s}).x[-1]

@@ -29,7 +29,7 @@ typedef struct {
 static int impulses_fit(Run *r, const Strike *of, const int32_t *taking, int takes, const int8_t *letter, double *after) {
   int m = r->m, w = r->width, k = 0, joints = of->joints, first;
   int32_t *unknown = r->pending + 4 * w;
-  double *every = r->lam, *a = r->matrix, *b = a + (int64_t)w * w, *limit = b + w, *h = limit + w, *scale = h + w;
+  double *every = r->lam, *a = r->matrix, *b = a + (int64_t)w * w, *limit = b + w, *h = limit + w, *scale = h + w, *before = scale + w;
   for (int i = of->carries; i < of->carries + joints; i++) unknown[k++] = of->carried[i];
   for (int i = 0; i < of->carries; i++) if (letter[of->carried[i]] == 0) unknown[k++] = of->carried[i];
   first = k;
@@ -48,8 +48,15 @@ static int impulses_fit(Run *r, const Strike *of, const int32_t *taking, int tak
   memset(every, 0, sizeof(double) * w);
   for (int i = 0; i < k; i++) every[unknown[i]] = b[i];
   /* What the impulses change, before r->slope is that of other multipliers. */
-  for (int i = 0; i < w; i++)
+  for (int i = 0; i < w; i++) {
+    before[i] = h[i];
     for (int j = 0; j < k; j++) if (b[j] != 0) h[i] += r->slope[i * w + unknown[j]] * b[j];
+  }
+  for (int i = 0; i < k; i++) { /* what depends on other rows may contradict them */
+    int own = unknown[i];
+    double wanted = i < first ? 0 : before[own] + of->target[own - m];
+    if (!(fabs(h[own] - wanted) <= MERGED * (fabs(before[own]) + fabs(wanted)) + ON_SURFACE * scale[own])) return 0;
+  }
   for (int j = 0; j < r->c; j++) r->held[m + j] = every[m + j]; /* impulses in place of reactions */
   error_scales(r, of->x, r->held, r->none);
   for (int i = 0; i < m; i++) limit[i] = fabs(factor_of(r, i));

@@ -206,7 +206,7 @@ def resonant_converter() -> Problem:
 def tank_cascade() -> Problem:
     """Two tanks that empty into one another.
 
-    $x' = -sqrt x$, $y' = sqrt x - sqrt y$ from (1, 1): the first is empty at $t = 2$, the second
+    $x' = -sqrt(x)$, $y' = sqrt(x) - sqrt(y)$ from (1, 1): the first is empty at $t = 2$, the second
     $2 sqrt(y(2))$ later.
 
     Returns

@@ -129,7 +129,8 @@ def preloaded(folder: Path) -> dict[str, str]:
 def main(kind: str, arguments: list[str]) -> int:
     """Run tests with an instrumented driver in a process of its own."""
     folder = ROOT / "build" / kind
-    environment = {**os.environ, **(preloaded(folder) if kind == "sanitize" else {})}
+    own = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST_XDIST")}
+    environment = {**own, **(preloaded(folder) if kind == "sanitize" else {})}
     environment |= {"NONSMOOTH_INSTRUMENT": f"{kind}:{folder}", "PYTHONPATH": str(ROOT)}
     given = arguments or ["-m", "not slow and not slow_cases and not browser", "tests/flow"]
     command = [

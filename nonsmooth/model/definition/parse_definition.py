@@ -218,8 +218,7 @@ def read_definition(
 ) -> Definition:
     """Read and check the arguments of FilippovSystem."""
     x = _states(states)
-    t = symbols([time], "time") if time is not None else ca.SX(0, 1)
-    p, defaults = _parameters(parameters)
+    t, (p, defaults) = _time(time), _parameters(parameters)
     entries = read_entries(surface, surfaces)
     sizes = tuple(len(entry.functions) for entry in entries)
     lam, f = _multipliers_and_field(entries, above, below, field, multipliers, x.numel())
@@ -229,11 +228,7 @@ def read_definition(
     items = [*[_items(*one) for one in given], read_constraints(constraints)]
     (stops, resets, impacts, conditions, joined), renamed = _distinct(items, _own_names(sizes))
     reactions, f = _reactions(impacts, "gap", x, t, f)
-    if above is not None and any(own.reaction is not None for own in joined):
-        raise DefinitionError(
-            "constraints: their reactions are in above= and below=, of which one holds at a time. Give field= with "
-            "multipliers= and surfaces=, which holds them once."
-        )
+    _require_one_field(above, joined)
     held, f = _reactions(joined, "function", x, t, f)
     require_unique(ca.vertcat(x, t, p, lam, reactions, held))
     joints = joints_of(joined, listed(held), f)
@@ -277,6 +272,19 @@ def _multipliers_and_field(
         f = column(field, "field", n)
     _one_multiplier_each(lam, h)
     return lam, f
+
+
+def _time(time: Any) -> ca.SX:
+    return ca.SX(0, 1) if time is None else symbols([time], "time")
+
+
+def _require_one_field(above: Any, constraints: Sequence[Any]) -> None:
+    """Refuse reactions of constraints in two fields."""
+    if above is not None and any(own.reaction is not None for own in constraints):
+        raise DefinitionError(
+            "constraints: their reactions are in above= and below=, of which one holds at a time. Give field= with "
+            "multipliers= and surfaces=, which holds them once."
+        )
 
 
 def _states(states: Any) -> ca.SX:

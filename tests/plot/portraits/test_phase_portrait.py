@@ -121,9 +121,6 @@ def test_other_systems_and_boxes_are_refused():
     space = ns.FilippovSystem([x, y, z], surface=x, above=[-1, 0, 0], below=[1, 0, 0])
     with pytest.raises(ns.DefinitionError, match="3 states"):
         ns.plot.phase_portrait(space, box)
-    smooth = ns.FilippovSystem([x, y], field=[y, -x])
-    with pytest.raises(ns.DefinitionError, match="0 surfaces"):
-        ns.plot.phase_portrait(smooth, box)
     lam = ca.SX.sym("lam")
     hidden = ns.FilippovSystem(
         [x, y], surface=y, multipliers=lam, field=[1, -(lam**3)], hidden=True

@@ -32,7 +32,6 @@ def test_steps(stand_in):
     for row in gpu.rates(quick=True).values():
         assert min(row["kernel"], row["outcomes"], row["ensemble"], row["steps of a run"]) > 1
     assert min(gpu.copies(quick=True).values()) > 1e6
-    assert gpu.interrupts(quick=True)["seconds"] < 2.0
 
 
 @pytest.mark.skipif(importlib.util.find_spec("cuda") is not None, reason="cuda-core is there")

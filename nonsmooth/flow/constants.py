@@ -139,6 +139,9 @@ TANGENT = 2e-14
 #: Shortest step, relative to the time and to that of the run, that rounding does not cancel.
 SHORTEST = 4 * EPSILON
 
+#: Where a guard's zero changes nothing, by rounding, a step of this many times that length goes on without it.
+OVER = 256.0
+
 #: A guard is low where it is below this many roundings of its terms. Before zeros that are not told apart a step ends
 #: where it is above this many times as much, unless that is no progress: this part of the way to them, and closer
 #: than SEPARATE, relative to the time. A root is exact to LOCATED of the time.

@@ -369,6 +369,8 @@ static int taylor_piece(Run *r, double left, Piece *q) {
     if (!ends_at_singular(r)) finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
     return 0;
   }
+  if (r->over) h = smaller(h, OVER * SHORTEST * time_scale(r)); /* a guard that changed nothing is passed over */
+  r->over = 0;
   if (is_fold_ahead(r, e, by_series)) {
     int fold = reach_fold(r, e, left);
     if (fold >= 0) serve_between(r, fold);
@@ -422,7 +424,7 @@ static void step(Run *r) {
   if (r->has_roots && pass_root(r, left)) return;
   Expansion *e = &r->e;
   Piece q;
-  int is_stiff = is_implicit(r);
+  int is_stiff = !r->over && is_implicit(r);
   if (r->wants_program) return;
   if (!(is_stiff && implicit_piece(r, left, &q)) && !taylor_piece(r, left, &q)) return;
   if (q.row < 0) memset(r->instant.passing, 0, r->s->rules.atoms);
@@ -440,7 +442,12 @@ static void step(Run *r) {
   else if (q.row >= 0) {
     int64_t events = r->event_count;
     serve_between(r, q.row);
-    if (r->event_count == events && q.dt <= SHORTEST * time_scale(r)) r->shortened++; /* back where it was */
+    if (r->event_count == events && q.dt <= SHORTEST * time_scale(r)) { /* back where it was */
+      r->shortened++;
+      int is_exit = r->now.kind[q.row] == EXIT_GUARD && has_law(r, r->now.index[q.row], SURFACE_LAW);
+      r->over = r->status == RUNNING && is_exit;
+      if (r->over) r->drop[q.row] = r->order + 1;
+    }
   }
   else if (!q.last) {
     if (r->s->sets) look_at_sets(r);

@@ -251,6 +251,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->length = r->shortened = 0;
   r->held_steps = r->wants_program = 0;
   r->held_length = 0;
+  r->over = 0;
   end_implicit(r);
   r->hold = INFINITY;
   r->begun = t;

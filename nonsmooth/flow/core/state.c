@@ -150,7 +150,7 @@ typedef struct {
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
   double size, time_size, length, shortened, held_length, hold; /* hold: the step's end before zeros of a guard that are not told apart */
-  int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
+  int32_t over, length_mode, active_count, several_count, several[SEVERAL], *active;
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
   Decision *decision;

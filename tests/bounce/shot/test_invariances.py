@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import bounce
@@ -69,6 +69,10 @@ def test_scaling(parameters, landing, load, c):
     assert abs(a.time - b.time) <= 1e-9
 
 
+@example(  # the bound of sticking and the load reach zero together, to rounding
+    parameters={"mu": 1.0, "d1": 0.0, "d2": 0.375, "eta": 5.186406375504506e-07, "G": 0.0},
+    landing=(0.0, -2.0, 1.0),
+)
 @given(parameters=PARAMETERS, landing=LANDING)
 def test_energy_and_cone(parameters, landing):
     check_energy_and_cone(bounce.KelvinVoigt(**parameters), landing)

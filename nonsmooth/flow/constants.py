@@ -30,6 +30,9 @@ GROWTH = 2.0
 FAR = 10.0
 FIRST = 0.01
 
+#: The two terms before the last two may be this much larger within a step; else a series has a gap.
+GAP = 1e3
+
 #: Points inside a step at which the defect is checked besides the end, and in each such octave.
 CHECKS, OCTAVE = 1, 8
 

@@ -115,17 +115,30 @@ static double reach_of_guards(const Run *r, const Expansion *e, double h) {
   return h;
 }
 
+/* The step h that the last two terms allow, parts of what is allowed at length 1, shortened where those before them are
+ * far larger: a series may have gaps, as that of sin t - cos t + exp(-t). */
+static double with_gaps(int order, double h, double last, double before, double third, double fourth) {
+  double least = h < INFINITY ? larger(last * h, before) * h : 0;
+  if (!(third <= GAP * least)) h = smaller(h, bound_at(third / GAP, order - 2));
+  if (!(fourth <= GAP * least * h)) h = smaller(h, bound_at(fourth / GAP, order - 3));
+  return h;
+}
+
 static double step_size(const Run *r, const Expansion *e) {
   int order = r->order, stride = r->stride;
-  double last = 0, before = 0, held = INFINITY;
+  double last = 0, before = 0, third = 0, fourth = 0, held = INFINITY;
   for (int i = 0; i < r->s->dimension; i++) {
     const double *c = e->states + (int64_t)i * stride;
+    double per = 1 / e->allowed[i];
     held = smaller(held, reach_of_held(c, order, e->allowed[i]));
-    last = larger(fabs(c[order]) / e->allowed[i], last);
-    before = larger(fabs(c[order - 1]) / e->allowed[i], before);
+    last = larger(fabs(c[order]) * per, last);
+    before = larger(fabs(c[order - 1]) * per, before);
+    third = larger(fabs(c[order - 2]) * per, third);
+    fourth = larger(fabs(c[order - 3]) * per, fourth);
   }
   if (r->s->sets) direction_bounds(r, e, &last, &before);
-  double h = reach_of_guards(r, e, smaller(held, smaller(bound_at(last, order), bound_at(before, order - 1))));
+  double h = smaller(bound_at(last, order), bound_at(before, order - 1));
+  h = reach_of_guards(r, e, smaller(held, with_gaps(order, h, last, before, third, fourth)));
   for (int j = 0; j < e->l.rows; j++) {
     const double *g = e->guards + (int64_t)j * stride;
     double a = e->of_guards[j] + r->o.rtol * fabs(g[0]);

@@ -204,10 +204,10 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T *
 }
 
 /* ``allowed`` and ``of_guards`` are the tolerances of states and of guards that are not affine. Not ``finite`` is also
- * a lane where the last terms of a guard vanish, and earlier ones bound the step. */
+ * a lane where the last terms vanish, or are far smaller, and earlier ones bound the step. */
 INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], T *allowed, T *of_guards,
                    I *finite) {
-  T last = BC(1e-300), before = BC(1e-300), sum = BC(0);
+  T last = BC(1e-300), before = BC(1e-300), third = BC(0), fourth = BC(0), sum = BC(0);
   UNROLL for (int i = 0; i < N; i++) {
     allowed[i] = i < ND ? SAFETY * (o->atol + o->rtol * ABS(s->x[i])) : BC(0);
     if (i >= ND) continue;
@@ -215,11 +215,15 @@ INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 
     sum += p + b;
     last = MAX(last, p);
     before = MAX(before, b);
+    third = MAX(third, ABS(c[i][P - 2]) * r);
+    fourth = MAX(fourth, ABS(c[i][P - 3]) * r);
   }
   guard_ratios(s, o, allowed, of_guards, g, &last, &before, &sum);
   *finite = ABS(sum) < INFINITY;
   T h1 = LOG2(MIN(last, BC(1e300))) * (-1.0 / P), h2 = LOG2(MIN(before, BC(1e300))) * (-1.0 / (P - 1));
-  return EXP2(MIN(h1, h2));
+  T h = EXP2(MIN(h1, h2)), least = MAX(last * h, before) * h * GAP;
+  *finite &= (third <= least) & (fourth <= least * h);
+  return h;
 }
 
 /* Roots: polynomials.h --------------------------------------------------------------------------- */

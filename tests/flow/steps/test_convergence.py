@@ -152,3 +152,26 @@ def test_error_falls_in_proportion_to_the_tolerance(name):
 def test_slip_at_separation_is_met_to_its_digits():
     final = run("impact", 1e-13).x[-1]
     assert final[1] + final[4] == pytest.approx(-0.0340870447107, abs=5e-14)
+
+
+@pytest.mark.parametrize("tol", [1e-6, 1e-8, 1e-10, 1e-13])
+@pytest.mark.parametrize("count", [1, 70])
+def test_a_series_with_gaps_has_its_tolerance(tol, count):
+    """x' = sin t - x from 0: of x = (sin t - cos t + exp(-t))/2 two of four terms vanish, the last two at some orders."""
+    x, t = ca.SX.sym("x"), ca.SX.sym("t")
+    system = ns.FilippovSystem([x], field=[ca.sin(t) - x], time=t)
+    many = ns.ensemble(system, np.zeros((count, 1)), 9.0, tol=tol)
+    assert many.engine == ("core" if count == 1 else "lanes")
+    exact = (np.sin(9.0) - np.cos(9.0) + np.exp(-9.0)) / 2
+    assert np.max(np.abs(many.x - exact)) < tol
+
+
+@pytest.mark.parametrize("tol", [1e-6, 1e-8, 1e-10, 1e-12, 1e-13])
+def test_a_diode_opens_where_the_current_vanishes(tol):
+    """The same current through a diode, from t = 2 pi on: it is back at zero at t = 2 pi + 3.9407."""
+    i, u, t = (ca.SX.sym(name) for name in ("i", "u", "t"))
+    diode = ns.Complementarity(i, multiplier=u)
+    system = ns.FilippovSystem([i], field=[ca.sin(t) - i + u], complementarity=diode, time=t)
+    run = ns.simulate(system, [0.0], 12.0, tol=tol)
+    times = [event.t for event in run.events[:-1]]
+    assert abs(times[2] - times[0] - 2 * np.pi) < max(100 * tol, 1e-12)

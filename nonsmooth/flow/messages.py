@@ -10,7 +10,7 @@ def held_by_decay(t: float, step: float, is_possible: bool) -> str:
     advice = (
         "method='auto' takes implicit steps."
         if is_possible
-        else "Implicit steps for it are not built."
+        else "Systems with vector multipliers have no implicit steps."
     )
     return (
         f"The steps are held near {step:.1e} at t = {t:.6g} by a decay rate of about {8 / step:.0e}, much faster "

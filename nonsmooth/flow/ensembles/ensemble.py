@@ -30,7 +30,7 @@ from .work import Work, checked_work, run_all, size_of_chunk
 #: systems with a set, which take longer to compile.
 _FEW, _FEW_WITH_SETS = 64, 4000
 
-#: Of more trajectories than these three are looked at, not one, to see whether they are stiff.
+#: Ensembles of at least this many trajectories are tested for stiffness on three of them, smaller ones on one.
 _MANY = 100_000
 
 

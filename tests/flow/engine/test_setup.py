@@ -60,7 +60,7 @@ def test_calls_grow_as_the_number_of_surfaces():
 
 @pytest.mark.parametrize("make", [lattice, blocks])
 def test_graphs_are_read_a_few_times(make, monkeypatch):
-    """Nodes that are read, beside those of the field; nothing is asked of one row of many."""
+    """The nodes that set-up reads are a small multiple of those of the field, whatever the number of rows."""
     read, linear, found = graph._read, ca.is_linear, []
     system = make(60)
     d = system.definition

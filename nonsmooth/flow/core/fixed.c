@@ -1,7 +1,5 @@
 /* Flows of known durations: nonsmooth/flow/fixed.py -------------------------------------------------------- */
 
-int64_t field_size(void) { return sizeof(Field); }
-
 /* Numbers that the work of a field needs. */
 int64_t field_work(const Field *f) {
   int64_t stride = f->order + 1;
@@ -28,8 +26,6 @@ typedef struct {
   const Field *const *field;
   const Values *const *event;
 } Legs;
-
-int64_t legs_size(void) { return sizeof(Legs); }
 
 /* Move all states to the ends of their legs. The number of a leg that fails and what is left of it, or -1. */
 int64_t fly_legs(const Legs *l, double *a, double tol, int64_t most_steps, double *left) {

@@ -123,18 +123,6 @@ def stuck(duration: float, left: float, z: Array) -> ConvergenceError:
     )
 
 
-def watched(field: GuardedField, y: Array, p: Array, duration: float, margin: float) -> Array:
-    """Extrema and values of the guards of a mode along its flow: rows (guard, t, h, h'', state)."""
-    # The values are at the end of every step, and by the margin beside the start and the end.
-    if not field.motion.guards:
-        return np.zeros((0, 4 + len(y)))
-    program = program_of(field)
-    found, end, left = program.watch(y, p, duration, TOLERANCE, MOST_STEPS, margin)
-    if left:
-        raise stuck(duration, left, end)
-    return found
-
-
 class LegsWatch:
     """Extrema and values of guards along many legs; those of no positive duration are left out."""
 
@@ -148,10 +136,11 @@ class LegsWatch:
     def __call__(
         self, starts: Sequence[Array], p: Array, durations: Array, ends: float
     ) -> tuple[list[Array], list[Array], list[Array]]:
-        """Rows of ``watched``, start series and end values of the guards, by leg."""
+        """Rows (guard, t, h, h'', state), start series and end values of the guards, by leg."""
+        # Values, with h'' = 0, are at the end of every step, and by the part ``ends`` beside the start and the end.
         found = self._program(starts, p, durations, TOLERANCE, MOST_STEPS, ends)
         if found.failed >= 0:
-            raise stuck(float(durations[found.failed]), found.left, starts[found.failed])
+            raise stuck(float(durations[found.failed]), found.left, found.rows[0])
         return found.rows, found.begins, found.values
 
 

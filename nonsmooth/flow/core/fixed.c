@@ -130,7 +130,7 @@ static void first_terms(const Flow *w, double *begin) {
 
 /* Values of what is watched at its extrema and at the ends of steps, no nearer than ``margin`` to both ends of the
  * flow, and at that distance from them. Rows of ``found``: number, time, value, second derivative (0 where it is
- * no extremum), state; their number, which stops at ``room``, is returned. First coefficients at the start go to ``begin``, if it is given. */
+ * no extremum), state; their number, which stops at ``room``, is returned. First coefficients at the start go to ``begin``. */
 static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin, double *found, int64_t room,
                           double *begin) {
   const Field *f = w->field;
@@ -138,7 +138,7 @@ static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin,
   double root[P + 2];
   for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
     double h = next_step(w, z, step), t = w->whole - w->left, slope;
-    if (step == 0 && begin) first_terms(w, begin);
+    if (step == 0) first_terms(w, begin);
     if (!(h > 0)) break;
     for (int j = 0; j < f->watched; j++) {
       const double *c = w->watched + j * stride;
@@ -161,14 +161,6 @@ static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin,
   return count;
 }
 
-/* The same of one flow: what is left of it. */
-double fixed_watch(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
-                   double margin, double *found, int64_t room, int64_t *count, double *work) {
-  Flow w = flow_of(f, p, duration, tol, work);
-  *count = watch_flow(&w, z, most_steps, margin, found, room, NULL);
-  return w.left;
-}
-
 /* Values of what is watched at a state. */
 static void watched_at(Flow *w, const double *z, double *values) {
   const Field *f = w->field;
@@ -179,7 +171,7 @@ static void watched_at(Flow *w, const double *z, double *values) {
   for (int j = 0; j < f->watched; j++) values[j] = w->rules[t->output[f->n + j]];
 }
 
-/* The same of many, with the margin ``ends`` times the duration: rows of all with the same width, their numbers in
+/* The same of many flows, with the margin ``ends`` times the duration: rows of all with the same width, their numbers in
  * ``counts``, first coefficients, and behind those of a leg values at its end. Those whose duration is not positive
  * have coefficients alone. The number of a flow
  * that fails, with what is left of it, or -1; -2 where there was not enough room. */
@@ -208,24 +200,20 @@ int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, cons
 
 /* Time until a watched function passes zero in a direction; a start nearer to zero than ``still`` is not counted.
  * -1 if it does not within the duration, -2 where the flow ends before. z is where the last step begins. */
-static double march_flow(Flow *w, double *z, int64_t most_steps, int32_t row, int32_t direction, double still) {
-  int order = w->field->order;
-  for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
-    double h = next_step(w, z, step);
-    if (!(h > 0)) break;
-    const double *c = w->watched + (int64_t)row * (order + 1);
-    int drop = 0;
-    while (step == 0 && drop < order && !(fabs(c[drop]) > still)) drop++;
-    double t = first_crossing(c + drop, order - drop, h, direction);
-    if (t >= 0 && w->whole - w->left + t > 0) { end_flow(w); return w->whole - w->left + t; }
-    make_step(w, h, z);
-  }
-  end_flow(w);
-  return w->left > 0 ? -2 : -1;
-}
-
 double fixed_march(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
                    int32_t row, int32_t direction, double still, double *work) {
   Flow w = flow_of(f, p, duration, tol, work);
-  return march_flow(&w, z, most_steps, row, direction, still);
+  int order = f->order;
+  for (int64_t step = 0; step < most_steps && w.left > 0; step++) {
+    double h = next_step(&w, z, step);
+    if (!(h > 0)) break;
+    const double *c = w.watched + (int64_t)row * (order + 1);
+    int drop = 0;
+    while (step == 0 && drop < order && !(fabs(c[drop]) > still)) drop++;
+    double t = first_crossing(c + drop, order - drop, h, direction);
+    if (t >= 0 && w.whole - w.left + t > 0) { end_flow(&w); return w.whole - w.left + t; }
+    make_step(&w, h, z);
+  }
+  end_flow(&w);
+  return w.left > 0 ? -2 : -1;
 }

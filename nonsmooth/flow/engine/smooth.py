@@ -60,21 +60,6 @@ class SmoothProgram:
         left = library().fixed_flow(self.pointer, at, state, duration, tol, most_steps, work)
         return memory[len(p) + 1 : len(p) + 1 + self.size], left
 
-    def watch(
-        self, z: Array, p: Array, duration: float, tol: float, most_steps: int, margin: float
-    ) -> tuple[Array, Array, float]:
-        """Extrema of the functions and values at the ends of steps, the end, and the time left."""
-        # Rows: number, time, value, second derivative (0 at the end of a step), state.
-        count, room = ctypes.c_int64(), _ROOM
-        while True:
-            memory, at, state, work = self._given(z, p)
-            found = np.empty((room, 4 + self.size))
-            where = (margin, address(found), room, ctypes.byref(count), work)
-            left = library().fixed_watch(self.pointer, at, state, duration, tol, most_steps, *where)
-            if count.value < room:
-                return found[: count.value], memory[len(p) + 1 : len(p) + 1 + self.size], left
-            room *= 8
-
     def march(
         self,
         z: Array,
@@ -232,7 +217,7 @@ class WatchProgram:
                 break
             room *= 8
         if failed >= 0:
-            return WatchedLegs([], [], [], failed, left.value)
+            return WatchedLegs([states[failed]], [], [], failed, left.value)
         own, begins, values, place = list[Array](), list[Array](), list[Array](), 0
         for i, (f, rows, count) in enumerate(
             zip(self._fields, self._rows, counts.tolist(), strict=True)

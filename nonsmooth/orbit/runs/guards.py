@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...flow.fixed import LegsWatch, passing, watched
+from ...flow.fixed import LegsWatch, passing
 from ...flow.names import described, guard_name
 from ...model import Array, FilippovSystem, Guard
 from ...model.derivatives.event_maps import is_due_at
@@ -52,12 +52,12 @@ def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array
     """Find the extrema of all guards inside a leg, and the violations."""
     field = guarded_field(system, mode)
     y = variational_field(system, mode).states_at(x, p)
-    rows = watched(field, y, p, duration, _ENDS * duration)
+    ((rows,), _, _) = LegsWatch([field])([y], p, np.array([duration]), _ENDS)
     return Watch(_approaches(field, rows, p), _violations_along(field, rows, p))
 
 
 def is_met(field: GuardedField, row: Array, p: Array) -> bool:
-    """Whether something happens where the guard of a row of ``watched`` passes zero."""
+    """Whether something happens where the guard of a row of ``LegsWatch`` passes zero."""
     guard, system = field.motion.guards[int(row[0])], field.motion.system
     if guard.kind not in CONDITIONS:
         return True

@@ -71,6 +71,15 @@ def flow_for(
     return end
 
 
+def first_terms(field: GuardedField, y: Array, p: Array, order: int = 3) -> tuple[Array, Array]:
+    """First coefficients of states (N + k, order + 1) and guards (g, order + 1) of a mode from a state."""
+    program = program_of(field)
+    if order > program.order:
+        program = made_program(field, order)
+    terms = program.terms(y, p)[:, : order + 1]
+    return terms[: len(y)], terms[len(y) :]
+
+
 #: Programs of the interpreter for fields and expressions, as long as these live.
 _PROGRAMS: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 
@@ -78,13 +87,16 @@ _PROGRAMS: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 def program_of(field: SmoothField) -> SmoothProgram:
     """Program of a smooth field for the interpreter, made once."""
     made: SmoothProgram | None = _PROGRAMS.get(field)
-    if made is None:
-        group = np.full(field.entries, -1, np.int32)
-        for k, entries in enumerate(field.groups):
-            group[entries] = k
-        of_columns = field.derivatives, field.by_start, field.columns
-        made = _PROGRAMS.setdefault(field, SmoothProgram(field.series, group, ORDER, *of_columns))
-    return made
+    return made or _PROGRAMS.setdefault(field, made_program(field, ORDER))
+
+
+def made_program(field: SmoothField, order: int) -> SmoothProgram:
+    """Make the program of a smooth field at an order."""
+    group = np.full(field.entries, -1, np.int32)
+    for k, entries in enumerate(field.groups):
+        group[entries] = k
+    of_columns = field.derivatives, field.by_start, field.columns
+    return SmoothProgram(field.series, group, order, *of_columns)
 
 
 class Evaluated(Protocol):

@@ -16,6 +16,13 @@ double fixed_flow(const Field *f, const double *p, double *z, double duration, d
   return w.left;
 }
 
+/* Series of states and of what is watched at a state z, in rows (n + watched, order + 1). */
+void fixed_terms(const Field *f, const double *p, const double *z, double *terms, double *work) {
+  Flow w = flow_of(f, p, 0, 1, work);
+  expand_flow(&w, z);
+  memcpy(terms, w.states, sizeof(double) * (f->n + f->watched) * (f->order + 1));
+}
+
 /* Legs ----------------------------------------------------------------------------------------------------- */
 
 /* Legs and what happens at their ends. One array has, from the places given: parameters, and in rows for each leg

@@ -28,12 +28,12 @@ class SmoothProgram:
         group: NDArray[np.int32],
         order: int,
         derivatives: Entries,
-        starts: int,
-        columns: int,
+        starts: int = 0,
+        columns: int = 0,
     ):
         self._kept: list[NDArray[Any]] = [np.ascontiguousarray(group, np.int32)]
         n, groups = len(group), int(group.max(initial=-1)) + 1
-        self.size, count = n * (1 + columns), len(derivatives.row)
+        self.order, self.size, count = order, n * (1 + columns), len(derivatives.row)
         self.watched = watched = len(series.outputs) - n - count
         rules = series_structure(series, n, order, self._kept)
         self._kept += [derivatives.row, derivatives.column]
@@ -59,6 +59,14 @@ class SmoothProgram:
         memory, at, state, work = self._given(z, p)
         left = library().fixed_flow(self.pointer, at, state, duration, tol, most_steps, work)
         return memory[len(p) + 1 : len(p) + 1 + self.size], left
+
+    def terms(self, z: Array, p: Array) -> Array:
+        """Coefficients of the states' and functions' series at a state, (n + watched, order + 1)."""
+        memory, at, state, work = self._given(z, p)
+        found = np.empty((self.size + self.watched, self.order + 1))
+        library().fixed_terms(self.pointer, at, state, address(found), work)
+        del memory
+        return found
 
     def march(
         self,

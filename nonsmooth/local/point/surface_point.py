@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...flow.fixed import first_terms
 from ...model import (
     Array,
     DefinitionError,
@@ -23,10 +24,10 @@ from ...model import (
     Switching,
     call,
     evaluator,
-    motion,
     one_surface,
     require_system,
 )
+from ...model.derivatives.variational import guarded_field
 from ...solvers.newton import Equations
 from ..checks import require_surface
 from .elements_at import Situation, acts, chosen, situation
@@ -363,8 +364,8 @@ class LocalSurface:
 
     def orbit(self, x: Array, letter: str, order: int) -> tuple[Array, Array]:
         """Taylor coefficients of an orbit (N, order + 1) and of h on it, L^k h/k! (order + 1,)."""
-        jet = motion(self.system, self.side(letter)).jet_function(order)
-        states, guards = call(jet, x, self.parameters)
+        field = guarded_field(self.system, self.side(letter))
+        states, guards = first_terms(field, x, self.parameters, order)
         # the guard of a side is h there, and positive
         return states, (1.0 if letter == "+" else -1.0) * guards[self.surface]
 

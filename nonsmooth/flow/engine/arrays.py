@@ -1,4 +1,4 @@
-"""What Python and the drivers in C share: structures of options and batches, a run as arrays."""
+"""What Python and the drivers in C share: options and batches, a run as arrays."""
 
 from __future__ import annotations
 
@@ -16,45 +16,10 @@ from ..constants import GUARDS, KINDS, METHODS
 from ..options import Options
 from ..results import Chunk
 from ..section import Hits
-from .building.build import CompilerError
+from .structures import structure
 
 #: Steps of one call of C; between calls Python hears Ctrl-C and requests to stop.
 BURST = 4096
-
-_D, _I32, _I64 = ctypes.c_double, ctypes.c_int32, ctypes.c_int64
-_POINTER = ctypes.c_void_p
-
-
-class OptionsStructure(ctypes.Structure):
-    """``Options`` of common.h."""
-
-    _fields_ = [
-        *[(name, _D) for name in ("t_end", "rtol", "atol", "max_step", "rest_below")],
-        *[(name, _I64) for name in ("max_steps", "max_events", "max_jumps")],
-        *[(name, _I32) for name in ("start_mode", "at_kind")],
-        ("at_count", _I64),
-        *[(name, _I32) for name in ("dense", "hit_after", "method", "pad")],
-        *[(name, _I64) for name in ("hit_kinds", "hit_width", "hit_side", "hit_skip", "hit_every")],
-        ("hit_count", _I64),
-        ("hit_named", _POINTER),
-        ("passed", _POINTER),
-    ]
-    kept: tuple[NDArray[Any], ...]  # what the last two point to
-
-
-class BatchStructure(ctypes.Structure):
-    """``Batch`` of common.h."""
-
-    _fields_ = [
-        ("count", _I64),
-        ("p_stride", _I64),
-        ("t0", _D),
-        *[(name, _POINTER) for name in ("which", "x0", "p", "x", "t", "status", "itinerary")],
-        *[(name, _POINTER) for name in ("kinds", "at_x", "at_t", "totals")],
-        *[(name, _I64) for name in ("room", "times_stride")],
-        *[(name, _POINTER) for name in ("times", "sample_t", "sample_x")],
-        ("kinds_width", _I64),
-    ]
 
 
 class Happened(NamedTuple):
@@ -192,16 +157,6 @@ def guard_of(system: FilippovSystem, code: int) -> Guard:
     return Guard(kind, i, 0 if kind == "branch" else side, system.entry_of(i))
 
 
-def require_size(size: Any, structure: type[ctypes.Structure]) -> None:
-    """Refuse a library whose structure is not laid out as ours."""
-    size.restype = _I64
-    if size() != ctypes.sizeof(structure):
-        raise CompilerError(
-            f"{structure.__name__}: expected {ctypes.sizeof(structure)} bytes, received {size()} "
-            "from the compiled library. Its compiler lays out structures in another way."
-        )
-
-
 def address(a: NDArray[Any] | None) -> int | None:
     """Return where an array begins."""
     if a is None:
@@ -218,11 +173,11 @@ def options_of(
     dense: bool,
     at: tuple[int, int] | None = None,
     start_mode: int = -1,
-) -> OptionsStructure:
+) -> ctypes.Structure:
     """Options as C reads them; the start's mode by its number."""
     kind, count = at or (-1, 0)
     limit = 2**62  # no run has so many events
-    made = OptionsStructure(
+    made: Any = structure("Options")(
         o.t_end,
         o.rtol,
         o.atol,
@@ -283,7 +238,7 @@ def batch_of(
     chunk: Chunk,
     times: Array | None,
     which: NDArray[np.intp] | None,
-) -> BatchStructure:
+) -> ctypes.Structure:
     """What C reads and where it writes; all arrays live as long as the caller's."""
     count = len(x) if which is None else len(which)
     stride = p.shape[-1] if p.ndim > 1 else 0
@@ -294,7 +249,7 @@ def batch_of(
     times_stride = 0 if times is None or times.ndim == 1 else times.shape[1]
     width = chunk.kinds.shape[1]
     samples = [address(a) for a in (times, chunk.sample_t, chunk.sample_x)]
-    return BatchStructure(count, stride, t_start, *arrays, room, times_stride, *samples, width)
+    return structure("Batch")(count, stride, t_start, *arrays, room, times_stride, *samples, width)
 
 
 def words_of(

@@ -8,7 +8,8 @@ from functools import lru_cache
 from typing import Any
 
 from ..flow.constants import FULL, GUARDS, IMPLICIT_STEP, KINDS
-from ..flow.engine.building.webassembly import MODULE
+from ..flow.engine.building.build import CompilerError
+from ..flow.engine.building.webassembly import MODULE, has_module_key
 from ..flow.engine.image import exchanged, image_of
 from ..flow.engine.recording import written_arrays
 from ..flow.engine.tape import tape_for
@@ -18,8 +19,12 @@ from ..model import FilippovSystem
 
 @lru_cache(maxsize=1)
 def module() -> str:
-    """The module, compressed, as text."""
-    return base64.b64encode(gzip.compress(MODULE.read_bytes(), 9, mtime=0)).decode()
+    """The module, compressed, as text; CompilerError in a checkout whose driver has changed since."""
+    if not has_module_key(content := MODULE.read_bytes()):
+        raise CompilerError(
+            f"{MODULE.name} was compiled from other sources of the driver. Run `make wasm`."
+        )
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 
 def described(system: FilippovSystem, tol: float = 1e-10) -> dict[str, Any]:
@@ -29,7 +34,6 @@ def described(system: FilippovSystem, tol: float = 1e-10) -> dict[str, Any]:
     layouts = exchanged()
     machine = dict(
         layout=layouts,
-        system_size=image.system_size,
         arrays=written_arrays(),
         full=FULL,
         implicit=IMPLICIT_STEP,

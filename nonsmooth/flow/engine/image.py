@@ -13,8 +13,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from .arrays import BatchStructure, OptionsStructure
-from .recording import Output
+from .structures import structure
 from .tape import TapeEngine
 
 _POINTER = ctypes.c_void_p
@@ -32,10 +31,10 @@ class Layout:
     fields: dict[str, tuple[int, str | Layout]]
 
 
-def layout_of(structure: type[ctypes.Structure]) -> Layout:
+def layout_of(own: type[ctypes.Structure]) -> Layout:
     """Lay out a structure of ctypes for a machine of 32 bits."""
     at, widest, fields = 0, 1, dict[str, tuple[int, str | Layout]]()
-    for name, kind, *_ in structure._fields_:
+    for name, kind, *_ in own._fields_:
         inner: str | Layout
         if kind is _POINTER:
             size = align = 4
@@ -53,9 +52,8 @@ def layout_of(structure: type[ctypes.Structure]) -> Layout:
 
 
 def exchanged() -> dict[str, dict[str, Any]]:
-    """Layouts of what a page writes for the driver, for JSON; of ``System`` the size."""
-    shared = {"Options": OptionsStructure, "Batch": BatchStructure, "Output": Output.Structure}
-    found = {name: layout_of(structure) for name, structure in shared.items()}
+    """Layouts of what a page writes for the driver, for JSON."""
+    found = {name: layout_of(structure(name)) for name in ("Options", "Batch", "Output")}
     return {name: {"size": own.size, "fields": own.fields} for name, own in found.items()}
 
 
@@ -69,20 +67,16 @@ class Image:
         The structure ``System`` of ``core/state.c``, then what it points to.
     places : list of int
         Offsets of its addresses.
-    system_size : int
-        Size of ``System``.
     """
 
     bytes: bytearray = field(default_factory=bytearray)
     places: list[int] = field(default_factory=list)
-    system_size: int = 0
 
 
 def image_of(engine: TapeEngine) -> Image:
     """Write a system as an image."""
     system, blocks = engine.blocks()
     layout, image, known = layout_of(type(system)), Image(), dict[int, int]()
-    image.system_size = layout.size
 
     def room(size: int) -> int:
         at = _up(len(image.bytes), 8)
@@ -102,9 +96,9 @@ def image_of(engine: TapeEngine) -> Image:
                 image.bytes[known[address] : known[address] + len(content)] = content
         return known[address]
 
-    def write(structure: ctypes.Structure, layout: Layout, base: int) -> None:
+    def write(own: ctypes.Structure, layout: Layout, base: int) -> None:
         for name, (at, kind) in layout.fields.items():
-            value = getattr(structure, name)
+            value = getattr(own, name)
             if isinstance(kind, Layout):
                 write(value, kind, base + at)
             elif kind == "P":

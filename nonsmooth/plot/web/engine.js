@@ -11,7 +11,6 @@ class Engine {
   constructor(c, system) {
     Object.assign(this, { c, system, machine: system.machine });
     c._initialize();
-    this.requireSizes();
     this.width = system.m + system.c;
     this.image = this.placed(system);
     for (const name of ["Options", "Batch", "Output"]) {
@@ -22,16 +21,6 @@ class Engine {
     this.read = c.malloc(8 * (4 + 15) + 4 * (this.width + 1 + 16) + 8 * (16 * system.n + 1));
     this.rooms = null;
     this.refresh();
-  }
-
-  /** Refuse a module whose structures are laid out in another way. */
-  requireSizes() {
-    const { c, machine } = this;
-    const sizes = { Options: c.options_size, Batch: c.batch_size, Output: c.output_size };
-    const fits = Object.entries(sizes).every(([k, size]) => Number(size()) === machine.layout[k].size);
-    if (!fits || Number(c.system_size()) !== machine.system_size) {
-      throw new Error("The module and the system are of different versions of the library.");
-    }
   }
 
   // Views end when the module's memory grows, so they are made anew.

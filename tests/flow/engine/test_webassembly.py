@@ -1,5 +1,6 @@
 """The driver as WebAssembly gives the runs of the driver in C: same itineraries, same numbers."""
 
+import ctypes
 import hashlib
 import importlib.util
 import math
@@ -104,7 +105,7 @@ def test_the_layout_is_that_of_a_machine_of_32_bits():
     engine = tape_for(stiff(), Options(t_end=1.0))
     system, _ = engine.blocks()
     image = image_of(engine)
-    assert layout_of(type(system)).size == image.system_size < len(image.bytes)
+    assert layout_of(type(system)).size < ctypes.sizeof(system) < len(image.bytes)
     assert all(at % 4 == 0 and at + 4 <= len(image.bytes) for at in image.places)
     assert len(set(image.places)) == len(image.places)
 

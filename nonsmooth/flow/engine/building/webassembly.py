@@ -19,7 +19,7 @@ MODULE = Path(__file__).parents[1] / "core.wasm"
 
 #: What pages call.
 _EXPORTS = """
-    options_size batch_size system_size output_size table_new table_modes table_size table_free table_read
+    table_new table_modes table_size table_free table_read
     run_new run_free run_begin run_continue run_read run_resume run_many run_sample malloc free calloc
 """.split()
 

@@ -36,6 +36,7 @@ from .laws.followed import Followed, followed
 from .laws.layer import Layer, LayerNumbers, layer_of
 from .laws.motion import Motion, motion, watched_functions
 from .laws.multipliers import sliding_multipliers
+from .laws.one_surface import OneSurface, has_elements, one_surface
 from .laws.switches import Guard
 from .reading import Parameters
 from .values import Array
@@ -59,6 +60,7 @@ __all__ = [
     "Motion",
     "NonsmoothError",
     "NotSmoothError",
+    "OneSurface",
     "OptionError",
     "ParameterError",
     "Parameters",
@@ -74,6 +76,7 @@ __all__ = [
     "evaluator",
     "explain",
     "followed",
+    "has_elements",
     "instruction_form",
     "is_function",
     "is_real",
@@ -81,6 +84,7 @@ __all__ = [
     "mode_field",
     "motion",
     "multiplier_enters",
+    "one_surface",
     "periods",
     "raised_of",
     "read_function",

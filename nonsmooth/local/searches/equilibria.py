@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import Array, FilippovSystem, OptionError, Parameters
+from ...model import Array, FilippovSystem, OptionError, Parameters, call
 from ...model.derivatives.mode_equations import mode_equations
 from ..checks import require_autonomous
 from ..discrete_states import with_discrete_states_held
@@ -30,7 +30,8 @@ class Equilibrium:
     side : {"+", "-"}
         Of the field $F1$ above the surface or $F2$ below it; ``"+"`` for a smooth system.
     status : {"real", "virtual", "boundary"}
-        Whether it is on its field's own side, on the other side of a surface, or on the surface.
+        Whether it is on its field's own side, on the other side of a surface or behind a contact, or on the
+        surface or contact.
     kind : str
         ``"stable node"``, ``"unstable focus"``, ``"saddle"``, ...; ``"degenerate"`` if an
         eigenvalue has no real part.
@@ -65,7 +66,8 @@ class Equilibrium:
     def __str__(self) -> str:
         values = ", ".join(f"{v:.6g}" for v in self.eigenvalues)
         if not self.mode:
-            return f"{self.kind} at {self.point.tolist()}, eigenvalues {values}."
+            status = "" if self.status == "real" else f"{self.status} "
+            return f"{status}{self.kind} at {self.point.tolist()}, eigenvalues {values}."
         where = f"mode {self.mode!r}" if set(self.mode) & set("ocs") else FIELDS[self.side]
         return (
             f"{self.status} {self.kind} of {where} at {self.point.tolist()}, h = {self.h:.6g}, "
@@ -121,7 +123,8 @@ def find_equilibrium(
     ----------
     system, parameters, surface, mode
         As in :func:`region`; the point need not be on the surface. A smooth system has none. With
-        complementarity conditions ``mode`` has all letters, also those of what slides or is closed.
+        complementarity conditions ``mode`` has all letters, also those of what slides or is closed; with
+        impacts it may, and without it contacts are open.
     near : array_like (n,)
         Where the search starts.
     side : {"+", "-"}
@@ -160,7 +163,7 @@ def find_equilibrium(
     (array([0.5, 0.5]), 'real', 'stable node')
     """
     k = side_index(side)
-    if isinstance(system, FilippovSystem) and system.complementarity:
+    if isinstance(system, FilippovSystem) and _has_all_letters(system, mode):
         return _of_mode(system, near, mode, parameters, tol, max_iterations)
     require_autonomous(system, "equilibrium")
     where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True)
@@ -175,6 +178,12 @@ def find_equilibrium(
     what = f"equilibrium of {FIELDS[side]}" if where.mode else "equilibrium"
     found = search(equations, x, tol=tol, max_iterations=max_iterations, what=what)
     return equilibrium_at(where, found, side)
+
+
+def _has_all_letters(system: FilippovSystem, mode: str | None) -> bool:
+    """Whether a mode names what slides and what is closed, too."""
+    contacts = bool(system.impacts) and mode is not None and len(mode) > len(system.entries)
+    return bool(system.complementarity) or contacts
 
 
 def _of_mode(
@@ -229,6 +238,9 @@ def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium
     else:
         signs = np.where(where.switches(x) > 0, "+", "-")
         status = "real" if "".join(signs) == mode else "virtual"
+    gap = float(_gaps(where, x).min(initial=np.inf))
+    if gap <= TOLERANCE * (1 + float(np.linalg.norm(x))) and status != "virtual":
+        status = "boundary" if gap >= -TOLERANCE * (1 + float(np.linalg.norm(x))) else "virtual"
     return Equilibrium(
         x,
         side,
@@ -242,3 +254,12 @@ def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium
         found.iterations,
         mode,
     )
+
+
+def _gaps(where: LocalSurface, x: Array) -> Array:
+    """Of the contacts, at a point."""
+    system = where.system
+    if not system.impacts:
+        return np.zeros(0)
+    function = system.function(("gaps",), lambda: [system.definition.gaps])
+    return np.asarray(call(function, x, where.parameters)[0]).ravel()

@@ -11,7 +11,10 @@ from ..laws.explicit import explicit
 
 
 def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
-    """(x, p) -> field, its derivative, functions that are kept at zero, theirs, and guards without events."""
+    """(x, p) -> field, its derivative, functions that are kept at zero, theirs, and guards without events.
+
+    A closed contact keeps its gap and the gap's rate.
+    """
 
     def build() -> Evaluator:
         of_mode, x = explicit(system, mode), system.extended_states
@@ -27,7 +30,9 @@ def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
             for k, guard in enumerate(of_mode.guards)
             if guard.kind in ("surface", "exit", "impact", "release")
         ]
-        field, h, functions = of_mode.field, every[kept], of_mode.functions[guards]
+        field, functions = of_mode.field, of_mode.functions[guards]
+        gaps = every[[i for i in kept if i >= system.surface_count]]
+        h = ca.vertcat(every[kept], ca.jtimes(gaps, x, field))
         rows = [field, ca.jacobian(field, x), h, ca.jacobian(h, x), functions]
         shapes = [ca.densify(e) if e.numel() else ca.SX(*e.shape) for e in rows]
         made = ca.Function("equations", [x, system.parameter_symbols], shapes, {"cse": True})

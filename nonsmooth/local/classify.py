@@ -33,7 +33,7 @@ from .point.surface_point import FIELDS, SIDES, LocalSurface, Numbers, surface_a
 from .read_only import ReadOnly
 from .searches.boundary_equilibria import boundary_equilibrium_at
 from .searches.equilibria import equilibrium_distance, kind_of
-from .searches.find_two_fold import independence, two_fold
+from .searches.find_two_fold import TwoFold, independence, two_fold
 from .searches.fold_folds import fold_fold_of
 from .searches.folds import Fold, bend, fold
 from .searches.pseudo_equilibria import (
@@ -140,7 +140,7 @@ def classify(
     PointError
         Off the surface, or without one, and no equilibrium; a wrong shape; not finite.
     DefinitionError
-        Hidden dynamics; a fold-fold of a planar system with explicit time; vector multipliers; a ``mode`` or ``surface`` that the system does not have.
+        Hidden dynamics; vector multipliers; a ``mode`` or ``surface`` that the system does not have.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     OptionError
@@ -168,14 +168,16 @@ def classify(
     if not where.mode:
         return _Classifier(where, where.at(x), tol, margin).smooth()
     require_linear(system, surface, "classify")
-    numbers = where.finite_at(x)
+    numbers = where.finite_at(x, slopes=False)
     if not np.any(numbers.gradient):
         raise PointError(
             f"point {x}: expected a regular point of surface {surface}, received grad h = 0. Write "
             "h with a nonzero gradient."
         )
-    classifier = _Classifier(where, numbers, tol, margin)
     away = numbers.distance / (1 + float(np.linalg.norm(x)))
+    if away > tol or np.abs(numbers.angles).min() <= tol:
+        where.finite_at(x)
+    classifier = _Classifier(where, numbers, tol, margin)
     if away > tol:
         return classifier.off_surface(away)
     return classifier.on_surface()
@@ -193,8 +195,9 @@ class _Classifier:
         self.evidence: dict[str, float] = {"h": float(numbers.h), **lie}
         self.to_zero = [float("inf"), float("inf")]  # distance to a zero of F1, F2
         if not where.system.time_dependent:
-            pairs = zip(numbers.fields, self.derivatives, strict=True)
-            self.to_zero = [equilibrium_distance(f, d, numbers.x) for f, d in pairs]
+            for k, (f, d) in enumerate(zip(numbers.fields, self.derivatives, strict=True)):
+                if np.all(np.isfinite(d)):  # a root on the surface may have an infinite slope
+                    self.to_zero[k] = equilibrium_distance(f, d, numbers.x)
 
     # the result -----------------------------------------------------------------------------------
 
@@ -363,6 +366,8 @@ class _Classifier:
         self.margins["dependent grad h, grad L1, grad L2"] = independence(numbers)
         if min(self.margins.values()) < self.margin:
             return self.result("degenerate", "")
+        if self.n < 3:  # of a plane, in which time is the third coordinate
+            return self._two_fold_of(*self._signs_and_ratios(), None)
         x = numbers.x
         try:
             found = two_fold(
@@ -377,12 +382,23 @@ class _Classifier:
         except DegenerateError:
             self.margins["the two-fold's normal form"] = 0.0
             return self.result("degenerate", "")
-        c = classify_two_fold(found.sigma, found.nu, tol=self.margin)
+        return self._two_fold_of(found.sigma, found.nu, found)
+
+    def _signs_and_ratios(self) -> tuple[tuple[int, int], tuple[float, float]]:
+        second = self.numbers.second
+        size = math.sqrt(abs(second["L11"] * second["L22"]))
+        sigma = (1 if second["L11"] > 0 else -1, 1 if second["L22"] > 0 else -1)
+        return sigma, (second["L12"] / size, -second["L21"] / size)
+
+    def _two_fold_of(
+        self, sigma: tuple[int, int], nu: tuple[float, float], found: TwoFold | None
+    ) -> LocalObject:
+        c = classify_two_fold(sigma, nu, tol=self.margin)
         undecided = any(not boundary.harmless for boundary in c.boundaries)
         if undecided or not c.nearest.startswith("nu"):
             self.margins[c.nearest or "no boundary"] = c.margin
-        self.evidence.update(nu1=found.nu[0], nu2=found.nu[1])
-        return self.result("two-fold", found.label, "", found)
+        self.evidence.update(nu1=nu[0], nu2=nu[1])
+        return self.result("two-fold", c.label, "", found)
 
     def _tangency(self, k: int) -> LocalObject:
         numbers, name = self.numbers, f"L{k + 1}{k + 1}"
@@ -422,7 +438,7 @@ class _Classifier:
         numbers = self.numbers
         l1, l2 = numbers.lie
         self.evidence["alpha"] = float(l1 / (l1 - l2))
-        if self.where.system.time_dependent:
+        if self.where.system.time_dependent or not np.all(np.isfinite(self.derivatives)):
             return self.result("sliding", region)
         speed = (l2 * numbers.fields[0] - l1 * numbers.fields[1]) / (l2 - l1)
         matrix, basis = sliding_matrix(numbers, self.derivatives)

@@ -124,7 +124,7 @@ def region(
         tol = positive(tol, "tol")
         return _region_of_set(law_at(system, point, parameters, t, surface, mode, tol), tol)
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    return region_of(on_surface(where, x, positive(tol, "tol")), tol)
+    return region_of(on_surface(where, x, positive(tol, "tol"), slopes=False), tol)
 
 
 def _is_set(system: FilippovSystem, surface: int) -> bool:
@@ -198,7 +198,7 @@ def alpha(
     0.75
     """
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    numbers = on_surface(where, x, positive(tol, "tol"))
+    numbers = on_surface(where, x, positive(tol, "tol"), slopes=False)
     found = region_of(numbers, tol)
     _refuse_crossing(numbers, found, "alpha")
     if found is Region.TWO_FOLD:
@@ -254,7 +254,7 @@ def sliding_field(
     array([1., 0.])
     """
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    numbers = on_surface(where, x, positive(tol, "tol"))
+    numbers = on_surface(where, x, positive(tol, "tol"), slopes=False)
     found = region_of(numbers, tol)
     _refuse_crossing(numbers, found, "sliding field")
     if found is Region.TWO_FOLD and not coincide(numbers, tol):

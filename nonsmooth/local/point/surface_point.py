@@ -199,10 +199,11 @@ class LocalSurface:
         lie = np.array([l1[0, 0], l2[0, 0]])
         return Numbers(x, float(h[0, 0]), g, np.array([f1, f2]), lie, np.array([g1, g2]))
 
-    def finite_at(self, x: Array) -> Numbers:
-        """Evaluate as ``at`` does and refuse NaN and inf."""
+    def finite_at(self, x: Array, slopes: bool = True) -> Numbers:
+        """Evaluate as ``at`` does and refuse NaN and inf, those of grad L1 and grad L2 if ``slopes``."""
         numbers = self.at(x)
-        if not all(np.all(np.isfinite(v)) for v in (numbers.h, numbers.fields, numbers.gradients)):
+        gradients = numbers.gradients if slopes else numbers.gradient
+        if not all(np.all(np.isfinite(v)) for v in (numbers.h, numbers.fields, gradients)):
             raise PointError(
                 f"point {x}: expected a state where the fields and the derivatives of h, L1 and "
                 f"L2 are finite, received h={numbers.h}, F1={numbers.fields[0]}, "
@@ -358,9 +359,9 @@ def _switches(system: FilippovSystem, x: Array, p: Array) -> Array:
     return np.array([v.item() for v in call(system.function(("local", "surfaces"), build), x, p)])
 
 
-def on_surface(where: LocalSurface, x: Array, tol: float) -> Numbers:
-    """Evaluate at a point whose distance from the surface is at most ``tol (1 + |x|)``."""
-    numbers = where.finite_at(x)
+def on_surface(where: LocalSurface, x: Array, tol: float, slopes: bool = True) -> Numbers:
+    """Evaluate as ``finite_at`` does at a point whose distance from the surface is at most ``tol (1 + |x|)``."""
+    numbers = where.finite_at(x, slopes)
     if not np.any(numbers.gradient):
         raise PointError(
             f"point {x}: expected a regular point of surface {where.surface}, received grad h = "

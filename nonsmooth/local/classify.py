@@ -21,6 +21,7 @@ from ..model import (
     FilippovSystem,
     Parameters,
     PointError,
+    call,
     layer_of,
     require_system,
 )
@@ -346,10 +347,44 @@ class _Classifier:
             slope = self.derivatives[k].T @ along + hessians[1 + k] @ numbers.fields[k]
             growth += float(slope @ tangent) / float(along @ tangent) / abs(second)
         self.evidence["growth"] = growth
+        shrinks = self._jumps()
+        if abs(shrinks - 1.0) > self.margin:
+            self.evidence["jumps"] = shrinks
+            return "stable" if shrinks < 1.0 else "unstable"
         speed = float(np.linalg.norm(numbers.fields[0]) * np.linalg.norm(numbers.gradient))
         if abs(growth) * speed < self.margin:
             return "neutral"
         return "stable" if growth < 0 else "unstable"
+
+    def _jumps(self) -> float:
+        """By what the resets on this surface multiply L in a turn round the point, which they keep."""
+        system, x = self.where.system, self.numbers.x
+        if not system.resets or not system.definition.plain:
+            return 1.0
+        d, first, ratio = system.definition, len(system.stops), 1.0
+        guards = [d.guards[first + k] for k in range(len(system.resets))]
+        maps = [d.maps[:, k] for k in range(len(system.resets))]
+        function = system.function(
+            ("jumps",),
+            lambda: [
+                *guards,
+                *map(system.gradient, guards),
+                *maps,
+                *(system.gradient(m[i]) for m in maps for i in range(self.n)),
+            ],
+        )
+        values, count = call(function, x, self.where.parameters), len(guards)
+        tangent = self.numbers.tangents[:, 0]
+        for k, (_, direction) in enumerate(system.resets):
+            gradient = values[count + k].ravel()
+            across = abs(float(gradient @ tangent)) > self.tol * float(np.linalg.norm(gradient))
+            kept = np.allclose(values[2 * count + k].ravel(), x, rtol=0.0, atol=self.tol)
+            if abs(float(values[k].item())) > self.tol or across or not kept:
+                continue
+            rows = values[3 * count + k * self.n : 3 * count + (k + 1) * self.n]
+            along = abs(float(tangent @ np.array([row.ravel() for row in rows]) @ tangent))
+            ratio *= along if direction else along**2
+        return ratio
 
     def _fold_fold(self) -> LocalObject:
         found = fold_fold_of(self.where, self.numbers, 1e-300)

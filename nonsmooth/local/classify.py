@@ -33,7 +33,7 @@ from .point.regions import region_of
 from .point.surface_point import FIELDS, SIDES, LocalSurface, Numbers, surface_at
 from .read_only import ReadOnly
 from .searches.boundary_equilibria import boundary_equilibrium_at
-from .searches.equilibria import equilibrium_distance, kind_of
+from .searches.equilibria import equilibrium_distance, kind_of, least_gap
 from .searches.find_two_fold import TwoFold, independence, two_fold
 from .searches.fold_folds import fold_fold_of
 from .searches.folds import Fold, bend, fold
@@ -166,6 +166,7 @@ def classify(
     if meeting is not None:
         return classify_intersection(meeting, tol, margin)
     where, x = surface_at(system, point, parameters, t, surface, mode, smooth=True)
+    where.require_open(x)
     if not where.mode:
         return _Classifier(where, where.at(x), tol, margin).smooth()
     require_linear(system, surface, "classify")
@@ -259,6 +260,8 @@ class _Classifier:
         )
 
     def _equilibrium(self, k: int, status: str) -> LocalObject:
+        if least_gap(self.where, self.numbers.x) < 0.0:
+            status = "virtual"
         eigenvalues = np.linalg.eigvals(self.derivatives[k])
         scale = float(np.max(np.abs(eigenvalues)))
         kind, hyperbolic = kind_of(eigenvalues, scale)

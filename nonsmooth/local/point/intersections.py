@@ -288,7 +288,7 @@ class Meeting:
         size = float(np.abs(m).max(initial=0.0))
         if not size or np.linalg.matrix_rank(m, tol=_NEUTRAL * size) == len(m):
             return None
-        lam = np.linalg.lstsq(m, -a, rcond=_NEUTRAL)[0]
+        lam = np.asarray(np.linalg.lstsq(m, -a, rcond=_NEUTRAL)[0], dtype=np.float64)
         holds = np.abs(a + m @ lam).max() <= _NEUTRAL * (size + np.abs(a).max())
         return self._with(lam) if holds else None
 

@@ -214,6 +214,28 @@ class LocalSurface:
             )
         return numbers
 
+    def require_open(self, x: Array) -> None:
+        """Refuse a point at which a contact is closed: its reaction is no function of the state alone."""
+        system = self.system
+        if not system.impacts:
+            return
+
+        def build() -> Sequence[Any]:
+            gaps = system.definition.gaps
+            modes = [self.side(letter) for letter in SIDES]
+            rates = [system.gradient(gap) @ system.field(modes[0]) for gap in gaps.elements()]
+            return [gaps, *rates]
+
+        gaps, *rates = evaluator(system, ("contacts", self.mode), build).copied(x, self.parameters)
+        near = TOLERANCE * (1 + float(np.linalg.norm(x)))
+        for name, gap, rate in zip(system.impacts, gaps.ravel(), rates, strict=True):
+            if abs(gap) <= near and abs(float(rate.item())) <= near:
+                raise PointError(
+                    f"point {x}: expected open contacts, received one at which {name!r} is closed. The "
+                    "multipliers of friction and the reactions of contacts are solved together: simulate "
+                    "follows them, and find_equilibrium(system, near, mode=...) finds rest."
+                )
+
     def many(self, x: Array) -> ManyNumbers:
         """Evaluate at points (k, N)."""
         function = self.system.function(("local", self.surface, self.mode), self._build)
@@ -361,6 +383,7 @@ def _switches(system: FilippovSystem, x: Array, p: Array) -> Array:
 
 def on_surface(where: LocalSurface, x: Array, tol: float, slopes: bool = True) -> Numbers:
     """Evaluate as ``finite_at`` does at a point whose distance from the surface is at most ``tol (1 + |x|)``."""
+    where.require_open(x)
     numbers = where.finite_at(x, slopes)
     if not np.any(numbers.gradient):
         raise PointError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -238,9 +239,9 @@ def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium
     else:
         signs = np.where(where.switches(x) > 0, "+", "-")
         status = "real" if "".join(signs) == mode else "virtual"
-    gap = float(_gaps(where, x).min(initial=np.inf))
-    if gap <= TOLERANCE * (1 + float(np.linalg.norm(x))) and status != "virtual":
-        status = "boundary" if gap >= -TOLERANCE * (1 + float(np.linalg.norm(x))) else "virtual"
+    gap, touching = least_gap(where, x), TOLERANCE * (1 + float(np.linalg.norm(x)))
+    if gap <= touching and status != "virtual":
+        status = "boundary" if gap >= -touching else "virtual"
     return Equilibrium(
         x,
         side,
@@ -256,10 +257,10 @@ def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium
     )
 
 
-def _gaps(where: LocalSurface, x: Array) -> Array:
-    """Of the contacts, at a point."""
+def least_gap(where: LocalSurface, x: Array) -> float:
+    """Of the contacts, at a point; inf without one."""
     system = where.system
     if not system.impacts:
-        return np.zeros(0)
+        return math.inf
     function = system.function(("gaps",), lambda: [system.definition.gaps])
-    return np.asarray(call(function, x, where.parameters)[0]).ravel()
+    return float(np.min(call(function, x, where.parameters)[0]))

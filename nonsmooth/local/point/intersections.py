@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -228,7 +229,7 @@ class Meeting:
 
     def intersection(self) -> Intersection:
         """Find all modes that can go on."""
-        candidates, complete = self._candidates()
+        candidates, complete = self._candidates
         slacks = [(self._slack(lam, mode), mode, lam) for mode, lam in candidates]
         going = [self._continuation(mode, lam, s) for s, mode, lam in slacks if s >= 0.0]
         whole = [c for c in going if all(c.mode[i] == "s" for i in self.surfaces)]
@@ -241,6 +242,7 @@ class Meeting:
             complete=complete,
         )
 
+    @cached_property
     def _candidates(self) -> tuple[list[tuple[str, Array]], bool]:
         """Modes with their multipliers, those outside [-1, 1] included; whether they are all."""
         k = len(self.surfaces)
@@ -374,7 +376,7 @@ class Meeting:
         from scipy.optimize import linprog
 
         rows = []
-        for mode, values in self._candidates()[0]:
+        for mode, values in self._candidates[0]:
             if all(mode[i] == "s" for i in self.surfaces) or np.abs(values).max() > 1.0 + _NEUTRAL:
                 continue
             terms = ((values - lam) * self.at(values).rates)[self.surfaces]

@@ -37,7 +37,7 @@ TASKS = {
         "Follow an orbit",
         "From a point and for a time: events, modes, dense output, and the reason why a run ended.",
         "nonsmooth",
-        "simulate Trajectory flow.Segments flow.Segment flow.Events flow.Event Status Section flow.follow flow.first_crossing flow.first_root load",
+        "simulate explore Trajectory flow.Segments flow.Segment flow.Events flow.Event Status Section flow.follow flow.first_crossing flow.first_root load",
     ),
     "many": _task(
         "Run many starts",

@@ -98,6 +98,7 @@ from .solvers import continuation
 
 if TYPE_CHECKING:
     from . import plot, proofs, textbook
+    from .plot.explorer import explore
     from .proofs import (
         certify,
         certify_orbit,
@@ -150,6 +151,7 @@ __all__ = [
     "continue_equilibrium",
     "continue_orbit",
     "ensemble",
+    "explore",
     "find_all",
     "find_boundary_equilibrium",
     "find_equilibrium",
@@ -189,6 +191,8 @@ def __getattr__(name: str) -> object:
 
     if name in ("plot", "proofs", "textbook"):
         return importlib.import_module(f".{name}", __name__)
+    if name == "explore":
+        return importlib.import_module(".plot.explorer", __name__).explore
     if name in _OF_PROOFS:
         return getattr(importlib.import_module(".proofs", __name__), name)
     raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}")

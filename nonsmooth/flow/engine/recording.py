@@ -69,6 +69,11 @@ def _layout(
     return places, used
 
 
+def written_arrays() -> dict[str, tuple[int, str]]:
+    """Bytes of a number of each array that the driver writes, and what there is one of for each entry."""
+    return {name: (8 if dtype is float else 4, kind) for name, (dtype, kind) in _ARRAYS.items()}
+
+
 class Output:
     """A block of memory for each of steps, points and events, which the driver fills."""
 

@@ -254,6 +254,21 @@ class TapeEngine:
     def _entries(self, e: Entries) -> ctypes.Structure:
         return structure("Entries")(len(e.row), 0, self._at(e.row), self._at(e.column))
 
+    @property
+    def motion_width(self) -> int:
+        """Numbers that a restart needs besides the state."""
+        return int(self._c.rules.width)
+
+    def blocks(self) -> tuple[ctypes.Structure, dict[int, NDArray[Any] | ctypes.Structure]]:
+        """The system as C reads it, with what implicit steps need, and what its addresses point to."""
+        self.add_implicit()
+        found: dict[int, NDArray[Any] | ctypes.Structure] = {}
+        for array in sorted(
+            self._kept, key=lambda a: a.nbytes
+        ):  # slices begin where the whole does
+            found[array.ctypes.data] = array
+        return self._c, found | {ctypes.addressof(self._implicit): self._implicit}
+
     # one trajectory ----------------------------------------------------------------------------
 
     def run(

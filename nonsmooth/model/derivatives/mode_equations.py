@@ -6,15 +6,13 @@ import casadi as ca
 
 from ..definition.system import FilippovSystem
 from ..errors import DefinitionError
+from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
 from ..laws.explicit import explicit
 
 
 def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
-    """(x, p) -> field, its derivative, functions that are kept at zero, theirs, and guards without events.
-
-    A closed contact keeps its gap and the gap's rate.
-    """
+    """(x, p) -> field, its derivative, functions that are kept at zero, theirs, and guards without events."""
 
     def build() -> Evaluator:
         of_mode, x = explicit(system, mode), system.extended_states
@@ -22,17 +20,18 @@ def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
             raise DefinitionError(
                 f"mode {mode!r}: its multipliers are no functions of the states, so that it has no field."
             )
-        d, letters = system.definition, system.parse_letters(mode)
-        every = ca.vertcat(d.open_surfaces, d.gaps)
+        letters = system.parse_letters(mode)
+        coupled, contacts = coupled_of(system), len(system.impacts)
+        every, lower = coupled.kept, system.surface_count + 2 * contacts
         kept = [i for i, s in enumerate(letters) if s == 0 and i not in system.algebraic]
+        kept += [i + contacts for i in kept if i >= system.surface_count]
+        kept += range(lower, every.numel())  # derivatives of joints
         guards = [
             k
             for k, guard in enumerate(of_mode.guards)
             if guard.kind in ("surface", "exit", "impact", "release")
         ]
-        field, functions = of_mode.field, of_mode.functions[guards]
-        gaps = every[[i for i in kept if i >= system.surface_count]]
-        h = ca.vertcat(every[kept], ca.jtimes(gaps, x, field))
+        field, h, functions = of_mode.field, every[kept], of_mode.functions[guards]
         rows = [field, ca.jacobian(field, x), h, ca.jacobian(h, x), functions]
         shapes = [ca.densify(e) if e.numel() else ca.SX(*e.shape) for e in rows]
         made = ca.Function("equations", [x, system.parameter_symbols], shapes, {"cse": True})

@@ -199,21 +199,3 @@ def test_a_root_whose_slope_is_infinite_on_the_surface_is_crossed_or_slides():
     assert ns.region(relay, [0.0, 0.1]) is Region.ATTRACTING
     assert (alpha(relay, [0.0, 0.1]), *sliding_field(relay, [0.0, 0.1])) == (0.5, 0.0, 1.0)
     assert ns.classify(relay, [0.0, 0.1]).label == "attracting sliding"
-
-
-def test_a_closed_contact_is_refused():
-    """Its reaction bounds the friction: the block sticks, though it would slip were the contact open."""
-    u, v, r, lam = (ca.SX.sym(s) for s in ("u", "v", "r", "lam"))
-    block = ns.FilippovSystem(
-        [x, y, u, v],
-        field=[u, v, 0.1 - 0.3 * lam * r, r - 1],
-        surfaces=[u],
-        multipliers=[lam],
-        impacts=ns.Impact(y, reaction=r, name="floor"),
-    )
-    assert ns.simulate(block, [0, 0, 0, 0], 1.0).itinerary == "sc"
-    for verb in (ns.region, ns.classify, ns.alpha):
-        with pytest.raises(ns.PointError, match="'floor' is closed"):
-            verb(block, [0.0, 0.0, 0.0, 0.0])
-    assert ns.region(block, [0.0, 0.1, 0.0, 0.0]) is Region.CROSSING_UP
-    assert ns.region(block, [0.0, 0.0, 0.0, -1.0]) is Region.CROSSING_UP  # before the impact

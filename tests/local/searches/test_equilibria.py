@@ -44,9 +44,8 @@ def test_an_equilibrium_behind_a_contact_is_virtual():
     free = find_equilibrium(spring, [0.0, 0.0])
     assert (free.point.round(12).tolist(), free.status) == ([-1.0, 0.0], "virtual")
     assert str(free).startswith("virtual stable focus")
-    assert ns.classify(spring, free.point).label == "virtual stable focus"
-    with pytest.raises(ns.PointError, match="'floor' is closed"):
-        ns.classify(spring, [0.0, 0.0])
+    with pytest.raises(ns.PointError, match="the gap of the contact 'floor' is -1"):
+        ns.classify(spring, free.point)
     away = ns.FilippovSystem([X, Y], field=[Y, 1 - X - 0.1 * Y], impacts=ns.Impact(X))
     assert find_equilibrium(away, [0.0, 0.0]).status == "real"
     touching = ns.FilippovSystem([X, Y], field=[Y, -X - 0.1 * Y], impacts=ns.Impact(X))

@@ -382,15 +382,17 @@ def surface_at(
     smooth: bool = False,
     tol: float = 1e-9,
     search: bool = False,
+    flight: bool = False,
 ) -> tuple[LocalSurface, Array]:
     """Check the arguments of a function at a point; ``smooth`` allows a point on no surface, or a system without.
 
-    The point of a ``search`` is near the surface, and ``mode`` has the letters of conditions and contacts.
+    The point of a ``search`` is near the surface, and ``mode`` has the letters of conditions and contacts. In a
+    ``flight`` contacts are open, wherever the point is.
     """
     require_system(system, complementarity=True, joints=True)
     x = system.extended_point(point, t)
     p = system.parameter_vector(parameters)
-    if acts(system, x, p, mode, tol):
+    if not flight and acts(system, x, p, mode, tol):
         if search:
             found = chosen(system, surface, mode)
         else:

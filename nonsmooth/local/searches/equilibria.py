@@ -132,7 +132,8 @@ def find_equilibrium(
     ----------
     system, parameters, surface, mode
         As in :func:`region`; the point need not be on the surface. A smooth system has none. With complementarity
-        conditions, constraints or closed contacts ``mode`` has all letters, also those of what slides or is closed.
+        conditions, constraints or closed contacts ``mode`` has all letters, also those of what slides or is closed;
+        without the letters of contacts these are open.
     near : array_like (n,)
         Where the search starts.
     side : {"+", "-"}
@@ -174,7 +175,9 @@ def find_equilibrium(
     if isinstance(system, FilippovSystem) and _needs_mode(system, mode):
         return _of_mode(system, near, mode, parameters, tol, max_iterations)
     require_autonomous(system, "equilibrium")
-    where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True)
+    if system.impacts and mode is not None:
+        mode = mode[: len(system.entries)] or None  # the contacts are open
+    where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True, flight=True)
     if not system.surface_count and side != "+":
         raise OptionError(
             f"side: expected '+', as a smooth system has one field, received {side!r}. Leave it out."

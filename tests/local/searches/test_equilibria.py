@@ -43,7 +43,8 @@ def test_an_equilibrium_behind_a_contact_is_virtual():
     )
     free = find_equilibrium(spring, [0.0, 0.0])
     assert (free.point.round(12).tolist(), free.status) == ([-1.0, 0.0], "virtual")
-    assert str(free).startswith("virtual stable focus")
+    assert str(free).startswith("virtual stable focus at")
+    assert find_equilibrium(spring, [0.0, 0.0], mode="o").status == "virtual"
     with pytest.raises(ns.PointError, match="the gap of the contact 'floor' is -1"):
         ns.classify(spring, free.point)
     away = ns.FilippovSystem([X, Y], field=[Y, 1 - X - 0.1 * Y], impacts=ns.Impact(X))
@@ -68,6 +69,8 @@ def test_rest_on_a_contact_and_on_friction():
         multipliers=[lam],
         impacts=floor,
     )
+    with pytest.raises(ns.ConvergenceError, match="equilibrium of F1"):
+        find_equilibrium(held, [0.8, 0.0, 0.0, 0.0])  # it falls
     found = find_equilibrium(held, [0.8, 0.1, 0.0, 0.0], mode="sc")
     assert found.point.round(12).tolist() == [0.8, 0.0, 0.0, 0.0] and found.status == "real"
     assert find_equilibrium(held, [0.5, 0.0, 0.0, 0.0], mode="sc").status == "virtual"

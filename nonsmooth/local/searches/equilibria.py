@@ -38,7 +38,8 @@ class Equilibrium:
     side : {"+", "-"}
         Of the field $F1$ above the surface or $F2$ below it; ``"+"`` for a smooth system.
     status : {"real", "virtual", "boundary"}
-        Whether it is on its field's own side, on the other side of a surface, or on the surface.
+        Whether it is on its field's own side, on the other side of a surface, or on the surface. Also virtual where a
+        stop or reset of the discrete state is due at once.
     kind : str
         ``"stable node"``, ``"unstable focus"``, ``"saddle"``, ...; ``"degenerate"`` if an
         eigenvalue has no real part.

@@ -28,7 +28,7 @@ from ..discrete_states import with_discrete_states_held
 from ..point.intersections import Meeting
 from ..point.regions import Region, region_of
 from ..point.surface_point import TOLERANCE, LocalSurface, Numbers, surface_at
-from .equilibria import by_real_part, kind_of
+from .equilibria import Equilibrium, by_real_part, kind_of
 from .search import Found, search
 
 
@@ -236,6 +236,27 @@ def pseudo_equilibrium_at(where: LocalSurface, found: Found) -> PseudoEquilibriu
         iterations=found.iterations,
         mode=where.mode,
         multipliers=np.array([1.0 - 2.0 * alpha]),
+    )
+
+
+def closed_equilibrium(found: Equilibrium) -> PseudoEquilibrium:
+    """The same of a condition that rests while it is closed: a zero of the limit of sliding."""
+    nothing = found.eigenvalues.size == 0
+    kind = "stable pseudo-node" if nothing else pseudo_kind(found.kind, Region.ATTRACTING)
+    return PseudoEquilibrium(
+        point=found.point,
+        alpha=float("nan"),
+        status="real" if found.status == "real" else "virtual",
+        region=Region.ATTRACTING,
+        kind=kind,
+        eigenvalues=found.eigenvalues,
+        stable=kind.startswith("stable"),
+        margin=found.margin,
+        distance=found.distance,
+        residual=found.residual,
+        iterations=found.iterations,
+        mode=found.mode,
+        multipliers=np.array([found.h]),
     )
 
 

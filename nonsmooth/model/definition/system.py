@@ -290,7 +290,8 @@ class FilippovSystem:
         """Hold the discrete states at values: the system between two events, without stops and resets.
 
         Functions of a point, such as :func:`classify` and :func:`find_equilibrium`, do this themselves, with
-        the values in the point. Portraits, two-folds and manifolds take the system that this returns.
+        the values in the point. Portraits do it for each value; two-folds and manifolds take the system that this
+        returns.
 
         Parameters
         ----------

@@ -52,7 +52,7 @@ const Pictures = (() => {
   /** The plane of a system with one or two states, and the projection of one with more. */
   class Portrait {
     constructor(element, engine, given, modes, redraw) {
-      const margin = isPhone() ? [8, 8, 40, 46] : [10, 12, 42, 54];
+      const margin = isPhone() ? [8, 8, 40, 52] : [10, 12, 42, 62];
       const { dimension } = engine.system;
       const aspect = dimension === 1 ? 0.3 : isPhone() ? 0.74 : 0.54;
       Object.assign(this, { engine, given, modes, dimension });
@@ -69,7 +69,13 @@ const Pictures = (() => {
       this.view = view;
       this.plane.limits(...state.limits);
       this.drawOrbit(pieces);
-      const shown = JSON.stringify([state.p, state.limits, state.flow, view.turn, this.plane.width]);
+      const shown = JSON.stringify([
+        state.p,
+        state.limits,
+        state.flow,
+        view.turn,
+        this.plane.width,
+      ]);
       if (shown !== this.shown) {
         this.shown = shown;
         for (const name of ["surface", "marks", "flow"]) this.layers[name].replaceChildren();
@@ -85,7 +91,10 @@ const Pictures = (() => {
       const { states } = this.engine.system;
       if (view.flat) {
         plane.ticks(states[0], states[1] ?? "");
-        if (!states[1]) plane.axes.querySelectorAll("text[text-anchor=end], path[d$=h5]").forEach((e) => e.remove());
+        if (!states[1])
+          plane.axes
+            .querySelectorAll("text[text-anchor=end], path[d$=h5]")
+            .forEach((e) => e.remove());
         return;
       }
       const ends = [0, 1, 2].map((i) => {
@@ -105,16 +114,34 @@ const Pictures = (() => {
 
     drawOrbit(pieces) {
       const { plane, view, modes } = this;
-      const paths = pieces.map(({ x }) => drawn(plane, x.map((one) => view.at(one))));
+      const paths = pieces.map(({ x }) =>
+        drawn(
+          plane,
+          x.map((one) => view.at(one)),
+        ),
+      );
       const parts = [svg("path", { d: paths.join(""), class: "casing" })];
       const jumps = pieces.filter(({ from }) => from).map(({ from, x }) => [from, x[0]]);
-      const jump = jumps.map((pair) => drawn(plane, pair.map((one) => view.at(one)))).join("");
+      const jump = jumps
+        .map((pair) =>
+          drawn(
+            plane,
+            pair.map((one) => view.at(one)),
+          ),
+        )
+        .join("");
       if (jump) parts.push(svg("path", { d: jump, class: "jump" }));
-      const lines = byClass([...pieces.keys()], (k) => modes.of(pieces[k].mode), (k) => paths[k]);
+      const lines = byClass(
+        [...pieces.keys()],
+        (k) => modes.of(pieces[k].mode),
+        (k) => paths[k],
+      );
       for (const [name, d] of lines) parts.push(svg("path", { d, class: `orbit ${name}` }));
       if (pieces.length === 1 && pieces[0].x.length === 1) {
         const [x, y] = plane.at(view.at(pieces[0].x[0]));
-        parts.push(svg("circle", { cx: x, cy: y, r: 5, class: `orbit ${modes.of(pieces[0].mode)}` }));
+        parts.push(
+          svg("circle", { cx: x, cy: y, r: 5, class: `orbit ${modes.of(pieces[0].mode)}` }),
+        );
       }
       this.layers.orbit.replaceChildren(...parts);
     }
@@ -131,7 +158,15 @@ const Pictures = (() => {
         for (let k = 0; k < 400; k++) {
           if (h(k) > 0 === h(k + 1) > 0) continue;
           const zero = at[k] + ((at[k + 1] - at[k]) * h(k)) / (h(k) - h(k + 1));
-          this.layers.surface.append(plane.path([[zero, -1], [zero, 1]], { class: "line" }));
+          this.layers.surface.append(
+            plane.path(
+              [
+                [zero, -1],
+                [zero, 1],
+              ],
+              { class: "line" },
+            ),
+          );
         }
       }
     }
@@ -142,13 +177,16 @@ const Pictures = (() => {
       const box = state.limits.flat();
       if (given.scan) {
         const { lines, marks } = Scan.planar(engine, state.p, box, given.slides);
+        this.names = [];
         this.drawStretches(lines);
         this.layers.marks.append(...marks.flatMap((mark) => this.marked(mark)));
       } else if (engine.system.n === engine.system.dimension) {
         for (let i = 0; i < engine.width; i++) {
           const cut = new Scan.Plane(engine, state.p, box, (x) => x, i);
           const lines = Scan.zeroLines((points) => cut.heights(points), box, 40);
-          this.layers.surface.append(svg("path", { d: lines.map((l) => drawn(plane, l)).join(""), class: "line" }));
+          this.layers.surface.append(
+            svg("path", { d: lines.map((l) => drawn(plane, l)).join(""), class: "line" }),
+          );
         }
       }
     }
@@ -156,7 +194,11 @@ const Pictures = (() => {
     drawStretches(lines) {
       const { plane } = this;
       for (const look of ["band", "line"]) {
-        for (const [kind, d] of byClass(lines, ({ kind }) => kind, ({ line }) => drawn(plane, line))) {
+        for (const [kind, d] of byClass(
+          lines,
+          ({ kind }) => kind,
+          ({ line }) => drawn(plane, line),
+        )) {
           this.layers.surface.append(svg("path", { d, class: `${look} ${kind}` }));
         }
       }
@@ -173,7 +215,8 @@ const Pictures = (() => {
       const folds = [];
       for (let k = 0; k < 9; k++) {
         const level = view.middle(w) + view.half(w) * (k / 4 - 1);
-        const embed = (point) => rest.map((own, i) => (i === u ? point[0] : i === v ? point[1] : i === w ? level : own));
+        const embed = (point) =>
+          rest.map((own, i) => (i === u ? point[0] : i === v ? point[1] : i === w ? level : own));
         const cut = Scan.surface(new Scan.Plane(engine, state.p, box, embed), 16);
         const seen = (one) => view.at(embed(one.x));
         for (const { kind, line } of cut.stretches) {
@@ -181,10 +224,13 @@ const Pictures = (() => {
         }
         folds.push(...cut.folds.map((one) => [one.fold, seen(one)]));
       }
-      for (const [kind, d] of found) this.layers.surface.append(svg("path", { d, class: `cut ${kind}` }));
+      for (const [kind, d] of found)
+        this.layers.surface.append(svg("path", { d, class: `cut ${kind}` }));
       for (const [side, point] of folds) {
         const [x, y] = plane.at(point);
-        this.layers.surface.append(svg("circle", { cx: x, cy: y, r: 2, class: side > 0 ? "fold above" : "fold below" }));
+        this.layers.surface.append(
+          svg("circle", { cx: x, cy: y, r: 2, class: side > 0 ? "fold above" : "fold below" }),
+        );
       }
     }
 
@@ -196,17 +242,42 @@ const Pictures = (() => {
       const isSolid = /^(stable|visible)/.test(kind);
       const shapes = {
         fold: () => svg("path", { d: `M${x} ${y - r}l${r} ${r}l${-r} ${r}l${-r} ${-r}Z` }),
-        pseudo: () => svg("rect", { x: x - r + 1, y: y - r + 1, width: 2 * r - 2, height: 2 * r - 2 }),
+        pseudo: () =>
+          svg("rect", { x: x - r + 1, y: y - r + 1, width: 2 * r - 2, height: 2 * r - 2 }),
         equilibrium: () => svg("circle", { cx: x, cy: y, r: r - 0.5 }),
       };
       const shape = shapes[type]();
       shape.setAttribute("class", `mark ${isSolid ? "solid" : ""}`);
       shape.append(svg("title", {}, `${kind} at (${text(point[0], 6)}, ${text(point[1], 6)})`));
-      if (plane.width < 480) return [shape];
-      const right = x > plane.box.left + plane.box.width - 120;
-      const low = y < plane.box.top + 20;
-      const place = { x: x + (right ? -10 : 10), y: low ? y + 17 : y - 8, "text-anchor": right ? "end" : "start" };
-      return [shape, svg("text", { ...place, class: "mark-name" }, kind)];
+      return [shape, ...(plane.width < 480 ? [] : this.named(x, y, kind))];
+    }
+
+    /** A name beside a point, where no other name is; none where there is no room. */
+    named(x, y, words) {
+      const { left, top, width, height } = this.plane.box;
+      const size = { width: 6.4 * words.length, height: 14 };
+      const sides = [
+        [10, -8],
+        [10, 17],
+        [-10, -8],
+        [-10, 17],
+      ];
+      const boxes = sides.map(([dx, dy]) => ({
+        ...{ x: dx > 0 ? x + dx : x + dx - size.width, y: y + dy - 11, ...size },
+        ...{ at: { x: x + dx, y: y + dy, "text-anchor": dx > 0 ? "start" : "end" } },
+      }));
+      const meets = (one, other) =>
+        Math.abs(one.x - other.x + (one.width - other.width) / 2) < (one.width + other.width) / 2 &&
+        Math.abs(one.y - other.y) < 14;
+      const fits = (one) =>
+        one.x > left &&
+        one.x + one.width < left + width &&
+        one.y > top &&
+        one.y + 14 < top + height;
+      const free = boxes.find((one) => fits(one) && !this.names.some((other) => meets(one, other)));
+      if (!free) return [];
+      this.names.push(free);
+      return [svg("text", { ...free.at, class: "mark-name" }, words)];
     }
 
     /** Short orbits from starts all over the plane. */
@@ -219,19 +290,40 @@ const Pictures = (() => {
       const paths = new Map();
       for (let j = 0; j < rows; j++) {
         for (let i = 0; i < columns; i++) {
-          const x = [a + ((i + (j % 2 ? 0.75 : 0.25)) / columns) * (b - a), c + ((j + 0.5) / rows) * (d - c)];
-          const options = { tEnd: this.timeOf(x, state, longest), tol: 1e-6, steps: 60, events: 12 };
+          const x = [
+            a + ((i + (j % 2 ? 0.75 : 0.25)) / columns) * (b - a),
+            c + ((j + 0.5) / rows) * (d - c),
+          ];
+          const options = {
+            tEnd: this.timeOf(x, state, longest),
+            tol: 1e-6,
+            steps: 60,
+            events: 12,
+          };
           const run = engine.simulate(x, state.p, options);
           const pieces = Orbit.pieces(run, engine.system, { seen, dense: 120, longest });
-          for (const [name, d] of byClass(pieces, (own) => modes.of(own.mode), (own) => drawn(plane, own.x))) {
+          for (const [name, d] of byClass(
+            pieces,
+            (own) => modes.of(own.mode),
+            (own) => drawn(plane, own.x),
+          )) {
             paths.set(name, (paths.get(name) ?? "") + d);
           }
           const { x: points, mode } = pieces.at(-1);
           const head = { class: `head-of-flow ${modes.of(mode)}` };
-          if (points.length > 2) this.layers.flow.append(plane.arrow(points.map((one) => view.at(one)), 1, head, 3.6));
+          if (points.length > 2)
+            this.layers.flow.append(
+              plane.arrow(
+                points.map((one) => view.at(one)),
+                1,
+                head,
+                3.6,
+              ),
+            );
         }
       }
-      for (const [name, d] of paths) this.layers.flow.prepend(svg("path", { d, class: `flow ${name}` }));
+      for (const [name, d] of paths)
+        this.layers.flow.prepend(svg("path", { d, class: `flow ${name}` }));
     }
 
     /** Time in which an orbit may come as far as it is drawn. */
@@ -253,9 +345,15 @@ const Pictures = (() => {
 
     /** `sizes` are those of the states. */
     constructor(element, system, sizes, modes, redraw) {
-      const margin = isPhone() ? [6, 8, 40, 46] : [6, 12, 42, 54];
+      const margin = isPhone() ? [6, 8, 40, 52] : [6, 12, 42, 62];
       Object.assign(this, { system, sizes, modes });
-      this.plane = new Plane(element, { x: [0, 1], y: [0, 1], aspect: isPhone() ? 0.5 : 0.33, margin, redraw });
+      this.plane = new Plane(element, {
+        x: [0, 1],
+        y: [0, 1],
+        aspect: isPhone() ? 0.5 : 0.33,
+        margin,
+        redraw,
+      });
       this.cursor = svg("path", { class: "cursor", visibility: "hidden" });
       this.plane.over.append(this.cursor);
     }
@@ -267,13 +365,30 @@ const Pictures = (() => {
       plane.limits([0, end], [0, 1]);
       const slid = pieces.filter(({ mode }) => /^[^,]*[s*]/.test(mode));
       const parts = slid.map(({ t }) =>
-        plane.polygon([[t[0], 0], [t.at(-1), 0], [t.at(-1), 1], [t[0], 1]], { class: "slid" }),
+        plane.polygon(
+          [
+            [t[0], 0],
+            [t.at(-1), 0],
+            [t.at(-1), 1],
+            [t[0], 1],
+          ],
+          { class: "slid" },
+        ),
       );
       const labels = [];
       for (let i = 0; i < rows; i++) {
         const { paths, low, high, top, bottom } = this.strip(pieces, i, rows, end);
         for (const [name, d] of paths) parts.push(svg("path", { d, class: `orbit thin ${name}` }));
-        if (i) parts.push(plane.path([[0, 1 - i / rows], [end, 1 - i / rows]], { class: "zero" }));
+        if (i)
+          parts.push(
+            plane.path(
+              [
+                [0, 1 - i / rows],
+                [end, 1 - i / rows],
+              ],
+              { class: "zero" },
+            ),
+          );
         const [left, upper] = plane.at([0, top]);
         const [, lower] = plane.at([0, bottom]);
         const side = { "text-anchor": "end" };
@@ -311,16 +426,28 @@ const Pictures = (() => {
         }
         return drawn(plane, points);
       };
-      return { paths: byClass(pieces, ({ mode }) => modes.of(mode), curve), low, high, top, bottom };
+      return {
+        paths: byClass(pieces, ({ mode }) => modes.of(mode), curve),
+        low,
+        high,
+        top,
+        bottom,
+      };
     }
   }
 
   /** Points of a sweep on a canvas behind a frame with axes. */
   class Cloud {
     constructor(element, canvas, redraw) {
-      const margin = isPhone() ? [8, 8, 40, 46] : [8, 12, 42, 54];
+      const margin = isPhone() ? [8, 8, 40, 52] : [8, 12, 42, 62];
       Object.assign(this, { canvas, lists: [] });
-      this.plane = new Plane(element, { x: [0, 1], y: [0, 1], aspect: isPhone() ? 0.62 : 0.46, margin, redraw });
+      this.plane = new Plane(element, {
+        x: [0, 1],
+        y: [0, 1],
+        aspect: isPhone() ? 0.62 : 0.46,
+        margin,
+        redraw,
+      });
     }
 
     /** `usual` is the range of the state in the portrait; the cloud reaches ten times as far at most. */
@@ -331,13 +458,16 @@ const Pictures = (() => {
 
     add(points) {
       this.lists.push(points);
-      if (Math.log2(this.lists.length) % 1 === 0) this.draw(); // limits that fit, ever less often
+      if (Math.log2(this.lists.length) % 1 === 0)
+        this.draw(); // limits that fit, ever less often
       else this.paint(points);
     }
 
     /** Limits of nearly all states: few that leave do not flatten the others. */
     limits() {
-      const all = Float64Array.from(this.lists.flatMap((list) => list.filter((_, k) => k % 2))).sort();
+      const all = Float64Array.from(
+        this.lists.flatMap((list) => list.filter((_, k) => k % 2)),
+      ).sort();
       const [a, b] = this.usual;
       if (!all.length) return this.usual;
       const least = Math.max(all[Math.floor(0.02 * all.length)], a - 10 * (b - a));
@@ -380,14 +510,18 @@ const Pictures = (() => {
       const { plane } = this;
       this.value = value;
       if (value === undefined) return;
-      const line = [[value, plane.y[0]], [value, plane.y[1]]];
+      const line = [
+        [value, plane.y[0]],
+        [value, plane.y[1]],
+      ];
       plane.layer.replaceChildren(plane.path(line, { class: "present" }));
     }
   }
 
   /** The key of modes that are seen, and of sliding. */
   function key(list, names) {
-    const swatch = (look) => svg("svg", { viewBox: "0 0 34 14" }, svg("path", { d: "M2 7H32", class: look }));
+    const swatch = (look) =>
+      svg("svg", { viewBox: "0 0 34 14" }, svg("path", { d: "M2 7H32", class: look }));
     list.replaceChildren(...names.map(([look, words]) => html("li", {}, swatch(look), words)));
   }
 

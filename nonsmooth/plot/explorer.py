@@ -18,7 +18,9 @@ from ..local.searches.find_two_fold import TwoFold
 from ..model import Array, FilippovSystem, OptionError, ParameterError, raised_of, require_system
 from .offline_page import WEB, installed_version, offline_page
 
-_SCRIPTS = ("scan.js", "orbit.js", "sweep.js", "pictures.js", "explore.js")
+_SCRIPTS = tuple(
+    f"{name}.js" for name in "scan orbit sweep pictures portrait saving explore".split()
+)
 #: Share of the range of a run that is left free beside it.
 _MARGIN = 0.2
 #: Of a two-fold: how far from it the page reaches at first.

@@ -94,7 +94,7 @@
   const modes = new Pictures.Modes();
   const sizes = view.pairs.map(([low, high]) => high - low);
   const redraw = () => update();
-  const portrait = new Pictures.Portrait($("plane"), engine, given, modes, redraw);
+  const portrait = new Portrait($("plane"), engine, given, modes, redraw);
   const series = new Pictures.Series($("series"), system, sizes, modes, redraw);
   const cloud = new Pictures.Cloud($("sweep"), $("cloud"), () => {
     cloud.draw();
@@ -384,20 +384,6 @@
     }, 2500);
   }
 
-  async function copy(words, name) {
-    try {
-      await navigator.clipboard.writeText(words);
-      say(`${name} copied.`);
-    } catch {
-      const area = html("textarea"); // a page from a file may have no clipboard
-      area.value = words;
-      document.body.append(area);
-      area.select();
-      say(document.execCommand("copy") ? `${name} copied.` : "The browser refuses to copy.");
-      area.remove();
-    }
-  }
-
   function python() {
     const values = given.sliders.map(({ name }, k) => `"${name}": ${short(state.p[k])}`).join(", ");
     const parameters = values && `, parameters={${values}}`;
@@ -405,43 +391,12 @@
     return `run = nonsmooth.simulate(system, [${start}], t_end=${short(state.t)}${parameters})\nprint(run)\n`;
   }
 
-  /** The style sheets of the page as they are for an SVG file, with colours in place of variables. */
-  function styles() {
-    const own = getComputedStyle(document.documentElement);
-    const sheet = [...document.querySelectorAll("style")].map((e) => e.textContent).join("\n");
-    const rules = sheet.match(/(^|\n)\s*(svg|\.mode-)[^{}]*\{[^{}]*\}/g).join("\n");
-    return rules.replace(/var\((--[\w-]+)\)/g, (_, name) => own.getPropertyValue(name).trim());
-  }
-
-  function picture() {
-    const shown = [portrait.plane, series.plane];
-    const gap = 8;
-    const width = Math.max(...shown.map((plane) => plane.width));
-    const height = shown[0].height + gap + shown[1].height;
-    const copies = shown.map((plane, k) => {
-      const element = plane.element.cloneNode(true);
-      element.querySelectorAll(".grip").forEach((e) => e.remove());
-      const size = { width: plane.width, height: plane.height, y: k ? shown[0].height + gap : 0 };
-      for (const [name, value] of Object.entries(size)) element.setAttribute(name, value);
-      element.removeAttribute("class");
-      return element;
-    });
-    const ground = getComputedStyle(document.documentElement).getPropertyValue("--ground").trim();
-    const frame = {
-      xmlns: "http://www.w3.org/2000/svg",
-      viewBox: `0 0 ${width} ${height}`,
-      width,
-      height,
-    };
-    const style = svg("style", {}, `${styles()}\nsvg { font: 13px sans-serif; }`);
-    const whole = svg("svg", frame, style, svg("rect", { width, height, fill: ground }), ...copies);
-    return new XMLSerializer().serializeToString(whole);
-  }
-
-  $("link").addEventListener("click", () => copy(location.href, "Link"));
-  $("python").addEventListener("click", () => copy(python(), "Python"));
+  $("link").addEventListener("click", () => Saving.copy(location.href, "Link").then(say));
+  $("python").addEventListener("click", () => Saving.copy(python(), "Python").then(say));
   $("save").addEventListener("click", () => {
-    const href = URL.createObjectURL(new Blob([picture()], { type: "image/svg+xml" }));
+    const href = URL.createObjectURL(
+      new Blob([Saving.picture([portrait.plane, series.plane])], { type: "image/svg+xml" }),
+    );
     html("a", { href, download: "orbit.svg" }).click();
     say("orbit.svg saved.");
   });

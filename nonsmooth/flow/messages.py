@@ -148,6 +148,11 @@ def surface_not_finite() -> str:
     return "A switching function is not finite."
 
 
+def out_of_table(argument: str, t: float) -> str:
+    """The argument of a table left its range."""
+    return f"The argument {argument} of a table left its range at t = {t:.10g}, and outside='error' has no value there."
+
+
 def reset_not_finite(name: str, t: float) -> str:
     """The map of a reset is not finite."""
     return f"The map of reset {name!r} at t = {t:.10g}."

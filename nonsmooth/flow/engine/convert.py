@@ -271,6 +271,9 @@ _SENTENCES: dict[str, Callable[[FilippovSystem, Options, Run], str]] = {
     "discrete_value": lambda s, o, run: messages.discrete_value(s.resets[run.where][0], _end(run)),
     "reset_map": lambda s, o, run: messages.reset_not_finite(s.resets[run.where][0], _end(run)),
     "surface": lambda s, o, run: messages.surface_not_finite(),
+    "out_of_table": lambda s, o, run: messages.out_of_table(
+        str(s.written.surfaces[run.where]), _end(run)
+    ),
 }
 
 

@@ -71,6 +71,15 @@ def flow_for(
     return end
 
 
+def first_terms(field: GuardedField, y: Array, p: Array, order: int = 3) -> tuple[Array, Array]:
+    """First coefficients of states (N + k, order + 1) and guards (g, order + 1) of a mode from a state."""
+    program = program_of(field)
+    if order > program.order:
+        program = made_program(field, order)
+    terms = program.terms(y, p)[:, : order + 1]
+    return terms[: len(y)], terms[len(y) :]
+
+
 #: Programs of the interpreter for fields and expressions, as long as these live.
 _PROGRAMS: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 
@@ -78,13 +87,16 @@ _PROGRAMS: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 def program_of(field: SmoothField) -> SmoothProgram:
     """Program of a smooth field for the interpreter, made once."""
     made: SmoothProgram | None = _PROGRAMS.get(field)
-    if made is None:
-        group = np.full(field.entries, -1, np.int32)
-        for k, entries in enumerate(field.groups):
-            group[entries] = k
-        of_columns = field.derivatives, field.by_start, field.columns
-        made = _PROGRAMS.setdefault(field, SmoothProgram(field.series, group, ORDER, *of_columns))
-    return made
+    return made or _PROGRAMS.setdefault(field, made_program(field, ORDER))
+
+
+def made_program(field: SmoothField, order: int) -> SmoothProgram:
+    """Make the program of a smooth field at an order."""
+    group = np.full(field.entries, -1, np.int32)
+    for k, entries in enumerate(field.groups):
+        group[entries] = k
+    of_columns = field.derivatives, field.by_start, field.columns
+    return SmoothProgram(field.series, group, order, *of_columns)
 
 
 class Evaluated(Protocol):
@@ -123,18 +135,6 @@ def stuck(duration: float, left: float, z: Array) -> ConvergenceError:
     )
 
 
-def watched(field: GuardedField, y: Array, p: Array, duration: float, margin: float) -> Array:
-    """Extrema and values of the guards of a mode along its flow: rows (guard, t, h, h'', state)."""
-    # The values are at the end of every step, and by the margin beside the start and the end.
-    if not field.motion.guards:
-        return np.zeros((0, 4 + len(y)))
-    program = program_of(field)
-    found, end, left = program.watch(y, p, duration, TOLERANCE, MOST_STEPS, margin)
-    if left:
-        raise stuck(duration, left, end)
-    return found
-
-
 class LegsWatch:
     """Extrema and values of guards along many legs; those of no positive duration are left out."""
 
@@ -148,10 +148,11 @@ class LegsWatch:
     def __call__(
         self, starts: Sequence[Array], p: Array, durations: Array, ends: float
     ) -> tuple[list[Array], list[Array], list[Array]]:
-        """Rows of ``watched``, start series and end values of the guards, by leg."""
+        """Rows (guard, t, h, h'', state), start series and end values of the guards, by leg."""
+        # Values, with h'' = 0, are at the end of every step, and by the part ``ends`` beside the start and the end.
         found = self._program(starts, p, durations, TOLERANCE, MOST_STEPS, ends)
         if found.failed >= 0:
-            raise stuck(float(durations[found.failed]), found.left, starts[found.failed])
+            raise stuck(float(durations[found.failed]), found.left, found.rows[0])
         return found.rows, found.begins, found.values
 
 

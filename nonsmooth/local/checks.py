@@ -17,9 +17,9 @@ def require_surface(system: FilippovSystem) -> None:
         )
 
 
-def require_autonomous(system: FilippovSystem, what: str, complementarity: bool = False) -> None:
-    """Refuse explicit time; a flag allows complementarity conditions."""
-    require_system(system, complementarity=complementarity)
+def require_autonomous(system: FilippovSystem, what: str, elements: bool = False) -> None:
+    """Refuse explicit time; a flag allows complementarity conditions and constraints."""
+    require_system(system, complementarity=elements, joints=elements)
     if system.time_dependent:
         raise DefinitionError(
             f"{what}: expected a system without explicit time, received one that depends on "

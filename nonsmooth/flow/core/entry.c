@@ -161,9 +161,6 @@ static size_t place_run(Run *r, char *base) {
 
 /* Entry points --------------------------------------------------------------------------------- */
 
-int64_t system_size(void) { return sizeof(System); }
-int64_t output_size(void) { return sizeof(Output); }
-
 double polynomial_root(const double *c, int32_t n, double h) { return first_root(c, n, h); }
 double polynomial_crossing(const double *c, int32_t n, double h, int32_t direction) {
   return first_crossing(c, n, h, direction);

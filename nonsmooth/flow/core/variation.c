@@ -383,7 +383,6 @@ static int carry(Run *r, Leg *l, Columns *c) {
   return LEG_STUCK;
 }
 
-int64_t leg_size(void) { return sizeof(Leg); }
 
 /* Carry state and columns of a leg to its end: LEG_DONE, or why not. */
 int32_t carry_columns(Run *r, Leg *l) {

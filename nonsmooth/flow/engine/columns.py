@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...model import Array, FilippovSystem
 from ..constants import GUARDS
-from .arrays import address, require_size
+from .arrays import address
+from .structures import structure
 from .tape import TapeEngine, library
-
-_I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
 #: Why a leg does not reach its end.
 DONE, STUCK, NOT_UNIQUE = range(3)
@@ -23,17 +22,6 @@ LEAVING = 4
 
 
 _ARRAYS = ("p", "dp", "letter", "x", "y", "start_rate", "end_rate", "gradient")
-
-
-class _Leg(ctypes.Structure):
-    _fields_ = [
-        *[(name, _I32) for name in ("columns", "hit", "kind", "index", "side", "pad")],
-        ("duration", _D),
-        ("tol", _D),
-        ("left", _D),
-        ("most_steps", _I64),
-        *[(name, _POINTER) for name in _ARRAYS],
-    ]
 
 
 class EndOfLeg(NamedTuple):
@@ -64,8 +52,6 @@ class ColumnsEngine(TapeEngine):
 
     def __init__(self, system: FilippovSystem, order: int):
         super().__init__(system, order, derived=True)
-        require_size(library().leg_size, _Leg)
-        library().carry_columns.argtypes = [_POINTER, _POINTER]
 
     def carry(
         self,
@@ -86,7 +72,7 @@ class ColumnsEngine(TapeEngine):
         dp[n + np.arange(q), list(chosen)] = 1.0
         letter, rates = np.array([*letters, 0], np.int8), np.empty((2, n))
         row, of = np.empty(n + len(p)), ends or EndOfLeg()
-        leg = _Leg(n + q, of.hit, GUARDS.index(of.guard), of.number, of.side, 0)
+        leg: Any = structure("Leg")(n + q, of.hit, GUARDS.index(of.guard), of.number, of.side)
         leg.duration, leg.tol, leg.most_steps = duration, tol, most_steps
         arrays = (given, dp, letter, end, y, rates[0], rates[1], row if ends else None)
         for name, array in zip(_ARRAYS, arrays, strict=True):

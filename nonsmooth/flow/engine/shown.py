@@ -17,11 +17,10 @@ _OF_FUNCTIONS = (
 
 
 class Shown:
-    """What results show of the system that is driven: that with a surface for each breakpoint, unless it is ``plain``."""
+    """What results show of the system that is driven: that with a surface for each breakpoint."""
 
-    def __init__(self, system: FilippovSystem, plain: bool = False):
-        self.system, self.driven = system, system if plain else system.of_pieces
-        self.tables = () if plain else system.written.tables
+    def __init__(self, system: FilippovSystem):
+        self.system, self.driven, self.tables = system, system.of_pieces, system.written.tables
         #: Parameters of the user, before those that cells set.
         self.parameters = len(system.parameter_names)
         self._cells = len(self.driven.parameter_names) - self.parameters

@@ -12,7 +12,15 @@ from ...model import Array, FilippovSystem, OptionError, Parameters
 from ...model.derivatives.mode_equations import mode_equations
 from ..checks import require_autonomous
 from ..discrete_states import with_discrete_states_held
-from ..point.surface_point import FIELDS, TOLERANCE, LocalSurface, Side, side_index, surface_at
+from ..point.surface_point import (
+    FIELDS,
+    TOLERANCE,
+    LocalSurface,
+    Side,
+    null_space,
+    side_index,
+    surface_at,
+)
 from .search import Found, search
 
 #: Eigenvalues whose real part is below this, relative to the largest, decide nothing.
@@ -30,7 +38,8 @@ class Equilibrium:
     side : {"+", "-"}
         Of the field $F1$ above the surface or $F2$ below it; ``"+"`` for a smooth system.
     status : {"real", "virtual", "boundary"}
-        Whether it is on its field's own side, on the other side of a surface, or on the surface.
+        Whether it is on its field's own side, on the other side of a surface, or on the surface. Also virtual where a
+        stop or reset of the discrete state is due at once.
     kind : str
         ``"stable node"``, ``"unstable focus"``, ``"saddle"``, ...; ``"degenerate"`` if an
         eigenvalue has no real part.
@@ -120,8 +129,8 @@ def find_equilibrium(
     Parameters
     ----------
     system, parameters, surface, mode
-        As in :func:`region`; the point need not be on the surface. A smooth system has none. With
-        complementarity conditions ``mode`` has all letters, also those of what slides or is closed.
+        As in :func:`region`; the point need not be on the surface. A smooth system has none. With complementarity
+        conditions, constraints or closed contacts ``mode`` has all letters, also those of what slides or is closed.
     near : array_like (n,)
         Where the search starts.
     side : {"+", "-"}
@@ -160,7 +169,7 @@ def find_equilibrium(
     (array([0.5, 0.5]), 'real', 'stable node')
     """
     k = side_index(side)
-    if isinstance(system, FilippovSystem) and system.complementarity:
+    if isinstance(system, FilippovSystem) and _needs_mode(system, mode):
         return _of_mode(system, near, mode, parameters, tol, max_iterations)
     require_autonomous(system, "equilibrium")
     where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True)
@@ -177,6 +186,17 @@ def find_equilibrium(
     return equilibrium_at(where, found, side)
 
 
+def _needs_mode(system: FilippovSystem, mode: str | None) -> bool:
+    """Whether conditions, joints or closed contacts take part."""
+    if system.complementarity or system.constraints:
+        return True
+    return (
+        bool(system.impacts)
+        and mode is not None
+        and 0 in system.parse_letters(mode)[system.surface_count :]
+    )
+
+
 def _of_mode(
     system: FilippovSystem,
     near: ArrayLike,
@@ -186,7 +206,9 @@ def _of_mode(
     max_iterations: int,
 ) -> Equilibrium:
     """An equilibrium of the field of a mode, whose conditions keep some functions at zero."""
-    require_autonomous(system, "equilibrium", complementarity=True)
+    require_autonomous(system, "equilibrium", elements=True)
+    if mode is None and len(system.modes) == 1 and not system.impacts:
+        mode = system.modes[0]
     if mode is None:
         raise OptionError(
             f"mode: expected letters, received none. Give one of {list(system.modes)}: in which mode the "
@@ -197,15 +219,16 @@ def _of_mode(
 
     def equations(u: Array) -> tuple[Array, Array]:
         field, slope, h, gradient, _ = numbers.copied(u, p)
-        return np.concatenate([field.ravel(), h.ravel()]), np.vstack(
-            [slope, gradient.reshape(-1, n)]
-        )
+        rows = gradient.reshape(-1, n)
+        along = null_space(rows).T if len(rows) else np.eye(n)
+        values = np.concatenate([along @ field.ravel(), h.ravel()])
+        return values, np.vstack([along @ slope, rows])
 
     start = system.extended_point(near, 0.0)
     what = f"equilibrium of mode {mode!r}"
     found = search(equations, start, tol=tol, max_iterations=max_iterations, what=what)
     _, slope, _, gradient, guards = numbers.copied(found.x, p)
-    along = np.linalg.svd(gradient)[2][len(gradient) :].T if gradient.size else np.eye(n)
+    along = null_space(gradient) if gradient.size else np.eye(n)
     eigenvalues = by_real_part(along.T @ slope @ along)
     scale = float(np.max(np.abs(eigenvalues), initial=0.0))
     kind, margin = kind_of(eigenvalues, scale) if eigenvalues.size else ("stable node", 1.0)

@@ -192,7 +192,7 @@ def fold(
     k = side_index(side)
     _check_order(max_order)
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    require_generic(system, surface, where.mode, "fold")
+    require_generic(where.system, where.surface, where.mode, "fold")
     numbers = on_surface(where, x, positive(tol, "tol"))
     if abs(numbers.angles[k]) > tol:
         raise PointError(
@@ -271,9 +271,9 @@ def find_fold(
     invisible visible
     """
     _check_order(max_order)
-    where, x = surface_at(system, near, parameters, t, surface, mode)
+    where, x = surface_at(system, near, parameters, t, surface, mode, search=True)
     free = unknowns(system, hold, 2, "fold")
-    require_generic(system, surface, where.mode, "fold")
+    require_generic(where.system, where.surface, where.mode, "fold")
     return tangency_near(where, x, side, free, max_order, tol, max_iterations)
 
 
@@ -287,14 +287,16 @@ def tangency_near(
     max_iterations: int = 50,
 ) -> Fold:
     """Find where one field is tangent to the surface, changing the states ``free`` only."""
-    k = side_index(side)
+    k, everywhere = side_index(side), where.free
 
     def equations(u: Array) -> tuple[Array, Array]:
-        numbers = where.at(u)
+        numbers = everywhere.at(u)
         values = np.array([numbers.h, numbers.lie[k]])
         return values, np.vstack([numbers.gradient, numbers.lie_gradients[k]])
 
     what = f"fold of {FIELDS[side]}"
-    found = search(equations, x, free, tol=tol, max_iterations=max_iterations, what=what)
+    found = search(
+        where.with_kept(equations), x, free, tol=tol, max_iterations=max_iterations, what=what
+    )
     # a multiple root is a cusp or worse, known to the square root of rounding only
     return fold_at(where, found, side, max_order, 1e-5 if found.linear else TOLERANCE)

@@ -301,7 +301,8 @@ class FilippovSystem:
         """Hold the discrete states at values: the system between two events, without stops and resets.
 
         Functions of a point, such as :func:`classify` and :func:`find_equilibrium`, do this themselves, with
-        the values in the point. Portraits, two-folds and manifolds take the system that this returns.
+        the values in the point. Portraits do it for each value; two-folds and manifolds take the system that this
+        returns.
 
         Parameters
         ----------
@@ -368,6 +369,16 @@ class FilippovSystem:
             return self
         system = type(self).__new__(type(self))
         system._adopt(by_pieces(self.written))
+        return system
+
+    @cached_property
+    def of_breakpoints(self) -> FilippovSystem:
+        """The system whose breakpoints are surfaces in runs too."""
+        if not self.written.tables:
+            return self
+        system = type(self).__new__(type(self))
+        system._adopt(self.definition)
+        system.lifted = self.lifted
         return system
 
     def __getstate__(self) -> dict[str, Any]:
@@ -601,8 +612,11 @@ class FilippovSystem:
         """The modes of one letter per surface in which at most one surface slides."""
         result = [""]
         for members in self.entries:
-            letters = "*s" if len(members) > 1 else self._letters(members[0])
-            result = [m + c for m in result for c in letters if not (c == "s" and "s" in m)]
+            own = self._letters(members[0])
+            letters, joint = "*s" if len(members) > 1 else own, members[0] in self.joints
+            result = [
+                m + c for m in result for c in letters if joint or not (c == "s" and "s" in m)
+            ]
         return tuple(result)
 
     def _letters(self, i: int) -> str:
@@ -686,9 +700,10 @@ class FilippovSystem:
         Parameters
         ----------
         surface : int, optional
-            Index of the surface.
+            Index of the surface, or of a complementarity condition: those follow the surfaces. One whose y holds its
+            multiplier is continuous, one of relative degree 1 generic: the motion goes along its boundary.
         mode : str, optional
-            Letters of the other surfaces, ``+``, ``-`` or ``s``: the class in that mode. Otherwise the class
+            Letters of the other surfaces, ``+``, ``-`` or ``s``, and conditions: the class in that mode. Otherwise the class
             holds for all values of the other multipliers.
         parameters : mapping, optional
             Values of the parameters; the class of these values only. Otherwise it holds for all.
@@ -723,12 +738,6 @@ class FilippovSystem:
         ('velocity continuous', 0)
         """
         i = self.surface_index(surface)
-        if i in self.half_lines:
-            name = self.surface_names[i]
-            raise DefinitionError(
-                f"surface {i} is the complementarity condition {name!r}, which has one side. Give the index of a "
-                "surface."
-            )
         if mode is not None:
             self.require_mode(mode)
         if i in (*self.set_of, *self.remembering, *self.joints):
@@ -960,12 +969,14 @@ def require_system(
     if value.complementarity and not complementarity:
         raise DefinitionError(
             f"system: {value!r} has complementarity conditions, which this function does not support. They work "
-            "in simulate, ensemble, outcomes, sensitivity, find_equilibrium, periodic_orbit and continue_orbit."
+            "in simulate, ensemble, outcomes, sensitivity, classify, region, find_equilibrium, find_fold, periodic_orbit and "
+            "continue_orbit."
         )
     if value.constraints and not joints:
         raise DefinitionError(
             f"system: {value!r} has constraints, which this function does not support. They work in simulate, "
-            "ensemble, outcomes, sensitivity, periodic_orbit and continue_orbit. Write the motion in coordinates that satisfy them."
+            "ensemble, outcomes, sensitivity, classify, region, find_equilibrium, find_fold, periodic_orbit and "
+            "continue_orbit. Write the motion in coordinates that satisfy them."
         )
 
 

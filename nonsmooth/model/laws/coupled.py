@@ -240,6 +240,19 @@ class Coupled:
         build = lambda: Evaluator(self.system.function("heights", lambda: [self.heights]))
         return self.system.cached("heights at", build).copied(x, p)[0].ravel()
 
+    def kept_at(self, x: Array, p: Array) -> tuple[Array, Array]:
+        """The functions of ``kept`` (k,) and their gradients (k, N) at an extended state."""
+
+        def build() -> Evaluator:
+            rows = ca.densify(self.kept)
+            states = self.system.extended_states
+            return Evaluator(
+                self.system.function("kept", lambda: [rows, ca.jacobian(rows, states)])
+            )
+
+        values, gradient = self.system.cached("kept at", build).copied(x, p)
+        return values.ravel(), gradient
+
     def sliding(self, mode: str) -> list[int]:
         """Surfaces that slide and contacts that are closed, with multipliers that are unknown."""
         signs = self.system.parse_letters(mode)
@@ -391,6 +404,12 @@ class Coupled:
         found = self._layer_values.copied(self._inputs(x, multipliers, unknowns), p)
         layer, slope, factors = found
         return LayerValues(layer.ravel(), slope, factors.ravel())
+
+    def layer_gradients_at(self, x: Array, multipliers: Array, p: Array) -> Array:
+        """Derivatives of the layer by the extended state (m, N), where no unknown acts."""
+        build = lambda: self._evaluator([ca.densify(self.gradients[0])])
+        found = self.system.cached("layer gradients", build)
+        return found.copied(self._inputs(x, multipliers, np.zeros(self.count)), p)[0]
 
     def _inputs(self, x: Array, multipliers: Array, unknowns: Array) -> Array:
         scaled = self._scaled

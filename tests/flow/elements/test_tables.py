@@ -14,20 +14,13 @@ XS = np.array([-1.7, -1.1, -0.6, -0.2, 0.1, 0.7, 1.2, 1.6])
 YS = np.array([-1.0, -1.3, -0.4, -0.5, 0.2, 0.3, 1.4, 1.1])
 
 
-def with_surfaces(system):
-    """The same system, whose breakpoints are surfaces in the driver too."""
-    other = ns.FilippovSystem.__new__(ns.FilippovSystem)
-    other._adopt(system.definition)
-    return other
-
-
 def labels(run):
     return [(e.kind, e.name, e.mode_before, e.mode_after, e.element, e.side) for e in run.events]
 
 
 def agree(system, x0, t_end, **options):
     run = ns.simulate(system, x0, t_end, tol=1e-11, **options)
-    other = ns.simulate(with_surfaces(system), x0, t_end, tol=1e-11, **options)
+    other = ns.simulate(system.of_breakpoints, x0, t_end, tol=1e-11, **options)
     assert labels(run) == labels(other) and run.itinerary == other.itinerary
     assert run.status == other.status
     np.testing.assert_allclose([e.t for e in run.events], [e.t for e in other.events], atol=1e-8)
@@ -164,7 +157,7 @@ def test_limits_hold_only_where_a_table_is_in_use():
 def test_sections_ensembles_and_files(tmp_path):
     system = SYSTEMS["a spring"]
     section = ns.simulate(system, [0.8, 0.4], 30.0, at=ns.Section("h4", direction=1))
-    other = ns.simulate(with_surfaces(system), [0.8, 0.4], 30.0, at=ns.Section("h4", direction=1))
+    other = ns.simulate(system.of_breakpoints, [0.8, 0.4], 30.0, at=ns.Section("h4", direction=1))
     np.testing.assert_allclose(section.sample_x, other.sample_x, atol=1e-7)
     assert len(section.sample_t) > 2 and abs(section.sample_x[:, 0] - 0.1).max() < 1e-12
     starts = np.random.default_rng(0).uniform(-1, 1, (9, 2))
@@ -197,7 +190,7 @@ def test_derivatives_and_orbits_pass_breakpoints():
         np.testing.assert_allclose(found.dx_dx0[:, i], (ends[0] - ends[1]) / 2e-6, atol=1e-6)
     orbits = [
         ns.periodic_orbit(one, ns.simulate(one, [0.8, 0.4], 40 * np.pi), period=2 * np.pi)
-        for one in (system, with_surfaces(system))
+        for one in (system, system.of_breakpoints)
     ]
     assert orbits[0].itinerary == orbits[1].itinerary and "+" in orbits[0].itinerary
     np.testing.assert_allclose(orbits[0].start, orbits[1].start, atol=1e-8)

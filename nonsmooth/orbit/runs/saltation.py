@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,8 @@ class Saltation:
 
 def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> Saltation:
     """Saltation matrix of an event."""
-    found = saltations(_One.of(at, before), after[None], lambda _: what)
+    rows = (before, at.after_state, at.after_parameters, at.gradient, at.by_parameters)
+    found = saltations(Ended(*[row[None] for row in rows]), after[None], lambda _: what)
     return Saltation(
         found.matrix[0],
         found.by_parameters[0],
@@ -57,34 +58,14 @@ def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> 
     )
 
 
-class Ended(Protocol):
-    """Ends of legs with their events, stacked."""
-
-    @property
-    def rate(self) -> Array: ...
-    @property
-    def after_state(self) -> Array: ...
-    @property
-    def after_parameters(self) -> Array: ...
-    @property
-    def gradient(self) -> Array: ...
-    @property
-    def value_parameters(self) -> Array: ...
-
-
-class _One(NamedTuple):
-    """One event, stacked."""
+class Ended(NamedTuple):
+    """Ends of legs with their events, stacked: fields, maps and functions of the events with derivatives."""
 
     rate: Array
     after_state: Array
     after_parameters: Array
     gradient: Array
     value_parameters: Array
-
-    @classmethod
-    def of(cls, at: AtEvent, rate: Array) -> _One:
-        rows = (rate, at.after_state, at.after_parameters, at.gradient, at.by_parameters)
-        return cls(*[row[None] for row in rows])
 
 
 class Passed(NamedTuple):

@@ -325,7 +325,7 @@ def _together(system: FilippovSystem, parts: Sequence[Stretch], flows: LegFlows)
     after[ends] = carried[ends]
     events = np.array([not part.leg.timed for part in parts])
     free = events & ~np.array([part.leg.at_start for part in parts])
-    found = saltations(flows, after, lambda k: _at(system, parts[k]), free)
+    found = saltations(flows.ended, after, lambda k: _at(system, parts[k]), free)
     rows = zip(
         parts,
         flows.by_leg,

@@ -56,7 +56,7 @@ def test_a_search_finds_the_rest_of_twisting_stable():
 
 
 def test_a_point_on_another_surface_is_told_so():
-    with pytest.raises(ns.PointError, match="one on surface 1. Give surface=1"):
+    with pytest.raises(ns.PointError, match=r"one on surface 1\. Give surface=1"):
         ns.classify(plane(y, -3 * a - b), [0.3, 0.0])
     assert ns.classify(plane(y, -3 * a - b), [0.3, 0.0], surface=1).label == "crossing down"
 

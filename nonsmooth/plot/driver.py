@@ -54,6 +54,7 @@ def described(system: FilippovSystem, tol: float = 1e-10) -> dict[str, Any]:
         n=system.extended_dimension,
         m=system.surface_count,
         c=contacts,
+        atoms=engine.atoms,
         entries=[members[0] for members in system.entries],
         half_lines=list(system.half_lines),
         discrete=names[system.dimension - discrete :] if discrete else [],

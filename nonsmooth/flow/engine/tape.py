@@ -255,6 +255,11 @@ class TapeEngine:
         return structure("Entries")(len(e.row), 0, self._at(e.row), self._at(e.column))
 
     @property
+    def atoms(self) -> int:
+        """Functions of which stops and resets are made."""
+        return int(self._c.rules.atoms)
+
+    @property
     def motion_width(self) -> int:
         """Numbers that a restart needs besides the state."""
         return int(self._c.rules.width)

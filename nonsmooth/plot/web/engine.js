@@ -12,12 +12,14 @@ class Engine {
     Object.assign(this, { c, system, machine: system.machine });
     c._initialize();
     this.width = system.m + system.c;
+    this.row = system.n + 2 * this.width + system.atoms; // numbers of a state that is sampled
     this.image = this.placed(system);
     for (const name of ["Options", "Batch", "Output"]) {
       this[name] = c.calloc(1, this.machine.layout[name].size);
     }
     this.named = c.calloc(this.machine.guards * system.named, 1);
     this.input = c.malloc(8 * (system.n + system.parameters.length + 2));
+    this.letters = c.malloc(this.width + 1);
     this.read = c.malloc(8 * (4 + 15) + 4 * (this.width + 1 + 16) + 8 * (16 * system.n + 1));
     this.rooms = null;
     this.refresh();
@@ -73,11 +75,11 @@ class Engine {
     }
   }
 
-  writeOptions({ tEnd, tol, steps = 1_000_000, events = 100_000, hits = {} }, dense) {
+  writeOptions({ tEnd, tol, maxStep = Infinity, steps = 1_000_000, events = 100_000, hits = {} }, dense) {
     const none = { hit_kinds: 0, hit_side: 0, hit_skip: 0, hit_count: 0 };
     const limits = { max_steps: steps, max_events: events, max_jumps: 1000 };
     this.write("Options", {
-      ...{ t_end: tEnd, rtol: tol, atol: tol, max_step: Infinity, rest_below: 0, ...limits },
+      ...{ t_end: tEnd, rtol: tol, atol: tol, max_step: maxStep, rest_below: 0, ...limits },
       ...{ start_mode: -1, at_kind: -1, at_count: 0, dense: +dense, hit_after: 0, method: 0 },
       ...{ hit_every: 1, hit_width: this.system.named, hit_named: this.named, passed: 0, ...none, ...hits },
     });
@@ -118,6 +120,14 @@ class Engine {
     return [this.input, this.input + 8 * n];
   }
 
+  /** Write the letters of a mode in which a run starts; 0 for none. */
+  startMode(mode) {
+    if (!mode) return 0;
+    const signs = Array.from(mode, (letter) => ({ "+": 1, o: 1, "-": -1 })[letter] ?? 0);
+    new Int8Array(this.c.memory.buffer, this.letters, this.width).set(signs);
+    return this.letters;
+  }
+
   /** One run with its polynomials: views of the memory that hold until the next run. */
   simulate(x, p, options) {
     const { c } = this;
@@ -126,7 +136,8 @@ class Engine {
     if (!this.rooms) this.makeRoom([256, 512, 256]);
     this.count([0, 0, 0]);
     this.writeOptions(options, true);
-    c.run_begin(this.run, this.Options, this.Output, ...this.given(x, p, t), 0, t, 0);
+    const mode = this.startMode(options.startMode);
+    c.run_begin(this.run, this.Options, this.Output, ...this.given(x, p, t), mode, t, 0);
     for (;;) {
       const status = c.run_continue(this.run, 1n << 40n);
       const counts = this.readCounts();
@@ -279,12 +290,12 @@ class Engine {
     return made;
   }
 
-  /** Rates of states, rates of surfaces, and their values, at states (count, n): rows of n + 2 width. */
+  /** Rates of states; rates of surfaces; their functions; those of stops and resets: rows for states (count, n). */
   sample(points, p, multipliers) {
     const { n } = this.system;
     const count = points.length / n;
     const parameters = this.system.parameters.length;
-    const row = n + 2 * this.width;
+    const { row } = this;
     const sizes = [points.length, parameters + 1, this.width, row * count].map((k) => 8 * k);
     const { places, free } = this.reserve(sizes);
     const [at, values, held, out] = places;
@@ -297,6 +308,23 @@ class Engine {
     return made;
   }
 }
+
+/** States and rates of a step of a run at a time since its start. */
+Engine.onStep = (run, { n, order, dimension }, step, s) => {
+  const stride = order + 1;
+  const x = new Array(dimension);
+  const rates = new Array(dimension);
+  for (let i = 0; i < dimension; i++) {
+    const first = (step * n + i) * stride;
+    let [value, slope] = [0, 0];
+    for (let k = first + order; k >= first; k--) {
+      slope = slope * s + value;
+      value = value * s + run.coefficients[k];
+    }
+    [x[i], rates[i]] = [value, slope];
+  }
+  return { x, rates };
+};
 
 /** Bytes of a text in base 64, inflated. */
 Engine.inflated = async (text) => {

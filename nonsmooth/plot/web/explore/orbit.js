@@ -2,23 +2,11 @@
 "use strict";
 
 const Orbit = (() => {
-  /** States of a step's polynomials at a time since its start. */
-  function stateAt(coefficients, stride, dimension, s) {
-    const x = new Array(dimension);
-    for (let i = 0; i < dimension; i++) {
-      let value = 0;
-      for (let q = (i + 1) * stride - 1; q >= i * stride; q--) value = value * s + coefficients[q];
-      x[i] = value;
-    }
-    return x;
-  }
-
   /**
    * Pieces of a run {mode, t, x}, new ones at each change of the mode and each jump, where `from` is the state
    * before. `seen` takes states to the plane of the picture, whose unit is its width; a unit has `dense` points.
    */
-  function pieces(run, { n, order, dimension }, { seen, dense, longest = Infinity }) {
-    const stride = order + 1;
+  function pieces(run, system, { seen, dense, longest = Infinity }) {
     const found = [];
     const far = (p, q) => Math.hypot(p[0] - q[0], p[1] - q[1]);
     let piece = null;
@@ -26,8 +14,7 @@ const Orbit = (() => {
     for (let k = 0; k < run.steps && length < longest; k++) {
       const start = run.starts[k];
       const h = (k + 1 < run.steps ? run.starts[k + 1] : run.t) - start;
-      const own = run.coefficients.subarray(k * n * stride, (k + 1) * n * stride);
-      const at = (s) => stateAt(own, stride, dimension, s);
+      const at = (s) => Engine.onStep(run, system, k, s).x;
       const first = at(0);
       const before = piece?.x.at(-1);
       const joins = before?.every((v, i) => Math.abs(v - first[i]) <= 1e-6 * (1 + Math.abs(v)));
@@ -124,7 +111,7 @@ const Orbit = (() => {
     }
   }
 
-  return { pieces, period, stateAt, View };
+  return { pieces, period, View };
 })();
 
 if (typeof module !== "undefined") module.exports = { Orbit };

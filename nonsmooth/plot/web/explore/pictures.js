@@ -127,7 +127,7 @@ const Pictures = (() => {
       const at = Float64Array.from({ length: 401 }, (_, k) => low + ((high - low) * k) / 400);
       const rows = engine.sample(at, state.p, Array(engine.width).fill(1));
       for (let i = 0; i < engine.width; i++) {
-        const h = (k) => rows[k * (1 + 2 * engine.width) + 1 + engine.width + i];
+        const h = (k) => rows[k * engine.row + 1 + engine.width + i];
         for (let k = 0; k < 400; k++) {
           if (h(k) > 0 === h(k + 1) > 0) continue;
           const zero = at[k] + ((at[k + 1] - at[k]) * h(k)) / (h(k) - h(k + 1));

@@ -118,7 +118,7 @@ const Scan = (() => {
   class Plane {
     constructor(engine, p, box, embed, surface = 0) {
       Object.assign(this, { engine, p, box, embed, surface });
-      this.row = engine.system.n + 2 * engine.width;
+      this.row = engine.row;
       this.cell = [(box[1] - box[0]) / 40, (box[3] - box[2]) / 40];
     }
 

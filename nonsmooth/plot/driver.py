@@ -29,6 +29,7 @@ def module() -> str:
 
 def described(system: FilippovSystem, tol: float = 1e-10) -> dict[str, Any]:
     """A system for ``Engine`` of engine.js: its image, its sizes, and how its modes are spelled."""
+    system = system.of_breakpoints
     engine = tape_for(system, Options(t_end=1.0, rtol=tol, atol=tol))
     image = image_of(engine)
     layouts = exchanged()

@@ -264,7 +264,7 @@ class _Classifier:
                 self.is_zero(self.to_zero[k], f"F{k + 1} = 0")
                 status = "real" if k == own else "virtual"
                 return self._equilibrium(k, status)
-        x, gradient = self.numbers.x, self.numbers.gradient
+        x, gradient = self.numbers.x, self.where.free.at(self.numbers.x).gradient
         foot = x - self.numbers.h * gradient / (gradient @ gradient)
         raise PointError(
             f"point {x}: expected a point of the surface h = 0, or an equilibrium of a field, "

@@ -354,16 +354,17 @@ class Meeting:
 
     def _return_map(self) -> tuple[float, float] | None:
         """How an orbit comes back that runs once round a point of the plane: ratio and bend."""
-        rates, slopes = [], []
+        rates, slopes, sizes = [], [], []
         for quadrant in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
             found = self.at(self._with(np.array(quadrant, float)))
             h_x = found.h_x[self.surfaces]
             if np.linalg.det(h_x) == 0.0:
                 return None
             rates.append(found.rates[self.surfaces])
+            sizes.append(np.linalg.norm(h_x, axis=1) * np.linalg.norm(found.field))
             slopes.append(found.rates_x[self.surfaces] @ np.linalg.inv(h_x))
         for turned in (0, 1):
-            if not np.any(np.array(rates)[:, turned]):
+            if np.all(np.abs(np.array(rates)) <= TOLERANCE * np.array(sizes), axis=0)[turned]:
                 return _go_round_a_touch(np.array(rates)[:, 1 - turned], np.array(slopes), turned)
         return point_law.go_round(np.array(rates), np.array(slopes))
 

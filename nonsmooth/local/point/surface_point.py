@@ -439,6 +439,11 @@ def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
     values = _switches(system, x, p).tolist()
     for i, value in enumerate(values):
         if i != surface and value == 0:
+            if values[surface]:
+                raise PointError(
+                    f"point {x}: expected a point on surface {surface}, received one on surface {i}. Give surface={i}, or "
+                    "the side with mode=, one letter per surface."
+                )
             raise PointError(
                 f"point {x}: expected a side of surface {i}, received a point on surfaces "
                 f"{surface} and {i}. Choose the side with mode=, one letter per surface."

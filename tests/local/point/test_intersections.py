@@ -50,6 +50,17 @@ def test_modes_that_can_go_on_and_attraction(name):
     assert ("modes that can go on: " + ", ".join(m.mode for m in found.continuations)) in str(found)
 
 
+def test_a_search_finds_the_rest_of_twisting_stable():
+    found = ns.find_pseudo_equilibrium(plane(y, -3 * a - b), [0.1, 0.2], mode="ss")
+    assert found.stable and found.kind == "stable pseudo-node"
+
+
+def test_a_point_on_another_surface_is_told_so():
+    with pytest.raises(ns.PointError, match=r"one on surface 1\. Give surface=1"):
+        ns.classify(plane(y, -3 * a - b), [0.3, 0.0])
+    assert ns.classify(plane(y, -3 * a - b), [0.3, 0.0], surface=1).label == "crossing down"
+
+
 NOT_RUN = ("a centre", "twisting out")  # rest goes on in both, and so do orbits that leave
 
 

@@ -134,6 +134,30 @@ def test_a_run_ends_where_the_argument_leaves_its_range():
     assert outside.status is ns.Status.NOT_FINITE and outside.t[-1] == 0.0
 
 
+def test_ends_of_a_flat_table_and_of_one_of_parameters():
+    flat = ns.table(x, [0.0, 1.0], [2.0, 2.0], outside="error")
+    run = ns.simulate(lifted([flat], [x]), [0.5], 5.0)
+    assert run.status is ns.Status.NOT_FINITE and run.t[-1] == pytest.approx(0.25, abs=1e-12)
+    system = lifted([closed(q) - x], [x], parameters={q: 0.5})
+    assert ns.simulate(system, [0.0], 5.0).status is ns.Status.REACHED_END
+    assert ns.simulate(system, [0.0], 5.0, parameters={q: 2.5}).status is ns.Status.NOT_FINITE
+    value = ca.Function("value", [x], [closed()])
+    assert float(value(1.5)) == 2.0 and np.isnan(float(value(2.5))) and np.isnan(float(value(-0.5)))
+
+
+@pytest.mark.parametrize(
+    ("rhs", "words"),
+    [
+        (lambda: ca.sign(closed() - 0.5), "within another switch"),
+        (lambda: ca.jacobian(closed(), x), "not for its derivative"),
+        (lambda: closed(3 + x**2), "from 3 to inf, and its breakpoints from 0 to 2"),
+    ],
+)
+def test_ends_that_cannot_be_watched_are_refused(rhs, words):
+    with pytest.raises(ns.DefinitionError, match=words):
+        lifted([rhs()], [x])
+
+
 @pytest.mark.parametrize(("part", "status"), [(1 + 1e-5, "REACHED_END"), (1 - 1e-5, "NOT_FINITE")])
 def test_a_motion_that_turns_before_the_end_goes_on(part, status):
     # v^2 / 2 + x is kept: the top is at 2

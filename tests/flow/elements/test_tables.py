@@ -67,6 +67,29 @@ def test_a_start_at_a_breakpoint(speed):
     assert run.events[0].mode_before == ("+++++---" if speed <= 0 else "++++++--")
 
 
+@pytest.mark.parametrize("restitution", [0.5, 0.0])
+def test_rest_on_a_contact_at_a_breakpoint(restitution):
+    # the driver does not decide on breakpoints: their letter there is that of a cell, not s
+    push = 1.6 * ca.sin(t) - 1 - 0.3 * ns.table(x, [-1.0, 0.0, 0.5, 1.5], [0.7, 0.4, 0.2, 0.9])
+    system = lifted([v, push], time=t, impacts=ns.Impact(x, restitution=restitution))
+    run, other = (
+        ns.simulate(s, [1.0, 0.3], 20.0, tol=1e-11) for s in (system, system.of_breakpoints)
+    )
+    kinds = [
+        [e.kind for e in one.events if e.kind in ("impact", "contact", "release")]
+        for one in (run, other)
+    ]
+    assert kinds[0] == kinds[1] and "release" in kinds[0]
+    np.testing.assert_allclose(
+        run(np.linspace(0, 20, 101)), other(np.linspace(0, 20, 101)), atol=1e-8
+    )
+
+
+def test_breakpoints_that_come_closer_and_closer_are_passed():
+    halves = 2.0 ** -np.arange(12, 0, -1.0)
+    agree(lifted([-1 - 0.01 * ns.table(x, halves, np.cos(9 * halves))], [x]), [1.0], 2.0)
+
+
 def test_runs_go_on_from_their_events():
     system = SYSTEMS["a spring"]
     run = ns.simulate(system, [0.8, 0.4], 10.0)

@@ -31,7 +31,10 @@
   };
   LANDING.xdot.step = LANDING.omega.step = LANDING.ydot.step = 0.01;
   const SURFACE = Object.fromEntries(
-    given.sliders.map(({ name, symbol, words, low, high }) => [name, range(symbol, words, [low, high])]),
+    given.sliders.map(({ name, symbol, words, low, high }) => [
+      name,
+      range(symbol, words, [low, high]),
+    ]),
   );
   const RANGES = { ...LANDING, ...SURFACE };
   const VERBS = {
@@ -124,7 +127,11 @@
   function coneKey(shot) {
     const modes = [...new Set(shot.phases.map((phase) => phase.mode))];
     const items = modes.map((mode) => {
-      const line = svg("path", { d: "M1 7H33", class: `phase phase-${Pictures.nameOf(mode)}`, fill: "none" });
+      const line = svg("path", {
+        d: "M1 7H33",
+        class: `phase phase-${Pictures.nameOf(mode)}`,
+        fill: "none",
+      });
       return html(
         "li",
         {},
@@ -213,7 +220,10 @@
       });
       ballPicture.draw(p, this.reach, p.mode, this.most);
       byId("clock").value = this.clock;
-      byId("clock").setAttribute("aria-valuetext", `time ${text(p.t, 3)}: ${VERBS[p.mode] ?? "slips"}`);
+      byId("clock").setAttribute(
+        "aria-valuetext",
+        `time ${text(p.t, 3)}: ${VERBS[p.mode] ?? "slips"}`,
+      );
     },
 
     frame(before) {

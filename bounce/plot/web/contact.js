@@ -63,12 +63,15 @@ class Contact {
     if (kind === "instant") return { x: later, t: 0 };
     const options = { tEnd: Contact.LONGEST, tol: Contact.TOLERANCE, maxStep: longest };
     const run = this.free.simulate(x, p, options);
-    if (run.status !== Contact.STOPPED) return { fault: "no lift-off: the surface does not push the ball up" };
+    if (run.status !== Contact.STOPPED)
+      return { fault: "no lift-off: the surface does not push the ball up" };
     const [, , y, ydot] = run.x;
     if (y > -Contact.SURFACE && ydot > 0) {
       return { fault: "the ball is back before the surface presses on it" };
     }
-    const phases = kept ? this.phases(run, this.free, p, "F") : [{ mode: "F", start: 0, end: run.t }];
+    const phases = kept
+      ? this.phases(run, this.free, p, "F")
+      : [{ mode: "F", start: 0, end: run.t }];
     return { x: this.ontoZeroLoad([...run.x], p), t: run.t, phases };
   }
 
@@ -110,7 +113,12 @@ class Contact {
     }
     if (this.rests(run.x, start)) return none("no lift-off: the ball stays in the ground");
     const phases = [...before, ...this.phases(run, this.touching, kept ? p : null)];
-    return { ...this.lifted(run.x), time: run.t, phases, ...named(phases.map((phase) => phase.mode)) };
+    return {
+      ...this.lifted(run.x),
+      time: run.t,
+      phases,
+      ...named(phases.map((phase) => phase.mode)),
+    };
   }
 
   lifted([x, xdot, y, ydot, omega]) {
@@ -136,7 +144,9 @@ class Contact {
         phase.points.push({ t: start + s, x, rates });
       }
     });
-    return p ? found.map((phase) => ({ ...phase, points: this.described(phase.points, p) })) : found;
+    return p
+      ? found.map((phase) => ({ ...phase, points: this.described(phase.points, p) }))
+      : found;
   }
 
   /** Points with their forces: the load by its own function, friction by what it does to the spin. */
@@ -146,7 +156,17 @@ class Contact {
     const rows = forces.sample(states, p, []);
     return points.map(({ t, x: [x, xdot, y, ydot, omega], rates }, k) => {
       const load = rows[k * forces.row + forces.system.n];
-      return { t, x, xdot, y, ydot, omega, load, friction: p[this.inertia] * rates[4], slip: xdot + omega };
+      return {
+        t,
+        x,
+        xdot,
+        y,
+        ydot,
+        omega,
+        load,
+        friction: p[this.inertia] * rates[4],
+        slip: xdot + omega,
+      };
     });
   }
 
@@ -156,7 +176,9 @@ class Contact {
     const starts = landings.map((landing) => this.start(landing));
     const loads = this.freely(starts, p).map((one) => one.load);
     const atOnce = [...landings.keys()].filter((k) => loads[k] > 0);
-    const found = landings.map((landing, k) => (loads[k] > 0 ? null : this.simulate(surface, landing)));
+    const found = landings.map((landing, k) =>
+      loads[k] > 0 ? null : this.simulate(surface, landing),
+    );
     const x0 = Float64Array.from(atOnce.flatMap((k) => starts[k]));
     const parameters = Float64Array.from(atOnce.flatMap(() => p));
     const options = { tEnd: Contact.LONGEST, tol: Contact.TOLERANCE };
@@ -165,7 +187,9 @@ class Contact {
     atOnce.forEach((k, q) => {
       const x = made.x.subarray(q * d, (q + 1) * d);
       const isLifted = made.status[q] === Contact.STOPPED && !this.rests(x, starts[k]);
-      found[k] = isLifted ? named(made.itinerary[q].split(" ")) : { fault: "no lift-off", itinerary: "", lastMode: "" };
+      found[k] = isLifted
+        ? named(made.itinerary[q].split(" "))
+        : { fault: "no lift-off", itinerary: "", lastMode: "" };
     });
     return found;
   }

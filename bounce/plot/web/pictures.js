@@ -240,7 +240,12 @@ const Pictures = (() => {
     const small = [];
     for (const { code, name, share } of shares) {
       const words = name.replaceAll("-", "−");
-      const place = Maps.label(outcomes, code, rooms[code], (9.5 * words.length + 8) / map.box.width);
+      const place = Maps.label(
+        outcomes,
+        code,
+        rooms[code],
+        (9.5 * words.length + 8) / map.box.width,
+      );
       if (place && rooms[code].room > 0.03 * outcomes.count) {
         const fill = luminance(colours.of(name)) < 0.2 ? "#ffffff" : "#000000";
         const label = map.label(
@@ -253,7 +258,14 @@ const Pictures = (() => {
       } else if (share > 0 && small.length < 12) {
         const box = svg("svg", { viewBox: "0 0 34 14", "aria-hidden": "true" });
         box.append(
-          svg("rect", { x: 1, y: 1, width: 32, height: 12, fill: colours.of(name), class: "swatch" }),
+          svg("rect", {
+            x: 1,
+            y: 1,
+            width: 32,
+            height: 12,
+            fill: colours.of(name),
+            class: "swatch",
+          }),
         );
         small.push(html("li", {}, box, words));
       }
@@ -267,7 +279,12 @@ const Pictures = (() => {
   /** The ball beside its ground: it sinks in, turns, and is pushed along by friction. */
   class Ball {
     constructor(element) {
-      this.plane = new Page.Plane(element, { x: [-1, 1], y: [-1, 1], aspect: 0.42, margin: [4, 4, 4, 4] });
+      this.plane = new Page.Plane(element, {
+        x: [-1, 1],
+        y: [-1, 1],
+        aspect: 0.42,
+        margin: [4, 4, 4, 4],
+      });
       this.plane.frame.remove();
     }
 
@@ -293,7 +310,10 @@ const Pictures = (() => {
       plane.layer.replaceChildren(
         svg("rect", { x: left, y: ground, width, height: top + height - ground, class: "ground" }),
         svg("circle", { cx, cy, r, class: `ball ball-${nameOf(mode)}` }),
-        svg("path", { d: [0, 1, 2].map((k) => spoke((2 * Math.PI * k) / 3)).join(""), class: "spoke" }),
+        svg("path", {
+          d: [0, 1, 2].map((k) => spoke((2 * Math.PI * k) / 3)).join(""),
+          class: "spoke",
+        }),
         svg("path", {
           d: `M${cx} ${cy + r}h${push}m${-tip} -4l${tip} 4l${-tip} 4`,
           class: `push phase-${nameOf(mode)}`,

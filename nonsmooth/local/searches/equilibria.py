@@ -175,8 +175,6 @@ def find_equilibrium(
     if isinstance(system, FilippovSystem) and _needs_mode(system, mode):
         return _of_mode(system, near, mode, parameters, tol, max_iterations)
     require_autonomous(system, "equilibrium")
-    if system.impacts and mode is not None:
-        mode = mode[: len(system.entries)] or None  # the contacts are open
     where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True, flight=True)
     if not system.surface_count and side != "+":
         raise OptionError(
@@ -192,14 +190,10 @@ def find_equilibrium(
 
 
 def _needs_mode(system: FilippovSystem, mode: str | None) -> bool:
-    """Whether conditions, joints or closed contacts take part."""
+    """Whether a mode has to name what slides and what is closed, or does so."""
     if system.complementarity or system.constraints:
         return True
-    return (
-        bool(system.impacts)
-        and mode is not None
-        and 0 in system.parse_letters(mode)[system.surface_count :]
-    )
+    return bool(system.impacts) and mode is not None and len(mode) > len(system.entries)
 
 
 def _of_mode(

@@ -42,7 +42,9 @@ def sliding_multipliers(
 
 
 def _is_linear(of: Coupled, mode: str, x: Array, unknowns: Array, p: Array) -> bool:
-    """Whether the slope of what slides is the same at some values of its multipliers."""
+    """Whether the slope of what slides is the same at some values of its multipliers, of which it is a polynomial."""
+    if any(of.system.nonlinear):
+        return False
     held, sliding, slopes = of.known_multipliers(mode, x, unknowns, p), of.sliding(mode), []
     for size in (-0.7, 0.3, 0.9):
         moved = unknowns.copy()

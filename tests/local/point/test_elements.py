@@ -314,3 +314,11 @@ def test_a_point_off_the_surface_beside_a_closed_diode_is_told_where_the_surface
         ns.PointError, match=r"nearest point of the surface is about \[0.0, 3.5, 0.3\]"
     ):
         ns.classify(boost.system, [0.0, 3.5, 0.5], mode="+c")
+
+
+def test_diodes_of_a_bridge_change_in_pairs():
+    bridge = ns.textbook.diode_bridge().system
+    assert [bridge.switching(i).kind for i in range(4)] == ["continuous"] * 2 + ["undecided"] * 2
+    assert "open and close together" in str(bridge.switching(2))
+    with pytest.raises(ns.DefinitionError, match=r"'[ac]': it opens and closes with others only"):
+        ns.classify(bridge, [0.0, 0.1], mode="coco")

@@ -45,6 +45,10 @@ def test_an_equilibrium_behind_a_contact_is_virtual():
     assert (free.point.round(12).tolist(), free.status) == ([-1.0, 0.0], "virtual")
     assert str(free).startswith("virtual stable focus at")
     assert find_equilibrium(spring, [0.0, 0.0], mode="o").status == "virtual"
+    beside = ns.FilippovSystem(
+        [X, Y], surface=X - 2, above=[Y, -X], below=[Y, 1 - X - Y], impacts=ns.Impact(X)
+    )
+    assert find_equilibrium(beside, [0.5, 0.0], mode="-o").point.round(12).tolist() == [1.0, 0.0]
     with pytest.raises(ns.PointError, match="the gap of the contact 'floor' is -1"):
         ns.classify(spring, free.point)
     away = ns.FilippovSystem([X, Y], field=[Y, 1 - X - 0.1 * Y], impacts=ns.Impact(X))

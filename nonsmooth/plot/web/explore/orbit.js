@@ -19,7 +19,12 @@ const Orbit = (() => {
       const before = piece?.x.at(-1);
       const joins = before?.every((v, i) => Math.abs(v - first[i]) <= 1e-6 * (1 + Math.abs(v)));
       if (!joins || piece.mode !== run.stepModes[k]) {
-        piece = { mode: run.stepModes[k], t: [start], x: [first], from: before && !joins ? before : null };
+        piece = {
+          mode: run.stepModes[k],
+          t: [start],
+          x: [first],
+          from: before && !joins ? before : null,
+        };
         found.push(piece);
       }
       const [a, b, c] = [0, h / 2, h].map((s) => seen(at(s)));
@@ -41,7 +46,8 @@ const Orbit = (() => {
     const last = events - 1;
     const scale = Array.from({ length: dimension }, (_, i) => {
       let most = 1e-9;
-      for (let k = Math.max(0, events - 50); k < events; k++) most = Math.max(most, Math.abs(eventX[k * n + i]));
+      for (let k = Math.max(0, events - 50); k < events; k++)
+        most = Math.max(most, Math.abs(eventX[k * n + i]));
       return most;
     });
     const same = (k, lag) =>
@@ -70,7 +76,12 @@ const Orbit = (() => {
     /** Ranges of the axes of the picture. */
     get limits() {
       if (this.dimension === 2) return this.pairs;
-      return this.flat ? [this.pairs[0], [-1, 1]] : [[-1.75, 1.75], [-1.2, 1.2]];
+      return this.flat
+        ? [this.pairs[0], [-1, 1]]
+        : [
+            [-1.75, 1.75],
+            [-1.2, 1.2],
+          ];
     }
 
     middle(i) {
@@ -106,7 +117,9 @@ const Orbit = (() => {
       const now = this.at(x);
       const [right, up] = this.axes;
       return x.map((v, i) =>
-        i > 2 ? v : v + this.half(i) * ((point[0] - now[0]) * right[i] + (point[1] - now[1]) * up[i]),
+        i > 2
+          ? v
+          : v + this.half(i) * ((point[0] - now[0]) * right[i] + (point[1] - now[1]) * up[i]),
       );
     }
   }

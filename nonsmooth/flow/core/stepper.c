@@ -449,6 +449,12 @@ static void note_hidden(Run *r, const Expansion *e, int row) {
     if (r->hidden[row] * fabs(e->states[(int64_t)i * r->stride + 1]) > e->allowed[i] / SAFETY) r->t_error = r->hidden[row];
 }
 
+/* Priority of a guard among simultaneous ones; tables pass with any other, and come last. */
+static int rank_of(const Run *r, const Expansion *e, int row) {
+  int kind = e->l.kind[row], is_table = kind == SURFACE_GUARD && has_law(r, e->l.index[row], TABLE_LAW);
+  return PRIORITY[kind] + (is_table ? KINDS : 0);
+}
+
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->met_at;
@@ -479,7 +485,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
       if (atom < 0 || time[j] < time[atom]) atom = j;
       continue;
     }
-    int rank = PRIORITY[e->l.kind[j]], best_rank = best < 0 ? rank + 1 : PRIORITY[e->l.kind[best]];
+    int rank = rank_of(r, e, j), best_rank = best < 0 ? rank + 1 : rank_of(r, e, best);
     if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
   }
   if (r->repelling) turn_exits(r, e);

@@ -283,7 +283,8 @@ class TapeEngine:
 
     def blocks(self) -> tuple[ctypes.Structure, dict[int, NDArray[Any] | ctypes.Structure]]:
         """The system as C reads it, with what implicit steps need, and what its addresses point to."""
-        self.add_implicit()
+        if not self._c.implicit:
+            self.add_implicit()
         found: dict[int, NDArray[Any] | ctypes.Structure] = {}
         for array in sorted(
             self._kept, key=lambda a: a.nbytes

@@ -15,11 +15,11 @@ import casadi as ca
 
 from ..definition.system import FilippovSystem
 from ..expressions.dependent_rows import in_span
-from ..expressions.jets import Expansion
 from ..expressions.linearity import bent
 from ..expressions.simplification import simplified
 from ..laws.coupled import Coupled, coupled_of
 from .ccode import Program
+from .jets import Expansion
 from .terms import OfTape, Term, Terms
 
 

@@ -25,7 +25,7 @@ def _is_plain(system: FilippovSystem) -> bool:
     """Whether all events are stops at a guard, without conditions, and multipliers enter linearly."""
     others = system.resets or system.impacts or any(system.nonlinear) or system.remembering
     others = others or system.complementarity or system.constraints
-    return not others and system.definition.plain
+    return not (others or system.written.tables) and system.definition.plain
 
 
 def tape_order(system: FilippovSystem, options: Options) -> int:

@@ -163,6 +163,14 @@
         names.push([`${view.flat ? "band" : "cut"} ${kind}`, `${kind} sliding`]);
       }
     }
+    for (const [side, sign] of [
+      ["above", ">"],
+      ["below", "<"],
+    ]) {
+      if ($("plane").querySelector(`.fold.${side}`)) {
+        names.push([`fold ${side}`, `folds of the field where ${given.surfaces[0]} ${sign} 0`]);
+      }
+    }
     Pictures.key($("key"), names);
   }
 
@@ -315,8 +323,8 @@
     const seconds = sweeper.milliseconds / 1000;
     const name = given.sliders[state.over].name;
     $("sweep-text").textContent =
-      `${sweeper.runs} runs in ${text(seconds, 2)} s, beside the page: ${Sweep.SKIPPED} events are left out, ` +
-      `${Sweep.SHOWN} shown. Drag to set ${name}.`;
+      `${sweeper.runs} runs in ${text(seconds, 2)} s. Of each the first ${Sweep.SKIPPED} events are left out ` +
+      `and ${Sweep.SHOWN} shown. Drag to set ${name}.`;
     document.body.dataset.swept = String(sweeper.version);
   }
 

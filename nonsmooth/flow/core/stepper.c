@@ -124,7 +124,8 @@ static double with_gaps(int order, double h, double last, double before, double 
   return h;
 }
 
-static double step_size(const Run *r, const Expansion *e) {
+/* The step that the states' series allow. */
+static double state_step(const Run *r, const Expansion *e) {
   int order = r->order, stride = r->stride;
   double last = 0, before = 0, third = 0, fourth = 0, held = INFINITY;
   for (int i = 0; i < r->s->dimension; i++) {
@@ -138,9 +139,14 @@ static double step_size(const Run *r, const Expansion *e) {
   }
   if (r->s->sets) direction_bounds(r, e, &last, &before);
   double h = smaller(bound_at(last, order), bound_at(before, order - 1));
-  h = reach_of_guards(r, e, smaller(held, with_gaps(order, h, last, before, third, fourth)));
+  return smaller(held, with_gaps(order, h, last, before, third, fourth));
+}
+
+static double step_size(const Run *r, const Expansion *e) {
+  int order = r->order;
+  double h = reach_of_guards(r, e, state_step(r, e));
   for (int j = 0; j < e->l.rows; j++) {
-    const double *g = e->guards + (int64_t)j * stride;
+    const double *g = e->guards + (int64_t)j * r->stride;
     double a = e->of_guards[j] + r->o.rtol * fabs(g[0]);
     if (!(a > 0) || a > RESOLVED * fabs(g[0])) h = resolve(g, order, h);
   }

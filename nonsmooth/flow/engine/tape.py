@@ -144,16 +144,19 @@ class TapeEngine:
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         entries = None
         if derived:
-            series, entries = derived_series_of(self.coupled)
+            series, entries = self._derived()
             tape = replace(tape, series=series, free=series)
         self._c = self._structure(self.coupled, tape)
         if entries is not None:
             self._c.derivatives = self._entries(entries)
         self._rooms: Rooms = rooms_of((0, 0, 0))
 
+    def _derived(self) -> tuple[Series, Entries]:
+        return self.system.cached("derived", lambda: derived_series_of(self.coupled))
+
     def add_implicit(self) -> None:
         """Give the driver the field's derivatives, which implicit steps need."""
-        series, entries = self.system.cached("derived", lambda: derived_series_of(self.coupled))
+        series, entries = self._derived()
         implicit = self._series(series, 0)
         self._c.derivatives = self._entries(entries)
         self._c.places = self._at(_places(entries, self.system.extended_dimension))

@@ -54,7 +54,7 @@ class Solved:
         slope = ca.jacobian(residual, symbols)
         if not ca.depends_on(slope, symbols):
             rest = ca.substitute(residual, symbols, 0)
-            dependent = system.complementarity or rests_on(system, mode)
+            dependent = system.complementarity or system.constraints or rests_on(system, mode)
             self.values = -(least_norm if dependent else solved)(slope, rest)
             self.field = ca.substitute(field, symbols, self.values)
             return

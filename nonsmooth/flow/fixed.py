@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..model import Array, ConvergenceError
-from ..model.derivatives.variational import ORDER, GuardedField
-from ..model.printing.tape import Entries, Series, Values
+from ..model.derivatives.event_maps import EventMap, PlainMap
+from ..model.derivatives.variational import ORDER, GuardedField, PlainField
 from .engine.smooth import LegsProgram, SmoothProgram, ValuesProgram, WatchProgram
 
 #: Part of the size of a group of states that the last terms of a step may reach.
@@ -25,42 +24,8 @@ TOLERANCE = 2.0**-53
 MOST_STEPS = 20_000
 
 
-class SmoothField(Protocol):
-    """A smooth field as Taylor rules, with groups of states that share an error scale, and columns of derivatives."""
-
-    @property
-    def series(self) -> Series:
-        """Taylor rules of the field."""
-        ...
-
-    @property
-    def entries(self) -> int:
-        """Number of states."""
-        ...
-
-    @property
-    def groups(self) -> Sequence[NDArray[np.intp]]:
-        """States whose errors have one scale; what is exact is in none."""
-        ...
-
-    @property
-    def derivatives(self) -> Entries:
-        """Places of the last outputs of ``series``, by states and by parameters."""
-        ...
-
-    @property
-    def by_start(self) -> int:
-        """Number of columns by the start, before those by parameters."""
-        ...
-
-    @property
-    def columns(self) -> int:
-        """Number of columns."""
-        ...
-
-
 def flow_for(
-    field: SmoothField, z: Array, p: Array, duration: float, tol: float = TOLERANCE
+    field: PlainField, z: Array, p: Array, duration: float, tol: float = TOLERANCE
 ) -> Array:
     """State of a smooth flow after a duration of either sign."""
     if not duration:
@@ -84,13 +49,13 @@ def first_terms(field: GuardedField, y: Array, p: Array, order: int = 3) -> tupl
 _PROGRAMS: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 
 
-def program_of(field: SmoothField) -> SmoothProgram:
+def program_of(field: PlainField) -> SmoothProgram:
     """Program of a smooth field for the interpreter, made once."""
     made: SmoothProgram | None = _PROGRAMS.get(field)
     return made or _PROGRAMS.setdefault(field, made_program(field, ORDER))
 
 
-def made_program(field: SmoothField, order: int) -> SmoothProgram:
+def made_program(field: PlainField, order: int) -> SmoothProgram:
     """Make the program of a smooth field at an order."""
     group = np.full(field.entries, -1, np.int32)
     for k, entries in enumerate(field.groups):
@@ -99,17 +64,8 @@ def made_program(field: SmoothField, order: int) -> SmoothProgram:
     return SmoothProgram(field.series, group, order, *of_columns)
 
 
-class Evaluated(Protocol):
-    """Expressions of states and parameters that the interpreter in C can evaluate."""
-
-    @property
-    def values(self) -> Values:
-        """Their graph."""
-        ...
-
-
 def legs_program(
-    fields: Sequence[SmoothField], events: Sequence[Evaluated | None], parameters: int
+    fields: Sequence[PlainField], events: Sequence[EventMap | PlainMap | None], parameters: int
 ) -> LegsProgram:
     """Program that integrates legs and evaluates expressions at their ends, in one call."""
     return LegsProgram(
@@ -119,7 +75,7 @@ def legs_program(
     )
 
 
-def values_program(event: Evaluated) -> ValuesProgram:
+def values_program(event: EventMap | PlainMap) -> ValuesProgram:
     """Program of expressions for the interpreter, made once."""
     made: ValuesProgram | None = _PROGRAMS.get(event)
     return made or _PROGRAMS.setdefault(event, ValuesProgram(event.values))

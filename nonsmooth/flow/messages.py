@@ -46,6 +46,8 @@ SENTENCES = {
     "field": "The field of mode {mode!r} at ({state}).",
     "state": "The state after a step from t = {t:.10g}.",
     "surface": "A switching function is not finite.",
+    "out_of_table": "The argument {argument} of a table left its range at t = {t:.10g}: with outside='error' it has "
+    "no value there.",
     "reset_map": "The map of reset {reset!r} at t = {t:.10g}.",
     "discrete_value": "The map of reset {reset!r} at t = {t:.10g} gives a discrete state a value that is not "
     "among those of discrete=.",
@@ -64,7 +66,8 @@ SENTENCES = {
     "round: it may be a floor or a ceiling. Give it a direction: -1 where its function falls to "
     "zero, 1 where it rises.",
     "branch_point": "The field stops being smooth just after t = {t:.8g}: a root or a power of something that "
-    "reaches zero there. End the run before, with a Stop at a small positive value of it.",
+    "reaches zero there. Make that a surface, surface= with above= and below=: a run passes the root of a switching "
+    "function. Or end the run before, with a Stop at a small positive value of it.",
     "decay": "The steps are held near {step:.1e} at t = {t:.6g} by a decay rate of about {decay:.0e}, much faster "
     "than the motion: the system is stiff there. {implicit}",
 }

@@ -157,10 +157,16 @@ class _Numbers:
         open_set = [*self.system.algebraic, *[i for i in touched if self._may_close(i)]]
         solved = list(self._solutions(letters, on, open_set))
         distinct = {tuple(one.tolist()) for one, _ in solved}
+        if not distinct:
+            raise PointError(
+                f"point {self.x.tolist()}: no motion goes on there, neither with closed conditions and contacts nor with open "
+                "ones (Painleve's paradox, or a negative load). Check the friction and the loads."
+            )
         between = {i for _, zeros in solved for i in zeros if i in self.system.algebraic}
         if len(on) == 1 and len(distinct) == 1 and not between:
             return Situation(self.spelled(next(iter(distinct))), on[0])
-        own = [*on, *sorted(between)] if on or between else touched
+        struck = [i for i in touched if not self._may_close(i)]
+        own = [*on, *sorted(between), *struck] if on or between or struck else touched
         if len(own) == 1 and len(distinct) <= 2:
             letters = np.array(min(distinct))  # closed, where it may be either
             return Situation(self.spelled(letters.tolist()), own[0])

@@ -56,7 +56,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     roots = gate_roots(plain, _surfaces(system), x, ones)[1]
     columns = ca.jacobian(plain, lam)
     for members in system.entries:  # a set has one factor
-        if members[0] in (*system.half_lines, *system.joints):
+        if members[0] in (*system.half_lines, *system.joints, *system.definition.breakpoints):
             continue
         places = [(row, i) for i in members for row in columns[:, i].sparsity().row()]
         entries = [e for i in members for e in columns[:, i].nonzeros()]
@@ -135,6 +135,9 @@ class Coupled:
         stops = ca.densify(d.guards) if d.guards.numel() else ca.SX(0, 1)
         heights = ca.densify(ca.vertcat(h, d.gaps))
         factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
+        #: The field in states, multipliers, reactions and nu; switching functions and gaps; factors n_i of surfaces
+        #: and contacts, 1 where there is none; functions of stops and resets.
+        self.field, self.heights, self.factors, self.stops = field, heights, factor, stops
         self.outputs = [field, self.layer, heights, factor, stops]
         every = ca.vertcat(*unknowns, d.reactions)
         self.slope, self._every = ca.jacobian(self.layer, every), every
@@ -152,6 +155,8 @@ class Coupled:
         if surface in (*special, *self.system.joints):
             return False
         d, x = self.system.definition, self.system.extended_states
+        if surface in d.breakpoints:
+            return True
         pieces = [e for e in column if not e.is_zero()]
         return all(ca.depends_on(e, x) for e in pieces) and vanish_on(
             pieces, d.surfaces[surface], x
@@ -317,26 +322,6 @@ class Coupled:
         return mixed
 
     # expressions --------------------------------------------------------------------------------
-
-    @property
-    def field(self) -> ca.SX:
-        """The field in states, multipliers, reactions and nu."""
-        return self.outputs[0]
-
-    @property
-    def heights(self) -> ca.SX:
-        """Switching functions and gaps."""
-        return self.outputs[2]
-
-    @property
-    def factors(self) -> ca.SX:
-        """The factors n_i of surfaces and contacts; 1 where there is none."""
-        return self.outputs[3]
-
-    @property
-    def stops(self) -> ca.SX:
-        """Functions of stops and resets."""
-        return self.outputs[4]
 
     @property
     def multipliers(self) -> ca.SX:

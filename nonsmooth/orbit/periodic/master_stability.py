@@ -131,7 +131,7 @@ def master_stability(
     values, eigenvalues = _checked(orbit, coupling, kappa)
     problem, at, n = orbit.problem, orbit.evaluation, orbit.system.dimension
     _require_no_jump(orbit, values)
-    jumps = saltations(at.flows, *events_of(problem, at)).matrix
+    jumps = saltations(at.flows.ended, *events_of(problem, at)).matrix
     product = np.broadcast_to(np.eye(n, dtype=complex), (len(eigenvalues), n, n))
     for k in range(len(problem.legs)):
         product = jumps[k][:n, :n] @ (_leg_map(orbit, values, k, eigenvalues) @ product)

@@ -232,7 +232,7 @@ def _eigenvector(orbit: PeriodicOrbit) -> Array:
 def _along(orbit: PeriodicOrbit, first: Array, samples: int) -> tuple[Array, ...]:
     """Times, states, responses, legs and Z . f on the legs that were solved for, from the last back."""
     problem, at = orbit.problem, orbit.evaluation
-    jumps = saltations(at.flows, *events_of(problem, at)).matrix
+    jumps = saltations(at.flows.ended, *events_of(problem, at)).matrix
     ends = np.cumsum(at.durations)
     z, rows = first @ problem.wrap, list[tuple[Array, ...]]()
     for k in reversed(range(len(problem.legs))):

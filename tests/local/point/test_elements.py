@@ -1,5 +1,7 @@
 """Conditions, contacts and joints at a point: the same answers as in coordinates, by limits and by runs."""
 
+import math
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -294,3 +296,81 @@ def test_points_off_a_joint_and_points_of_several_elements():
     with pytest.raises(ns.PointError, match="the condition 'a' and the condition 'b'"):
         ns.classify(corner, [0.0, 0.0])
     assert ns.classify(corner, [0.0, 0.0], mode="oo", surface=1).kind == "leaving"
+
+
+def test_the_paradox_of_painleve_has_no_motion():
+    rod = ns.textbook.painleve_rod()
+    found = ns.classify(rod.system, rod.start)
+    assert found.kind == "closed"
+    expected = 1 / (1 + 3 * math.cos(1) * (math.cos(1) - math.sin(1)))
+    assert found.evidence["multiplier"] == pytest.approx(expected, rel=1e-12)
+    with pytest.raises(ns.PointError, match="no motion goes on there"):
+        ns.classify(rod.system, rod.start, parameters={"mu": 2.0})
+
+
+def test_a_point_off_the_surface_beside_a_closed_diode_is_told_where_the_surface_is():
+    boost = ns.textbook.boost_converter()
+    with pytest.raises(
+        ns.PointError, match=r"nearest point of the surface is about \[0.0, 3.5, 0.3\]"
+    ):
+        ns.classify(boost.system, [0.0, 3.5, 0.5], mode="+c")
+
+
+def test_diodes_of_a_bridge_change_in_pairs():
+    bridge = ns.textbook.diode_bridge().system
+    assert [bridge.switching(i).kind for i in range(4)] == ["continuous"] * 2 + ["undecided"] * 2
+    assert "open and close together" in str(bridge.switching(2))
+    with pytest.raises(ns.DefinitionError, match=r"'[ac]': it opens and closes with others only"):
+        ns.classify(bridge, [0.0, 0.1], mode="coco")
+
+
+def test_corners_impacts_beside_rest_and_what_leaves_no_direction():
+    pressed = ns.FilippovSystem(
+        [x, y],
+        field=[u - 1, w - 2],
+        complementarity=[ns.Complementarity(x, u, "a"), ns.Complementarity(y, w, "b")],
+    )
+    found = ns.classify(pressed, [0.0, 0.0])
+    assert (found.kind, found.label) == ("equilibrium", "stable node")
+    assert ns.find_equilibrium(pressed, [0.1, 0.1], mode="cc").kind == "stable node"
+    assert ns.classify(pressed, [0.0, 0.5]).kind == "closed"
+    room = ns.FilippovSystem(
+        [x, y, v, w],
+        field=[v, w, 0, -1],
+        impacts=[ns.Impact(y, 0.5, name="floor"), ns.Impact(x, 0.5, name="wall")],
+    )
+    assert ns.classify(room, [0.0, 0.0, -1.0, 0.0]).kind == "impact"  # of the wall, on the floor
+    assert ns.classify(room, [1.0, 0.0, 1.0, 0.0]).kind == "closed"
+    with pytest.raises(ns.PointError, match="contact 'floor' and the contact 'wall'"):
+        ns.classify(room, [0.0] * 4)
+
+
+def test_joints_that_depend_on_one_another_and_friction_that_drops():
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    rods = [
+        ns.Constraint(x**2 + y**2 - 1, reaction=a, name="one"),
+        ns.Constraint(2 * x**2 + 2 * y**2 - 2, reaction=b, name="two"),
+    ]
+    pull = [(a + 2 * b) * x - v, (a + 2 * b) * y - 1 - w]
+    swing = ns.FilippovSystem([x, y, v, w], field=[v, w, *pull], constraints=rods)
+    rest = ns.find_equilibrium(swing, [0.1, -1.0, 0.0, 0.0])
+    assert rest.kind == "stable focus"
+    np.testing.assert_allclose(rest.point, [0, -1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(abs(rest.eigenvalues), 1.0, atol=1e-12)  # z^2 + z + 1
+    assert ns.classify(swing, rest.point).label == "stable focus"
+    dry = ns.Friction(v, load=r, kinetic=0.3, static=0.5)
+    block = ns.FilippovSystem(
+        [x, y, v, w],
+        field=[v, w, dry.force - x, r - 1],
+        surfaces=[dry],
+        impacts=ns.Impact(y, reaction=r),
+    )
+    with pytest.raises(ns.DefinitionError, match="hidden"):
+        ns.classify(block, [0.0] * 4)
+    skate = ns.FilippovSystem(
+        [x, y, z, v, w],
+        field=[v, w, 1, -r * ca.sin(z), r * ca.cos(z)],
+        constraints=ns.Constraint(w * ca.cos(z) - v * ca.sin(z), reaction=r),
+    )
+    with pytest.raises(ns.PointError, match=r"inside a mode, received the field \[(1.0|0.99)"):
+        ns.classify(skate, [0, 0, 0, 1, 0])

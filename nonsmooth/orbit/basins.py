@@ -71,11 +71,11 @@ _LONGEST = 8
 #: Distance beside a point at which runs must come back to it, in units of ``near``.
 _ISOLATED = 0.01
 
-#: Starts beside what recurs, from which runs must come back.
-_BESIDE = 8
+#: Starts beside what recurs, of which a third must come back: from one side is enough.
+_BESIDE = 24
 
 #: How far beside, in units of ``near``.
-_BESIDE_BY = 5.0
+_BESIDE_BY = 10.0
 
 #: Relative distance within which points of two attractors are one.
 _EQUAL = 1e-6
@@ -570,7 +570,8 @@ class Search:
         """Whether runs from beside points come back near them."""
         rng = np.random.default_rng(len(points))
         chosen = points[rng.integers(len(points), size=_BESIDE)]
-        beside = chosen + _BESIDE_BY * self.near * self.scale * rng.choice([-1, 1], chosen.shape)
+        off = rng.choice([-1, 1], chosen.shape) * rng.uniform(0.5, 1.5, chosen.shape)
+        beside = chosen + _BESIDE_BY * self.near * self.scale * off
         try:
             last = self._sample(beside, self.most, "beside").late(0)
         except NonsmoothError:  # these are no starts, as of a clock at its tick
@@ -578,7 +579,7 @@ class Search:
         away = _tree(points / self.scale).query(
             last[np.isfinite(last).all(axis=1)] / self.scale, p=np.inf
         )[0]
-        return bool(np.sum(away <= self.near) > 0.5 * _BESIDE)
+        return bool(np.sum(away <= self.near) > _BESIDE / 3)
 
     def _extended(self, points: Array) -> int:
         """Number of the recurrent attractor near most of the points, which is extended by them; 0 for none."""

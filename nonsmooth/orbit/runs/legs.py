@@ -147,6 +147,8 @@ class Leg:
             return instant_map(system, *given)(x, p)
         own, every = self.map(system), tuple(range(len(p)))
         assert own is not None
+        if self.field(system).entries == len(x):
+            return own(x, p)
         start, n = self.field(system, every).initial(x, p), len(x)
         at = own(start[:, 0], p)
         moved, by_p = start[:, 1 : 1 + n], start[:, 1 + n :]
@@ -241,6 +243,9 @@ def carry_leg(
 
 def rate_at(system: FilippovSystem, leg: Leg, x: Array, p: Array) -> Array:
     """The field of a leg's mode at an extended state (N,)."""
+    if not system.sets:
+        field = leg.field(system)
+        return np.asarray(field.rate_at(field.states_at(x, p), p)[: len(x)])
     flown = [FlownLeg(leg.mode, x, 0.0, None, leg.left)]
     found = carry_legs(system, flown, p, back=True)
     require_done(system, flown, found)

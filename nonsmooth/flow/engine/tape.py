@@ -44,6 +44,9 @@ _VALUES = ("point", "surfaces", "maps", "atoms", "choices", "restitution", "colu
 _ENTRIES = tuple(field.name for field in fields(Tape) if field.type == "Entries")
 
 
+#: What an address of the driver's structures points to.
+Block = NDArray[Any] | ctypes.Structure | ctypes.Array[Any]
+
 #: Steps by which a run is known to be stiff.
 _PROBED = 400
 
@@ -284,15 +287,17 @@ class TapeEngine:
         """Numbers that a restart needs besides the state."""
         return int(self._c.rules.width)
 
-    def blocks(self) -> tuple[ctypes.Structure, dict[int, NDArray[Any] | ctypes.Structure]]:
+    def blocks(self) -> tuple[ctypes.Structure, dict[int, Block]]:
         """The system as C reads it, with what implicit steps need, and what its addresses point to."""
         if not self._c.implicit:
             self.add_implicit()
-        found: dict[int, NDArray[Any] | ctypes.Structure] = {}
+        found = dict[int, Block]()
         for array in sorted(
             self._kept, key=lambda a: a.nbytes
         ):  # slices begin where the whole does
             found[array.ctypes.data] = array
+        cells = structure("Cells") * (self.system.surface_count + 1)
+        found[self._c.cells] = cells.from_buffer_copy(bytes(found[self._c.cells]))
         return self._c, found | {ctypes.addressof(self._implicit): self._implicit}
 
     # one trajectory ----------------------------------------------------------------------------
@@ -335,7 +340,6 @@ class TapeEngine:
             recorded = recorder.finished(counts[7:10])
             self._rooms = recorder.rooms if dense else self._rooms  # the next run is often similar
             modes, labels = self._modes(table), self._labels(table)
-            shown = self.shown.where(REASONS[counts[1]], counts[2])
             final = np.zeros(width)
             library().run_motion(state, address(final))
             if width == 1 and options.t_start == 0:  # times of events are known to rounding
@@ -343,7 +347,7 @@ class TapeEngine:
         return Run(
             status=counts[0],
             reason=counts[1],
-            where=shown,
+            where=self.shown.where(REASONS[counts[1]], counts[2]),
             mode=counts[3],
             limit=numbers[1],
             letters=modes,

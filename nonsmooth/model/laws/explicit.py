@@ -34,24 +34,27 @@ class Solved:
         coupled = raised_of(system) if rests_on(system, mode) else coupled_of(system)
         x = system.extended_states
         self.system, self.mode, self.coupled = system, mode, coupled
+        #: Surfaces whose unknown is lambda + c lambda^3, and their c: sliding ends where that is largest.
+        self.cubic: dict[int, ca.SX] = {}
+        self.unknowns: tuple[int, ...] = ()
+        if system.written.tables and 0 not in system.parse_letters(mode):
+            self.states, self.values, self.field = x, ca.SX(0, 1), system.field(mode)
+            return
         sliding = coupled.sliding(mode)
         own = [coupled.unknown(i) for i in sliding]
         symbols = ca.vertcat(*own) if own else ca.SX(0, 1)
         field, layer = coupled.held_at(mode, [coupled.field, coupled.layer])
-        #: Surfaces whose unknown is lambda + c lambda^3, and their c: sliding ends where that is largest.
-        self.cubic: dict[int, ca.SX] = {}
         for i in sliding:
             if i < system.surface_count and system.nonlinear[i]:
                 field, layer = self._of_cubic(i, field, layer, symbols)
         residual = layer[sliding] if sliding else ca.SX(0, 1)
-        self.unknowns: tuple[int, ...] = ()
         self.states, self.values, self.field = x, symbols, field
         if not sliding:
             return
         slope = ca.jacobian(residual, symbols)
         if not ca.depends_on(slope, symbols):
             rest = ca.substitute(residual, symbols, 0)
-            dependent = system.complementarity or rests_on(system, mode)
+            dependent = system.complementarity or system.constraints or rests_on(system, mode)
             self.values = -(least_norm if dependent else solved)(slope, rest)
             self.field = ca.substitute(field, symbols, self.values)
             return

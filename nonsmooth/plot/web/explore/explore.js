@@ -151,13 +151,17 @@
     const sides = {
       "+": `${given.surfaces[0]} > 0`,
       "-": `${given.surfaces[0]} < 0`,
+      "*": `${given.surfaces[0]} ≠ 0`,
       s: "sliding",
     };
     const known = system.entries.length === 1 && !system.c ? sides : {};
-    const shown = new Map(
-      pieces.map(({ mode }) => [modes.of(mode), known[mode] ?? (minus(mode) || "smooth")]),
-    );
-    const names = [...shown].map(([look, words]) => [`orbit ${look}`, words]);
+    const shown = new Map();
+    for (const { mode } of pieces) {
+      const words = shown.get(modes.of(mode)) ?? new Set();
+      shown.set(modes.of(mode), words.add(known[mode] ?? (minus(mode) || "smooth")));
+    }
+    const listed = (words) => [...words].slice(0, 3).join(", ") + (words.size > 3 ? ", …" : "");
+    const names = [...shown].map(([look, words]) => [`orbit ${look}`, listed(words)]);
     for (const kind of ["attracting", "repelling"]) {
       if ($("plane").querySelector(`.band.${kind}, .cut.${kind}`)) {
         names.push([`${view.flat ? "band" : "cut"} ${kind}`, `${kind} sliding`]);

@@ -128,6 +128,7 @@ class Portrait {
       this.layers.marks.append(...marks.flatMap((mark) => this.marked(mark)));
     } else if (engine.system.n === engine.system.dimension) {
       for (let i = 0; i < engine.width; i++) {
+        if (engine.system.tables.some(({ element }) => element === i)) continue; // its function follows the cell
         const cut = new Scan.Plane(engine, state.p, box, (x) => x, i);
         const lines = Scan.zeroLines((points) => cut.heights(points), box, 40);
         this.layers.surface.append(

@@ -234,7 +234,9 @@ def carry_leg(
     """The same of a leg of a run, by the states alone; at times since its start, or recorded to be taken ``back``."""
     if not (system.sets or back or len(times)):  # one leg costs less by its own program
         found, n = integrate_leg(system, leg, x, duration, p, chosen), len(x)
-        return LegFlow(found.end[:n], found.by_start[:n], found.by_parameters[:n], found.rate[:n])
+        none = np.zeros((0, n, n + len(chosen)))
+        by = found.by_start[:n], found.by_parameters[:n]
+        return LegFlow(found.end[:n], *by, found.rate[:n], at_samples=none)
     flown = [leg.flown(system, x, duration)]
     carried = carry_legs(system, flown, p, chosen, times, back=back)
     require_done(system, flown, carried)

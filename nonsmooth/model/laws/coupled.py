@@ -31,7 +31,6 @@ from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .degree import Degree, degree_of
 from .evaluators import Evaluator
-from .switches import Guard, event_guards
 
 
 @dataclass(frozen=True)
@@ -269,22 +268,6 @@ class Coupled:
         idle = bool(carried) and all(signs[self._surfaces + j] for j in carried)
         return self.continuous[i] or idle
 
-    def guards(self, mode: str) -> tuple[Guard, ...]:
-        """Guards of a mode: surfaces and exits, contacts, stops and resets."""
-        result, contacts = list[Guard](), len(self.system.entries)
-        for i, sign in enumerate(self.system.parse_letters(mode)):
-            j = i - self._surfaces
-            if i in self.system.half_lines:
-                kind, entry = "surface" if sign else "release", self.system.entry_of(i)
-                result.append(Guard(kind, i, sign, entry))
-            elif j >= 0:
-                result.append(Guard("impact" if sign else "release", j, sign, contacts + j))
-            elif sign:
-                result.append(Guard("surface", i, sign, self.system.entry_of(i)))
-            elif i not in self.system.joints:
-                result += [Guard("exit", i, side, self.system.entry_of(i)) for side in (1, -1)]
-        return (*result, *event_guards(self.system))
-
     @cached_property
     def slope_moves(self) -> NDArray[np.bool_]:
         """Which derivatives of the layer's rates by the unknowns change along a motion (m, m)."""
@@ -347,7 +330,7 @@ class Coupled:
             for k in range(rest.numel()):
                 if ca.is_equal(rest[k], own):
                     held[k] = own
-        return [ca.substitute(e, rest, held) for e in expressions]
+        return [ca.substitute(e, ca.vec(rest), held) for e in expressions]
 
     def awake(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Dense expressions in ``moving``, for numbers: terms that a mode leaves out are not evaluated."""

@@ -10,8 +10,7 @@ import casadi as ca
 from ..cache import Content
 from ..definition.events import Stop
 from ..definition.system import FilippovSystem
-from .explicit import explicit
-from .motion import watched_functions
+from .motion import motion, watched_functions
 from .switches import Guard
 
 
@@ -51,7 +50,7 @@ def followed(
 def _made(
     system: FilippovSystem, mode: str, expressions: Sequence[ca.SX], backward: bool
 ) -> Followed:
-    of_mode, n = explicit(system, mode), system.dimension
+    of_mode, n = motion(system, mode), system.dimension
     functions = [of_mode.functions[k] for k in range(len(of_mode.guards))] + [*expressions]
     guards = (*of_mode.guards, *(Guard("zero", k, 0, k) for k in range(len(expressions))))
     own = ca.vertsplit(of_mode.states)
@@ -77,4 +76,4 @@ def _made(
         time=time,
         stops=list(stops.values()),
     )
-    return Followed(made, guards, tuple(stops), of_mode.law.unknowns)
+    return Followed(made, guards, tuple(stops), of_mode.unknowns)

@@ -219,24 +219,6 @@ class Coupled:
         signs[[*self.system.set_of, *self.system.half_lines]] = 0.0
         return signs
 
-    def known_multipliers(self, mode: str, x: Array, unknowns: Array, p: Array) -> Array:
-        """Multipliers at a state that are known in a mode."""
-        held = self.held(mode)
-        for members in self.moving_sets(mode):
-            own = list(members)
-            h = self.heights_at(x, p)[own] if mode[own[0]] == "*" else unknowns[own]
-            held[own] = unit(h)
-        return held
-
-    def moving_sets(self, mode: str) -> list[tuple[int, ...]]:
-        """Sets off which a mode is, or which it leaves."""
-        return [s for s in self.system.sets if self.system.widened(mode)[s[0]] in "*bl"]
-
-    def acting(self, mode: str, unknowns: Array) -> Array:
-        """Unknowns that multiply the field: not what is kept of sets that are left."""
-        slides = np.array(self.system.parse_letters(mode)) == 0
-        return np.where(slides, unknowns, 0.0) if self.system.sets else unknowns
-
     def heights_at(self, x: Array, p: Array) -> Array:
         """Switching functions and gaps (m,) at an extended state."""
         build = lambda: Evaluator(self.system.function("heights", lambda: [self.heights]))
@@ -417,10 +399,3 @@ def raised_of(system: FilippovSystem) -> Coupled:
         return Coupled(system, by_degree=True) if raised else plain
 
     return system.cached("raised", build)
-
-
-def unit(h: Array) -> Array:
-    """Direction of a vector of any size; NaN for zero."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scaled = h / np.abs(h).max()
-        return np.asarray(scaled / np.linalg.norm(scaled))

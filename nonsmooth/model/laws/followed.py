@@ -16,24 +16,12 @@ from .switches import Guard
 
 @dataclass(frozen=True)
 class Followed:
-    """A mode's flow.
+    """A mode's flow."""
 
-    Attributes
-    ----------
-    system : FilippovSystem
-        Of the states and of the multipliers that are states; backward in -t.
-    guards : tuple of Guard
-        Those of the mode, then the further functions.
-    stops : tuple of int
-        Guards of the system's stops; constant ones have none.
-    unknowns : tuple of int
-        Multipliers that are states.
-    """
-
-    system: FilippovSystem
-    guards: tuple[Guard, ...]
-    stops: tuple[int, ...]
-    unknowns: tuple[int, ...]
+    system: FilippovSystem  # of the states and of the multipliers that are states; backward in -t
+    guards: tuple[Guard, ...]  # those of the mode, then the further functions
+    stops: tuple[int, ...]  # guards of the system's stops; constant ones have none
+    unknowns: tuple[int, ...]  # multipliers that are states
 
 
 def followed(

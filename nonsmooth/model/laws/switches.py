@@ -9,24 +9,14 @@ from ..definition.system import FilippovSystem
 
 @dataclass(frozen=True)
 class Guard:
-    """What the zero of one event function means.
+    """What the zero of one event function means."""
 
-    Attributes
-    ----------
-    kind : {"surface", "exit", "near", "slip", "branch", "impact", "release", "stop", "reset", "atom", "zero"}
-    index : int
-        Of the switching function, gap, stop or reset in the definition.
-    side : int
-        For an exit the side, +1 or -1, to which the motion leaves; for a surface or an open contact
-        the side on which the motion is; for stops and resets the direction; else 0.
-    element : int
-        Of the surface, set or contact among the letters of a mode; ``index`` for others.
-    """
-
-    kind: str
-    index: int
+    kind: str  # of ``GUARDS`` in flow/constants.py, or "zero"
+    index: int  # of the switching function, gap, stop or reset in the definition
+    #: For an exit the side, +1 or -1, to which the motion leaves; for a surface or an open contact the side on which the
+    #: motion is; for stops and resets the direction; else 0.
     side: int
-    element: int
+    element: int  # of the surface, set or contact among the letters of a mode; ``index`` for others
 
     def ends(self, kind: str, element: int, side: int) -> bool:
         """Whether its zero is the event of a kind, of an element, to a side (of an exit)."""

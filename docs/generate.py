@@ -231,7 +231,7 @@ def explorers() -> dict[str, str]:
         "explore/stick_slip.html": _stick_slip().html,
         "explore/teixeira.html": _teixeira().html,
         "explore/two_folds.html": ns.plot.two_fold_explorer(),
-        "explore/bounce.html": bounce.plot.explorer(),
+        "explore/bounce.html": bounce.explore().html,
     }
 
 

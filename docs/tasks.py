@@ -106,7 +106,7 @@ TASKS = {
         "One bounce",
         "From touch-down to lift-off: slip, rolling, forces, and derivatives of the lift-off.",
         "bounce",
-        "simulate Shot shot.Phase shot.Forces shot.State BounceStatus sensitivity shot.Sensitivity certify "
+        "simulate explore Shot shot.Phase shot.Forces shot.State BounceStatus sensitivity shot.Sensitivity certify "
         "shot.BounceProof",
     ),
     "bounce_models": _task(

@@ -46,6 +46,8 @@ SENTENCES = {
     "field": "The field of mode {mode!r} at ({state}).",
     "state": "The state after a step from t = {t:.10g}.",
     "surface": "A switching function is not finite.",
+    "out_of_table": "The argument {argument} of a table left its range at t = {t:.10g}: with outside='error' it has "
+    "no value there.",
     "reset_map": "The map of reset {reset!r} at t = {t:.10g}.",
     "discrete_value": "The map of reset {reset!r} at t = {t:.10g} gives a discrete state a value that is not "
     "among those of discrete=.",

@@ -21,6 +21,7 @@ from ..model import (
     FilippovSystem,
     Parameters,
     PointError,
+    call,
     layer_of,
     require_system,
 )
@@ -152,7 +153,7 @@ def classify(
         Off the surface, or without one, and no equilibrium; off a constraint, or where a gap is negative; on several
         conditions at once; a wrong shape; not finite.
     DefinitionError
-        Hidden dynamics; a fold-fold of a planar system with explicit time; vector multipliers; a ``mode`` or ``surface`` that the system does not have.
+        Hidden dynamics; vector multipliers; a ``mode`` or ``surface`` that the system does not have.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     OptionError
@@ -180,16 +181,18 @@ def classify(
     if not where.mode:
         return _Classifier(where, where.at(x), tol, margin).smooth()
     require_linear(where.system, where.surface, "classify")
-    numbers = where.finite_at(x)
+    numbers = where.finite_at(x, slopes=where.one_sided)
     if not np.any(numbers.gradient):
         raise PointError(
             f"point {x}: expected a regular point of surface {surface}, received grad h = 0. Write "
             "h with a nonzero gradient."
         )
+    away = numbers.distance / (1 + float(np.linalg.norm(x)))
+    if away > tol or np.abs(numbers.angles).min() <= tol:
+        where.finite_at(x)
     classifier = _Classifier(where, numbers, tol, margin)
     if where.one_sided:
         return classifier.one_sided()
-    away = numbers.distance / (1 + float(np.linalg.norm(x)))
     if away > tol:
         return classifier.off_surface(away)
     return classifier.on_surface()
@@ -207,8 +210,9 @@ class _Classifier:
         self.evidence: dict[str, float] = {"h": float(numbers.h), **lie}
         self.to_zero = [float("inf"), float("inf")]  # distance to a zero of F1, F2
         if not where.system.time_dependent:
-            pairs = zip(numbers.fields, self.derivatives, strict=True)
-            self.to_zero = [equilibrium_distance(f, d, numbers.x) for f, d in pairs]
+            for k, (f, d) in enumerate(zip(numbers.fields, self.derivatives, strict=True)):
+                if np.all(np.isfinite(d)):  # a root on the surface may have an infinite slope
+                    self.to_zero[k] = equilibrium_distance(f, d, numbers.x)
 
     # the result -----------------------------------------------------------------------------------
 
@@ -260,7 +264,7 @@ class _Classifier:
                 self.is_zero(self.to_zero[k], f"F{k + 1} = 0")
                 status = "real" if k == own else "virtual"
                 return self._equilibrium(k, status)
-        x, gradient = self.numbers.x, self.numbers.gradient
+        x, gradient = self.numbers.x, self.where.free.at(self.numbers.x).gradient
         foot = x - self.numbers.h * gradient / (gradient @ gradient)
         raise PointError(
             f"point {x}: expected a point of the surface h = 0, or an equilibrium of a field, "
@@ -400,10 +404,44 @@ class _Classifier:
             slope = self.derivatives[k].T @ along + hessians[1 + k] @ numbers.fields[k]
             growth += float(slope @ tangent) / float(along @ tangent) / abs(second)
         self.evidence["growth"] = growth
+        shrinks = self._jumps()
+        if abs(shrinks - 1.0) > self.margin:
+            self.evidence["jumps"] = shrinks
+            return "stable" if shrinks < 1.0 else "unstable"
         speed = float(np.linalg.norm(numbers.fields[0]) * np.linalg.norm(numbers.gradient))
         if abs(growth) * speed < self.margin:
             return "neutral"
         return "stable" if growth < 0 else "unstable"
+
+    def _jumps(self) -> float:
+        """By what the resets on this surface multiply L in a turn round the point, which they keep."""
+        system, x = self.where.system, self.numbers.x
+        if not system.resets or not system.definition.plain:
+            return 1.0
+        d, first, ratio = system.definition, len(system.stops), 1.0
+        guards = [d.guards[first + k] for k in range(len(system.resets))]
+        maps = [d.maps[:, k] for k in range(len(system.resets))]
+        function = system.function(
+            ("jumps",),
+            lambda: [
+                *guards,
+                *map(system.gradient, guards),
+                *maps,
+                *(system.gradient(m[i]) for m in maps for i in range(self.n)),
+            ],
+        )
+        values, count = call(function, x, self.where.parameters), len(guards)
+        tangent = self.numbers.tangents[:, 0]
+        for k, (_, direction) in enumerate(system.resets):
+            gradient = values[count + k].ravel()
+            across = abs(float(gradient @ tangent)) > self.tol * float(np.linalg.norm(gradient))
+            kept = np.allclose(values[2 * count + k].ravel(), x, rtol=0.0, atol=self.tol)
+            if abs(float(values[k].item())) > self.tol or across or not kept:
+                continue
+            rows = values[3 * count + k * self.n : 3 * count + (k + 1) * self.n]
+            along = abs(float(tangent @ np.array([row.ravel() for row in rows]) @ tangent))
+            ratio *= along if direction else along**2
+        return ratio
 
     def _fold_fold(self) -> LocalObject:
         found = fold_fold_of(self.where, self.numbers, 1e-300)
@@ -430,9 +468,8 @@ class _Classifier:
         if undecided or not c.nearest.startswith("nu"):
             self.margins[c.nearest or "no boundary"] = c.margin
         self.evidence.update(nu1=found.nu[0], nu2=found.nu[1])
-        own = (
-            found if self.where.along(numbers.x) is None else None
-        )  # it has coordinates of all states
+        free = self.where.along(numbers.x) is None and self.n > 2
+        own = found if free else None  # it has coordinates of all states
         return self.result("two-fold", found.label, "", own)
 
     def _tangency(self, k: int) -> LocalObject:
@@ -464,7 +501,7 @@ class _Classifier:
         numbers = self.numbers
         l1, l2 = numbers.lie
         self.evidence["alpha"] = float(l1 / (l1 - l2))
-        if self.where.system.time_dependent:
+        if self.where.system.time_dependent or not np.all(np.isfinite(self.derivatives)):
             return self.result("sliding", region)
         speed = (l2 * numbers.fields[0] - l1 * numbers.fields[1]) / (l2 - l1)
         matrix, basis = sliding_matrix(numbers, self.derivatives)

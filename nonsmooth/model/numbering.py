@@ -58,7 +58,7 @@ TAPE_RULES = tuple(
 )
 
 #: Laws of elements, by number in C.
-LAWS = ("surface", "contact", "set", "relay", "joint", "complementarity")
+LAWS = ("surface", "contact", "set", "relay", "joint", "complementarity", "table")
 
 #: Laws of impacts, by number in C.
 IMPACT_LAWS = ("newton", "moreau", "poisson")

@@ -29,6 +29,7 @@ def module() -> str:
 
 def described(system: FilippovSystem, tol: float = 1e-10) -> dict[str, Any]:
     """A system for ``Engine`` of engine.js: its image, its sizes, and how its modes are spelled."""
+    system = system.of_breakpoints
     engine = tape_for(system, Options(t_end=1.0, rtol=tol, atol=tol))
     image = image_of(engine)
     layouts = exchanged()
@@ -54,6 +55,7 @@ def described(system: FilippovSystem, tol: float = 1e-10) -> dict[str, Any]:
         n=system.extended_dimension,
         m=system.surface_count,
         c=contacts,
+        atoms=engine.atoms,
         entries=[members[0] for members in system.entries],
         half_lines=list(system.half_lines),
         discrete=names[system.dimension - discrete :] if discrete else [],

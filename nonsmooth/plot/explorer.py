@@ -18,7 +18,9 @@ from ..local.searches.find_two_fold import TwoFold
 from ..model import Array, FilippovSystem, OptionError, ParameterError, raised_of, require_system
 from .offline_page import WEB, installed_version, offline_page
 
-_SCRIPTS = ("scan.js", "orbit.js", "sweep.js", "pictures.js", "explore.js")
+_SCRIPTS = tuple(
+    f"{name}.js" for name in "scan orbit sweep pictures portrait saving explore".split()
+)
 #: Share of the range of a run that is left free beside it.
 _MARGIN = 0.2
 #: Of a two-fold: how far from it the page reaches at first.
@@ -98,7 +100,7 @@ def explore(
     system : FilippovSystem or TwoFold
         Any system that :func:`simulate` takes, or a two-fold of one: the page then begins beside it.
     start : array_like (n,), optional
-        Start of the orbit; by default the origin.
+        Start of the orbit; by default the origin, with the first value of each discrete state.
     t_end : float, optional
         Time at which the orbit ends.
     parameters : mapping, optional
@@ -148,7 +150,7 @@ def explore(
     ranges = _ranges(system, parameters or {})
     sliders = _sliders(system, ranges)
     values = {slider["name"]: slider["value"] for slider in sliders}
-    x0 = np.zeros(system.dimension) if start is None else start
+    x0 = _usual(system) if start is None else start
     x0 = system.extended_point(x0)[: system.dimension]
     t_end = _positive(t_end)
     limits = _box(system, box) if box is not None else _around(system, x0, t_end, values)
@@ -194,6 +196,12 @@ def _beside(fold: TwoFold, start: Any, box: Any) -> tuple[FilippovSystem, Any, A
         point + 0.3 * reach if start is None else start,
         around if box is None else box,
     )
+
+
+def _usual(system: FilippovSystem) -> Array:
+    """The origin, with the first value of each discrete state."""
+    first = [values[0] if values else 0.0 for values in system.definition.discrete]
+    return np.array([0.0] * (system.dimension - len(first)) + first)
 
 
 def _positive(t_end: float) -> float:

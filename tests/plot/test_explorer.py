@@ -1,6 +1,7 @@
 """The page of a system shows what Python computes, follows pointer and keys, and needs no network."""
 
 import itertools
+import json
 import re
 
 import casadi as ca
@@ -77,6 +78,36 @@ def test_a_parameter_without_a_value_begins_in_the_middle_of_its_range():
         ns.explore(system, start=[1.0])
     made = ns.explore(system, start=[1.0], t_end=2.0, parameters={a: (1.0, 3.0)})
     assert '"name": "a", "value": 2.0, "low": 1.0, "high": 3.0' in made.html
+
+
+def data(page):
+    return json.loads(re.search(r'id="data-explorer">(.*?)</script>', page.html)[1])
+
+
+def test_a_two_fold_is_explored_from_beside_it():
+    fold = ns.find_two_fold(ns.textbook.PROBLEMS["two_fold"]().system, near=[0.0, 0.1, 0.1])
+    made = data(ns.explore(fold, t_end=5.0))
+    assert made["start"] == pytest.approx([0.3, 0.3, 0.3], abs=1e-9)
+    assert made["box"] == pytest.approx([-1.0, 1.0] * 3, abs=1e-9)
+    assert sorted(made["cuts"]) == [0, 1, 2] and made["cuts"][-1] != 0  # planes on which z1 varies
+
+
+def test_without_a_start_discrete_states_have_their_first_value():
+    assert data(ns.explore(ns.textbook.PROBLEMS["gearbox"]().system))["start"] == [0.0, 1.0]
+
+
+def test_folds_are_shown_where_forces_jump_only():
+    stiff = ns.FilippovSystem([x, v], surface=x, above=[v, -4 * x], below=[v, -x])
+    assert data(ns.explore(BELT))["slides"] and not data(ns.explore(stiff))["slides"]
+
+
+def test_a_module_of_other_sources_makes_no_page(monkeypatch, tmp_path):
+    monkeypatch.setattr(driver, "MODULE", tmp_path / "core.wasm")
+    driver.MODULE.write_bytes(b"\0asm")
+    driver.module.cache_clear()
+    with pytest.raises(ns.NonsmoothError, match="make wasm"):
+        ns.explore(BELT)
+    driver.module.cache_clear()
 
 
 def test_every_status_has_its_sentence():
@@ -304,7 +335,7 @@ def test_a_system_in_space_is_turned_and_its_start_moved(browser, space):
 @pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", [*ns.textbook.PROBLEMS][::4])
+@pytest.mark.parametrize("name", [*ns.textbook.PROBLEMS][::6])
 def test_pages_of_textbook_problems_have_no_faults(browser, tmp_path, name):
     problem = ns.textbook.PROBLEMS[name]()
     run = problem.run()

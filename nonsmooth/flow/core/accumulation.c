@@ -316,7 +316,7 @@ static void rest_if_slow(Run *r) {
 
 /* Store an event among the last ones. */
 static void remember(Run *r, int kind, int guard) {
-  int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->met.kind << 32) + (guard < 0 ? -1 : r->met.index);
+  int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->met.kind << 32) + (guard < 0 ? -1 : shown_index(r));
   r->past[r->history++ % HISTORY] = (Happened){r->since, pattern, kind, r->met};
   r->since = 0;
 }

@@ -36,6 +36,7 @@ static void adopt(Run *r, const Continuation *c) {
   }
   r->shown = shown;
   enter_segment(r, shown);
+  require_limits(r);
 }
 
 /* A surface that would come to rest though its multiplier enters only its third derivative or a later one: motions
@@ -70,6 +71,7 @@ static int letters_of(Run *r, int8_t *letter) {
   if (!r->width) return 1;
   const double *h = surface_values(r, r->x);
   int finite = finite_all(h, r->m + 2 * r->c);
+  find_cells(r, h);
   for (int i = 0; i < r->width; i++) letter[i] = law_of(r, i)->side(r, i, h[i]);
   if (r->s->sets && r->c) idle_sets(r, letter, surface_scales(r, r->x));
   take_sides(r, letter, -1);
@@ -97,6 +99,7 @@ static int settle_in(Run *r) {
   active_surfaces(r, -1, r->start);
   if (r->status != RUNNING) return jumped;
   choose(r, r->start, 0, 0);
+  turn_cells(r);
   strike_due(r);
   if (jumped) event(r, JUMP, before, 0, r->jumped_from);
   r->met = met;
@@ -183,8 +186,8 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
       choose(r, r->start, 0, 0);
     }
   }
-  r->shown = shown_number(r, r->letter);
-  enter_segment(r, r->shown);
+  renumber(r);
+  turn_cells(r);
   strike_due(r);
   if (jumped) event(r, JUMP, before, 0, r->jumped_from);
   begin_events(r, motion);
@@ -291,6 +294,7 @@ static void serve_contact(Run *r, int row) {
 static void serve(Run *r, int row) {
   int kind = r->now.kind[row], index = r->now.index[row], side = r->now.side[row];
   r->met = (Met){kind, index, side};
+  pass_cells(r, row);
   if (kind != BRANCH_GUARD) law_of(r, index)->serve(r, row);
   else if (side == OF_ONE || is_mixed(r, r->now.sliding, r->now.slides)) pass(r, row, 0, 0);
   else {

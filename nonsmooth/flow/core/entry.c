@@ -119,17 +119,24 @@ void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = time
 /* Letters from which elements with hysteresis go on, or none. */
 void run_remember(Run *r, const int8_t *letter) { r->remembered = letter; }
 
-static void set_parameters(Run *r, const double *p) {
+/* What follows from the parameters, in all programs. */
+static void prepare(Run *r) {
   const System *s = r->s;
   const Values *program[] = {&s->point, &s->surfaces, &s->maps, &s->restitution, &s->columns, &s->atoms, &s->choices};
   double *work[] = {r->point, r->heights, r->maps, r->restitution, r->columns, r->atom_work, r->choice_work};
-  memcpy(r->p, p, sizeof(double) * s->parameters);
   series_prepare(&s->series, r->p, r->series);
   pairs_begin(s->series.size, r->stride, r->begun, r->series);
   for (int k = 0; k < 7; k++) {
     values_prepare(program[k], r->p, work[k]);
     pairs_begin(program[k]->size, 1, r->begun, work[k]);
   }
+  prepare_implicit(r);
+}
+
+static void set_parameters(Run *r, const double *p) {
+  memcpy(r->p, p, sizeof(double) * r->s->parameters);
+  for (int i = 0; i < r->m; i++) r->cell[i] = -1;
+  prepare(r);
 }
 
 /* A run that has not begun. */

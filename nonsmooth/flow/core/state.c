@@ -23,9 +23,18 @@ typedef struct {
  * between are rows from ``lower`` on of what is kept: all functions, then these. With hysteresis h is that of the
  * multiplier +1, and the row ``lower`` that of -1. */
 typedef struct {
-  int32_t law, first, k, degree, lower, flags;
+  int32_t law, first, k, degree, lower, flags, shown, pad; /* shown: the number of the function in results */
   double width, power; /* of the layer; the smallest power of h in the field, or 0 */
 } Element;
+
+/* A table: ``count`` breakpoints of its function, and for each of the cells between them the values of ``size``
+ * parameters from ``first`` on. Each breakpoint's number among those that are shown, or -1. Of each limit the first and
+ * the last cell, and surfaces with the sides on which it holds, after their number. */
+typedef struct {
+  int32_t count, size, first, limits;
+  const double *level, *value;
+  const int32_t *shown, *limit;
+} Cells;
 
 /* Flags: the multiplier makes no difference on h = 0; its unknown is a product with a factor. */
 enum { CONTINUOUS = 1, SCALED = 2 };
@@ -43,6 +52,7 @@ typedef struct {
   Values columns;     /* entries of the field's derivatives by the unknowns */
   Entries slope, layer_gradient, height_gradient, stop_gradient, factor_gradient, surface_gradient, atom_gradient, column;
   const Element *element; /* of each function: of m surfaces and sets, c contacts */
+  const Cells *cells; /* of each function, where it is a table's */
   const int32_t *carries, *component; /* (m, c): contacts whose reaction scales a surface's multiplier */
   /* (m + c, m + c): output of the series or -1; whether it moves; whether the matrix is symmetric */
   const int32_t *slope_output, *slope_moves, *slope_symmetric;
@@ -51,7 +61,7 @@ typedef struct {
    * the time, nothing to be checked; the latter: 0 if affine in states and time, polynomials are exact. */
   const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
-  int32_t sets, kept_rows, impact_law, joints; /* sets: of codimension two and more; kept_rows: see Element */
+  int32_t sets, kept_rows, impact_law, joints, tables; /* sets: of codimension two and more; kept_rows: see Element */
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   Rules rules;
   Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
@@ -169,7 +179,7 @@ typedef struct {
   Layout now; /* of the present mode */
   Met met;
   Instant instant;
-  int32_t mode, status, reason, where, due_impact, falls, repelling, folded;
+  int32_t mode, status, reason, where, due_impact, falls, repelling, folded, passed; /* passed: the breakpoint */
   int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
@@ -216,7 +226,8 @@ typedef struct {
   OF(int8_t, moving, w) OF(int8_t, turned, rows) OF(double, rates_of_several, SEVERAL * n) \
   OF(double, layer_series, s->slope_outputs ? (tried * tried + sums * sums) * stride : 0) \
   OF(int8_t, idle, m) OF(int8_t, vanishes, most) /* sets without friction; nodes of a program that are zero */ \
-  OF(double, of_defect, rows) OF(int8_t, key, w + 8 * s->rules.discrete) /* of_defect: errors of guards */ \
+  OF(double, of_defect, rows) OF(int8_t, key, w + 8 * (s->rules.discrete + s->tables)) /* of_defect: errors of guards */ \
+  OF(int32_t, cell, w) OF(double, levels, all + 1) /* of tables; values of functions onto which a state is put */ \
   OF(double, met_at, rows) OF(double, hidden, rows) /* root of each guard in the step, or -1; what rounding hides of it */
   RUN_ARRAYS(DECLARED)
 } Run;
@@ -253,6 +264,7 @@ static void direction_bounds(const Run *r, const Expansion *e, double *last, dou
 static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h);
 static void measure_limits(Run *r, Expansion *e);
 static void keep_carried(const Run *r, const int8_t *letter, double *unknowns);
+static void prepare_implicit(Run *r);
 
 static void finish(Run *r, int status, int reason, int where) {
   if (r->status == RUNNING) { r->status = status; r->reason = reason; r->where = where; }

@@ -242,6 +242,7 @@ _FIELDS: dict[str, Callable[[FilippovSystem, Options, Run], Any]] = {
     "actual": lambda s, o, run: s.spelled(run.letters[run.where]),
     "entry": lambda s, o, run: s.entry_of(run.where),
     "surface": lambda s, o, run: s.surface_names[run.where],
+    "argument": lambda s, o, run: str(s.written.surfaces[run.where]),
     "stop": lambda s, o, run: s.stops[run.where][0],
     "reset": lambda s, o, run: s.resets[run.where][0],
     "impact": lambda s, o, run: s.impacts[run.where],

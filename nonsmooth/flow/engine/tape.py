@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from ...model.printing.tape import (
     derived_series_of,
     tape_of,
 )
-from ..constants import FULL, IMPACT_LAWS, LAWS, NEEDS_PROGRAM, RUNNING, SEVERAL
+from ..constants import FULL, IMPACT_LAWS, LAWS, NEEDS_PROGRAM, REASONS, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
@@ -36,6 +37,7 @@ from .arrays import (
 from .building.codegen import tape_order
 from .library import core_library
 from .recording import Output, Recorder, Rooms, rooms_of
+from .shown import Shown
 from .structures import declare, structure
 
 _VALUES = ("point", "surfaces", "maps", "atoms", "choices", "restitution", "columns")
@@ -52,8 +54,8 @@ def library() -> ctypes.CDLL:
     return declare(core_library())
 
 
-def _elements(coupled: Coupled) -> list[ctypes.Structure]:
-    """The element of each function: of surfaces and sets, then of contacts."""
+def _elements(coupled: Coupled, shown: Sequence[int]) -> list[ctypes.Structure]:
+    """The element of each function: of surfaces and sets, then of contacts; and its number in results."""
     system, m, c = coupled.system, coupled.system.surface_count, len(coupled.system.impacts)
     made, lower = list[ctypes.Structure](), m + 2 * c
     for name, members in zip(system.laws, system.entries, strict=True):
@@ -62,18 +64,17 @@ def _elements(coupled: Coupled) -> list[ctypes.Structure]:
         law, degree = LAWS.index(name), 1 if i in system.remembering else further + 1
         degree = 0 if i in system.algebraic else degree
         size = (system.layer_widths[i], coupled.powers[i])
-        made += [structure("Element")(law, i, k, degree, lower, flags, *size)] * k
+        rest = (law, i, k, degree, lower, flags)
+        made += [structure("Element")(*rest, shown[j], 0, *size) for j in members]
         lower += further
     law = LAWS.index("contact")
-    return [
-        *made,
-        *[structure("Element")(law, m + j, 1, 2, m + c + j, 0, 1.0, 0.0) for j in range(c)],
-    ]
+    of_contact = lambda j: (law, m + j, 1, 2, m + c + j, 0, shown[m + j], 0, 1.0, 0.0)
+    return [*made, *[structure("Element")(*of_contact(j)) for j in range(c)]]
 
 
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine:
     """Return the driver with a system at the options' tolerance."""
-    order = tape_order(system, options)
+    order = tape_order(system.of_pieces, options)
     return system.cached(("tape", order), lambda: TapeEngine(system, order))
 
 
@@ -133,9 +134,10 @@ class TapeEngine:
     """The driver in C with one system at one order, with ``derived`` for derivatives."""
 
     def __init__(self, system: FilippovSystem, order: int, derived: bool = False):
-        self.system, self.order = system, order
-        self.coupled = raised_of(system)
-        tape = system.cached("tape", lambda: tape_of(self.coupled))
+        self.shown, self.order = Shown(system.of_breakpoints if derived else system), order
+        self.system = self.shown.driven
+        self.coupled = raised_of(self.system)
+        tape = self.system.cached("tape", lambda: tape_of(self.coupled))
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         entries = None
         if derived:
@@ -184,7 +186,7 @@ class TapeEngine:
         carries = np.zeros((m, c))
         for i, carried in enumerate(coupled.carriers):
             carries[i, carried] = 1
-        elements = _elements(coupled)
+        elements = _elements(coupled, self.shown.functions)
         tables: dict[str, Any] = {
             "carries": carries.ravel(),
             "component": tape.component,
@@ -202,10 +204,25 @@ class TapeEngine:
         made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
         table = (structure("Element") * (len(elements) + 1))(*elements)
         made.element = self._at(np.frombuffer(bytes(table), np.uint8))
+        made.tables, made.cells = len(self.shown.tables), self._cells()
         for name, values in tables.items():
             setattr(made, name, self._at(np.array([*values, 0], np.int32)))
         made.rules = self._rules()
         return made
+
+    def _cells(self) -> int:
+        """Tables as C reads them, by their functions."""
+        made: Any = (structure("Cells") * (self.system.surface_count + 1))()
+        first = self.shown.parameters
+        for table in self.shown.tables:
+            values, k = table.values(), len(table.levels)
+            limits = [v for *cells, own in table.limits for v in (*cells, len(own), *chain(*own))]
+            numbers = [np.array(a, np.int32) for a in ([*table.shown, 0], [*limits, 0])]
+            arrays = [np.array([*table.levels, 0.0]), np.ascontiguousarray(values), *numbers]
+            sizes = (k, values.shape[1], first, len(table.limits))
+            made[table.element] = structure("Cells")(*sizes, *[self._at(a) for a in arrays])
+            first += values.shape[1]
+        return self._at(np.frombuffer(bytes(made), np.uint8))
 
     def _rules(self) -> ctypes.Structure:
         """Conditions of stops and resets as C reads them."""
@@ -255,6 +272,11 @@ class TapeEngine:
         return structure("Entries")(len(e.row), 0, self._at(e.row), self._at(e.column))
 
     @property
+    def atoms(self) -> int:
+        """Functions of which stops and resets are made."""
+        return int(self._c.rules.atoms)
+
+    @property
     def motion_width(self) -> int:
         """Numbers that a restart needs besides the state."""
         return int(self._c.rules.width)
@@ -289,10 +311,10 @@ class TapeEngine:
         rooms = {"rooms": self._rooms} if dense else {}
         output = Output(self.system.extended_dimension, self.order, motion=width, **rooms)
         recorder = Recorder(output, self.system.dimension, dense, read_at)
-        x, p = np.array(x, float), np.array([*p, 0.0], float)
+        x, p = np.array(x, float), self.shown.with_cells(p)
         start, known = self._letters(options.start_mode), self._letters(mode)
         with self.held_table() as table, self.held_run(table) as state:
-            c_options = ctypes.byref(options_of(self.system, options, dense=True))
+            c_options = ctypes.byref(options_of(self.shown.system, options, dense=True))
             given = (address(x), address(p), address(start))
             library().run_read_at(state, address(read_at), 0 if read_at is None else len(read_at))
             library().run_remember(state, address(known))
@@ -309,6 +331,7 @@ class TapeEngine:
             recorded = recorder.finished(counts[7:10])
             self._rooms = recorder.rooms if dense else self._rooms  # the next run is often similar
             modes, labels = self._modes(table), self._labels(table)
+            shown = self.shown.where(REASONS[counts[1]], counts[2])
             final = np.zeros(width)
             library().run_motion(state, address(final))
             if width == 1 and options.t_start == 0:  # times of events are known to rounding
@@ -316,11 +339,11 @@ class TapeEngine:
         return Run(
             status=counts[0],
             reason=counts[1],
-            where=counts[2],
+            where=shown,
             mode=counts[3],
             limit=numbers[1],
             letters=modes,
-            active=active,
+            active=[self.shown.functions[i] for i in active],
             several=[modes[k] for k in several],
             rates=rates[:, : self.system.dimension],
             facts=counts[12],
@@ -359,13 +382,14 @@ class TapeEngine:
         )
 
     def _letters(self, mode: str | None) -> NDArray[np.int8] | None:
-        return None if mode is None else np.array([*self.system.parse_letters(mode), 0], np.int8)
+        return None if mode is None else np.array([*self.shown.narrowed(mode), 0], np.int8)
 
     @property
     def _width(self) -> int:
         """Bytes of a mode: letters, then values of discrete states."""
         system = self.system
-        return system.surface_count + len(system.impacts) + 8 * len(system.definition.discrete)
+        values = len(system.definition.discrete) + len(self.shown.tables)
+        return system.surface_count + len(system.impacts) + 8 * values
 
     def held_table(self) -> _Held:
         made = library()
@@ -390,7 +414,7 @@ class TapeEngine:
     def words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
         """Modes that were met, and itineraries of some nodes of their tree."""
         modes = self._modes(table)
-        spelled = [self.system.spelled(letters) for letters in modes]
+        spelled = [self.shown.system.spelled(letters) for letters in modes]
         if self.system.definition.discrete:
             rows = self._labels(table)
             spelled = [
@@ -404,7 +428,17 @@ class TapeEngine:
     def _modes(self, table: int) -> list[str]:
         """Modes that were met, by number."""
         width = self.system.surface_count + len(self.system.impacts)
-        return [self._spelled(row) for row in self._met(table)[:, :width].tolist()]
+        letters = [self._spelled(row) for row in self._met(table)[:, :width].tolist()]
+        return [*map(self.shown.widened, letters, self._values(table)[:, self._discrete :])]
+
+    @property
+    def _discrete(self) -> int:
+        return len(self.system.definition.discrete)
+
+    def _values(self, table: int) -> Array:
+        """Values of the discrete states and cells of tables in the modes that were met."""
+        width = self.system.surface_count + len(self.system.impacts)
+        return np.ascontiguousarray(self._met(table)[:, width:]).view(np.float64)
 
     def _met(self, table: int) -> NDArray[np.int8]:
         """Modes that were met, as bytes."""
@@ -415,11 +449,11 @@ class TapeEngine:
 
     def _labels(self, table: int) -> list[tuple[float, ...]]:
         """Values of the discrete states in the modes that were met."""
-        discrete = len(self.system.definition.discrete)
-        if not discrete:
-            return []
-        rows = np.ascontiguousarray(self._met(table)[:, -8 * discrete :]).view(np.float64)
-        return [tuple(row) for row in rows.tolist()]
+        return (
+            [*map(tuple, self._values(table)[:, : self._discrete].tolist())]
+            if self._discrete
+            else []
+        )
 
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``core/state.c`` for those of sets."""
@@ -446,10 +480,10 @@ class TapeEngine:
         chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
         x = np.ascontiguousarray(x, float)
-        p = np.ascontiguousarray(np.append(p, np.zeros((*p.shape[:-1], 1)), axis=-1), float)
+        p = self.shown.with_cells(p)
         batch = batch_of(x, p, options.t_start, chunk, times, None)
         start, done = self._letters(options.start_mode), np.zeros(1, np.int64)
-        c_options = options_of(self.system, options, dense=False, at=at)
+        c_options = options_of(self.shown.system, options, dense=False, at=at)
         with self.held_table() as table, self.held_run(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
             while status := library().run_many(*call, address(start), BURST):

@@ -157,6 +157,11 @@ class _Numbers:
         open_set = [*self.system.algebraic, *[i for i in touched if self._may_close(i)]]
         solved = list(self._solutions(letters, on, open_set))
         distinct = {tuple(one.tolist()) for one, _ in solved}
+        if not distinct:
+            raise PointError(
+                f"point {self.x.tolist()}: no motion goes on there, neither with closed conditions and contacts nor with open "
+                "ones (Painleve's paradox, or a negative load). Check the friction and the loads."
+            )
         between = {i for _, zeros in solved for i in zeros if i in self.system.algebraic}
         if len(on) == 1 and len(distinct) == 1 and not between:
             return Situation(self.spelled(next(iter(distinct))), on[0])

@@ -134,7 +134,7 @@ def region(
         tol = positive(tol, "tol")
         return _region_of_set(law_at(system, point, parameters, t, surface, mode, tol), tol)
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    return region_at(where, on_surface(where, x, positive(tol, "tol")), tol)
+    return region_at(where, on_surface(where, x, positive(tol, "tol"), slopes=where.one_sided), tol)
 
 
 def _is_set(system: FilippovSystem, surface: int) -> bool:
@@ -208,7 +208,7 @@ def alpha(
     0.75
     """
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    numbers = on_surface(where, x, positive(tol, "tol"))
+    numbers = on_surface(where, x, positive(tol, "tol"), slopes=where.one_sided)
     if where.one_sided:
         raise PointError(
             f"alpha: a condition or contact has no field below. Its multiplier at {x.tolist()} is in "
@@ -269,7 +269,7 @@ def sliding_field(
     array([1., 0.])
     """
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    numbers = on_surface(where, x, positive(tol, "tol"))
+    numbers = on_surface(where, x, positive(tol, "tol"), slopes=where.one_sided)
     if where.one_sided:
         return velocity_while_closed(where, numbers, tol)[: system.dimension]
     found = region_of(numbers, tol)

@@ -250,10 +250,11 @@ class LocalSurface:
         rows = rows if basis is None else rows @ basis
         return Numbers(x, float(h[0, 0]), rows[0], rows[1:3], lie, rows[3:])
 
-    def finite_at(self, x: Array) -> Numbers:
-        """Evaluate as ``at`` does and refuse NaN and inf."""
+    def finite_at(self, x: Array, slopes: bool = True) -> Numbers:
+        """Evaluate as ``at`` does and refuse NaN and inf, those of grad L1 and grad L2 if ``slopes``."""
         numbers = self.at(x)
-        if not all(np.all(np.isfinite(v)) for v in (numbers.h, numbers.fields, numbers.gradients)):
+        gradients = numbers.gradients if slopes else numbers.gradient
+        if not all(np.all(np.isfinite(v)) for v in (numbers.h, numbers.fields, gradients)):
             raise PointError(
                 f"point {x}: expected a state where the fields and the derivatives of h, L1 and "
                 f"L2 are finite, received h={numbers.h}, F1={numbers.fields[0]}, "
@@ -381,15 +382,17 @@ def surface_at(
     smooth: bool = False,
     tol: float = 1e-9,
     search: bool = False,
+    flight: bool = False,
 ) -> tuple[LocalSurface, Array]:
     """Check the arguments of a function at a point; ``smooth`` allows a point on no surface, or a system without.
 
-    The point of a ``search`` is near the surface, and ``mode`` has the letters of conditions and contacts.
+    The point of a ``search`` is near the surface, and ``mode`` has the letters of conditions and contacts. In a
+    ``flight`` contacts are open, wherever the point is.
     """
     require_system(system, complementarity=True, joints=True)
     x = system.extended_point(point, t)
     p = system.parameter_vector(parameters)
-    if acts(system, x, p, mode, tol):
+    if not flight and acts(system, x, p, mode, tol):
         if search:
             found = chosen(system, surface, mode)
         else:
@@ -436,6 +439,11 @@ def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
     values = _switches(system, x, p).tolist()
     for i, value in enumerate(values):
         if i != surface and value == 0:
+            if values[surface]:
+                raise PointError(
+                    f"point {x}: expected a point on surface {surface}, received one on surface {i}. Give surface={i}, or "
+                    "the side with mode=, one letter per surface."
+                )
             raise PointError(
                 f"point {x}: expected a side of surface {i}, received a point on surfaces "
                 f"{surface} and {i}. Choose the side with mode=, one letter per surface."
@@ -453,9 +461,9 @@ def _switches(system: FilippovSystem, x: Array, p: Array) -> Array:
     return np.array([v.item() for v in call(system.function(("local", "surfaces"), build), x, p)])
 
 
-def on_surface(where: LocalSurface, x: Array, tol: float) -> Numbers:
-    """Evaluate at a point whose distance from the surface is at most ``tol (1 + |x|)``."""
-    numbers = where.finite_at(x)
+def on_surface(where: LocalSurface, x: Array, tol: float, slopes: bool = True) -> Numbers:
+    """Evaluate as ``finite_at`` does at a point whose distance from the surface is at most ``tol (1 + |x|)``."""
+    numbers = where.finite_at(x, slopes)
     if not np.any(numbers.gradient):
         raise PointError(
             f"point {x}: expected a regular point of surface {where.surface}, received grad h = "

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import Array, FilippovSystem, OptionError, Parameters
+from ...model import Array, FilippovSystem, OptionError, Parameters, call
 from ...model.derivatives.mode_equations import mode_equations
 from ..checks import require_autonomous
 from ..discrete_states import with_discrete_states_held
@@ -38,8 +39,8 @@ class Equilibrium:
     side : {"+", "-"}
         Of the field $F1$ above the surface or $F2$ below it; ``"+"`` for a smooth system.
     status : {"real", "virtual", "boundary"}
-        Whether it is on its field's own side, on the other side of a surface, or on the surface. Also virtual where a
-        stop or reset of the discrete state is due at once.
+        Whether it is on its field's own side, on the other side of a surface or behind a contact, or on the surface or
+        contact. Also virtual where a stop or reset of the discrete state is due at once.
     kind : str
         ``"stable node"``, ``"unstable focus"``, ``"saddle"``, ...; ``"degenerate"`` if an
         eigenvalue has no real part.
@@ -74,7 +75,8 @@ class Equilibrium:
     def __str__(self) -> str:
         values = ", ".join(f"{v:.6g}" for v in self.eigenvalues)
         if not self.mode:
-            return f"{self.kind} at {self.point.tolist()}, eigenvalues {values}."
+            status = "" if self.status == "real" else f"{self.status} "
+            return f"{status}{self.kind} at {self.point.tolist()}, eigenvalues {values}."
         where = f"mode {self.mode!r}" if set(self.mode) & set("ocs") else FIELDS[self.side]
         return (
             f"{self.status} {self.kind} of {where} at {self.point.tolist()}, h = {self.h:.6g}, "
@@ -130,7 +132,8 @@ def find_equilibrium(
     ----------
     system, parameters, surface, mode
         As in :func:`region`; the point need not be on the surface. A smooth system has none. With complementarity
-        conditions, constraints or closed contacts ``mode`` has all letters, also those of what slides or is closed.
+        conditions, constraints or closed contacts ``mode`` has all letters, also those of what slides or is closed;
+        without the letters of contacts these are open.
     near : array_like (n,)
         Where the search starts.
     side : {"+", "-"}
@@ -172,7 +175,7 @@ def find_equilibrium(
     if isinstance(system, FilippovSystem) and _needs_mode(system, mode):
         return _of_mode(system, near, mode, parameters, tol, max_iterations)
     require_autonomous(system, "equilibrium")
-    where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True)
+    where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True, flight=True)
     if not system.surface_count and side != "+":
         raise OptionError(
             f"side: expected '+', as a smooth system has one field, received {side!r}. Leave it out."
@@ -187,14 +190,10 @@ def find_equilibrium(
 
 
 def _needs_mode(system: FilippovSystem, mode: str | None) -> bool:
-    """Whether conditions, joints or closed contacts take part."""
+    """Whether a mode has to name what slides and what is closed, or does so."""
     if system.complementarity or system.constraints:
         return True
-    return (
-        bool(system.impacts)
-        and mode is not None
-        and 0 in system.parse_letters(mode)[system.surface_count :]
-    )
+    return bool(system.impacts) and mode is not None and len(mode) > len(system.entries)
 
 
 def _of_mode(
@@ -252,6 +251,9 @@ def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium
     else:
         signs = np.where(where.switches(x) > 0, "+", "-")
         status = "real" if "".join(signs) == mode else "virtual"
+    gap, touching = _least_gap(where, x), TOLERANCE * (1 + float(np.linalg.norm(x)))
+    if gap <= touching and status != "virtual":
+        status = "boundary" if gap >= -touching else "virtual"
     return Equilibrium(
         x,
         side,
@@ -265,3 +267,12 @@ def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium
         found.iterations,
         mode,
     )
+
+
+def _least_gap(where: LocalSurface, x: Array) -> float:
+    """Of the contacts, at a point; inf without one."""
+    system = where.system
+    if not system.impacts:
+        return math.inf
+    function = system.function(("gaps",), lambda: [system.definition.gaps])
+    return float(np.min(call(function, x, where.parameters)[0]))

@@ -27,6 +27,7 @@ from ..point.surface_point import (
     side_index,
     surface_at,
 )
+from .equilibria import equilibrium_distance
 from .search import Found, search, unknowns
 
 
@@ -95,7 +96,11 @@ def contact(where: LocalSurface, x: Array, side: Side, max_order: int, tol: floa
             f"point {x}: expected derivatives of h up to order {max_order}, received NaN or inf. "
             "The field is not that smooth here; lower max_order."
         )
-    if size > 0:
+    k = side_index(side)
+    rests = equilibrium_distance(where.at(x).fields[k], where.jacobians(x)[k], x) <= TOLERANCE
+    if rests:
+        h[1:] = 0.0
+    elif size > 0:
         powers = 1.0 / np.arange(1, max_order)
         growth = np.maximum(np.linalg.norm(states[:, 2:], axis=0) / speed, np.abs(h[2:]) / size)
         rate = float(np.max(growth**powers))

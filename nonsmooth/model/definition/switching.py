@@ -73,6 +73,8 @@ def class_of(
     if surface in system.half_lines and surface not in system.algebraic:
         how = "its definition as a condition of relative degree 1"
         return Switching("generic", None, None, how)
+    if surface in system.algebraic and not _changes_alone(system, surface):
+        return Switching("undecided", None, None, "conditions that open and close together")
     h, x, jump, above = _jump(system, surface, mode)
     if parameters is not None:
         p, values = system.parameter_symbols, ca.DM(system.parameter_vector(parameters))
@@ -94,6 +96,12 @@ def class_of(
     along = of_speed - gradient * ca.mtimes(gradient, of_speed.T) / ca.mtimes(gradient, gradient.T)
     k, how = _first(ca.vertsplit(jump), along.T, [h, speed], x, how, 0)
     return Switching("velocity continuous", k, None if k is None else 1.5 if k else 0.5, how)
+
+
+def _changes_alone(system: FilippovSystem, condition: int) -> bool:
+    """Whether a condition's own multiplier is in its y."""
+    d = system.definition
+    return bool(ca.depends_on(d.surfaces[condition], d.multipliers[condition]))
 
 
 def _jump(

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
+from itertools import accumulate
 from typing import Any, TypeVar
 
 import casadi as ca
@@ -35,6 +37,7 @@ from .parse_definition import (
     consistent_parameters,
     read_definition,
 )
+from .pieces import by_breakpoints, by_pieces
 from .roots import roots_of
 from .switching import Switching, class_of
 
@@ -239,8 +242,16 @@ class FilippovSystem:
         found = lift(entries, frame.states, frame.time, held, hidden=hidden)
         given |= {"field": found.field, "multipliers": found.multipliers, "surface": None}
         given |= {"surfaces": found.surfaces, "above": None, "below": None}
+        values = given["parameters"]
+        if found.values and isinstance(values, Mapping):
+            given["parameters"] = {**values, **dict.fromkeys(found.values)}
+        elif found.values:
+            given["parameters"] = [*listed(values), *found.values]
+        made = read_definition(**given)
+        names = {value.name() for value in found.values}
+        defaults = {name: value for name, value in made.defaults.items() if name not in names}
         system = cls.__new__(cls)
-        system._adopt(read_definition(**given))
+        system._adopt(replace(made, tables=found.tables, defaults=defaults))
         system.lifted = found.switches
         return system
 
@@ -326,27 +337,52 @@ class FilippovSystem:
 
         def made() -> FilippovSystem:
             system = type(self).__new__(type(self))
-            system._adopt(with_values(self.definition, list(key)))
+            system._adopt(with_values(self.written, list(key)))
             system.lifted = self.lifted
             return system
 
         return self.cached(("holding", key), made)
 
-    def _adopt(self, definition: Definition) -> None:
-        self.definition = definition
+    def _adopt(self, written: Definition) -> None:
+        #: The definition with tables as elements of one argument each; ``definition`` has their breakpoints.
+        self.written = written
+        definition = self.definition = by_breakpoints(written) if written.tables else written
         self.stops, self.resets = definition.stops, definition.resets
         self.impacts, self.constraints = definition.impacts, definition.constraints
         self.complementarity = definition.complementarity
         self.hidden = definition.hidden
-        self.nonlinear = enters_nonlinearly(definition.field, definition.multipliers)
         names = definition.names
         self.state_names = tuple(names["states"])
         self.parameter_names = tuple(names["parameters"])
         self._extended_states = definition.extended_states
         self._cache = Cache()
 
+    @cached_property
+    def nonlinear(self) -> Any:
+        """Which multipliers enter the field nonlinearly."""
+        return enters_nonlinearly(self.definition.field, self.definition.multipliers)
+
+    @cached_property
+    def of_pieces(self) -> FilippovSystem:
+        """The system that runs integrate: with tables as elements, whose cells set parameters."""
+        if not self.written.tables:
+            return self
+        system = type(self).__new__(type(self))
+        system._adopt(by_pieces(self.written))
+        return system
+
+    @cached_property
+    def of_breakpoints(self) -> FilippovSystem:
+        """The system whose breakpoints are surfaces in runs too."""
+        if not self.written.tables:
+            return self
+        system = type(self).__new__(type(self))
+        system._adopt(self.definition)
+        system.lifted = self.lifted
+        return system
+
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.definition.state(), "lifted": self.lifted}
+        return {**self.written.state(), "lifted": self.lifted}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._adopt(Definition.from_state(state))
@@ -356,7 +392,7 @@ class FilippovSystem:
         """Hash of the definition: equal for equal expressions, names, stops and resets."""
 
         def build() -> str:
-            parts = sorted((k, repr(v)) for k, v in self.definition.state().items())
+            parts = sorted((k, repr(v)) for k, v in self.written.state().items())
             return hashlib.sha256(str(parts).encode()).hexdigest()
 
         return self.cached("content hash", build)
@@ -465,8 +501,8 @@ class FilippovSystem:
     def entries(self) -> tuple[tuple[int, ...], ...]:
         """Switching functions of each surface or set, in the order in which they were given."""
         sizes = self.definition.sizes or (1,) * self.surface_count
-        firsts = [sum(sizes[:i]) for i in range(len(sizes))]
-        return tuple(tuple(range(f, f + k)) for f, k in zip(firsts, sizes, strict=True))
+        firsts = accumulate(sizes, initial=0)
+        return tuple(tuple(range(f, f + k)) for f, k in zip(firsts, sizes, strict=False))
 
     @cached_property
     def layer_widths(self) -> tuple[float, ...]:

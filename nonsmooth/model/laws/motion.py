@@ -18,6 +18,7 @@ import numpy as np
 from ..definition.parse_definition import read_function
 from ..definition.system import FilippovSystem, require_system
 from ..errors import DefinitionError
+from ..expressions.identity import decide_zero
 from .coupled import coupled_of, raised_of
 from .switches import Guard, event_guards
 
@@ -53,6 +54,11 @@ class Motion:
         sliding = coupled.sliding(self.mode)
         symbols = coupled.symbols_of(sliding)
         field, layer = coupled.held_at(self.mode, [coupled.field, coupled.layer])
+        #: Surfaces whose unknown is lambda + c lambda^3, and their c: sliding ends where that is largest.
+        self._cubic: dict[int, ca.SX] = {}
+        for i in sliding:
+            if i < self.system.surface_count and self.system.nonlinear[i]:
+                field, layer = self._of_cubic(i, field, layer, symbols)
         self.states, self.field, self._values = x, field, symbols
         if not sliding:
             return
@@ -75,6 +81,26 @@ class Motion:
         drift = ca.mtimes(ca.jacobian(residual, x), field)
         self.field = ca.vertcat(field, -solved(slope, drift))
 
+    def _of_cubic(self, i: int, field: ca.SX, layer: ca.SX, symbols: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Field and layer in lambda + c lambda^3 if lambda_i enters as such, as friction that drops does."""
+        x, own = self.system.extended_states, self._coupled.unknown(i)
+        both = ca.vertcat(field, layer)
+        slopes, zero = [both], ca.SX(0)
+        for _ in range(4):
+            slopes.append(ca.jacobian(slopes[-1], own))
+        first, second = (ca.substitute(e, own, zero) for e in slopes[1:3])
+        third, n = slopes[3] / 6, field.numel()
+        row = [first[n + i], third[n + i]]
+        parts = ca.vertcat(first, third)
+        if not slopes[4].is_zero() or ca.depends_on(parts, symbols) or row[0].is_zero():
+            return field, layer
+        apart = [*ca.vertsplit(second), *ca.vertsplit(third * row[0] - first * row[1])]
+        if not decide_zero(apart, [], x)[0]:
+            return field, layer
+        self._cubic[i] = row[1] / row[0]
+        both = ca.densify(ca.substitute(both, own, zero) + first * own)
+        return both[:n], both[n:]
+
     def _guarded(self, is_single: bool) -> Iterator[tuple[Guard, ca.SX]]:
         """Guards of surfaces and exits, contacts, stops and resets, and their functions."""
         coupled, system, m = self._coupled, self.system, self.system.surface_count
@@ -89,6 +115,11 @@ class Motion:
                 yield guard("surface" if i < m else "impact", sign), sign * heights[i]
             elif i >= m or i in system.half_lines:
                 yield guard("release", 0), self._values[sliding.index(i)]
+            elif i in self._cubic:
+                yield (
+                    guard("branch", 0),
+                    -4 / (27 * self._cubic[i]) - self._values[sliding.index(i)] ** 2,
+                )
             elif i not in system.joints:
                 for side in (1, -1):
                     if is_single:  # vanishes where sliding stops being attracting

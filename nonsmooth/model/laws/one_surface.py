@@ -13,6 +13,7 @@ from typing import Any, Literal
 import casadi as ca
 
 from ..definition.system import FilippovSystem
+from ..errors import DefinitionError
 from ..reading import listed
 from ..values import Array
 from .coupled import Coupled, coupled_of
@@ -112,7 +113,9 @@ class _Held:
             return ca.densify(what)
         unknowns = ca.vertcat(*[coupled.unknown(i) for i in closed])
         rows = put(coupled.layer[closed])
-        slope = ca.jacobian(rows, unknowns)
+        slope = ca.sparsify(ca.jacobian(rows, unknowns))
+        if not slope.nnz():
+            raise self._together(closed)
         found = -least_norm(slope, ca.substitute(rows, unknowns, ca.SX.zeros(len(closed), 1)))
         return ca.densify(ca.substitute(what, unknowns, found))
 
@@ -129,10 +132,21 @@ class _Held:
         push = ca.jacobian(self.at(0, field, own), own)
         row = self.at(0, self.coupled.layer[self.element], own)
         first = ca.substitute(row, own, 0)
-        load = -first / ca.jacobian(row, own)
+        slope = ca.jacobian(row, own)
+        if slope.is_zero():
+            raise self._together([self.element])
+        load = -first / slope
         h = first if self.kind == "algebraic" else self.coupled.kept[self.element]
         made = _with_sides(self.system, h, [above, above + load * push])
         return self._with(made, push, load)
+
+    def _together(self, which: Sequence[int]) -> DefinitionError:
+        names = [*self.system.surface_names, *self.system.impacts]
+        return DefinitionError(
+            f"condition {' and '.join(repr(names[i]) for i in which)}: it opens and closes with others only, as its own "
+            "multiplier is not in its y, so that it is no surface by itself. simulate follows them, and "
+            "find_equilibrium(system, near, mode=...) finds rest."
+        )
 
     def _with(self, made: FilippovSystem, *more: ca.SX) -> OneSurface:
         """The result with functions for numbers."""

@@ -34,6 +34,7 @@ MARKERS = {
     "release": ("h", "white", "release"),
     "jump": ("D", style.BLACK, "jump"),
     "rest": ("*", style.BLACK, "rest"),
+    "rest_below": ("*", "white", "rest below a speed"),
     "zero": ("P", "white", "zero"),
     "end": ("X", style.GREY, "end"),
 }

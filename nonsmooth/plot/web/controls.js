@@ -9,7 +9,10 @@ const Page = (() => {
     if (Number.isNaN(value)) return "undecided";
     if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
     if (value === 0) return "0";
-    return String(Number(value.toPrecision(digits))).replaceAll("-", "−");
+    const rounded = Number(value.toPrecision(digits));
+    const words =
+      Math.abs(rounded) < 1e6 ? String(rounded) : rounded.toExponential().replace("+", "");
+    return words.replaceAll("-", "−");
   }
 
   /** An element of SVG with attributes and children. */

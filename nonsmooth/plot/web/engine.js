@@ -12,12 +12,14 @@ class Engine {
     Object.assign(this, { c, system, machine: system.machine });
     c._initialize();
     this.width = system.m + system.c;
+    this.row = system.n + 2 * this.width + system.atoms; // numbers of a state that is sampled
     this.image = this.placed(system);
     for (const name of ["Options", "Batch", "Output"]) {
       this[name] = c.calloc(1, this.machine.layout[name].size);
     }
     this.named = c.calloc(this.machine.guards * system.named, 1);
     this.input = c.malloc(8 * (system.n + system.parameters.length + 2));
+    this.letters = c.malloc(this.width + 1);
     this.read = c.malloc(8 * (4 + 15) + 4 * (this.width + 1 + 16) + 8 * (16 * system.n + 1));
     this.rooms = null;
     this.refresh();
@@ -73,13 +75,23 @@ class Engine {
     }
   }
 
-  writeOptions({ tEnd, tol, steps = 1_000_000, events = 100_000, hits = {} }, dense) {
+  writeOptions(
+    { tEnd, tol, maxStep = Infinity, steps = 1_000_000, events = 100_000, hits = {} },
+    dense,
+  ) {
     const none = { hit_kinds: 0, hit_side: 0, hit_skip: 0, hit_count: 0 };
     const limits = { max_steps: steps, max_events: events, max_jumps: 1000 };
     this.write("Options", {
-      ...{ t_end: tEnd, rtol: tol, atol: tol, max_step: Infinity, rest_below: 0, ...limits },
+      ...{ t_end: tEnd, rtol: tol, atol: tol, max_step: maxStep, rest_below: 0, ...limits },
       ...{ start_mode: -1, at_kind: -1, at_count: 0, dense: +dense, hit_after: 0, method: 0 },
-      ...{ hit_every: 1, hit_width: this.system.named, hit_named: this.named, passed: 0, ...none, ...hits },
+      ...{
+        hit_every: 1,
+        hit_width: this.system.named,
+        hit_named: this.named,
+        passed: 0,
+        ...none,
+        ...hits,
+      },
     });
   }
 
@@ -96,7 +108,8 @@ class Engine {
       const at = (this.arrays[name] = this.c.malloc(row * rooms[kind] + 8));
       if (!at) throw new Error("no memory for so long a run");
       const from = old[name];
-      if (counts) new Uint8Array(this.c.memory.buffer).copyWithin(at, from, from + row * counts[kind]);
+      if (counts)
+        new Uint8Array(this.c.memory.buffer).copyWithin(at, from, from + row * counts[kind]);
       if (from) this.c.free(from);
     }
     this.rooms = rooms;
@@ -118,6 +131,14 @@ class Engine {
     return [this.input, this.input + 8 * n];
   }
 
+  /** Write the letters of a mode in which a run starts; 0 for none. */
+  startMode(mode) {
+    if (!mode) return 0;
+    const signs = Array.from(mode, (letter) => ({ "+": 1, o: 1, "-": -1 })[letter] ?? 0);
+    new Int8Array(this.c.memory.buffer, this.letters, this.width).set(signs);
+    return this.letters;
+  }
+
   /** One run with its polynomials: views of the memory that hold until the next run. */
   simulate(x, p, options) {
     const { c } = this;
@@ -126,13 +147,17 @@ class Engine {
     if (!this.rooms) this.makeRoom([256, 512, 256]);
     this.count([0, 0, 0]);
     this.writeOptions(options, true);
-    c.run_begin(this.run, this.Options, this.Output, ...this.given(x, p, t), 0, t, 0);
+    const mode = this.startMode(options.startMode);
+    c.run_begin(this.run, this.Options, this.Output, ...this.given(x, p, t), mode, t, 0);
     for (;;) {
       const status = c.run_continue(this.run, 1n << 40n);
       const counts = this.readCounts();
       if (status !== this.machine.full) return this.result(counts);
       const written = counts.slice(7, 10);
-      this.makeRoom(this.rooms.map((room, k) => (written[k] + 8 > room / 2 ? 2 * room : room)), written);
+      this.makeRoom(
+        this.rooms.map((room, k) => (written[k] + 8 > room / 2 ? 2 * room : room)),
+        written,
+      );
       this.count(written);
       c.run_resume(this.run, this.Output);
     }
@@ -199,7 +224,9 @@ class Engine {
     const at = c.malloc(8 * size + count * wide + 8);
     c.table_read(this.table, at, at + 4 * size, at + 8 * size);
     const bytes = new Uint8Array(c.memory.buffer, at + 8 * size, count * wide).slice();
-    this.modes = Array.from({ length: count }, (_, k) => this.spelled(bytes.subarray(k * wide, (k + 1) * wide)));
+    this.modes = Array.from({ length: count }, (_, k) =>
+      this.spelled(bytes.subarray(k * wide, (k + 1) * wide)),
+    );
     this.parents = this.i32(at, size).slice();
     this.nodeModes = this.i32(at + 4 * size, size).slice();
     c.free(at);
@@ -251,7 +278,8 @@ class Engine {
     const kindCount = this.machine.kinds.length;
     const words = [n, stride, d, 1, 1, 1, kindCount, room, room * d].map((k) => 8 * k * count);
     const { places, free } = this.reserve([...words, 16, 8]);
-    const [starts, values, ends, t, status, itinerary, kinds, sampleT, sampleX, totals, next] = places;
+    const [starts, values, ends, t, status, itinerary, kinds, sampleT, sampleX, totals, next] =
+      places;
     this.f64(starts, x0.length).set(x0);
     const table = this.f64(values, stride * count).fill(0);
     for (let k = 0; k < count; k++) table.set(p.subarray(k * own, (k + 1) * own), k * stride);
@@ -259,11 +287,22 @@ class Engine {
     this.i64(totals, 2).fill(0n);
     this.i64(next, 1).fill(0n);
     this.write("Batch", {
-      ...{ count, p_stride: stride, t0: options.tStart ?? 0, which: 0, x0: starts, p: values, x: ends, t },
+      ...{
+        count,
+        p_stride: stride,
+        t0: options.tStart ?? 0,
+        which: 0,
+        x0: starts,
+        p: values,
+        x: ends,
+        t,
+      },
       ...{ status, itinerary, kinds, at_x: 0, at_t: 0, totals, room, times_stride: 0, times: 0 },
       ...{ sample_t: sampleT, sample_x: sampleX, kinds_width: kindCount },
     });
-    new Uint8Array(c.memory.buffer, this.named, this.machine.guards * this.system.named).fill(+(room > 0));
+    new Uint8Array(c.memory.buffer, this.named, this.machine.guards * this.system.named).fill(
+      +(room > 0),
+    );
     this.writeOptions(options, false);
     while (c.run_many(this.run, next, this.Batch, this.Options, 0, 1n << 40n));
     this.readTable();
@@ -279,17 +318,19 @@ class Engine {
     return made;
   }
 
-  /** Rates of states, rates of surfaces, and their values, at states (count, n): rows of n + 2 width. */
+  /** Rates of states; rates of surfaces; their functions; those of stops and resets: rows for states (count, n). */
   sample(points, p, multipliers) {
     const { n } = this.system;
     const count = points.length / n;
     const parameters = this.system.parameters.length;
-    const row = n + 2 * this.width;
+    const { row } = this;
     const sizes = [points.length, parameters + 1, this.width, row * count].map((k) => 8 * k);
     const { places, free } = this.reserve(sizes);
     const [at, values, held, out] = places;
     this.f64(at, points.length).set(points);
-    this.f64(values, parameters + 1).fill(0).set(p);
+    this.f64(values, parameters + 1)
+      .fill(0)
+      .set(p);
     this.f64(held, this.width).fill(0).set(multipliers);
     this.c.run_sample(this.run, values, at, BigInt(count), held, out);
     const made = this.f64(out, row * count).slice();
@@ -297,6 +338,23 @@ class Engine {
     return made;
   }
 }
+
+/** States and rates of a step of a run at a time since its start. */
+Engine.onStep = (run, { n, order, dimension }, step, s) => {
+  const stride = order + 1;
+  const x = new Array(dimension);
+  const rates = new Array(dimension);
+  for (let i = 0; i < dimension; i++) {
+    const first = (step * n + i) * stride;
+    let [value, slope] = [0, 0];
+    for (let k = first + order; k >= first; k--) {
+      slope = slope * s + value;
+      value = value * s + run.coefficients[k];
+    }
+    [x[i], rates[i]] = [value, slope];
+  }
+  return { x, rates };
+};
 
 /** Bytes of a text in base 64, inflated. */
 Engine.inflated = async (text) => {

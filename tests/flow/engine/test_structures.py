@@ -5,7 +5,9 @@ import ctypes
 from nonsmooth.flow.engine.building.build import build
 from nonsmooth.flow.engine.structures import bodies, structure
 
-FILLED = "Options Batch Output System Rules Element Series Values Entries Field Legs Leg".split()
+FILLED = (
+    "Options Batch Output System Rules Element Cells Series Values Entries Field Legs Leg".split()
+)
 
 
 def test_fields_are_where_the_compiler_puts_them():

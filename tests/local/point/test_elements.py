@@ -1,5 +1,7 @@
 """Conditions, contacts and joints at a point: the same answers as in coordinates, by limits and by runs."""
 
+import math
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -294,3 +296,29 @@ def test_points_off_a_joint_and_points_of_several_elements():
     with pytest.raises(ns.PointError, match="the condition 'a' and the condition 'b'"):
         ns.classify(corner, [0.0, 0.0])
     assert ns.classify(corner, [0.0, 0.0], mode="oo", surface=1).kind == "leaving"
+
+
+def test_the_paradox_of_painleve_has_no_motion():
+    rod = ns.textbook.painleve_rod()
+    found = ns.classify(rod.system, rod.start)
+    assert found.kind == "closed"
+    expected = 1 / (1 + 3 * math.cos(1) * (math.cos(1) - math.sin(1)))
+    assert found.evidence["multiplier"] == pytest.approx(expected, rel=1e-12)
+    with pytest.raises(ns.PointError, match="no motion goes on there"):
+        ns.classify(rod.system, rod.start, parameters={"mu": 2.0})
+
+
+def test_a_point_off_the_surface_beside_a_closed_diode_is_told_where_the_surface_is():
+    boost = ns.textbook.boost_converter()
+    with pytest.raises(
+        ns.PointError, match=r"nearest point of the surface is about \[0.0, 3.5, 0.3\]"
+    ):
+        ns.classify(boost.system, [0.0, 3.5, 0.5], mode="+c")
+
+
+def test_diodes_of_a_bridge_change_in_pairs():
+    bridge = ns.textbook.diode_bridge().system
+    assert [bridge.switching(i).kind for i in range(4)] == ["continuous"] * 2 + ["undecided"] * 2
+    assert "open and close together" in str(bridge.switching(2))
+    with pytest.raises(ns.DefinitionError, match=r"'[ac]': it opens and closes with others only"):
+        ns.classify(bridge, [0.0, 0.1], mode="coco")

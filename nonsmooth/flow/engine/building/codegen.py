@@ -14,7 +14,7 @@ _MOST_LINEAR = 22
 
 def supports_lanes(system: FilippovSystem) -> bool:
     """Whether the lanes engine can be generated for a system."""
-    return system.surface_count <= 1 and _has_only_plain_stops(system)
+    return system.surface_count <= 1 and not system.written.tables and _has_only_plain_stops(system)
 
 
 def supports_set_lanes(coupled: Coupled) -> bool:

@@ -24,7 +24,7 @@ _FILES = """
     programs.h pairs.h linear.h banded.h radau.h state.c modes.c jets.c laws/stability.c laws/sets.c stepper.c
     near_zeros.c laws/elements.c record.c laws/spiral.c laws/vectors.c laws/blocks.c laws/decide.c laws/layer.c laws/contacts.c
     laws/complementarity.c laws/approach.c events.c collocation.c implicit.c stiffness.c driver.c accumulation.c laws/roots.c
-    entry.c variation.c sample.c
+    entry.c sample.c
 """.split()
 
 
@@ -39,8 +39,8 @@ def driver_text(name: str) -> str:
 
 
 @lru_cache(maxsize=1)
-def core_source() -> str:
-    """C of the driver."""
+def run_source() -> str:
+    """C of runs: the driver without derivatives and flows of known durations."""
     # UNFUSED: the same bits on every processor.
     enumerations = [("OP", OPERATIONS), ("RULE", TAPE_RULES)]
     head = "".join(
@@ -52,11 +52,17 @@ def core_source() -> str:
     head += f"#define OPERATIONS_OF(x, y) {' '.join(cases)}\n"
     sizes = f"#define UNFUSED\n#define P {MOST_ORDER}\n"
     driver = [driver_text(f"core/{name}") for name in _FILES]
-    flows = [driver_text("core/flow.c"), _extended("programs.h", "flow.c")]
-    fixed = driver_text("core/implicit_flow.c") + driver_text("core/fixed.c")
-    return "".join(
-        [facts_header(), sizes, head, driver_text("core/common.h"), *driver, *flows, fixed]
+    return "".join([facts_header(), sizes, head, driver_text("core/common.h"), *driver])
+
+
+@lru_cache(maxsize=1)
+def core_source() -> str:
+    """C of the driver."""
+    flow, *others = (
+        driver_text(f"core/{name}") for name in ("flow.c", "implicit_flow.c", "fixed.c")
     )
+    extended = _extended("programs.h", "flow.c")
+    return "".join([run_source(), driver_text("core/variation.c"), flow, extended, *others])
 
 
 def _extended(*files: str) -> str:

@@ -1,4 +1,4 @@
-"""The driver as WebAssembly: ``make wasm`` compiles the text of ``core`` for pages in a browser.
+"""The driver as WebAssembly: ``make wasm`` compiles the text of runs for pages in a browser.
 
 The module imports nothing: the compiler's C library for WASI provides the functions of libm and malloc.
 """
@@ -12,7 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from .core_source import core_source, keyed
+from .core_source import keyed, run_source
 
 #: The module in the package.
 MODULE = Path(__file__).parents[1] / "core.wasm"
@@ -39,8 +39,8 @@ def key_of(source: str) -> str:
 
 
 def module_key() -> str:
-    """Identify the module of the present text of the driver."""
-    return key_of(core_source())
+    """Identify the module of the present text of runs."""
+    return key_of(run_source())
 
 
 def has_module_key(module: bytes) -> bool:
@@ -52,7 +52,7 @@ def compile_module() -> bytes:
     """Compile the module with ziglang (the extra ``compiler``)."""
     with tempfile.TemporaryDirectory() as folder:
         text, module = Path(folder, "core.c"), Path(folder, "core.wasm")
-        text.write_text(keyed(core_source(), module_key()), encoding="utf-8")
+        text.write_text(keyed(run_source(), module_key()), encoding="utf-8")
         exports = [f"-Wl,--export={name}" for name in _EXPORTS]
         zig = (sys.executable, "-m", "ziglang", "cc")
         subprocess.run([*zig, *_FLAGS, *exports, str(text), "-o", str(module)], check=True)

@@ -10,8 +10,10 @@
   const SENTENCES = {
     REACHED_END: () => "reached the end",
     STOPPED: () => "stopped by a stop",
-    NON_UNIQUE: (run) => `the motion is not unique here${run.several.length ? `: ${run.several.join(" or ")}` : ""}`,
-    ACCUMULATION: (run) => `events accumulate${Number.isFinite(run.limit) ? ` at t = ${text(run.limit, 8)}` : ""}`,
+    NON_UNIQUE: (run) =>
+      `the motion is not unique here${run.several.length ? `: ${run.several.join(" or ")}` : ""}`,
+    ACCUMULATION: (run) =>
+      `events accumulate${Number.isFinite(run.limit) ? ` at t = ${text(run.limit, 8)}` : ""}`,
     INTERSECTION: () => "no stable motion at this intersection of surfaces",
     STEP_TOO_SMALL: () => "a singularity: the steps became too short",
     NOT_FINITE: () => "a value is not finite here",
@@ -76,7 +78,14 @@
     resting = setTimeout(() => {
       const turn = view.flat ? {} : { turn: view.turn.map(short) };
       const box = state.limits.flat().map(short);
-      setAddress({ p: state.p.map(short), x: state.x.map(short), t: short(state.t), box, ...turn, flow: state.flow });
+      setAddress({
+        p: state.p.map(short),
+        x: state.x.map(short),
+        t: short(state.t),
+        box,
+        ...turn,
+        flow: state.flow,
+      });
     }, 200);
   }
 
@@ -85,7 +94,7 @@
   const modes = new Pictures.Modes();
   const sizes = view.pairs.map(([low, high]) => high - low);
   const redraw = () => update();
-  const portrait = new Pictures.Portrait($("plane"), engine, given, modes, redraw);
+  const portrait = new Portrait($("plane"), engine, given, modes, redraw);
   const series = new Pictures.Series($("series"), system, sizes, modes, redraw);
   const cloud = new Pictures.Cloud($("sweep"), $("cloud"), () => {
     cloud.draw();
@@ -121,7 +130,10 @@
   function facts(run, period, took) {
     const words = run.itinerary.split(" ");
     const tail = words.slice(-36);
-    const letters = tail.flatMap((mode) => [html("span", { class: modes.of(mode) }, minus(mode)), " "]);
+    const letters = tail.flatMap((mode) => [
+      html("span", { class: modes.of(mode) }, minus(mode)),
+      " ",
+    ]);
     $("word").replaceChildren(...(words.length > tail.length ? ["… "] : []), ...letters);
     const rows = [
       ["status", SENTENCES[given.statuses[run.status]]?.(run) ?? `status ${run.status}`],
@@ -136,9 +148,15 @@
   }
 
   function drawKey() {
-    const sides = { "+": `${given.surfaces[0]} > 0`, "-": `${given.surfaces[0]} < 0`, s: "sliding" };
+    const sides = {
+      "+": `${given.surfaces[0]} > 0`,
+      "-": `${given.surfaces[0]} < 0`,
+      s: "sliding",
+    };
     const known = system.entries.length === 1 && !system.c ? sides : {};
-    const shown = new Map(pieces.map(({ mode }) => [modes.of(mode), known[mode] ?? (minus(mode) || "smooth")]));
+    const shown = new Map(
+      pieces.map(({ mode }) => [modes.of(mode), known[mode] ?? (minus(mode) || "smooth")]),
+    );
     const names = [...shown].map(([look, words]) => [`orbit ${look}`, words]);
     for (const kind of ["attracting", "repelling"]) {
       if ($("plane").querySelector(`.band.${kind}, .cut.${kind}`)) {
@@ -187,7 +205,11 @@
         from = [event.clientX, event.clientY, ...view.turn];
       },
       move: (event) => {
-        if (from) turn(from[2] + (event.clientX - from[0]) / 150, from[3] + (event.clientY - from[1]) / 150);
+        if (from)
+          turn(
+            from[2] + (event.clientX - from[0]) / 150,
+            from[3] + (event.clientY - from[1]) / 150,
+          );
       },
       up: () => {
         from = null;
@@ -200,25 +222,59 @@
   const fine = (low, high) => Number(((high - low) / 400).toPrecision(2));
   const input = (id, name, title, [min, max], get, set) =>
     refreshers.push(
-      numberInput($("inputs"), { id, name, title, min, max, step: fine(min, max), get, set: (v) => (set(v), update()) }),
+      numberInput($("inputs"), {
+        id,
+        name,
+        title,
+        min,
+        max,
+        step: fine(min, max),
+        get,
+        set: (v) => (set(v), update()),
+      }),
     );
   given.sliders.forEach(({ name, low, high }, k) => {
-    input(`p-${k}`, name, "", [low, high], () => state.p[k], (v) => (state.p[k] = v));
+    input(
+      `p-${k}`,
+      name,
+      "",
+      [low, high],
+      () => state.p[k],
+      (v) => (state.p[k] = v),
+    );
   });
   system.states.forEach((name, k) => {
     const [low, high] = view.pairs[k];
     const range = [Math.min(low, given.start[k]), Math.max(high, given.start[k])];
-    input(`x-${k}`, name, "at the start", range, () => state.x[k], (v) => (state.x[k] = v));
+    input(
+      `x-${k}`,
+      name,
+      "at the start",
+      range,
+      () => state.x[k],
+      (v) => (state.x[k] = v),
+    );
   });
-  input("t", "t", "at the end", [given.t_end / 100, 4 * given.t_end], () => state.t, (v) => (state.t = v));
+  input(
+    "t",
+    "t",
+    "at the end",
+    [given.t_end / 100, 4 * given.t_end],
+    () => state.t,
+    (v) => (state.t = v),
+  );
 
   // a sweep --------------------------------------------------------------------------------------------
 
   const isSwept = given.sliders.length > 0 && given.events;
   $("sweep-panel").hidden = !isSwept;
   const sweeper = new Sweep("own", (points) => (points ? cloud.add(points) : sweepDone()));
-  const KINDS = { in: ["crossing", "entry", "impact", "contact", "reset"], out: ["exit", "release"] };
-  const bits = (kinds) => kinds.reduce((sum, kind) => sum | (1 << system.machine.kinds.indexOf(kind)), 0);
+  const KINDS = {
+    in: ["crossing", "entry", "impact", "contact", "reset"],
+    out: ["exit", "release"],
+  };
+  const bits = (kinds) =>
+    kinds.reduce((sum, kind) => sum | (1 << system.machine.kinds.indexOf(kind)), 0);
 
   let swept = "";
   let waiting;
@@ -226,7 +282,14 @@
     if (!isSwept) return;
     cloud.mark(state.p[state.over]);
     const others = state.p.map((v, k) => (k === state.over ? 0 : v));
-    const wanted = JSON.stringify([others, state.x, state.over, state.show, state.at, cloud.plane.width]);
+    const wanted = JSON.stringify([
+      others,
+      state.x,
+      state.over,
+      state.show,
+      state.at,
+      cloud.plane.width,
+    ]);
     if (wanted === swept) return;
     swept = wanted;
     clearTimeout(waiting);
@@ -286,7 +349,11 @@
       $(id).value = state[key];
     });
   }
-  choice("sweep-p", given.sliders.map(({ name }) => name), "over");
+  choice(
+    "sweep-p",
+    given.sliders.map(({ name }) => name),
+    "over",
+  );
   choice("sweep-x", system.states, "show");
   $("sweep-at").addEventListener("change", () => {
     state.at = $("sweep-at").value;
@@ -317,20 +384,6 @@
     }, 2500);
   }
 
-  async function copy(words, name) {
-    try {
-      await navigator.clipboard.writeText(words);
-      say(`${name} copied.`);
-    } catch {
-      const area = html("textarea"); // a page from a file may have no clipboard
-      area.value = words;
-      document.body.append(area);
-      area.select();
-      say(document.execCommand("copy") ? `${name} copied.` : "The browser refuses to copy.");
-      area.remove();
-    }
-  }
-
   function python() {
     const values = given.sliders.map(({ name }, k) => `"${name}": ${short(state.p[k])}`).join(", ");
     const parameters = values && `, parameters={${values}}`;
@@ -338,38 +391,12 @@
     return `run = nonsmooth.simulate(system, [${start}], t_end=${short(state.t)}${parameters})\nprint(run)\n`;
   }
 
-  /** The style sheets of the page as they are for an SVG file, with colours in place of variables. */
-  function styles() {
-    const own = getComputedStyle(document.documentElement);
-    const sheet = [...document.querySelectorAll("style")].map((e) => e.textContent).join("\n");
-    const rules = sheet.match(/(^|\n)\s*(svg|\.mode-)[^{}]*\{[^{}]*\}/g).join("\n");
-    return rules.replace(/var\((--[\w-]+)\)/g, (_, name) => own.getPropertyValue(name).trim());
-  }
-
-  function picture() {
-    const shown = [portrait.plane, series.plane];
-    const gap = 8;
-    const width = Math.max(...shown.map((plane) => plane.width));
-    const height = shown[0].height + gap + shown[1].height;
-    const copies = shown.map((plane, k) => {
-      const element = plane.element.cloneNode(true);
-      element.querySelectorAll(".grip").forEach((e) => e.remove());
-      const size = { width: plane.width, height: plane.height, y: k ? shown[0].height + gap : 0 };
-      for (const [name, value] of Object.entries(size)) element.setAttribute(name, value);
-      element.removeAttribute("class");
-      return element;
-    });
-    const ground = getComputedStyle(document.documentElement).getPropertyValue("--ground").trim();
-    const frame = { xmlns: "http://www.w3.org/2000/svg", viewBox: `0 0 ${width} ${height}`, width, height };
-    const style = svg("style", {}, `${styles()}\nsvg { font: 13px sans-serif; }`);
-    const whole = svg("svg", frame, style, svg("rect", { width, height, fill: ground }), ...copies);
-    return new XMLSerializer().serializeToString(whole);
-  }
-
-  $("link").addEventListener("click", () => copy(location.href, "Link"));
-  $("python").addEventListener("click", () => copy(python(), "Python"));
+  $("link").addEventListener("click", () => Saving.copy(location.href, "Link").then(say));
+  $("python").addEventListener("click", () => Saving.copy(python(), "Python").then(say));
   $("save").addEventListener("click", () => {
-    const href = URL.createObjectURL(new Blob([picture()], { type: "image/svg+xml" }));
+    const href = URL.createObjectURL(
+      new Blob([Saving.picture([portrait.plane, series.plane])], { type: "image/svg+xml" }),
+    );
     html("a", { href, download: "orbit.svg" }).click();
     say("orbit.svg saved.");
   });
@@ -408,7 +435,13 @@
     clock = (clock + (Math.min(now - before, 100) / 1000 / SECONDS) * end) % (end || 1);
     before = now;
     const { t, x, mode } = pieces.find((piece) => clock <= piece.t.at(-1)) ?? pieces.at(-1);
-    const k = Math.min(Math.max(t.findIndex((own) => own >= clock), 1), t.length - 1);
+    const k = Math.min(
+      Math.max(
+        t.findIndex((own) => own >= clock),
+        1,
+      ),
+      t.length - 1,
+    );
     const share = k ? Math.min(Math.max((clock - t[k - 1]) / (t[k] - t[k - 1] || 1), 0), 1) : 0;
     const at = k ? x[k].map((v, i) => x[k - 1][i] + share * (v - x[k - 1][i])) : x[0];
     const [cx, cy] = portrait.plane.at(view.at(at));
@@ -422,7 +455,8 @@
     playing = !playing;
     $("play").textContent = playing ? "Pause" : "Play";
     $("play").setAttribute("aria-pressed", playing);
-    for (const e of [portrait.runner, series.cursor]) e.setAttribute("visibility", playing ? "visible" : "hidden");
+    for (const e of [portrait.runner, series.cursor])
+      e.setAttribute("visibility", playing ? "visible" : "hidden");
     before = performance.now();
     requestAnimationFrame(frame);
   });

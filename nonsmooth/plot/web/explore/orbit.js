@@ -2,23 +2,11 @@
 "use strict";
 
 const Orbit = (() => {
-  /** States of a step's polynomials at a time since its start. */
-  function stateAt(coefficients, stride, dimension, s) {
-    const x = new Array(dimension);
-    for (let i = 0; i < dimension; i++) {
-      let value = 0;
-      for (let q = (i + 1) * stride - 1; q >= i * stride; q--) value = value * s + coefficients[q];
-      x[i] = value;
-    }
-    return x;
-  }
-
   /**
    * Pieces of a run {mode, t, x}, new ones at each change of the mode and each jump, where `from` is the state
    * before. `seen` takes states to the plane of the picture, whose unit is its width; a unit has `dense` points.
    */
-  function pieces(run, { n, order, dimension }, { seen, dense, longest = Infinity }) {
-    const stride = order + 1;
+  function pieces(run, system, { seen, dense, longest = Infinity }) {
     const found = [];
     const far = (p, q) => Math.hypot(p[0] - q[0], p[1] - q[1]);
     let piece = null;
@@ -26,13 +14,17 @@ const Orbit = (() => {
     for (let k = 0; k < run.steps && length < longest; k++) {
       const start = run.starts[k];
       const h = (k + 1 < run.steps ? run.starts[k + 1] : run.t) - start;
-      const own = run.coefficients.subarray(k * n * stride, (k + 1) * n * stride);
-      const at = (s) => stateAt(own, stride, dimension, s);
+      const at = (s) => Engine.onStep(run, system, k, s).x;
       const first = at(0);
       const before = piece?.x.at(-1);
       const joins = before?.every((v, i) => Math.abs(v - first[i]) <= 1e-6 * (1 + Math.abs(v)));
       if (!joins || piece.mode !== run.stepModes[k]) {
-        piece = { mode: run.stepModes[k], t: [start], x: [first], from: before && !joins ? before : null };
+        piece = {
+          mode: run.stepModes[k],
+          t: [start],
+          x: [first],
+          from: before && !joins ? before : null,
+        };
         found.push(piece);
       }
       const [a, b, c] = [0, h / 2, h].map((s) => seen(at(s)));
@@ -54,7 +46,8 @@ const Orbit = (() => {
     const last = events - 1;
     const scale = Array.from({ length: dimension }, (_, i) => {
       let most = 1e-9;
-      for (let k = Math.max(0, events - 50); k < events; k++) most = Math.max(most, Math.abs(eventX[k * n + i]));
+      for (let k = Math.max(0, events - 50); k < events; k++)
+        most = Math.max(most, Math.abs(eventX[k * n + i]));
       return most;
     });
     const same = (k, lag) =>
@@ -83,7 +76,12 @@ const Orbit = (() => {
     /** Ranges of the axes of the picture. */
     get limits() {
       if (this.dimension === 2) return this.pairs;
-      return this.flat ? [this.pairs[0], [-1, 1]] : [[-1.75, 1.75], [-1.2, 1.2]];
+      return this.flat
+        ? [this.pairs[0], [-1, 1]]
+        : [
+            [-1.75, 1.75],
+            [-1.2, 1.2],
+          ];
     }
 
     middle(i) {
@@ -119,12 +117,14 @@ const Orbit = (() => {
       const now = this.at(x);
       const [right, up] = this.axes;
       return x.map((v, i) =>
-        i > 2 ? v : v + this.half(i) * ((point[0] - now[0]) * right[i] + (point[1] - now[1]) * up[i]),
+        i > 2
+          ? v
+          : v + this.half(i) * ((point[0] - now[0]) * right[i] + (point[1] - now[1]) * up[i]),
       );
     }
   }
 
-  return { pieces, period, stateAt, View };
+  return { pieces, period, View };
 })();
 
 if (typeof module !== "undefined") module.exports = { Orbit };

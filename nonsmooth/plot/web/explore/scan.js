@@ -7,7 +7,8 @@ const Scan = (() => {
     const n = cells + 1;
     const points = [];
     for (let j = 0; j < n; j++) {
-      for (let i = 0; i < n; i++) points.push([a + ((b - a) * i) / cells, c + ((d - c) * j) / cells]);
+      for (let i = 0; i < n; i++)
+        points.push([a + ((b - a) * i) / cells, c + ((d - c) * j) / cells]);
     }
     return points;
   }
@@ -54,10 +55,18 @@ const Scan = (() => {
     /** Take a value; an end that stays twice counts half. */
     narrow(share, value) {
       if (value > 0 === this.atLow > 0) {
-        Object.assign(this, { low: share, atLow: value, atHigh: this.kept > 0 ? 0.5 * this.atHigh : this.atHigh });
+        Object.assign(this, {
+          low: share,
+          atLow: value,
+          atHigh: this.kept > 0 ? 0.5 * this.atHigh : this.atHigh,
+        });
         this.kept = 1;
       } else {
-        Object.assign(this, { high: share, atHigh: value, atLow: this.kept < 0 ? 0.5 * this.atLow : this.atLow });
+        Object.assign(this, {
+          high: share,
+          atHigh: value,
+          atLow: this.kept < 0 ? 0.5 * this.atLow : this.atLow,
+        });
         this.kept = -1;
       }
     }
@@ -89,7 +98,7 @@ const Scan = (() => {
       for (const [, link] of next[first]) {
         if (used.has(link)) continue;
         const chain = [first];
-        for (let at = first; ; ) {
+        for (let at = first; ;) {
           const go = next[at].find(([, k]) => !used.has(k));
           if (!go) break;
           used.add(go[1]);
@@ -118,7 +127,7 @@ const Scan = (() => {
   class Plane {
     constructor(engine, p, box, embed, surface = 0) {
       Object.assign(this, { engine, p, box, embed, surface });
-      this.row = engine.system.n + 2 * engine.width;
+      this.row = engine.row;
       this.cell = [(box[1] - box[0]) / 40, (box[3] - box[2]) / 40];
     }
 
@@ -142,7 +151,9 @@ const Scan = (() => {
       const { n } = this.engine.system;
       const [one, two] = [1, -1].map((sign) => this.sampled(points, sign));
       return points.map((x, k) => {
-        const [f1, f2] = [one, two].map((values) => Array.from(values.subarray(k * row, k * row + n)));
+        const [f1, f2] = [one, two].map((values) =>
+          Array.from(values.subarray(k * row, k * row + n)),
+        );
         const [l1, l2] = [one, two].map((values) => values[k * row + n + this.surface]);
         return { x, f1, f2, l1, l2 };
       });
@@ -245,7 +256,9 @@ const Scan = (() => {
       if (speed(u) > 0 === speed(v) > 0) continue;
       const { x } = plane.root(u, v, speed);
       const stays = speed(u) > 0 === (kind === "attracting");
-      const name = !stays ? "pseudo-saddle" : `${kind === "attracting" ? "stable" : "unstable"} pseudo-node`;
+      const name = !stays
+        ? "pseudo-saddle"
+        : `${kind === "attracting" ? "stable" : "unstable"} pseudo-node`;
       found.push({ type: "pseudo", x, kind: name });
     }
     return found;
@@ -259,13 +272,20 @@ const Scan = (() => {
     const [ahead, behind] = plane.at(ends);
     const bend = one.fold === 1 ? ahead.l1 - behind.l1 : ahead.l2 - behind.l2;
     const visible = bend * one.fold > 0;
-    return { type: "fold", side: one.fold, x: one.x, visible, kind: `${visible ? "visible" : "invisible"} fold` };
+    return {
+      type: "fold",
+      side: one.fold,
+      x: one.x,
+      visible,
+      kind: `${visible ? "visible" : "invisible"} fold`,
+    };
   }
 
   function kindOfEquilibrium([[a, b], [c, d]]) {
     const [trace, det] = [a + d, a * d - b * c];
     if (det < 0) return "saddle";
-    if (Math.abs(trace) < 1e-7 * (Math.abs(a) + Math.abs(b) + Math.abs(c) + Math.abs(d))) return "centre";
+    if (Math.abs(trace) < 1e-7 * (Math.abs(a) + Math.abs(b) + Math.abs(c) + Math.abs(d)))
+      return "centre";
     return `${trace < 0 ? "stable" : "unstable"} ${trace * trace >= 4 * det ? "node" : "focus"}`;
   }
 
@@ -300,14 +320,16 @@ const Scan = (() => {
     const n = cells + 1;
     const points = grid(plane.box, cells);
     const values = plane.sampled(points, sign);
-    const changes = (corners, e) => {
-      const own = corners.map((k) => values[k * plane.row + e]);
-      return Math.min(...own) <= 0 && Math.max(...own) >= 0;
+    const { row } = plane;
+    /** Whether a component of the field changes its sign in the cell of a corner. */
+    const changes = (k, e) => {
+      let positive = 0;
+      for (const corner of [k, k + 1, k + n, k + n + 1]) positive += values[corner * row + e] > 0;
+      return positive > 0 && positive < 4;
     };
     const found = [];
     for (let k = 0; k < points.length - n; k++) {
-      const corners = [k, k + 1, k + n, k + n + 1];
-      if (k % n === cells || !changes(corners, 0) || !changes(corners, 1)) continue;
+      if (k % n === cells || !changes(k, 0) || !changes(k, 1)) continue;
       const start = [0, 1].map((e) => (points[k][e] + points[k + n + 1][e]) / 2);
       const one = equilibriumNear(plane, start, sign);
       if (!one) continue;
@@ -315,7 +337,12 @@ const Scan = (() => {
       const inside = u >= a && u <= b && v >= c && v <= d;
       const own = !plane.engine.width || plane.heights([one.x])[0] * sign > 0;
       if (!inside || !own || found.some((other) => plane.apart(other, one) < 0.01)) continue;
-      found.push({ type: "equilibrium", side: sign, x: one.x, kind: kindOfEquilibrium(one.jacobian) });
+      found.push({
+        type: "equilibrium",
+        side: sign,
+        x: one.x,
+        kind: kindOfEquilibrium(one.jacobian),
+      });
     }
     return found;
   }
@@ -339,7 +366,10 @@ const Scan = (() => {
     const marks = sides.flatMap((sign) => equilibria(plane, sign, 40));
     if (!engine.width) return { lines: [], marks };
     const found = surface(plane);
-    const lines = found.stretches.map(({ kind, line }) => ({ kind, line: line.map((one) => one.x) }));
+    const lines = found.stretches.map(({ kind, line }) => ({
+      kind,
+      line: line.map((one) => one.x),
+    }));
     if (slides) {
       const sliding = found.stretches.filter(({ kind }) => kind !== "crossing");
       marks.push(...found.folds.map((one) => foldMark(plane, one)));

@@ -32,7 +32,13 @@ class Sweep {
     this.started ??= this.start();
     await this.started;
     if (version !== this.version) return;
-    this.worker.postMessage({ ...task, version, room: Sweep.SHOWN, skip: Sweep.SKIPPED, chunk: Sweep.CHUNK });
+    this.worker.postMessage({
+      ...task,
+      version,
+      room: Sweep.SHOWN,
+      skip: Sweep.SKIPPED,
+      chunk: Sweep.CHUNK,
+    });
   }
 
   /** The worker's program: columns from coarse to fine; a newer task ends an older one. */
@@ -50,7 +56,8 @@ class Sweep {
     const column = (made, k, { room, state }, d) => {
       const seen = [];
       for (let q = 0; q < room; q++) {
-        if (Number.isFinite(made.sampleT[k * room + q])) seen.push(made.sampleX[(k * room + q) * d + state]);
+        if (Number.isFinite(made.sampleT[k * room + q]))
+          seen.push(made.sampleX[(k * room + q) * d + state]);
       }
       return seen.length || made.status[k] ? seen : [made.x[k * d + state]];
     };
@@ -69,7 +76,12 @@ class Sweep {
         const x = values.flatMap(() => (system.n > d ? [...task.x, 0] : task.x));
         const hits = { hit_kinds: task.kinds, hit_skip: task.skip, hit_count: task.room };
         const limits = { tEnd: task.tEnd, tol: 1e-7, steps: 4000, events: 2000 };
-        const made = engine.many(Float64Array.from(x), Float64Array.from(p), { ...limits, hits }, task.room);
+        const made = engine.many(
+          Float64Array.from(x),
+          Float64Array.from(p),
+          { ...limits, hits },
+          task.room,
+        );
         const points = values.flatMap((v, c) => column(made, c, task, d).flatMap((y) => [v, y]));
         const done = k + task.chunk >= order.length;
         const milliseconds = performance.now() - begun;

@@ -66,7 +66,8 @@ SENTENCES = {
     "round: it may be a floor or a ceiling. Give it a direction: -1 where its function falls to "
     "zero, 1 where it rises.",
     "branch_point": "The field stops being smooth just after t = {t:.8g}: a root or a power of something that "
-    "reaches zero there. End the run before, with a Stop at a small positive value of it.",
+    "reaches zero there. Make that a surface, surface= with above= and below=: a run passes the root of a switching "
+    "function. Or end the run before, with a Stop at a small positive value of it.",
     "decay": "The steps are held near {step:.1e} at t = {t:.6g} by a decay rate of about {decay:.0e}, much faster "
     "than the motion: the system is stiff there. {implicit}",
 }

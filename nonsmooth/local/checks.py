@@ -27,9 +27,9 @@ def require_autonomous(system: FilippovSystem, what: str, elements: bool = False
         )
 
 
-def require_linear(system: FilippovSystem, surface: int, what: str) -> None:
+def require_linear(system: FilippovSystem, surface: int | None, what: str) -> None:
     """Refuse a multiplier that enters nonlinearly, for which alpha is not Filippov's weight."""
-    if system.nonlinear[surface]:
+    if surface is not None and surface < len(system.nonlinear) and system.nonlinear[surface]:
         raise DefinitionError(
             f"{what}: expected multiplier {surface} to enter the field linearly, received hidden "
             "dynamics. The sliding field is then not a convex combination of two fields; follow "

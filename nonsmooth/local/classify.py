@@ -180,7 +180,7 @@ def classify(
     where, x = surface_at(system, point, parameters, t, surface, mode, smooth=True, tol=tol)
     if not where.mode:
         return _Classifier(where, where.at(x), tol, margin).smooth()
-    require_linear(where.system, where.surface, "classify")
+    require_linear(system, surface if where.element is None else where.element.surface, "classify")
     numbers = where.finite_at(x, slopes=where.one_sided)
     if not np.any(numbers.gradient):
         raise PointError(
@@ -246,9 +246,11 @@ class _Classifier:
         self.evidence.clear()
         if self.to_zero[0] > self.margin:
             why = "it is inside a mode" if self.where.element else "the system has no surface"
+            basis, field = self.where.along(self.numbers.x), self.numbers.fields[0]
+            field = field if basis is None else basis @ field
             raise PointError(
                 f"point {self.numbers.x}: expected an equilibrium, as {why}, received the "
-                f"field {self.numbers.fields[0].tolist()}. find_equilibrium goes to one nearby."
+                f"field {field.tolist()}. find_equilibrium goes to one nearby."
             )
         self.is_zero(self.to_zero[0], "F = 0")
         return replace(self._equilibrium(0, "real"), side="")
@@ -275,7 +277,7 @@ class _Classifier:
 
     def _equilibrium(self, k: int, status: str) -> LocalObject:
         eigenvalues = np.linalg.eigvals(self.derivatives[k])
-        scale = float(np.max(np.abs(eigenvalues)))
+        scale = float(np.max(np.abs(eigenvalues), initial=0.0))
         kind, hyperbolic = kind_of(eigenvalues, scale)
         self.margins["an eigenvalue without real part"] = hyperbolic
         self._gaps(eigenvalues, scale, kind)
@@ -324,11 +326,9 @@ class _Classifier:
 
     def _closed_equilibrium(self, matrix: Array) -> LocalObject:
         """Rest of a closed condition or contact."""
-        eigenvalues = np.linalg.eigvals(matrix) if matrix.size else np.zeros(0)
+        eigenvalues = np.linalg.eigvals(matrix)
         self.evidence.update(spectrum(eigenvalues))
-        if not eigenvalues.size:
-            return self.result("pseudo-equilibrium", "stable pseudo-node")
-        scale = float(np.max(np.abs(eigenvalues)))
+        scale = float(np.max(np.abs(eigenvalues), initial=0.0))
         kind, hyperbolic = kind_of(eigenvalues, scale)
         self.margins["a sliding eigenvalue without real part"] = hyperbolic
         self._gaps(eigenvalues, scale, kind)

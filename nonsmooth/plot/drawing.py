@@ -50,7 +50,18 @@ class Canvas:
         self.stroke = mpl.rcParams["lines.linewidth"] / mpl.rcParamsDefault["lines.linewidth"]
 
     def panels(self, rows: int, columns: int) -> list[Canvas]:
-        """Return canvases of new axes in the figure, as many as rows and columns hold."""
+        """Return canvases of new axes in the figure.
+
+        Parameters
+        ----------
+        rows, columns : int
+            Of panels.
+
+        Returns
+        -------
+        list of Canvas
+            Row by row.
+        """
         axes = self.figure.subplots(rows, columns, squeeze=False).ravel()
         return [Canvas(ax, self.drawn, self.colors, self.own) for ax in axes]
 

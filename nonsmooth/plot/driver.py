@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 from functools import lru_cache
+from itertools import accumulate
 from typing import Any
 
 from ..flow.constants import FULL, GUARDS, IMPLICIT_STEP, KINDS
@@ -41,7 +42,12 @@ def described(system: FilippovSystem, tol: float = 1e-10) -> dict[str, Any]:
         kinds=list(KINDS),
         guards=len(GUARDS),
     )
-    contacts, discrete = len(system.impacts), len(system.definition.discrete)
+    driven, tables = engine.system, engine.shown.tables  # a table is one function of the driver
+    m, contacts, discrete = (
+        driven.surface_count,
+        len(driven.impacts),
+        len(driven.definition.discrete),
+    )
     names = system.state_names
     return dict(
         machine=machine,
@@ -51,18 +57,23 @@ def described(system: FilippovSystem, tol: float = 1e-10) -> dict[str, Any]:
         order=engine.order,
         states=list(names),
         parameters=list(system.parameter_names),
+        cells=len(driven.parameter_names) - len(system.parameter_names),
         dimension=system.dimension,
         n=system.extended_dimension,
-        m=system.surface_count,
+        m=m,
         c=contacts,
         atoms=engine.atoms,
-        entries=[members[0] for members in system.entries],
-        half_lines=list(system.half_lines),
+        entries=[members[0] for members in driven.entries],
+        half_lines=list(driven.half_lines),
+        tables=[_table(table) for table in tables],
         discrete=names[system.dimension - discrete :] if discrete else [],
-        mode_width=system.surface_count + contacts + 8 * discrete,
+        mode_width=m + contacts + 8 * (discrete + len(tables)),
         motion=engine.motion_width,
-        named=max(map(len, (system.entries, system.stops, system.resets)))
-        + system.surface_count
-        + contacts
-        + 1,
+        named=max(map(len, (system.stops, system.resets))) + m + contacts + 1,
     )
+
+
+def _table(table: Any) -> dict[str, Any]:
+    """A table: its function, how many breakpoints are shown, and how many of them are below each cell."""
+    below = [*accumulate([i >= 0 for i in table.shown], initial=0)]
+    return dict(element=table.element, count=table.count, below=below)

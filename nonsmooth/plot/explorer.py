@@ -296,9 +296,8 @@ def _is_plain(system: FilippovSystem) -> bool:
     return bool(raised.affine) and not len(raised.lower[0]) and not system.definition.discrete
 
 
-def _cuts(system: FilippovSystem) -> list[int]:
-    """States of the planes that cut the surface, and the state that is constant on each."""
+def _cuts(system: FilippovSystem) -> list[list[int]]:
+    """States of the planes that cut the surface, and last the state that is constant on each; in two directions."""
     gradient = system.gradient(system.surface_function())
-    free = [i for i in range(3) if gradient[i].is_zero()]
-    level = free[0] if free else 2
-    return [*(i for i in range(3) if i != level), level]
+    levels = sorted(range(3), key=lambda i: not gradient[i].is_zero())[:2]
+    return [[*(i for i in range(3) if i != level), level] for level in levels]

@@ -71,7 +71,6 @@ static int letters_of(Run *r, int8_t *letter) {
   if (!r->width) return 1;
   const double *h = surface_values(r, r->x);
   int finite = finite_all(h, r->m + 2 * r->c);
-  find_cells(r, h);
   for (int i = 0; i < r->width; i++) letter[i] = law_of(r, i)->side(r, i, h[i]);
   if (r->s->sets && r->c) idle_sets(r, letter, surface_scales(r, r->x));
   take_sides(r, letter, -1);
@@ -95,6 +94,7 @@ static void strike_due(Run *r) {
 static int settle_in(Run *r) {
   Met met = r->met;
   int before = r->mode, jumped = become_consistent(r);
+  find_cells(r);
   letters_of(r, r->start);
   active_surfaces(r, -1, r->start);
   if (r->status != RUNNING) return jumped;
@@ -171,6 +171,7 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   find_idle(r);
   if (start_mode || r->remembered) memcpy(r->letter, start_mode ? start_mode : r->remembered, r->width);
   else memset(r->letter, -1, r->width);
+  find_cells(r);
   measure_time(r);
   int finite = letters_of(r, r->letter);
   enter_mode(r);

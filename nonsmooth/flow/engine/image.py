@@ -86,10 +86,12 @@ def image_of(engine: TapeEngine) -> Image:
     def placed(address: int) -> int:
         if address not in known:
             block = blocks[address]
-            if isinstance(block, ctypes.Structure):
-                inner = layout_of(type(block))
-                known[address] = room(inner.size)
-                write(block, inner, known[address])
+            if isinstance(block, (ctypes.Structure, ctypes.Array)):
+                several = [*block] if isinstance(block, ctypes.Array) else [block]
+                inner = layout_of(type(several[0]))
+                known[address] = room(inner.size * len(several))
+                for k, one in enumerate(several):
+                    write(one, inner, known[address] + k * inner.size)
             else:
                 content = np.ascontiguousarray(block).tobytes()
                 known[address] = room(len(content) + 8)  # an empty array has a place too

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem
+from ...model.definition.pieces import places_of
 
 #: Reasons of which ``where`` is a function.
 _OF_FUNCTIONS = (
@@ -24,15 +25,13 @@ class Shown:
         #: Parameters of the user, before those that cells set.
         self.parameters = len(system.parameter_names)
         self._cells = len(self.driven.parameter_names) - self.parameters
-        sizes = np.ones(self.driven.surface_count + len(system.impacts), int)
-        for table in self.tables:
-            sizes[table.element] = table.count
         #: For each table, how many of its surfaces are below each cell.
         self._above = {
             t.element: list(accumulate([i >= 0 for i in t.shown], initial=0)) for t in self.tables
         }
         #: The number of each function, of a table that of its first breakpoint.
-        self.functions: list[int] = (np.cumsum(sizes) - sizes).tolist()
+        *first, count = places_of(system.written)
+        self.functions = [*first, *range(count, count + len(system.impacts))]
 
     def with_cells(self, p: Array) -> Array:
         """Parameters (..., np) with room for those of cells."""

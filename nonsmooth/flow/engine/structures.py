@@ -11,7 +11,7 @@ from .building.core_source import driver_text
 
 #: Sources with structures that Python fills, and with functions of the driver that it calls.
 _STRUCTURES = "common.h programs.h state.c flow.c fixed.c variation.c".split()
-_CALLED = "state.c entry.c fixed.c variation.c".split()
+_CALLED = "state.c entry.c fixed.c legs.c".split()
 
 _NUMBERS = {
     "double": ctypes.c_double,

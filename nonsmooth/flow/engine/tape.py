@@ -44,6 +44,9 @@ _VALUES = ("point", "surfaces", "maps", "atoms", "choices", "restitution", "colu
 _ENTRIES = tuple(field.name for field in fields(Tape) if field.type == "Entries")
 
 
+#: What an address of the driver's structures points to.
+Block = NDArray[Any] | ctypes.Structure | ctypes.Array[Any]
+
 #: Steps by which a run is known to be stiff.
 _PROBED = 400
 
@@ -141,16 +144,19 @@ class TapeEngine:
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         entries = None
         if derived:
-            series, entries = derived_series_of(self.coupled)
+            series, entries = self._derived()
             tape = replace(tape, series=series, free=series)
         self._c = self._structure(self.coupled, tape)
         if entries is not None:
             self._c.derivatives = self._entries(entries)
         self._rooms: Rooms = rooms_of((0, 0, 0))
 
+    def _derived(self) -> tuple[Series, Entries]:
+        return self.system.cached("derived", lambda: derived_series_of(self.coupled))
+
     def add_implicit(self) -> None:
         """Give the driver the field's derivatives, which implicit steps need."""
-        series, entries = self.system.cached("derived", lambda: derived_series_of(self.coupled))
+        series, entries = self._derived()
         implicit = self._series(series, 0)
         self._c.derivatives = self._entries(entries)
         self._c.places = self._at(_places(entries, self.system.extended_dimension))
@@ -281,14 +287,17 @@ class TapeEngine:
         """Numbers that a restart needs besides the state."""
         return int(self._c.rules.width)
 
-    def blocks(self) -> tuple[ctypes.Structure, dict[int, NDArray[Any] | ctypes.Structure]]:
+    def blocks(self) -> tuple[ctypes.Structure, dict[int, Block]]:
         """The system as C reads it, with what implicit steps need, and what its addresses point to."""
-        self.add_implicit()
-        found: dict[int, NDArray[Any] | ctypes.Structure] = {}
+        if not self._c.implicit:
+            self.add_implicit()
+        found = dict[int, Block]()
         for array in sorted(
             self._kept, key=lambda a: a.nbytes
         ):  # slices begin where the whole does
             found[array.ctypes.data] = array
+        cells = structure("Cells") * (self.system.surface_count + 1)
+        found[self._c.cells] = cells.from_buffer_copy(bytes(found[self._c.cells]))
         return self._c, found | {ctypes.addressof(self._implicit): self._implicit}
 
     # one trajectory ----------------------------------------------------------------------------
@@ -331,7 +340,6 @@ class TapeEngine:
             recorded = recorder.finished(counts[7:10])
             self._rooms = recorder.rooms if dense else self._rooms  # the next run is often similar
             modes, labels = self._modes(table), self._labels(table)
-            shown = self.shown.where(REASONS[counts[1]], counts[2])
             final = np.zeros(width)
             library().run_motion(state, address(final))
             if width == 1 and options.t_start == 0:  # times of events are known to rounding
@@ -339,7 +347,7 @@ class TapeEngine:
         return Run(
             status=counts[0],
             reason=counts[1],
-            where=shown,
+            where=self.shown.where(REASONS[counts[1]], counts[2]),
             mode=counts[3],
             limit=numbers[1],
             letters=modes,

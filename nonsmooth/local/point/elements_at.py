@@ -165,7 +165,8 @@ class _Numbers:
         between = {i for _, zeros in solved for i in zeros if i in self.system.algebraic}
         if len(on) == 1 and len(distinct) == 1 and not between:
             return Situation(self.spelled(next(iter(distinct))), on[0])
-        own = [*on, *sorted(between)] if on or between else touched
+        struck = [i for i in touched if not self._may_close(i)]
+        own = [*on, *sorted(between), *struck] if on or between or struck else touched
         if len(own) == 1 and len(distinct) <= 2:
             letters = np.array(min(distinct))  # closed, where it may be either
             return Situation(self.spelled(letters.tolist()), own[0])

@@ -105,6 +105,8 @@ def by_real_part(matrix: Array) -> NDArray[Any]:
 def kind_of(eigenvalues: NDArray[Any], scale: float) -> tuple[str, float]:
     """Name an equilibrium by its eigenvalues; also the smallest real part over ``scale``."""
     real = eigenvalues.real
+    if not real.size:  # what is kept leaves no direction
+        return "stable node", math.inf
     margin = float(np.min(np.abs(real))) / scale if scale > 0 else 0.0
     if margin <= HYPERBOLIC:
         return "degenerate", margin
@@ -230,7 +232,7 @@ def _of_mode(
     along = null_space(gradient) if gradient.size else np.eye(n)
     eigenvalues = by_real_part(along.T @ slope @ along)
     scale = float(np.max(np.abs(eigenvalues), initial=0.0))
-    kind, margin = kind_of(eigenvalues, scale) if eigenvalues.size else ("stable node", 1.0)
+    kind, margin = kind_of(eigenvalues, scale)
     least = float(guards.min(initial=np.inf))
     near_zero = abs(least) <= TOLERANCE * (1 + float(np.linalg.norm(found.x)))
     status = "boundary" if near_zero else "real" if least > 0.0 else "virtual"

@@ -52,10 +52,19 @@ class Curve:
         return tuple(x for x, jump in zip(self.levels, self.jumps, strict=True) if any(jump))
 
     def of(self, u: ca.SX) -> ca.SX:
-        """The curve as an expression: a sum over the breakpoints, or a choice among the pieces where sums lose digits."""
-        if self.lost > _LOST:
-            return self._chosen(u)
-        return self.summed(u, ca.fmax(u - ca.DM(self.kinks), 0), 1)
+        """The curve as an expression: a sum over the breakpoints, or a choice among the pieces where sums lose digits.
+
+        It is the root of a negative number, NaN, where the curve has no value.
+        """
+        is_lossy = self.lost > _LOST
+        value = (
+            self._chosen(u) if is_lossy else self.summed(u, ca.fmax(u - ca.DM(self.kinks), 0), 1)
+        )
+        if self.closed[0]:
+            value = ca.if_else(u < self.levels[0], ca.sqrt(u - self.levels[0]), value)
+        if self.closed[1]:
+            value = ca.if_else(u > self.levels[-1], ca.sqrt(self.levels[-1] - u), value)
+        return value
 
     def marked(self, argument: ca.SX) -> ca.SX:
         """The same, so that ``with_curves`` recognises it."""
@@ -148,7 +157,7 @@ def polynomial(c: Sequence[Any], u: ca.SX) -> ca.SX:
 def with_curves(nodes: list[Node], rows: list[list[int]]) -> tuple[list[Node], list[list[int]]]:
     """A graph in which a marked curve is a node ``curve`` of its argument, with the curve as payload.
 
-    One on which a switch depends stays as it is, and so does a single kink.
+    One on which a switch depends stays as it is without its mark, and so does a single kink.
     """
     constants = {
         j: cast("float", node.payload) for j, node in enumerate(nodes) if node.op == "const"
@@ -167,12 +176,25 @@ def with_curves(nodes: list[Node], rows: list[list[int]]) -> tuple[list[Node], l
         found = None if switched[j] else _argument(nodes[j].args, sums[j][0] / 2.0, nodes, sums)
         if found is not None and len(curve.levels) + sum(curve.closed) > 1:
             inner[j], arguments[j] = found, (sums[found][1],)
+    ends = {j for j, (c, *_) in sums.items() if c in _MARKED and any(_MARKED[c].closed)}
+    if ends - {*inner.values()}:
+        raise DefinitionError(
+            "table: outside='error' holds for the value of a table, not for its derivative or within another switch as "
+            "sign. Use 'constant' or 'linear', and a Stop at each end."
+        )
+    unmarked = {
+        j: own for j, own in sums.items() if j not in inner and (j in curves or own[0] in _MARKED)
+    }
+    arguments = [(unmarked[j][1],) if j in unmarked else own for j, own in enumerate(arguments)]
     made, number = list[Node](), dict[int, int]()
     for j in reached(arguments, [True] * len(nodes), [j for row in rows for j in row]):
         args = tuple(number[k] for k in arguments[j])
-        if j in inner and sums[inner[j]][2]:
+        if sums[inner[j]][2] if j in inner else j in unmarked and unmarked[j][2]:
             made.append(Node("neg", args))
             args = (len(made) - 1,)
+        if j in unmarked:
+            number[j] = args[0]
+            continue
         made.append(Node("curve", args, curves[j]) if j in inner else nodes[j]._replace(args=args))
         number[j] = len(made) - 1
     return made, [[number[j] for j in row] for row in rows]

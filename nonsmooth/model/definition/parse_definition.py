@@ -94,6 +94,7 @@ class Definition:
     impact_law: str = "newton"
     constraints: tuple[str, ...] = ()  # names of the joints, the last entries
     tables: tuple[Table, ...] = ()  # the values of their curves are the last parameters
+    breakpoints: frozenset[int] = frozenset()  # surfaces that are breakpoints of tables
 
     @cached_property
     def plain(self) -> bool:

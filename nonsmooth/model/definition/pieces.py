@@ -19,7 +19,7 @@ import numpy as np
 
 from ..reading import listed
 from ..values import Array
-from .curves import Curve
+from .curves import Curve, polynomial
 from .elements import Element, Entry
 
 if TYPE_CHECKING:
@@ -131,18 +131,34 @@ def by_pieces(d: Definition) -> Definition:
             base, *c = [ca.SX.sym(f"{value.name()}_{j}") for j in range(5)]
             cells += [base, *c]
             degree = max((j for piece in curve.pieces for j in range(4) if piece[1 + j]), default=0)
-            pieces.append(_nested(c[: degree + 1], u - base))
+            pieces.append(polynomial(c[: degree + 1], u - base))
     every = ca.vertcat(*[value for own in values for value in own])
     field = ca.substitute(d.field, every, ca.vertcat(*pieces))
     defaults = d.defaults | {cell.name(): 0.0 for cell in cells}
     return replace(d, parameters=ca.vertcat(p, *cells), field=field, defaults=defaults, tables=())
 
 
-def _nested(c: Sequence[ca.SX], u: ca.SX) -> ca.SX:
-    result = c[-1]
-    for a in c[-2::-1]:
-        result = result * u + a
-    return result
+def places_of(d: Definition) -> list[int]:
+    """The first surface of each function where breakpoints are surfaces, and their number."""
+    counts = {table.element: table.count for table in d.tables}
+    return [*accumulate((counts.get(i, 1) for i in range(d.surfaces.numel())), initial=0)]
+
+
+def in_cells(d: Definition, signs: Sequence[float]) -> ca.SX | None:
+    """The field where surfaces and breakpoints have signs; None where these are of no cell."""
+    places, (_, values), found = places_of(d), _parted(d), list[ca.SX]()
+    elements = {table.element for table in d.tables}
+    own = [signs[k] if i not in elements else 0.0 for i, k in enumerate(places[:-1])]
+    for table in d.tables:
+        above = {k: signs[places[table.element] + i] for k, i in enumerate(table.shown) if i >= 0}
+        above |= {k: sign * signs[places[i]] for k, i, sign in table.twins}
+        cell = max((k + 1 for k, sign in above.items() if sign == 1), default=0)
+        if any(sign != (1 if k < cell else -1) for k, sign in above.items()):
+            return None
+        u, pieces = d.surfaces[table.element], table.values()[cell].reshape(-1, 5)
+        found += [polynomial(c, u - base) for base, *c in pieces.tolist()]
+    known = [*[value for each in values for value in each], *listed(d.multipliers)]
+    return ca.substitute(d.field, ca.vertcat(*known), ca.vertcat(*found, *own))
 
 
 def by_breakpoints(d: Definition) -> Definition:
@@ -170,6 +186,8 @@ def by_breakpoints(d: Definition) -> Definition:
             d.field, ca.vertcat(*[value for own in values for value in own]), ca.vertcat(*found)
         )
 
+    places = places_of(d)
+    breakpoints = [places[table.element] + i for table in d.tables for i in range(table.count)]
     laws = tuple(
         name
         for law, own in zip(d.laws, shown, strict=True)
@@ -183,4 +201,5 @@ def by_breakpoints(d: Definition) -> Definition:
         multipliers=ca.vertcat(*[lam for _, own in shown for lam in own]),
         laws=laws if set(laws) - {"surface"} else (),
         tables=(),
+        breakpoints=frozenset(breakpoints),
     )

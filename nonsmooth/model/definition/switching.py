@@ -43,7 +43,7 @@ class Switching:
         How the return map of an orbit that touches the surface departs from that of the orbit that does
         not: like this power of the depth. 1/2 (a square root) is that of a jumping force.
     decided_by : str
-        Exact arithmetic modulo a prime, or doubles at random points, which prove nothing.
+        Exact arithmetic, perhaps but for the rounding of the numbers, or doubles at random points, which prove nothing.
     """
 
     kind: Kind

@@ -37,7 +37,7 @@ from .parse_definition import (
     consistent_parameters,
     read_definition,
 )
-from .pieces import by_breakpoints, by_pieces
+from .pieces import by_breakpoints, by_pieces, in_cells
 from .roots import roots_of
 from .switching import Switching, class_of
 
@@ -46,6 +46,7 @@ T = TypeVar("T")
 #: Classes of surfaces are shown for at most so many of them.
 _CLASSES_SHOWN = 8
 _EQUATIONS_SHOWN = 12
+_FUNCTIONS_SHOWN = 24
 _SIDES = (("+", "above"), ("-", "below"))
 
 Discrete = Sequence[Expression] | Mapping[Any, Sequence[float] | None]
@@ -438,7 +439,10 @@ class FilippovSystem:
         parts = [
             f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
         ]
-        names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
+        functions = [s.function for s in self.lifted]
+        if len(functions) > _FUNCTIONS_SHOWN:
+            functions[2:-1] = ["..."]
+        names = f": {', '.join(functions)}" if functions else ""
         others = len(self.complementarity) + len(self.constraints)
         surfaces = len(self.entries) - len(self.sets) - others
         if surfaces or not (self.sets or others):
@@ -774,9 +778,12 @@ class FilippovSystem:
 
         The ``reactions`` of impacts are zero unless given.
         """
-        d, f = self.definition, self.definition.field
-        if self.surface_count:
-            f = ca.substitute(f, d.multipliers, multipliers)
+        d, f = self.definition, None
+        if self.written.tables and isinstance(multipliers, ca.DM):
+            f = in_cells(self.written, np.array(multipliers).ravel().tolist())
+        if f is None:
+            f = d.field
+            f = ca.substitute(f, d.multipliers, multipliers) if self.surface_count else f
         if self.impacts:
             f = ca.substitute(f, d.reactions, 0 if reactions is None else reactions)
         return ca.vertcat(f, ca.SX.ones(d.time.numel(), 1))

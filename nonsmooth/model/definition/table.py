@@ -83,6 +83,11 @@ def table(
     pieces, (low, high) = _pieces(x, y, order, outside), _bounds_of(e)
     first = int(np.searchsorted(x, low, side="right"))  # the piece at the lowest argument
     last = int(np.searchsorted(x, high))
+    if outside == "error" and (low >= x[-1] or high <= x[0]):
+        raise DefinitionError(
+            f"table: its argument is from {low:g} to {high:g}, and its breakpoints from {x[0]:g} to {x[-1]:g}, so that it "
+            "has no value with outside='error'."
+        )
     closed = (outside == "error" and first == 0, outside == "error" and last == len(x))
     jumps = _jumps(pieces, x, order, outside)
     is_kept = np.array(jumps != 0.0).any(axis=1) | _ends(len(x), closed)

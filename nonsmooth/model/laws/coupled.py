@@ -55,7 +55,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     roots = gate_roots(plain, _surfaces(system), x, ones)[1]
     columns = ca.jacobian(plain, lam)
     for members in system.entries:  # a set has one factor
-        if members[0] in (*system.half_lines, *system.joints):
+        if members[0] in (*system.half_lines, *system.joints, *system.definition.breakpoints):
             continue
         places = [(row, i) for i in members for row in columns[:, i].sparsity().row()]
         entries = [e for i in members for e in columns[:, i].nonzeros()]
@@ -154,6 +154,8 @@ class Coupled:
         if surface in (*special, *self.system.joints):
             return False
         d, x = self.system.definition, self.system.extended_states
+        if surface in d.breakpoints:
+            return True
         pieces = [e for e in column if not e.is_zero()]
         return all(ca.depends_on(e, x) for e in pieces) and vanish_on(
             pieces, d.surfaces[surface], x

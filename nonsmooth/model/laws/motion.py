@@ -39,7 +39,7 @@ class Motion:
         #: Multipliers that are states.
         self.unknowns: tuple[int, ...] = ()
         is_single = not system.coupled and not rests
-        self._solve(is_single, bool(rests) or bool(system.complementarity))
+        self._solve(is_single, bool(rests or system.complementarity or system.constraints))
         pairs = [*self._guarded(is_single)]
         self.guards = tuple(guard for guard, _ in pairs)
         functions = ca.densify(ca.vertcat(*[own for _, own in pairs])) if pairs else ca.SX(0, 1)
@@ -51,11 +51,14 @@ class Motion:
     def _solve(self, is_single: bool, may_depend: bool) -> None:
         """Solve for the multipliers of what slides."""
         coupled, x = self._coupled, self.system.extended_states
+        #: Surfaces whose unknown is lambda + c lambda^3, and their c: sliding ends where that is largest.
+        self._cubic: dict[int, ca.SX] = {}
+        if self.system.written.tables and 0 not in self.system.parse_letters(self.mode):
+            self.states, self.field, self._values = x, self.system.field(self.mode), ca.SX(0, 1)
+            return
         sliding = coupled.sliding(self.mode)
         symbols = coupled.symbols_of(sliding)
         field, layer = coupled.held_at(self.mode, [coupled.field, coupled.layer])
-        #: Surfaces whose unknown is lambda + c lambda^3, and their c: sliding ends where that is largest.
-        self._cubic: dict[int, ca.SX] = {}
         for i in sliding:
             if i < self.system.surface_count and self.system.nonlinear[i]:
                 field, layer = self._of_cubic(i, field, layer, symbols)

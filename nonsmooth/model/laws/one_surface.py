@@ -32,6 +32,8 @@ class OneSurface:
     ----------
     kind : str
         What the surface is in the whole system.
+    surface : int or None
+        Its number among the letters there.
     system : FilippovSystem
         Above the surface a condition or contact is open, below it is closed.
     kept : int
@@ -40,6 +42,7 @@ class OneSurface:
     """
 
     kind: Kind
+    surface: int | None
     system: FilippovSystem
     kept: int
     _evaluate: Evaluator
@@ -160,7 +163,7 @@ class _Held:
                 "kept", [x, self.system.parameter_symbols], [ca.densify(e) for e in outputs]
             )
         )
-        return OneSurface(self.kind, made, len(rows), evaluate)
+        return OneSurface(self.kind, self.element, made, len(rows), evaluate)
 
     def kept(self) -> Sequence[ca.SX]:
         """Functions of what is closed besides the element, and of joints with their lower derivatives."""

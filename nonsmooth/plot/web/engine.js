@@ -12,13 +12,14 @@ class Engine {
     Object.assign(this, { c, system, machine: system.machine });
     c._initialize();
     this.width = system.m + system.c;
+    this.parameters = system.parameters.length + system.cells + 1; // with room for cells of tables
     this.row = system.n + 2 * this.width + system.atoms; // numbers of a state that is sampled
     this.image = this.placed(system);
     for (const name of ["Options", "Batch", "Output"]) {
       this[name] = c.calloc(1, this.machine.layout[name].size);
     }
     this.named = c.calloc(this.machine.guards * system.named, 1);
-    this.input = c.malloc(8 * (system.n + system.parameters.length + 2));
+    this.input = c.malloc(8 * (system.n + this.parameters + 1));
     this.letters = c.malloc(this.width + 1);
     this.read = c.malloc(8 * (4 + 15) + 4 * (this.width + 1 + 16) + 8 * (16 * system.n + 1));
     this.rooms = null;
@@ -123,8 +124,8 @@ class Engine {
 
   /** Start and parameters in the memory; a system that depends on time has it as its last state. */
   given(x, p, t) {
-    const { n, dimension, parameters } = this.system;
-    const at = this.f64(this.input, n + parameters.length + 1);
+    const { n, dimension } = this.system;
+    const at = this.f64(this.input, n + this.parameters);
     at.fill(0);
     at.set(n > dimension ? [...x, t] : x);
     at.set(p, n);
@@ -232,14 +233,20 @@ class Engine {
     c.free(at);
   }
 
-  /** A mode as itineraries show it: a letter for each surface, set and contact, then discrete states. */
+  /** A mode as itineraries show it: a letter for each surface, set, breakpoint and contact, then discrete states. */
   spelled(bytes) {
-    const { m, entries, half_lines: halfLines, discrete } = this.system;
+    const { m, entries, half_lines: halfLines, discrete, tables } = this.system;
     const signs = new Int8Array(bytes.buffer, bytes.byteOffset, this.width);
-    const letter = (i) => (halfLines.includes(i) ? "co"[+!!signs[i]] : "-s+****i"[signs[i] + 1]);
-    const surfaces = entries.map(letter);
-    const contacts = Array.from(signs.subarray(m), (sign) => "co"[+!!sign]);
     const values = new Float64Array(bytes.slice(this.width).buffer);
+    const letters = (i) => {
+      const k = tables.findIndex(({ element }) => element === i);
+      if (k < 0) return halfLines.includes(i) ? "co"[+!!signs[i]] : "-s+****i"[signs[i] + 1];
+      const { count, below } = tables[k];
+      const above = below[Math.max(values[discrete.length + k], 0)];
+      return "+".repeat(above) + "-".repeat(count - above);
+    };
+    const surfaces = entries.map(letters);
+    const contacts = Array.from(signs.subarray(m), (sign) => "co"[+!!sign]);
     const labels = discrete.map((name, k) => `${name}=${Number(values[k].toPrecision(6))}`);
     return [[...surfaces, ...contacts].join(""), ...labels].filter((part) => part).join(",");
   }
@@ -273,7 +280,7 @@ class Engine {
     const { n, dimension: d } = this.system;
     const own = this.system.parameters.length;
     const count = x0.length / n;
-    const stride = own + 1;
+    const stride = this.parameters;
     this.refreshIfLarge();
     const kindCount = this.machine.kinds.length;
     const words = [n, stride, d, 1, 1, 1, kindCount, room, room * d].map((k) => 8 * k * count);
@@ -322,15 +329,12 @@ class Engine {
   sample(points, p, multipliers) {
     const { n } = this.system;
     const count = points.length / n;
-    const parameters = this.system.parameters.length;
-    const { row } = this;
-    const sizes = [points.length, parameters + 1, this.width, row * count].map((k) => 8 * k);
+    const { row, parameters } = this;
+    const sizes = [points.length, parameters, this.width, row * count].map((k) => 8 * k);
     const { places, free } = this.reserve(sizes);
     const [at, values, held, out] = places;
     this.f64(at, points.length).set(points);
-    this.f64(values, parameters + 1)
-      .fill(0)
-      .set(p);
+    this.f64(values, parameters).fill(0).set(p);
     this.f64(held, this.width).fill(0).set(multipliers);
     this.c.run_sample(this.run, values, at, BigInt(count), held, out);
     const made = this.f64(out, row * count).slice();

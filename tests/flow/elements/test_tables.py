@@ -67,6 +67,29 @@ def test_a_start_at_a_breakpoint(speed):
     assert run.events[0].mode_before == ("+++++---" if speed <= 0 else "++++++--")
 
 
+@pytest.mark.parametrize("restitution", [0.5, 0.0])
+def test_rest_on_a_contact_at_a_breakpoint(restitution):
+    # the driver does not decide on breakpoints: their letter there is that of a cell, not s
+    push = 1.6 * ca.sin(t) - 1 - 0.3 * ns.table(x, [-1.0, 0.0, 0.5, 1.5], [0.7, 0.4, 0.2, 0.9])
+    system = lifted([v, push], time=t, impacts=ns.Impact(x, restitution=restitution))
+    run, other = (
+        ns.simulate(s, [1.0, 0.3], 20.0, tol=1e-11) for s in (system, system.of_breakpoints)
+    )
+    kinds = [
+        [e.kind for e in one.events if e.kind in ("impact", "contact", "release")]
+        for one in (run, other)
+    ]
+    assert kinds[0] == kinds[1] and "release" in kinds[0]
+    np.testing.assert_allclose(
+        run(np.linspace(0, 20, 101)), other(np.linspace(0, 20, 101)), atol=1e-8
+    )
+
+
+def test_breakpoints_that_come_closer_and_closer_are_passed():
+    halves = 2.0 ** -np.arange(12, 0, -1.0)
+    agree(lifted([-1 - 0.01 * ns.table(x, halves, np.cos(9 * halves))], [x]), [1.0], 2.0)
+
+
 def test_runs_go_on_from_their_events():
     system = SYSTEMS["a spring"]
     run = ns.simulate(system, [0.8, 0.4], 10.0)
@@ -132,6 +155,30 @@ def test_a_run_ends_where_the_argument_leaves_its_range():
     assert low.x[-1, 0] == pytest.approx(0.0, abs=1e-12) and low.t[-1] == pytest.approx(np.log(1.5))
     outside = ns.simulate(lifted([-1 - closed()], [x]), [2.5], 9.0)
     assert outside.status is ns.Status.NOT_FINITE and outside.t[-1] == 0.0
+
+
+def test_ends_of_a_flat_table_and_of_one_of_parameters():
+    flat = ns.table(x, [0.0, 1.0], [2.0, 2.0], outside="error")
+    run = ns.simulate(lifted([flat], [x]), [0.5], 5.0)
+    assert run.status is ns.Status.NOT_FINITE and run.t[-1] == pytest.approx(0.25, abs=1e-12)
+    system = lifted([closed(q) - x], [x], parameters={q: 0.5})
+    assert ns.simulate(system, [0.0], 5.0).status is ns.Status.REACHED_END
+    assert ns.simulate(system, [0.0], 5.0, parameters={q: 2.5}).status is ns.Status.NOT_FINITE
+    value = ca.Function("value", [x], [closed()])
+    assert float(value(1.5)) == 2.0 and np.isnan(float(value(2.5))) and np.isnan(float(value(-0.5)))
+
+
+@pytest.mark.parametrize(
+    ("rhs", "words"),
+    [
+        (lambda: ca.sign(closed() - 0.5), "within another switch"),
+        (lambda: ca.jacobian(closed(), x), "not for its derivative"),
+        (lambda: closed(3 + x**2), "from 3 to inf, and its breakpoints from 0 to 2"),
+    ],
+)
+def test_ends_that_cannot_be_watched_are_refused(rhs, words):
+    with pytest.raises(ns.DefinitionError, match=words):
+        lifted([rhs()], [x])
 
 
 @pytest.mark.parametrize(("part", "status"), [(1 + 1e-5, "REACHED_END"), (1 - 1e-5, "NOT_FINITE")])

@@ -30,6 +30,17 @@ def stiff():
     return ns.FilippovSystem([x, y], surface=x - 1, above=[-1, fast], below=[2, fast])
 
 
+def tabulated():
+    """Friction from a table: a sign, a kink and three breakpoints."""
+    import casadi as ca
+
+    x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    speed = v - 0.3
+    measured = ns.table(ca.fabs(speed), [0.0, 0.05, 0.1, 0.3, 1.0], [0.60, 0.45, 0.40, 0.36, 0.35])
+    rates = [v, -x - measured * ca.sign(speed)]
+    return ns.FilippovSystem.from_expression([x, v], rates)
+
+
 def textbook(name):
     problem = ns.textbook.PROBLEMS[name]()
     run = problem.run()
@@ -73,7 +84,7 @@ def test_comments_and_spaces_leave_the_key():
 @pytest.mark.filterwarnings("ignore::nonsmooth.flow.warn.DecisionWarning")
 def test_runs_are_python_s():
     cases = [textbook(name) for name in FEW]
-    cases.append((stiff(), [0.0, 2.0], 3.0, None))
+    cases += [(stiff(), [0.0, 2.0], 3.0, None), (tabulated(), [0.0, 0.0], 20.0, None)]
     assert wrong(cases) == [""] * len(cases)
 
 

@@ -322,3 +322,55 @@ def test_diodes_of_a_bridge_change_in_pairs():
     assert "open and close together" in str(bridge.switching(2))
     with pytest.raises(ns.DefinitionError, match=r"'[ac]': it opens and closes with others only"):
         ns.classify(bridge, [0.0, 0.1], mode="coco")
+
+
+def test_corners_impacts_beside_rest_and_what_leaves_no_direction():
+    pressed = ns.FilippovSystem(
+        [x, y],
+        field=[u - 1, w - 2],
+        complementarity=[ns.Complementarity(x, u, "a"), ns.Complementarity(y, w, "b")],
+    )
+    found = ns.classify(pressed, [0.0, 0.0])
+    assert (found.kind, found.label) == ("equilibrium", "stable node")
+    assert ns.find_equilibrium(pressed, [0.1, 0.1], mode="cc").kind == "stable node"
+    assert ns.classify(pressed, [0.0, 0.5]).kind == "closed"
+    room = ns.FilippovSystem(
+        [x, y, v, w],
+        field=[v, w, 0, -1],
+        impacts=[ns.Impact(y, 0.5, name="floor"), ns.Impact(x, 0.5, name="wall")],
+    )
+    assert ns.classify(room, [0.0, 0.0, -1.0, 0.0]).kind == "impact"  # of the wall, on the floor
+    assert ns.classify(room, [1.0, 0.0, 1.0, 0.0]).kind == "closed"
+    with pytest.raises(ns.PointError, match="contact 'floor' and the contact 'wall'"):
+        ns.classify(room, [0.0] * 4)
+
+
+def test_joints_that_depend_on_one_another_and_friction_that_drops():
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    rods = [
+        ns.Constraint(x**2 + y**2 - 1, reaction=a, name="one"),
+        ns.Constraint(2 * x**2 + 2 * y**2 - 2, reaction=b, name="two"),
+    ]
+    pull = [(a + 2 * b) * x - v, (a + 2 * b) * y - 1 - w]
+    swing = ns.FilippovSystem([x, y, v, w], field=[v, w, *pull], constraints=rods)
+    rest = ns.find_equilibrium(swing, [0.1, -1.0, 0.0, 0.0])
+    assert rest.kind == "stable focus"
+    np.testing.assert_allclose(rest.point, [0, -1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(abs(rest.eigenvalues), 1.0, atol=1e-12)  # z^2 + z + 1
+    assert ns.classify(swing, rest.point).label == "stable focus"
+    dry = ns.Friction(v, load=r, kinetic=0.3, static=0.5)
+    block = ns.FilippovSystem(
+        [x, y, v, w],
+        field=[v, w, dry.force - x, r - 1],
+        surfaces=[dry],
+        impacts=ns.Impact(y, reaction=r),
+    )
+    with pytest.raises(ns.DefinitionError, match="hidden"):
+        ns.classify(block, [0.0] * 4)
+    skate = ns.FilippovSystem(
+        [x, y, z, v, w],
+        field=[v, w, 1, -r * ca.sin(z), r * ca.cos(z)],
+        constraints=ns.Constraint(w * ca.cos(z) - v * ca.sin(z), reaction=r),
+    )
+    with pytest.raises(ns.PointError, match=r"inside a mode, received the field \[(1.0|0.99)"):
+        ns.classify(skate, [0, 0, 0, 1, 0])

@@ -398,10 +398,10 @@ static int is_at_level(const Run *r, int i, int side, double h) {
 }
 
 /* The cells of a state, of present ones those that it is in to rounding. */
-static void find_cells(Run *r, const double *h) {
+static void find_cells(Run *r) {
   for (int i = 0; r->s->tables && i < r->m; i++) {
     if (!has_law(r, i, TABLE_LAW)) continue;
-    double value = h[i];
+    double value = surface_values(r, r->x)[i];
     int known = r->cell[i] >= 0 && (is_at_level(r, i, 1, value) || is_at_level(r, i, -1, value));
     if (!known) set_cell(r, i, cell_at(cells_of(r, i), value));
   }

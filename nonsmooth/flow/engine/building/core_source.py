@@ -27,6 +27,9 @@ _FILES = """
     entry.c sample.c
 """.split()
 
+#: Legs of known durations with derivatives.
+_LEGS = "variation.c adjoint.c implicit_legs.c legs.c".split()
+
 
 #: The folder of those of the C files.
 _SOURCES = Path(__file__).parents[2]
@@ -58,11 +61,12 @@ def run_source() -> str:
 @lru_cache(maxsize=1)
 def core_source() -> str:
     """C of the driver."""
+    legs = [driver_text(f"core/{name}") for name in _LEGS]
     flow, *others = (
         driver_text(f"core/{name}") for name in ("flow.c", "implicit_flow.c", "fixed.c")
     )
     extended = _extended("programs.h", "flow.c")
-    return "".join([run_source(), driver_text("core/variation.c"), flow, extended, *others])
+    return "".join([run_source(), *legs, flow, extended, *others])
 
 
 def _extended(*files: str) -> str:

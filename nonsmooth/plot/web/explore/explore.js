@@ -151,16 +151,28 @@
     const sides = {
       "+": `${given.surfaces[0]} > 0`,
       "-": `${given.surfaces[0]} < 0`,
+      "*": `${given.surfaces[0]} ≠ 0`,
       s: "sliding",
     };
     const known = system.entries.length === 1 && !system.c ? sides : {};
-    const shown = new Map(
-      pieces.map(({ mode }) => [modes.of(mode), known[mode] ?? (minus(mode) || "smooth")]),
-    );
-    const names = [...shown].map(([look, words]) => [`orbit ${look}`, words]);
+    const shown = new Map();
+    for (const { mode } of pieces) {
+      const words = shown.get(modes.of(mode)) ?? new Set();
+      shown.set(modes.of(mode), words.add(known[mode] ?? (minus(mode) || "smooth")));
+    }
+    const listed = (words) => [...words].slice(0, 3).join(", ") + (words.size > 3 ? ", …" : "");
+    const names = [...shown].map(([look, words]) => [`orbit ${look}`, listed(words)]);
     for (const kind of ["attracting", "repelling"]) {
       if ($("plane").querySelector(`.band.${kind}, .cut.${kind}`)) {
         names.push([`${view.flat ? "band" : "cut"} ${kind}`, `${kind} sliding`]);
+      }
+    }
+    for (const [side, sign] of [
+      ["above", ">"],
+      ["below", "<"],
+    ]) {
+      if ($("plane").querySelector(`.fold.${side}`)) {
+        names.push([`fold ${side}`, `folds of the field where ${given.surfaces[0]} ${sign} 0`]);
       }
     }
     Pictures.key($("key"), names);
@@ -315,8 +327,8 @@
     const seconds = sweeper.milliseconds / 1000;
     const name = given.sliders[state.over].name;
     $("sweep-text").textContent =
-      `${sweeper.runs} runs in ${text(seconds, 2)} s, beside the page: ${Sweep.SKIPPED} events are left out, ` +
-      `${Sweep.SHOWN} shown. Drag to set ${name}.`;
+      `${sweeper.runs} runs in ${text(seconds, 2)} s. Of each the first ${Sweep.SKIPPED} events are left out ` +
+      `and ${Sweep.SHOWN} shown. Drag to set ${name}.`;
     document.body.dataset.swept = String(sweeper.version);
   }
 

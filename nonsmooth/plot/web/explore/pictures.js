@@ -5,16 +5,16 @@ const Pictures = (() => {
   const { svg, html, text, Plane } = Page;
   const isPhone = () => innerWidth < 900;
 
-  /** A class of lines for each mode: sides of a surface, sliding, and three for others. */
+  /** A class of lines for each mode: off surfaces and sets, below, sliding or in contact, and three for others. */
   class Modes {
     others = [];
 
     of(mode) {
       const [letters] = mode.split(",");
+      if (/[sc]/.test(letters)) return "mode-slide";
       if (mode.includes(",")) return this.further(mode);
-      if (/^[+o]*$/.test(letters)) return "mode-above";
+      if (/^[+o*]*$/.test(letters)) return "mode-above";
       if (/^-+$/.test(letters)) return "mode-below";
-      if (/^[sc*]+$/.test(letters)) return "mode-slide";
       return this.further(mode);
     }
 
@@ -73,7 +73,7 @@ const Pictures = (() => {
       const { states, dimension } = this.system;
       const rows = Math.min(dimension, Series.MOST);
       plane.limits([0, end], [0, 1]);
-      const slid = pieces.filter(({ mode }) => /^[^,]*[s*]/.test(mode));
+      const slid = pieces.filter(({ mode }) => /^[^,]*s/.test(mode));
       const parts = slid.map(({ t }) =>
         plane.polygon(
           [

@@ -128,6 +128,7 @@ class Portrait {
       this.layers.marks.append(...marks.flatMap((mark) => this.marked(mark)));
     } else if (engine.system.n === engine.system.dimension) {
       for (let i = 0; i < engine.width; i++) {
+        if (engine.system.tables.some(({ element }) => element === i)) continue; // its function follows the cell
         const cut = new Scan.Plane(engine, state.p, box, (x) => x, i);
         const lines = Scan.zeroLines((points) => cut.heights(points), box, 40);
         this.layers.surface.append(
@@ -153,33 +154,48 @@ class Portrait {
     }
   }
 
-  /** Cuts of the first surface of a system in space by planes, with the kind of sliding. */
+  /** The surface of a system in space as its cuts by planes: stretches and folds, which are kept while it is turned. */
+  cutsOf(state) {
+    const { engine, view, given } = this;
+    const rest = engine.system.states.length > 3 ? state.x : [0, 0, 0];
+    const key = JSON.stringify([state.p, rest.slice(3), view.pairs]);
+    if (key === this.cut?.key) return this.cut;
+    const found = { key, lines: [], folds: [] };
+    given.cuts.forEach(([u, v, w], family) => {
+      const box = [...view.pairs[u], ...view.pairs[v]];
+      for (let k = 0; k < 9; k++) {
+        const level = view.middle(w) + view.half(w) * (k / 4 - 1);
+        const at = (point) =>
+          rest.map((own, i) => ({ [u]: point[0], [v]: point[1], [w]: level })[i] ?? own);
+        const { stretches, folds } = Scan.surface(new Scan.Plane(engine, state.p, box, at), 16);
+        const drawn = family ? [] : stretches;
+        found.lines.push(
+          ...drawn.map(({ kind, line }) => ({ kind, line: line.map((one) => at(one.x)) })),
+        );
+        const special = given.slides ? folds : [];
+        found.folds.push(...special.map((one) => ({ side: one.fold, x: at(one.x) })));
+      }
+    });
+    this.cut = found;
+    return found;
+  }
+
   drawSpace(state) {
     const { engine, view, plane } = this;
     if (!this.given.cuts || engine.system.n > engine.system.dimension) return;
-    const rest = state.x;
-    const [u, v, w] = this.given.cuts;
-    const box = [...view.pairs[u], ...view.pairs[v]];
-    const found = new Map();
-    const folds = [];
-    for (let k = 0; k < 9; k++) {
-      const level = view.middle(w) + view.half(w) * (k / 4 - 1);
-      const embed = (point) =>
-        rest.map((own, i) => (i === u ? point[0] : i === v ? point[1] : i === w ? level : own));
-      const cut = Scan.surface(new Scan.Plane(engine, state.p, box, embed), 16);
-      const seen = (one) => view.at(embed(one.x));
-      for (const { kind, line } of cut.stretches) {
-        found.set(kind, (found.get(kind) ?? "") + Pictures.drawn(plane, line.map(seen)));
-      }
-      folds.push(...cut.folds.map((one) => [one.fold, seen(one)]));
-    }
-    for (const [kind, d] of found)
-      this.layers.surface.append(Page.svg("path", { d, class: `cut ${kind}` }));
-    for (const [side, point] of folds) {
-      const [x, y] = plane.at(point);
-      this.layers.surface.append(
-        Page.svg("circle", { cx: x, cy: y, r: 2, class: side > 0 ? "fold above" : "fold below" }),
+    const { lines, folds } = this.cutsOf(state);
+    const path = ({ line }) =>
+      Pictures.drawn(
+        plane,
+        line.map((x) => view.at(x)),
       );
+    for (const [kind, d] of Pictures.byClass(lines, ({ kind }) => kind, path)) {
+      this.layers.surface.append(Page.svg("path", { d, class: `cut ${kind}` }));
+    }
+    for (const { side, x } of folds) {
+      const [cx, cy] = plane.at(view.at(x));
+      const look = `fold ${side > 0 ? "above" : "below"}`;
+      this.layers.surface.append(Page.svg("circle", { cx, cy, r: 2, class: look }));
     }
   }
 

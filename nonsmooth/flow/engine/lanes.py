@@ -9,12 +9,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...model import Array, FilippovSystem, coupled_of
+from ...model import Array, FilippovSystem
 from ..options import Options
 from ..results import Chunk, Stopped
 from .arrays import BURST, batch_of, options_of
 from .building.build import build
-from .building.codegen import lanes_source, set_lanes_source, supports_lanes, supports_set_lanes
+from .building.codegen import lanes_source, supports_lanes
 from .building.compilers import lane_width
 from .structures import declare, structure
 from .tape import library as core_library
@@ -40,14 +40,9 @@ class Lanes:
         """The library, loaded."""
         with self._lock:
             if self._library is None:
-                source = self._source(lane_width())
+                source = lanes_source(self.system, self.order, lane_width())
                 self._library = declare(build(source, FLAGS), "kernel/batch.c")
             return self._library
-
-    def _source(self, width: int) -> str:
-        if self.system.sets:
-            return set_lanes_source(coupled_of(self.system), self.order, width)
-        return lanes_source(self.system, self.order, width)
 
     def run_many(
         self,
@@ -104,7 +99,7 @@ def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
     """Return what runs a system's trajectories in step, or None where the driver has to run them."""
     if options.start_mode is not None or options.rest_below is not None or options.begins_late:
         return None
-    if not (supports_set_lanes(coupled_of(system)) if system.sets else supports_lanes(system)):
+    if not supports_lanes(system):
         return None
     order = _order_with_sets(options) if system.sets else options.order
     return system.cached(("lanes", order), lambda: Lanes(system, order))

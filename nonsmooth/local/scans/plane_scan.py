@@ -73,15 +73,26 @@ class PlaneScan:
     @cached_property
     def excluded(self) -> list[Any]:
         """Functions of the state that are positive where there is no motion, as expressions."""
-        found, gaps = [e.region for e in self.events if e.level], self.whole.definition.gaps
+        found, gaps = self._levels, self.whole.definition.gaps
         found += [-gaps[j] for j in range(gaps.numel())]
         return [*found, -self.where.system.surface_function()] if self.where.one_sided else found
 
+    @property
+    def _levels(self) -> list[Any]:
+        return [e.region for e in self.events if e.level]
+
     def is_excluded(self, points: Array) -> NDArray[np.bool_]:
         """Whether there is no motion at points (k, 2)."""
-        if not self.excluded or not len(points):
+        return self._any_positive(self.excluded, "excluded", points)
+
+    def is_due(self, points: Array) -> NDArray[np.bool_]:
+        """Whether an event is due at once at points (k, 2)."""
+        return self._any_positive(self._levels, "levels", points)
+
+    def _any_positive(self, functions: list[Any], name: str, points: Array) -> NDArray[np.bool_]:
+        if not functions or not len(points):
             return np.zeros(len(points), dtype=bool)
-        function = self.whole.function(("excluded", self.events), lambda: self.excluded)
+        function = self.whole.function((name, self.events), lambda: functions)
         values = call(function, points.T, self.where.parameters)
         return np.asarray(np.any([v.ravel() > 0.0 for v in values], axis=0))
 
@@ -122,9 +133,16 @@ class PlaneScan:
 
     @cached_property
     def pieces(self) -> list[Piece]:
-        """The surface cut at its folds."""
+        """The surface cut at its folds, where there is motion."""
         found = [_pieces(self, curve) for curve in self.curves]
-        return [piece for pieces in found for piece in pieces]
+        return [part for pieces in found for piece in pieces for part in self._moving(piece)]
+
+    def _moving(self, piece: Piece) -> list[Piece]:
+        """Parts of a piece at which no event is due at once."""
+        due = self.is_due(piece.points)
+        cuts = [0, *(np.flatnonzero(due[1:] != due[:-1]) + 1), len(due)]
+        parts = [(a, b) for a, b in pairwise(cuts) if not due[a] and b - a > 1]
+        return [Piece(piece.kind, piece.points[a:b]) for a, b in parts]
 
     # special points ----------------------------------------------------------------------------
 
@@ -140,7 +158,8 @@ class PlaneScan:
                 share = np.nan_to_num(values[k] / (values[k] - values[k + 1]))
             starts.append(curve[k] + share[:, None] * (curve[k + 1] - curve[k]))
         found = find_all(look, np.vstack(starts)[:_MOST])
-        return [f for f in found if self.box.contains(f.point)]
+        found = [f for f in found if self.box.contains(f.point)]
+        return [f for f in found if not self.is_due(f.point[None, :])[0]]
 
     @cached_property
     def tangencies(self) -> list[Fold]:

@@ -20,6 +20,9 @@ from .terms import MASKS, Graph, Terms
 #: Compilers take more than proportional time for long functions: statements of one that is not
 #: split, and of a part.
 _WHOLE, _PART = 5000, 250
+
+#: Statements of a function that is short.
+_SHORT = 150
 _NAME = re.compile(r"\b[vm]\d+\b")
 _DEFINED = re.compile(r"  const [TI] ([vm]\d+) =")
 
@@ -181,7 +184,9 @@ class _Printed:
         arrays = "".join(f", T *restrict {a}" for a in function.arrays)
         head = f"{function.name}(const T *restrict x, const T *restrict q{extra}{arrays})"
         if len(lines) <= _WHOLE:
-            return _define(f"FUNCTION {head}", lines)
+            # Compilers see into short functions that are needed in parts: other outputs are then not computed.
+            short = len(lines) <= _SHORT and function.name.endswith("_values")
+            return _define(f"{'INLINE void' if short else 'FUNCTION'} {head}", lines)
         parts, size = _parts(lines)
         given = ["x", "q", *(f"e{k}" for k in range(len(self.types))), *function.arrays, "w"]
         text, calls = "", [f"  T w[{size}];"]

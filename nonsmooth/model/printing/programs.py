@@ -30,9 +30,9 @@ class Shape:
     rows: list[int]  # of the field, what a step has to be checked with
     slots: list[int]  # of the guards
     affine: list[bool]  # which guards are affine in the states
-    affine_modes: list[
-        bool
-    ]  # whether all is, sines of the time added: above, below, on the surface
+    #: Whether all is, sines of the time added: above, below and on the surface; or off a set, on it and where it is left.
+    affine_modes: list[bool]
+    own: Sequence[int] = ()  # states that a set's functions are, if they are
 
 
 def lanes_program(system: FilippovSystem, order: int) -> tuple[str, Shape]:

@@ -193,6 +193,12 @@ def test_each_value_of_a_discrete_state_has_a_panel_in_which_orbits_end_at_its_e
     for curve in _curves(right, "orbit"):  # none goes on where x falls through -1
         sides = np.sign(curve[np.abs(curve[:, 0] + 1) > 1e-6, 0] + 1)
         assert np.all(np.diff(sides)[np.diff(sides) != 0] > 0)
+    belt = ns.FilippovSystem(  # its surface, with a fold at x = 2, is drawn where there is motion
+        [x, y], surface=y, above=[1, x - 2], below=[1, 1], discrete={q: (0, 1)}, resets=[on]
+    )
+    ax = ns.plot.phase_portrait(belt, box, holding={q: 0}, legend=False).axes[0]
+    ends = [c[:, 0].max() for kind in ("attracting", "crossing") for c in _curves(ax, kind)]
+    assert 0.9 < max(ends) <= 1.0 and not _curves(ax, "visible fold")
     one = ns.plot.phase_portrait(system, box, holding={"q": 1}, legend=False).axes
     assert len(one) == 1 and one[0].get_title() == "q = 1"
     assert len(_curves(one[0], "orbit")) == len(_curves(right, "orbit"))

@@ -28,7 +28,7 @@ from ...model import (
 )
 from ...model.derivatives.event_maps import AtEvent, function_map
 from ...model.laws.coupled import raised_of
-from ...model.laws.explicit import rests_on
+from ...model.laws.motion import rests_on
 from .guards import watch
 from .legs import (
     Leg,

@@ -233,8 +233,8 @@ def no_jump(name: str, t: float) -> str:
 def no_reaction(names: Sequence[str], algebraic: bool = False) -> str:
     """No reactions are consistent with closed or opening contacts."""
     advice = (
-        " No multipliers keep y >= 0: a sign is wrong, or closed conditions leave an equation of the states alone "
-        "(a resistance of 0, capacities that diodes join). Then write y as a function of the states."
+        " No multipliers keep y >= 0: a sign is wrong, or a source forces a current through diodes that block or a "
+        "voltage on diodes that conduct. Give it a resistance."
     )
     return f"At {' and '.join(map(repr, names))} neither the closed contact nor an open one holds.{advice * algebraic}"
 

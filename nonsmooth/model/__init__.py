@@ -29,7 +29,7 @@ from .errors import (
     PointError,
     explain,
 )
-from .laws.coupled import Coupled, coupled_of, raised_of
+from .laws.coupled import Coupled, coupled_of, driven_of, raised_of
 from .laws.evaluators import Evaluator, Surfaces, evaluator
 from .laws.explicit import mode_field
 from .laws.followed import Followed, followed
@@ -71,6 +71,7 @@ __all__ = [
     "call",
     "clock_periods",
     "coupled_of",
+    "driven_of",
     "evaluator",
     "explain",
     "followed",

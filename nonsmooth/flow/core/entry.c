@@ -87,7 +87,7 @@ static size_t place_decision(Run *r, char *base, size_t used) {
 static size_t place_run(Run *r, char *base) {
   const System *s = r->s;
   int n = r->n, w = r->width, c = r->c, all = r->kept_rows, g = r->guards, stride = r->stride;
-  size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
+  size_t used = 0, q = s->combined, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
   used = place_layout(&r->now, base, used, w, g);
   used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets ? r->m : 0);
   used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets ? r->m : 0);
@@ -113,8 +113,15 @@ static size_t place_run(Run *r, char *base) {
   r->tried_letter = LETTERS(2 * w);
   r->drop = INTEGERS(g);
   r->active = INTEGERS(w);
-  r->involved = INTEGERS(3 * w + 4 * all + 1);
-  r->p = DOUBLES(s->parameters);
+  r->involved = INTEGERS(3 * w + 4 * all + q + 1);
+  r->p = DOUBLES(s->parameters + 2 * q * q);
+  r->equations.letter = LETTERS(w);
+  r->equations.row = INTEGERS(q);
+  r->equations.own = INTEGERS(q);
+  r->equations.mark = INTEGERS(3 * q + w);
+  r->equations.slope = DOUBLES(q * w);
+  r->equations.gradient = DOUBLES(q * n);
+  r->equations.work = DOUBLES(q ? 2 * q * q + 2 * q * w + w + q : 0);
   r->series = DOUBLES(series_room(&s->series, stride));
   r->rounding = DOUBLES(s->series.size * stride);
   r->point = DOUBLES(pair_room(s->point.size, 1));
@@ -129,7 +136,7 @@ static size_t place_run(Run *r, char *base) {
   r->vector = DOUBLES(3 * n + 2 * w);
   r->sample = DOUBLES(3 * ((size_t)n + w + g));
   r->work = DOUBLES(6 * square + 8 * w + rows + g);
-  r->gradient_row = DOUBLES((size_t)all * n + 2 * all);
+  r->gradient_row = DOUBLES(((size_t)all + q) * n + 2 * (all + q));
   r->rates = DOUBLES(2 * all + 2 * c);
   r->lam = DOUBLES(2 * w);
   r->matrix = DOUBLES(square + 9 * w + all + 2 * c);
@@ -137,7 +144,7 @@ static size_t place_run(Run *r, char *base) {
   r->atom_work = DOUBLES(pair_room(s->atoms.size, 1));
   r->choice_work = DOUBLES(pair_room(s->choices.size, 1));
   used = place_instant(&r->instant, base, used, s);
-  r->pending = INTEGERS(6 * w + 2 * all);
+  r->pending = INTEGERS(6 * w + 2 * (all + q));
   r->sparse = INTEGERS(square + 2 * w + 1);
   r->direction = DOUBLES(w);
   r->later = DOUBLES(w);
@@ -146,8 +153,8 @@ static size_t place_run(Run *r, char *base) {
   r->moving = LETTERS(w);
   r->turned = LETTERS(g);
   r->rates_of_several = DOUBLES(SEVERAL * n);
-  size_t q = r->m < MOST_ENUMERATED ? r->m : MOST_ENUMERATED, sums = q * (q - (q > 0)) / 2;
-  r->layer_series = DOUBLES(s->slope_outputs ? (q * q + sums * sums) * stride : 0);
+  size_t some = r->m < MOST_ENUMERATED ? r->m : MOST_ENUMERATED, sums = some * (some - (some > 0)) / 2;
+  r->layer_series = DOUBLES(s->slope_outputs ? (some * some + sums * sums) * stride : 0);
   r->idle = LETTERS(s->m);
   r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
   r->of_defect = DOUBLES(g);
@@ -226,6 +233,7 @@ static void set_parameters(Run *r, const double *p) {
   const Values *program[] = {&s->point, &s->surfaces, &s->maps, &s->restitution, &s->columns, &s->atoms, &s->choices};
   double *work[] = {r->point, r->heights, r->maps, r->restitution, r->columns, r->atom_work, r->choice_work};
   memcpy(r->p, p, sizeof(double) * s->parameters);
+  forget_rows(r);
   series_prepare(&s->series, r->p, r->series);
   pairs_begin(s->series.size, r->stride, r->begun, r->series);
   for (int k = 0; k < 7; k++) {

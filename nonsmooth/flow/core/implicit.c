@@ -85,6 +85,10 @@ static int jacobian_at_stage(void *of, int stage, const double *x, double *jacob
   return 1;
 }
 
+static void prepare_implicit(Run *r) {
+  if (r->implicit && r->s->implicit) series_prepare(r->s->implicit, r->p, r->implicit->program);
+}
+
 /* Memory for implicit steps; 0 where there is none. */
 static int begin_implicit(Run *r) {
   Implicit *m = r->implicit;

@@ -51,7 +51,8 @@ typedef struct {
    * the time, nothing to be checked; the latter: 0 if affine in states and time, polynomials are exact. */
   const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
-  int32_t sets, kept_rows, impact_law, joints; /* sets: of codimension two and more; kept_rows: see Element */
+  /* sets: of codimension two and more; kept_rows: see Element; combined: conditions whose rows are sums (hidden.c) */
+  int32_t sets, kept_rows, impact_law, joints, combined;
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   Rules rules;
   Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
@@ -111,6 +112,11 @@ typedef struct {
   double most, field, rate;
   Motion motion[SEVERAL];
 } Decision;
+
+/* Equations of the states alone that closed conditions leave (hidden.c): letters of the mode for which rows are
+ * combined, and what for; how many of those that are closed depend on others; numbers of the rows that are combined;
+ * slopes of all conditions by the unknowns, gradients of their functions, the part by which dropped slopes are off. */
+typedef struct { int8_t *letter; int32_t kind, is_raw, is_known, dependent, count, *row, *own, *mark; double *slope, *gradient, *work, off; } Equations;
 
 /* Modes met, by number: their letters. */
 typedef struct { Tree tree; int32_t width, count, room; int8_t *letter; int32_t *bucket, buckets; } Table;
@@ -176,6 +182,7 @@ typedef struct {
   double *saved, *speed, *at_root; /* a state to return to; of each surface at its last zero */
   double *jumped_from, *jump_work; /* the state before the last jump of complementarity conditions */
   int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
+  Equations equations;
   int32_t shown, has_roots, held_steps, wants_program; /* held_steps: steps in a row that a decay rate held */
   Implicit *implicit;
   const Expansion *expansion;

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
+from ...model import Array, Coupled, FilippovSystem, OptionError, driven_of
 from ...model.printing.tape import (
     LISTS,
     Entries,
@@ -110,6 +110,7 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
         *[(name, _I32) for name in ("affine", "sets", "kept_rows", "impact_law", "joints")],
+        ("combined", _I32),
         ("mixed", _POINTER),
         ("rules", _Rules),
         ("derivatives", EntriesStructure),
@@ -236,7 +237,7 @@ class TapeEngine:
 
     def __init__(self, system: FilippovSystem, order: int, derived: bool = False):
         self.system, self.order = system, order
-        self.coupled = raised_of(system)
+        self.coupled = driven_of(system)
         tape = system.cached("tape", lambda: tape_of(self.coupled))
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         entries = None
@@ -300,7 +301,7 @@ class TapeEngine:
             "curved": coupled.linearity.curved_guards,
         }
         made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
-        made.joints = len(system.joints)
+        made.joints, made.combined = len(system.joints), len(coupled.combined)
         made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
         table = (_Element * (len(elements) + 1))(*elements)
         made.element = self._at(np.frombuffer(bytes(table), np.uint8))

@@ -22,6 +22,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ..definition.complementarity import rate_of
 from ..definition.roots import gate_roots, roots_of
 from ..definition.system import FilippovSystem
 from ..expressions.cancel import cancel_common_factor
@@ -32,6 +33,9 @@ from ..values import Array
 from .degree import Degree, degree_of
 from .evaluators import Evaluator
 from .switches import Guard, event_guards
+
+#: Slopes of conditions are regular if eigenvalues are above this part of them and of those of the rates.
+_REGULAR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -86,10 +90,31 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     return field, factors, unknowns
 
 
-class Coupled:
-    """Series of states, surfaces, stops and multipliers of a system in any mode."""
+def combinable(system: FilippovSystem) -> tuple[int, ...]:
+    """Conditions of degree 0 whose closed ones may leave equations of the states alone, with constant weights."""
+    d, x, own = system.definition, system.extended_states, list(system.algebraic)
+    if not own:
+        return ()
+    slope = ca.densify(ca.jacobian(d.surfaces[own], d.multipliers))
+    if ca.depends_on(slope, x):
+        return ()
+    rate = ca.densify(ca.jacobian(rate_of(d, d.surfaces[own]), d.multipliers))
+    if slope.is_constant() and rate.is_constant() and len(own) == len(system.half_lines):
+        matrix, of_rate = (np.array(ca.DM(e[:, own])) for e in (slope, rate))
+        least = np.linalg.eigvalsh((matrix + matrix.T) / 2)[0]
+        if least > _REGULAR * max(abs(matrix).max(), abs(of_rate).max()):
+            return ()  # no matrix of closed ones is singular, or nearly so
+    return tuple(own)
 
-    def __init__(self, system: FilippovSystem, by_degree: bool = False):
+
+class Coupled:
+    """Series of states, surfaces, stops and multipliers of a system in any mode.
+
+    With ``combines`` the layer's rows of conditions of degree 0 are sums over all of them, with weights that follow
+    the parameters: of y first, then of the rates of y without those of the multipliers (``flow/core/laws/hidden.c``).
+    """
+
+    def __init__(self, system: FilippovSystem, by_degree: bool = False, combines: bool = False):
         self.system, d = system, system.definition
         self._surfaces = system.surface_count
         #: Surfaces and impacts: the letters of a mode.
@@ -116,13 +141,22 @@ class Coupled:
         )
         extra = [n for n, scaled in zip(unknowns, self.scaled, strict=True) if scaled]
         self.moving = ca.vertcat(x, lam, d.reactions, *extra)
-        self._symbols = [self.moving, system.parameter_symbols]
         h = ca.SX(d.surfaces)
         if system.algebraic:
             h = ca.substitute(h, d.multipliers, lam)
         self.layer = ca.densify(ca.jtimes(ca.vertcat(h, d.gap_rates), x, field))
+        #: Conditions whose rows of the layer are combined.
+        self.combined = list(combinable(system)) if combines else []
+        rates, q = self.layer[self.combined], len(self.combined)
         for i in system.algebraic:
             self.layer[i] = h[i]
+        weights = ca.SX.sym("weight", 2 * q * q)
+        if q:
+            of_y, of_rates = (ca.reshape(w, q, q).T for w in ca.vertsplit(weights, q * q))
+            sums = of_y @ h[self.combined] + of_rates @ rates
+            for k, i in enumerate(self.combined):
+                self.layer[i] = sums[k]
+        self._symbols = [self.moving, ca.vertcat(system.parameter_symbols, weights)]
         #: Of each surface, derivatives that vanish while it rests; the layer has the next one.
         self.lower: list[tuple[ca.SX, ...]] = [()] * self._surfaces
         degrees = self.degrees(field, lam, unknowns) if by_degree or system.joints else []
@@ -375,7 +409,13 @@ class Coupled:
     @property
     def derivatives(self) -> ca.SX:
         """Of field, layer, surfaces and gaps, and factors by ``moving`` and the parameters, sparse."""
-        return ca.jacobian(ca.vertcat(*self.outputs[:4]), ca.vertcat(*self._symbols))
+        symbols = ca.vertcat(self.moving, self.system.parameter_symbols)
+        return ca.jacobian(ca.vertcat(*self.outputs[:4]), symbols)
+
+    @property
+    def parameter_symbols(self) -> ca.SX:
+        """Parameters, and behind them weights of rows that are combined."""
+        return self._symbols[1]
 
     # numbers -----------------------------------------------------------------------------------
 
@@ -432,6 +472,17 @@ def raised_of(system: FilippovSystem) -> Coupled:
         return Coupled(system, by_degree=True) if raised else plain
 
     return system.cached("raised", build)
+
+
+def driven_of(system: FilippovSystem) -> Coupled:
+    """Return the same as the driver reads it, with rows of conditions of degree 0 combined."""
+
+    def build() -> Coupled:
+        raised = raised_of(system)
+        by_degree = raised is not coupled_of(system)
+        return Coupled(system, by_degree, True) if combinable(system) else raised
+
+    return system.cached("driven", build)
 
 
 def unit(h: Array) -> Array:

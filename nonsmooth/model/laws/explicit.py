@@ -13,7 +13,7 @@ import numpy as np
 
 from ..definition.system import FilippovSystem, require_system
 from ..errors import DefinitionError
-from .coupled import coupled_of, raised_of
+from .coupled import combinable, coupled_of, raised_of
 from .motion import Motion, motion
 from .switches import Guarded
 
@@ -36,6 +36,7 @@ class Solved:
         symbols = ca.vertcat(*own) if own else ca.SX(0, 1)
         field, layer = coupled.held_at(mode, [coupled.field, coupled.layer])
         residual = layer[sliding] if sliding else ca.SX(0, 1)
+        residual = _with_rates(system, sliding, residual, symbols, field)
         self.unknowns: tuple[int, ...] = ()
         self.states, self.values, self.field = x, symbols, field
         if not sliding:
@@ -82,6 +83,31 @@ class Solved:
         return list(zip(guards, functions, strict=True))
 
 
+def _with_rates(
+    system: FilippovSystem, sliding: list[int], residual: ca.SX, symbols: ca.SX, field: ca.SX
+) -> ca.SX:
+    """Equations of a mode, those that closed conditions of degree 0 leave of the states alone by their rates."""
+    rows = [k for k, i in enumerate(sliding) if i in combinable(system)]
+    if not rows:
+        return residual
+    x, own = system.extended_states, residual[rows]
+    slope = ca.densify(ca.jacobian(own, symbols))
+    if not slope.is_constant():
+        return residual
+    values, kept = np.array(ca.DM(slope)), list[int]()
+    for k in range(len(rows)):
+        known = values[kept]
+        factors = np.linalg.lstsq(known.T, values[k], rcond=None)[0]
+        if abs(values[k] - factors @ known).max() > _DEPENDENT * max(1.0, abs(values[k]).max()):
+            kept.append(k)
+            continue
+        of_states = ca.substitute(
+            own[k] - sum(float(f) * own[j] for f, j in zip(factors, kept, strict=True)), symbols, 0
+        )
+        residual[rows[k]] = ca.jtimes(of_states, x, field)
+    return residual
+
+
 def solved(matrix: ca.SX, right: ca.SX) -> ca.SX:
     """Solution of linear equations, written out for few unknowns."""
     k = matrix.shape[0]
@@ -117,6 +143,8 @@ def least_norm(matrix: ca.SX, right: ca.SX) -> ca.SX:
             rows = more
     if len(rows) == len(values):
         return solved(matrix, right)
+    if not rows:
+        return ca.SX.zeros(matrix.shape[1], 1)
     own = matrix[rows, :]
     return ca.mtimes(own.T, solved(ca.mtimes(own, own.T), right[rows]))
 

@@ -147,15 +147,7 @@ class Coupled:
         self.layer = ca.densify(ca.jtimes(ca.vertcat(h, d.gap_rates), x, field))
         #: Conditions whose rows of the layer are combined.
         self.combined = list(combinable(system)) if combines else []
-        rates, q = self.layer[self.combined], len(self.combined)
-        for i in system.algebraic:
-            self.layer[i] = h[i]
-        weights = ca.SX.sym("weight", 2 * q * q)
-        if q:
-            of_y, of_rates = (ca.reshape(w, q, q).T for w in ca.vertsplit(weights, q * q))
-            sums = of_y @ h[self.combined] + of_rates @ rates
-            for k, i in enumerate(self.combined):
-                self.layer[i] = sums[k]
+        weights = self._combine(h)
         self._symbols = [self.moving, ca.vertcat(system.parameter_symbols, weights)]
         #: Of each surface, derivatives that vanish while it rests; the layer has the next one.
         self.lower: list[tuple[ca.SX, ...]] = [()] * self._surfaces
@@ -179,6 +171,19 @@ class Coupled:
         #: Of layer, of surfaces and gaps, of stops and resets, and of factors, by the states.
         self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)
+
+    def _combine(self, h: ca.SX) -> ca.SX:
+        """Rows of conditions of degree 0: y, or sums of all y and of their rates with weights, which are returned."""
+        rates, q = self.layer[self.combined], len(self.combined)
+        for i in self.system.algebraic:
+            self.layer[i] = h[i]
+        weights = ca.SX.sym("weight", 2 * q * q)
+        if q:
+            of_y, of_rates = (ca.reshape(w, q, q).T for w in ca.vertsplit(weights, q * q))
+            sums = of_y @ h[self.combined] + of_rates @ rates
+            for k, i in enumerate(self.combined):
+                self.layer[i] = sums[k]
+        return weights
 
     def _is_continuous(self, surface: int, column: Sequence[ca.SX]) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""

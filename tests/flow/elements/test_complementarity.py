@@ -414,6 +414,7 @@ def test_random_networks_of_diodes():
     found = [is_that_of_its_network(seed) for seed in range(120)]
     assert found.count(True) > 100
     assert not found.count(False)
+    assert [is_that_of_its_network(seed, 9) for seed in (1, 2, 5)] == [True] * 3
 
 
 def test_a_set_that_vanishes_ends_the_run():

@@ -93,9 +93,9 @@ static int find_jump(Run *r, const int32_t *own, int n, const double *from, doub
   return 0;
 }
 
-/* Letters with which conditions take impulses, where e is the part ``share`` of what makes e C B as large as D; 0 where
- * there are none. */
-static int find_taking(Run *r, const int32_t *own, int n, double share, int8_t *letter) {
+/* Letters with which conditions take impulses, where e is the part ``share`` of what makes e C B as large as D, or with
+ * which they go on after the time e, an implicit step; 0 where there are none. */
+static int find_taking(Run *r, const int32_t *own, int n, double share, int goes_on, int8_t *letter) {
   double *q = r->decision->block, *m = q + n, *nu = r->decision->large, of_d = 0, of_rates = 0;
   int w = r->width, count = 0;
   read_conditions(r, r->x);
@@ -107,13 +107,12 @@ static int find_taking(Run *r, const int32_t *own, int n, double share, int8_t *
   double e = of_rates > 0 ? of_d > 0 ? share * of_d / of_rates : 1 : 0;
   for (int i = 0; i < n; i++) {
     int is_given = degree_of(r, own[i]) == 0;
-    q[i] = h[own[i]];
+    q[i] = h[own[i]] + (goes_on ? e * layer_of(r, own[i]) : 0);
     for (int j = 0; j < n; j++)
       m[i * n + j] = e * r->slope[own[i] * w + own[j]] + (is_given ? r->equations.slope[count * w + own[j]] : 0);
     count += is_given;
   }
   if (!lemke_scaled(m, q, n, nu, r->decision->work, r->decision->pivot)) return 0;
-  memcpy(letter, r->letter, w);
   for (int i = 0; i < n; i++) letter[own[i]] = nu[i] > 0 ? 0 : 1;
   return 1;
 }
@@ -156,9 +155,31 @@ static int take_impulses(Run *r, const int8_t *letter, const int32_t *own, int n
 /* The same where closed conditions may leave equations of the states. */
 static int find_hidden_jump(Run *r, const int32_t *own, int n, const double *from, double *p) {
   int8_t *letter = r->tried_letter;
+  memcpy(letter, r->letter, r->width);
   for (double share = IMPULSIVE; share < WEAK; share *= IMPULSIVE_STEP) {
-    if (find_taking(r, own, n, share, letter) && take_impulses(r, letter, own, n, from, p)) return 1;
+    if (find_taking(r, own, n, share, 0, letter) && take_impulses(r, letter, own, n, from, p)) return 1;
     memcpy(r->x, from, sizeof(double) * r->n);
+  }
+  return 0;
+}
+
+/* The mode of a short implicit step, as r->chosen, if it can continue: where modes are too many to try all. */
+static int follow_step(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  int32_t *own = r->decision->own;
+  int8_t *trial = r->tried_letter;
+  int due, n = find_jumping(r, 1, own, &due);
+  Solutions all = {0};
+  for (double share = IMPULSIVE; share < WEAK; share *= IMPULSIVE_STEP) {
+    memcpy(trial, letter, r->width);
+    n = find_jumping(r, 1, own, &due);
+    if (!find_taking(r, own, n, share, 1, trial)) continue;
+    lay_out(r, trial, &r->trial.l);
+    mode_solutions(r, &r->trial.l, &all);
+    if (all.count != 1) continue;
+    memcpy(r->found.unknowns, all.each, sizeof(double) * r->width);
+    if (!continues(r, trial, known, known_count, &r->found)) continue;
+    copy_continuation(r, &r->chosen, &r->found);
+    return 1;
   }
   return 0;
 }

@@ -920,6 +920,7 @@ static int no_motion(Run *r, const int8_t *letter) {
 static int is_mixed(const Run *r, const int32_t *own, int count);
 static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count);
+static int follow_step(Run *r, const int8_t *letter, const Known *known, int known_count);
 
 /* The law at the point of the active elements; 0 where it is no number. */
 static int begin_law(Run *r, const int8_t *letter, const Known *known, int known_count) {
@@ -967,7 +968,9 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
   int has_law = begin_law(r, letter, known, known_count);
   if (has_law) explore(r, d, 0, 0);
   r->equations.is_raw = 0;
-  if (!has_law || has_hidden(r, d)) return try_modes(r, letter, known, known_count);
+  int is_hidden = has_law && has_hidden(r, d), are_many = is_hidden && k > MOST_TRIED;
+  if (are_many && follow_step(r, letter, known, known_count)) return 1;
+  if (!has_law || (is_hidden && !(are_many && d->motions))) return try_modes(r, letter, known, known_count);
   if (!d->motions || r->status != RUNNING) return no_motion(r, letter);
   for (int i = 0; i < d->motions; i++) {
     int is_new = 1;

@@ -2,16 +2,14 @@
  * products, sets of codimension two and more). A mode can continue if each of its guards that vanishes here becomes
  * positive at once: its first coefficient that is not zero is positive. */
 
-/* Modes that are tried at most. */
-#define TRIED 256
 
 static int bits(int a) { return (a & 1) + (a >> 1 & 1) + (a >> 2 & 1); }
 
-/* Number of the modes that are possible, or one more than are tried. */
-static int choices_of(const int8_t *possible, int count) {
-  int total = 1;
-  for (int i = 0; i < count && total <= TRIED; i++) total *= bits(possible[i]);
-  return total <= TRIED ? total : TRIED + 1;
+/* Number of the modes that are possible, or 0 where they are more than are tried. */
+static int choices_of(const Run *r, const int8_t *possible, int count) {
+  int total = 1, most = r->s->combined ? DIODES_TRIED : TRIED;
+  for (int i = 0; i < count && total <= most; i++) total *= bits(possible[i]);
+  return total <= most ? total : 0;
 }
 
 /* Coefficients that are no numbers decide nothing. */
@@ -494,8 +492,8 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
     int own = r->active[i], s = set_of(r, own);
     possible[i] = s >= 0 && own != s ? 4 : s == own || is_half_line(r, own) ? 5 : 7;
   }
-  int total = choices_of(possible, k);
-  if (total > TRIED) { finish(r, NON_UNIQUE, POSSIBLY_SEVERAL, 0); return 0; }
+  int total = choices_of(r, possible, k);
+  if (!total) { finish(r, NON_UNIQUE, POSSIBLY_SEVERAL, 0); return 0; }
   r->several_count = 0;
   for (int number = 0; number < total && r->status == RUNNING; number++) {
     spell_choice(r, letter, possible, number, trial);

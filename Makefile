@@ -12,7 +12,7 @@ PYTEST := $(BIN)/python -m pytest --quiet -n 2 --dist worksteal
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help reproduce test check bench docs lint clean
+.PHONY: help reproduce test check bench docs lint wasm clean
 
 help: ## list the verbs
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -39,6 +39,9 @@ lint: .venv/.dev ## formatting, lint, types and layers
 	@$(BIN)/ruff check --quiet .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-logo
+
+wasm: .venv/.compiler ## the driver for pages in a browser, nonsmooth/flow/engine/core.wasm
+	@$(BIN)/python -m nonsmooth.flow.engine.building.webassembly
 
 clean: ## remove what was made, except .venv
 	@rm -rf build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache

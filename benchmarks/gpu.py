@@ -26,7 +26,6 @@ from nonsmooth.flow.engine import find_compiler
 from nonsmooth.flow.engine.device import card as cards
 from nonsmooth.flow.engine.device.card import Card, card
 from nonsmooth.flow.engine.device.kernel import Kernel, Source
-from nonsmooth.flow.engine.device.machine import Machine
 from nonsmooth.flow.ensembles.on_device import device_order
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
@@ -62,13 +61,13 @@ def starts_of(name: str, count: int) -> ns.RandomStarts:
     return ns.RandomStarts(count, *PROBLEMS[name][2:])
 
 
-def kernel_of(name: str, machine: Machine) -> Kernel:
+def kernel_of(name: str, machine: Card) -> Kernel:
     """The kernel of a problem."""
     options = options_of(name)
     return Kernel(PROBLEMS[name][0](), device_order(options), machine)
 
 
-def ends(name: str, x: Array, machine: Machine) -> Chunk:
+def ends(name: str, x: Array, machine: Card) -> Chunk:
     """What a machine makes of starts (m, n), without the driver."""
     kernel = kernel_of(name, machine)
     chunk, p = Chunk.empty(len(x), kernel.system, False), kernel.system.parameter_vector()

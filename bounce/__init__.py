@@ -49,6 +49,7 @@ from .units import BALLS, Ball, Landing, Scaling
 
 if TYPE_CHECKING:
     from . import plot as plot
+    from .plot.explorer import explore as explore
 
 __all__ = [
     "BALLS",
@@ -70,6 +71,7 @@ __all__ = [
     "certify",
     "contact",
     "dividing_curve",
+    "explore",
     "golf",
     "laws",
     "lift_off",
@@ -90,6 +92,8 @@ def __getattr__(name: str) -> Any:
     """Load the pictures on first use (matplotlib is slow to import)."""
     if name == "plot":
         return importlib.import_module(".plot", __name__)
+    if name == "explore":
+        return importlib.import_module(".plot.explorer", __name__).explore
     raise AttributeError(f"module 'bounce' has no attribute {name!r}")
 
 

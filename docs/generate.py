@@ -228,9 +228,27 @@ def gallery() -> str:
 def explorers() -> dict[str, str]:
     """The pages that compute in the browser, by their address in the site."""
     return {
+        "explore/stick_slip.html": _stick_slip().html,
+        "explore/teixeira.html": _teixeira().html,
         "explore/two_folds.html": ns.plot.two_fold_explorer(),
-        "explore/bounce.html": bounce.plot.explorer(),
+        "explore/bounce.html": bounce.explore().html,
     }
+
+
+def _stick_slip() -> Any:
+    """The page of the program in explore.md, with a title."""
+    text = (DOCS / "explore.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    exec(re.findall(r"```python\n(.*?)page = ", text, re.DOTALL)[0], names)
+    ranges = {"belt": (0.05, 1.0), "friction": (0.0, 1.0)}
+    title = "A block on a belt sticks and slips"
+    return ns.explore(names["stick_slip"], start=[0.0, 0.0], parameters=ranges, title=title)
+
+
+def _teixeira() -> Any:
+    fold = ns.find_two_fold(ns.textbook.PROBLEMS["two_fold"]().system, near=[0.0, 0.1, 0.1])
+    start = [0.25, 0.4, 0.5]
+    return ns.explore(fold, start=start, t_end=10.0, title="A Teixeira two-fold")
 
 
 # Pages --------------------------------------------------------------------------------------------

@@ -37,7 +37,7 @@ TASKS = {
         "Follow an orbit",
         "From a point and for a time: events, modes, dense output, and the reason why a run ended.",
         "nonsmooth",
-        "simulate Trajectory flow.Segments flow.Segment flow.Events flow.Event Status Section flow.follow flow.first_crossing flow.first_root load",
+        "simulate explore Trajectory flow.Segments flow.Segment flow.Events flow.Event Status Section flow.follow flow.first_crossing flow.first_root load",
     ),
     "many": _task(
         "Run many starts",
@@ -65,9 +65,11 @@ TASKS = {
     "orbits": _task(
         "Find periodic orbits",
         "An orbit that closes, stable or not, with its itinerary, its period and its multipliers; "
-        "and the successive returns of any orbit to a section.",
+        "the successive returns of any orbit to a section; how kicks shift the phase of an orbit, and whether "
+        "coupled oscillators stay in step.",
         "nonsmooth",
-        "periodic_orbit orbit.PeriodicOrbit orbit.poincare orbit.PoincareOrbit orbit.FixedItinerary",
+        "periodic_orbit orbit.PeriodicOrbit orbit.poincare orbit.PoincareOrbit orbit.FixedItinerary "
+        "phase_response orbit.PhaseResponse master_stability orbit.MasterStability",
     ),
     "derivatives": _task(
         "Differentiate a run",
@@ -104,7 +106,7 @@ TASKS = {
         "One bounce",
         "From touch-down to lift-off: slip, rolling, forces, and derivatives of the lift-off.",
         "bounce",
-        "simulate Shot shot.Phase shot.Forces shot.State BounceStatus sensitivity shot.Sensitivity certify "
+        "simulate explore Shot shot.Phase shot.Forces shot.State BounceStatus sensitivity shot.Sensitivity certify "
         "shot.BounceProof",
     ),
     "bounce_models": _task(

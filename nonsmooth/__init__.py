@@ -88,7 +88,9 @@ from .orbit import (
     gradient,
     lyapunov_spectrum,
     manifold,
+    master_stability,
     periodic_orbit,
+    phase_response,
     sensitivity,
     vjp,
 )
@@ -96,6 +98,7 @@ from .solvers import continuation
 
 if TYPE_CHECKING:
     from . import plot, proofs, textbook
+    from .plot.explorer import explore
     from .proofs import (
         certify,
         certify_orbit,
@@ -148,6 +151,7 @@ __all__ = [
     "continue_equilibrium",
     "continue_orbit",
     "ensemble",
+    "explore",
     "find_all",
     "find_boundary_equilibrium",
     "find_equilibrium",
@@ -161,9 +165,11 @@ __all__ = [
     "local",
     "lyapunov_spectrum",
     "manifold",
+    "master_stability",
     "orbit",
     "outcomes",
     "periodic_orbit",
+    "phase_response",
     "plot",
     "proofs",
     "prove_all",
@@ -185,6 +191,8 @@ def __getattr__(name: str) -> object:
 
     if name in ("plot", "proofs", "textbook"):
         return importlib.import_module(f".{name}", __name__)
+    if name == "explore":
+        return importlib.import_module(".plot.explorer", __name__).explore
     if name in _OF_PROOFS:
         return getattr(importlib.import_module(".proofs", __name__), name)
     raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}")

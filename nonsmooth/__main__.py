@@ -1,4 +1,4 @@
-"""The command line ``python -m nonsmooth``: list, show NAME (textbook problems), explore (two-folds)."""
+"""The command line ``python -m nonsmooth``: list, show NAME, explore [NAME] (textbook problems, or two-folds)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .textbook import PROBLEMS, Problem, by_name
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m nonsmooth",
-        description="Textbook problems of nonsmooth dynamics, and two-folds explored in a browser.",
+        description="Textbook problems of nonsmooth dynamics, run and explored in a browser.",
     )
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("list", help="names and titles of the problems")
@@ -25,29 +25,27 @@ def _parser() -> argparse.ArgumentParser:
     show.add_argument("name", help="a name from the list")
     show.add_argument("--output", type=Path, help="draw the run into this file (.png, .svg, .pdf)")
     explore = verbs.add_parser(
-        "explore", help="two-folds in a browser: one page, without a network"
+        "explore", help="a problem in a browser, or the two-folds: one page, without a network"
     )
-    explore.add_argument(
-        "--output",
-        type=Path,
-        default=Path("two_folds.html"),
-        help="file to write (default: two_folds.html)",
-    )
+    explore.add_argument("name", nargs="?", help="a name from the list; two-folds without one")
+    explore.add_argument("--output", type=Path, help="file to write (default: NAME.html)")
     explore.add_argument("--open", action="store_true", help="open it in the browser")
     return parser
 
 
-def _explore(path: Path, show: bool) -> int:
-    plot = importlib.import_module("nonsmooth.plot")
-    try:
-        path.write_text(plot.two_fold_explorer(), encoding="utf-8")
-    except OSError as error:
-        print(error, file=sys.stderr)
-        return 2
+def _explore(name: str | None, path: Path | None, show: bool) -> None:
+    path = path or Path(f"{name or 'two_folds'}.html")
+    if name is None:
+        page = importlib.import_module("nonsmooth.plot").two_fold_explorer()
+    else:
+        problem = by_name(name)
+        explorer = importlib.import_module("nonsmooth.plot.explorer")
+        given = dict(start=problem.start, t_end=problem.t_end, title=problem.title)
+        page = explorer.explore(problem.system, **given).html
+    path.write_text(page, encoding="utf-8")
     print(f"wrote {path}")
     if show:
         webbrowser.open(path.resolve().as_uri())
-    return 0
 
 
 def _draw(problem: Problem, path: Path) -> None:
@@ -59,14 +57,15 @@ def _draw(problem: Problem, path: Path) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit status is 0, or 2 for a mistake in it."""
     given = _parser().parse_args(arguments)
-    if given.verb == "explore":
-        return _explore(given.output, given.open)
     if given.verb == "list":
         width = max(map(len, PROBLEMS))
         for name, make in PROBLEMS.items():
             print(f"{name:{width}}  {make().title}")
         return 0
     try:
+        if given.verb == "explore":
+            _explore(given.name, given.output, given.open)
+            return 0
         problem = by_name(given.name)
         run = problem.run()
         print(problem, f"  run: {run!r}", f"  {run.message}", sep="\n")

@@ -72,3 +72,9 @@ def test_orbit(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "branch.png").stat().st_size > 10_000
     printed = capsys.readouterr().out
     assert "grazing-sliding 25.118" in printed and "LyapunovSpectrum" in printed
+
+
+def test_explore(tmp_path, monkeypatch):
+    run("explore", tmp_path, monkeypatch)
+    text = (tmp_path / "belt.html").read_text(encoding="utf-8")
+    assert "belt" in text and "friction" in text and "https:" not in text

@@ -24,9 +24,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the page."""
-    from ..plot import explorer  # matplotlib is slow to import
+    from ..plot.explorer import explore  # matplotlib is slow to import
 
-    args.output.write_text(explorer(), encoding="utf-8")
+    explore(path=args.output)
     if args.json:
         print_json({**opening(args), "output": str(args.output)})
     else:

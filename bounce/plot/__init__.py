@@ -1,6 +1,5 @@
 """Pictures (matplotlib; loaded as ``bounce.plot`` on first use)."""
 
-from .explorer import explorer
 from .outcomes import outcome_map
 from .proven import proven_map
 from .residuals import residuals
@@ -10,7 +9,6 @@ from .slip_directions import direction_colours, slip_map
 __all__ = [
     "STYLES",
     "direction_colours",
-    "explorer",
     "friction_cone",
     "outcome_map",
     "proven_map",

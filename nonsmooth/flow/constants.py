@@ -292,6 +292,7 @@ REASONS = (
     "off_constraint",
     "dead_point",
     "decay",
+    "out_of_table",
 )
 
 #: Flag of the mode of an implicit step, as it is recorded.

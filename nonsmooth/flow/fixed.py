@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..model import Array, ConvergenceError
-from ..model.derivatives.variational import ORDER, GuardedField
-from ..model.printing.tape import Entries, Series, Values
+from ..model.derivatives.event_maps import EventMap, PlainMap
+from ..model.derivatives.variational import ORDER, GuardedField, PlainField
 from .engine.smooth import LegsProgram, SmoothProgram, ValuesProgram, WatchProgram
 
 #: Part of the size of a group of states that the last terms of a step may reach.
@@ -25,42 +24,8 @@ TOLERANCE = 2.0**-53
 MOST_STEPS = 20_000
 
 
-class SmoothField(Protocol):
-    """A smooth field as Taylor rules, with groups of states that share an error scale, and columns of derivatives."""
-
-    @property
-    def series(self) -> Series:
-        """Taylor rules of the field."""
-        ...
-
-    @property
-    def entries(self) -> int:
-        """Number of states."""
-        ...
-
-    @property
-    def groups(self) -> Sequence[NDArray[np.intp]]:
-        """States whose errors have one scale; what is exact is in none."""
-        ...
-
-    @property
-    def derivatives(self) -> Entries:
-        """Places of the last outputs of ``series``, by states and by parameters."""
-        ...
-
-    @property
-    def by_start(self) -> int:
-        """Number of columns by the start, before those by parameters."""
-        ...
-
-    @property
-    def columns(self) -> int:
-        """Number of columns."""
-        ...
-
-
 def flow_for(
-    field: SmoothField, z: Array, p: Array, duration: float, tol: float = TOLERANCE
+    field: PlainField, z: Array, p: Array, duration: float, tol: float = TOLERANCE
 ) -> Array:
     """State of a smooth flow after a duration of either sign."""
     if not duration:
@@ -71,33 +36,36 @@ def flow_for(
     return end
 
 
+def first_terms(field: GuardedField, y: Array, p: Array, order: int = 3) -> tuple[Array, Array]:
+    """First coefficients of states (N + k, order + 1) and guards (g, order + 1) of a mode from a state."""
+    program = program_of(field)
+    if order > program.order:
+        program = made_program(field, order)
+    terms = program.terms(y, p)[:, : order + 1]
+    return terms[: len(y)], terms[len(y) :]
+
+
 #: Programs of the interpreter for fields and expressions, as long as these live.
 _PROGRAMS: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 
 
-def program_of(field: SmoothField) -> SmoothProgram:
+def program_of(field: PlainField) -> SmoothProgram:
     """Program of a smooth field for the interpreter, made once."""
     made: SmoothProgram | None = _PROGRAMS.get(field)
-    if made is None:
-        group = np.full(field.entries, -1, np.int32)
-        for k, entries in enumerate(field.groups):
-            group[entries] = k
-        of_columns = field.derivatives, field.by_start, field.columns
-        made = _PROGRAMS.setdefault(field, SmoothProgram(field.series, group, ORDER, *of_columns))
-    return made
+    return made or _PROGRAMS.setdefault(field, made_program(field, ORDER))
 
 
-class Evaluated(Protocol):
-    """Expressions of states and parameters that the interpreter in C can evaluate."""
-
-    @property
-    def values(self) -> Values:
-        """Their graph."""
-        ...
+def made_program(field: PlainField, order: int) -> SmoothProgram:
+    """Make the program of a smooth field at an order."""
+    group = np.full(field.entries, -1, np.int32)
+    for k, entries in enumerate(field.groups):
+        group[entries] = k
+    of_columns = field.derivatives, field.by_start, field.columns
+    return SmoothProgram(field.series, group, order, *of_columns)
 
 
 def legs_program(
-    fields: Sequence[SmoothField], events: Sequence[Evaluated | None], parameters: int
+    fields: Sequence[PlainField], events: Sequence[EventMap | PlainMap | None], parameters: int
 ) -> LegsProgram:
     """Program that integrates legs and evaluates expressions at their ends, in one call."""
     return LegsProgram(
@@ -107,7 +75,7 @@ def legs_program(
     )
 
 
-def values_program(event: Evaluated) -> ValuesProgram:
+def values_program(event: EventMap | PlainMap) -> ValuesProgram:
     """Program of expressions for the interpreter, made once."""
     made: ValuesProgram | None = _PROGRAMS.get(event)
     return made or _PROGRAMS.setdefault(event, ValuesProgram(event.values))
@@ -123,18 +91,6 @@ def stuck(duration: float, left: float, z: Array) -> ConvergenceError:
     )
 
 
-def watched(field: GuardedField, y: Array, p: Array, duration: float, margin: float) -> Array:
-    """Extrema and values of the guards of a mode along its flow: rows (guard, t, h, h'', state)."""
-    # The values are at the end of every step, and by the margin beside the start and the end.
-    if not field.motion.guards:
-        return np.zeros((0, 4 + len(y)))
-    program = program_of(field)
-    found, end, left = program.watch(y, p, duration, TOLERANCE, MOST_STEPS, margin)
-    if left:
-        raise stuck(duration, left, end)
-    return found
-
-
 class LegsWatch:
     """Extrema and values of guards along many legs; those of no positive duration are left out."""
 
@@ -148,10 +104,11 @@ class LegsWatch:
     def __call__(
         self, starts: Sequence[Array], p: Array, durations: Array, ends: float
     ) -> tuple[list[Array], list[Array], list[Array]]:
-        """Rows of ``watched``, start series and end values of the guards, by leg."""
+        """Rows (guard, t, h, h'', state), start series and end values of the guards, by leg."""
+        # Values, with h'' = 0, are at the end of every step, and by the part ``ends`` beside the start and the end.
         found = self._program(starts, p, durations, TOLERANCE, MOST_STEPS, ends)
         if found.failed >= 0:
-            raise stuck(float(durations[found.failed]), found.left, starts[found.failed])
+            raise stuck(float(durations[found.failed]), found.left, found.rows[0])
         return found.rows, found.begins, found.values
 
 

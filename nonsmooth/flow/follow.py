@@ -134,7 +134,14 @@ def follow(
     x = system.extended_point(point, t_start)
     unknowns = sliding_multipliers(coupled_of(system), mode, x, p, stable_only=False)
     if made.unknowns and len(unknowns) != 1:
-        return _stuck(system, mode, x, p, t_start, messages.start_solutions(mode, len(unknowns)))
+        return _stuck(
+            system,
+            mode,
+            x,
+            p,
+            t_start,
+            _said("start_solutions", start_mode=mode, where=len(unknowns)),
+        )
     start = x[: system.dimension]
     if made.unknowns:
         start = np.concatenate([start, unknowns[0][list(made.unknowns)]])
@@ -145,6 +152,10 @@ def follow(
 
 def _several(value: Any) -> list[Any]:
     return list(value) if isinstance(value, (list, tuple)) else [value]
+
+
+def _said(reason: str, **fields: Any) -> str:
+    return messages.SENTENCES[reason].format(**fields)
 
 
 def _stuck(
@@ -191,11 +202,11 @@ def _trajectory(
         events.append(Event(kind, sign * time, x, mode, mode, names[at], x, *of))
     end, x_end = float(t[-1]), run.x[-1, :n].copy()
     if status is Status.REACHED_END:
-        message = messages.reached_end(end)
+        message = _said("REACHED_END", t_end=end)
     elif status is Status.STOPPED:
-        message = messages.stopped(events[-1].name, end)
+        message = _said("STOPPED", stop=events[-1].name, t=end)
     elif status is Status.NOT_FINITE:
-        message = messages.field_not_finite(mode, x_end.tolist())
+        message = _said("field", mode=mode, state=messages.listed(x_end.tolist()))
     else:
         message = message_of(made.system, options, replace(run, t=t))
     if status is not Status.STOPPED:

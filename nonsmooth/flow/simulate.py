@@ -180,7 +180,8 @@ def _with_samples(
         t, states = options.hits.samples(made.events)
     else:
         return made
-    return replace(made, sample_t=t, sample_x=states)
+    at_events = read_at is None
+    return replace(made, sample_t=t, sample_x=states, sampled_events=at_events)
 
 
 def _begun(

@@ -189,6 +189,8 @@ class Trajectory(
         What the decisions of the run rest on.
     dense : bool
         Whether the polynomials were kept, so that the run can be read between its points.
+    sampled_events : bool
+        Whether the samples are at events, by ``at=``, whose times depend on the start.
     """
 
     system: FilippovSystem
@@ -206,6 +208,7 @@ class Trajectory(
     continuations: list[Continuation] = field(default_factory=list)
     facts: Facts = field(default_factory=Facts)
     dense: bool = True
+    sampled_events: bool = False
 
     @property
     def itinerary(self) -> str:

@@ -1,60 +1,82 @@
-"""Flow and derivatives along one mode over a known duration, by the driver in C."""
+"""Flow and derivatives along legs of known durations, by the driver in C."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from ..model import Array, DegenerateError, FilippovSystem
 from ..model.derivatives.variational import ORDER
-from .engine.columns import LEAVING, NOT_UNIQUE, STUCK, CarriedLeg, ColumnsEngine, EndOfLeg
+from .engine.columns import (
+    DONE,
+    LEAVING,
+    NOT_UNIQUE,
+    CarriedLegs,
+    ColumnsEngine,
+    EndOfLeg,
+    GivenLegs,
+)
 from .fixed import MOST_STEPS, TOLERANCE, stuck
 
+#: No times.
+NONE = np.zeros(0)
 
-class CarriedField:
-    """One mode of a system, along which the driver carries states and derivatives."""
 
-    def __init__(
-        self,
-        system: FilippovSystem,
-        mode: str,
-        chosen: tuple[int, ...] = (),
-        left: tuple[int, ...] = (),
-    ):
-        # ``left``: switching functions of the sets on which the mode begins, and which it leaves.
-        self.system, self.mode, self.chosen = system, mode, chosen
-        self._letters = list(system.parse_letters(mode))
-        for i in left:
-            self._letters[i] = LEAVING
-        self._engine = system.cached("columns", lambda: ColumnsEngine(system, ORDER))
+class FlownLeg(NamedTuple):
+    """A leg: its mode, start, duration and end; ``left``: switching functions of the sets on which it begins, and which
+    it leaves."""
 
-    def states_at(self, x: Array, p: Array) -> Array:
-        """The states of a leg at an extended state: the state itself."""
-        return x
+    mode: str
+    start: Array
+    duration: float
+    ends: EndOfLeg | None = None
+    left: tuple[int, ...] = ()
 
-    def initial(self, x: Array, p: Array) -> Array:
-        """State and its derivatives by the start, (N, 1 + N)."""
-        return np.column_stack([x, np.eye(len(x))])
 
-    def rate_at(self, x: Array, p: Array) -> Array:
-        """The field at an extended state (N,)."""
-        return self._carry(x, p, 0.0, (), None).start_rate
+def carry_legs(
+    system: FilippovSystem,
+    legs: Sequence[FlownLeg],
+    p: Array,
+    chosen: Sequence[int] = (),
+    times: Array = NONE,
+    first: Sequence[int] = (),
+    back: bool = False,
+) -> CarriedLegs:
+    """Carry states over legs, with derivatives of the ends, and at samples, by the starts and by chosen parameters.
 
-    def flow(self, x: Array, p: Array, duration: float, ends: EndOfLeg | None = None) -> CarriedLeg:
-        """State and derivatives after a duration, from those of a state that is on the sets of the mode at once."""
-        return self._carry(x, p, duration, self.chosen, ends)
+    ``times`` are those of samples since the starts of their legs, which begin at ``first``. With ``back`` steps along
+    which rows can be pulled back are recorded in place of derivatives.
+    """
+    engine: ColumnsEngine = system.cached("columns", lambda: ColumnsEngine(system, ORDER))
+    words = {mode: list(system.parse_letters(mode)) for mode in {leg.mode for leg in legs}}
+    letters = np.array([words[leg.mode] for leg in legs], np.int8).reshape(len(legs), -1)
+    for row, leg in zip(letters, legs, strict=True):
+        if leg.left:
+            row[list(leg.left)] = LEAVING
+    given = GivenLegs(
+        letters,
+        np.array([leg.start for leg in legs], float),
+        np.array([leg.duration for leg in legs], float),
+        [leg.ends for leg in legs],
+        p,
+        TOLERANCE,
+        MOST_STEPS,
+        times,
+        np.array(first if len(first) else [0] * len(legs) + [len(times)]),
+    )
+    return engine.record(given) if back else engine.carry(given, chosen)
 
-    def _carry(
-        self, x: Array, p: Array, duration: float, chosen: Sequence[int], ends: EndOfLeg | None
-    ) -> CarriedLeg:
-        given = (self._letters, x, p, chosen, duration, TOLERANCE, MOST_STEPS)
-        found = self._engine.carry(*given, ends)
-        if found.status == NOT_UNIQUE:
-            raise DegenerateError(
-                f"mode {self.system.spelled(self.mode)!r} at {x.tolist()}: expected one set of multipliers that "
-                "keeps the sliding, received none or several. Start elsewhere."
-            )
-        if found.status == STUCK:
-            raise stuck(duration, found.left, found.end)
-        return found
+
+def require_done(system: FilippovSystem, legs: Sequence[FlownLeg], found: CarriedLegs) -> None:
+    """Raise for a leg that does not reach its end."""
+    if found.status == DONE:
+        return
+    leg = legs[found.failed]
+    if found.status == NOT_UNIQUE:
+        raise DegenerateError(
+            f"mode {system.spelled(leg.mode)!r} at {leg.start.tolist()}: expected one set of multipliers that "
+            "keeps the sliding, received none or several. Start elsewhere."
+        )
+    raise stuck(leg.duration, found.left, leg.start)

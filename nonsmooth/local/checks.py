@@ -17,9 +17,9 @@ def require_surface(system: FilippovSystem) -> None:
         )
 
 
-def require_autonomous(system: FilippovSystem, what: str, complementarity: bool = False) -> None:
-    """Refuse explicit time; a flag allows complementarity conditions."""
-    require_system(system, complementarity=complementarity)
+def require_autonomous(system: FilippovSystem, what: str, elements: bool = False) -> None:
+    """Refuse explicit time; a flag allows complementarity conditions and constraints."""
+    require_system(system, complementarity=elements, joints=elements)
     if system.time_dependent:
         raise DefinitionError(
             f"{what}: expected a system without explicit time, received one that depends on "
@@ -27,9 +27,9 @@ def require_autonomous(system: FilippovSystem, what: str, complementarity: bool 
         )
 
 
-def require_linear(system: FilippovSystem, surface: int, what: str) -> None:
+def require_linear(system: FilippovSystem, surface: int | None, what: str) -> None:
     """Refuse a multiplier that enters nonlinearly, for which alpha is not Filippov's weight."""
-    if system.nonlinear[surface]:
+    if surface is not None and surface < len(system.nonlinear) and system.nonlinear[surface]:
         raise DefinitionError(
             f"{what}: expected multiplier {surface} to enter the field linearly, received hidden "
             "dynamics. The sliding field is then not a convex combination of two fields; follow "

@@ -21,25 +21,29 @@ from ..model import (
     FilippovSystem,
     Parameters,
     PointError,
+    call,
     layer_of,
     require_system,
 )
 from ..model.checks import positive
 from .checks import MARGIN, require_linear
 from .discrete_states import with_discrete_states_held
+from .point.elements_at import acts
 from .point.intersections import Intersection, Meeting
-from .point.regions import region_of
+from .point.one_sided import one_sided_at
+from .point.regions import Region, region_of
 from .point.surface_point import FIELDS, SIDES, LocalSurface, Numbers, surface_at
 from .read_only import ReadOnly
 from .searches.boundary_equilibria import boundary_equilibrium_at
 from .searches.equilibria import equilibrium_distance, kind_of
-from .searches.find_two_fold import independence, two_fold
+from .searches.find_two_fold import independence, two_fold_at
 from .searches.fold_folds import fold_fold_of
-from .searches.folds import Fold, bend, fold
+from .searches.folds import Fold, bend, fold_at
 from .searches.pseudo_equilibria import (
     along_intersection,
     equilibrium_of,
     pseudo_equilibrium_at,
+    pseudo_kind,
     sliding_expansion,
     sliding_matrix,
 )
@@ -57,7 +61,8 @@ class LocalObject:
         ``"crossing"``, ``"sliding"``, ``"fold"``, ``"cusp"``, ``"fold-fold"`` (plane),
         ``"two-fold"``, ``"touch"`` (of a surface on which nothing slides), ``"rest"`` (between the two
         forces there), ``"equilibrium"``, ``"pseudo-equilibrium"``, ``"boundary equilibrium"``,
-        ``"intersection"`` (of surfaces, where no mode or several can go on) or ``"degenerate"``.
+        ``"intersection"`` (of surfaces, where no mode or several can go on) or ``"degenerate"``. On the
+        boundary of a complementarity condition or contact also ``"leaving"``, ``"closed"`` and ``"impact"``.
     label : str
         Its class: ``"crossing up"``, ``"attracting sliding"``, ``"visible"``, ``"II2"``,
         ``"VV-C1"``, ``"stable focus"``, ``"pseudo-saddle"``, ``"BF3"``, ``"crossing to +-"``, ...
@@ -135,12 +140,20 @@ def classify(
     LocalObject
         The class of the point, with its margins and the numbers that decide it.
 
+    Notes
+    -----
+    Conditions, closed contacts and joints have the letters that go on at the point unless ``mode`` gives them; what
+    they keep at zero is not counted among the directions, so eigenvalues are those of the motions that are possible.
+    Where a condition or contact opens or closes, rest while it is closed is a pseudo-equilibrium, and ``evidence`` has its
+    multiplier; a condition whose y holds its multiplier is a continuous surface.
+
     Raises
     ------
     PointError
-        Off the surface, or without one, and no equilibrium; a wrong shape; not finite.
+        Off the surface, or without one, and no equilibrium; off a constraint, or where a gap is negative; on several
+        conditions at once; a wrong shape; not finite.
     DefinitionError
-        Hidden dynamics; a fold-fold of a planar system with explicit time; vector multipliers; a ``mode`` or ``surface`` that the system does not have.
+        Hidden dynamics; vector multipliers; a ``mode`` or ``surface`` that the system does not have.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     OptionError
@@ -164,18 +177,22 @@ def classify(
     meeting = meeting_at(system, point, parameters, t, mode, tol)
     if meeting is not None:
         return classify_intersection(meeting, tol, margin)
-    where, x = surface_at(system, point, parameters, t, surface, mode, smooth=True)
+    where, x = surface_at(system, point, parameters, t, surface, mode, smooth=True, tol=tol)
     if not where.mode:
         return _Classifier(where, where.at(x), tol, margin).smooth()
-    require_linear(system, surface, "classify")
-    numbers = where.finite_at(x)
+    require_linear(system, surface if where.element is None else where.element.surface, "classify")
+    numbers = where.finite_at(x, slopes=where.one_sided)
     if not np.any(numbers.gradient):
         raise PointError(
             f"point {x}: expected a regular point of surface {surface}, received grad h = 0. Write "
             "h with a nonzero gradient."
         )
-    classifier = _Classifier(where, numbers, tol, margin)
     away = numbers.distance / (1 + float(np.linalg.norm(x)))
+    if away > tol or np.abs(numbers.angles).min() <= tol:
+        where.finite_at(x)
+    classifier = _Classifier(where, numbers, tol, margin)
+    if where.one_sided:
+        return classifier.one_sided()
     if away > tol:
         return classifier.off_surface(away)
     return classifier.on_surface()
@@ -193,8 +210,9 @@ class _Classifier:
         self.evidence: dict[str, float] = {"h": float(numbers.h), **lie}
         self.to_zero = [float("inf"), float("inf")]  # distance to a zero of F1, F2
         if not where.system.time_dependent:
-            pairs = zip(numbers.fields, self.derivatives, strict=True)
-            self.to_zero = [equilibrium_distance(f, d, numbers.x) for f, d in pairs]
+            for k, (f, d) in enumerate(zip(numbers.fields, self.derivatives, strict=True)):
+                if np.all(np.isfinite(d)):  # a root on the surface may have an infinite slope
+                    self.to_zero[k] = equilibrium_distance(f, d, numbers.x)
 
     # the result -----------------------------------------------------------------------------------
 
@@ -227,9 +245,12 @@ class _Classifier:
         """An equilibrium of a smooth system."""
         self.evidence.clear()
         if self.to_zero[0] > self.margin:
+            why = "it is inside a mode" if self.where.element else "the system has no surface"
+            basis, field = self.where.along(self.numbers.x), self.numbers.fields[0]
+            field = field if basis is None else basis @ field
             raise PointError(
-                f"point {self.numbers.x}: expected an equilibrium, as the system has no surface, received the "
-                f"field {self.numbers.fields[0].tolist()}. find_equilibrium goes to one nearby."
+                f"point {self.numbers.x}: expected an equilibrium, as {why}, received the "
+                f"field {field.tolist()}. find_equilibrium goes to one nearby."
             )
         self.is_zero(self.to_zero[0], "F = 0")
         return replace(self._equilibrium(0, "real"), side="")
@@ -245,7 +266,7 @@ class _Classifier:
                 self.is_zero(self.to_zero[k], f"F{k + 1} = 0")
                 status = "real" if k == own else "virtual"
                 return self._equilibrium(k, status)
-        x, gradient = self.numbers.x, self.numbers.gradient
+        x, gradient = self.numbers.x, self.where.free.at(self.numbers.x).gradient
         foot = x - self.numbers.h * gradient / (gradient @ gradient)
         raise PointError(
             f"point {x}: expected a point of the surface h = 0, or an equilibrium of a field, "
@@ -256,7 +277,7 @@ class _Classifier:
 
     def _equilibrium(self, k: int, status: str) -> LocalObject:
         eigenvalues = np.linalg.eigvals(self.derivatives[k])
-        scale = float(np.max(np.abs(eigenvalues)))
+        scale = float(np.max(np.abs(eigenvalues), initial=0.0))
         kind, hyperbolic = kind_of(eigenvalues, scale)
         self.margins["an eigenvalue without real part"] = hyperbolic
         self._gaps(eigenvalues, scale, kind)
@@ -272,6 +293,46 @@ class _Classifier:
         gaps = np.abs(eigenvalues[i] - eigenvalues[j]) / scale
         # the gap is the square root of the discriminant, which is the distance
         self.margins["equal eigenvalues"] = float(np.min(gaps)) ** 2
+
+    # on the boundary of a condition or contact ---------------------------------------------------
+
+    def one_sided(self) -> LocalObject:
+        """Rest, an impact, the border of release, release, or motion along the boundary, in this order."""
+        found = one_sided_at(self.where, self.numbers)
+        del self.evidence["L2"]
+        if self.is_zero(self.to_zero[0], "F1 = 0"):
+            return self._boundary_equilibrium(0, "+")
+        if not self.is_zero(abs(found.rate), "rate of the gap = 0"):
+            name = "leaving" if found.rate > 0 else "impact"
+            return self.result(name, name)
+        self.evidence["multiplier"] = found.load
+        matrix = found.tangents.T @ self.derivatives[1] @ found.tangents
+        along = found.tangents.T @ self.numbers.fields[1]
+        away = equilibrium_distance(along, matrix, self.numbers.x) if along.size else 0.0
+        if self.where.system.time_dependent or found.drive > self.tol:
+            away = float("inf")
+        rests = self.is_zero(away, "a pseudo-equilibrium")
+        border = self.is_zero(abs(found.drive), "release")
+        if rests and not border:
+            return self._closed_equilibrium(matrix)
+        if border:
+            self.evidence["next derivative"] = found.next
+            label = "visible" if found.next > 0 else "invisible"
+            if not found.next:
+                self.margins["next derivative = 0"] = 0.0
+            return self.result("fold", label, "+")
+        name = "leaving" if found.drive > 0 else "closed"
+        return self.result(name, name)
+
+    def _closed_equilibrium(self, matrix: Array) -> LocalObject:
+        """Rest of a closed condition or contact."""
+        eigenvalues = np.linalg.eigvals(matrix)
+        self.evidence.update(spectrum(eigenvalues))
+        scale = float(np.max(np.abs(eigenvalues), initial=0.0))
+        kind, hyperbolic = kind_of(eigenvalues, scale)
+        self.margins["a sliding eigenvalue without real part"] = hyperbolic
+        self._gaps(eigenvalues, scale, kind)
+        return self.result("pseudo-equilibrium", pseudo_kind(kind, Region.ATTRACTING))
 
     # on the surface ----------------------------------------------------------------------------
 
@@ -299,7 +360,7 @@ class _Classifier:
 
     @property
     def _planar(self) -> bool:
-        return self.where.system.extended_dimension == 2
+        return self.numbers.gradient.size == 2
 
     def _boundary_equilibrium(self, k: int, side: str) -> LocalObject:
         found = boundary_equilibrium_at(self.where, self.numbers, k, self.derivatives, 1e-300)
@@ -343,10 +404,44 @@ class _Classifier:
             slope = self.derivatives[k].T @ along + hessians[1 + k] @ numbers.fields[k]
             growth += float(slope @ tangent) / float(along @ tangent) / abs(second)
         self.evidence["growth"] = growth
+        shrinks = self._jumps()
+        if abs(shrinks - 1.0) > self.margin:
+            self.evidence["jumps"] = shrinks
+            return "stable" if shrinks < 1.0 else "unstable"
         speed = float(np.linalg.norm(numbers.fields[0]) * np.linalg.norm(numbers.gradient))
         if abs(growth) * speed < self.margin:
             return "neutral"
         return "stable" if growth < 0 else "unstable"
+
+    def _jumps(self) -> float:
+        """By what the resets on this surface multiply L in a turn round the point, which they keep."""
+        system, x = self.where.system, self.numbers.x
+        if not system.resets or not system.definition.plain:
+            return 1.0
+        d, first, ratio = system.definition, len(system.stops), 1.0
+        guards = [d.guards[first + k] for k in range(len(system.resets))]
+        maps = [d.maps[:, k] for k in range(len(system.resets))]
+        function = system.function(
+            ("jumps",),
+            lambda: [
+                *guards,
+                *map(system.gradient, guards),
+                *maps,
+                *(system.gradient(m[i]) for m in maps for i in range(self.n)),
+            ],
+        )
+        values, count = call(function, x, self.where.parameters), len(guards)
+        tangent = self.numbers.tangents[:, 0]
+        for k, (_, direction) in enumerate(system.resets):
+            gradient = values[count + k].ravel()
+            across = abs(float(gradient @ tangent)) > self.tol * float(np.linalg.norm(gradient))
+            kept = np.allclose(values[2 * count + k].ravel(), x, rtol=0.0, atol=self.tol)
+            if abs(float(values[k].item())) > self.tol or across or not kept:
+                continue
+            rows = values[3 * count + k * self.n : 3 * count + (k + 1) * self.n]
+            along = abs(float(tangent @ np.array([row.ravel() for row in rows]) @ tangent))
+            ratio *= along if direction else along**2
+        return ratio
 
     def _fold_fold(self) -> LocalObject:
         found = fold_fold_of(self.where, self.numbers, 1e-300)
@@ -363,17 +458,8 @@ class _Classifier:
         self.margins["dependent grad h, grad L1, grad L2"] = independence(numbers)
         if min(self.margins.values()) < self.margin:
             return self.result("degenerate", "")
-        x = numbers.x
         try:
-            found = two_fold(
-                self.where.system,
-                x[: self.n],
-                parameters=self.where.values,
-                t=float(x[-1]) if self.where.system.time_dependent else 0.0,
-                surface=self.where.surface,
-                mode=self.where.mode,
-                tol=1.0,  # tangency was decided above
-            )
+            found = two_fold_at(self.where, Found(numbers.x))
         except DegenerateError:
             self.margins["the two-fold's normal form"] = 0.0
             return self.result("degenerate", "")
@@ -382,7 +468,9 @@ class _Classifier:
         if undecided or not c.nearest.startswith("nu"):
             self.margins[c.nearest or "no boundary"] = c.margin
         self.evidence.update(nu1=found.nu[0], nu2=found.nu[1])
-        return self.result("two-fold", found.label, "", found)
+        free = self.where.along(numbers.x) is None and self.n > 2
+        own = found if free else None  # it has coordinates of all states
+        return self.result("two-fold", found.label, "", own)
 
     def _tangency(self, k: int) -> LocalObject:
         numbers, name = self.numbers, f"L{k + 1}{k + 1}"
@@ -406,23 +494,14 @@ class _Classifier:
         return self.result("cusp", "cusp", SIDES[k], self._fold(k))
 
     def _fold(self, k: int) -> Fold:
-        where, x = self.where, self.numbers.x
-        return fold(
-            where.system,
-            x[: self.n],
-            side=SIDES[k],
-            parameters=where.values,
-            t=float(x[-1]) if where.system.time_dependent else 0.0,
-            surface=where.surface,
-            mode=where.mode,
-            tol=self.tol,
-        )
+        found = Found(self.numbers.x, residual=self.numbers.distance)
+        return fold_at(self.where, found, SIDES[k], 6, self.tol)
 
     def _sliding(self, region: str) -> LocalObject:
         numbers = self.numbers
         l1, l2 = numbers.lie
         self.evidence["alpha"] = float(l1 / (l1 - l2))
-        if self.where.system.time_dependent:
+        if self.where.system.time_dependent or not np.all(np.isfinite(self.derivatives)):
             return self.result("sliding", region)
         speed = (l2 * numbers.fields[0] - l1 * numbers.fields[1]) / (l2 - l1)
         matrix, basis = sliding_matrix(numbers, self.derivatives)
@@ -474,15 +553,15 @@ def meeting_at(
     tol: float,
 ) -> Meeting | None:
     """The intersection at a point, or None if only one surface is to be classified."""
-    require_system(system)
-    if system.surface_count < 2:
+    require_system(system, complementarity=True, joints=True)
+    x, p = system.extended_point(point, t), system.parameter_vector(parameters)
+    if system.surface_count < 2 or acts(system, x, p, mode, tol):
         return None
     chosen = None
     if mode is not None:
         chosen = [i for i, sign in enumerate(system.parse_mode(mode)) if sign == 0]
         if len(chosen) < 2:
             return None
-    x, p = system.extended_point(point, t), system.parameter_vector(parameters)
     if chosen is None:
         at = layer_of(system).at(x, np.zeros(system.surface_count), p)
         lengths = np.linalg.norm(at.h_x, axis=1) * (1.0 + np.linalg.norm(x))

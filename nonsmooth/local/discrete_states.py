@@ -10,7 +10,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numpy as np
 
-from ..model import Array, FilippovSystem
+from ..model import Array, FilippovSystem, Parameters, held_events
 from ..model.definition.system import parted
 
 P = ParamSpec("P")
@@ -34,9 +34,27 @@ def with_discrete_states_held(analyse: Callable[P, R]) -> Callable[P, R]:
         found = cast(Callable[..., Any], analyse)(
             system.holding(values), moving, *args[2:], **options
         )
-        return _with_values(found, moving.size, list(values.values()))
+        own = _named_virtual(found, system, values, options.get("parameters"))
+        return _with_values(own, moving.size, list(values.values()))
 
     return cast(Callable[P, R], held)
+
+
+def _named_virtual(
+    found: Any, system: FilippovSystem, values: dict[str, float], parameters: Parameters | None
+) -> Any:
+    """Rest as virtual where a stop or reset is due at once, so that no motion comes to it."""
+    own, kind = getattr(found, "status", None), getattr(found, "kind", "")
+    named = kind in ("equilibrium", "pseudo-equilibrium")
+    if own != "real" and not named:
+        return found
+    held = system.holding(values)
+    regions = [event.region for event in held_events(system, values) if event.level]
+    if all(held.evaluate(e, found.point, parameters).item() < 0.0 for e in regions):
+        return found
+    if own == "real":
+        return replace(found, status="virtual")
+    return replace(found, label=f"virtual {found.label.removeprefix('virtual ')}")
 
 
 def _with_values(found: Any, count: int, values: list[float]) -> Any:

@@ -5,6 +5,7 @@ from .checks import is_real, real, real_array, whole
 from .definition import instruction_form
 from .definition.derived_systems import SECTION, reversed_system, surface_of, with_section
 from .definition.events import Clock, Impact, Reset, Stop
+from .definition.held_events import HeldEvent, discrete_values, held_events, held_relay
 from .definition.lift import LiftedSwitch
 from .definition.parse_definition import read_function
 from .definition.regularise import regularise
@@ -36,6 +37,7 @@ from .laws.followed import Followed, followed
 from .laws.layer import Layer, LayerNumbers, layer_of
 from .laws.motion import Motion, motion, watched_functions
 from .laws.multipliers import sliding_multipliers
+from .laws.one_surface import OneSurface, has_elements, one_surface
 from .laws.switches import Guard
 from .reading import Parameters
 from .values import Array
@@ -52,6 +54,7 @@ __all__ = [
     "FilippovSystem",
     "Followed",
     "Guard",
+    "HeldEvent",
     "Impact",
     "Layer",
     "LayerNumbers",
@@ -59,6 +62,7 @@ __all__ = [
     "Motion",
     "NonsmoothError",
     "NotSmoothError",
+    "OneSurface",
     "OptionError",
     "ParameterError",
     "Parameters",
@@ -71,10 +75,14 @@ __all__ = [
     "call",
     "clock_periods",
     "coupled_of",
+    "discrete_values",
     "driven_of",
     "evaluator",
     "explain",
     "followed",
+    "has_elements",
+    "held_events",
+    "held_relay",
     "instruction_form",
     "is_function",
     "is_real",
@@ -82,6 +90,7 @@ __all__ = [
     "mode_field",
     "motion",
     "multiplier_enters",
+    "one_surface",
     "periods",
     "raised_of",
     "read_function",

@@ -23,7 +23,9 @@ from .manifolds.dividing_surfaces import (
 from .manifolds.forward_reachable_set import Departure, Funnel, funnel
 from .manifolds.invariant_manifolds import Manifold, manifold
 from .periodic.find_periodic import VirtualOrbitError, periodic_orbit
+from .periodic.master_stability import MasterStability, master_stability
 from .periodic.orbit import PeriodicOrbit
+from .periodic.phase_response import PhaseResponse, phase_response
 from .runs.itinerary import Arrival, FixedItinerary
 from .runs.lyapunov import LyapunovSpectrum, lyapunov_spectrum
 from .runs.poincare import PoincareOrbit, poincare
@@ -52,9 +54,11 @@ __all__ = [
     "Gradient",
     "LyapunovSpectrum",
     "Manifold",
+    "MasterStability",
     "Passage",
     "Path",
     "PeriodicOrbit",
+    "PhaseResponse",
     "PoincareOrbit",
     "Sensitivity",
     "Slider",
@@ -72,8 +76,10 @@ __all__ = [
     "joint_root",
     "lyapunov_spectrum",
     "manifold",
+    "master_stability",
     "paths_from",
     "periodic_orbit",
+    "phase_response",
     "poincare",
     "saltation_matrix",
     "sensitivity",

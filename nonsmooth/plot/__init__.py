@@ -3,13 +3,15 @@
 Every function that draws takes ``ax=`` (``figure=``, if it makes several axes) and returns it; without it,
 a new matplotlib Figure that pyplot knows. It follows your ``rcParams`` and takes ``colors=`` and properties
 of lines. Colours, dashes and arrows are in ``style``, and ``canvas`` makes your own pictures in this way.
-``two_fold_explorer`` is a page for the browser, and ``offline_page`` puts such pages together.
+``two_fold_explorer`` is a page for the browser on the classes of two-folds; ``offline_page`` puts such pages
+together, as ``nonsmooth.explore`` does for a system.
 """
 
 from . import style
 from .basin_map import basins
 from .branches import bifurcation_curves, branch
 from .drawing import Canvas, canvas
+from .explorer import ExplorerPage
 from .offline_page import offline_page
 from .orbits import multipliers, periodic_orbit
 from .portraits.dividing_curves import dividing_curves
@@ -26,6 +28,7 @@ from .two_folds.sliding_flow import two_fold
 
 __all__ = [
     "Canvas",
+    "ExplorerPage",
     "basins",
     "bifurcation_curves",
     "branch",

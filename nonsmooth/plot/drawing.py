@@ -49,6 +49,22 @@ class Canvas:
         self.own = _checked_look(look)
         self.stroke = mpl.rcParams["lines.linewidth"] / mpl.rcParamsDefault["lines.linewidth"]
 
+    def panels(self, rows: int, columns: int) -> list[Canvas]:
+        """Return canvases of new axes in the figure.
+
+        Parameters
+        ----------
+        rows, columns : int
+            Of panels.
+
+        Returns
+        -------
+        list of Canvas
+            Row by row.
+        """
+        axes = self.figure.subplots(rows, columns, squeeze=False).ravel()
+        return [Canvas(ax, self.drawn, self.colors, self.own) for ax in axes]
+
     def color(self, name: str, default: Any) -> Any:
         """Return the user's colour of a thing, or the default; for areas and marks.
 

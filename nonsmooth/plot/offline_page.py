@@ -13,11 +13,14 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from ..model import OptionError
+from ..model import FilippovSystem, OptionError
+from .driver import described, module
 
 WEB = Path(__file__).parent / "web"
 #: In the page's head, so that a browser loads nothing from elsewhere.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
+#: The same, with WebAssembly and a worker whose program is in the page.
+_POLICY_OF_DRIVER = _POLICY.replace("; img", " 'wasm-unsafe-eval'; worker-src blob:; img")
 
 
 def offline_page(
@@ -27,6 +30,7 @@ def offline_page(
     styles: Sequence[str] = (),
     scripts: Sequence[str] = (),
     data: Mapping[str, Any] | None = None,
+    systems: Mapping[str, FilippovSystem] | None = None,
 ) -> str:
     """Put a page together that opens from a file, without a server and without a network.
 
@@ -40,6 +44,9 @@ def offline_page(
         Further style sheets and scripts (their text), after those that all pages share.
     data : mapping, optional
         What ``Page.data(name)`` gives the scripts: anything that JSON can hold.
+    systems : mapping, optional
+        Systems that the scripts integrate: ``await Engine.of(name)`` is the library's own driver, compiled to
+        WebAssembly, with that system. ``engine.simulate(x, p, {tEnd, tol})`` is one run.
 
     Returns
     -------
@@ -62,12 +69,18 @@ def offline_page(
             raise OptionError(f"{name} is {text!r}, not a text.")
     sheets = "\n".join([_shared("page.css"), *styles])
     blocks = [_data(name, value) for name, value in (data or {}).items()]
-    blocks += [f"<script>\n{text}</script>" for text in (_shared("controls.js"), *scripts)]
+    shared = [_shared("controls.js")]
+    if systems:
+        blocks += [_data(f"system-{name}", described(own)) for name, own in systems.items()]
+        blocks.append(_data("module", module()))
+        shared.append(_shared("engine.js"))
+    blocks += [f"<script>\n{text}</script>" for text in (*shared, *scripts)]
+    policy = _POLICY_OF_DRIVER if systems else _POLICY
     return "\n".join(
         [
             "<!doctype html>",
             '<html lang="en"><head><meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             '<meta name="color-scheme" content="light dark">',
             '<link rel="icon" href="data:,">',

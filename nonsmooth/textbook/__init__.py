@@ -18,14 +18,8 @@ from types import MappingProxyType
 
 from ..model import OptionError
 from ..notebook import add_cards
-from .control import (
-    abs_brake,
-    drill_string,
-    resonant_converter,
-    super_twisting,
-    tank_cascade,
-    twisting,
-)
+from .control import abs_brake, drill_string, super_twisting, tank_cascade, twisting
+from .converters import boost_converter, diode_bridge, resonant_converter
 from .friction import dry_friction, leine_stick_slip, stick_slip_exponential
 from .hybrid import (
     gearbox,
@@ -37,6 +31,7 @@ from .hybrid import (
     thermostat,
 )
 from .impacts import bouncing_ball, impact_oscillator, kelvin_voigt_bounce
+from .mechanisms import painleve_rod, slider_crank, woodpecker
 from .models import harvested_prey_predator, state_dependent_jump, welander_box
 from .periodic import (
     belt_oscillator,
@@ -81,11 +76,13 @@ __all__ = [
     "block_on_belt",
     "block_on_disc",
     "block_on_incline",
+    "boost_converter",
     "bouncing_ball",
     "buck_converter",
     "by_name",
     "chua_circuit",
     "cue_ball",
+    "diode_bridge",
     "drill_string",
     "dry_friction",
     "forced_dry_friction",
@@ -102,6 +99,7 @@ __all__ = [
     "leine_stick_slip",
     "mckean_neuron",
     "multi_sliding_relay",
+    "painleve_rod",
     "piecewise_cycle",
     "pivoting_disc",
     "planar_relay",
@@ -113,6 +111,7 @@ __all__ = [
     "shaken_block",
     "simplest_walker",
     "sir_threshold",
+    "slider_crank",
     "soft_stop",
     "spiral_oscillator",
     "state_dependent_jump",
@@ -127,6 +126,7 @@ __all__ = [
     "two_fold",
     "two_relay_spiral",
     "welander_box",
+    "woodpecker",
 ]
 
 add_cards(globals(), __all__)
@@ -181,7 +181,12 @@ _FUNCTIONS: tuple[Callable[[], Problem], ...] = (
     abs_brake,
     drill_string,
     resonant_converter,
+    diode_bridge,
+    boost_converter,
     tank_cascade,
+    painleve_rod,
+    woodpecker,
+    slider_crank,
     threshold_harvesting,
     sir_threshold,
     stommel_box,

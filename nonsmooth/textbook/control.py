@@ -1,4 +1,4 @@
-"""Sliding-mode control, brakes, drills and converters."""
+"""Sliding-mode control, brakes, drills and tanks."""
 
 from __future__ import annotations
 
@@ -158,48 +158,6 @@ def drill_string() -> Problem:
         stated("break-away", "x + c W where the bit starts", "3"),
         title="Drill string that sticks and slips",
         source="after Leine, van Campen & Keultjes 2002; closed form",
-    )
-
-
-def resonant_converter() -> Problem:
-    """Series resonant converter that is switched by the sign of its own current.
-
-    $i' = E sgn i - v - R i$, $v' = i$ with $E = 1$, $R = 1/2$. With $rho = exp(-pi a/w)$, $a = R/2$,
-    $w = sqrt(1 - a^2)$ the capacitor swings between $E (1 + rho)/(1 - rho)$ and its negative; the period is $2 pi/w$, the
-    multiplier $rho^2$.
-
-    Returns
-    -------
-    Problem
-        The system, a start, and the values that are known of it.
-
-    Notes
-    -----
-    Source: classical self-oscillating (LLC) drive; closed form.
-
-    Examples
-    --------
-    >>> resonant_converter().run(t_end=10.0).itinerary
-    '+ - + -'
-    """
-    i, v, source, load = (ca.SX.sym(s) for s in ("i", "v", "E", "R"))
-    system = FilippovSystem(
-        [i, v],
-        surface=i,
-        above=[source - v - load * i, i],
-        below=[-source - v - load * i, i],
-        parameters={source: 1.0, load: 0.5},
-    )
-    return problem(
-        "resonant_converter",
-        system,
-        (0.0, -1.5),
-        60.0,
-        stated("period", "of its orbit", "6.4892458815577790351"),
-        stated("amplitude", "largest voltage on the orbit", "2.59935069570455208"),
-        stated("multiplier", "of its orbit, next to 1", "0.19744179036948955834"),
-        title="Series resonant converter",
-        source="classical; closed form",
     )
 
 

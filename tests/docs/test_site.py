@@ -186,9 +186,12 @@ def test_every_name_of_the_overview_leads_to_its_description(site):
 def test_every_page_fits_the_window_and_complains_of_nothing(browser, site, width):
     wrong = {}
     pages = [page for page in sorted(site.rglob("*.html")) if page.name != "404.html"]
-    assert {"explore/two_folds.html", "explore/bounce.html", "index.html"} <= {
-        page.relative_to(site).as_posix() for page in pages
-    }
+    assert {
+        "explore/two_folds.html",
+        "explore/stick_slip.html",
+        "explore/bounce.html",
+        "index.html",
+    } <= {page.relative_to(site).as_posix() for page in pages}
     for page in pages:
         browser.open(page, width)
         if faults := browser.faults():

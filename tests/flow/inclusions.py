@@ -31,8 +31,6 @@ class Case:
     def __post_init__(self):
         if "points" in self.data:
             self.data = planar_body(self.data)
-        elif self.data["id"].startswith("slider-crank"):
-            self.data = {**self.data, "field": slider_crank(), "start_mode": "oocc"}
         names = [self.data.get(key, "") for key in ("states", "multipliers", "reactions", "time")]
         self.names = [name.split() for name in names]
         own = [condition["lam"] for condition in self.data.get("complementarity", [])]
@@ -54,6 +52,8 @@ class Case:
     @cached_property
     def system(self) -> ns.FilippovSystem:
         data = self.data
+        if data["id"].startswith("slider-crank"):
+            return ns.textbook.slider_crank(friction=False).system
         states, multipliers, _, time = ([self.symbols[n] for n in own] for own in self.names)
         surfaces = self.parse(data.get("surfaces", ""))
         multipliers += self.parse(data.get("vector_multipliers", ""))
@@ -154,26 +154,3 @@ def accelerations(run: ns.Trajectory) -> np.ndarray:
     else:
         found = run.steps.coefficients[:1, 3:6, 1]
     return found[np.lexsort(found.T[::-1].round(7))]
-
-
-def slider_crank() -> str:
-    """The field of a slider-crank mechanism with clearance (see the case's text)."""
-    mass = {"m00": "(7.4e-5+.1235*.153**2)", "m11": "(5.9e-4+.0855*.306**2)"}
-    mass["m01"] = "(.095*.153*.306*cos(q1-q0))"
-    gaps = [(side, end) for side in (1, -1) for end in (-1, 1)]
-    forces = [
-        "-.095*.153*.306*sin(q0-q1)*v1**2-.133*9.81*.153*cos(q0)",
-        ".095*.153*.306*sin(q0-q1)*v0**2-.095*9.81*.306*cos(q1)",
-        "0",
-    ]
-    for k, (side, end) in enumerate(gaps):
-        forces[0] += f"-({side})*.153*cos(q0)*r{k}"
-        forces[1] += f"-({side})*.306*cos(q1)*r{k}"
-        forces[2] += f"-({side})*(({end})*.05*cos(q2)-({side})*.025*sin(q2))*r{k}"
-    det = "({m00}*{m11}-{m01}**2)".format(**mass)
-    solved = [
-        f"({mass['m11']}*({forces[0]})-{mass['m01']}*({forces[1]}))/{det}",
-        f"({mass['m00']}*({forces[1]})-{mass['m01']}*({forces[0]}))/{det}",
-        f"({forces[2]})/2.7e-6",
-    ]
-    return ", ".join(["v0", "v1", "v2", *solved])

@@ -69,10 +69,16 @@ def number(text: str | float) -> float:
 
 
 class Problem:
-    """One problem; ``let`` names expressions, ``system`` has the arguments of a FilippovSystem."""
+    """One problem; ``let`` names expressions, ``system`` has the arguments of a FilippovSystem, ``textbook`` names one."""
 
     def __init__(self, data: dict[str, Any]):
         self.data = data
+        if "textbook" in data:
+            self.known = getattr(ns.textbook, data["textbook"])(**data.get("arguments", {}))
+            self.data = {"start": self.known.start, "t_end": self.known.t_end, **data}
+            if any(reference.quantity == "end" for reference in self.known.references):
+                names, end = self.known.system.state_names, self.known["end"].value
+                self.data["end"] = dict(zip(names, end, strict=True))
 
     @cached_property
     def space(self) -> dict[str, Any]:
@@ -88,6 +94,8 @@ class Problem:
 
     @cached_property
     def system(self) -> ns.FilippovSystem:
+        if "textbook" in self.data:
+            return self.known.system
         given = {name: self.read(text) for name, text in self.data["system"].items()}
         make = ns.FilippovSystem.from_expression if "rhs" in given else ns.FilippovSystem
         return make(**given)

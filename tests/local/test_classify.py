@@ -68,3 +68,20 @@ def test_both_fields_vanish():
     system = ns.FilippovSystem([X, Y], surface=Y, above=[X, -Y], below=[-X, Y])
     found = classify(system, [0.0, 0.0])
     assert found.kind == "degenerate" and found.distance == 0.0
+
+
+def test_a_two_fold_of_a_plane_and_time():
+    """A rectifier at the start of its source, and the same with time as a state."""
+    i, v, s = (ca.SX.sym(name) for name in ("i", "v", "s"))
+
+    def rectifier(states, moment, **more):
+        rates = [[ca.sin(moment) - i - v, i - v], [ca.sin(moment) - i + v, -i - v]]
+        rest = [1] * (len(states) - 2)
+        above, below = (rate + rest for rate in rates)
+        return ns.FilippovSystem(states, surface=i, above=above, below=below, **more)
+
+    found = ns.classify(rectifier([i, v], s, time=s), [0.0, 0.0])
+    known = ns.classify(rectifier([i, v, s], s), [0.0, 0.0, 0.0])
+    assert (found.kind, found.label) == (known.kind, known.label) == ("two-fold", "mix-0")
+    assert found.evidence["nu1"] == known.evidence["nu1"] and found.detail is None
+    assert ns.classify(rectifier([i, v], s, time=s), [0.0, 0.1]).label == "attracting sliding"

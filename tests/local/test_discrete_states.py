@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
@@ -38,7 +39,12 @@ def test_an_equilibrium_is_that_of_the_discrete_state_and_has_no_eigenvalue_for_
     found = ns.find_equilibrium(room(), [20.0, value])
     assert found.point.tolist() == [at, value]
     assert found.eigenvalues.tolist() == [-1.0] and found.kind == "stable node"
-    assert ns.classify(room(), [at, value]).kind == "equilibrium"
+    assert found.status == "virtual"  # the heating changes at 18 and 22 degrees
+    at_rest = ns.classify(room(), [at, value])
+    assert (at_rest.kind, at_rest.label) == ("equilibrium", "virtual stable node")
+    inside = {"k": 20.0}
+    if value:
+        assert ns.find_equilibrium(room(), [20.0, 1], parameters=inside).status == "real"
 
 
 @pytest.mark.parametrize("value", [0, 1])
@@ -95,8 +101,8 @@ def test_points_need_all_states_and_allowed_values():
 
 
 def test_pictures_and_connections_name_the_system_that_they_can_take():
-    with pytest.raises(ns.DefinitionError, match=r"system.holding\(\{'q': 0\}\)"):
-        ns.plot.phase_portrait(pushed(), (-5, 5, -2, 2))
+    with pytest.raises(ns.OptionError, match=r"ax= is one picture.*holding=\{'q': 0"):
+        ns.plot.phase_portrait(pushed(), (-5, 5, -2, 2), ax=Figure().add_subplot())
     with pytest.raises(ns.DefinitionError, match="holding"):
         ns.find_homoclinic(pushed(), [2.5, 0.0, 1], "k")
 

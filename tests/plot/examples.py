@@ -180,4 +180,11 @@ EXAMPLES = {
     "slip_map": [Example(pair)],
 }
 #: Public functions of the modules of pictures that draw nothing.
-OTHERS = {"Canvas", "canvas", "direction_colours", "explorer", "offline_page", "two_fold_explorer"}
+OTHERS = {
+    "Canvas",
+    "ExplorerPage",
+    "canvas",
+    "direction_colours",
+    "offline_page",
+    "two_fold_explorer",
+}

@@ -85,6 +85,11 @@ def test_picture_as_wide_as_a_column_is_fit_for_print_too(draw):
     assert max(ax.bbox.width for ax in figure.axes) > 0.3 * figure.bbox.width  # two side by side
 
 
+@pytest.mark.parametrize("name", ["boost_converter", "diode_bridge"])
+def test_a_long_itinerary_is_not_cut(name):
+    assert faults(ns.plot.trajectory(ns.textbook.by_name(name).run())) == []
+
+
 @pytest.mark.slow
 def test_no_title_is_cut_in_a_file():
     """Square axes of a narrow figure need more than one layout."""

@@ -28,13 +28,30 @@ def test_portraits_are_of_autonomous_systems_with_one_surface(draw, n):
     for wrong, received in (
         (1, "FilippovSystem"),
         (system(5 - n), f"{5 - n} states: x, y"),
-        (system(n, [lam, lam * y, *rest], discrete={z2: (0, 1)}, **one), "has discrete states"),
         (system(n, [-lam, -kap, *rest], **two), "2 surfaces"),
         (timed, "explicit time"),
         (system(n, [lam**3, 1, *rest], **hidden), "hidden dynamics"),
     ):
         with pytest.raises(ns.DefinitionError, match=received):
             draw(wrong, (-1, 1, -1, 1))
+    held = system(n, [lam, lam * y, *rest], discrete=[z2], **one)
+    with pytest.raises(ns.DefinitionError, match="which values its discrete states"):
+        draw(held, (-1, 1, -1, 1))
+    r = ca.SX.sym("r")
+    joined = system(n, [lam, r, *rest], constraints=ns.Constraint(y, reaction=r), **one)
+    with pytest.raises(ns.DefinitionError, match="constraints: constraint"):
+        draw(joined, (-1, 1, -1, 1))
+
+
+def test_a_sliding_portrait_needs_the_values_of_discrete_states():
+    q = ca.SX.sym("q")
+    held = system(3, [lam * y, z - q, 1], surface=x, multipliers=lam, discrete={q: (0, 1)})
+    with pytest.raises(ns.OptionError, match="holding"):
+        ns.plot.sliding_portrait(held, (-1, 1, -1, 1))
+    drawn = ns.plot.sliding_portrait(held, (-1, 1, -1, 1), holding={q: 1}, orbits=0, legend=False)
+    plain = ns.plot.sliding_portrait(held.holding({q: 1}), (-1, 1, -1, 1), orbits=0, legend=False)
+    texts = [[text.get_text() for text in f.axes[0].texts] for f in (drawn, plain)]
+    assert texts[0] == texts[1]
 
 
 def test_a_smooth_system_has_a_phase_portrait_and_no_sliding_portrait():

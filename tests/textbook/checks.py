@@ -1,6 +1,9 @@
 """How the values of hybrid automata, springs, controllers and thresholds are computed."""
 
+import functools
+
 import numpy as np
+from scipy.optimize import brentq
 
 import nonsmooth as ns
 
@@ -181,9 +184,63 @@ check("resonant_converter", "amplitude")(
     lambda problem: max(abs(leg.start[1]) for leg in orbit_of(problem).legs)
 )
 check("resonant_converter", "multiplier")(lambda problem: orbit_of(problem).multipliers[1].real)
+check("diode_bridge", "first change")(lambda problem: first(problem, "crossing").t)
+check("diode_bridge", "interval")(
+    lambda problem: (
+        np.diff([e.t for e in run_of(problem).events if e.kind == "crossing"]) @ np.full(15, 1 / 15)
+    )
+)
+for _name in ("diode_bridge", "boost_converter", "woodpecker", "slider_crank"):
+    check(_name, "end")(lambda problem: run_of(problem).x[-1])
+
+
+@functools.cache
+def discontinuous(problem):
+    return ns.periodic_orbit(problem.system, run_of(problem, 400.0))
+
+
+@check("boost_converter", "voltage")
+def _(problem):
+    return next(leg.start[1] for leg in discontinuous(problem).legs if leg.start[2] == 0.0)
+
+
+@check("boost_converter", "conduction")
+def _(problem):
+    return next(leg.duration for leg in discontinuous(problem).legs if leg.mode == "+o")
+
+
+check("boost_converter", "multiplier")(lambda problem: discontinuous(problem).multipliers[1].real)
 check("tank_cascade", "empty")(
     lambda problem: [e.t for e in run_of(problem).events if e.kind in ("entry", "rest")]
 )
+
+# mechanisms --------------------------------------------------------------------------------------
+
+
+def paradox(at):
+    """The friction from which the rod that slides at an angle has no motion."""
+
+    def moves(problem):
+        def status(mu):
+            run = problem.run({**at, "mu": mu}, t_end=1e-6)
+            return -1.0 if run.status is ns.Status.INCONSISTENT else 1.0
+
+        return brentq(status, 1.0, 2.0, xtol=1e-11)
+
+    return moves
+
+
+check("painleve_rod", "paradox")(paradox({}))
+check("painleve_rod", "least friction")(
+    paradox({"a": float(np.arctan(2)), "y": float(np.sin(np.arctan(2))) / 2})
+)
+
+
+@check("painleve_rod", "sticks (t, a)")
+def _(problem):
+    event = first(problem, "entry")
+    return event.t, event.x[2]
+
 
 # thresholds --------------------------------------------------------------------------------------
 

@@ -1,34 +1,42 @@
 // The explorer of one bounce: one state (surface, landing), and the pictures that follow it.
 "use strict";
 
-(() => {
+(async () => {
   const { svg, html, text } = Page;
   const given = Page.data("bounce");
   const byId = (id) => document.getElementById(id);
-  const REACH = [3, 6]; // of the map, in xdot and omega
+  const REACH = given.reach; // of the map, in xdot and omega
   const FINE = 160;
   const COARSE = 30;
+  const SECONDS = 5; // in which the ball plays a bounce
   const state = { ...given.start };
 
-  const RANGES = {
-    xdot: { name: "Ẋ", title: "speed along the ground", min: -REACH[0], max: REACH[0], step: 0.01 },
-    omega: {
-      name: "Ω",
-      title: "spin, positive for backspin",
-      min: -REACH[1],
-      max: REACH[1],
-      step: 0.01,
-    },
-    ydot: { name: "Ẏ", title: "normal speed, downward", min: -3, max: -0.1, step: 0.01 },
-    mu: { name: "μ", title: "friction coefficient", min: 0, max: 1.5, step: 0.01 },
-    eta: { name: "η", title: "stiffness along / normal (frequencies)", min: 0, max: 3, step: 0.01 },
-    d1: { name: "d₁", title: "damping along the ground", min: 0, max: 1, step: 0.01 },
-    d2: { name: "d₂", title: "damping normal to it", min: 0, max: 1, step: 0.01 },
-    G: { name: "G", title: "gravity", min: 0, max: 0.5, step: 0.001 },
+  let contacts;
+  try {
+    const loaded = given.loads.map(async (load) => [load, await Contact.of(load, given)]);
+    contacts = Object.fromEntries(await Promise.all(loaded));
+  } catch (error) {
+    byId("fault").textContent = `This browser cannot run the page: ${error.message}`;
+    byId("fault").hidden = false;
+    throw error;
+  }
+  const contact = () => contacts[state.load];
+
+  const fine = (size) => Number((10 ** Math.floor(Math.log10(size / 150))).toPrecision(1));
+  const range = (name, title, [min, max]) => ({ name, title, min, max, step: fine(max - min) });
+  const LANDING = {
+    xdot: range("Ẋ", "speed along the ground", [-REACH[0], REACH[0]]),
+    omega: range("Ω", "spin, positive for backspin", [-REACH[1], REACH[1]]),
+    ydot: range("Ẏ", "normal speed, downward", [Math.min(-3, 2 * state.ydot), -0.1]),
   };
-  const LANDING = ["xdot", "omega", "ydot"];
-  const SURFACE = ["mu", "eta", "d1", "d2", "G"];
-  const NAMES = { "+": "forward", "-": "reverse", s: "rolling", F: "free" };
+  LANDING.xdot.step = LANDING.omega.step = LANDING.ydot.step = 0.01;
+  const SURFACE = Object.fromEntries(
+    given.sliders.map(({ name, symbol, words, low, high }) => [
+      name,
+      range(symbol, words, [low, high]),
+    ]),
+  );
+  const RANGES = { ...LANDING, ...SURFACE };
   const VERBS = {
     "+": "slips forward",
     "-": "slips in reverse",
@@ -36,7 +44,13 @@
     F: "feels no friction at first",
   };
 
+  const surface = () => Object.fromEntries(given.parameters.map((name) => [name, state[name]]));
+  const colours = new Pictures.Colours(given);
   let outcomes = null; // the map that is shown
+  const drawMap = (shown) => {
+    outcomes = shown;
+    Pictures.drawMap(map, byId("map-key"), shown, colours);
+  };
   const redraw = () => {
     if (outcomes) drawMap(outcomes);
     draw();
@@ -48,11 +62,12 @@
   });
   const cone = new Page.Plane(byId("cone"), { x: [-1, 1], y: [0, 1], redraw });
   const slip = new Page.Plane(byId("slip"), { x: [0, 1], y: [-1, 1], aspect: 0.78, redraw });
-
-  const surface = () => {
-    const { mu, eta, d1, d2, G, inertia, load } = state;
-    return { mu, eta, d1, d2, G, inertia, load };
-  };
+  const ballPicture = new Pictures.Ball(byId("ball-picture"));
+  const movers = [cone, slip].map((plane) => {
+    const dot = svg("circle", { r: 6, class: "mover", visibility: "hidden" });
+    plane.element.append(dot);
+    return { plane, dot };
+  });
 
   function set(changes) {
     Object.assign(state, changes);
@@ -62,173 +77,6 @@
     ]);
     Page.setAddress(Object.fromEntries(shown));
     refresh();
-  }
-
-  // the bounce ---------------------------------------------------------------------------------
-
-  function curves(shot) {
-    return shot.phases
-      .filter((phase) => phase.steps.length)
-      .map((phase) => ({ mode: phase.mode, points: Bounce.along(phase, 90) }));
-  }
-
-  const extent = (values) =>
-    values.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]);
-
-  function marks(plane, all, read) {
-    const points = all.map((curve) => curve.points.map(read));
-    const found = [];
-    const dot = ([x, y], look) => svg("circle", { cx: x, cy: y, r: 4.6, class: look });
-    points.slice(1).forEach((p) => {
-      const [x, y] = plane.at(p[0]);
-      found.push(svg("rect", { x: x - 4, y: y - 4, width: 8, height: 8, class: "turn" }));
-    });
-    found.push(dot(plane.at(points[0][0]), "touch"));
-    const [x, y] = plane.at(points.at(-1).at(-1));
-    found.push(svg("path", { d: `M${x} ${y - 7}l7 7l-7 7l-7 -7z`, class: "off" }));
-    return found;
-  }
-
-  function drawCone(all) {
-    const { mu } = state;
-    const points = all.flatMap((curve) => curve.points);
-    const top = 1.14 * Math.max(extent(points.map((p) => p.load))[1], 1e-9);
-    const bottom = Math.min(0, 1.1 * extent(points.map((p) => p.load))[0]) - 0.06 * top;
-    const pushed = Math.max(...points.map((p) => Math.abs(p.friction)));
-    const half = Math.max(1.35 * pushed, Math.min(1.35 * mu, 0.6) * top, 1e-6);
-    cone.limits([-half, half], [bottom, top]);
-    const end = Math.min(top, mu ? half / mu : top);
-    const edge = (sign) => [
-      [0, 0],
-      [sign * mu * end, end],
-    ];
-    const inside = [
-      [0, 0],
-      [mu * end, end],
-      [mu * end < half ? mu * end : half, top],
-    ];
-    const mirrored = inside.map(([u, v]) => [-u, v]).reverse();
-    const parts = [cone.polygon([...inside, ...mirrored], { class: "cone-inside" })];
-    parts.push(...[1, -1].map((sign) => cone.path(edge(sign), { class: "cone-edge" })));
-    parts.push(
-      cone.path(
-        [
-          [-half, 0],
-          [half, 0],
-        ],
-        { class: "zero" },
-      ),
-    );
-    const read = (p) => [p.friction, p.load];
-    all.forEach(({ mode, points: own }, k) => {
-      if (k)
-        parts.push(cone.path([read(all[k - 1].points.at(-1)), read(own[0])], { class: "jump" }));
-      parts.push(cone.path(own.map(read), { class: `phase phase-${NAMES[mode]}` }));
-    });
-    for (const { mode, points: own } of all) {
-      const line = own.map(read);
-      if (length(cone, line) > 30)
-        parts.push(cone.arrow(line, 0.45, { class: `head-${NAMES[mode]}` }, 7));
-    }
-    cone.layer.replaceChildren(...parts, ...marks(cone, all, read));
-    cone.ticks("friction force", "load");
-  }
-
-  function length(plane, line) {
-    const pixels = line.map((p) => plane.at(p));
-    return pixels
-      .slice(1)
-      .reduce((l, p, k) => l + Math.hypot(p[0] - pixels[k][0], p[1] - pixels[k][1]), 0);
-  }
-
-  function drawSlip(all, time) {
-    const values = all.flatMap((curve) => curve.points.map((p) => p.slip));
-    const [low, high] = extent([0, ...values]);
-    const room = 0.12 * (high - low || 1);
-    slip.limits([0, time], [low - room, high + 1.6 * room]);
-    const parts = [];
-    all.forEach(({ mode, points }, k) => {
-      const [a, b] = [points[0].t, points.at(-1).t];
-      if (k)
-        parts.push(
-          slip.path(
-            [
-              [a, slip.y[0]],
-              [a, slip.y[1]],
-            ],
-            { class: "band" },
-          ),
-        );
-      const words = { "+": "S+", "-": "S−", s: "R", F: "F" }[mode];
-      const wide = slip.at([b, 0])[0] - slip.at([a, 0])[0];
-      const look = { class: "name" };
-      if (wide > 26) parts.push(slip.label([(a + b) / 2, slip.y[1]], words, look, [0, 18]));
-    });
-    parts.push(
-      slip.path(
-        [
-          [0, 0],
-          [time, 0],
-        ],
-        { class: "zero" },
-      ),
-    );
-    const read = (p) => [p.t, p.slip];
-    for (const { mode, points } of all) {
-      parts.push(slip.path(points.map(read), { class: `phase phase-${NAMES[mode]}` }));
-    }
-    slip.layer.replaceChildren(...parts, ...enlarged(all, high - low));
-    slip.over.replaceChildren(...marks(slip, all, read));
-    slip.ticks("time", "slip H = Ẋ + Ω");
-  }
-
-  /** The last slip in a frame of its own, where it is too small to be seen beside the first. */
-  function enlarged(all, range) {
-    const { mode, points } = all.at(-1);
-    const most = Math.max(...points.map((p) => Math.abs(p.slip)));
-    if (all.length < 2 || mode === "s" || most > 0.06 * range || most === 0) return [];
-    const { left, top, width, height } = slip.box;
-    const words = ["the end,", `slip to ${text(points.at(-1).slip, 2)}`];
-    const lines = width < 420 ? words : [words.join(" ")]; // on a phone one line reaches over the curve
-    const tall = 0.36 * height + 16 * lines.length;
-    const places = [top + 34, top + height - tall - 12].map((y) => ({
-      x: left + 0.5 * width,
-      y,
-      width: 0.46 * width,
-      height: 0.36 * height,
-    }));
-    const covers = ({ x, y }) =>
-      all
-        .flatMap((phase) => phase.points)
-        .map((p) => slip.at([p.t, p.slip]))
-        .filter((q) => q[0] > x - 8 && q[1] > y - 8 && q[1] < y + tall + 8).length;
-    const box = covers(places[0]) > covers(places[1]) ? places[1] : places[0];
-    const [start, end] = [points[0].t, points.at(-1).t];
-    const at = (p) => [
-      box.x + box.width * (0.08 + (0.84 * (p.t - start)) / (end - start || 1)),
-      box.y + box.height * (0.5 - (0.4 * p.slip) / most),
-    ];
-    const pixels = points.map((p) =>
-      at(p)
-        .map((v) => v.toFixed(1))
-        .join(" "),
-    );
-    const below = (k) => ({
-      x: box.x + box.width,
-      y: box.y + box.height + 15 + 15 * k,
-      "text-anchor": "end",
-      class: "halo",
-    });
-    return [
-      svg("rect", { ...box, class: "inset" }),
-      svg("path", { d: `M${box.x} ${box.y + box.height / 2}h${box.width}`, class: "zero" }),
-      svg("path", {
-        d: `M${pixels.join("L")}`,
-        fill: "none",
-        class: `phase end phase-${NAMES[mode]}`,
-      }),
-      ...lines.map((line, k) => svg("text", below(k), line)),
-    ];
   }
 
   // words --------------------------------------------------------------------------------------
@@ -247,9 +95,9 @@
     }
     const { liftOff, time, itinerary } = shot;
     const leaves = { "+": "forward slip", "-": "reverse slip", s: "rolling" }[shot.lastMode];
-    byId("verdict").textContent = Bounce.regionName(itinerary).replaceAll("-", "−");
+    byId("verdict").textContent = regionName(itinerary).replaceAll("-", "−");
     byId("story").textContent =
-      `The ball ${listed(itinerary.split(" ").map((m) => VERBS[m]))}, and leaves ${
+      `The ball ${listed(itinerary.split(" ").map((m) => VERBS[m] ?? "slips"))}, and leaves ${
         shot.lastMode === "s" ? "" : "in "
       }${leaves}.`;
     const facts = {
@@ -268,7 +116,7 @@
     byId("facts").replaceChildren(...rows);
     const turns = shot.phases
       .slice(1)
-      .map((phase) => `${VERBS[phase.mode]} from t = ${text(phase.start)}`);
+      .map((phase) => `${VERBS[phase.mode] ?? "slips"} from t = ${text(phase.start)}`);
     byId("slip-text").textContent =
       `It lands with slip ${text(state.xdot + state.omega)}; ${[...turns, `lift-off at t = ${text(time)}`].join("; ")}.`;
     byId("cone-text").textContent =
@@ -279,12 +127,16 @@
   function coneKey(shot) {
     const modes = [...new Set(shot.phases.map((phase) => phase.mode))];
     const items = modes.map((mode) => {
-      const line = svg("path", { d: "M1 7H33", class: `phase phase-${NAMES[mode]}`, fill: "none" });
+      const line = svg("path", {
+        d: "M1 7H33",
+        class: `phase phase-${Pictures.nameOf(mode)}`,
+        fill: "none",
+      });
       return html(
         "li",
         {},
         svg("svg", { viewBox: "0 0 34 14", "aria-hidden": "true" }, line),
-        VERBS[mode],
+        VERBS[mode] ?? "slips",
       );
     });
     byId("cone-key").replaceChildren(...items);
@@ -292,99 +144,12 @@
 
   // the map ------------------------------------------------------------------------------------
 
-  const luminance = (colour) => {
-    const parts = [1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16) / 255);
-    const linear = parts.map((c) => (c <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
-  };
-  const spare = {}; // colours of itineraries without one of their own, kept while sliders move
-  const bare = (name) => name.replace(/^F /, ""); // a map has all landings with F, or none
-  const colourOf = (name) => given.colours[bare(name)] || spare[bare(name)];
-
-  /** Give the regions of a map colours; those that share one by chance get others. */
-  function assign(regions) {
-    const used = new Set(Object.values(given.colours));
-    for (const name of regions.map(bare)) {
-      if (given.colours[name]) continue;
-      if (!spare[name] || used.has(spare[name])) {
-        const free = given.more.find((colour) => !used.has(colour));
-        spare[name] = free || given.more[Object.keys(spare).length % given.more.length];
-      }
-      used.add(spare[name]);
-    }
-  }
-
-  function picture(outcomes) {
-    const { count, code, regions } = outcomes;
-    const canvas = html("canvas", { width: count, height: count });
-    const context = canvas.getContext("2d");
-    const image = context.createImageData(count, count);
-    const colours = regions.map((name) => {
-      const colour = colourOf(name);
-      return [1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16));
-    });
-    for (let at = 0; at < code.length; at++) {
-      const row = count - 1 - Math.floor(at / count);
-      const to = 4 * (row * count + (at % count));
-      const [r, g, b] = code[at] < 0 ? [255, 255, 255] : colours[code[at]];
-      image.data.set([r, g, b, 255], to);
-    }
-    context.putImageData(image, 0, 0);
-    return canvas.toDataURL();
-  }
-
-  function drawMap(shown) {
-    outcomes = shown;
-    const shares = Maps.shares(shown);
-    assign(shares.map(({ name }) => name));
-    const [left, top] = map.at([-REACH[0], REACH[1]]);
-    const [right, bottom] = map.at([REACH[0], -REACH[1]]);
-    const box = {
-      x: left,
-      y: top,
-      width: right - left,
-      height: bottom - top,
-      preserveAspectRatio: "none",
-    };
-    const image = svg("image", { ...box, href: picture(outcomes), class: "regions" });
-    const lines = Maps.curve(outcomes).map(({ kind, points }) =>
-      map.path(points, { class: `divide ${kind}` }),
-    );
-    const rooms = Maps.rooms(outcomes);
-    const names = [];
-    const small = [];
-    for (const { code, name, share } of shares) {
-      const words = name.replaceAll("-", "−");
-      const place = Maps.label(outcomes, code, rooms[code], (9.5 * words.length + 8) / map.box.width);
-      if (place && rooms[code].room > 0.03 * outcomes.count) {
-        const fill = luminance(colourOf(name)) < 0.2 ? "#ffffff" : "#000000";
-        const label = map.label(
-          place,
-          words,
-          { class: "region-name", style: `fill: ${fill}` },
-          [0, 4],
-        );
-        names.push(label);
-      } else if (share > 0 && small.length < 12) {
-        const box = svg("svg", { viewBox: "0 0 34 14", "aria-hidden": "true" });
-        box.append(
-          svg("rect", { x: 1, y: 1, width: 32, height: 12, fill: colourOf(name), class: "swatch" }),
-        );
-        small.push(html("li", {}, box, words));
-      }
-    }
-    map.under.replaceChildren(image);
-    map.layer.replaceChildren(...lines, ...names);
-    byId("map-key").replaceChildren(...small);
-    map.ticks("speed Ẋ", "spin Ω");
-  }
-
   let job = 0;
 
   /** A coarse map at once, a fine one in slices of time between which the page stays alive. */
   function startMap() {
     const mine = ++job;
-    const begin = (count) => Maps.empty(surface(), state.ydot, REACH, count);
+    const begin = (count) => Maps.empty(contact(), surface(), state.ydot, REACH, count);
     const coarse = begin(COARSE);
     Maps.compute(coarse, Infinity);
     Maps.divide(coarse, 1e-2, Infinity);
@@ -403,6 +168,84 @@
     setTimeout(work, 120); // not while a slider moves
   }
 
+  // the ball as it goes ------------------------------------------------------------------------
+
+  /** The course of the bounce that is shown: the ball at a time, and its points in the other pictures. */
+  const course = {
+    points: [],
+    clock: 0,
+    playing: false,
+
+    take(all) {
+      let angle = 0;
+      this.points = all.flatMap(({ mode, points }) =>
+        points.map((p, k) => {
+          if (k) angle += 0.5 * (p.omega + points[k - 1].omega) * (p.t - points[k - 1].t);
+          return { ...p, mode, angle };
+        }),
+      );
+      const xs = this.points.map((p) => p.x);
+      this.reach = [Math.min(...xs), Math.max(...xs)];
+      this.most = Math.max(...this.points.map((p) => Math.abs(p.friction)));
+      this.draw();
+    },
+
+    get end() {
+      return this.points.at(-1)?.t ?? 0;
+    },
+
+    /** The point at the clock, between those that were computed. */
+    get now() {
+      const { points } = this;
+      const t = this.clock * this.end;
+      const k = points.findIndex((p) => p.t > t);
+      if (k < 1) return k < 0 ? points.at(-1) : points[0];
+      const [a, b] = [points[k - 1], points[k]];
+      const s = (t - a.t) / (b.t - a.t || 1);
+      const between = (name) => a[name] + s * (b[name] - a[name]);
+      const names = ["t", "x", "y", "angle", "load", "friction", "slip"];
+      return { mode: a.mode, ...Object.fromEntries(names.map((name) => [name, between(name)])) };
+    },
+
+    draw() {
+      const isShown = this.points.length > 0;
+      byId("ball-panel").hidden = !isShown;
+      for (const { dot } of movers) dot.setAttribute("visibility", isShown ? "visible" : "hidden");
+      if (!isShown) return;
+      const p = this.now;
+      const [inCone, inSlip] = [cone.at([p.friction, p.load]), slip.at([p.t, p.slip])];
+      [inCone, inSlip].forEach(([cx, cy], k) => {
+        movers[k].dot.setAttribute("cx", cx);
+        movers[k].dot.setAttribute("cy", cy);
+      });
+      ballPicture.draw(p, this.reach, p.mode, this.most);
+      byId("clock").value = this.clock;
+      byId("clock").setAttribute(
+        "aria-valuetext",
+        `time ${text(p.t, 3)}: ${VERBS[p.mode] ?? "slips"}`,
+      );
+    },
+
+    frame(before) {
+      if (!this.playing) return;
+      requestAnimationFrame((now) => {
+        this.clock = (this.clock + Math.min(now - before, 100) / 1000 / SECONDS) % 1;
+        this.draw();
+        this.frame(now);
+      });
+    },
+  };
+  byId("play").addEventListener("click", () => {
+    course.playing = !course.playing;
+    byId("play").textContent = course.playing ? "Pause" : "Play";
+    byId("play").setAttribute("aria-pressed", course.playing);
+    course.frame(performance.now());
+  });
+  byId("clock").addEventListener("input", () => {
+    course.clock = Number(byId("clock").value);
+    course.draw();
+  });
+
   // inputs -------------------------------------------------------------------------------------
 
   const moveHandle = Page.draggable(map, {
@@ -420,14 +263,15 @@
       set: (value) => set({ [key]: value }),
     });
   const fields = [
-    ...LANDING.map((key) => field("landing", key)),
-    ...SURFACE.map((key) => field("surface", key)),
+    ...["xdot", "omega", "ydot"].map((key) => field("landing", key)),
+    ...given.sliders.map(({ name }) => field("surface", name)),
   ];
   const LOADS = { contact: "the surface's force", net: "that less gravity" };
-  const radios = Object.entries(LOADS).map(([load, words]) => {
+  byId("load-choice").hidden = given.loads.length < 2;
+  const radios = given.loads.map((load) => {
     const input = html("input", { type: "radio", name: "load", value: load });
     input.addEventListener("change", () => set({ load }));
-    byId("loads").append(html("label", {}, input, words));
+    byId("loads").append(html("label", {}, input, LOADS[load]));
     return input;
   });
   const ball = byId("ball");
@@ -437,25 +281,29 @@
     ["hoop or cylinder shell (1)", 1],
     ["disc or cylinder (1/2)", 0.5],
   ];
+  if (!BALLS.some((one) => one[1] === given.start.inertia)) {
+    BALLS.unshift([`this one (${text(given.start.inertia)})`, given.start.inertia]);
+  }
   BALLS.forEach(([words, inertia]) => ball.append(html("option", { value: inertia }, words)));
   ball.addEventListener("change", () => set({ inertia: Number(ball.value) }));
   byId("reset").addEventListener("click", () => set({ ...given.start }));
 
   let mapped = "";
   function draw() {
-    const key = JSON.stringify([surface(), state.ydot]);
+    const key = JSON.stringify([surface(), state.load, state.ydot]);
     if (key !== mapped) startMap();
     mapped = key;
     const { xdot, ydot, omega } = state;
-    const shot = Bounce.simulate(surface(), { xdot, ydot, omega }, true);
-    const all = curves(shot);
+    const shot = contact().simulate(surface(), { xdot, ydot, omega }, true);
+    const all = shot.phases.filter((phase) => phase.points.length);
     if (shot.fault) {
       for (const plane of [cone, slip]) plane.layer.replaceChildren();
       slip.over.replaceChildren();
     } else {
-      drawCone(all);
-      drawSlip(all, shot.time);
+      Pictures.drawCone(cone, all, state.mu);
+      Pictures.drawSlip(slip, all, shot.time);
     }
+    course.take(all);
     drawWords(shot);
     coneKey(shot);
     moveHandle();
@@ -473,7 +321,7 @@
       const value = Number(asked[key]);
       if (asked[key] && Number.isFinite(value)) state[key] = Math.min(Math.max(value, min), max);
     }
-    if (Object.hasOwn(LOADS, asked.load ?? "")) state.load = asked.load;
+    if (given.loads.includes(asked.load)) state.load = asked.load;
     const inertia = BALLS.map((one) => one[1]).find(
       (one) => Math.abs(one - Number(asked.inertia)) < 1e-6,
     );
@@ -481,6 +329,11 @@
     refresh();
   }
 
+  byId("title").textContent = given.title;
+  byId("model").textContent =
+    given.model === "KelvinVoigt"
+      ? "The linear (Kelvin-Voigt) contact of Biber, Champneys and Szalai (2022)"
+      : `The contact model ${given.model}`;
   byId("version").textContent = given.version;
   window.addEventListener("hashchange", read);
   read();

@@ -8,12 +8,13 @@ const Maps = (() => {
   }
 
   /** An empty map: `code` counts through `regions` (-1: no lift-off), `side` is that of lift-off. */
-  function empty(p, ydot, reach, count) {
+  function empty(contact, p, ydot, reach, count) {
     const [xdot, omega] = reach.map((r) => middles(r, count));
     const code = new Int16Array(count * count).fill(-1);
     const side = new Int8Array(count * count);
     const rolled = new Uint8Array(count * count); // whether the last slip began by leaving rolling
     return {
+      contact,
       p,
       ydot,
       reach,
@@ -36,7 +37,7 @@ const Maps = (() => {
 
   function put(map, at, { fault, itinerary }) {
     if (fault) return;
-    const name = Bounce.regionName(itinerary);
+    const name = regionName(itinerary);
     let code = map.regions.indexOf(name);
     if (code < 0) code = map.regions.push(name) - 1;
     map.code[at] = code;
@@ -44,21 +45,20 @@ const Maps = (() => {
     map.rolled[at] = itinerary.at(-3) === "s" ? 1 : 0;
   }
 
-  /** Compute rows for at most `milliseconds`; true when the map is complete. Half of it is mirrored. */
+  /** Compute rows for at most `milliseconds`; true when the map is complete. Half of it is mirrored, if it may be. */
   function compute(map, milliseconds) {
-    const { p, ydot, count, xdot, omega } = map;
+    const { contact, p, ydot, count, xdot, omega } = map;
+    const { mirrored } = contact.given;
     const until = performance.now() + milliseconds;
-    for (; map.done < count / 2; map.done++) {
+    for (; map.done < count / (mirrored ? 2 : 1); map.done++) {
       if (performance.now() > until) return false;
       const j = map.done;
-      for (let i = 0; i < count; i++) {
-        const shot = Bounce.simulate(p, { xdot: xdot[i], ydot, omega: omega[j] });
+      const landings = xdot.map((own) => ({ xdot: own, ydot, omega: omega[j] }));
+      contact.many(p, landings).forEach((shot, i) => {
         put(map, j * count + i, shot);
-        put(map, (count - 1 - j) * count + count - 1 - i, {
-          ...shot,
-          itinerary: mirror(shot.itinerary),
-        });
-      }
+        const other = { ...shot, itinerary: mirror(shot.itinerary) };
+        if (mirrored) put(map, (count - 1 - j) * count + count - 1 - i, other);
+      });
     }
     return true;
   }
@@ -137,7 +137,7 @@ const Maps = (() => {
     if (!found.has(name)) {
       const n = map.count;
       const [one, other] = [a, b].map((at) => [map.xdot[at % n], map.omega[Math.floor(at / n)]]);
-      const point = Bounce.divide(map.p, map.ydot, one, other, tolerance);
+      const point = map.contact.divide(map.p, map.ydot, one, other, tolerance);
       const kind = map.rolled[a] && map.rolled[b] ? "two-fold" : "slipping";
       found.set(name, { name, point, kind });
     }
@@ -165,13 +165,14 @@ const Maps = (() => {
   /** Find pieces of the curve for at most `milliseconds`, row by row; true when all are found. */
   function divide(map, tolerance, milliseconds) {
     const until = performance.now() + milliseconds;
-    const last = map.count / 2 - 1; // this row of cells is its own mirror image
+    const { mirrored } = map.contact.given;
+    const last = mirrored ? map.count / 2 - 1 : map.count - 2; // a row of cells that is its own mirror image, or the last
     for (; map.divided <= last; map.divided++) {
       if (performance.now() > until) return false;
       for (let i = 0; i < map.count - 1; i++) {
         for (const piece of pieces(map, map.crossings, i, map.divided, tolerance)) {
           map.pieces.push(piece);
-          if (map.divided < last) map.pieces.push(piece.map(mirrorEnd));
+          if (mirrored && map.divided < last) map.pieces.push(piece.map(mirrorEnd));
         }
       }
     }

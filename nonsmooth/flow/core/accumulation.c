@@ -87,7 +87,8 @@ static int is_quiet(Run *r, Expansion *e, const int32_t *drop, const double *nea
     const double *c = e->guards + (int64_t)row * r->stride + drop[row];
     if (is_atom(e->l.kind[row]) && (!r->instant.side[row - e->l.atoms] || e->l.side[row] == UNWATCHED)) continue;
     if (drop[row] > order || is_repeated(r, block, e->l.kind[row], e->l.index[row])) continue;
-    if (block && e->l.kind[row] == SURFACE_GUARD && fabs(c[0]) <= noise[row]) continue; /* is zero at the limit */
+    int may_vanish = e->l.kind[row] == SURFACE_GUARD && (block || has_law(r, e->l.index[row], TABLE_LAW));
+    if (may_vanish && fabs(c[0]) <= noise[row]) continue; /* is zero at the limit */
     if (singular && !(fabs(c[0]) <= noise[row])) continue;
     if (!(fabs(c[0]) - (drop[row] ? 0 : noise[row]) > rest_of(c, order - drop[row], time))) return 0;
   }
@@ -316,7 +317,7 @@ static void rest_if_slow(Run *r) {
 
 /* Store an event among the last ones. */
 static void remember(Run *r, int kind, int guard) {
-  int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->met.kind << 32) + (guard < 0 ? -1 : r->met.index);
+  int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->met.kind << 32) + (guard < 0 ? -1 : shown_index(r));
   r->past[r->history++ % HISTORY] = (Happened){r->since, pattern, kind, r->met};
   r->since = 0;
 }

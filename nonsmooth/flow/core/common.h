@@ -83,12 +83,6 @@ typedef struct {
 #define MOST_MODES 30
 #define FROZEN (1LL << 62)
 
-#ifndef ON_DEVICE
-/* Sizes of what Python and C share, compared when a library is loaded. */
-int64_t options_size(void) { return sizeof(Options); }
-int64_t batch_size(void) { return sizeof(Batch); }
-#endif
-
 /* a * b + c, in lanes rounded once where the processor does that at once. The driver is compiled without
  * contraction and UNFUSED, so that it gives the same bits on every processor. */
 #if defined(UNFUSED)

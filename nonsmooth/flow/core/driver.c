@@ -37,6 +37,7 @@ static void adopt(Run *r, const Continuation *c) {
   }
   r->shown = shown;
   enter_segment(r, shown);
+  require_limits(r);
 }
 
 /* A surface that would come to rest though its multiplier enters only its third derivative or a later one: motions
@@ -94,10 +95,12 @@ static void strike_due(Run *r) {
 static int settle_in(Run *r) {
   Met met = r->met;
   int before = r->mode, jumped = become_consistent(r);
+  find_cells(r);
   letters_of(r, r->start);
   active_surfaces(r, -1, r->start);
   if (r->status != RUNNING) return jumped;
   choose(r, r->start, 0, 0);
+  turn_cells(r);
   strike_due(r);
   if (jumped) event(r, JUMP, before, 0, r->jumped_from);
   r->met = met;
@@ -170,6 +173,7 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   find_idle(r);
   if (start_mode || r->remembered) memcpy(r->letter, start_mode ? start_mode : r->remembered, r->width);
   else memset(r->letter, -1, r->width);
+  find_cells(r);
   measure_time(r);
   int finite = letters_of(r, r->letter);
   lay_out(r, r->letter, &r->now);
@@ -186,8 +190,8 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
       choose(r, r->start, 0, 0);
     }
   }
-  r->shown = shown_number(r, r->letter);
-  enter_segment(r, r->shown);
+  renumber(r);
+  turn_cells(r);
   strike_due(r);
   if (jumped) event(r, JUMP, before, 0, r->jumped_from);
   begin_events(r, motion);
@@ -295,6 +299,7 @@ static void serve_contact(Run *r, int row) {
 static void serve(Run *r, int row) {
   int kind = r->now.kind[row], index = r->now.index[row], side = r->now.side[row];
   r->met = (Met){kind, index, side};
+  pass_cells(r, row);
   if (kind != BRANCH_GUARD) law_of(r, index)->serve(r, row);
   else if (side == OF_ONE || is_mixed(r, r->now.sliding, r->now.slides)) pass(r, row, 0, 0);
   else {

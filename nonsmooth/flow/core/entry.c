@@ -1,36 +1,17 @@
 /* Memory ------------------------------------------------------------------------------------------- */
 
-static size_t place_layout(Layout *l, char *base, size_t used, int width, int guards) {
-  l->letter = LETTERS(width);
-  l->sliding = INTEGERS(width);
-  l->group = INTEGERS(width);
-  l->kind = INTEGERS(guards);
-  l->index = INTEGERS(guards);
-  l->side = INTEGERS(guards);
-  l->bent = INTEGERS(guards);
+#define PLACED(type, name, count) to->name = place(base, &used, sizeof(type), (size_t)(count));
+
+static size_t place_layout(Layout *to, char *base, size_t used, int width, int guards) {
+  LAYOUT_ARRAYS(PLACED)
   return used;
 }
 
-static size_t place_expansion(Expansion *e, char *base, size_t used, int n, int width, int guards, int stride,
-                              int sets) {
-  used = place_layout(&e->l, base, used, width, guards);
-  e->states = DOUBLES(n * stride);
-  e->guards = DOUBLES(guards * stride);
-  e->series = DOUBLES(width * stride);
-  e->allowed = DOUBLES(n);
-  e->of_guards = DOUBLES(guards);
-  e->scale = DOUBLES(guards);
-  e->steep = DOUBLES(guards);
-  e->inverse = DOUBLES(width * width);
-  if (sets) {
-    e->lambda = DOUBLES(width * stride);
-    e->apart = DOUBLES(width * stride);
-    e->root = DOUBLES(sets * stride);
-    e->rates = DOUBLES(sets * (stride + 1));
-    e->slopes = DOUBLES(width * width);
-    e->radius = DOUBLES(sets);
-    e->per_radius = DOUBLES(sets);
-  }
+static size_t place_expansion(Expansion *to, char *base, size_t used, const Run *r) {
+  size_t n = r->n, width = r->width, rows = r->guards, stride = r->stride, sets = r->s->sets ? r->m : 0;
+  size_t of_sets = sets ? width : 0;
+  used = place_layout(&to->l, base, used, r->width, r->guards);
+  EXPANSION_ARRAYS(PLACED)
   return used;
 }
 
@@ -41,41 +22,17 @@ static size_t place_continuation(Continuation *c, char *base, size_t used, int w
   return used;
 }
 
-static size_t place_instant(Instant *i, char *base, size_t used, const System *s) {
-  int atoms = s->rules.atoms, triggers = s->rules.triggers, clocks = s->rules.clocks;
-  int8_t **flags[] = {&i->side, &i->view, &i->now, &i->passing, &i->zero};
-  for (int k = 0; k < 5; k++) *flags[k] = LETTERS(atoms);
-  i->pending = LETTERS(triggers);
-  i->was = LETTERS(triggers);
-  i->unmet = LETTERS(triggers);
-  i->value = DOUBLES(atoms);
-  i->noise = DOUBLES(atoms);
-  i->residual = DOUBLES(atoms);
-  i->germ = DOUBLES(GERM * atoms);
-  i->trigger_x = DOUBLES(s->rules.keeps ? (size_t)triggers * s->n : 0);
-  i->arrived = DOUBLES(s->n);
-  i->tick = DOUBLES(2 * clocks);
-  i->count = place(base, &used, sizeof(int64_t), (size_t)clocks);
+static size_t place_instant(Instant *to, char *base, size_t used, const System *s) {
+  size_t atoms = s->rules.atoms, triggers = s->rules.triggers, clocks = s->rules.clocks;
+  INSTANT_ARRAYS(PLACED)
   return used;
 }
 
-/* Lemke's method on a block of all takes most of it. */
 static size_t place_decision(Run *r, char *base, size_t used) {
-  size_t w = r->width, square = w * w, orders = (ORDERS + 1) * w;
-  Decision *d = r->decision = place(base, &used, sizeof(Decision), 1);
-  if (!base) d = r->decision = 0;
-  Decision none = {0}, *to = d ? d : &none;
-  to->own = INTEGERS(w); to->order = INTEGERS(w); to->first = INTEGERS(w + 1); to->mark = INTEGERS(4 * w);
-  to->pivot = INTEGERS(8 * w + 8); to->proved = INTEGERS(w);
-  to->is_contact = LETTERS(w); to->is_idle = LETTERS(w); to->is_touched = LETTERS(w); to->is_known = LETTERS(w);
-  to->state = LETTERS(orders + w); to->block_state = LETTERS(4 * w); to->large_class = LETTERS(w);
-  to->base = LETTERS(w); to->span = LETTERS(w); to->began = LETTERS(w);
-  to->along = DOUBLES(orders); to->speed = DOUBLES(orders); to->axes = DOUBLES(3 * w);
-  to->matrix = DOUBLES(square); to->share = DOUBLES(square); to->bound = DOUBLES(orders); to->joint = DOUBLES(square); to->through = DOUBLES(square);
-  to->a = DOUBLES(orders); to->b = DOUBLES(orders); to->nu = DOUBLES(orders); to->floor = DOUBLES(orders);
-  to->turn = DOUBLES(w); to->sign = DOUBLES(w); to->old = DOUBLES(w); to->yard = DOUBLES(w); to->room = DOUBLES(w);
-  to->steep = DOUBLES(w); to->block = DOUBLES(6 * square + 8 * w); to->large = DOUBLES(w);
-  to->work = DOUBLES(90 * square + 90 * w + 64);
+  size_t w = r->width, orders = (ORDERS + 1) * w;
+  Decision none = {0}, *to = r->decision = place(base, &used, sizeof(Decision), 1);
+  if (!base) { to = &none; r->decision = 0; }
+  DECISION_ARRAYS(PLACED)
   for (int i = 0; i < SEVERAL; i++) {
     Motion *own = to->motion + i;
     own->state = LETTERS(w); own->order = LETTERS(w); own->before = LETTERS(w);
@@ -84,90 +41,38 @@ static size_t place_decision(Run *r, char *base, size_t used) {
   return used;
 }
 
-static size_t place_run(Run *r, char *base) {
-  const System *s = r->s;
-  int n = r->n, w = r->width, c = r->c, all = r->kept_rows, g = r->guards, stride = r->stride;
-  size_t used = 0, q = s->combined, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
-  used = place_layout(&r->now, base, used, w, g);
-  used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets ? r->m : 0);
-  used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets ? r->m : 0);
-  Continuation *each[] = {&r->chosen, &r->one, &r->first, &r->rest, &r->found};
-  for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, w, g);
-  used = place_decision(r, base, used);
-  r->letter = LETTERS(w);
-  r->start = LETTERS(w);
-  r->x = DOUBLES(n);
-  r->at_x = DOUBLES(n);
-  r->before = DOUBLES(n);
-  r->saved = DOUBLES(n);
-  int jumping = 0;
-  for (int i = 0; i < s->m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;
-  r->jumped_from = DOUBLES(n);
-  r->jump_work = DOUBLES(jumping ? (size_t)n * (2 * n + jumping + 1) : 0);
-  r->speed = DOUBLES(w);
-  r->at_root = DOUBLES(3 * n);
-  r->at_work = DOUBLES(n);
-  r->unknowns = DOUBLES(w);
-  r->tried = DOUBLES(w);
-  r->solutions = DOUBLES(SOLUTIONS * w);
-  r->tried_letter = LETTERS(2 * w);
-  r->drop = INTEGERS(g);
-  r->active = INTEGERS(w);
-  r->involved = INTEGERS(3 * w + 4 * all + q + 1);
-  r->p = DOUBLES(s->parameters + 2 * q * q);
-  r->equations.letter = LETTERS(w);
-  r->equations.row = INTEGERS(q);
-  r->equations.own = INTEGERS(q);
-  r->equations.mark = INTEGERS(3 * q + w);
-  r->equations.slope = DOUBLES(q * w);
-  r->equations.gradient = DOUBLES(q * n);
-  r->equations.work = DOUBLES(q ? 2 * q * q + 2 * q * w + w + q : 0);
-  r->series = DOUBLES(series_room(&s->series, stride));
-  r->rounding = DOUBLES(s->series.size * stride);
-  r->point = DOUBLES(pair_room(s->point.size, 1));
-  r->heights = DOUBLES(pair_room(s->surfaces.size, 1));
-  r->maps = DOUBLES(pair_room(s->maps.size, 1));
-  r->restitution = DOUBLES(pair_room(s->restitution.size, 1));
-  r->columns = DOUBLES(pair_room(s->columns.size, 1));
-  r->input = DOUBLES(n + 2 * w);
-  r->held = DOUBLES(w);
-  r->none = DOUBLES(w);
-  r->slope = DOUBLES(square);
-  r->vector = DOUBLES(3 * n + 2 * w);
-  r->sample = DOUBLES(3 * ((size_t)n + w + g));
-  r->work = DOUBLES(6 * square + 8 * w + rows + g);
-  r->gradient_row = DOUBLES(((size_t)all + q) * n + 2 * (all + q));
-  r->rates = DOUBLES(2 * all + 2 * c);
-  r->lam = DOUBLES(2 * w);
-  r->matrix = DOUBLES(square + 9 * w + all + 2 * c);
-  r->small = DOUBLES(4 * w + s->rules.atoms);
-  r->atom_work = DOUBLES(pair_room(s->atoms.size, 1));
-  r->choice_work = DOUBLES(pair_room(s->choices.size, 1));
-  used = place_instant(&r->instant, base, used, s);
-  r->pending = INTEGERS(6 * w + 2 * (all + q));
-  r->sparse = INTEGERS(square + 2 * w + 1);
-  r->direction = DOUBLES(w);
-  r->later = DOUBLES(w);
-  r->heights_of = DOUBLES(w);
-  r->aside = DOUBLES(2 * n);
-  r->moving = LETTERS(w);
-  r->turned = LETTERS(g);
-  r->rates_of_several = DOUBLES(SEVERAL * n);
-  size_t some = r->m < MOST_ENUMERATED ? r->m : MOST_ENUMERATED, sums = some * (some - (some > 0)) / 2;
-  r->layer_series = DOUBLES(s->slope_outputs ? (some * some + sums * sums) * stride : 0);
-  r->idle = LETTERS(s->m);
-  r->vanishes = LETTERS(s->point.size > s->columns.size ? s->point.size : s->columns.size);
-  r->of_defect = DOUBLES(g);
-  r->key = LETTERS(w + 8 * s->rules.discrete);
-  r->met_at = DOUBLES(g);
-  r->hidden = DOUBLES(g);
+static size_t place_equations(Run *to, char *base, size_t used) {
+  size_t w = to->width, q = to->s->combined;
+  Equations *h = &to->equations;
+  h->letter = LETTERS(w);
+  h->row = INTEGERS(q);
+  h->own = INTEGERS(q);
+  h->mark = INTEGERS(3 * q + w);
+  h->slope = DOUBLES(q * w);
+  h->gradient = DOUBLES(q * to->n);
+  h->work = DOUBLES(q ? 2 * q * q + 2 * q * w + w + q : 0);
+  return used;
+}
+
+static size_t place_run(Run *to, char *base) {
+  const System *s = to->s;
+  size_t n = to->n, m = to->m, w = to->width, c = to->c, all = to->kept_rows, rows = to->guards, stride = to->stride;
+  size_t used = 0, jumping = 0, q = s->combined, tried = m < MOST_ENUMERATED ? m : MOST_ENUMERATED, sums = tried * (tried - (tried > 0)) / 2;
+  size_t most = s->point.size > s->columns.size ? s->point.size : s->columns.size;
+  for (size_t i = 0; i < m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;
+  used = place_layout(&to->now, base, used, to->width, to->guards);
+  used = place_expansion(&to->e, base, used, to);
+  used = place_expansion(&to->trial, base, used, to);
+  Continuation *each[] = {&to->chosen, &to->one, &to->first, &to->rest, &to->found};
+  for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, to->width, to->guards);
+  used = place_decision(to, base, used);
+  used = place_instant(&to->instant, base, used, s);
+  used = place_equations(to, base, used);
+  RUN_ARRAYS(PLACED)
   return used;
 }
 
 /* Entry points --------------------------------------------------------------------------------- */
-
-int64_t system_size(void) { return sizeof(System); }
-int64_t output_size(void) { return sizeof(Output); }
 
 double polynomial_root(const double *c, int32_t n, double h) { return first_root(c, n, h); }
 double polynomial_crossing(const double *c, int32_t n, double h, int32_t direction) {
@@ -228,18 +133,25 @@ void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = time
 /* Letters from which elements with hysteresis go on, or none. */
 void run_remember(Run *r, const int8_t *letter) { r->remembered = letter; }
 
-static void set_parameters(Run *r, const double *p) {
+/* What follows from the parameters, in all programs. */
+static void prepare(Run *r) {
   const System *s = r->s;
   const Values *program[] = {&s->point, &s->surfaces, &s->maps, &s->restitution, &s->columns, &s->atoms, &s->choices};
   double *work[] = {r->point, r->heights, r->maps, r->restitution, r->columns, r->atom_work, r->choice_work};
-  memcpy(r->p, p, sizeof(double) * s->parameters);
-  forget_rows(r);
   series_prepare(&s->series, r->p, r->series);
   pairs_begin(s->series.size, r->stride, r->begun, r->series);
   for (int k = 0; k < 7; k++) {
     values_prepare(program[k], r->p, work[k]);
     pairs_begin(program[k]->size, 1, r->begun, work[k]);
   }
+  prepare_implicit(r);
+}
+
+static void set_parameters(Run *r, const double *p) {
+  memcpy(r->p, p, sizeof(double) * r->s->parameters);
+  for (int i = 0; i < r->m; i++) r->cell[i] = -1;
+  forget_rows(r);
+  prepare(r);
 }
 
 /* A run that has not begun. */

@@ -1,7 +1,5 @@
 /* Flows of known durations: nonsmooth/flow/fixed.py -------------------------------------------------------- */
 
-int64_t field_size(void) { return sizeof(Field); }
-
 /* Numbers that the work of a field needs. */
 int64_t field_work(const Field *f) {
   int64_t stride = f->order + 1;
@@ -18,6 +16,13 @@ double fixed_flow(const Field *f, const double *p, double *z, double duration, d
   return w.left;
 }
 
+/* Series of states and of what is watched at a state z, in rows (n + watched, order + 1). */
+void fixed_terms(const Field *f, const double *p, const double *z, double *terms, double *work) {
+  Flow w = flow_of(f, p, 0, 1, work);
+  expand_flow(&w, z);
+  memcpy(terms, w.states, sizeof(double) * (f->n + f->watched) * (f->order + 1));
+}
+
 /* Legs ----------------------------------------------------------------------------------------------------- */
 
 /* Legs and what happens at their ends. One array has, from the places given: parameters, and in rows for each leg
@@ -28,8 +33,6 @@ typedef struct {
   const Field *const *field;
   const Values *const *event;
 } Legs;
-
-int64_t legs_size(void) { return sizeof(Legs); }
 
 /* Move all states to the ends of their legs. The number of a leg that fails and what is left of it, or -1. */
 int64_t fly_legs(const Legs *l, double *a, double tol, int64_t most_steps, double *left) {
@@ -134,7 +137,7 @@ static void first_terms(const Flow *w, double *begin) {
 
 /* Values of what is watched at its extrema and at the ends of steps, no nearer than ``margin`` to both ends of the
  * flow, and at that distance from them. Rows of ``found``: number, time, value, second derivative (0 where it is
- * no extremum), state; their number, which stops at ``room``, is returned. First coefficients at the start go to ``begin``, if it is given. */
+ * no extremum), state; their number, which stops at ``room``, is returned. First coefficients at the start go to ``begin``. */
 static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin, double *found, int64_t room,
                           double *begin) {
   const Field *f = w->field;
@@ -142,7 +145,7 @@ static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin,
   double root[P + 2];
   for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
     double h = next_step(w, z, step), t = w->whole - w->left, slope;
-    if (step == 0 && begin) first_terms(w, begin);
+    if (step == 0) first_terms(w, begin);
     if (!(h > 0)) break;
     for (int j = 0; j < f->watched; j++) {
       const double *c = w->watched + j * stride;
@@ -165,14 +168,6 @@ static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin,
   return count;
 }
 
-/* The same of one flow: what is left of it. */
-double fixed_watch(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
-                   double margin, double *found, int64_t room, int64_t *count, double *work) {
-  Flow w = flow_of(f, p, duration, tol, work);
-  *count = watch_flow(&w, z, most_steps, margin, found, room, NULL);
-  return w.left;
-}
-
 /* Values of what is watched at a state. */
 static void watched_at(Flow *w, const double *z, double *values) {
   const Field *f = w->field;
@@ -183,7 +178,7 @@ static void watched_at(Flow *w, const double *z, double *values) {
   for (int j = 0; j < f->watched; j++) values[j] = w->rules[t->output[f->n + j]];
 }
 
-/* The same of many, with the margin ``ends`` times the duration: rows of all with the same width, their numbers in
+/* The same of many flows, with the margin ``ends`` times the duration: rows of all with the same width, their numbers in
  * ``counts``, first coefficients, and behind those of a leg values at its end. Those whose duration is not positive
  * have coefficients alone. The number of a flow
  * that fails, with what is left of it, or -1; -2 where there was not enough room. */
@@ -212,24 +207,20 @@ int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, cons
 
 /* Time until a watched function passes zero in a direction; a start nearer to zero than ``still`` is not counted.
  * -1 if it does not within the duration, -2 where the flow ends before. z is where the last step begins. */
-static double march_flow(Flow *w, double *z, int64_t most_steps, int32_t row, int32_t direction, double still) {
-  int order = w->field->order;
-  for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
-    double h = next_step(w, z, step);
-    if (!(h > 0)) break;
-    const double *c = w->watched + (int64_t)row * (order + 1);
-    int drop = 0;
-    while (step == 0 && drop < order && !(fabs(c[drop]) > still)) drop++;
-    double t = first_crossing(c + drop, order - drop, h, direction);
-    if (t >= 0 && w->whole - w->left + t > 0) { end_flow(w); return w->whole - w->left + t; }
-    make_step(w, h, z);
-  }
-  end_flow(w);
-  return w->left > 0 ? -2 : -1;
-}
-
 double fixed_march(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
                    int32_t row, int32_t direction, double still, double *work) {
   Flow w = flow_of(f, p, duration, tol, work);
-  return march_flow(&w, z, most_steps, row, direction, still);
+  int order = f->order;
+  for (int64_t step = 0; step < most_steps && w.left > 0; step++) {
+    double h = next_step(&w, z, step);
+    if (!(h > 0)) break;
+    const double *c = w.watched + (int64_t)row * (order + 1);
+    int drop = 0;
+    while (step == 0 && drop < order && !(fabs(c[drop]) > still)) drop++;
+    double t = first_crossing(c + drop, order - drop, h, direction);
+    if (t >= 0 && w.whole - w.left + t > 0) { end_flow(&w); return w.whole - w.left + t; }
+    make_step(&w, h, z);
+  }
+  end_flow(&w);
+  return w.left > 0 ? -2 : -1;
 }

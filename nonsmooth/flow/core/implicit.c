@@ -85,8 +85,11 @@ static int jacobian_at_stage(void *of, int stage, const double *x, double *jacob
   return 1;
 }
 
+/* What follows from the parameters. */
 static void prepare_implicit(Run *r) {
-  if (r->implicit && r->s->implicit) series_prepare(r->s->implicit, r->p, r->implicit->program);
+  if (!r->implicit || !r->s->implicit) return;
+  series_prepare(r->s->implicit, r->p, r->implicit->program);
+  pairs_begin(r->s->implicit->size, 1, r->begun, r->implicit->program);
 }
 
 /* Memory for implicit steps; 0 where there is none. */
@@ -105,13 +108,10 @@ static int begin_implicit(Run *r) {
   m->arena = calloc(1, place_implicit(m, r, 0));
   if (!m->arena) { free(m); return 0; }
   place_implicit(m, r, m->arena);
-  if (r->s->implicit) {
-    series_prepare(r->s->implicit, r->p, m->program);
-    pairs_begin(r->s->implicit->size, 1, r->begun, m->program);
-  }
+  r->implicit = m;
+  prepare_implicit(r);
   m->wait = HELD_STEPS;
   m->leg = -1;
-  r->implicit = m;
   return 1;
 }
 

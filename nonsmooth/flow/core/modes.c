@@ -51,15 +51,19 @@ static int is_bent(const Run *r, int kind, int index) {
   return kind != BRANCH_GUARD;
 }
 
-/* Number of a mode, with values of the discrete states (or none), as results show it. */
+/* Number of a mode, with values of the discrete states (or none) and cells of tables, as results show it. */
 static int32_t numbered(const Run *r, const int8_t *letter, const double *values) {
-  int count = r->s->rules.discrete;
-  if (!count) return mode_number(r->table, letter);
+  int count = r->s->rules.discrete, tables = r->s->tables;
+  if (!count && !tables) return mode_number(r->table, letter);
   memcpy(r->key, letter, r->width);
-  memset(r->key + r->width, 0, sizeof(double) * count);
-  for (int d = 0; values && d < count; d++) {
-    double value = values[d] + 0.0; /* not -0 */
-    memcpy(r->key + r->width + sizeof(double) * d, &value, sizeof(double));
+  int8_t *to = r->key + r->width;
+  for (int d = 0; d < count; d++, to += sizeof(double)) {
+    double value = values ? values[d] + 0.0 : 0; /* not -0 */
+    memcpy(to, &value, sizeof(double));
+  }
+  for (int i = 0; tables && i < r->m; i++) {
+    double value = r->cell[i];
+    if (has_law(r, i, TABLE_LAW)) { memcpy(to, &value, sizeof(double)); to += sizeof(double); }
   }
   return mode_number(r->table, r->key);
 }

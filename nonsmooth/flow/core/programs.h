@@ -37,57 +37,11 @@ typedef struct {
   List still, values, moving, later, late, early, loop, loop_late, before, after;
 } Series;
 
-/* Not inlined: the same code whoever calls, which no compiler replaces by other arithmetic. */
+/* Not inlined: the same code whoever calls, which no compiler replaces by other arithmetic. The cases are written from
+ * model/numbering.py. */
 OUTSIDE double operate(int op, double x, double y) {
   switch (op) {
-    case OP_assign: return x;
-    case OP_neg: return -x;
-    case OP_twice: return x + x;
-    case OP_sq: return x * x;
-    case OP_inv: return 1.0 / x;
-    case OP_sign: return x == x ? ns_sign(x) : NAN;
-    case OP_fabs: return fabs(x);
-    case OP_not: return !x;
-    case OP_floor: return floor(x);
-    case OP_ceil: return ceil(x);
-    case OP_erfinv: return ns_erfinv(x);
-    case OP_sqrt: return sqrt(x);
-    case OP_exp: return exp(x);
-    case OP_expm1: return expm1(x);
-    case OP_log: return log(x);
-    case OP_log1p: return log1p(x);
-    case OP_sin: return sin(x);
-    case OP_cos: return cos(x);
-    case OP_tan: return tan(x);
-    case OP_asin: return asin(x);
-    case OP_acos: return acos(x);
-    case OP_atan: return atan(x);
-    case OP_sinh: return sinh(x);
-    case OP_cosh: return cosh(x);
-    case OP_tanh: return tanh(x);
-    case OP_asinh: return asinh(x);
-    case OP_acosh: return acosh(x);
-    case OP_atanh: return atanh(x);
-    case OP_erf: return erf(x);
-    case OP_add: return x + y;
-    case OP_sub: return x - y;
-    case OP_mul: return x * y;
-    case OP_div: return x / y;
-    case OP_pow: case OP_constpow: return pow(x, y);
-    case OP_atan2: return atan2(x, y);
-    case OP_hypot: return hypot(x, y);
-    case OP_fmin: return fmin(x, y);
-    case OP_fmax: return fmax(x, y);
-    case OP_fmod: return fmod(x, y);
-    case OP_remainder: return remainder(x, y);
-    case OP_copysign: return copysign(x, y);
-    case OP_lt: return x < y;
-    case OP_le: return x <= y;
-    case OP_eq: return x == y;
-    case OP_ne: return x != y;
-    case OP_and: return x && y;
-    case OP_or: return x || y;
-    case OP_if_else_zero: return x ? y : 0;
+    OPERATIONS_OF(x, y)
   }
   return NAN;
 }

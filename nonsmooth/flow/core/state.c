@@ -23,9 +23,18 @@ typedef struct {
  * between are rows from ``lower`` on of what is kept: all functions, then these. With hysteresis h is that of the
  * multiplier +1, and the row ``lower`` that of -1. */
 typedef struct {
-  int32_t law, first, k, degree, lower, flags;
+  int32_t law, first, k, degree, lower, flags, shown, pad; /* shown: the number of the function in results */
   double width, power; /* of the layer; the smallest power of h in the field, or 0 */
 } Element;
+
+/* A table: ``count`` breakpoints of its function, and for each of the cells between them the values of ``size``
+ * parameters from ``first`` on. Each breakpoint's number among those that are shown, or -1. Of each limit the first and
+ * the last cell, and surfaces with the sides on which it holds, after their number. */
+typedef struct {
+  int32_t count, size, first, limits;
+  const double *level, *value;
+  const int32_t *shown, *limit;
+} Cells;
 
 /* Flags: the multiplier makes no difference on h = 0; its unknown is a product with a factor. */
 enum { CONTINUOUS = 1, SCALED = 2 };
@@ -43,6 +52,7 @@ typedef struct {
   Values columns;     /* entries of the field's derivatives by the unknowns */
   Entries slope, layer_gradient, height_gradient, stop_gradient, factor_gradient, surface_gradient, atom_gradient, column;
   const Element *element; /* of each function: of m surfaces and sets, c contacts */
+  const Cells *cells; /* of each function, where it is a table's */
   const int32_t *carries, *component; /* (m, c): contacts whose reaction scales a surface's multiplier */
   /* (m + c, m + c): output of the series or -1; whether it moves; whether the matrix is symmetric */
   const int32_t *slope_output, *slope_moves, *slope_symmetric;
@@ -52,7 +62,7 @@ typedef struct {
   const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
   /* sets: of codimension two and more; kept_rows: see Element; combined: conditions whose rows are sums (hidden.c) */
-  int32_t sets, kept_rows, impact_law, joints, combined;
+  int32_t sets, kept_rows, impact_law, joints, tables, combined;
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   Rules rules;
   Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
@@ -62,30 +72,49 @@ typedef struct {
 
 enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
 
+/* Arrays of a structure: one list declares them, with the numbers of their entries, and places them (entry.c). */
+#define DECLARED(type, name, count) type *name;
+
 /* What happens at one time (events.c). Of atoms: sides, as the jumps have made them, as evaluated now; those that are
  * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before,
  * whether true at the start and not met since. */
 typedef struct {
   int32_t running, first, settled, unsettled, last, tied, is_last;
-  int64_t jumps, counted, sampled, *count;
-  int8_t *side, *view, *now, *passing, *zero, *pending, *was, *unmet;
-  double *value, *noise, *residual, *germ, *trigger_x, *arrived, *tick; /* two numbers each; germ: first coefficients on arrival */
+  int64_t jumps, counted, sampled;
+#define INSTANT_ARRAYS(OF) \
+  OF(int8_t, side, atoms) OF(int8_t, view, atoms) OF(int8_t, now, atoms) OF(int8_t, passing, atoms) \
+  OF(int8_t, zero, atoms) OF(int8_t, pending, triggers) OF(int8_t, was, triggers) OF(int8_t, unmet, triggers) \
+  OF(double, value, atoms) OF(double, noise, atoms) OF(double, residual, atoms) \
+  OF(double, germ, GERM * atoms) /* first coefficients on arrival */ \
+  OF(double, trigger_x, s->rules.keeps ? triggers * s->n : 0) OF(double, arrived, s->n) \
+  OF(double, tick, 2 * clocks) OF(int64_t, count, clocks) /* ticks are two numbers each */
+  INSTANT_ARRAYS(DECLARED)
 } Instant;
 
 /* The guards of a mode, and what slides in it. */
 typedef struct {
-  int8_t *letter; /* +1, -1, 0 for each surface; +1, 0 for open and closed contacts; see below */
   int32_t rows, atoms, slides, mode, branches, is_free; /* atoms: first row of stops and resets; free: no letter is 0 */
-  int32_t *sliding, *group, *kind, *index, *side, *bent, bent_count; /* bent: guards that a step is checked with */
+  int32_t bent_count;
+#define LAYOUT_ARRAYS(OF) /* letter: +1, -1, 0 for each surface; +1, 0 for open and closed contacts; see below */ \
+  OF(int8_t, letter, width) OF(int32_t, sliding, width) OF(int32_t, group, width) \
+  OF(int32_t, kind, guards) OF(int32_t, index, guards) OF(int32_t, side, guards) \
+  OF(int32_t, bent, guards) /* guards that a step is checked with */
+  LAYOUT_ARRAYS(DECLARED)
 } Layout;
 
 typedef struct {
   Layout l;
   int finite, scaled, steepened; /* whether scale and steep are known */
   int64_t stamp; /* of the values of the program ``point`` */
-  double *states, *guards, *series, *allowed, *of_guards, *scale, *steep, *inverse;
-  /* of sets: multipliers, h in units of |h|, its root, distances when leaving, slopes then, |h| at the start */
-  double *lambda, *apart, *root, *rates, *slopes, *radius, *per_radius;
+#define EXPANSION_ARRAYS(OF) \
+  OF(double, states, n * stride) OF(double, guards, rows * stride) OF(double, series, width * stride) \
+  OF(double, allowed, n) OF(double, of_guards, rows) OF(double, scale, rows) OF(double, steep, rows) \
+  OF(double, inverse, width * width) \
+  /* of sets: multipliers, h in units of |h|, its root, distances when leaving, slopes then, |h| at the start */ \
+  OF(double, lambda, of_sets * stride) OF(double, apart, of_sets * stride) OF(double, root, sets * stride) \
+  OF(double, rates, sets * (stride + 1)) OF(double, slopes, of_sets * width) OF(double, radius, sets) \
+  OF(double, per_radius, sets)
+  EXPANSION_ARRAYS(DECLARED)
   const double *end; /* the state at the end of an implicit step, or none */
 } Expansion;
 
@@ -102,13 +131,21 @@ typedef struct {
   int32_t count, blocks, motions, branches, unstable, last; /* last: order that growth decides instead of coefficients */
   int32_t is_imposed; /* whether states are given: those of a mode */
   const int8_t *letter;
-  /* Of vectors: rows of each, as in Block; the order at which their law is posed; directions u and speeds s of what
-   * leaves, by orders; axes. ``base`` has letters in which they are held. */
-  int8_t *base, *span, *began;
-  double *along, *speed, *axes;
-  int32_t *own, *order, *first, *mark, *pivot, *proved;
-  int8_t *is_contact, *is_idle, *is_touched, *is_known, *state, *block_state, *large_class;
-  double *matrix, *share, *bound, *joint, *through, *a, *b, *nu, *floor, *turn, *sign, *old, *yard, *room, *steep, *block, *large, *work;
+#define DECISION_ARRAYS(OF) /* Lemke's method on a block of all takes most of them */ \
+  OF(int32_t, own, w) OF(int32_t, order, w) OF(int32_t, first, w + 1) OF(int32_t, mark, 4 * w) \
+  OF(int32_t, pivot, 8 * w + 8) OF(int32_t, proved, w) \
+  OF(int8_t, is_contact, w) OF(int8_t, is_idle, w) OF(int8_t, is_touched, w) OF(int8_t, is_known, w) \
+  OF(int8_t, state, orders + w) OF(int8_t, block_state, 4 * w) OF(int8_t, large_class, w) \
+  /* of vectors: letters in which they are held, rows of each, as in Block; the order at which their law is posed; \
+   * directions u and speeds s of what leaves, by orders; axes */ \
+  OF(int8_t, base, w) OF(int8_t, span, w) OF(int8_t, began, w) \
+  OF(double, along, orders) OF(double, speed, orders) OF(double, axes, 3 * w) \
+  OF(double, matrix, w * w) OF(double, share, w * w) OF(double, bound, orders) OF(double, joint, w * w) \
+  OF(double, through, w * w) OF(double, a, orders) OF(double, b, orders) OF(double, nu, orders) \
+  OF(double, floor, orders) OF(double, turn, w) OF(double, sign, w) OF(double, old, w) OF(double, yard, w) \
+  OF(double, room, w) OF(double, steep, w) OF(double, block, 6 * w * w + 8 * w) OF(double, large, w) \
+  OF(double, work, 90 * w * w + 90 * w + 64)
+  DECISION_ARRAYS(DECLARED)
   double most, field, rate;
   Motion motion[SEVERAL];
 } Decision;
@@ -140,53 +177,66 @@ typedef struct {
   Options o;
   const System *s;
   Table *table;
-  double *p;
   int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
   /* The time is t + t_low: that of an event is no number of its own where times are large. */
   Pair begun;
-  double t, t_low, since, limit, at_t, *x, *at_x, *unknowns;
+  double t, t_low, since, limit, at_t;
   const int8_t *remembered; /* letters from which elements with hysteresis go on, or none */
-  int8_t *letter, *start, *tried_letter; /* present ones, and those that a choice is made from */
-  double *tried, *solutions, *of_defect; /* unknowns that enter nonlinearly; errors of guards */
   Layout now; /* of the present mode */
   Met met;
   Instant instant;
-  int32_t mode, status, reason, where, due_impact, falls, repelling, folded, *drop;
+  int32_t mode, status, reason, where, due_impact, falls, repelling, folded, passed; /* passed: the breakpoint */
   int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history;
   int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
   Happened past[HISTORY];
   double size, time_size, length, shortened, held_length, hold; /* hold: the step's end before zeros of a guard that are not told apart */
-  int32_t over, length_mode, active_count, several_count, several[SEVERAL], *active;
+  int32_t over, length_mode, active_count, several_count, several[SEVERAL];
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
   Decision *decision;
   int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
-  int32_t turned_mode; /* the mode of start_mode, whose guards of stability begin with these signs */
-  int8_t *turned;
-  double *layer_series, *rates_of_several;
+  int32_t turned_mode; /* the mode of start_mode, whose guards of stability begin with the signs ``turned`` */
   Output out;
   int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
   const double *times, *read_at; /* times of samples in the row; times at which any run is read */
   int64_t read_count;
   double *sample_t, *sample_x;
-  /* programs' values, inputs, error scales */
-  double *series, *rounding, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope;
-  double *vector, *sample;
-  double *atom_work, *choice_work;
-  double *met_at, *hidden; /* root of each guard in the step, or -1; how long before it rounding may hide its zero */
-  double t_error; /* the largest of those of events that move a state by more than the tolerance */
-  double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
-  int32_t *pending, *sparse, *involved;
-  /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
-  double *direction, *later, *aside, *heights_of;
-  double *saved, *speed, *at_root; /* a state to return to; of each surface at its last zero */
-  double *jumped_from, *jump_work; /* the state before the last jump of complementarity conditions */
-  int8_t *moving, *key, *idle, *vanishes; /* sets without friction; nodes of a program that are zero */
   Equations equations;
+  double t_error; /* the largest of what is ``hidden`` of events that move a state by more than the tolerance */
   int32_t shown, has_roots, held_steps, wants_program; /* held_steps: steps in a row that a decay rate held */
   Implicit *implicit;
   const Expansion *expansion;
   void *arena;
+#define RUN_ARRAYS(OF) \
+  OF(int8_t, letter, w) OF(int8_t, start, w) /* present letters, and those that a choice is made from */ \
+  OF(double, x, n) OF(double, at_x, n) OF(double, before, n) OF(double, saved, n) /* saved: to return to */ \
+  OF(double, jumped_from, n) /* the state before the last jump of complementarity conditions */ \
+  OF(double, jump_work, jumping ? n * (2 * n + jumping + 1) : 0) \
+  OF(double, speed, w) OF(double, at_root, 3 * n) OF(double, at_work, n) /* speed: of each at its last zero */ \
+  OF(double, unknowns, w) OF(double, tried, w) OF(double, solutions, SOLUTIONS * w) /* that enter nonlinearly */ \
+  OF(int8_t, tried_letter, 2 * w) OF(int32_t, drop, rows) OF(int32_t, active, w) \
+  OF(int32_t, involved, 3 * w + 4 * all + q + 1) \
+  /* programs' values, inputs, error scales */ \
+  OF(double, p, s->parameters + 2 * q * q) OF(double, series, series_room(&s->series, stride)) \
+  OF(double, rounding, s->series.size * stride) OF(double, point, pair_room(s->point.size, 1)) \
+  OF(double, heights, pair_room(s->surfaces.size, 1)) OF(double, maps, pair_room(s->maps.size, 1)) \
+  OF(double, restitution, pair_room(s->restitution.size, 1)) OF(double, columns, pair_room(s->columns.size, 1)) \
+  OF(double, input, n + 2 * w) OF(double, held, w) OF(double, none, w) OF(double, slope, w * w) \
+  OF(double, vector, 3 * n + 2 * w) OF(double, sample, 3 * (n + w + rows)) \
+  OF(double, work, 6 * w * w + 8 * w + (rows + w) * stride + rows) OF(double, gradient_row, (all + q) * n + 2 * (all + q)) \
+  OF(double, rates, 2 * all + 2 * c) OF(double, lam, 2 * w) OF(double, matrix, w * w + 9 * w + all + 2 * c) \
+  OF(double, small, 4 * w + s->rules.atoms) OF(double, atom_work, pair_room(s->atoms.size, 1)) \
+  OF(double, choice_work, pair_room(s->choices.size, 1)) \
+  OF(int32_t, pending, 6 * w + 2 * (all + q)) OF(int32_t, sparse, w * w + 2 * w + 1) \
+  /* of sets: multipliers, room, whether they move */ \
+  OF(double, direction, w) OF(double, later, w) OF(double, heights_of, w) OF(double, aside, 2 * n) \
+  OF(int8_t, moving, w) OF(int8_t, turned, rows) OF(double, rates_of_several, SEVERAL * n) \
+  OF(double, layer_series, s->slope_outputs ? (tried * tried + sums * sums) * stride : 0) \
+  OF(int8_t, idle, m) OF(int8_t, vanishes, most) /* sets without friction; nodes of a program that are zero */ \
+  OF(double, of_defect, rows) OF(int8_t, key, w + 8 * (s->rules.discrete + s->tables)) /* of_defect: errors of guards */ \
+  OF(int32_t, cell, w) OF(double, levels, all + 1) /* of tables; values of functions onto which a state is put */ \
+  OF(double, met_at, rows) OF(double, hidden, rows) /* root of each guard in the step, or -1; what rounding hides of it */
+  RUN_ARRAYS(DECLARED)
 } Run;
 
 /* What a state has at least where rounding is weighed: of one, and of the time. */
@@ -221,6 +271,7 @@ static void direction_bounds(const Run *r, const Expansion *e, double *last, dou
 static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h);
 static void measure_limits(Run *r, Expansion *e);
 static void keep_carried(const Run *r, const int8_t *letter, double *unknowns);
+static void prepare_implicit(Run *r);
 
 static void finish(Run *r, int status, int reason, int where) {
   if (r->status == RUNNING) { r->status = status; r->reason = reason; r->where = where; }

@@ -124,7 +124,8 @@ static double with_gaps(int order, double h, double last, double before, double 
   return h;
 }
 
-static double step_size(const Run *r, const Expansion *e) {
+/* The step that the states' series allow. */
+static double state_step(const Run *r, const Expansion *e) {
   int order = r->order, stride = r->stride;
   double last = 0, before = 0, third = 0, fourth = 0, held = INFINITY;
   for (int i = 0; i < r->s->dimension; i++) {
@@ -138,9 +139,14 @@ static double step_size(const Run *r, const Expansion *e) {
   }
   if (r->s->sets) direction_bounds(r, e, &last, &before);
   double h = smaller(bound_at(last, order), bound_at(before, order - 1));
-  h = reach_of_guards(r, e, smaller(held, with_gaps(order, h, last, before, third, fourth)));
+  return smaller(held, with_gaps(order, h, last, before, third, fourth));
+}
+
+static double step_size(const Run *r, const Expansion *e) {
+  int order = r->order;
+  double h = reach_of_guards(r, e, state_step(r, e));
   for (int j = 0; j < e->l.rows; j++) {
-    const double *g = e->guards + (int64_t)j * stride;
+    const double *g = e->guards + (int64_t)j * r->stride;
     double a = e->of_guards[j] + r->o.rtol * fabs(g[0]);
     if (!(a > 0) || a > RESOLVED * fabs(g[0])) h = resolve(g, order, h);
   }
@@ -449,6 +455,12 @@ static void note_hidden(Run *r, const Expansion *e, int row) {
     if (r->hidden[row] * fabs(e->states[(int64_t)i * r->stride + 1]) > e->allowed[i] / SAFETY) r->t_error = r->hidden[row];
 }
 
+/* Priority of a guard among simultaneous ones; tables pass with any other, and come last. */
+static int rank_of(const Run *r, const Expansion *e, int row) {
+  int kind = e->l.kind[row], is_table = kind == SURFACE_GUARD && has_law(r, e->l.index[row], TABLE_LAW);
+  return PRIORITY[kind] + (is_table ? KINDS : 0);
+}
+
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->met_at;
@@ -479,7 +491,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
       if (atom < 0 || time[j] < time[atom]) atom = j;
       continue;
     }
-    int rank = PRIORITY[e->l.kind[j]], best_rank = best < 0 ? rank + 1 : PRIORITY[e->l.kind[best]];
+    int rank = rank_of(r, e, j), best_rank = best < 0 ? rank + 1 : rank_of(r, e, best);
     if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
   }
   if (r->repelling) turn_exits(r, e);

@@ -1,32 +1,45 @@
 /* Columns of derivatives along legs of known duration: nonsmooth/flow/variation.py.
  *
- * A leg is one mode, in which nothing is decided. Columns are derivatives of the states by the start and by
+ * A leg is one mode, in which nothing is decided (legs.c). Columns are derivatives of the states by the start and by
  * parameters. The program of a step gives series of its outputs' derivatives too, once for all columns; multipliers
  * of sliding follow by the inverse that the step has. Sets off which the mode is carry h along, so that close to them
  * its direction has all its digits. Neighbours of a state on a set reach the set at once: B M^-1 h is added to their
  * columns.
  */
 
-/* A leg: columns, each a row of n derivatives of the state and one of its parameters. */
+/* A leg: columns, each a row of n derivatives of the state and a direction of parameters: none (-1), one of them, or the
+ * one ``dp`` (ALONG_DP). The first ``starts`` columns have one error scale. At ``samples`` times since its start columns are read (n for each, time after time), or rows are
+ * added (adjoint.c). Its steps are recorded: length, time since the start, stages, state, unknowns; of each stage of an
+ * implicit one once more the last two. */
 typedef struct {
-  int32_t columns, hit, kind, index, side; /* hit: the first function of the set that is reached at its end, or -1; then the guard that ends it */
+  int32_t columns, starts, hit, kind, index, side, status, pad; /* hit: the first function of the set that is reached at its end, or -1; then the guard that ends it */
   double duration, tol, left; /* left: of the duration, where it is stuck */
-  int64_t most_steps;
+  int64_t most_steps, samples, step_count, step_room;
   const double *p, *dp;
+  const int32_t *direction;
   const int8_t *letter;
-  double *x, *y;
+  const double *x;
+  double *end, *y;
   double *start_rate, *end_rate, *gradient; /* gradient: of the event's function by states, then by parameters */
+  const double *sample_t;
+  double *at_samples, *steps;
+  double *row, *by_parameters; /* a row at the end, then at the start; what it gives by parameters */
 } Leg;
 
 /* Columns on their way: h of sets (m each), series of states and of unknowns (h is carried there). Of the column that
  * is derived: series by what the program is derived by, with as many terms as are not zero; sums of an order. */
 typedef struct {
-  double *h, *states, *series, *sum, *dp;
+  double *h, *states, *series, *sum, *push; /* push: what parameters add to the sums of all orders */
   const double **of;
-  int32_t *terms, *bend, *active, count; /* bend: terms of the program's derivatives; active: those that count */
+  int32_t *terms;
   int8_t *late; /* whether that is an unknown of sliding, or the direction in which a set is left */
 } Columns;
 
+/* Entries of the program's derivatives: where those by each of its inputs begin, terms of their series, at most so many;
+ * the ones by what moves that count in a mode. */
+typedef struct { int32_t *first, *terms, *most, *active, count; } Slopes;
+
+enum { ALONG_DP = -2 };
 enum { LEG_DONE, LEG_STUCK, LEG_NOT_UNIQUE };
 
 static const double *derivative_row(const Run *r, int q) {
@@ -40,44 +53,93 @@ static int is_wanted(const Run *r, const Expansion *e, int row, int at_point) {
   return letter == 0 || letter == LEAVING || letter == LEFT_BEHIND;
 }
 
-/* What the program's derivatives are multiplied with, of a column, and those that count. */
-static void aim_column(const Run *r, const Expansion *e, const Expansion *d, const double *dp, Columns *c, int at_point) {
-  const Entries *g = &r->s->derivatives;
-  int size = moving_size(r), stride = r->stride;
+static size_t place_slopes(const Run *r, Slopes *g, char *base, size_t used) {
+  size_t entries = r->s->derivatives.count;
+  g->first = INTEGERS(moving_size(r) + r->s->parameters + 1);
+  g->terms = INTEGERS(entries);
+  g->most = INTEGERS(entries);
+  g->active = INTEGERS(entries);
+  return used;
+}
+
+static void begin_slopes(const Run *r, Slopes *g) {
+  const Entries *e = &r->s->derivatives;
+  const Series *t = &r->s->series;
+  int inputs = moving_size(r) + r->s->parameters;
+  for (int j = 0, q = 0; j <= inputs; j++) {
+    while (q < e->count && e->column[q] < j) q++;
+    g->first[j] = q;
+  }
+  int8_t *moves = calloc(t->size, 1);
+  for (int l = 0; moves && l < t->later.count; l++) {
+    const Rule *q = t->rule + t->later.rule[l];
+    int is_pair = q->later == RULE_pair || q->later == RULE_turns; /* which write row b too */
+    moves[q->w / r->stride] = 1;
+    if (is_pair) moves[q->b / r->stride] = 1;
+  }
+  for (int l = 0; moves && l < t->inputs; l++) moves[t->input[l] / r->stride] = 1;
+  for (int q = 0; q < e->count; q++)
+    g->most[q] = moves && !moves[(derivative_row(r, q) - r->series) / r->stride] ? 1 : r->stride;
+  free(moves);
+}
+
+/* Those of an expansion. */
+static void measure_slopes(const Run *r, const Expansion *e, Slopes *g, int at_point) {
+  int size = moving_size(r);
+  g->count = 0;
   for (int j = 0; j < size + r->s->parameters; j++) {
-    int i = j < r->n || j >= size ? -1 : unknown_at(r, j), letter = i < 0 ? 1 : e->l.letter[i];
+    int i = j < r->n || j >= size ? -1 : unknown_at(r, j), counts = j < r->n || j >= size;
+    counts |= i >= 0 && (is_moving(r, i) || e->l.letter[i] == 0);
+    for (int q = g->first[j]; q < g->first[j + 1]; q++) {
+      g->terms[q] = 0;
+      if (!counts || !is_wanted(r, e, r->s->derivatives.row[q], at_point)) continue;
+      g->terms[q] = terms_of(derivative_row(r, q), g->most[q]);
+      if (g->terms[q] && j < size) g->active[g->count++] = q;
+    }
+  }
+}
+
+/* What the program's derivatives are multiplied with, of a column. */
+static void aim_column(const Run *r, const Expansion *e, const Expansion *d, const Leg *l, int column, const Slopes *g, const Columns *c) {
+  int size = moving_size(r), stride = r->stride;
+  memset(c->push, 0, sizeof(double) * (r->n + 3 * r->width) * stride);
+  int own = l->direction[column], first = own < 0 ? 0 : own, last = own == ALONG_DP ? r->s->parameters : own + 1;
+  for (int j = first; j < last; j++)
+    for (int q = g->first[size + j]; q < g->first[size + j + 1]; q++) {
+      double *to = c->push + (int64_t)r->s->derivatives.row[q] * stride;
+      const double *slope = derivative_row(r, q);
+      for (int k = 0; k < g->terms[q]; k++) to[k] += slope[k] * (own < 0 ? l->dp[j] : 1);
+    }
+  for (int j = 0; j < size; j++) {
+    int i = j < r->n ? -1 : unknown_at(r, j), letter = i < 0 ? 1 : e->l.letter[i];
     c->of[j] = 0;
     c->late[j] = letter == 0 || letter == LEAVING;
-    c->terms[j] = j >= size && dp[j - size] != 0;
+    c->terms[j] = 0;
     if (j < r->n) c->of[j] = d->states + (int64_t)j * stride;
-    else if (j >= size) c->of[j] = c->terms[j] ? dp + j - size : 0;
     else if (i >= 0 && is_moving(r, i)) c->of[j] = d->lambda + (int64_t)i * stride;
     else if (letter == 0) c->of[j] = d->series + (int64_t)i * stride;
   }
-  c->count = 0;
-  for (int q = 0; q < g->count; q++)
-    if (c->of[g->column[q]] && c->bend[q] && is_wanted(r, e, g->row[q], at_point)) c->active[c->count++] = q;
 }
 
 /* Sums of order k: derivatives of field, layer, surfaces and gaps, factors along the column. */
-static void derive(const Run *r, const Columns *c, int k) {
-  const Entries *g = &r->s->derivatives;
+static void derive(const Run *r, const Slopes *g, const Columns *c, int k) {
+  const Entries *at = &r->s->derivatives;
   int size = moving_size(r);
-  memset(c->sum, 0, sizeof(double) * (r->n + 3 * r->width));
+  for (int i = 0; i < r->n + 3 * r->width; i++) c->sum[i] = c->push[(int64_t)i * r->stride + k];
   for (int j = 0; j < size; j++) if (c->of[j] && c->of[j][k] != 0) c->terms[j] = k + 1;
-  for (int a = 0; a < c->count; a++) {
-    int q = c->active[a], j = g->column[q];
-    c->sum[g->row[q]] += product_of(c->of[j], c->terms[j], derivative_row(r, q), c->bend[q], k);
+  for (int a = 0; a < g->count; a++) {
+    int q = g->active[a], j = at->column[q];
+    c->sum[at->row[q]] += product_of(c->of[j], c->terms[j], derivative_row(r, q), g->terms[q], k);
   }
 }
 
 /* Add what coefficients k of unknowns do that were zero. */
-static void derive_late(const Run *r, const Columns *c, int k) {
-  const Entries *g = &r->s->derivatives;
-  for (int a = 0; a < c->count; a++) {
-    int q = c->active[a], j = g->column[q];
+static void derive_late(const Run *r, const Slopes *g, const Columns *c, int k) {
+  const Entries *at = &r->s->derivatives;
+  for (int a = 0; a < g->count; a++) {
+    int q = g->active[a], j = at->column[q];
     if (!c->late[j] || c->of[j][k] == 0) continue;
-    c->sum[g->row[q]] += derivative_row(r, q)[0] * c->of[j][k];
+    c->sum[at->row[q]] += derivative_row(r, q)[0] * c->of[j][k];
     c->terms[j] = k + 1;
   }
 }
@@ -155,7 +217,7 @@ static void next_terms(const Run *r, const Expansion *e, Expansion *d, const Col
 }
 
 /* Coefficients of a column to an order, from the first of states and of h; sums of the last order. */
-static void column_series(Run *r, const Expansion *e, Expansion *d, const double *dp, Columns *c, int order) {
+static void column_series(Run *r, const Expansion *e, Expansion *d, const Leg *l, int column, const Slopes *g, Columns *c, int order) {
   int leaving = 0, stride = r->stride;
   EACH_SET(r, f) {
     if (e->l.letter[f] != LEAVING) continue;
@@ -166,13 +228,13 @@ static void column_series(Run *r, const Expansion *e, Expansion *d, const double
       change[0] += e->lambda[(int64_t)i * stride] * d->series[(int64_t)i * stride];
   }
   if (r->s->sets) memset(d->lambda, 0, sizeof(double) * r->m * stride);
-  aim_column(r, e, d, dp, c, order == 0);
+  aim_column(r, e, d, l, column, g, c);
   for (int k = 0; k <= order; k++) {
     EACH_SET(r, f)
       if (e->l.letter[f] == LEFT_BEHIND) turn_direction(r, e, d, f, k);
-    derive(r, c, k);
+    derive(r, g, c, k);
     if (leaving) turn_leaving(r, e, d, c, k); else turn_sliding(r, e, d, c, k);
-    if (leaving || e->l.slides) derive_late(r, c, k);
+    if (leaving || e->l.slides) derive_late(r, g, c, k);
     if (k < r->order) next_terms(r, e, d, c, k);
   }
 }
@@ -190,25 +252,27 @@ static Expansion column_of(Run *r, const Columns *c, int k, const double *y) {
 }
 
 /* Derivatives of h of the sets at the start, and columns from which what leads off sets is taken. */
-static void land(Run *r, const Leg *l, Columns *c) {
+static void land(Run *r, const Leg *l, Slopes *g, Columns *c) {
   const Expansion *e = &r->e;
-  const Entries *g = &r->s->derivatives;
+  const Entries *at = &r->s->derivatives;
   int n = r->n, slides = e->l.slides;
-  for (int k = 0; k < l->columns && r->s->sets; k++) {
+  if (!r->s->sets) return;
+  measure_slopes(r, e, g, 1);
+  for (int k = 0; k < l->columns; k++) {
     double *y = l->y + k * n, *h = c->h + k * r->m;
     memset(h, 0, sizeof(double) * r->m);
     Expansion d = column_of(r, c, k, y);
     memset(d.lambda, 0, sizeof(double) * r->m * r->stride);
-    aim_column(r, e, &d, l->dp + k * r->s->parameters, c, 1);
-    derive(r, c, 0);
+    aim_column(r, e, &d, l, k, g, c);
+    derive(r, g, c, 0);
     for (int i = 0; i < r->m; i++) if (set_of(r, i) >= 0) h[i] = c->sum[n + r->width + i];
     for (int i = 0; i < slides; i++)
       for (int j = 0; j < slides; j++)
         if (set_of(r, e->l.sliding[j]) >= 0)
           d.series[(int64_t)e->l.sliding[i] * r->stride] -= e->inverse[i * slides + j] * h[e->l.sliding[j]];
-    for (int a = 0; a < c->count; a++) {
-      int q = c->active[a], j = g->column[q];
-      if (c->late[j] && g->row[q] < n) y[g->row[q]] += derivative_row(r, q)[0] * c->of[j][0];
+    for (int a = 0; a < g->count; a++) {
+      int q = g->active[a], j = at->column[q];
+      if (c->late[j] && at->row[q] < n) y[at->row[q]] += derivative_row(r, q)[0] * c->of[j][0];
     }
     for (int i = 0; i < r->m; i++) if (e->l.letter[i] == 0) h[i] = 0;
   }
@@ -219,11 +283,12 @@ static void land(Run *r, const Leg *l, Columns *c) {
 static double column_step(const Run *r, const Leg *l, const Columns *c, int first, int count) {
   const Entries *g = &r->s->derivatives;
   int n = r->n, w = r->width, size = moving_size(r), order = r->order, stride = r->stride;
-  double most = 0, rate = 0, before = 0, last = 0, h = INFINITY;
+  double most = 0, rate = 0, second = 0, before = 0, last = 0, h = INFINITY;
   for (int64_t i = (int64_t)first * n; i < (int64_t)(first + count) * n; i++) {
     const double *own = c->states + i * stride;
     most = larger(fabs(own[0]), most);
     rate = larger(fabs(own[1]), rate);
+    second = larger(fabs(own[2]), second);
     before = larger(fabs(own[order - 1]), before);
     last = larger(fabs(own[order]), last);
   }
@@ -234,178 +299,12 @@ static double column_step(const Run *r, const Leg *l, const Columns *c, int firs
     for (int64_t k = first; k < first + count; k++) rate = larger(push * fabs(c->series[(k * w + i) * stride]), rate);
   }
   double allowed = l->tol * larger(most, rate * l->duration);
+  if (allowed == 0) { /* nothing but higher terms */
+    order -= 2;
+    allowed = l->tol * second;
+  }
+  if (allowed == 0) return h;
   if (last > 0) h = pow(allowed / last, 1.0 / order);
   if (before > 0) h = smaller(pow(allowed / before, 1.0 / (order - 1)), h);
   return h;
-}
-
-/* The derivative of the event's function by a column whose first terms are known. */
-static double event_slope(const Run *r, const Leg *l, const Expansion *d, const Columns *c) {
-  const Expansion *e = &r->e;
-  int n = r->n, w = r->width, stride = r->stride, own = l->index;
-  double sum = 0;
-  if (l->hit >= 0) {
-    for (int i = l->hit; i < l->hit + size_of(r, l->hit); i++) sum += e->lambda[(int64_t)i * stride] * c->sum[n + w + i];
-    return sum;
-  }
-  const double *unknown = d->series + (int64_t)own * stride;
-  double factor = c->sum[n + 2 * w + own];
-  if (l->kind == RELEASE_GUARD) return unknown[0];
-  if (l->kind == EXIT_GUARD && is_idle(r, e->l.letter, own)) return -l->side * c->sum[n + own];
-  if (l->kind == EXIT_GUARD)
-    return turn_of(r, own, row_of(r, n + 2 * w + own), r->order + 1) * (factor - l->side * unknown[0]);
-  for (int i = 0; i < size_of(r, own); i++)
-    sum -= 2 * e->series[(int64_t)(own + i) * stride] * unknown[(int64_t)i * stride];
-  return sum + 2 * factor * row_of(r, n + 2 * w + own)[0];
-}
-
-/* The gradient of the event's function by states and parameters. */
-static void event_gradient(Run *r, const Leg *l, Columns *c) {
-  const Expansion *e = &r->e;
-  int n = r->n, q = r->s->parameters;
-  memset(c->h, 0, sizeof(double) * r->m);
-  for (int k = 0; k < n + q; k++) {
-    for (int i = 0; i < q; i++) c->dp[i] = i == k - n;
-    Expansion d = column_of(r, c, 0, 0);
-    if (k < n) d.states[(int64_t)k * r->stride] = 1;
-    if (r->s->sets) { /* h that is carried */
-      memset(d.lambda, 0, sizeof(double) * r->m * r->stride);
-      aim_column(r, e, &d, c->dp, c, 1);
-      derive(r, c, 0);
-      for (int i = 0; i < r->m; i++)
-        if (e->l.letter[i] == LEFT_BEHIND) d.series[(int64_t)i * r->stride] = c->sum[n + r->width + i];
-    }
-    column_series(r, e, &d, c->dp, c, 0);
-    l->gradient[k] = event_slope(r, l, &d, c);
-  }
-}
-
-/* The mode of a leg at its start: sets off which it is carry h. 0 where its unknowns are not unique. */
-static int begin_leg(Run *r, const Leg *l) {
-  Solutions all = {0};
-  memcpy(r->x, l->x, sizeof(double) * r->n);
-  set_time_state(r);
-  memcpy(r->letter, l->letter, r->width);
-  find_idle(r);
-  const double *h = surface_values(r, r->x);
-  EACH_SET(r, f) {
-    if (r->letter[f] == 0) continue;
-    int k = size_of(r, f), stays = r->idle[f] && !(length_of(h + f, k) > 0); /* friction that a parameter may bring acts */
-    for (int i = f; i < f + k; i++) {
-      r->letter[i] = stays ? IDLE : r->letter[i] == OFF ? LEFT_BEHIND : LEAVING;
-      r->unknowns[i] = h[i];
-    }
-  }
-  lay_out(r, r->letter, &r->now);
-  mode_solutions(r, &r->now, &all);
-  if (all.count > 1) keep_stable(r, &r->now, &all);
-  if (all.count != 1) return 0;
-  memcpy(r->unknowns, all.each, sizeof(double) * r->width);
-  return 1;
-}
-
-/* Move state, unknowns and columns by a step. */
-static void move_columns(Run *r, const Leg *l, const Columns *c, double dt) {
-  const Expansion *e = &r->e;
-  int n = r->n, w = r->width, m = r->m, order = r->order, stride = r->stride;
-  for (int i = 0; i < n; i++) r->x[i] = value_at(e->states + (int64_t)i * stride, order, dt);
-  for (int i = 0; i < w; i++) r->unknowns[i] = value_at(e->series + (int64_t)i * stride, order, dt);
-  for (int64_t k = 0; k < l->columns; k++) {
-    for (int i = 0; i < n; i++) l->y[k * n + i] = value_at(c->states + (k * n + i) * stride, order, dt);
-    for (int i = 0; i < m; i++)
-      if (set_of(r, i) >= 0 && r->letter[i]) c->h[k * m + i] = value_at(c->series + (k * w + i) * stride, order, dt);
-  }
-  for (int i = 0; i < m; i++) if (r->letter[i] == LEAVING) r->letter[i] = LEFT_BEHIND;
-  lay_out(r, r->letter, &r->now);
-  improve(r, &r->now, r->x, r->unknowns, 2);
-}
-
-/* Whether a set is so close that nothing is left of the way to it. */
-static int has_arrived(const Run *r, int f, double *most) {
-  int k = size_of(r, f);
-  double rate[3], radius = length_of(r->unknowns + f, k);
-  for (int i = 0; i < k; i++) rate[i] = r->e.series[(int64_t)(f + i) * r->stride + 1];
-  *most = larger(radius, *most);
-  return r->letter[f] == LEFT_BEHIND && radius < larger(ARRIVED * *most, TENFOLD * shortest(r) * length_of(rate, k));
-}
-
-/* A step that is no longer than until |h| of a set has fallen tenfold. */
-static double near_step(const Run *r, int f, double h) {
-  const Expansion *e = &r->e;
-  for (int row = 0; row < e->l.rows; row++) {
-    if (e->l.kind[row] != NEAR_GUARD || e->l.index[row] != f || r->letter[f] == LEAVING) continue;
-    double root = first_root(e->guards + (int64_t)row * r->stride, r->order, h);
-    if (root > 0) return root;
-  }
-  return h;
-}
-
-static int carry(Run *r, Leg *l, Columns *c) {
-  double most = 0, size = 0;
-  Expansion *e = &r->e;
-  l->left = l->duration;
-  if (!begin_leg(r, l)) return LEG_NOT_UNIQUE;
-  for (int64_t step = 0; step < l->most_steps; step++) {
-    for (int i = 0; i < r->s->dimension; i++) size = larger(fabs(r->x[i]), size);
-    r->o.atol = r->o.rtol * (size > 0 ? size : 1);
-    r->size = size;
-    r->time_size = l->duration;
-    expand(r, r->letter, r->x, r->unknowns, e);
-    for (int i = 0; i < r->s->dimension; i++)
-      size = larger(fabs(e->states[(int64_t)i * r->stride + 1]) * l->duration, size);
-    for (int i = 0; i < r->n; i++) l->end_rate[i] = e->states[(int64_t)i * r->stride + 1];
-    if (!finite_all(l->end_rate, r->n)) return LEG_STUCK;
-    for (int q = 0; q < r->s->derivatives.count; q++) c->bend[q] = terms_of(derivative_row(r, q), r->stride);
-    if (step == 0) {
-      memcpy(l->start_rate, l->end_rate, sizeof(double) * r->n);
-      land(r, l, c);
-    }
-    if (l->hit < 0 ? l->left <= 0 : has_arrived(r, l->hit, &most)) {
-      memcpy(l->x, r->x, sizeof(double) * r->n);
-      if (r->s->timed) l->x[r->n - 1] += r->t;
-      if (l->gradient) event_gradient(r, l, c);
-      return LEG_DONE;
-    }
-    if (!e->finite) return LEG_STUCK;
-    for (int k = 0; k < l->columns; k++) {
-      Expansion d = column_of(r, c, k, l->y + k * r->n);
-      column_series(r, e, &d, l->dp + k * r->s->parameters, c, r->order);
-    }
-    double h = step_size(r, e);
-    h = smaller(h, column_step(r, l, c, 0, r->n)); /* those by the start, those by parameters */
-    h = smaller(h, column_step(r, l, c, r->n, l->columns - r->n));
-    if (!(h > (l->hit < 0 ? FIXED_SHORTEST * l->duration : 0))) return LEG_STUCK;
-    if (l->hit >= 0) h = near_step(r, l->hit, smaller(h, l->duration));
-    else h = h >= l->left ? l->left : l->left < 1.5 * h ? smaller(h, 0.5 * l->left) : h;
-    move_columns(r, l, c, h);
-    l->left -= h;
-  }
-  return LEG_STUCK;
-}
-
-int64_t leg_size(void) { return sizeof(Leg); }
-
-/* Carry state and columns of a leg to its end: LEG_DONE, or why not. */
-int32_t carry_columns(Run *r, Leg *l) {
-  const System *s = r->s;
-  int64_t count = l->columns > 0 ? l->columns : 1, inputs = moving_size(r) + s->parameters, entries = s->derivatives.count;
-  int64_t doubles = count * (r->m + (int64_t)(r->n + r->width) * r->stride) + r->n + 3 * r->width + s->parameters;
-  char *memory = calloc(doubles * 8 + inputs * (sizeof(double *) + 5) + entries * 8, 1);
-  if (!memory) return LEG_STUCK;
-  Columns c = {.h = (double *)memory};
-  c.states = c.h + count * r->m;
-  c.series = c.states + count * r->n * r->stride;
-  c.sum = c.series + count * r->width * r->stride;
-  c.dp = c.sum + r->n + 3 * r->width;
-  c.of = (const double **)(c.dp + s->parameters);
-  c.terms = (int32_t *)(c.of + inputs);
-  c.bend = c.terms + inputs;
-  c.active = c.bend + entries;
-  c.late = (int8_t *)(c.active + entries);
-  Options o = {.rtol = l->tol / SAFETY, .atol = l->tol};
-  clear(r, &o, (Pair){s->timed ? l->x[r->n - 1] : 0, 0});
-  set_parameters(r, l->p);
-  int status = carry(r, l, &c);
-  free(memory);
-  return status;
 }

@@ -1,4 +1,4 @@
-"""What Python and the drivers in C share: structures of options and batches, a run as arrays."""
+"""What Python and the drivers in C share: options and batches, a run as arrays."""
 
 from __future__ import annotations
 
@@ -16,155 +16,56 @@ from ..constants import GUARDS, KINDS, METHODS
 from ..options import Options
 from ..results import Chunk
 from ..section import Hits
-from .building.build import CompilerError
+from .structures import structure
 
 #: Steps of one call of C; between calls Python hears Ctrl-C and requests to stop.
 BURST = 4096
 
-_D, _I32, _I64 = ctypes.c_double, ctypes.c_int32, ctypes.c_int64
-_POINTER = ctypes.c_void_p
-
-
-class OptionsStructure(ctypes.Structure):
-    """``Options`` of common.h."""
-
-    _fields_ = [
-        *[(name, _D) for name in ("t_end", "rtol", "atol", "max_step", "rest_below")],
-        *[(name, _I64) for name in ("max_steps", "max_events", "max_jumps")],
-        *[(name, _I32) for name in ("start_mode", "at_kind")],
-        ("at_count", _I64),
-        *[(name, _I32) for name in ("dense", "hit_after", "method", "pad")],
-        *[(name, _I64) for name in ("hit_kinds", "hit_width", "hit_side", "hit_skip", "hit_every")],
-        ("hit_count", _I64),
-        ("hit_named", _POINTER),
-        ("passed", _POINTER),
-    ]
-    kept: tuple[NDArray[Any], ...]  # what the last two point to
-
-
-class BatchStructure(ctypes.Structure):
-    """``Batch`` of common.h."""
-
-    _fields_ = [
-        ("count", _I64),
-        ("p_stride", _I64),
-        ("t0", _D),
-        *[(name, _POINTER) for name in ("which", "x0", "p", "x", "t", "status", "itinerary")],
-        *[(name, _POINTER) for name in ("kinds", "at_x", "at_t", "totals")],
-        *[(name, _I64) for name in ("room", "times_stride")],
-        *[(name, _POINTER) for name in ("times", "sample_t", "sample_x")],
-        ("kinds_width", _I64),
-    ]
-
 
 class Happened(NamedTuple):
-    """Events and segments of a run as arrays.
+    """Events and segments of a run as arrays; the end is one of the e + 1 events."""
 
-    Attributes
-    ----------
-    event_t, event_rows, event_jumps : ndarray (e + 1,)
-        Events, and the end of the run: time, row of the state in ``states``, whether the state after it is the
-        next row.
-    event_codes, keys : ndarray (e + 1,), sequence of tuple
-        What an event is, as a position in the keys (the end is after them): kind (position in
-        ``facts.KINDS``), modes before and after, guard (``guard_of``) or -1.
-    states : ndarray
-        The points of the run, then what else is the state of an event.
-    event_motions : ndarray (e, w)
-        What a restart after each event needs; empty without dense output.
-    segment_modes, segment_starts : ndarray (k,), (k + 1,)
-        Segments: numbers of their modes, and times at which they begin, and the last one ends.
-    segment_firsts : ndarray (k,)
-        Numbers of the first steps of the segments; zero without dense output.
-    """
-
-    event_t: Array
-    event_rows: NDArray[np.int64]
-    event_jumps: NDArray[np.bool_]
-    event_codes: NDArray[np.int32]
-    event_motions: Array
-    segment_modes: NDArray[np.int32]
-    segment_starts: Array
-    segment_firsts: NDArray[np.int64]
-    states: Array
-    keys: Sequence[tuple[int, ...]]
+    event_t: Array  # (e + 1,)
+    event_rows: NDArray[np.int64]  # rows of their states in ``states``
+    event_jumps: NDArray[np.bool_]  # whether the state after each is the next row
+    event_codes: NDArray[np.int32]  # positions in ``keys``; the end is after them
+    event_motions: Array  # (e, w): what a restart after each needs; empty without dense output
+    segment_modes: NDArray[np.int32]  # (k,): numbers of their modes
+    segment_starts: Array  # (k + 1,): times at which they begin, and the last one ends
+    segment_firsts: NDArray[np.int64]  # numbers of their first steps; zero without dense output
+    states: Array  # the points of the run, then what else is the state of an event
+    keys: Sequence[tuple[int, ...]]  # kind, modes before and after, guard (``guard_of``) or -1
 
 
 @dataclass
 class Run:
-    """One run as arrays.
+    """One run as arrays."""
 
-    Attributes
-    ----------
-    status : int
-        A Status.
-    reason, where : int
-        Why, for the message (see ``facts.REASONS``): a surface, a stop.
-    mode : int
-        Last mode.
-    limit : float
-        Accumulation time or NaN.
-    letters : sequence of str
-        Modes by number.
-    active : list of int
-        Surfaces and contacts at the last point that was decided.
-    several : list of str
-        Modes that could continue there, where more than one could.
-    rates : ndarray (k, n)
-        Rates of the states in them.
-    facts : int
-        What was noted about the decisions, as bits.
-    t_error : float
-        Largest error of the time of an event that rounding hides; see ``Facts``.
-    unmet : int
-        A stop or reset, in this order, that was true at the start and did not happen, or -1.
-    implicit_steps : int
-        How many steps were implicit.
-    t, x : ndarray (m,), (m, n)
-        Points: start, steps and events; a reset appears twice.
-    motion : ndarray (w,)
-        What a restart at the end needs besides the state.
-    dense : bool
-        Whether the following were kept.
-    starts, coefficients, implicit : ndarray (s,), (s, N, P+1), (s,)
-        Steps: start times, coefficients of the states, whether they are implicit.
-    sample_x : ndarray (K, n)
-        States at the times before the end at which the run was to be read, unless it is dense.
-    event_count : int
-        Number of events but the end.
-    make_happened : callable
-        Makes events and segments when they are first read.
-    few : mapping or None
-        What the driver wrote, by name, if events and steps are few.
-    labels : sequence of tuple
-        Values of the discrete states by number of mode; empty without any.
-    """
-
-    status: int
-    reason: int
-    where: int
-    mode: int
-    limit: float
-    letters: Sequence[str]
-    active: list[int]
-    several: list[str]
-    rates: Array
-    facts: int
-    t_error: float
-    unmet: int
-    implicit_steps: int
-    t: Array
-    x: Array
-    motion: Array
-    labels: Sequence[tuple[float, ...]]
-    dense: bool
-    starts: Array
-    coefficients: Array
-    implicit: NDArray[np.bool_]
-    sample_x: Array
-    event_count: int
-    make_happened: Callable[[], Happened]
-    few: Mapping[str, NDArray[Any]] | None
+    status: int  # of Status
+    reason: int  # why, for the message: position in ``REASONS``
+    where: int  # a surface, a stop
+    mode: int  # the last one
+    limit: float  # accumulation time or NaN
+    letters: Sequence[str]  # modes by number
+    active: list[int]  # surfaces and contacts at the last point that was decided
+    several: list[str]  # modes that could continue there, where more than one could
+    rates: Array  # (k, n): rates of the states in them
+    facts: int  # what was noted about the decisions, as bits
+    t_error: float  # largest error of the time of an event that rounding hides; see ``Facts``
+    unmet: int  # a stop or reset that was true at the start and did not happen, or -1
+    implicit_steps: int  # how many steps were implicit
+    t: Array  # (m,): start, steps and events; a reset appears twice
+    x: Array  # (m, n)
+    motion: Array  # (w,): what a restart at the end needs besides the state
+    labels: Sequence[tuple[float, ...]]  # discrete states by number of mode; empty without any
+    dense: bool  # whether the following were kept
+    starts: Array  # (s,): of steps
+    coefficients: Array  # (s, N, P+1): of the states
+    implicit: NDArray[np.bool_]  # (s,): whether steps are implicit
+    sample_x: Array  # (K, n): states at the times to be read before the end, unless it is dense
+    event_count: int  # without the end
+    make_happened: Callable[[], Happened]  # events and segments, when they are first read
+    few: Mapping[str, NDArray[Any]] | None  # what the driver wrote, if events and steps are few
 
     @cached_property
     def happened(self) -> Happened:
@@ -192,16 +93,6 @@ def guard_of(system: FilippovSystem, code: int) -> Guard:
     return Guard(kind, i, 0 if kind == "branch" else side, system.entry_of(i))
 
 
-def require_size(size: Any, structure: type[ctypes.Structure]) -> None:
-    """Refuse a library whose structure is not laid out as ours."""
-    size.restype = _I64
-    if size() != ctypes.sizeof(structure):
-        raise CompilerError(
-            f"{structure.__name__}: expected {ctypes.sizeof(structure)} bytes, received {size()} "
-            "from the compiled library. Its compiler lays out structures in another way."
-        )
-
-
 def address(a: NDArray[Any] | None) -> int | None:
     """Return where an array begins."""
     if a is None:
@@ -218,11 +109,11 @@ def options_of(
     dense: bool,
     at: tuple[int, int] | None = None,
     start_mode: int = -1,
-) -> OptionsStructure:
+) -> ctypes.Structure:
     """Options as C reads them; the start's mode by its number."""
     kind, count = at or (-1, 0)
     limit = 2**62  # no run has so many events
-    made = OptionsStructure(
+    made: Any = structure("Options")(
         o.t_end,
         o.rtol,
         o.atol,
@@ -283,7 +174,7 @@ def batch_of(
     chunk: Chunk,
     times: Array | None,
     which: NDArray[np.intp] | None,
-) -> BatchStructure:
+) -> ctypes.Structure:
     """What C reads and where it writes; all arrays live as long as the caller's."""
     count = len(x) if which is None else len(which)
     stride = p.shape[-1] if p.ndim > 1 else 0
@@ -294,7 +185,7 @@ def batch_of(
     times_stride = 0 if times is None or times.ndim == 1 else times.shape[1]
     width = chunk.kinds.shape[1]
     samples = [address(a) for a in (times, chunk.sample_t, chunk.sample_x)]
-    return BatchStructure(count, stride, t_start, *arrays, room, times_stride, *samples, width)
+    return structure("Batch")(count, stride, t_start, *arrays, room, times_stride, *samples, width)
 
 
 def words_of(

@@ -1,19 +1,22 @@
-"""Columns of derivatives along legs of known duration, in the driver in C."""
+"""Derivatives along legs of known duration, in the driver in C: columns forward, rows back."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
-from typing import NamedTuple
+import weakref
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem
 from ..constants import GUARDS
-from .arrays import address, require_size
+from .arrays import address
+from .structures import structure
 from .tape import TapeEngine, library
-
-_I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
 #: Why a leg does not reach its end.
 DONE, STUCK, NOT_UNIQUE = range(3)
@@ -22,18 +25,13 @@ DONE, STUCK, NOT_UNIQUE = range(3)
 LEAVING = 4
 
 
-_ARRAYS = ("p", "dp", "letter", "x", "y", "start_rate", "end_rate", "gradient")
+#: Steps for which there is room at first, and those of each leg.
+_ROOM, _STEPS = 32, 6
 
+_NO_STEPS = np.zeros((0, 0))
 
-class _Leg(ctypes.Structure):
-    _fields_ = [
-        *[(name, _I32) for name in ("columns", "hit", "kind", "index", "side", "pad")],
-        ("duration", _D),
-        ("tol", _D),
-        ("left", _D),
-        ("most_steps", _I64),
-        *[(name, _POINTER) for name in _ARRAYS],
-    ]
+#: Direction of a column along given parameters (``variation.c``).
+_ALONG_DP = -2
 
 
 class EndOfLeg(NamedTuple):
@@ -45,18 +43,113 @@ class EndOfLeg(NamedTuple):
     side: int = 0
 
 
-class CarriedLeg(NamedTuple):
-    """End of a leg and its derivatives, fields at start and end; gradient of its event's function by states and
-    parameters there."""
+class GivenLegs(NamedTuple):
+    """Legs: letters of their modes (L, w), starts (L, n), durations (L,), ends; parameters, error, most steps of a leg;
+    times of samples since the starts (K,), and where those of each leg begin (L + 1,)."""
 
-    status: int
-    left: float
-    end: Array
-    by_start: Array
-    by_parameters: Array
-    start_rate: Array
-    end_rate: Array
-    gradient: Array
+    letters: NDArray[np.int8]
+    starts: Array
+    durations: Array
+    ends: Sequence[EndOfLeg | None]
+    p: Array
+    tol: float
+    most_steps: int
+    times: Array
+    first: NDArray[np.intp]
+
+
+@cache
+def _leg_type() -> np.dtype[Any]:
+    return np.dtype(structure("Leg"))
+
+
+class CarriedLegs:
+    """Ends of legs (L, n) with fields at starts and ends, gradients of their events by states and parameters (L, n + np),
+    derivatives of the ends (L, n, columns) and at samples (K, n, columns).
+
+    ``failed`` is the number of a leg that did not reach its end, with its status and the time that was left, or -1.
+    """
+
+    def __init__(self, engine: ColumnsEngine, given: GivenLegs, count: int, starts: int):
+        legs, n = given.starts.shape
+        self._engine, self.given = engine, given
+        self.ends, self.before, self.rates = (np.empty((legs, n)) for _ in range(3))
+        self.gradients = np.empty((legs, n + len(given.p)))
+        self._y, self._samples = np.zeros((legs, count, n)), np.empty((len(given.times), count, n))
+        self._y[:, range(min(n, count)), range(min(n, count))] = 1.0
+        self._kept = [np.ascontiguousarray(a) for a in given[:3]]
+        self._kept += [np.append(given.p, 0.0), np.ascontiguousarray(given.times, float)]
+        self.failed, self.status, self.left = -1, DONE, 0.0
+        self.row = np.zeros(n)
+        self._c = self._structures(count, starts)
+
+    def _structures(self, count: int, starts: int) -> NDArray[np.void]:
+        """The legs as C reads them."""
+        given, (legs, n) = self.given, self.given.starts.shape
+        letters, begins, durations, p, times = self._kept
+        made, row = np.zeros(legs, _leg_type()), np.arange(legs) * 8 * n
+        none = EndOfLeg()
+        own = [
+            (e.hit, GUARDS.index(e.guard), e.number, e.side)
+            for e in (e or none for e in given.ends)
+        ]
+        made["hit"], made["kind"], made["index"], made["side"] = np.array(own, np.int32).T
+        made["columns"], made["starts"] = count, starts
+        made["duration"], made["tol"] = durations, given.tol
+        made["most_steps"], made["samples"] = given.most_steps, np.diff(given.first)
+        made["letter"] = letters.ctypes.data + np.arange(legs) * letters.shape[1]
+        for name, array in (("x", begins), ("end", self.ends)):
+            made[name] = array.ctypes.data + row
+        made["start_rate"], made["end_rate"] = (
+            a.ctypes.data + row for a in (self.before, self.rates)
+        )
+        made["y"], made["p"] = self._y.ctypes.data + row * count, p.ctypes.data
+        made["sample_t"] = times.ctypes.data + 8 * given.first[:-1]
+        made["at_samples"] = self._samples.ctypes.data + 8 * n * count * given.first[:-1]
+        gradients = self.gradients.ctypes.data + np.arange(legs) * 8 * self.gradients.shape[1]
+        made["gradient"] = np.where([e is not None for e in given.ends], gradients, 0)
+        return made
+
+    def carry(self, direction: Array, dp: Array | None, steps: Array) -> int:
+        """Carry them; the number of steps, of which as many as there is room for are recorded."""
+        self._c["direction"], self._c["dp"] = direction.ctypes.data, address(dp) or 0
+        self._c["steps"][0], self._c["step_room"][0] = address(steps) or 0, len(steps)
+        self._steps = steps
+        with self._engine.state() as state:
+            self.failed = int(library().carry_legs(state, self._c.ctypes.data, len(self._c)))
+        if self.failed >= 0:
+            self.status = int(self._c["status"][self.failed])
+            self.left = float(self._c["left"][self.failed])
+        return int(self._c["step_count"].sum())
+
+    def set_columns(self, first: Array) -> None:
+        """Let the first column (n,) of all legs be one, and others zero."""
+        self._y[:] = 0.0
+        self._y[:, 0] = first
+
+    @property
+    def derivatives(self) -> Array:
+        """Of the ends (L, n, columns)."""
+        return self._y.swapaxes(1, 2)
+
+    @property
+    def at_samples(self) -> Array:
+        """Derivatives at samples (K, n, columns)."""
+        return self._samples.swapaxes(1, 2)
+
+    def begin_pull(self, row: Array, by_parameters: Array, rows: Array) -> None:
+        """Let ``pull`` change a row (n,) and what it gives by all parameters; ``rows`` (K, n) join it at samples."""
+        c, width = self._c, 8 * rows.shape[1]
+        self.row, self._pulled = row, (by_parameters, rows)
+        c["row"], c["by_parameters"] = row.ctypes.data, by_parameters.ctypes.data
+        c["at_samples"] = rows.ctypes.data + width * self.given.first[:-1]
+        self._at = int(c.ctypes.data)
+
+    def pull(self, leg: int) -> None:
+        """Pull the row from the end of a recorded leg back to its start."""
+        with self._engine.state() as state:
+            if library().pull_row(state, self._at + leg * self._c.itemsize) != DONE:
+                self.row[:] = np.nan
 
 
 class ColumnsEngine(TapeEngine):
@@ -64,33 +157,48 @@ class ColumnsEngine(TapeEngine):
 
     def __init__(self, system: FilippovSystem, order: int):
         super().__init__(system, order, derived=True)
-        require_size(library().leg_size, _Leg)
-        library().carry_columns.argtypes = [_POINTER, _POINTER]
+        self.add_implicit()
+        self._idle: list[int] = []  # runs that no call uses
 
-    def carry(
-        self,
-        letters: Sequence[int],
-        x: Array,
-        p: Array,
-        chosen: Sequence[int],
-        duration: float,
-        tol: float,
-        most_steps: int,
-        ends: EndOfLeg | None,
-    ) -> CarriedLeg:
-        """Carry a state and its derivatives by the start and by chosen parameters over a duration."""
-        n, q = len(x), len(chosen)
-        given, end = np.append(p, 0.0), np.array(x, float)
-        y, dp = np.zeros((n + q, n)), np.zeros((n + q, len(p) + 1))
-        y[:n], dp = np.eye(n), dp[:, : len(p)].copy()
-        dp[n + np.arange(q), list(chosen)] = 1.0
-        letter, rates = np.array([*letters, 0], np.int8), np.empty((2, n))
-        row, of = np.empty(n + len(p)), ends or EndOfLeg()
-        leg = _Leg(n + q, of.hit, GUARDS.index(of.guard), of.number, of.side, 0)
-        leg.duration, leg.tol, leg.most_steps = duration, tol, most_steps
-        arrays = (given, dp, letter, end, y, rates[0], rates[1], row if ends else None)
-        for name, array in zip(_ARRAYS, arrays, strict=True):
-            setattr(leg, name, address(array))
-        with self.held_table() as table, self.held_run(table) as state:
-            status = library().carry_columns(state, ctypes.byref(leg))
-        return CarriedLeg(status, leg.left, end, y[:n].T, y[n:].T, rates[0], rates[1], row)
+    @contextmanager
+    def state(self) -> Iterator[int]:
+        """A run of the driver, which goes on to the next call."""
+        try:
+            state = self._idle.pop()
+        except IndexError:
+            made = library()
+            table = made.table_new(self._width)
+            state = made.run_new(ctypes.byref(self._c), table)
+            weakref.finalize(self, _freed, state, table)
+        try:
+            yield state
+        finally:
+            self._idle.append(state)
+
+    def carry(self, given: GivenLegs, chosen: Sequence[int]) -> CarriedLegs:
+        """Carry states and their derivatives by the starts and by chosen parameters over legs."""
+        n = given.starts.shape[1]
+        found = CarriedLegs(self, given, n + len(chosen), n)
+        found.carry(np.array([-1] * n + list(chosen), np.int32), None, _NO_STEPS)
+        return found
+
+    def record(self, given: GivenLegs) -> CarriedLegs:
+        """Carry states over legs by steps that rows can take back: short enough for two columns; implicit ones end at
+        samples."""
+        (legs, n), q = given.starts.shape, len(given.p)
+        some = 1.0 + 0.5 * np.cos(np.arange(max(n, q)))
+        room = _ROOM + _STEPS * legs
+        while True:
+            found = CarriedLegs(self, given, 2, 1)
+            found.set_columns(some[:n])
+            steps = np.empty((room, 3 + n + given.letters.shape[1]))
+            count = found.carry(np.array([-1, _ALONG_DP], np.int32), some[:q], steps)
+            if count <= room:
+                return found
+            room = count
+
+
+def _freed(state: int, table: int) -> None:
+    """Free a run of the driver."""
+    library().run_free(state)
+    library().table_free(table)

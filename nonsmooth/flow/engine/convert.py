@@ -172,109 +172,94 @@ def _segments(system: FilippovSystem, run: Run) -> Segments:
 def _unmet(system: FilippovSystem, run: Run) -> str:
     """What is said of an event that was true at the start and silent."""
     names = [name for name, *_ in (*system.stops, *system.resets)]
-    return "" if run.unmet < 0 else f" {messages.unmet(names[run.unmet])}"
+    return "" if run.unmet < 0 else messages.UNMET.format(name=names[run.unmet])
 
 
 def message_of(system: FilippovSystem, options: Options, run: Run) -> str:
     """The message of the end of a run."""
-    status, t = Status(run.status), float(run.t[-1])
-    if status is Status.REACHED_END:
-        return messages.reached_end(options.t_end)
-    if status is Status.STOPPED and REASONS[run.reason] == "sampled":
-        return messages.sampled(run.where, t)
-    if status is Status.STOPPED:
-        return messages.stopped(system.stops[run.where][0], t)
-    if status is Status.ENDLESS_JUMPS:
-        at_once = _events(system, run)[-1 - (options.max_jumps + 1) // 2 : -1]
-        return messages.endless_jumps(sorted({e.name for e in at_once if e.t == t}), t)
-    if status is Status.ACCUMULATION and REASONS[run.reason] == "pressed":
-        return messages.pressed(system.resets[run.where][0], t)
-    if status is Status.ACCUMULATION:
-        return messages.accumulation(run.event_count, run.limit)
-    if status is Status.TOO_MANY_EVENTS:
-        return messages.too_many("events", options.max_events)
-    if status is Status.TOO_MANY_STEPS and REASONS[run.reason] == "decay":
-        return messages.held_by_decay(t, float(run.t[-1] - run.t[-2]), not system.sets)
-    if status is Status.TOO_MANY_STEPS:
-        return messages.too_many("steps", options.max_steps)
-    if status is Status.STEP_TOO_SMALL and REASONS[run.reason] == "branch_point":
-        return messages.branch_point(t)
-    if status is Status.STEP_TOO_SMALL:
-        return messages.step_too_small(4e-16 * max(1.0, abs(t)))
-    return _reason(system, options, run)
+    found = messages.SENTENCES.get(REASONS[run.reason])
+    return (found or messages.SENTENCES[str(Status(run.status))]).format_map(
+        _Said(system, options, run)
+    )
 
 
-def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
-    found = _SENTENCES.get(REASONS[run.reason])
-    return found(system, options, run) if found else messages.degenerate()
+class _Said(dict[str, Any]):
+    """What a message says of the end of a run, made where it is read."""
+
+    def __init__(self, system: FilippovSystem, options: Options, run: Run):
+        self._of = system, options, run
+
+    def __missing__(self, name: str) -> Any:
+        return _FIELDS[name](*self._of)
 
 
-def _ambiguous(system: FilippovSystem, _: Options, run: Run) -> str:
+def _at_once(system: FilippovSystem, options: Options, run: Run) -> str:
+    """Names of the events that repeat at one instant."""
+    last = _events(system, run)[-1 - (options.max_jumps + 1) // 2 : -1]
+    return _quoted(sorted({e.name for e in last if e.t == run.t[-1]}))
+
+
+def _differing(system: FilippovSystem, run: Run) -> list[str]:
+    """Names of what the modes that can continue differ in."""
     names = [system.surface_names[members[0]] for members in system.entries]
-    several = [system.spelled(mode) for mode in run.several]
-    return messages.ambiguous(several, [*names, *system.impacts])
+    letters = zip(*map(system.spelled, run.several), strict=True)
+    pairs = zip([*names, *system.impacts], letters, strict=True)
+    return [name for name, own in pairs if len(set(own)) > 1]
 
 
-def _off_constraint(system: FilippovSystem, _: Options, run: Run) -> str:
-    what = "Function" if run.where < system.surface_count else "Rate of the function"
-    name = system.constraints[system.joints.index(run.where % system.surface_count)]
-    return messages.off_constraint(name, what, run.limit, _end(run))
-
-
-def _undetermined(system: FilippovSystem, _: Options, run: Run) -> str:
-    firsts = [i for i in run.active if i in system.set_of and i == system.set_of[i][0]]
-    return messages.undetermined([system.surface_names[i] for i in firsts])
-
-
-def _end(run: Run) -> float:
-    return float(run.t[-1])
-
-
-def _entries(system: FilippovSystem, run: Run) -> list[int]:
-    """Entries of what was decided last."""
-    return [k for k, own in enumerate(system.entries) if any(i in run.active for i in own)]
-
-
-#: What is said of a run's end, by its reason.
-_SENTENCES: dict[str, Callable[[FilippovSystem, Options, Run], str]] = {
-    "two_fold": lambda s, o, run: messages.two_fold(s.entry_of(run.where)),
-    "slid_to_two_fold": lambda s, o, run: messages.slid_to_two_fold(s.entry_of(run.where)),
-    "ambiguous": _ambiguous,
-    "wrong_start": lambda s, o, run: messages.wrong_start(
-        str(o.start_mode), s.spelled(run.letters[run.where])
-    ),
-    "start_solutions": lambda s, o, run: messages.start_solutions(str(o.start_mode), run.where),
-    "impossible_start": lambda s, o, run: messages.impossible_start(str(o.start_mode)),
-    "several_directions": lambda s, o, run: messages.several_directions(run.where),
-    "indefinite": lambda s, o, run: messages.indefinite(s.surface_names[run.where]),
-    "undetermined": _undetermined,
-    "field": lambda s, o, run: messages.field_not_finite(
-        s.spelled(run.letters[run.mode]), run.x[-1].tolist()
-    ),
-    "state": lambda s, o, run: messages.state_not_finite(_end(run)),
-    "multiple_zero": lambda s, o, run: messages.multiple_zero(s.entry_of(run.where)),
-    "two_sided": lambda s, o, run: messages.two_sided(s.resets[run.where][0]),
-    "behind": lambda s, o, run: messages.behind(s.impacts[run.where], _end(run)),
-    "no_jump": lambda s, o, run: messages.no_jump(s.surface_names[run.where], _end(run)),
-    "off_constraint": _off_constraint,
-    "dead_point": lambda s, o, run: messages.dead_point(s.constraints, _end(run)),
-    "no_impulse": lambda s, o, run: messages.no_impulse(s.impacts[run.where], _end(run)),
-    "restitution": lambda s, o, run: messages.restitution(s.impacts[run.where], _end(run)),
-    "no_reaction": lambda s, o, run: messages.no_reaction(_contacts(s, run), bool(s.algebraic)),
-    "no_stable_motion": lambda s, o, run: messages.no_stable_motion(_entries(s, run)),
-    "undetermined_rates": lambda s, o, run: messages.undetermined_rates(_entries(s, run)),
-    "stability_lost": lambda s, o, run: messages.stability_lost(
-        s.surface_names[run.where], _end(run)
-    ),
-    "high_degree": lambda s, o, run: messages.high_degree(s.entry_of(run.where)),
-    "possibly_several": lambda s, o, run: messages.possibly_several(_entries(s, run)),
-    "discrete_value": lambda s, o, run: messages.discrete_value(s.resets[run.where][0], _end(run)),
-    "reset_map": lambda s, o, run: messages.reset_not_finite(s.resets[run.where][0], _end(run)),
-    "surface": lambda s, o, run: messages.surface_not_finite(),
-}
+def _sets(system: FilippovSystem, run: Run) -> list[str]:
+    """Names of the sets at the last point that was decided."""
+    return [system.surface_names[m[0]] for m in system.sets if m[0] in run.active]
 
 
 def _contacts(system: FilippovSystem, run: Run) -> list[str]:
-    """Names of the contacts at the last point that was decided."""
+    """Names of the contacts there."""
     m, names = system.surface_count, [*system.surface_names, *system.impacts]
     return [names[i] for i in run.active if i >= m or i in system.half_lines]
+
+
+def _entries(system: FilippovSystem, run: Run) -> list[str]:
+    """Names of the surfaces and sets there."""
+    return [f"h{k}" for k, own in enumerate(system.entries) if any(i in run.active for i in own)]
+
+
+def _quoted(names: Sequence[str]) -> str:
+    return " and ".join(map(repr, names))
+
+
+#: Fields of messages.
+_FIELDS: dict[str, Callable[[FilippovSystem, Options, Run], Any]] = {
+    "t": lambda s, o, run: float(run.t[-1]),
+    "t_end": lambda s, o, run: o.t_end,
+    "max_events": lambda s, o, run: o.max_events,
+    "max_steps": lambda s, o, run: o.max_steps,
+    "start_mode": lambda s, o, run: o.start_mode,
+    "limit": lambda s, o, run: run.limit,
+    "where": lambda s, o, run: run.where,
+    "events": lambda s, o, run: run.event_count,
+    "state": lambda s, o, run: messages.listed(run.x[-1].tolist()),
+    "mode": lambda s, o, run: s.spelled(run.letters[run.mode]),
+    "actual": lambda s, o, run: s.spelled(run.letters[run.where]),
+    "entry": lambda s, o, run: s.entry_of(run.where),
+    "surface": lambda s, o, run: s.surface_names[run.where],
+    "argument": lambda s, o, run: str(s.written.surfaces[run.where]),
+    "stop": lambda s, o, run: s.stops[run.where][0],
+    "reset": lambda s, o, run: s.resets[run.where][0],
+    "impact": lambda s, o, run: s.impacts[run.where],
+    "constraint": lambda s, o, run: s.constraints[s.joints.index(run.where % s.surface_count)],
+    "what": lambda s, o, run: "Function" if run.where < s.surface_count else "Rate of the function",
+    "constraints": lambda s, o, run: _quoted(s.constraints),
+    "contacts": lambda s, o, run: _quoted(_contacts(s, run)),
+    "equations": lambda s, o, run: messages.EQUATIONS if s.algebraic else "",
+    "entries": lambda s, o, run: " and ".join(_entries(s, run)),
+    "sets": lambda s, o, run: " and ".join(_sets(s, run)),
+    "jumps": _at_once,
+    "shortest": lambda s, o, run: 4e-16 * max(1.0, abs(float(run.t[-1]))),
+    "step": lambda s, o, run: float(run.t[-1] - run.t[-2]),
+    "decay": lambda s, o, run: 8 / float(run.t[-1] - run.t[-2]),
+    "implicit": lambda s, o, run: messages.NO_IMPLICIT if s.sets else messages.IMPLICIT,
+    "differing": lambda s, o, run: " and ".join(_differing(s, run)),
+    "modes": lambda s, o, run: ", ".join(repr(s.spelled(mode)) for mode in run.several),
+    "place": lambda s, o, run: messages.PLACES[len(_differing(s, run)) > 1],
+    "delay": lambda s, o, run: messages.DELAYS[len(_differing(s, run)) > 1],
+}

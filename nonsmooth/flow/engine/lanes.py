@@ -9,33 +9,19 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...model import Array, FilippovSystem, coupled_of
+from ...model import Array, FilippovSystem
 from ..options import Options
 from ..results import Chunk, Stopped
-from .arrays import (
-    BURST,
-    BatchStructure,
-    OptionsStructure,
-    batch_of,
-    options_of,
-    require_size,
-)
+from .arrays import BURST, batch_of, options_of
 from .building.build import build
-from .building.codegen import lanes_source, set_lanes_source, supports_lanes, supports_set_lanes
+from .building.codegen import lanes_source, supports_lanes
 from .building.compilers import lane_width
+from .structures import declare, structure
 from .tape import library as core_library
 from .tape import tape_for
 
-_I64, _POINTER = ctypes.c_int64, ctypes.c_void_p
-
 #: Lanes are compiled for this processor, and have no bits in common with the driver: sums of products may be fused.
 FLAGS = ("-march=native", "-ffp-contract=fast")
-
-
-class _Core(ctypes.Structure):
-    """``Core`` of common.h."""
-
-    _fields_ = [*[(name, _POINTER) for name in ("run", "begin", "step")], ("random", _I64)]
 
 
 class Lanes:
@@ -54,14 +40,9 @@ class Lanes:
         """The library, loaded."""
         with self._lock:
             if self._library is None:
-                source = self._source(lane_width())
-                self._library = _declare(build(source, FLAGS))
+                source = lanes_source(self.system, self.order, lane_width())
+                self._library = declare(build(source, FLAGS), "kernel/batch.c")
             return self._library
-
-    def _source(self, width: int) -> str:
-        if self.system.sets:
-            return set_lanes_source(coupled_of(self.system), self.order, width)
-        return lanes_source(self.system, self.order, width)
 
     def run_many(
         self,
@@ -92,10 +73,10 @@ class Lanes:
 
 def _call(
     library: ctypes.CDLL,
-    batch: BatchStructure,
-    options: OptionsStructure,
+    batch: ctypes.Structure,
+    options: ctypes.Structure,
     tree: int,
-    core: _Core,
+    core: ctypes.Structure,
     stop: Callable[[], bool],
 ) -> None:
     memory = np.zeros(library.many_size() + 64, np.uint8)
@@ -106,25 +87,19 @@ def _call(
             raise Stopped
 
 
-def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
-    require_size(library.options_size, OptionsStructure)
-    require_size(library.batch_size, BatchStructure)
-    library.many_size.restype = _I64
-    library.run_many.argtypes = [*[_POINTER] * 5, _I64]
-    return library
-
-
-def _core(run: int, random: int) -> _Core:
+def _core(run: int, random: int) -> ctypes.Structure:
     """The driver as C of the lanes calls it."""
     begin, step = core_library().core_begin, core_library().core_step
-    return _Core(run, *[ctypes.cast(f, _POINTER).value for f in (begin, step)], random)
+    return structure("Core")(
+        run, *[ctypes.cast(f, ctypes.c_void_p).value for f in (begin, step)], random
+    )
 
 
 def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
     """Return what runs a system's trajectories in step, or None where the driver has to run them."""
     if options.start_mode is not None or options.rest_below is not None or options.begins_late:
         return None
-    if not (supports_set_lanes(coupled_of(system)) if system.sets else supports_lanes(system)):
+    if not supports_lanes(system):
         return None
     order = _order_with_sets(options) if system.sets else options.order
     return system.cached(("lanes", order), lambda: Lanes(system, order))

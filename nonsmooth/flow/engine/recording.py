@@ -15,6 +15,7 @@ from ...model import Array
 from ..constants import IMPLICIT_STEP, KINDS
 from ..trajectory import Steps
 from .arrays import Happened, address
+from .structures import structure
 
 #: Arrays in the order of C's pointers: type, and what there is one of for each entry.
 _ARRAYS = {
@@ -68,17 +69,13 @@ def _layout(
     return places, used
 
 
+def written_arrays() -> dict[str, tuple[int, str]]:
+    """Bytes of a number of each array that the driver writes, and what there is one of for each entry."""
+    return {name: (8 if dtype is float else 4, kind) for name, (dtype, kind) in _ARRAYS.items()}
+
+
 class Output:
     """A block of memory for each of steps, points and events, which the driver fills."""
-
-    class Structure(ctypes.Structure):
-        """``Output`` of the drivers."""
-
-        _fields_ = [
-            *[(name, ctypes.c_int64) for name in ("steps", "points", "events")],
-            *[(name, ctypes.c_int64) for name in ("step_room", "point_room", "event_room")],
-            *[(name, ctypes.c_void_p) for name in _ARRAYS],
-        ]
 
     def __init__(self, n: int, order: int, rooms: Rooms = _FIRST, motion: int = 0):
         self.motion = motion
@@ -97,7 +94,7 @@ class Output:
         first = {kind: address(block) or 0 for kind, block in self._blocks.items()}
         rooms, places = self._rooms, self._places
         at = [first[own] + rooms[own] * places[name][0] for name, (_, own) in _ARRAYS.items()]
-        self.pointer = ctypes.byref(self.Structure(*counts, *rooms.values(), *at))
+        self.pointer = ctypes.byref(structure("Output")(*counts, *rooms.values(), *at))
 
     def full(self, counts: Sequence[int]) -> dict[str, bool]:
         """Kinds without room for another step, and whether their blocks may grow."""

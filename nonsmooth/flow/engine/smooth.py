@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,51 +11,12 @@ from numpy.typing import NDArray
 
 from ...model import Array
 from ...model.printing.tape import Entries, Series, Values
-from .arrays import address, require_size
-from .tape import EntriesStructure, SeriesStructure, library, series_structure, values_structure
-
-_I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+from .arrays import address
+from .structures import structure
+from .tape import library, series_structure, values_structure
 
 #: Rows of what is watched that are looked for at first.
 _ROOM = 64
-
-
-class _Field(ctypes.Structure):
-    _fields_ = [
-        *[(name, _I32) for name in ("n", "watched", "order", "groups", "starts", "columns")],
-        ("group", _POINTER),
-        ("series", SeriesStructure),
-        ("derivatives", EntriesStructure),
-    ]
-
-
-class _Legs(ctypes.Structure):
-    _fields_ = [
-        *[(name, _I64) for name in ("count", "width", "results", "states", "durations")],
-        *[(name, _I64) for name in ("before", "after", "events", "work")],
-        ("field", _POINTER),
-        ("event", _POINTER),
-    ]
-
-
-@lru_cache(maxsize=1)
-def _library() -> ctypes.CDLL:
-    made = library()
-    require_size(made.field_size, _Field)
-    require_size(made.legs_size, _Legs)
-    flow: list[Any] = [_POINTER, _POINTER, _POINTER, _D, _D, _I64]
-    made.fixed_flow.restype = made.fixed_watch.restype = made.fixed_march.restype = _D
-    made.fixed_flow.argtypes = [*flow, _POINTER]
-    made.fixed_watch.argtypes = [*flow, _D, _POINTER, _I64, _POINTER, _POINTER]
-    made.fixed_march.argtypes = [*flow, _I32, _I32, _D, _POINTER]
-    made.fly_legs.restype = made.field_work.restype = _I64
-    made.fly_legs.argtypes = [_POINTER, _POINTER, _D, _I64, _POINTER]
-    made.field_work.argtypes = [_POINTER]
-    made.fly_legs_extended.restype = made.watch_legs.restype = _I64
-    made.watch_legs.argtypes = [_POINTER, _I64, _I64, _POINTER, _POINTER, _POINTER, _D, _I64, _D]
-    made.watch_legs.argtypes += [_POINTER, _I64, _POINTER, _POINTER, _I64, _POINTER, _POINTER]
-    made.fly_legs_extended.argtypes = [_POINTER, _POINTER, _D, _I64, _POINTER, _POINTER]
-    return made
 
 
 class SmoothProgram:
@@ -68,20 +28,20 @@ class SmoothProgram:
         group: NDArray[np.int32],
         order: int,
         derivatives: Entries,
-        starts: int,
-        columns: int,
+        starts: int = 0,
+        columns: int = 0,
     ):
         self._kept: list[NDArray[Any]] = [np.ascontiguousarray(group, np.int32)]
         n, groups = len(group), int(group.max(initial=-1)) + 1
-        self.size, count = n * (1 + columns), len(derivatives.row)
+        self.order, self.size, count = order, n * (1 + columns), len(derivatives.row)
         self.watched = watched = len(series.outputs) - n - count
         rules = series_structure(series, n, order, self._kept)
         self._kept += [derivatives.row, derivatives.column]
-        places = EntriesStructure(count, 0, *[a.ctypes.data for a in self._kept[-2:]])
+        places = structure("Entries")(count, 0, *[a.ctypes.data for a in self._kept[-2:]])
         sizes = (n, watched, order, groups, starts, columns)
-        self._c = _Field(*sizes, address(self._kept[0]), rules, places)
+        self._c = structure("Field")(*sizes, address(self._kept[0]), rules, places)
         self.pointer = ctypes.addressof(self._c)
-        self.work = int(_library().field_work(self.pointer))
+        self.work = int(library().field_work(self.pointer))
 
     def _given(self, z: Array, p: Array) -> tuple[Array, int, int, int]:
         """Parameters, state and room for work in one array, and where they are."""
@@ -97,25 +57,16 @@ class SmoothProgram:
     ) -> tuple[Array, float]:
         """State after a duration of either sign, and the time that is left where it fails, else 0."""
         memory, at, state, work = self._given(z, p)
-        left = _library().fixed_flow(self.pointer, at, state, duration, tol, most_steps, work)
+        left = library().fixed_flow(self.pointer, at, state, duration, tol, most_steps, work)
         return memory[len(p) + 1 : len(p) + 1 + self.size], left
 
-    def watch(
-        self, z: Array, p: Array, duration: float, tol: float, most_steps: int, margin: float
-    ) -> tuple[Array, Array, float]:
-        """Extrema of the functions and values at the ends of steps, the end, and the time left."""
-        # Rows: number, time, value, second derivative (0 at the end of a step), state.
-        count, room = ctypes.c_int64(), _ROOM
-        while True:
-            memory, at, state, work = self._given(z, p)
-            found = np.empty((room, 4 + self.size))
-            where = (margin, address(found), room, ctypes.byref(count), work)
-            left = _library().fixed_watch(
-                self.pointer, at, state, duration, tol, most_steps, *where
-            )
-            if count.value < room:
-                return found[: count.value], memory[len(p) + 1 : len(p) + 1 + self.size], left
-            room *= 8
+    def terms(self, z: Array, p: Array) -> Array:
+        """Coefficients of the states' and functions' series at a state, (n + watched, order + 1)."""
+        memory, at, state, work = self._given(z, p)
+        found = np.empty((self.size + self.watched, self.order + 1))
+        library().fixed_terms(self.pointer, at, state, address(found), work)
+        del memory
+        return found
 
     def march(
         self,
@@ -130,7 +81,7 @@ class SmoothProgram:
     ) -> float:
         """Time until a function passes zero; -1 if it does not, -2 where the flow ends before."""
         memory, at, state, work = self._given(z, p)
-        found: float = _library().fixed_march(
+        found: float = library().fixed_march(
             self.pointer, at, state, duration, tol, most_steps, row, direction, still, work
         )
         del memory
@@ -171,14 +122,14 @@ class LegsProgram:
         count, own = len(fields), [e for e in events if e is not None]
         self.width = max(f.size for f in fields)
         results = max([e.results for e in own], default=0)
-        self._pointers = (_POINTER * count)(*[f.pointer for f in fields])
-        self._events = (_POINTER * count)(*[e.pointer if e else None for e in events])
+        self._pointers = (ctypes.c_void_p * count)(*[f.pointer for f in fields])
+        self._events = (ctypes.c_void_p * count)(*[e.pointer if e else None for e in events])
         sizes = [parameters + 1, count * self.width, count, count * self.width, count * self.width]
         sizes += [count * results, max([*(f.work for f in fields), *(e.work for e in own)])]
         places = np.cumsum([0, *sizes]).tolist()
         self._places, self._count, self._parameters = places, count, parameters
         pointers = (ctypes.addressof(self._pointers), ctypes.addressof(self._events))
-        self._c = _Legs(count, self.width, results, *places[1:7], *pointers)
+        self._c = structure("Legs")(count, self.width, results, *places[1:7], *pointers)
         self._pointer, self._size = ctypes.addressof(self._c), int(places[-1])
 
     def __call__(
@@ -187,7 +138,7 @@ class LegsProgram:
         """Fly all legs from states (L, width)."""
         memory, _ = self._given(z, p, durations)
         left = ctypes.c_double()
-        failed = _library().fly_legs(
+        failed = library().fly_legs(
             self._pointer, memory.ctypes.data, tol, most_steps, ctypes.byref(left)
         )
         at, count = self._places, self._count
@@ -211,7 +162,7 @@ class LegsProgram:
         """Results (L, results) in extended precision, rounded, and what that leaves."""
         memory, parts = self._given(z, p, durations)
         left, rest = ctypes.c_double(), np.empty(len(parts[5]))
-        failed = _library().fly_legs_extended(
+        failed = library().fly_legs_extended(
             self._pointer,
             memory.ctypes.data,
             tol,
@@ -243,7 +194,7 @@ class WatchProgram:
         self._rows = [f.size + f.watched for f in fields]
         self._begin = max(4 * r + f.watched for r, f in zip(self._rows, fields, strict=True))
         self._work = max(f.work for f in fields)
-        self._pointers = (_POINTER * self._count)(*[f.pointer for f in fields])
+        self._pointers = (ctypes.c_void_p * self._count)(*[f.pointer for f in fields])
 
     def __call__(
         self,
@@ -265,7 +216,7 @@ class WatchProgram:
                 states[i, : len(y)] = y
             memory, found = np.empty(legs * begin + self._work), np.empty(room * (4 + width))
             at = memory.ctypes.data
-            failed = _library().watch_legs(
+            failed = library().watch_legs(
                 *(pointers, legs, width, p.ctypes.data, states.ctypes.data),
                 *(durations.ctypes.data, tol, most_steps, ends, found.ctypes.data, room),
                 *(counts.ctypes.data, at, begin, ctypes.addressof(left), at + 8 * legs * begin),
@@ -274,7 +225,7 @@ class WatchProgram:
                 break
             room *= 8
         if failed >= 0:
-            return WatchedLegs([], [], [], failed, left.value)
+            return WatchedLegs([states[failed]], [], [], failed, left.value)
         own, begins, values, place = list[Array](), list[Array](), list[Array](), 0
         for i, (f, rows, count) in enumerate(
             zip(self._fields, self._rows, counts.tolist(), strict=True)

@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -21,103 +22,30 @@ from ...model.printing.tape import (
     derived_series_of,
     tape_of,
 )
-from ..constants import FULL, IMPACT_LAWS, LAWS, NEEDS_PROGRAM, RUNNING, SEVERAL
+from ..constants import FULL, IMPACT_LAWS, LAWS, NEEDS_PROGRAM, REASONS, RUNNING, SEVERAL
 from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
 from .arrays import (
     BURST,
-    BatchStructure,
-    OptionsStructure,
     Run,
     address,
     batch_of,
     options_of,
-    require_size,
     words_of,
 )
 from .building.codegen import tape_order
 from .library import core_library
 from .recording import Output, Recorder, Rooms, rooms_of
-
-_I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
-
-
-class ValuesStructure(ctypes.Structure):
-    """A graph as C reads it."""
-
-    _fields_ = [
-        *[(name, _I32) for name in ("size", "still_count", "moving_count", "free_count")],
-        *[(name, _I32) for name in ("output_count", "timed")],
-        *[(name, _POINTER) for name in ("op", "a", "b", "still", "moving", "free", "output")],
-        ("paired", _POINTER),
-        ("constant", _POINTER),
-    ]
-
-
-class ListStructure(ctypes.Structure):
-    """Numbers of rules as C reads them."""
-
-    _fields_ = [("count", _I32), ("pad", _I32), ("rule", _POINTER)]
-
-
-class SeriesStructure(ctypes.Structure):
-    """Rules of series as C reads them."""
-
-    _fields_ = [
-        *[(name, _I32) for name in ("size", "terms", "inputs", "states", "outputs", "timed")],
-        *[(name, _POINTER) for name in ("rule", "term", "input", "place", "output")],
-        *[(name, ListStructure) for name in LISTS],
-    ]
-
-
-class EntriesStructure(ctypes.Structure):
-    """Places of entries of a matrix as C reads them."""
-
-    _fields_ = [("count", _I32), ("pad", _I32), ("row", _POINTER), ("column", _POINTER)]
-
+from .shown import Shown
+from .structures import declare, structure
 
 _VALUES = ("point", "surfaces", "maps", "atoms", "choices", "restitution", "columns")
 _ENTRIES = tuple(field.name for field in fields(Tape) if field.type == "Entries")
 
 
-class _Element(ctypes.Structure):
-    _fields_ = [
-        *[(name, _I32) for name in ("law", "first", "k", "degree", "lower", "flags")],
-        *[(name, _D) for name in ("width", "power")],
-    ]
-
-
-class _Rules(ctypes.Structure):
-    _fields_ = [
-        *[(name, _I32) for name in ("atoms", "triggers", "clocks", "discrete", "keeps", "width")],
-        *[(name, _POINTER) for name in ("way", "trigger_event", "trigger_at", "condition")],
-        *[(name, _POINTER) for name in ("filter_at", "filter", "flags", "initially", "named")],
-        *[(name, _POINTER) for name in ("clock_reset", "clock_state", "value_at", "value")],
-    ]
-
-
-class _System(ctypes.Structure):
-    _fields_ = [
-        *[(name, _I32) for name in ("n", "dimension", "timed", "m", "c", "parameters")],
-        *[(name, _I32) for name in ("stops", "resets", "order", "slope_outputs")],
-        ("series", SeriesStructure),
-        ("free", SeriesStructure),
-        *[(name, ValuesStructure) for name in _VALUES],
-        *[(name, EntriesStructure) for name in _ENTRIES],
-        *[(name, _POINTER) for name in ("element", "carries", "component")],
-        *[(name, _POINTER) for name in ("slope_output", "slope_moves", "slope_symmetric")],
-        *[(name, _I32) for name in ("linear", "linear_free")],
-        *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards", "curved")],
-        *[(name, _I32) for name in ("affine", "sets", "kept_rows", "impact_law", "joints")],
-        ("combined", _I32),
-        ("mixed", _POINTER),
-        ("rules", _Rules),
-        ("derivatives", EntriesStructure),
-        ("implicit", _POINTER),
-        ("places", _POINTER),
-    ]
-
+#: What an address of the driver's structures points to.
+Block = NDArray[Any] | ctypes.Structure | ctypes.Array[Any]
 
 #: Steps by which a run is known to be stiff.
 _PROBED = 400
@@ -126,61 +54,34 @@ _PROBED = 400
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL:
     """Return the driver."""
-    return _declared(core_library())
+    return declare(core_library())
 
 
-def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
-    require_size(made.options_size, OptionsStructure)
-    require_size(made.batch_size, BatchStructure)
-    require_size(made.system_size, _System)
-    require_size(made.output_size, Output.Structure)
-    made.table_new.restype = made.run_new.restype = made.lanes_tree.restype = _POINTER
-    made.table_new.argtypes = [_I32]
-    made.polynomial_root.restype = made.polynomial_crossing.restype = _D
-    made.polynomial_root.argtypes = [_POINTER, _I32, _D]
-    made.polynomial_crossing.argtypes = [*made.polynomial_root.argtypes, _I32]
-    for name in ("table_modes", "table_size", "table_free", "run_free", "lanes_tree"):
-        getattr(made, name).argtypes = [_POINTER]
-    made.table_read.argtypes = [_POINTER] * 4
-    made.law_certificate.argtypes = [_POINTER, _I32]
-    made.law_solution.argtypes = [_POINTER, _POINTER, _I32, _POINTER]
-    made.law_round.argtypes = [_POINTER] * 4
-    made.run_new.argtypes = [_POINTER] * 2
-    made.run_read_at.argtypes = [_POINTER, _POINTER, _I64]
-    made.run_remember.argtypes = [_POINTER, _POINTER]
-    made.run_begin.argtypes = [*[_POINTER] * 6, _D, _POINTER]
-    made.run_motion.argtypes = [_POINTER] * 2
-    made.run_continue.argtypes = [_POINTER, _I64]
-    made.run_read.argtypes = [_POINTER] * 6
-    made.run_resume.argtypes = [_POINTER] * 2
-    made.run_many.argtypes = [*[_POINTER] * 5, _I64]
-    made.run_left.argtypes = [*[_POINTER] * 5, _I64, _I32, _I64]
-    return made
-
-
-def _elements(coupled: Coupled) -> list[_Element]:
-    """The element of each function: of surfaces and sets, then of contacts."""
+def _elements(coupled: Coupled, shown: Sequence[int]) -> list[ctypes.Structure]:
+    """The element of each function: of surfaces and sets, then of contacts; and its number in results."""
     system, m, c = coupled.system, coupled.system.surface_count, len(coupled.system.impacts)
-    made, lower = list[_Element](), m + 2 * c
+    made, lower = list[ctypes.Structure](), m + 2 * c
     for name, members in zip(system.laws, system.entries, strict=True):
         i, k, further = members[0], len(members), len(coupled.lower[members[0]])
         flags = coupled.continuous[i] + 2 * coupled.scaled[i]
         law, degree = LAWS.index(name), 1 if i in system.remembering else further + 1
         degree = 0 if i in system.algebraic else degree
         size = (system.layer_widths[i], coupled.powers[i])
-        made += [_Element(law, i, k, degree, lower, flags, *size)] * k
+        rest = (law, i, k, degree, lower, flags)
+        made += [structure("Element")(*rest, shown[j], 0, *size) for j in members]
         lower += further
     law = LAWS.index("contact")
-    return [*made, *[_Element(law, m + j, 1, 2, m + c + j, 0, 1.0, 0.0) for j in range(c)]]
+    of_contact = lambda j: (law, m + j, 1, 2, m + c + j, 0, shown[m + j], 0, 1.0, 0.0)
+    return [*made, *[structure("Element")(*of_contact(j)) for j in range(c)]]
 
 
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine:
     """Return the driver with a system at the options' tolerance."""
-    order = tape_order(system, options)
+    order = tape_order(system.of_pieces, options)
     return system.cached(("tape", order), lambda: TapeEngine(system, order))
 
 
-def series_structure(s: Series, n: int, order: int, kept: list[NDArray[Any]]) -> SeriesStructure:
+def series_structure(s: Series, n: int, order: int, kept: list[NDArray[Any]]) -> ctypes.Structure:
     """Rules for n states at an order as C reads them; what it points to is added to ``kept``."""
     stride, rule, term = order + 1, s.rule.copy(), s.term.copy()
     for table, names in ((rule, "wabc"), (term, "ab")):
@@ -191,16 +92,16 @@ def series_structure(s: Series, n: int, order: int, kept: list[NDArray[Any]]) ->
     kept += (*arrays, *lists)
     states, paired = int((s.place < n).sum()), int(rule["paired"].any())
     sizes = (len(rule), len(term), len(s.input), states, len(s.outputs), paired)
-    own = [ListStructure(len(a), 0, a.ctypes.data) for a in lists]
-    return SeriesStructure(*sizes, *[a.ctypes.data for a in arrays], *own)
+    own = [structure("List")(len(a), 0, a.ctypes.data) for a in lists]
+    return structure("Series")(*sizes, *[a.ctypes.data for a in arrays], *own)
 
 
-def values_structure(v: Values, kept: list[NDArray[Any]]) -> ValuesStructure:
+def values_structure(v: Values, kept: list[NDArray[Any]]) -> ctypes.Structure:
     """A graph as C reads it; what it points to is added to ``kept``."""
     arrays = (v.op, v.a, v.b, v.still, v.moving, v.free, v.outputs, v.paired, v.constant)
     kept += arrays
     sizes = (*map(len, (v.op, v.still, v.moving, v.free, v.outputs)), int(v.paired.any()))
-    return ValuesStructure(*sizes, *[a.ctypes.data for a in arrays])
+    return structure("Values")(*sizes, *[a.ctypes.data for a in arrays])
 
 
 class _Held:
@@ -236,34 +137,38 @@ class TapeEngine:
     """The driver in C with one system at one order, with ``derived`` for derivatives."""
 
     def __init__(self, system: FilippovSystem, order: int, derived: bool = False):
-        self.system, self.order = system, order
-        self.coupled = driven_of(system)
-        tape = system.cached("tape", lambda: tape_of(self.coupled))
+        self.shown, self.order = Shown(system.of_breakpoints if derived else system), order
+        self.system = self.shown.driven
+        self.coupled = driven_of(self.system)
+        tape = self.system.cached("tape", lambda: tape_of(self.coupled))
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         entries = None
         if derived:
-            series, entries = derived_series_of(self.coupled)
+            series, entries = self._derived()
             tape = replace(tape, series=series, free=series)
         self._c = self._structure(self.coupled, tape)
         if entries is not None:
             self._c.derivatives = self._entries(entries)
         self._rooms: Rooms = rooms_of((0, 0, 0))
 
+    def _derived(self) -> tuple[Series, Entries]:
+        return self.system.cached("derived", lambda: derived_series_of(self.coupled))
+
     def add_implicit(self) -> None:
         """Give the driver the field's derivatives, which implicit steps need."""
-        series, entries = self.system.cached("derived", lambda: derived_series_of(self.coupled))
+        series, entries = self._derived()
         implicit = self._series(series, 0)
         self._c.derivatives = self._entries(entries)
         self._c.places = self._at(_places(entries, self.system.extended_dimension))
         self._c.implicit = ctypes.addressof(implicit)
         self._implicit = implicit
 
-    def _series(self, series: Series, order: int) -> SeriesStructure:
+    def _series(self, series: Series, order: int) -> ctypes.Structure:
         return series_structure(series, self.system.extended_dimension, order, self._kept)
 
-    def _structure(self, coupled: Coupled, tape: Tape) -> _System:
+    def _structure(self, coupled: Coupled, tape: Tape) -> Any:
         system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
-        made = _System(
+        made = structure("System")(
             n=system.extended_dimension,
             dimension=system.dimension,
             timed=int(system.time_dependent),
@@ -287,7 +192,7 @@ class TapeEngine:
         carries = np.zeros((m, c))
         for i, carried in enumerate(coupled.carriers):
             carries[i, carried] = 1
-        elements = _elements(coupled)
+        elements = _elements(coupled, self.shown.functions)
         tables: dict[str, Any] = {
             "carries": carries.ravel(),
             "component": tape.component,
@@ -303,14 +208,29 @@ class TapeEngine:
         made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
         made.joints, made.combined = len(system.joints), len(coupled.combined)
         made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
-        table = (_Element * (len(elements) + 1))(*elements)
+        table = (structure("Element") * (len(elements) + 1))(*elements)
         made.element = self._at(np.frombuffer(bytes(table), np.uint8))
+        made.tables, made.cells = len(self.shown.tables), self._cells()
         for name, values in tables.items():
             setattr(made, name, self._at(np.array([*values, 0], np.int32)))
         made.rules = self._rules()
         return made
 
-    def _rules(self) -> _Rules:
+    def _cells(self) -> int:
+        """Tables as C reads them, by their functions."""
+        made: Any = (structure("Cells") * (self.system.surface_count + 1))()
+        first = self.shown.parameters
+        for table in self.shown.tables:
+            values, k = table.values(), len(table.levels)
+            limits = [v for *cells, own in table.limits for v in (*cells, len(own), *chain(*own))]
+            numbers = [np.array(a, np.int32) for a in ([*table.shown, 0], [*limits, 0])]
+            arrays = [np.array([*table.levels, 0.0]), np.ascontiguousarray(values), *numbers]
+            sizes = (k, values.shape[1], first, len(table.limits))
+            made[table.element] = structure("Cells")(*sizes, *[self._at(a) for a in arrays])
+            first += values.shape[1]
+        return self._at(np.frombuffer(bytes(made), np.uint8))
+
+    def _rules(self) -> ctypes.Structure:
         """Conditions of stops and resets as C reads them."""
         d, n = self.system.definition, self.system.dimension
         conditions = [tree for rule in d.rules for tree in rule.triggers]
@@ -337,7 +257,7 @@ class TapeEngine:
         atoms, keeps = d.guards.numel(), any(rule.at_trigger for rule in d.rules)
         width = 1 + (5 + 4 * atoms + len(conditions) + 3 * len(d.clocks)) * (atoms > 0)
         width += len(conditions) * self.system.extended_dimension * keeps
-        made = _Rules(
+        made: Any = structure("Rules")(
             atoms=atoms,
             triggers=len(conditions),
             clocks=len(d.clocks),
@@ -354,8 +274,31 @@ class TapeEngine:
         self._kept.append(array)
         return array.ctypes.data
 
-    def _entries(self, e: Entries) -> EntriesStructure:
-        return EntriesStructure(len(e.row), 0, self._at(e.row), self._at(e.column))
+    def _entries(self, e: Entries) -> ctypes.Structure:
+        return structure("Entries")(len(e.row), 0, self._at(e.row), self._at(e.column))
+
+    @property
+    def atoms(self) -> int:
+        """Functions of which stops and resets are made."""
+        return int(self._c.rules.atoms)
+
+    @property
+    def motion_width(self) -> int:
+        """Numbers that a restart needs besides the state."""
+        return int(self._c.rules.width)
+
+    def blocks(self) -> tuple[ctypes.Structure, dict[int, Block]]:
+        """The system as C reads it, with what implicit steps need, and what its addresses point to."""
+        if not self._c.implicit:
+            self.add_implicit()
+        found = dict[int, Block]()
+        for array in sorted(
+            self._kept, key=lambda a: a.nbytes
+        ):  # slices begin where the whole does
+            found[array.ctypes.data] = array
+        cells = structure("Cells") * (self.system.surface_count + 1)
+        found[self._c.cells] = cells.from_buffer_copy(bytes(found[self._c.cells]))
+        return self._c, found | {ctypes.addressof(self._implicit): self._implicit}
 
     # one trajectory ----------------------------------------------------------------------------
 
@@ -377,10 +320,10 @@ class TapeEngine:
         rooms = {"rooms": self._rooms} if dense else {}
         output = Output(self.system.extended_dimension, self.order, motion=width, **rooms)
         recorder = Recorder(output, self.system.dimension, dense, read_at)
-        x, p = np.array(x, float), np.array([*p, 0.0], float)
+        x, p = np.array(x, float), self.shown.with_cells(p)
         start, known = self._letters(options.start_mode), self._letters(mode)
         with self.held_table() as table, self.held_run(table) as state:
-            c_options = ctypes.byref(options_of(self.system, options, dense=True))
+            c_options = ctypes.byref(options_of(self.shown.system, options, dense=True))
             given = (address(x), address(p), address(start))
             library().run_read_at(state, address(read_at), 0 if read_at is None else len(read_at))
             library().run_remember(state, address(known))
@@ -404,11 +347,11 @@ class TapeEngine:
         return Run(
             status=counts[0],
             reason=counts[1],
-            where=counts[2],
+            where=self.shown.where(REASONS[counts[1]], counts[2]),
             mode=counts[3],
             limit=numbers[1],
             letters=modes,
-            active=active,
+            active=[self.shown.functions[i] for i in active],
             several=[modes[k] for k in several],
             rates=rates[:, : self.system.dimension],
             facts=counts[12],
@@ -447,13 +390,14 @@ class TapeEngine:
         )
 
     def _letters(self, mode: str | None) -> NDArray[np.int8] | None:
-        return None if mode is None else np.array([*self.system.parse_letters(mode), 0], np.int8)
+        return None if mode is None else np.array([*self.shown.narrowed(mode), 0], np.int8)
 
     @property
     def _width(self) -> int:
         """Bytes of a mode: letters, then values of discrete states."""
         system = self.system
-        return system.surface_count + len(system.impacts) + 8 * len(system.definition.discrete)
+        values = len(system.definition.discrete) + len(self.shown.tables)
+        return system.surface_count + len(system.impacts) + 8 * values
 
     def held_table(self) -> _Held:
         made = library()
@@ -467,9 +411,9 @@ class TapeEngine:
         return _Held(state, made.run_free)
 
     def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
-        numbers, counts = (_D * 4)(), (_I64 * 15)()
+        numbers, counts = (ctypes.c_double * 4)(), (ctypes.c_int64 * 15)()
         width = self.system.surface_count + len(self.system.impacts)
-        active, several = (_I32 * (width + 1))(), (_I32 * SEVERAL)()
+        active, several = (ctypes.c_int32 * (width + 1))(), (ctypes.c_int32 * SEVERAL)()
         rates = np.empty((SEVERAL, self.system.extended_dimension))
         library().run_read(state, numbers, counts, active, several, address(rates))
         known, found = active[: counts[10]], several[: counts[11]]
@@ -478,7 +422,7 @@ class TapeEngine:
     def words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
         """Modes that were met, and itineraries of some nodes of their tree."""
         modes = self._modes(table)
-        spelled = [self.system.spelled(letters) for letters in modes]
+        spelled = [self.shown.system.spelled(letters) for letters in modes]
         if self.system.definition.discrete:
             rows = self._labels(table)
             spelled = [
@@ -492,7 +436,17 @@ class TapeEngine:
     def _modes(self, table: int) -> list[str]:
         """Modes that were met, by number."""
         width = self.system.surface_count + len(self.system.impacts)
-        return [self._spelled(row) for row in self._met(table)[:, :width].tolist()]
+        letters = [self._spelled(row) for row in self._met(table)[:, :width].tolist()]
+        return [*map(self.shown.widened, letters, self._values(table)[:, self._discrete :])]
+
+    @property
+    def _discrete(self) -> int:
+        return len(self.system.definition.discrete)
+
+    def _values(self, table: int) -> Array:
+        """Values of the discrete states and cells of tables in the modes that were met."""
+        width = self.system.surface_count + len(self.system.impacts)
+        return np.ascontiguousarray(self._met(table)[:, width:]).view(np.float64)
 
     def _met(self, table: int) -> NDArray[np.int8]:
         """Modes that were met, as bytes."""
@@ -503,11 +457,11 @@ class TapeEngine:
 
     def _labels(self, table: int) -> list[tuple[float, ...]]:
         """Values of the discrete states in the modes that were met."""
-        discrete = len(self.system.definition.discrete)
-        if not discrete:
-            return []
-        rows = np.ascontiguousarray(self._met(table)[:, -8 * discrete :]).view(np.float64)
-        return [tuple(row) for row in rows.tolist()]
+        return (
+            [*map(tuple, self._values(table)[:, : self._discrete].tolist())]
+            if self._discrete
+            else []
+        )
 
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``core/state.c`` for those of sets."""
@@ -534,10 +488,10 @@ class TapeEngine:
         chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
         x = np.ascontiguousarray(x, float)
-        p = np.ascontiguousarray(np.append(p, np.zeros((*p.shape[:-1], 1)), axis=-1), float)
+        p = self.shown.with_cells(p)
         batch = batch_of(x, p, options.t_start, chunk, times, None)
         start, done = self._letters(options.start_mode), np.zeros(1, np.int64)
-        c_options = options_of(self.system, options, dense=False, at=at)
+        c_options = options_of(self.shown.system, options, dense=False, at=at)
         with self.held_table() as table, self.held_run(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
             while status := library().run_many(*call, address(start), BURST):

@@ -1,5 +1,4 @@
-/* Batches on this processor: groups of W lanes that are refilled, itineraries as nodes of a tree. After lanes.c. */
-#define GROUPS MOST
+/* Batches on this processor: groups of W lanes in pools, refilled; itineraries as nodes of a tree. After lanes.c. */
 #define OFTEN 16 /* starts for each lane from which on there are several groups */
 
 INLINE const Options *limits(const Work *w) { return w->o; }
@@ -13,8 +12,16 @@ static __attribute__((noinline)) void shorten_codes(Lanes *s, Work *w) {
 
 /* Loading and storing -------------------------------------------------------------------------- */
 
+/* The run of a lane has ended. */
+static void release_lane(Lanes *s, Work *w, int l) {
+  w->alive[s->pool]--;
+#if SET
+  w->spare[w->spares++] = (int)LANE_I(s->own, l);
+#endif
+}
+
 static void store(Lanes *s, Work *w, int l, int status) {
-  w->alive--;
+  release_lane(s, w, l);
   keep_end(s, w, l, status);
 }
 
@@ -32,10 +39,14 @@ static int load(Lanes *s, Work *w, int l, I mine) {
   }
   LANE_I(s->index, l) = i;
   LANE_I(s->base, l) = 0;
-  s->past[l].count = s->past[l].steps = 0;
-  s->past[l].row = s->row;
-  s->past[l].shortened = 0;
-  w->alive++;
+#if SET
+  LANE_I(s->own, l) = w->spare[--w->spares];
+#endif
+  Past *past = past_of(s, l);
+  past->count = past->steps = 0;
+  past->row = s->row;
+  past->shortened = 0;
+  w->alive[AWAY]++;
   return 1;
 }
 
@@ -52,7 +63,7 @@ static I refill(Lanes *s, Work *w) {
   I refused = fresh & (wrong != 0);
   for EACH(l, refused) {
     refuse(w->b, LANE_I(s->index, l));
-    w->alive--;
+    release_lane(s, w, (int)l);
   }
   fresh &= ~refused;
   s->t = SELECT(fresh, BC(w->b->t0), s->t);
@@ -63,41 +74,50 @@ static I refill(Lanes *s, Work *w) {
   s->steps &= ~fresh;
   s->events &= ~fresh;
   s->entered &= ~fresh;
-  s->drop &= ~fresh;
   UNROLL for (int k = 0; k < LAST_KIND; k++) s->kinds[k] &= ~fresh;
   return fresh;
 }
 
-/* Steps of the driver ------------------------------------------------------------------------ */
-
-static Past *past_of(const Lanes *s, Work *w, int l) { (void)w; return &s->past[l]; }
-
-static void write_mode(const Lanes *s, Work *w, int l, Suspended *m) {
-  (void)w;
-  recall(s, l);
-  m->letter[0] = LANE_I(s->slides, l) ? 0 : LANE_I(s->above, l) ? 1 : -1;
-  m->drop = (int32_t)LANE_I(s->drop, l);
+#if SET
+/* The lanes ``which`` wait for another pool. */
+static void send(Lanes *s, Work *w, I which, int to) {
+  for EACH(l, which) {
+    Traveller *one = &w->queue[to][w->waiting[to]++];
+    for (int j = 0; j < w->column; j++) one->word[j] = LANE_I(((I *)s)[j], l);
+    LANE_I(s->live, l) = 0;
+    w->alive[s->pool]--;
+  }
 }
 
-static void read_mode(Lanes *s, Work *w, int l, const Suspended *m) {
-  (void)w;
-  s->past[l].row = s->row;
-  LANE_I(s->slides, l) = -(int64_t)(M > 0 && m->letter[0] == 0);
-  LANE_I(s->above, l) = -(int64_t)(m->letter[0] > 0);
-  LANE(s->lambda, l) = m->letter[0] > 0 ? 1 : -1;
-  LANE_I(s->drop, l) = m->drop;
+static void receive(Lanes *s, Work *w) {
+  for EACH(l, ~s->live) {
+    if (!w->waiting[s->pool]) return;
+    const Traveller *one = &w->queue[s->pool][--w->waiting[s->pool]];
+    for (int j = 0; j < w->column; j++) LANE_I(((I *)s)[j], l) = one->word[j];
+    w->alive[s->pool]++;
+  }
 }
+#endif
 
 static __attribute__((noinline)) void go_elsewhere(Lanes *s, Work *w, I which, int begun) {
-  for EACH(l, which)
-    if (!driven(s, w, (int)l, begun)) {
+  for EACH(l, which) {
+    int to = driven(s, w, (int)l, begun);
+    if (to < 0) {
+      release_lane(s, w, (int)l);
       LANE_I(s->live, l) = 0;
-      w->alive--;
     }
+#if SET
+    else if (to != s->pool) {
+      I one = {0};
+      LANE_I(one, l) = -1;
+      send(s, w, one, to);
+    }
+#endif
+  }
 }
 static void begin_elsewhere(Lanes *s, Work *w, I which) { go_elsewhere(s, w, which, 0); }
 
-typedef struct { Lanes lanes[GROUPS]; Step steps[GROUPS]; Past past[GROUPS][W]; Log log[GROUPS]; Work work; int begun; } Many;
+typedef struct { Lanes lanes[POOLS][GROUPS]; Step steps[GROUPS]; Log log[SET ? 1 : GROUPS]; Work work; int begun; } Many;
 
 int64_t many_size(void) { return sizeof(Many); }
 
@@ -107,10 +127,24 @@ int64_t many_size(void) { return sizeof(Many); }
   static __attribute__((noinline)) void NAME(Lanes *groups, Work *w, Step *e, int n) { \
     for (int i = 0; i < n; i++) { Lanes *s = &groups[i]; (void)w; if (any(s->live)) { CALL; } } \
   }
-PART(expand_all, expand_step(s, w, &e[i]))
-PART(sort_all, sort_step(s, &e[i]))
-PART(take_all, I unclear = take_step(s, w, &e[i]); if (any(unclear)) go_elsewhere(s, w, unclear, 1))
-static __attribute__((noinline)) void hit_all(Lanes *s, Step *e) { first_hits(GROUPS, s, e); }
+#define ELSEWHERE(CALL) I unclear = CALL; if (any(unclear)) go_elsewhere(s, w, unclear, 1)
+#define STEPS(NAME, MODE) \
+  PART(expand_##NAME, expand_step(s, w, &e[i], MODE)) \
+  PART(take_##NAME, ELSEWHERE(take_step(s, w, &e[i], MODE)))
+PART(sort_all, sort_step(s, &e[i], s->pool))
+static __attribute__((noinline)) void hit_all(Lanes *s, Step *e, int n) {
+  for (int i = 0; i < n; i += MOST) first_hits(MOST, s + i, e + i);
+}
+STEPS(away, AWAY)
+typedef void (*Part)(Lanes *, Work *, Step *, int);
+#if SET
+STEPS(on, ON)
+STEPS(going, GOING)
+PART(near_all, ELSEWHERE(come_near(s, w, &e[i])))
+static const Part EXPAND[] = {expand_away, expand_on, expand_going}, TAKE[] = {take_away, take_on, take_going};
+#else
+static const Part EXPAND[] = {expand_away}, TAKE[] = {take_away};
+#endif
 
 static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree, const Core *core) {
   Work *w = &many->work;
@@ -121,33 +155,56 @@ static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree, 
   w->words.tree = tree;
   w->groups = b->count >= OFTEN * GROUPS * W ? GROUPS : 1 + (int)(b->count / (OFTEN * W));
   prepare(b->p, q);
-  for (int i = 0; i < GROUPS; i++) {
-    many->lanes[i].size = o->atol / o->rtol;
-    many->lanes[i].past = many->past[i];
-    many->lanes[i].log = &many->log[i];
-    for (int k = 0; k < NQ; k++) many->lanes[i].q[k] = BC(q[k]);
+  for (int i = 0; i < POOLS * GROUPS; i++) {
+    Lanes *s = &many->lanes[0][i];
+    s->size = o->atol / o->rtol;
+    s->pool = i / GROUPS;
+    s->past = SET ? w->past : w->past + i * W;
+    s->log = &many->log[SET ? 0 : i];
+    for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);
   }
+#if SET
+  w->column = WORDS - (b->p_stride ? 0 : NQ);
+  for (int i = 0; i < WAITING; i++) w->spare[w->spares++] = i;
+#endif
   many->begun = 1;
+}
+
+/* The pool whose lanes take a step: the last one of a run that has enough of them. */
+static int chosen(const Work *w) {
+  for (int pool = POOLS - 1; pool >= AWAY; pool--) if (w->alive[pool] + w->waiting[pool] >= w->groups * W) return pool;
+  if (w->next < w->b->count) return AWAY;
+  for (int pool = AWAY; pool < POOLS; pool++) if (w->alive[pool] + w->waiting[pool]) return pool;
+  return -1;
 }
 
 /* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``many``
  * is zero before the first, and aligned like a vector. */
 int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, const Core *core, int64_t budget) {
-  Lanes *s = many->lanes;
-  Step *e = many->steps;
   Work *w = &many->work;
+  Step *e = many->steps;
   if (!many->begun) begin_all(many, b, o, tree, core);
   for (;;) {
-    while (w->alive < w->groups * W && w->next < b->count)
+    int pool = chosen(w);
+    if (pool < 0) return 0;
+    Lanes *s = many->lanes[pool];
+#if SET
+    for (int i = 0; i < w->groups && w->waiting[pool]; i++) receive(&s[i], w);
+#endif
+    if (pool == AWAY && w->alive[AWAY] < w->groups * W && w->next < b->count) {
       for (int i = 0; i < w->groups; i++) {
         I fresh = refill(&s[i], w);
         if (any(fresh)) begin(&s[i], w, fresh);
       }
-    if (!w->alive) return 0;
+      continue;
+    }
     if ((budget -= w->groups) < 0) return 1;
-    expand_all(s, w, e, w->groups);
+#if SET
+    if (pool == NEAR_SET) { near_all(s, w, e, w->groups); continue; }
+#endif
+    EXPAND[pool](s, w, e, w->groups);
     sort_all(s, w, e, w->groups);
-    hit_all(s, e);
-    take_all(s, w, e, w->groups);
+    hit_all(s, e, w->groups);
+    TAKE[pool](s, w, e, w->groups);
   }
 }

@@ -131,7 +131,7 @@ static inline void read_record(Lanes *s, const Work *w, const int64_t *record, i
 }
 
 /* The driver takes the run from here. */
-SELDOM void leave(Lanes *s, Work *w, int begun) {
+OUTLINED void leave(Lanes *s, Work *w, int begun) {
   write_record(s, begun, w->out.left + (int64_t)atomicAdd(w->out.left_count, 1ULL) * WORDS);
   w->out.status[s->index.v] = HAND_OVER;
   w->alive = 0;
@@ -198,10 +198,10 @@ static inline int load(Lanes *s, Work *w) {
 
 static inline void step(Lanes *s, Work *w) {
   Step e;
-  expand_step(s, w, &e);
-  sort_step(s, &e);
+  expand_step(s, w, &e, AWAY);
+  sort_step(s, &e, AWAY);
   first_hits(1, s, &e);
-  if (any(take_step(s, w, &e))) leave(s, w, 1);
+  if (any(take_step(s, w, &e, AWAY))) leave(s, w, 1);
 }
 
 /* A thread whose run has ended takes its next start at once: its neighbours wait for that, and all make their step

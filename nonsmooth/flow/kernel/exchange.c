@@ -1,6 +1,13 @@
-/* What lanes of every kind give to the driver and take back, on this processor; where their runs end. After the types of
- * the lanes, which define LETTERS, OF_POOLS, past_of, write_mode and read_mode.
- */
+/* What lanes give to the driver and take back, on this processor; where their runs end. */
+#if SET
+#define WAITING (4 * GROUPS * W)
+
+/* A trajectory on its way to another pool, in words. */
+#define WORDS ((int)(__builtin_offsetof(Lanes, size) / sizeof(T)))
+typedef struct { int64_t word[WORDS]; } Traveller;
+#else
+#define WAITING (GROUPS * W)
+#endif
 
 /* A batch, and how far it is. */
 struct Work {
@@ -9,8 +16,12 @@ struct Work {
   const Core *core;
   Words words;
   int64_t next;
-  int groups;
-  OF_POOLS
+  int groups, alive[POOLS], waiting[POOLS]; /* trajectories in lanes of a pool, and those that wait for one */
+  Past past[WAITING];
+#if SET
+  int column, spares, spare[WAITING]; /* words of a trajectory; pasts that are free */
+  Traveller queue[POOLS][WAITING];
+#endif
 };
 
 /* A lane as the driver takes and gives it back. */
@@ -20,10 +31,6 @@ typedef struct {
   int64_t kinds[KINDS];
   int8_t letter[LETTERS], side[STOPS + 1];
 } Packed;
-
-static Past *past_of(const Lanes *s, Work *w, int l);
-static void write_mode(const Lanes *s, Work *w, int l, Suspended *m);
-static void read_mode(Lanes *s, Work *w, int l, const Suspended *m);
 
 static void point_to(Packed *a, Past *past) {
   a->m.x = a->x;
@@ -37,8 +44,8 @@ static void point_to(Packed *a, Past *past) {
 
 static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   Suspended *m = &a->m;
-  const Past *past = past_of(s, w, l);
-  write_mode(s, w, l, m);
+  const Past *past = past_of(s, l);
+  write_mode(s, l, m);
   UNROLL for (int i = 0; i < N; i++) a->x[i] = LANE(s->x[i], l);
   for (int k = 0; k < LAST_KIND; k++) a->kinds[k] = LANE_I(s->kinds[k], l);
   for (int j = 0; j < STOPS; j++) a->side[j] = LANE_I(s->above_stop[j], l) ? 1 : -1;
@@ -53,9 +60,10 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   m->itinerary = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
 }
 
-static void unpack(Lanes *s, Work *w, int l, const Packed *a) {
+/* Returns the pool where a lane goes on. */
+static int unpack(Lanes *s, int l, const Packed *a) {
   const Suspended *m = &a->m;
-  Past *past = past_of(s, w, l);
+  Past *past = past_of(s, l);
   UNROLL for (int i = 0; i < N; i++) LANE(s->x[i], l) = a->x[i];
   for (int k = 0; k < LAST_KIND; k++) LANE_I(s->kinds[k], l) = a->kinds[k];
   for (int j = 0; j < STOPS; j++) LANE_I(s->above_stop[j], l) = -(int64_t)(a->side[j] > 0);
@@ -69,7 +77,7 @@ static void unpack(Lanes *s, Work *w, int l, const Packed *a) {
   past->count = m->history;
   LANE_I(s->base, l) = m->itinerary;
   LANE_I(s->code, l) = 0;
-  read_mode(s, w, l, m);
+  return read_mode(s, l, m);
 }
 
 static void keep_end(const Lanes *s, Work *w, int l, int status) {
@@ -116,15 +124,13 @@ INLINE I by_chance(const Lanes *s, const Work *w) {
   return which;
 }
 
-/* Let the driver begin the run of a lane, or make its step: whether the run goes on, in the lane. Else the driver has
- * stored where it ended. */
+/* Let the driver begin the run of a lane, or make its step: the pool where the run goes on, from this lane. Else, if
+ * negative, the driver has stored where it ended. */
 static __attribute__((noinline)) int driven(Lanes *s, Work *w, int l, int begun) {
   Packed a;
-  point_to(&a, past_of(s, w, l));
+  point_to(&a, past_of(s, l));
   if (begun) pack(s, w, l, &a);
   (begun ? w->core->step : w->core->begin)(w->core->run, w->b, w->o, LANE_I(s->index, l), &a.m);
   w->b->totals[2]++;
-  if (a.m.status != RUNNING) return 0;
-  unpack(s, w, l, &a);
-  return 1;
+  return a.m.status == RUNNING ? unpack(s, l, &a) : -1;
 }

@@ -7,7 +7,7 @@
 #define LAST_KIND (SIMPLE_KINDS - 1) /* the end of a run; events of the kinds before it are counted */
 #define INLINE static inline
 #define FUNCTION static inline void
-#define SELDOM static inline
+#define OUTLINED static inline
 
 struct T;
 struct I {

@@ -34,12 +34,12 @@ INLINE T sine_of(T a, int quarters) {
   return (T)((I)SELECT(odd, cosine_near(x, y), sine_near(x, y)) ^ negative);
 }
 
-SELDOM T SIN_(T a) {
+OUTLINED T SIN_(T a) {
   T found = sine_of(a, 0);
   for EACH(l, ~(I)(ABS(a) < LARGEST_ANGLE)) LANE(found, l) = sin(LANE(a, l));
   return found;
 }
-SELDOM T COS_(T a) {
+OUTLINED T COS_(T a) {
   T found = sine_of(a, 1);
   for EACH(l, ~(I)(ABS(a) < LARGEST_ANGLE)) LANE(found, l) = cos(LANE(a, l));
   return found;

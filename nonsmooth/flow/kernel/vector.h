@@ -17,7 +17,7 @@ typedef int64_t I __attribute__((vector_size(8 * W)));
 #define SELECT(m, a, b) ((T)(((I)(a) & (m)) | ((I)(b) & ~(m))))
 #define INLINE static inline __attribute__((always_inline))
 #define FUNCTION static __attribute__((noinline)) void
-#define SELDOM static __attribute__((noinline))
+#define OUTLINED static __attribute__((noinline))
 #define UNROLL _Pragma("GCC unroll 32")
 
 #define LANEWISE(NAME, f) \

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -228,7 +229,7 @@ class Meeting:
 
     def intersection(self) -> Intersection:
         """Find all modes that can go on."""
-        candidates, complete = self._candidates()
+        candidates, complete = self._candidates
         slacks = [(self._slack(lam, mode), mode, lam) for mode, lam in candidates]
         going = [self._continuation(mode, lam, s) for s, mode, lam in slacks if s >= 0.0]
         whole = [c for c in going if all(c.mode[i] == "s" for i in self.surfaces)]
@@ -241,6 +242,7 @@ class Meeting:
             complete=complete,
         )
 
+    @cached_property
     def _candidates(self) -> tuple[list[tuple[str, Array]], bool]:
         """Modes with their multipliers, those outside [-1, 1] included; whether they are all."""
         k = len(self.surfaces)
@@ -264,6 +266,11 @@ class Meeting:
 
     def _solved(self, letters: Array) -> Iterable[tuple[str, Array]]:
         mode = self._mode(letters)
+        if not np.any(letters) and self.layer.affine:
+            lam = self._dependent()
+            if lam is not None:
+                yield mode, lam
+                return
         coupled = coupled_of(self.system)
         for unknowns in sliding_multipliers(coupled, mode, self.x, self.p, stable_only=False):
             lam = self._with(letters)
@@ -274,6 +281,18 @@ class Meeting:
                 lam[slides] = (unknowns / factors)[slides]
             if np.all(np.isfinite(lam)):
                 yield mode, lam
+
+    def _dependent(self) -> Array | None:
+        """Multipliers of least norm that hold all surfaces, where their matrix is singular; None if there are none."""
+        none = self._with(np.zeros(len(self.surfaces)))
+        at = self.at(none)
+        a, m = at.rates[self.surfaces], at.rates_l[np.ix_(self.surfaces, self.surfaces)]
+        size = float(np.abs(m).max(initial=0.0))
+        if not size or np.linalg.matrix_rank(m, tol=_NEUTRAL * size) == len(m):
+            return None
+        lam = np.asarray(np.linalg.lstsq(m, -a, rcond=_NEUTRAL)[0], dtype=np.float64)
+        holds = np.abs(a + m @ lam).max() <= _NEUTRAL * (size + np.abs(a).max())
+        return self._with(lam) if holds else None
 
     def _mode(self, letters: Array) -> str:
         values = self._with(letters)
@@ -295,8 +314,15 @@ class Meeting:
                 slack.append(1.0 - abs(float(lam[i])))
             else:
                 angle = found.rates[i] / sizes[i] if sizes[i] else 0.0
+                if abs(angle) <= TOLERANCE and sizes[i] and not self.system.switching(i).slides:
+                    angle = self._bend(found, i) / sizes[i]  # an orbit that touches, or that turns
                 slack.append(float(angle if mode[i] == "+" else -angle))
         return min(slack)
+
+    def _bend(self, found: LayerNumbers, i: int) -> float:
+        """Second derivative of a surface along the motion, over the field's rate in the layer's mode."""
+        speed = float(np.linalg.norm(found.field))
+        return float(found.rates_x[i] @ found.field) * (1 + float(np.linalg.norm(self.x))) / speed
 
     def _continuation(self, mode: str, lam: Array, slack: float) -> Continuation:
         found = self.at(lam)
@@ -328,14 +354,18 @@ class Meeting:
 
     def _return_map(self) -> tuple[float, float] | None:
         """How an orbit comes back that runs once round a point of the plane: ratio and bend."""
-        rates, slopes = [], []
+        rates, slopes, sizes = [], [], []
         for quadrant in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
             found = self.at(self._with(np.array(quadrant, float)))
             h_x = found.h_x[self.surfaces]
             if np.linalg.det(h_x) == 0.0:
                 return None
             rates.append(found.rates[self.surfaces])
+            sizes.append(np.linalg.norm(h_x, axis=1) * np.linalg.norm(found.field))
             slopes.append(found.rates_x[self.surfaces] @ np.linalg.inv(h_x))
+        for turned in (0, 1):
+            if np.all(np.abs(np.array(rates)) <= TOLERANCE * np.array(sizes), axis=0)[turned]:
+                return _go_round_a_touch(np.array(rates)[:, 1 - turned], np.array(slopes), turned)
         return point_law.go_round(np.array(rates), np.array(slopes))
 
     def _shrinks(self, lam: Array, m: Array, sign: float) -> bool:
@@ -347,7 +377,7 @@ class Meeting:
         from scipy.optimize import linprog
 
         rows = []
-        for mode, values in self._candidates()[0]:
+        for mode, values in self._candidates[0]:
             if all(mode[i] == "s" for i in self.surfaces) or np.abs(values).max() > 1.0 + _NEUTRAL:
                 continue
             terms = ((values - lam) * self.at(values).rates)[self.surfaces]
@@ -364,6 +394,22 @@ class Meeting:
             bounds=[(0.0, 1.0)] * len(self.surfaces) + [(None, None)],
         )
         return found.x is not None and bool(found.x[-1] > _NEUTRAL)
+
+
+def _go_round_a_touch(speeds: Array, slopes: Array, turned: int) -> tuple[float, float] | None:
+    """Return map of a point where orbits touch one of the surfaces in all quadrants ++, -+, --, +-.
+
+    Along them $h' = c k$ and $k' = s$, so that k turns from v to $-v sqrt(|s'/s|)$ between two passages of h = 0.
+    """
+    other = 1 - turned
+    c, above = slopes[:, turned, other], np.array([[1, 0, 0, 1], [1, 1, 0, 0]][turned], bool)
+    out = np.sign(c[0])
+    if not np.all(out * c > 0) or not np.all(np.where(above, -out, out) * speeds > 0):
+        return None
+    rising = np.array([[1, 1, 0, 0], [1, 0, 0, 1]][turned], bool)  # k > 0
+    leaving = above == (rising if out > 0 else ~rising)
+    ratio = float(np.sqrt(np.prod(np.abs(speeds[~leaving])) / np.prod(np.abs(speeds[leaving]))))
+    return ratio if abs(ratio - 1.0) > _NEUTRAL else 1.0, 0.0
 
 
 # the range of Filippov's convex set --------------------------------------------------------------

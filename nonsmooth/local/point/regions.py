@@ -12,7 +12,8 @@ from ...model.checks import positive
 from ...model.laws.frozen import Frozen
 from ..discrete_states import with_discrete_states_held
 from .higher_codimension import law_at
-from .surface_point import TOLERANCE, Numbers, on_surface, surface_at
+from .one_sided import one_sided_at, velocity_while_closed
+from .surface_point import TOLERANCE, LocalSurface, Numbers, on_surface, surface_at
 
 
 class Region(Enum):
@@ -57,6 +58,14 @@ def region_of(numbers: Numbers, tol: float) -> Region:
     }.get((above, below), Region.TANGENT_ABOVE if above == 0 else Region.TANGENT_BELOW)
 
 
+def region_at(where: LocalSurface, numbers: Numbers, tol: float) -> Region:
+    """Name the region of a surface, or of the boundary of a condition or contact, at a point."""
+    if not where.one_sided:
+        return region_of(numbers, tol)
+    way = one_sided_at(where, numbers).way(tol)
+    return {1: Region.CROSSING_UP, -1: Region.ATTRACTING, 0: Region.TANGENT_ABOVE}[way]
+
+
 @with_discrete_states_held
 def region(
     system: FilippovSystem,
@@ -70,7 +79,8 @@ def region(
 ) -> Region:
     """Region of the switching surface, or of a set of codimension two or three, in which a point lies.
 
-    On a set $h = 0$ with a vector multiplier $h' = a - M lambda$: ``SLIDING`` where $|M^-1 a| < 1$, so that
+    On the boundary of a condition or contact ``ATTRACTING`` where it is closed or hit, ``CROSSING_UP`` where a
+    motion leaves it. On a set $h = 0$ with a vector multiplier $h' = a - M lambda$: ``SLIDING`` where $|M^-1 a| < 1$, so that
     $lambda = M^-1 a$ keeps the motion on it; ``CROSSING`` where $|M^-1 a| > 1$ (see
     :func:`limit_directions`), ``BOUNDARY`` between; ``MIXED`` where M has a negative direction, or
     none in which it attracts.
@@ -119,12 +129,12 @@ def region(
     >>> [str(region(s, [x0, 0.0])) for x0 in (0.2, -0.5, 0.4)]
     ['attracting sliding', 'crossing up', 'tangency of the field below']
     """
-    require_system(system, sets=True)
+    require_system(system, sets=True, complementarity=True, joints=True)
     if system.sets and _is_set(system, surface):
         tol = positive(tol, "tol")
         return _region_of_set(law_at(system, point, parameters, t, surface, mode, tol), tol)
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    return region_of(on_surface(where, x, positive(tol, "tol")), tol)
+    return region_at(where, on_surface(where, x, positive(tol, "tol"), slopes=where.one_sided), tol)
 
 
 def _is_set(system: FilippovSystem, surface: int) -> bool:
@@ -198,7 +208,12 @@ def alpha(
     0.75
     """
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    numbers = on_surface(where, x, positive(tol, "tol"))
+    numbers = on_surface(where, x, positive(tol, "tol"), slopes=where.one_sided)
+    if where.one_sided:
+        raise PointError(
+            f"alpha: a condition or contact has no field below. Its multiplier at {x.tolist()} is in "
+            "classify(system, point).evidence."
+        )
     found = region_of(numbers, tol)
     _refuse_crossing(numbers, found, "alpha")
     if found is Region.TWO_FOLD:
@@ -254,7 +269,9 @@ def sliding_field(
     array([1., 0.])
     """
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    numbers = on_surface(where, x, positive(tol, "tol"))
+    numbers = on_surface(where, x, positive(tol, "tol"), slopes=where.one_sided)
+    if where.one_sided:
+        return velocity_while_closed(where, numbers, tol)[: system.dimension]
     found = region_of(numbers, tol)
     _refuse_crossing(numbers, found, "sliding field")
     if found is Region.TWO_FOLD and not coincide(numbers, tol):
@@ -263,8 +280,8 @@ def sliding_field(
             f"tangent and different at {x.tolist()}. The sliding field is 0/0 at this two-fold "
             "and its limit depends on the direction; find_two_fold gives the class of the point."
         )
-    build = motion(system, where.mode)
-    function = system.function(("sliding field", where.mode), lambda: [build.field])
+    build = motion(where.system, where.mode)
+    function = where.system.function(("sliding field", where.mode), lambda: [build.field])
     value = call(function, x, where.parameters)[0].ravel()
     if found is Region.TWO_FOLD:
         middle = numbers.fields.mean(axis=0)

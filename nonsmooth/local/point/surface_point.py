@@ -7,25 +7,30 @@ and vectors have N coordinates: the states, then time if the system depends on i
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...flow.fixed import first_terms
 from ...model import (
     Array,
     DefinitionError,
     FilippovSystem,
+    OneSurface,
     Parameters,
     PointError,
     Switching,
     call,
     evaluator,
-    motion,
+    one_surface,
     require_system,
 )
+from ...model.derivatives.variational import guarded_field
+from ...solvers.newton import Equations
 from ..checks import require_surface
+from .elements_at import Situation, acts, chosen, situation
 
 #: Default of ``tol`` at a given point: an angle, and a relative distance.
 TOLERANCE = 1e-10
@@ -53,6 +58,12 @@ def side_index(side: object) -> int:
 def other(side: Side) -> Side:
     """The other side."""
     return "-" if side == "+" else "+"
+
+
+def null_space(rows: Array) -> Array:
+    """Orthonormal basis of the directions that rows (k, N) leave free, dependent ones included; (N, d)."""
+    sizes, basis = np.linalg.svd(rows)[1:]
+    return np.asarray(basis[np.count_nonzero(sizes > 1e-10 * sizes.max(initial=0.0)) :].T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,12 +158,50 @@ class LocalSurface:
     surface: int
     mode: str  # one letter per surface, ``s`` for this one; empty for a smooth system
     parameters: Array
+    element: OneSurface | None = None  # what it is in a system with conditions, contacts or joints
 
     def side(self, letter: str) -> str:
         """Return the mode above (``+``) or below (``-``) the surface; of a smooth system its one mode."""
         if not self.mode:
             return ""
         return self.mode[: self.surface] + letter + self.mode[self.surface + 1 :]
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether it is the boundary of a condition or of a contact, below which there is no motion."""
+        return self.element is not None and self.element.kind in ("one-sided", "contact")
+
+    def along(self, x: Array) -> Array | None:
+        """Orthonormal basis (N, d) of the tangent space of joints and of what is closed; None if all is free."""
+        if self.element is None or not self.element.kept:
+            return None
+        return null_space(self.element.kept_at(x, self.parameters)[1])
+
+    @property
+    def free(self) -> LocalSurface:
+        """The same with derivatives in all directions, also those that leave joints and closed contacts."""
+        return replace(self, element=None)
+
+    def with_kept(self, equations: Equations, velocities: bool = False) -> Equations:
+        """Equations whose first unknowns are the states, and those of joints and of what is closed.
+
+        The first equations are components of a velocity if ``velocities``: those along the joints are taken.
+        """
+        element, n = self.element, self.system.extended_dimension
+        if element is None or not element.kept:
+            return equations
+
+        def more(u: Array) -> tuple[Array, Array]:
+            values, matrix = equations(u)
+            kept, gradient, _ = element.kept_at(u[:n], self.parameters)
+            rows = np.pad(gradient, [(0, 0), (0, u.size - n)])
+            if velocities:
+                along = null_space(gradient).T
+                values = np.concatenate([along @ values[:n], values[n:]])
+                matrix = np.vstack([along @ matrix[:n], matrix[n:]])
+            return np.concatenate([values, kept]), np.vstack([matrix, rows])
+
+        return more
 
     @property
     def values(self) -> dict[str, float]:
@@ -196,13 +245,16 @@ class LocalSurface:
         evaluate = evaluator(self.system, ("local", self.surface, self.mode), self._build)
         h, l1, l2, *vectors = evaluate.copied(x, self.parameters)
         g, g1, g2, f1, f2 = (v.ravel() for v in vectors)
-        lie = np.array([l1[0, 0], l2[0, 0]])
-        return Numbers(x, float(h[0, 0]), g, np.array([f1, f2]), lie, np.array([g1, g2]))
+        lie, rows = np.array([l1[0, 0], l2[0, 0]]), np.array([g, f1, f2, g1, g2])
+        basis = self.along(x)
+        rows = rows if basis is None else rows @ basis
+        return Numbers(x, float(h[0, 0]), rows[0], rows[1:3], lie, rows[3:])
 
-    def finite_at(self, x: Array) -> Numbers:
-        """Evaluate as ``at`` does and refuse NaN and inf."""
+    def finite_at(self, x: Array, slopes: bool = True) -> Numbers:
+        """Evaluate as ``at`` does and refuse NaN and inf, those of grad L1 and grad L2 if ``slopes``."""
         numbers = self.at(x)
-        if not all(np.all(np.isfinite(v)) for v in (numbers.h, numbers.fields, numbers.gradients)):
+        gradients = numbers.gradients if slopes else numbers.gradient
+        if not all(np.all(np.isfinite(v)) for v in (numbers.h, numbers.fields, gradients)):
             raise PointError(
                 f"point {x}: expected a state where the fields and the derivatives of h, L1 and "
                 f"L2 are finite, received h={numbers.h}, F1={numbers.fields[0]}, "
@@ -255,7 +307,8 @@ class LocalSurface:
         def build() -> Sequence[Any]:
             return [system.gradient(f[i]) for f in self._expressions()[2] for i in range(size)]
 
-        return self._rows("jacobians", build, x).reshape(2, size, size)
+        found, basis = self._rows("jacobians", build, x).reshape(2, size, size), self.along(x)
+        return found if basis is None else np.asarray(basis.T @ found @ basis)
 
     def hessians(self, x: Array) -> tuple[Array, Array]:
         """Hessians of h, L1, L2 (3, N, N) and of the numerator L2 F1 - L1 F2 of sliding (N, N, N)."""
@@ -267,8 +320,27 @@ class LocalSurface:
             gradients = [system.gradient(e) for e in (h, l1, l2, *numerator)]
             return [system.gradient(g[i]) for g in gradients for i in range(size)]
 
-        found = self._rows("hessians", build, x).reshape(3 + size, size, size)
+        found, basis = self._rows("hessians", build, x).reshape(3 + size, size, size), self.along(x)
+        if basis is not None:
+            found = self._bent(found, x, basis)
+            return found[:3], np.einsum("ia,ijk->ajk", basis, found[3:])
         return found[:3], found[3:]
+
+    def _bent(self, hessians: Array, x: Array, basis: Array) -> Array:
+        """Second derivatives along the manifold of what is kept, which bends."""
+        system, size = self.system, self.system.extended_dimension
+        assert self.element is not None
+
+        def build() -> Sequence[Any]:
+            h, (l1, l2), (f1, f2) = self._expressions()
+            numerator = [l2 * f1[i] - l1 * f2[i] for i in range(size)]
+            return [system.gradient(e) for e in (h, l1, l2, *numerator)]
+
+        slopes = self._rows("slopes", build, x)
+        _, gradient, second = self.element.kept_at(x, self.parameters)
+        normal = -slopes @ np.linalg.pinv(gradient, rcond=1e-10)
+        flat = hessians + np.einsum("ik,kab->iab", normal, second)
+        return np.asarray(basis.T @ flat @ basis)
 
     def parameter_derivatives(self, x: Array) -> tuple[Array, Array]:
         """Derivatives of h (q,) and of F1, F2 (2, N, q) by the q parameters, at a point."""
@@ -293,8 +365,8 @@ class LocalSurface:
 
     def orbit(self, x: Array, letter: str, order: int) -> tuple[Array, Array]:
         """Taylor coefficients of an orbit (N, order + 1) and of h on it, L^k h/k! (order + 1,)."""
-        jet = motion(self.system, self.side(letter)).jet_function(order)
-        states, guards = call(jet, x, self.parameters)
+        field = guarded_field(self.system, self.side(letter))
+        states, guards = first_terms(field, x, self.parameters, order)
         # the guard of a side is h there, and positive
         return states, (1.0 if letter == "+" else -1.0) * guards[self.surface]
 
@@ -308,11 +380,24 @@ def surface_at(
     mode: str | None = None,
     *,
     smooth: bool = False,
+    tol: float = 1e-9,
+    search: bool = False,
+    flight: bool = False,
 ) -> tuple[LocalSurface, Array]:
-    """Check the arguments of a function at a point; ``smooth`` allows a system without surfaces."""
-    require_system(system)
+    """Check the arguments of a function at a point; ``smooth`` allows a point on no surface, or a system without.
+
+    The point of a ``search`` is near the surface, and ``mode`` has the letters of conditions and contacts. In a
+    ``flight`` contacts are open, wherever the point is.
+    """
+    require_system(system, complementarity=True, joints=True)
     x = system.extended_point(point, t)
     p = system.parameter_vector(parameters)
+    if not flight and acts(system, x, p, mode, tol):
+        if search:
+            found = chosen(system, surface, mode)
+        else:
+            found = situation(system, x, p, surface, mode, tol)
+        return _element_at(system, x, p, found, smooth), x
     if system.surface_count == 0 and smooth:
         if surface or mode:
             raise DefinitionError(
@@ -335,12 +420,30 @@ def surface_at(
     return LocalSurface(system, int(surface), "".join(letters), p), x
 
 
+def _element_at(
+    system: FilippovSystem, x: Array, p: Array, found: Situation, smooth: bool
+) -> LocalSurface:
+    """The surface, condition or contact at a point, with the others held."""
+    if found.element is None and not smooth:
+        raise PointError(
+            f"point {x.tolist()}: expected a point on a surface or where a condition or contact opens or closes, received "
+            f"one inside the mode {found.mode!r}. find_equilibrium(system, near, mode={found.mode!r}) goes to where it rests."
+        )
+    element = one_surface(system, found.mode, found.element)
+    return LocalSurface(element.system, 0, "" if found.element is None else "s", p, element)
+
+
 def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
     if system.surface_count == 1:
         return "s"
     values = _switches(system, x, p).tolist()
     for i, value in enumerate(values):
         if i != surface and value == 0:
+            if values[surface]:
+                raise PointError(
+                    f"point {x}: expected a point on surface {surface}, received one on surface {i}. Give surface={i}, or "
+                    "the side with mode=, one letter per surface."
+                )
             raise PointError(
                 f"point {x}: expected a side of surface {i}, received a point on surfaces "
                 f"{surface} and {i}. Choose the side with mode=, one letter per surface."
@@ -358,9 +461,9 @@ def _switches(system: FilippovSystem, x: Array, p: Array) -> Array:
     return np.array([v.item() for v in call(system.function(("local", "surfaces"), build), x, p)])
 
 
-def on_surface(where: LocalSurface, x: Array, tol: float) -> Numbers:
-    """Evaluate at a point whose distance from the surface is at most ``tol (1 + |x|)``."""
-    numbers = where.finite_at(x)
+def on_surface(where: LocalSurface, x: Array, tol: float, slopes: bool = True) -> Numbers:
+    """Evaluate as ``finite_at`` does at a point whose distance from the surface is at most ``tol (1 + |x|)``."""
+    numbers = where.finite_at(x, slopes)
     if not np.any(numbers.gradient):
         raise PointError(
             f"point {x}: expected a regular point of surface {where.surface}, received grad h = "

@@ -1,5 +1,8 @@
 """Scan of a planar system in a box: pieces of its surface, folds, equilibria, pseudo-equilibria.
 
+The surface may be that of a complementarity condition. Where a condition or a gap is negative, or an event is due
+at once, there is no motion.
+
 Points are found by sign changes on a grid and then solved for. Two of a kind closer than the grid
 (1/160 of the box) can be missed. Names follow Kuznetsov, Rinaldi & Gragnani 2003.
 """
@@ -15,12 +18,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, FilippovSystem
+from ...model import Array, FilippovSystem, HeldEvent, call, one_surface
 from ...solvers.newton import solve_many
 from ..point.surface_point import SIDES, LocalSurface, ManyNumbers, Side
 from ..searches.equilibria import Equilibrium, find_equilibrium
 from ..searches.folds import Fold, tangency_near
-from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
+from ..searches.pseudo_equilibria import (
+    PseudoEquilibrium,
+    closed_equilibrium,
+    find_pseudo_equilibrium,
+)
 from ..searches.search import find_all
 from .box import Box, inserted, middle_of_sign_changes, refined, sign_changes, zero_lines
 
@@ -44,12 +51,61 @@ class PlaneScan:
 
     where: LocalSurface
     box: Box
+    whole: FilippovSystem
+    events: tuple[HeldEvent, ...] = ()
 
     @classmethod
-    def of(cls, system: FilippovSystem, parameters: Mapping[str, float], box: Box) -> PlaneScan:
-        """Scan a system of two states, at most one surface and no explicit time."""
-        mode = "s" if system.surface_count else ""
-        return cls(LocalSurface(system, 0, mode, system.parameter_vector(parameters)), box)
+    def of(
+        cls,
+        system: FilippovSystem,
+        parameters: Mapping[str, float],
+        box: Box,
+        events: tuple[HeldEvent, ...] = (),
+    ) -> PlaneScan:
+        """Scan a system of two states, at most one surface or condition and no explicit time."""
+        p, mode = system.parameter_vector(parameters), "s" if system.surface_count else ""
+        where = LocalSurface(system, 0, mode, p)
+        if system.complementarity:
+            element = one_surface(system, "o", 0)
+            where = LocalSurface(element.system, 0, mode, p, element)
+        return cls(where, box, system, events)
+
+    @cached_property
+    def excluded(self) -> list[Any]:
+        """Functions of the state that are positive where there is no motion, as expressions."""
+        found, gaps = self._levels, self.whole.definition.gaps
+        found += [-gaps[j] for j in range(gaps.numel())]
+        return [*found, -self.where.system.surface_function()] if self.where.one_sided else found
+
+    @property
+    def _levels(self) -> list[Any]:
+        return [e.region for e in self.events if e.level]
+
+    def is_excluded(self, points: Array) -> NDArray[np.bool_]:
+        """Whether there is no motion at points (k, 2)."""
+        return self._any_positive(self.excluded, "excluded", points)
+
+    def is_due(self, points: Array) -> NDArray[np.bool_]:
+        """Whether an event is due at once at points (k, 2)."""
+        return self._any_positive(self._levels, "levels", points)
+
+    def _any_positive(self, functions: list[Any], name: str, points: Array) -> NDArray[np.bool_]:
+        if not functions or not len(points):
+            return np.zeros(len(points), dtype=bool)
+        function = self.whole.function((name, self.events), lambda: functions)
+        values = call(function, points.T, self.where.parameters)
+        return np.asarray(np.any([v.ravel() > 0.0 for v in values], axis=0))
+
+    def of_events(self, points: Array) -> list[Array]:
+        """For each event a function at points (k, 2) that is zero where it is due, NaN where its filter does not hold."""
+
+        def build() -> list[Any]:
+            return [e for event in self.events for e in event.functions]
+
+        function = self.whole.function(("events", self.events), build)
+        values = [v.ravel() for v in call(function, points.T, self.where.parameters)]
+        pairs = zip(values[::2], values[1::2], strict=True)
+        return [np.where(when >= 0.0, due, np.nan) for due, when in pairs]
 
     def at(self, points: Array) -> ManyNumbers:
         """Numbers at points (k, 2)."""
@@ -77,9 +133,16 @@ class PlaneScan:
 
     @cached_property
     def pieces(self) -> list[Piece]:
-        """The surface cut at its folds."""
+        """The surface cut at its folds, where there is motion."""
         found = [_pieces(self, curve) for curve in self.curves]
-        return [piece for pieces in found for piece in pieces]
+        return [part for pieces in found for piece in pieces for part in self._moving(piece)]
+
+    def _moving(self, piece: Piece) -> list[Piece]:
+        """Parts of a piece at which no event is due at once."""
+        due = self.is_due(piece.points)
+        cuts = [0, *(np.flatnonzero(due[1:] != due[:-1]) + 1), len(due)]
+        parts = [(a, b) for a, b in pairwise(cuts) if not due[a] and b - a > 1]
+        return [Piece(piece.kind, piece.points[a:b]) for a, b in parts]
 
     # special points ----------------------------------------------------------------------------
 
@@ -95,12 +158,18 @@ class PlaneScan:
                 share = np.nan_to_num(values[k] / (values[k] - values[k + 1]))
             starts.append(curve[k] + share[:, None] * (curve[k + 1] - curve[k]))
         found = find_all(look, np.vstack(starts)[:_MOST])
-        return [f for f in found if self.box.contains(f.point)]
+        found = [f for f in found if self.box.contains(f.point)]
+        return [f for f in found if not self.is_due(f.point[None, :])[0]]
 
     @cached_property
     def tangencies(self) -> list[Fold]:
         """Where a field is tangent to the surface or zero: folds, and boundary equilibria."""
-        return [fold for k, side in enumerate(SIDES) for fold in self._folds(k, side)]
+        return [fold for k, side in enumerate(self.sides) for fold in self._folds(k, side)]
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """Sides on which there is motion."""
+        return SIDES if self.where.mode and not self.where.one_sided else SIDES[:1]
 
     def _folds(self, k: int, side: Side) -> list[Fold]:
         where = self.where
@@ -134,7 +203,7 @@ class PlaneScan:
         """Folds of both fields, those in one point where a force jumps; none of a continuous surface."""
         if not self.where.mode:
             return []
-        soft = self.where.switching.kind == "continuous"
+        soft = not self.where.one_sided and self.where.switching.kind == "continuous"
         return [] if soft else self._apart(self.tangencies)
 
     @cached_property
@@ -149,15 +218,29 @@ class PlaneScan:
         def look(x: Array) -> PseudoEquilibrium:
             return find_pseudo_equilibrium(where.system, x, parameters=where.values)
 
+        if where.one_sided:
+            return self._apart(self._closed())
         found = self._from_curves(along, look)
         return self._apart([e for e in found if e.status == "real"])
+
+    def _closed(self) -> list[PseudoEquilibrium]:
+        """Where a condition rests while it is closed."""
+
+        def along(numbers: ManyNumbers) -> Array:
+            tangent = np.column_stack([numbers.gradient[:, 1], -numbers.gradient[:, 0]])
+            return np.sum(numbers.fields[:, 1] * tangent, axis=1)
+
+        def look(x: Array) -> Equilibrium:
+            return find_equilibrium(self.whole, x, parameters=self.where.values, mode="c")
+
+        found = self._from_curves(along, look)
+        return [closed_equilibrium(e) for e in found if e.status == "real"]
 
     @cached_property
     def equilibria(self) -> list[Equilibrium]:
         """Equilibria of each field on its own side."""
         numbers = self.at(self.box.grid(_CELLS))
-        sides = SIDES if self.where.mode else SIDES[:1]
-        return [e for k, side in enumerate(sides) for e in self._equilibria(numbers, k, side)]
+        return [e for k, side in enumerate(self.sides) for e in self._equilibria(numbers, k, side)]
 
     def _equilibria(self, numbers: ManyNumbers, k: int, side: Side) -> list[Equilibrium]:
         field = numbers.fields[:, k].reshape(_CELLS, _CELLS, 2)
@@ -166,6 +249,7 @@ class PlaneScan:
 
         found = find_all(partial(self._equilibrium, side=side), starts[:_MOST])
         found = [e for e in found if e.status == "real" and self.box.contains(e.point)]
+        found = [e for e in found if not self.is_excluded(e.point[None, :])[0]]
         return self._apart(found)
 
     def _equilibrium(self, near: Array, side: Side) -> Equilibrium:
@@ -187,7 +271,9 @@ def _pieces(scan: PlaneScan, curve: Array) -> list[Piece]:
     ]
     full = inserted(curve, np.reshape(near, (-1, 2)))
     lie = scan.at((full[1:] + full[:-1]) / 2).lie
-    slides = (lie[:, 0] * lie[:, 1] < 0) & scan.where.switching.slides
+    slides = lie[:, 0] < 0
+    if not scan.where.one_sided:
+        slides = (lie[:, 0] * lie[:, 1] < 0) & scan.where.switching.slides
     kinds = np.where(slides, np.where(lie[:, 0] < 0, "attracting", "repelling"), "crossing")
     cuts = [0, *(np.flatnonzero(kinds[1:] != kinds[:-1]) + 1), len(kinds)]
     return [Piece(str(kinds[a]), full[a : b + 1]) for a, b in pairwise(cuts)]

@@ -32,6 +32,7 @@ from ..checks import (
     require_linear,
 )
 from ..discrete_states import with_discrete_states_held
+from ..point.one_sided import one_sided_at
 from ..point.surface_point import (
     FIELDS,
     SIDES,
@@ -220,6 +221,11 @@ def boundary_equilibrium_at(
 ) -> BoundaryEquilibrium:
     """Class of the equilibrium of field ``k`` by the class of the surface."""
     x, gradient, other = numbers.x, numbers.gradient, numbers.fields[1 - k]
+    if where.one_sided:
+        push = one_sided_at(where, numbers).push
+        if where.element and where.element.kind == "contact":
+            return _of_a_contact(x, gradient, push, derivatives[0], margin)
+        return boundary_equilibrium_of(x, 0, gradient, push, derivatives[0], margin)
     kind = where.switching.kind
     if kind == "continuous":
         return _continuous(x, derivatives, margin)
@@ -276,6 +282,22 @@ def _with_a_jumping_force(
         ReadOnly(margins),
         "velocity continuous",
     )
+
+
+def _of_a_contact(
+    x: Array, gradient: Array, push: Array, a: Array, margin: float
+) -> BoundaryEquilibrium:
+    """An equilibrium whose gap is zero: the contact that it becomes is closed where s < 0, on the side without it."""
+    singular = np.linalg.svd(a, compute_uv=False)
+    margins = {"determinant": float(singular[-1] / singular[0]) if singular[0] else 0.0}
+    values, unfolding = {"s": math.nan}, "degenerate"
+    if margins["determinant"] > 1e-14:
+        inverse: Array = np.asarray(np.linalg.solve(a, push), dtype=np.float64)
+        values["s"], margins["s"] = float(gradient @ inverse), _sine(gradient, inverse)
+        unfolding = "nonsmooth fold" if values["s"] > 0 else "persistence"
+    label = unfolding if min(margins.values()) >= margin else "degenerate"
+    rest = ReadOnly(values), ReadOnly(margins)
+    return BoundaryEquilibrium(x, "+", label, unfolding, False, np.linalg.eigvals(a), *rest)
 
 
 def boundary_equilibrium_of(
@@ -434,8 +456,8 @@ def find_boundary_equilibrium(
     'persistence'
     """
     k = side_index(side)
-    require_autonomous(system, "boundary equilibrium")
-    where, x = surface_at(system, near, parameters, 0.0, surface, mode)
+    require_autonomous(system, "boundary equilibrium", elements=True)
+    where, x = surface_at(system, near, parameters, 0.0, surface, mode, search=True)
     advice = "An equilibrium is on the surface at isolated values of a parameter."
     j, n = parameter_index(system, vary, "vary", advice), x.size
 
@@ -445,14 +467,16 @@ def find_boundary_equilibrium(
         return replace(where, parameters=p)
 
     def equations(u: Array) -> tuple[Array, Array]:
-        here, point = at(u[n]), u[:n]
+        here, point = at(u[n]).free, u[:n]
         numbers, (dh, df) = here.at(point), here.parameter_derivatives(point)
         by_states = np.vstack([here.jacobians(point)[k], numbers.gradient])
         by_parameter = np.append(df[k, :, j], dh[j])
         return np.append(numbers.fields[k], numbers.h), np.column_stack([by_states, by_parameter])
 
+    kept = where.with_kept(equations, velocities=True)
+
     found = search(
-        equations,
+        kept,
         np.append(x, where.parameters[j]),
         tol=tol,
         max_iterations=max_iterations,

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import Array, FilippovSystem, OptionError, Parameters
+from ...model import Array, FilippovSystem, OptionError, Parameters, call
 from ...model.derivatives.mode_equations import mode_equations
 from ..checks import require_autonomous
 from ..discrete_states import with_discrete_states_held
-from ..point.surface_point import FIELDS, TOLERANCE, LocalSurface, Side, side_index, surface_at
+from ..point.surface_point import (
+    FIELDS,
+    TOLERANCE,
+    LocalSurface,
+    Side,
+    null_space,
+    side_index,
+    surface_at,
+)
 from .search import Found, search
 
 #: Eigenvalues whose real part is below this, relative to the largest, decide nothing.
@@ -30,7 +39,8 @@ class Equilibrium:
     side : {"+", "-"}
         Of the field $F1$ above the surface or $F2$ below it; ``"+"`` for a smooth system.
     status : {"real", "virtual", "boundary"}
-        Whether it is on its field's own side, on the other side of a surface, or on the surface.
+        Whether it is on its field's own side, on the other side of a surface or behind a contact, or on the surface or
+        contact. Also virtual where a stop or reset of the discrete state is due at once.
     kind : str
         ``"stable node"``, ``"unstable focus"``, ``"saddle"``, ...; ``"degenerate"`` if an
         eigenvalue has no real part.
@@ -65,7 +75,8 @@ class Equilibrium:
     def __str__(self) -> str:
         values = ", ".join(f"{v:.6g}" for v in self.eigenvalues)
         if not self.mode:
-            return f"{self.kind} at {self.point.tolist()}, eigenvalues {values}."
+            status = "" if self.status == "real" else f"{self.status} "
+            return f"{status}{self.kind} at {self.point.tolist()}, eigenvalues {values}."
         where = f"mode {self.mode!r}" if set(self.mode) & set("ocs") else FIELDS[self.side]
         return (
             f"{self.status} {self.kind} of {where} at {self.point.tolist()}, h = {self.h:.6g}, "
@@ -94,6 +105,8 @@ def by_real_part(matrix: Array) -> NDArray[Any]:
 def kind_of(eigenvalues: NDArray[Any], scale: float) -> tuple[str, float]:
     """Name an equilibrium by its eigenvalues; also the smallest real part over ``scale``."""
     real = eigenvalues.real
+    if not real.size:  # what is kept leaves no direction
+        return "stable node", math.inf
     margin = float(np.min(np.abs(real))) / scale if scale > 0 else 0.0
     if margin <= HYPERBOLIC:
         return "degenerate", margin
@@ -120,8 +133,9 @@ def find_equilibrium(
     Parameters
     ----------
     system, parameters, surface, mode
-        As in :func:`region`; the point need not be on the surface. A smooth system has none. With
-        complementarity conditions ``mode`` has all letters, also those of what slides or is closed.
+        As in :func:`region`; the point need not be on the surface. A smooth system has none. With complementarity
+        conditions, constraints or closed contacts ``mode`` has all letters, also those of what slides or is closed;
+        without the letters of contacts these are open.
     near : array_like (n,)
         Where the search starts.
     side : {"+", "-"}
@@ -160,10 +174,10 @@ def find_equilibrium(
     (array([0.5, 0.5]), 'real', 'stable node')
     """
     k = side_index(side)
-    if isinstance(system, FilippovSystem) and system.complementarity:
+    if isinstance(system, FilippovSystem) and _needs_mode(system, mode):
         return _of_mode(system, near, mode, parameters, tol, max_iterations)
     require_autonomous(system, "equilibrium")
-    where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True)
+    where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True, flight=True)
     if not system.surface_count and side != "+":
         raise OptionError(
             f"side: expected '+', as a smooth system has one field, received {side!r}. Leave it out."
@@ -177,6 +191,13 @@ def find_equilibrium(
     return equilibrium_at(where, found, side)
 
 
+def _needs_mode(system: FilippovSystem, mode: str | None) -> bool:
+    """Whether a mode has to name what slides and what is closed, or does so."""
+    if system.complementarity or system.constraints:
+        return True
+    return bool(system.impacts) and mode is not None and len(mode) > len(system.entries)
+
+
 def _of_mode(
     system: FilippovSystem,
     near: ArrayLike,
@@ -186,7 +207,9 @@ def _of_mode(
     max_iterations: int,
 ) -> Equilibrium:
     """An equilibrium of the field of a mode, whose conditions keep some functions at zero."""
-    require_autonomous(system, "equilibrium", complementarity=True)
+    require_autonomous(system, "equilibrium", elements=True)
+    if mode is None and len(system.modes) == 1 and not system.impacts:
+        mode = system.modes[0]
     if mode is None:
         raise OptionError(
             f"mode: expected letters, received none. Give one of {list(system.modes)}: in which mode the "
@@ -197,18 +220,19 @@ def _of_mode(
 
     def equations(u: Array) -> tuple[Array, Array]:
         field, slope, h, gradient, _ = numbers.copied(u, p)
-        return np.concatenate([field.ravel(), h.ravel()]), np.vstack(
-            [slope, gradient.reshape(-1, n)]
-        )
+        rows = gradient.reshape(-1, n)
+        along = null_space(rows).T if len(rows) else np.eye(n)
+        values = np.concatenate([along @ field.ravel(), h.ravel()])
+        return values, np.vstack([along @ slope, rows])
 
     start = system.extended_point(near, 0.0)
     what = f"equilibrium of mode {mode!r}"
     found = search(equations, start, tol=tol, max_iterations=max_iterations, what=what)
     _, slope, _, gradient, guards = numbers.copied(found.x, p)
-    along = np.linalg.svd(gradient)[2][len(gradient) :].T if gradient.size else np.eye(n)
+    along = null_space(gradient) if gradient.size else np.eye(n)
     eigenvalues = by_real_part(along.T @ slope @ along)
     scale = float(np.max(np.abs(eigenvalues), initial=0.0))
-    kind, margin = kind_of(eigenvalues, scale) if eigenvalues.size else ("stable node", 1.0)
+    kind, margin = kind_of(eigenvalues, scale)
     least = float(guards.min(initial=np.inf))
     near_zero = abs(least) <= TOLERANCE * (1 + float(np.linalg.norm(found.x)))
     status = "boundary" if near_zero else "real" if least > 0.0 else "virtual"
@@ -229,6 +253,9 @@ def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium
     else:
         signs = np.where(where.switches(x) > 0, "+", "-")
         status = "real" if "".join(signs) == mode else "virtual"
+    gap, touching = _least_gap(where, x), TOLERANCE * (1 + float(np.linalg.norm(x)))
+    if gap <= touching and status != "virtual":
+        status = "boundary" if gap >= -touching else "virtual"
     return Equilibrium(
         x,
         side,
@@ -242,3 +269,12 @@ def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium
         found.iterations,
         mode,
     )
+
+
+def _least_gap(where: LocalSurface, x: Array) -> float:
+    """Of the contacts, at a point; inf without one."""
+    system = where.system
+    if not system.impacts:
+        return math.inf
+    function = system.function(("gaps",), lambda: [system.definition.gaps])
+    return float(np.min(call(function, x, where.parameters)[0]))

@@ -15,7 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import Array, DegenerateError, FilippovSystem, Parameters, PointError, real_array
+from ...model import (
+    Array,
+    DefinitionError,
+    DegenerateError,
+    FilippovSystem,
+    Parameters,
+    PointError,
+    real_array,
+)
 from ...model.checks import positive
 from ...notebook import card, quadrants
 from ...solvers.newton import solve_many
@@ -466,7 +474,8 @@ def independence(numbers: Numbers) -> float:
     return float(np.linalg.svd(scaled, compute_uv=False)[-1])
 
 
-def _build(where: LocalSurface, found: Found) -> TwoFold:
+def two_fold_at(where: LocalSurface, found: Found) -> TwoFold:
+    """Describe the two-fold at a point where h = L1 = L2 = 0."""
     system, numbers = where.system, where.finite_at(found.x)
     _refuse_degenerate(numbers, found.linear)
     lie = numbers.second
@@ -488,6 +497,15 @@ def _build(where: LocalSurface, found: Found) -> TwoFold:
         iterations=found.iterations,
         chart=Chart(where, found.x, scales),
     )
+
+
+def _require_coordinates(where: LocalSurface, x: Array) -> None:
+    """Refuse joints and closed contacts, beside which the coordinates of a two-fold are not defined."""
+    if where.along(x) is not None:
+        raise DefinitionError(
+            "two-fold: the system has constraints or closed contacts, and a two-fold has coordinates in which the motion is "
+            "free. Write the motion in such coordinates; classify(system, point) names the class as it is."
+        )
 
 
 @with_discrete_states_held
@@ -542,9 +560,10 @@ def two_fold(
     ('visible', (1, -1), (1.0, 2.0), 'VV-F')
     """
     where, x = surface_at(system, point, parameters, t, surface, mode)
+    _require_coordinates(where, x)
     if system.dimension < 3:
         unknowns(system, (), 3, "two-fold")
-    require_generic(system, surface, where.mode, "two-fold")
+    require_generic(where.system, where.surface, where.mode, "two-fold")
     numbers = on_surface(where, x, positive(tol, "tol"))
     lengths = np.linalg.norm(numbers.lie_gradients, axis=1)
     allowed = tol * (1 + np.linalg.norm(x)) * np.where(lengths > 0, lengths, 1.0)
@@ -553,7 +572,7 @@ def two_fold(
             f"point {x}: expected a two-fold, L1 = L2 = 0, received L1 = {numbers.lie[0]:.6g}, L2 "
             f"= {numbers.lie[1]:.6g}. find_two_fold(system, near=point) goes to the nearest one."
         )
-    return _build(where, Found(x))
+    return two_fold_at(where, Found(x))
 
 
 @with_discrete_states_held
@@ -623,9 +642,10 @@ def find_two_fold(
       are spirals of flights along the diabolo.
       Found 0.141 from the start in 1 iteration, residual 0.
     """
-    where, x = surface_at(system, near, parameters, t, surface, mode)
+    where, x = surface_at(system, near, parameters, t, surface, mode, search=True)
+    _require_coordinates(where, x)
     free = unknowns(system, hold, 3, "two-fold")
-    require_generic(system, surface, where.mode, "two-fold")
+    require_generic(where.system, where.surface, where.mode, "two-fold")
     return search_two_fold(where, x, free, tol, max_iterations)
 
 
@@ -639,4 +659,4 @@ def search_two_fold(
         return np.array([numbers.h, *numbers.lie]), numbers.gradients
 
     found = search(equations, x, free, tol=tol, max_iterations=max_iterations, what="two-fold")
-    return _build(where, found)
+    return two_fold_at(where, found)

@@ -109,7 +109,7 @@ def fold_fold(
     positive(tol, "tol"), positive(margin, "margin")
     require_planar(system, "fold-fold")
     where, x = surface_at(system, point, parameters, 0.0, surface, mode)
-    require_generic(system, surface, where.mode, "fold-fold", force=True)
+    require_generic(where.system, where.surface, where.mode, "fold-fold", force=True)
     numbers = on_surface(where, x, tol)
     if np.any(np.abs(numbers.angles) > tol):
         raise PointError(

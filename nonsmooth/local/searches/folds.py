@@ -27,6 +27,7 @@ from ..point.surface_point import (
     side_index,
     surface_at,
 )
+from .equilibria import equilibrium_distance
 from .search import Found, search, unknowns
 
 
@@ -95,7 +96,11 @@ def contact(where: LocalSurface, x: Array, side: Side, max_order: int, tol: floa
             f"point {x}: expected derivatives of h up to order {max_order}, received NaN or inf. "
             "The field is not that smooth here; lower max_order."
         )
-    if size > 0:
+    k = side_index(side)
+    rests = equilibrium_distance(where.at(x).fields[k], where.jacobians(x)[k], x) <= TOLERANCE
+    if rests:
+        h[1:] = 0.0
+    elif size > 0:
         powers = 1.0 / np.arange(1, max_order)
         growth = np.maximum(np.linalg.norm(states[:, 2:], axis=0) / speed, np.abs(h[2:]) / size)
         rate = float(np.max(growth**powers))
@@ -192,7 +197,7 @@ def fold(
     k = side_index(side)
     _check_order(max_order)
     where, x = surface_at(system, point, parameters, t, surface, mode)
-    require_generic(system, surface, where.mode, "fold")
+    require_generic(where.system, where.surface, where.mode, "fold")
     numbers = on_surface(where, x, positive(tol, "tol"))
     if abs(numbers.angles[k]) > tol:
         raise PointError(
@@ -271,9 +276,9 @@ def find_fold(
     invisible visible
     """
     _check_order(max_order)
-    where, x = surface_at(system, near, parameters, t, surface, mode)
+    where, x = surface_at(system, near, parameters, t, surface, mode, search=True)
     free = unknowns(system, hold, 2, "fold")
-    require_generic(system, surface, where.mode, "fold")
+    require_generic(where.system, where.surface, where.mode, "fold")
     return tangency_near(where, x, side, free, max_order, tol, max_iterations)
 
 
@@ -287,14 +292,16 @@ def tangency_near(
     max_iterations: int = 50,
 ) -> Fold:
     """Find where one field is tangent to the surface, changing the states ``free`` only."""
-    k = side_index(side)
+    k, everywhere = side_index(side), where.free
 
     def equations(u: Array) -> tuple[Array, Array]:
-        numbers = where.at(u)
+        numbers = everywhere.at(u)
         values = np.array([numbers.h, numbers.lie[k]])
         return values, np.vstack([numbers.gradient, numbers.lie_gradients[k]])
 
     what = f"fold of {FIELDS[side]}"
-    found = search(equations, x, free, tol=tol, max_iterations=max_iterations, what=what)
+    found = search(
+        where.with_kept(equations), x, free, tol=tol, max_iterations=max_iterations, what=what
+    )
     # a multiple root is a cusp or worse, known to the square root of rounding only
     return fold_at(where, found, side, max_order, 1e-5 if found.linear else TOLERANCE)

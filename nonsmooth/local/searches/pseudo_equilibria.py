@@ -22,14 +22,13 @@ from ...model import (
     Parameters,
     PointError,
     layer_of,
-    require_system,
 )
 from ..checks import require_autonomous, require_generic, require_linear
 from ..discrete_states import with_discrete_states_held
 from ..point.intersections import Meeting
 from ..point.regions import Region, region_of
 from ..point.surface_point import TOLERANCE, LocalSurface, Numbers, surface_at
-from .equilibria import by_real_part, kind_of
+from .equilibria import Equilibrium, by_real_part, kind_of
 from .search import Found, search
 
 
@@ -166,21 +165,26 @@ def find_pseudo_equilibrium(
     >>> found.kind, (found.point.round(9) + 0.0).tolist(), found.eigenvalues.round(9).tolist()
     ('stable pseudo-node', [0.0, 0.0, 1.0], [-1.0])
     """
-    require_system(system)
-    require_autonomous(system, "pseudo-equilibrium")
-    if mode is not None and sliding_in(system, mode) > 1:
+    require_autonomous(system, "pseudo-equilibrium", elements=True)
+    plain = not (system.complementarity or system.constraints)
+    if mode is not None and plain and sliding_in(system, mode) > 1:
         return find_on_intersection(
             system, near, mode, parameters, tol=tol, max_iterations=max_iterations
         )
-    where, x = surface_at(system, near, parameters, 0.0, surface, mode)
+    where, x = surface_at(system, near, parameters, 0.0, surface, mode, search=True)
+    if where.one_sided:
+        raise DefinitionError(
+            f"surface {surface} is the boundary of a condition or contact. find_equilibrium(system, near, mode=...) with "
+            "its letter c finds where it rests."
+        )
     require_linear(system, surface, "pseudo-equilibrium")
-    require_generic(system, surface, where.mode, "pseudo-equilibrium")
+    require_generic(where.system, where.surface, where.mode, "pseudo-equilibrium")
     numbers = where.finite_at(x)
-    n, (l1, l2) = x.size, numbers.lie
+    n, (l1, l2), everywhere = x.size, numbers.lie, where.free
     alpha = float(np.clip(l1 / (l1 - l2), 0.0, 1.0)) if l1 != l2 else 0.5
 
     def equations(u: Array) -> tuple[Array, Array]:
-        at, derivatives = where.at(u[:n]), where.jacobians(u[:n])
+        at, derivatives = everywhere.at(u[:n]), everywhere.jacobians(u[:n])
         f1, f2 = at.fields
         values = np.append((1 - u[n]) * f1 + u[n] * f2, at.h)
         matrix = np.zeros((n + 1, n + 1))
@@ -190,7 +194,7 @@ def find_pseudo_equilibrium(
         return values, matrix
 
     found = search(
-        equations,
+        where.with_kept(equations, velocities=True),
         np.append(x, alpha),
         tol=tol,
         max_iterations=max_iterations,
@@ -232,6 +236,27 @@ def pseudo_equilibrium_at(where: LocalSurface, found: Found) -> PseudoEquilibriu
         iterations=found.iterations,
         mode=where.mode,
         multipliers=np.array([1.0 - 2.0 * alpha]),
+    )
+
+
+def closed_equilibrium(found: Equilibrium) -> PseudoEquilibrium:
+    """The same of a condition that rests while it is closed: a zero of the limit of sliding."""
+    nothing = found.eigenvalues.size == 0
+    kind = "stable pseudo-node" if nothing else pseudo_kind(found.kind, Region.ATTRACTING)
+    return PseudoEquilibrium(
+        point=found.point,
+        alpha=float("nan"),
+        status="real" if found.status == "real" else "virtual",
+        region=Region.ATTRACTING,
+        kind=kind,
+        eigenvalues=found.eigenvalues,
+        stable=kind.startswith("stable"),
+        margin=found.margin,
+        distance=found.distance,
+        residual=found.residual,
+        iterations=found.iterations,
+        mode=found.mode,
+        multipliers=np.array([found.h]),
     )
 
 

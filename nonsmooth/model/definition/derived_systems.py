@@ -1,4 +1,4 @@
-"""Systems derived from a system: with a Poincare section, or reversed in time."""
+"""Systems derived from a system: with a Poincare section, with an input, or reversed in time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SECTION = "section"
 def _changed(system: FilippovSystem, **changes: Any) -> FilippovSystem:
     """A system with some parts of its definition replaced."""
     changed = FilippovSystem.__new__(FilippovSystem)
-    state = replace(system.definition, **changes).state()
+    state = replace(system.definition if "field" in changes else system.written, **changes).state()
     changed.__setstate__({**state, "lifted": system.lifted})
     return changed
 
@@ -70,6 +70,27 @@ def with_section(system: FilippovSystem, function: Any, direction: int) -> Filip
         )
 
     return system.cached((SECTION, Content([known], h), direction), build)
+
+
+def with_input(system: FilippovSystem, output: ca.SX) -> FilippovSystem:
+    """Return the system with the field F + u - H(x), of outputs H (n,) and inputs u, n more last parameters."""
+    d = system.definition
+    taken = {*system.parameter_names, *system.state_names}
+    names = [next(n for n in chain([base], (f"{base} {k}" for k in count(2))) if n not in taken)
+             for base in (f"input of {s}" for s in system.state_names)]  # fmt: skip
+    u = ca.vertcat(*[ca.SX.sym(name) for name in names])
+
+    def build() -> FilippovSystem:
+        return _changed(
+            system,
+            field=d.field + u - output,
+            parameters=ca.vertcat(d.parameters, u),
+            defaults={**d.defaults, **dict.fromkeys(names, 0.0)},
+        )
+
+    return system.cached(
+        ("input", Content([ca.vertcat(d.extended_states, d.parameters)], output)), build
+    )
 
 
 def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:

@@ -85,7 +85,8 @@ class Friction(Element):
 
     def __post_init__(self) -> None:
         slips = self._slips("slip")
-        words = ", ".join(map(str, slips))
+        load = self._read("load")  # two loads may have the same slip
+        words = ", ".join(map(str, slips if load.is_constant() else (*slips, load)))
         short = words if len(words) <= _LONGEST else f"{zlib.crc32(words.encode()):08x}"
         made = ca.SX.sym(f"friction({short})", len(slips))
         object.__setattr__(self, "multiplier", made)

@@ -7,6 +7,7 @@ end the process.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -21,9 +22,11 @@ from ..numbering import LAWS, MOST_CODES, OPERATIONS
 from ..reading import listed
 from ..values import Array
 from .conditions import OR, Rule
+from .curves import Curve
 from .elements import LARGEST
 from .lift import LiftedSwitch
 from .parse_definition import OUTPUTS, Definition, require_consistent
+from .pieces import Table
 from .system import FilippovSystem
 
 #: Most instructions, and entries, of a system in a file, and most that are nested: CasADi prints nested ones
@@ -35,7 +38,7 @@ _INPUTS = ("states", "time", "parameters", "multipliers", "reactions")
 
 def written(system: FilippovSystem) -> dict[str, Any]:
     """Return plain values from which ``read_system`` makes an equal system."""
-    d = system.definition
+    d = system.written
     inputs, outputs = ([getattr(d, name) for name in names] for names in (_INPUTS, d.outputs))
     nodes, rows = instructions(inputs, outputs, merged=False)
     operations = sorted({node.op for node in nodes})
@@ -72,6 +75,7 @@ def written(system: FilippovSystem) -> dict[str, Any]:
         "layer_widths": list(d.layer_widths),
         "laws": list(d.laws),
         "complementarity": list(d.complementarity),
+        "tables": [_plain_table(table) for table in d.tables],
         "lifted": system.lifted,
     }
 
@@ -83,6 +87,9 @@ def read_system(plain: Any) -> FilippovSystem:
     vectors = [_symbols(v) for v in names]
     expressions = _expressions(plain, vectors)
     stops, resets, impacts = _list(plain, "events", 3)
+    tables = tuple(_table(v) for v in _parts(plain.get("tables", []), None, "tables"))
+    count = len(names[2]) - sum(len(table.curves) for table in tables)
+    _require(count >= 0, "a value of each curve")
     sizes = [_whole(v, "sizes", 1, LARGEST) for v in _list(plain, "sizes")]
     widths = _list(plain, "layer_widths") if "layer_widths" in plain else []
     _require(all(is_real(v) and v > 0 for v in widths), "layer_widths that are positive numbers")
@@ -95,13 +102,14 @@ def read_system(plain: Any) -> FilippovSystem:
         rules=tuple(map(_rule, _list(plain, "rules", len(stops) + len(resets)))),
         clocks=_clocks(plain, len(resets)),
         discrete=tuple(map(_values, _list(plain, "discrete"))),
-        defaults=_defaults(plain, names[2]),
+        defaults=_defaults(plain, names[2][:count]),
         hidden=_flag(plain.get("hidden")),
         sizes=tuple(sizes),
         renamed=tuple((a, b) for a, b in map(_pair, _list(plain, "renamed"))),
         layer_widths=tuple(map(float, widths)),
         laws=tuple(_texts(plain.get("laws", []), "laws")),
         complementarity=tuple(_texts(plain.get("complementarity", []), "complementarity")),
+        tables=tables,
     )
     _require_shapes(definition)
     require_consistent(definition, given=False)
@@ -318,6 +326,48 @@ def _defaults(plain: Mapping[str, Any], parameters: Sequence[str]) -> dict[str, 
     return {name: None if v is None else float(v) for name, v in values.items()}
 
 
+def _plain_table(table: Table) -> list[Any]:
+    curves = [[*map(np.array, (c.levels, c.pieces, c.jumps)), list(c.closed)] for c in table.curves]
+    pairs = [[list(pair) for pair in sides] for sides in table.sides]
+    return [table.element, curves, pairs, [list(twin) for twin in table.twins]]
+
+
+def _table(value: Any) -> Table:
+    element, curves, sides, twins = _parts(value, 4, "tables of four parts")
+    made = Table(
+        _whole(element, "functions", 0, MOST),
+        tuple(_curve(own) for own in _parts(curves, None, "curves")),
+        tuple(
+            tuple(_wholes(p, 2) for p in _parts(own, None, "sides"))
+            for own in _parts(sides, None, "sides")
+        ),
+    )
+    _require(0 < len(made.curves) == len(made.sides), "sides of each curve")
+    return replace(made, twins=tuple(_wholes(twin, 3) for twin in _parts(twins, None, "twins")))
+
+
+def _curve(value: Any) -> Curve:
+    *arrays, closed = _parts(value, 4, "curves of four parts")
+    numbers = all(isinstance(a, np.ndarray) and a.dtype == np.float64 for a in arrays)
+    _require(numbers and all(np.isfinite(a).all() for a in arrays), "numbers of a curve")
+    levels, pieces, jumps = arrays
+    k = len(levels) if levels.ndim == 1 else -1
+    _require(pieces.shape == (k + 1, 5) and jumps.size == 4 * k, "a piece of each cell")
+    _require(bool((np.diff(levels) > 0).all()), "breakpoints that increase")
+    low, high = _parts(closed, 2, "ends of a curve")
+    rows, more = (tuple(map(tuple, a.tolist())) for a in (pieces, jumps.reshape(k, 4)))
+    return Curve(tuple(levels.tolist()), rows, more, (_flag(low), _flag(high)))
+
+
+def _parts(value: Any, length: int | None, what: str) -> list[Any]:
+    _require(isinstance(value, list) and length in (None, len(value)), what)
+    return list(value)
+
+
+def _wholes(value: Any, length: int) -> Any:
+    return tuple(_whole(v, "surfaces", -1, MOST) for v in _parts(value, length, "numbers"))
+
+
 def _lifted(value: Any) -> tuple[LiftedSwitch, ...]:
     fits = isinstance(value, tuple) and all(isinstance(s, LiftedSwitch) for s in value)
     _require(fits, "switches that were lifted")
@@ -366,6 +416,16 @@ def _require_shapes(d: Definition) -> None:
     sizes = sum(d.sizes) == d.multipliers.numel() and max(d.sizes, default=1) > 1
     _require(not d.sizes or sizes, "sizes of the sets")
     _require(len(d.layer_widths) in (0, d.surfaces.numel()), "one layer width for each surface")
+    tables = [table.element for table in d.tables]
+    _require(tables == [*d.functions_of("table")], "an argument of each table")
+    sides = [pair for t in d.tables for own in t.sides for pair in own]
+    surfaces = [i for i, _ in [*sides, *[twin[1:] for t in d.tables for twin in t.twins]]]
+    _require(
+        all(0 <= i < d.surfaces.numel() and i not in tables for i in surfaces), "sides of surfaces"
+    )
+    _require(
+        all(0 <= k < len(t.levels) for t in d.tables for k, *_ in t.twins), "twins of breakpoints"
+    )
     known = [law in LAWS and law != "contact" for law in d.laws]
     _require(len(known) in (0, len(d.sizes or range(d.surfaces.numel()))) and all(known), "laws")
     _require(d.hysteresis.numel() in (0, d.surfaces.numel()), "a hysteresis of each surface")

@@ -1,4 +1,4 @@
-"""Lifting: sign, fabs, fmin, fmax and if_else in an expression become surfaces and multipliers.
+"""Lifting: sign, fabs, fmin, fmax, if_else and tables in an expression become surfaces and multipliers.
 
 Each switch of the right-hand side is replaced by what it is on the two sides of the zero set of a
 smooth switching function h, with one multiplier lam = sgn h for all switches on the same set:
@@ -9,6 +9,9 @@ smooth switching function h, with one multiplier lam = sgn h for all switches on
     fmin(a, b)     (1-lam)/2 a + (1+lam)/2 b     a - b
     a < b          (1+lam)/2                     b - a     also <=, and the condition of if_else
     copysign(a, b) fabs(a) sign(b)
+
+A table is one element for each argument, on its sides like the other switches; its value in the field is a
+parameter of a cell (``pieces.py``).
 
 ``not``, ``and``, ``or`` act on conditions. Two functions that differ by a constant factor are one
 surface; the first one found is used, and a negative factor turns the sign of the multiplier.
@@ -32,13 +35,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Any
+from typing import Any, cast
 
 import casadi as ca
 
 from ..errors import DefinitionError, NotSmoothError
 from ..expressions.cancel import NormalForms, Sum, ratio, simple_zeros
 from ..expressions.graph import NOT_SMOOTH, POWERS, evaluate, instructions, operation, power_of
+from .curves import Curve, with_curves
+from .pieces import Argument, Sides, Table, twins_of
 
 
 @dataclass(frozen=True)
@@ -68,12 +73,25 @@ class Switch:
     hidden: bool = False
 
 
+@dataclass
+class Curves:
+    """Tables of one argument under construction: curves, their values, the sides on which they are in use."""
+
+    h: ca.SX
+    form: Sum
+    multiplier: ca.SX
+    curves: list[Curve] = field(default_factory=list)
+    values: list[ca.SX] = field(default_factory=list)
+    sides: list[Sides] = field(default_factory=list)
+
+
 class Switches:
-    """Surfaces with their multipliers, in the order in which they are found."""
+    """Surfaces with their multipliers, and arguments of tables, in the order in which they are found."""
 
     def __init__(self, states: ca.SX, inputs: list[ca.SX]):
         self.states, self.inputs = states, inputs
         self.all: list[Switch] = []
+        self.tables: list[Curves] = []
         self._forms = NormalForms(inputs)
         names = {str(s) for s in ca.vertsplit(ca.vertcat(*inputs))}
         self.prefix = next(p for p in _prefixes() if not any(n.startswith(p) for n in names))
@@ -108,6 +126,29 @@ class Switches:
         self.all.append(Switch(h, lam, even, form, [origin]))
         return k, 1
 
+    def value(self, curve: Curve, u: ca.SX, sides: Sides) -> ca.SX:
+        """The value of a curve at an argument, a symbol."""
+        form = self._forms.of(u)
+        for own in self.tables:
+            factor, shift = _line(form, own.form)
+            if factor:
+                curve = curve.moved(factor, shift)
+                break
+        else:
+            own = Curves(u, form, ca.SX.sym(f"{self.prefix}_table{len(self.tables)}"))
+            self.tables.append(own)
+        found = [
+            k
+            for k, pair in enumerate(zip(own.curves, own.sides, strict=True))
+            if pair == (curve, sides)
+        ]
+        if not found:
+            found = [len(own.curves)]
+            own.curves.append(curve)
+            own.sides.append(sides)
+            own.values.append(ca.SX.sym(f"{own.multiplier.name()}_{found[0]}"))
+        return own.values[found[0]]
+
     def _on_both_sides(self, h: ca.SX) -> ca.SX:
         """A function of |g|^p, g another switch, on one of its sides, as one that is a number on the other too."""
         nodes, rows = instructions(self.inputs, [h])
@@ -120,15 +161,28 @@ class Switches:
         form = self._forms.of(g)
         return any(ratio(form, other.form) for other in self.all)
 
-    def report(self, f: ca.SX) -> tuple[list[Switch], tuple[LiftedSwitch, ...]]:
-        """Return the switches of a field in the order of their states, and their descriptions."""
-        kept = [s for s in self.all if ca.depends_on(f, s.lam)]
+    def report(self, f: ca.SX) -> tuple[list[Switch | Curves], list[Table]]:
+        """The switches and tables of a field in the order of their states, and the elements of the tables."""
+        kept: list[Switch | Curves] = [s for s in self.all if ca.depends_on(f, s.lam)]
+        kept += [t for t in self.tables if ca.depends_on(f, ca.vertcat(*t.values))]
         kept.sort(key=lambda s: self._states_of(s.h))
-        described = tuple(
-            LiftedSwitch(f"h{i}", str(s.lam), str(s.h), tuple(sorted(s.origins)), s.hidden)
-            for i, s in enumerate(kept)
-        )
-        return kept, described
+        place = {id(s): i for i, s in enumerate(kept)}
+        elements = list[Table]()
+        for own in (t for t in kept if isinstance(t, Curves)):
+            sides = [
+                tuple((place[id(self.all[i])], s) for i, s in pairs if id(self.all[i]) in place)
+                for pairs in own.sides
+            ]
+            lines = [
+                (place[id(s)], *_line(s.form, own.form)) for s in kept if isinstance(s, Switch)
+            ]
+            zeros = [
+                (-shift / factor, i, 1 if factor > 0 else -1)
+                for i, factor, shift in lines
+                if factor
+            ]
+            elements.append(twins_of(Table(place[id(own)], tuple(own.curves), tuple(sides)), zeros))
+        return kept, elements
 
     def _states_of(self, h: ca.SX) -> tuple[int, ...]:
         return tuple(i for i in range(self.states.numel()) if ca.depends_on(h, self.states[i]))
@@ -151,6 +205,13 @@ class _EvenPowers:
         if power is None or not self._switches.is_found(args[0]):
             return operation(op, list(args))
         return (args[0] * args[0]) ** (power / 2)
+
+
+def _line(first: Sum, second: Sum) -> tuple[float, float]:
+    """The numbers a and b with first = a second + b; zeros if there are none."""
+    one, two = ({k: v for k, v in form.items() if k} for form in (first, second))
+    factor = ratio(one, two)
+    return factor, first.get((), 0.0) - factor * second.get((), 0.0) if factor else 0.0
 
 
 def _factored(h: ca.SX, moving: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -209,12 +270,14 @@ _REFUSED: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Lifting:
-    """A right-hand side with its switches replaced: field (n,), multipliers and surfaces (m,)."""
+    """A right-hand side with its switches replaced: field (n,), multipliers and surfaces (m,), values of tables."""
 
     field: ca.SX
     multipliers: ca.SX
-    surfaces: ca.SX
+    surfaces: list[ca.SX | Argument]
     switches: tuple[LiftedSwitch, ...]
+    tables: tuple[Table, ...]
+    values: list[ca.SX]
 
 
 @dataclass(frozen=True)
@@ -239,7 +302,7 @@ class _Lifter:
         self.hidden = hidden
         self.inputs = [ca.vertcat(states, time), parameters]
         self.states, self.moving = states, self.inputs[0]
-        self.nodes, self.rows = instructions(self.inputs, [rhs])
+        self.nodes, self.rows = with_curves(*instructions(self.inputs, [rhs]))
         self.switches = Switches(states, self.inputs)
         self.done = 0  # nodes evaluated: the number of the one under way
 
@@ -249,10 +312,26 @@ class _Lifter:
         return self._finish(ca.vertcat(*entries))
 
     def _finish(self, f: ca.SX) -> Lifting:
-        kept, described = self.switches.report(f)
-        lam = ca.vertcat(*[s.lam for s in kept]) if kept else ca.SX(0, 1)
-        h = ca.vertcat(*[s.h for s in kept]) if kept else ca.SX(0, 1)
-        return Lifting(f, lam, h, described)
+        kept, tables = self.switches.report(f)
+        described, own = list[LiftedSwitch](), iter(tables)
+        for s in kept:
+            if isinstance(s, Switch):
+                what = (str(s.lam), str(s.h), tuple(sorted(s.origins)), s.hidden)
+                described.append(LiftedSwitch(f"h{len(described)}", *what))
+                continue
+            table = next(own)
+            for level, i in zip(table.levels, table.shown, strict=True):
+                if i >= 0:
+                    name, function = f"h{len(described)}", str(s.h - level)
+                    described.append(
+                        LiftedSwitch(name, f"{s.multiplier}_{i}", function, ("table",))
+                    )
+        lam = [s.lam if isinstance(s, Switch) else s.multiplier for s in kept]
+        h = [s.h if isinstance(s, Switch) else Argument(s.h) for s in kept]
+        values = [value for s in kept if isinstance(s, Curves) for value in s.values]
+        return Lifting(
+            f, ca.vertcat(*lam) if lam else ca.SX(0, 1), h, tuple(described), tuple(tables), values
+        )
 
     # the algebra of the graph's evaluation -----------------------------------------------------
 
@@ -275,18 +354,20 @@ class _Lifter:
     def _operation(self, op: str, args: Sequence[_Value]) -> _Value:
         if op == "if_else_zero":
             return self._if_else(*args)
+        if op == "curve":
+            return self._curve(cast("Curve", self.nodes[self.done].payload), args[0])
         inside = frozenset().union(*(a.inside for a in args))
         if op in NOT_SMOOTH:
-            return self._over_sides(list(args), inside, lambda e: self._switch(op, e))
+            return self._over_sides(list(args), inside, lambda e, _=(): self._switch(op, e))
         if op == "sqrt" and args[0].e.op() == ca.OP_SQ:  # CasADi would make it fabs by itself
             inner = [_Value(args[0].e.dep(0), inside)]
-            return self._over_sides(inner, inside, lambda e: self._switch("fabs", e))
+            return self._over_sides(inner, inside, lambda e, _=(): self._switch("fabs", e))
         return _Value(operation(op, [a.e for a in args]), inside)
 
     def _over_sides(
-        self, args: list[_Value], inside: frozenset[int], build: Callable[[list[_Value]], _Value]
+        self, args: list[_Value], inside: frozenset[int], build: Callable[..., _Value]
     ) -> _Value:
-        """Sum ``build`` over the sides of the switches ``inside``, with their weights."""
+        """Sum ``build`` of arguments and sides over the sides of the switches ``inside``, with their weights."""
         if not inside:
             return build(args)
         if len(inside) > _MOST_NESTED:
@@ -298,7 +379,8 @@ class _Lifter:
         weights, values = [], []
         for sides in product((1, -1), repeat=len(numbers)):
             chosen = dict(zip(numbers, sides, strict=True))
-            value = build([_Value(self._at(a.e, chosen), a.inside - inside) for a in args])
+            own = [_Value(self._at(a.e, chosen), a.inside - inside) for a in args]
+            value = build(own, tuple(chosen.items()))
             weight = ca.SX(1)
             for i, side in chosen.items():
                 weight = weight * (1 + side * self._symbol(i, args)) / 2
@@ -319,6 +401,19 @@ class _Lifter:
             e = ca.substitute(e, ca.vertcat(s.lam, s.even), ca.DM([side, side]))
         return e
 
+    def _curve(self, curve: Curve, argument: _Value) -> _Value:
+        """The value of a table, on each side of the switches in its argument."""
+        if not ca.depends_on(argument.e, self.moving):
+            return _Value(curve.of(argument.e))
+
+        def value(args: list[_Value], sides: Sides = ()) -> _Value:
+            constant = not ca.depends_on(args[0].e, self.moving)
+            return _Value(
+                curve.of(args[0].e) if constant else self.switches.value(curve, args[0].e, sides)
+            )
+
+        return self._over_sides([argument], argument.inside, value)
+
     # the switches, of smooth arguments ---------------------------------------------------------
 
     def _if_else(self, condition: _Value, value: _Value) -> _Value:
@@ -329,7 +424,7 @@ class _Lifter:
         factor = self._over_sides([condition, one], condition.inside, self._if_else_zero)
         return _Value(factor.e * value.e, factor.inside | value.inside)
 
-    def _if_else_zero(self, args: list[_Value]) -> _Value:
+    def _if_else_zero(self, args: list[_Value], _: Sides = ()) -> _Value:
         condition, value = args
         if ca.depends_on(condition.e, self.moving):
             raise _cannot(

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import casadi as ca
@@ -45,6 +46,7 @@ from .elements import (
     read_entries,
 )
 from .events import Clock, Impact, Reset, Stop
+from .pieces import Table
 from .read_events import direction_of, read_maps, read_rules, read_when, require_no_endless_level
 
 #: No expressions.
@@ -91,6 +93,8 @@ class Definition:
     complementarity: tuple[str, ...] = ()  # names of the conditions among the entries
     impact_law: str = "newton"
     constraints: tuple[str, ...] = ()  # names of the joints, the last entries
+    tables: tuple[Table, ...] = ()  # the values of their curves are the last parameters
+    breakpoints: frozenset[int] = frozenset()  # surfaces that are breakpoints of tables
 
     @cached_property
     def plain(self) -> bool:
@@ -123,10 +127,13 @@ class Definition:
     @cached_property
     def half_lines(self) -> tuple[int, ...]:
         """Functions y of complementarity conditions, among the surfaces."""
+        return self.functions_of("complementarity")
+
+    def functions_of(self, law: str) -> tuple[int, ...]:
+        """First functions of the elements of a law, among the surfaces."""
         sizes = self.sizes or (1,) * self.surfaces.numel()
-        firsts = [sum(sizes[:k]) for k in range(len(sizes))]
-        laws = zip(firsts, self.laws, strict=False)
-        return tuple(first for first, law in laws if law == "complementarity")
+        laws = zip(accumulate(sizes, initial=0), self.laws, strict=False)
+        return tuple(first for first, own in laws if own == law)
 
     @property
     def open_surfaces(self) -> ca.SX:
@@ -162,6 +169,7 @@ class Definition:
         some |= {"clocks": self.clocks, "discrete": self.discrete}
         some |= {"layer_widths": self.layer_widths, "laws": self.laws}
         some |= {"complementarity": self.complementarity, "constraints": self.constraints}
+        some |= {"tables": self.tables}
         some |= {"impact_law": self.impact_law} if self.impact_law != "newton" else {}
         return {
             **{name: value for name, value in some.items() if value},
@@ -186,11 +194,27 @@ class Definition:
         parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=False))
         some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths", "laws")
         tuples: dict[str, Any] = {
-            name: tuple(state.get(name, ())) for name in (*some, "complementarity", "constraints")
+            name: tuple(state.get(name, ()))
+            for name in (*some, "complementarity", "constraints", "tables")
         }
         law = state.get("impact_law", "newton")
         return cls(**parts, **rest, **tuples, impact_law=law)
 
+
+class _Deferred:
+    """An attribute that may be given as a function, called where it is first read."""
+
+    def __get__(self, owner: Any, _: Any) -> Any:
+        value = vars(owner)["field"]
+        if callable(value) and not isinstance(value, ca.SX):
+            value = vars(owner)["field"] = value()
+        return value
+
+    def __set__(self, owner: Any, value: Any) -> None:
+        vars(owner)["field"] = value
+
+
+Definition.field = _Deferred()
 
 _DIRECTIONS = (-1, 0, 1)
 
@@ -590,7 +614,10 @@ def require_consistent(d: Definition, given: bool = True) -> None:
         _require_states(name, d.guards[i], d.extended_states, d)
         if given:
             _require_simple(name, d.guards[i], d)
-    moves = ca.which_depends(d.surfaces, d.extended_states, 1, True) if functions else []
+    moves, of_tables = (
+        ca.which_depends(d.surfaces, x, 1, True) if functions else [],
+        d.functions_of("table"),
+    )
     for i, ((name, h), curved) in enumerate(zip(functions, bent(d.surfaces, x), strict=True)):
         if i in d.half_lines:
             if not ca.depends_on(h, d.multipliers):
@@ -598,7 +625,7 @@ def require_consistent(d: Definition, given: bool = True) -> None:
             continue
         if not moves[i]:
             _require_states(name, h, d.extended_states, d)
-        if curved:
+        if curved and i not in of_tables:
             _require_simple(name, h, d)
     for j in range(len(d.impacts)):
         _check_impact(d, j)

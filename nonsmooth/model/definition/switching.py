@@ -43,7 +43,7 @@ class Switching:
         How the return map of an orbit that touches the surface departs from that of the orbit that does
         not: like this power of the depth. 1/2 (a square root) is that of a jumping force.
     decided_by : str
-        Exact arithmetic modulo a prime, or doubles at random points, which prove nothing.
+        Exact arithmetic, perhaps but for the rounding of the numbers, or doubles at random points, which prove nothing.
     """
 
     kind: Kind
@@ -70,6 +70,11 @@ def class_of(
     system: FilippovSystem, surface: int, mode: str | None, parameters: Parameters | None
 ) -> Switching:
     """The class of a surface, for all values of parameters or for given ones."""
+    if surface in system.half_lines and surface not in system.algebraic:
+        how = "its definition as a condition of relative degree 1"
+        return Switching("generic", None, None, how)
+    if surface in system.algebraic and not _changes_alone(system, surface):
+        return Switching("undecided", None, None, "conditions that open and close together")
     h, x, jump, above = _jump(system, surface, mode)
     if parameters is not None:
         p, values = system.parameter_symbols, ca.DM(system.parameter_vector(parameters))
@@ -93,32 +98,64 @@ def class_of(
     return Switching("velocity continuous", k, None if k is None else 1.5 if k else 0.5, how)
 
 
+def _changes_alone(system: FilippovSystem, condition: int) -> bool:
+    """Whether a condition's own multiplier is in its y."""
+    d = system.definition
+    return bool(ca.depends_on(d.surfaces[condition], d.multipliers[condition]))
+
+
 def _jump(
     system: FilippovSystem, surface: int, mode: str | None
 ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """h, the states, F2 - F1 and F1 for the other multipliers as they are, or as a mode has them."""
     d, x = system.definition, system.extended_states
     free = [ca.SX.sym(f"lambda{j}") for j in range(system.surface_count)]
-    slides = list[int]()
+    slides, condition = list[int](), surface in system.algebraic
     if mode is not None:
         for j, letter in enumerate(system.parse_mode(mode)):
             if j != surface and letter == 0:
                 slides.append(j)
             elif j != surface and letter != 2:
-                free[j] = ca.SX(letter)
+                free[j] = ca.SX(0 if j in system.half_lines else letter)
     fields = []
-    for side in (1.0, -1.0):
-        values = [ca.SX(side) if j == surface else free[j] for j in range(len(free))]
+    for side in (0.0,) if condition else (1.0, -1.0):
+        values, found = [*free], []
+        if not condition:
+            values[surface] = ca.SX(side)
+        else:
+            found = [ca.substitute(d.surfaces[surface], d.multipliers, ca.vertcat(*values))]
         field = system.field_with(ca.vertcat(*values), d.reactions)
+        found = [ca.densify(field), *found]
         if slides:
             unknown = ca.vertcat(*[free[j] for j in slides])
-            rows = ca.jacobian(ca.vertcat(*[d.surfaces[j] for j in slides]), x)
-            rates = ca.mtimes(rows, field)
-            middle = ca.substitute(rates, unknown, ca.SX.zeros(len(slides), 1))
-            matrix = ca.jacobian(rates, unknown)
-            field = ca.substitute(field, unknown, -ca.solve(matrix, middle))
-        fields.append(ca.densify(field))
-    return d.surfaces[surface], x, fields[1] - fields[0], fields[0]
+            rows = ca.vertcat(*[_row(system, j, values, field, unknown) for j in slides])
+            middle = ca.substitute(rows, unknown, ca.SX.zeros(len(slides), 1))
+            solution = -ca.solve(ca.jacobian(rows, unknown), middle)
+            found = [ca.substitute(e, unknown, solution) for e in found]
+        fields.append(found)
+    if not condition:
+        return d.surfaces[surface], x, fields[1][0] - fields[0][0], fields[0][0]
+    field, y = fields[
+        0
+    ]  # affine in the condition's own multiplier, which is -h over its factor in y
+    own = free[surface]
+    h, open_field = (ca.substitute(e, own, 0) for e in (y, field))
+    jump = -h / ca.jacobian(y, own) * ca.jacobian(field, own)
+    return h, x, ca.densify(jump), ca.densify(open_field)
+
+
+def _row(
+    system: FilippovSystem, j: int, values: list[ca.SX], field: ca.SX, unknown: ca.SX
+) -> ca.SX:
+    """The first derivative along a field of what is kept at zero that holds an unknown."""
+    row = ca.substitute(
+        system.definition.surfaces[j], system.definition.multipliers, ca.vertcat(*values)
+    )
+    for _ in range(_MOST if j not in system.algebraic else 0):
+        row = ca.mtimes(ca.jacobian(row, system.extended_states), field)
+        if ca.depends_on(row, unknown):
+            break
+    return row
 
 
 def _first(

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
+from itertools import accumulate
 from typing import Any, TypeVar
 
 import casadi as ca
@@ -35,6 +37,7 @@ from .parse_definition import (
     consistent_parameters,
     read_definition,
 )
+from .pieces import by_breakpoints, by_pieces, in_cells
 from .roots import roots_of
 from .switching import Switching, class_of
 
@@ -43,6 +46,7 @@ T = TypeVar("T")
 #: Classes of surfaces are shown for at most so many of them.
 _CLASSES_SHOWN = 8
 _EQUATIONS_SHOWN = 12
+_FUNCTIONS_SHOWN = 24
 _SIDES = (("+", "above"), ("-", "below"))
 
 Discrete = Sequence[Expression] | Mapping[Any, Sequence[float] | None]
@@ -241,8 +245,16 @@ class FilippovSystem:
         found = lift(entries, frame.states, frame.time, held, hidden=hidden)
         given |= {"field": found.field, "multipliers": found.multipliers, "surface": None}
         given |= {"surfaces": found.surfaces, "above": None, "below": None}
+        values = given["parameters"]
+        if found.values and isinstance(values, Mapping):
+            given["parameters"] = {**values, **dict.fromkeys(found.values)}
+        elif found.values:
+            given["parameters"] = [*listed(values), *found.values]
+        made = read_definition(**given)
+        names = {value.name() for value in found.values}
+        defaults = {name: value for name, value in made.defaults.items() if name not in names}
         system = cls.__new__(cls)
-        system._adopt(read_definition(**given))
+        system._adopt(replace(made, tables=found.tables, defaults=defaults))
         system.lifted = found.switches
         return system
 
@@ -292,7 +304,8 @@ class FilippovSystem:
         """Hold the discrete states at values: the system between two events, without stops and resets.
 
         Functions of a point, such as :func:`classify` and :func:`find_equilibrium`, do this themselves, with
-        the values in the point. Portraits, two-folds and manifolds take the system that this returns.
+        the values in the point. Portraits do it for each value; two-folds and manifolds take the system that this
+        returns.
 
         Parameters
         ----------
@@ -327,27 +340,52 @@ class FilippovSystem:
 
         def made() -> FilippovSystem:
             system = type(self).__new__(type(self))
-            system._adopt(with_values(self.definition, list(key)))
+            system._adopt(with_values(self.written, list(key)))
             system.lifted = self.lifted
             return system
 
         return self.cached(("holding", key), made)
 
-    def _adopt(self, definition: Definition) -> None:
-        self.definition = definition
+    def _adopt(self, written: Definition) -> None:
+        #: The definition with tables as elements of one argument each; ``definition`` has their breakpoints.
+        self.written = written
+        definition = self.definition = by_breakpoints(written) if written.tables else written
         self.stops, self.resets = definition.stops, definition.resets
         self.impacts, self.constraints = definition.impacts, definition.constraints
         self.complementarity = definition.complementarity
         self.hidden = definition.hidden
-        self.nonlinear = enters_nonlinearly(definition.field, definition.multipliers)
         names = definition.names
         self.state_names = tuple(names["states"])
         self.parameter_names = tuple(names["parameters"])
         self._extended_states = definition.extended_states
         self._cache = Cache()
 
+    @cached_property
+    def nonlinear(self) -> Any:
+        """Which multipliers enter the field nonlinearly."""
+        return enters_nonlinearly(self.definition.field, self.definition.multipliers)
+
+    @cached_property
+    def of_pieces(self) -> FilippovSystem:
+        """The system that runs integrate: with tables as elements, whose cells set parameters."""
+        if not self.written.tables:
+            return self
+        system = type(self).__new__(type(self))
+        system._adopt(by_pieces(self.written))
+        return system
+
+    @cached_property
+    def of_breakpoints(self) -> FilippovSystem:
+        """The system whose breakpoints are surfaces in runs too."""
+        if not self.written.tables:
+            return self
+        system = type(self).__new__(type(self))
+        system._adopt(self.definition)
+        system.lifted = self.lifted
+        return system
+
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.definition.state(), "lifted": self.lifted}
+        return {**self.written.state(), "lifted": self.lifted}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._adopt(Definition.from_state(state))
@@ -357,7 +395,7 @@ class FilippovSystem:
         """Hash of the definition: equal for equal expressions, names, stops and resets."""
 
         def build() -> str:
-            parts = sorted((k, repr(v)) for k, v in self.definition.state().items())
+            parts = sorted((k, repr(v)) for k, v in self.written.state().items())
             return hashlib.sha256(str(parts).encode()).hexdigest()
 
         return self.cached("content hash", build)
@@ -403,7 +441,10 @@ class FilippovSystem:
         parts = [
             f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
         ]
-        names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
+        functions = [s.function for s in self.lifted]
+        if len(functions) > _FUNCTIONS_SHOWN:
+            functions[2:-1] = ["..."]
+        names = f": {', '.join(functions)}" if functions else ""
         others = len(self.complementarity) + len(self.constraints)
         surfaces = len(self.entries) - len(self.sets) - others
         if surfaces or not (self.sets or others):
@@ -466,8 +507,8 @@ class FilippovSystem:
     def entries(self) -> tuple[tuple[int, ...], ...]:
         """Switching functions of each surface or set, in the order in which they were given."""
         sizes = self.definition.sizes or (1,) * self.surface_count
-        firsts = [sum(sizes[:i]) for i in range(len(sizes))]
-        return tuple(tuple(range(f, f + k)) for f, k in zip(firsts, sizes, strict=True))
+        firsts = accumulate(sizes, initial=0)
+        return tuple(tuple(range(f, f + k)) for f, k in zip(firsts, sizes, strict=False))
 
     @cached_property
     def layer_widths(self) -> tuple[float, ...]:
@@ -577,8 +618,11 @@ class FilippovSystem:
         """The modes of one letter per surface in which at most one surface slides."""
         result = [""]
         for members in self.entries:
-            letters = "*s" if len(members) > 1 else self._letters(members[0])
-            result = [m + c for m in result for c in letters if not (c == "s" and "s" in m)]
+            own = self._letters(members[0])
+            letters, joint = "*s" if len(members) > 1 else own, members[0] in self.joints
+            result = [
+                m + c for m in result for c in letters if joint or not (c == "s" and "s" in m)
+            ]
         return tuple(result)
 
     def _letters(self, i: int) -> str:
@@ -662,9 +706,10 @@ class FilippovSystem:
         Parameters
         ----------
         surface : int, optional
-            Index of the surface.
+            Index of the surface, or of a complementarity condition: those follow the surfaces. One whose y holds its
+            multiplier is continuous, one of relative degree 1 generic: the motion goes along its boundary.
         mode : str, optional
-            Letters of the other surfaces, ``+``, ``-`` or ``s``: the class in that mode. Otherwise the class
+            Letters of the other surfaces, ``+``, ``-`` or ``s``, and conditions: the class in that mode. Otherwise the class
             holds for all values of the other multipliers.
         parameters : mapping, optional
             Values of the parameters; the class of these values only. Otherwise it holds for all.
@@ -699,12 +744,6 @@ class FilippovSystem:
         ('velocity continuous', 0)
         """
         i = self.surface_index(surface)
-        if i in self.half_lines:
-            name = self.surface_names[i]
-            raise DefinitionError(
-                f"surface {i} is the complementarity condition {name!r}, which has one side. Give the index of a "
-                "surface."
-            )
         if mode is not None:
             self.require_mode(mode)
         if i in (*self.set_of, *self.remembering, *self.joints):
@@ -741,9 +780,12 @@ class FilippovSystem:
 
         The ``reactions`` of impacts are zero unless given.
         """
-        d, f = self.definition, self.definition.field
-        if self.surface_count:
-            f = ca.substitute(f, d.multipliers, multipliers)
+        d, f = self.definition, None
+        if self.written.tables and isinstance(multipliers, ca.DM):
+            f = in_cells(self.written, np.array(multipliers).ravel().tolist())
+        if f is None:
+            f = d.field
+            f = ca.substitute(f, d.multipliers, multipliers) if self.surface_count else f
         if self.impacts:
             f = ca.substitute(f, d.reactions, 0 if reactions is None else reactions)
         return ca.vertcat(f, ca.SX.ones(d.time.numel(), 1))
@@ -936,12 +978,14 @@ def require_system(
     if value.complementarity and not complementarity:
         raise DefinitionError(
             f"system: {value!r} has complementarity conditions, which this function does not support. They work "
-            "in simulate, ensemble, outcomes, sensitivity, find_equilibrium, periodic_orbit and continue_orbit."
+            "in simulate, ensemble, outcomes, sensitivity, classify, region, find_equilibrium, find_fold, periodic_orbit and "
+            "continue_orbit."
         )
     if value.constraints and not joints:
         raise DefinitionError(
             f"system: {value!r} has constraints, which this function does not support. They work in simulate, "
-            "ensemble, outcomes, sensitivity, periodic_orbit and continue_orbit. Write the motion in coordinates that satisfy them."
+            "ensemble, outcomes, sensitivity, classify, region, find_equilibrium, find_fold, periodic_orbit and "
+            "continue_orbit. Write the motion in coordinates that satisfy them."
         )
 
 

@@ -8,21 +8,16 @@ from typing import Literal
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DefinitionError
 from ..expressions.graph import evaluate, instructions
 from ..reading import Expression, scalar
 from ..values import Array
-
-#: Most breakpoints, each a surface.
-_MOST = 500
+from .curves import Curve
 
 #: Jumps of a derivative below this part of it are rounding.
 _ROUNDING = 1e-12
-
-#: Part of the largest value that values may be off by.
-_LOST = 1e-9
 
 Bounds = tuple[float, float]
 
@@ -32,13 +27,14 @@ def table(
     xs: ArrayLike,
     ys: ArrayLike,
     order: Literal[1, 3] = 1,
-    outside: Literal["constant", "linear"] = "constant",
+    outside: Literal["constant", "linear", "error"] = "constant",
 ) -> ca.SX:
     """Interpolate a table, for use in ``FilippovSystem.from_expression``.
 
-    Nothing is interpolated behind the solver's back: a run stops at each breakpoint that it passes, where the
+    Nothing is interpolated behind the solver's back: a step ends at each breakpoint that it passes, where the
     curve has a kink (order 1) or a jump of its third derivative (order 3). Breakpoints that the argument cannot
-    pass, as that at 0 of the absolute value of something, are none.
+    pass, as that at 0 of the absolute value of something, are none. A run has the cell of a table between two
+    breakpoints as its state: what a step costs does not depend on their number.
 
     Parameters
     ----------
@@ -50,20 +46,20 @@ def table(
         Values there.
     order : {1, 3}, optional
         Straight lines, or a cubic spline.
-    outside : {"constant", "linear"}, optional
-        Beyond the ends: the last value, or the last slope. A spline has the slope zero at its ends for the first,
-        the curvature zero for the second.
+    outside : {"constant", "linear", "error"}, optional
+        Beyond the ends: the last value, the last slope, or the end of the run (NOT_FINITE). A spline has the slope
+        zero at its ends for the first, the curvature zero for the others.
 
     Returns
     -------
     SX
-        The expression, with ``fmax`` of the argument and the breakpoints.
+        The expression. Within another switch, as sign of a table, its breakpoints are switches one by one, and at
+        most six.
 
     Raises
     ------
     DefinitionError
-        Values that are not finite, not increasing, too few or of different lengths; another order or outside;
-        more than 500 breakpoints, or breakpoints with which the values lose their digits.
+        Values that are not finite, not increasing, too few or of different lengths; another order or outside.
 
     Examples
     --------
@@ -80,22 +76,32 @@ def table(
         raise DefinitionError(
             f"order of the table: expected 1 (straight lines) or 3 (a cubic spline), received {order!r}."
         )
-    if outside not in ("constant", "linear"):
+    if outside not in ("constant", "linear", "error"):
         raise DefinitionError(
-            f"outside of the table: expected 'constant' or 'linear', received {outside!r}. A Stop at the first or "
-            "last breakpoint ends a run there."
+            f"outside of the table: expected 'constant', 'linear' or 'error', received {outside!r}."
         )
     pieces, (low, high) = _pieces(x, y, order, outside), _bounds_of(e)
     first = int(np.searchsorted(x, low, side="right"))  # the piece at the lowest argument
     last = int(np.searchsorted(x, high))
-    jumps = [_jump(pieces, x, k, order, outside) for k in range(first, last)]
-    u = ca.SX.sym("u")
-    curve = _polynomial(pieces[first], u - x[max(first - 1, 0)])
-    for k, jump in enumerate(jumps, first):
-        if jump.any():
-            curve += _polynomial(jump, ca.fmax(u - x[k], 0))
-    _require_exact(ca.Function("table", [u], [curve]), pieces, x, first, last)
-    return ca.substitute(curve, u, e)
+    if outside == "error" and (low >= x[-1] or high <= x[0]):
+        raise DefinitionError(
+            f"table: its argument is from {low:g} to {high:g}, and its breakpoints from {x[0]:g} to {x[-1]:g}, so that it "
+            "has no value with outside='error'."
+        )
+    closed = (outside == "error" and first == 0, outside == "error" and last == len(x))
+    jumps = _jumps(pieces, x, order, outside)
+    is_kept = np.array(jumps != 0.0).any(axis=1) | _ends(len(x), closed)
+    kept = first + np.flatnonzero(is_kept[first:last])
+    cells = np.concatenate([[first], kept + 1])
+    rows = np.column_stack([x[np.maximum(cells - 1, 0)], pieces[cells]])
+    levels, own, jumped = x[kept].tolist(), rows.tolist(), jumps[kept].tolist()
+    return Curve(tuple(levels), tuple(map(tuple, own)), tuple(map(tuple, jumped)), closed).marked(e)
+
+
+def _ends(count: int, closed: tuple[bool, bool]) -> NDArray[np.bool_]:
+    found = np.zeros(count, bool)
+    found[[0, -1]] = closed
+    return found
 
 
 def _read(xs: ArrayLike, ys: ArrayLike) -> tuple[Array, Array]:
@@ -111,10 +117,6 @@ def _read(xs: ArrayLike, ys: ArrayLike) -> tuple[Array, Array]:
         raise DefinitionError(
             "table: expected finite numbers, and xs that increase. Sort the table, and leave out points that are twice "
             "in it or not known."
-        )
-    if len(x) > _MOST:
-        raise DefinitionError(
-            f"table: expected at most {_MOST} breakpoints, received {len(x)}. Fit a spline of fewer, or a formula."
         )
     return x, y
 
@@ -135,59 +137,36 @@ def _pieces(x: Array, y: Array, order: int, outside: str) -> Array:
         pieces[1:-1] = CubicSpline(x, y, bc_type=ends).c[::-1].T
     if outside == "linear":
         pieces[0, 1] = pieces[1, 1]
-        pieces[-1, 1] = _moved(pieces[-2], x[-1] - x[-2])[1]
+        pieces[-1, 1] = _moved(pieces[-2:-1], x[-1:] - x[-2:-1])[0, 1]
+    if outside == "error":  # the first and the last piece, up to the end of a step
+        pieces[0], pieces[-1] = pieces[1], _moved(pieces[-2:-1], x[-1:] - x[-2:-1])[0]
     return pieces
 
 
-def _jump(pieces: Array, x: Array, k: int, order: int, outside: str) -> Array:
-    """What a breakpoint adds, from its first derivative that can jump on."""
-    before = _moved(pieces[k], x[k] - x[max(k - 1, 0)])
-    jump = pieces[k + 1] - before
-    jump[np.abs(jump) <= _ROUNDING * (np.abs(before) + np.abs(pieces[k + 1]))] = 0.0
-    at_end = k in (0, len(x) - 1) and outside == "constant"
-    jump[: 1 if order == 1 else 2 if at_end else 3] = 0.0
-    return jump
+def _jumps(pieces: Array, x: Array, order: int, outside: str) -> Array:
+    """What each breakpoint adds (k, 4), from its first derivative that can jump on."""
+    before = _moved(pieces[:-1], np.diff(x, prepend=x[0]))
+    jumps = pieces[1:] - before
+    jumps[np.abs(jumps) <= _ROUNDING * (np.abs(before) + np.abs(pieces[1:]))] = 0.0
+    curvatures = jumps[[0, -1], 2]
+    jumps[:, : 1 if order == 1 else 3] = 0.0
+    if order == 3 and outside == "constant":
+        jumps[[0, -1], 2] = curvatures
+    if outside == "error":
+        jumps[[0, -1]] = 0.0
+    return jumps
 
 
-def _require_exact(curve: ca.Function, pieces: Array, x: Array, first: int, last: int) -> None:
-    """Refuse tables whose terms, added up, lose the digits of the values."""
-    if last - first < 1:
-        return
-    ends = np.concatenate([[2 * x[0] - x[1]], x, [2 * x[-1] - x[-2]]])
-    at = np.concatenate(
-        [ends[first : last + 2], (ends[first : last + 1] + ends[first + 1 : last + 2]) / 2]
-    )
-    which = np.searchsorted(x, at, side="right")
-    exact = np.array(
-        [_moved(pieces[k], u - x[max(k - 1, 0)])[0] for k, u in zip(which, at, strict=True)]
-    )
-    wrong = float(np.abs(np.array(curve(at[None, :])).ravel() - exact).max())
-    size = float(np.abs(exact).max())
-    if wrong > _LOST * size:
-        raise DefinitionError(
-            f"table: added up piece by piece its values are known to {wrong:.1e} only, of {size:.1e}: it has "
-            "too many breakpoints for a spline, or some too close together. Use fewer, or order=1."
-        )
-
-
-def _moved(c: Array, by: float) -> Array:
-    """Coefficients of a cubic about a point further on."""
-    a0, a1, a2, a3 = c
-    return np.array(
-        [
-            a0 + by * (a1 + by * (a2 + by * a3)),
-            a1 + by * (2 * a2 + 3 * a3 * by),
-            a2 + 3 * a3 * by,
-            a3,
-        ]
-    )
-
-
-def _polynomial(c: Array, u: ca.SX) -> ca.SX:
-    result = ca.SX(0)
-    for a in c[::-1]:
-        result = result * u + float(a)
-    return result
+def _moved(c: Array, by: Array) -> Array:
+    """Coefficients (k, 4) of cubics about points further on (k,)."""
+    a0, a1, a2, a3 = c.T
+    moved = [
+        a0 + by * (a1 + by * (a2 + by * a3)),
+        a1 + by * (2 * a2 + 3 * a3 * by),
+        a2 + 3 * a3 * by,
+        a3,
+    ]
+    return np.stack(moved, axis=1)
 
 
 # What an argument can be --------------------------------------------------------------------------

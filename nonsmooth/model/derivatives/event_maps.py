@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 
 import casadi as ca
 import numpy as np
@@ -46,30 +46,39 @@ class EventMap:
         after: ca.SX | None = None,
     ):
         self.guard, self.smooth = guard, after is None
-        n, p = system.extended_dimension, system.parameter_symbols
-        g = states[:n] if after is None else after
-        outputs = [g, ca.jacobian(g, states), ca.jacobian(g, p)]
-        outputs += [event, ca.jacobian(event, states), ca.jacobian(event, p)]
-        self._inputs, self._outputs = [states, p], [ca.densify(e) for e in outputs]
+        self._n, self._event = system.extended_dimension, event
+        self._after = states[: self._n] if after is None else after
+        self._inputs = [states, system.parameter_symbols]
+
+    def _with_gradients(self, e: ca.SX) -> list[ca.SX]:
+        return [ca.densify(d) for d in (e, *(ca.jacobian(e, v) for v in self._inputs))]
 
     @cached_property
     def _function(self) -> Evaluator:
-        return Evaluator(ca.Function("event", self._inputs, self._outputs, {"cse": True}))
+        outputs = [] if self.smooth else self._with_gradients(self._after)
+        outputs += self._with_gradients(self._event)
+        return Evaluator(ca.Function("event", self._inputs, outputs, {"cse": True}))
 
     @cached_property
     def values(self) -> Values:
         """The entries of g, g_x, g_p, e, e_x and e_p, column after column, as a graph."""
-        return values_of(self._inputs, self._outputs)
+        outputs = [*self._with_gradients(self._after), *self._with_gradients(self._event)]
+        return values_of(self._inputs, outputs)
 
     @cached_property
     def plain(self) -> PlainMap:
         """g and e alone."""
-        return PlainMap(values_of(self._inputs, [self._outputs[0], self._outputs[3]]))
+        outputs = [ca.densify(e) for e in (self._after, self._event)]
+        return PlainMap(values_of(self._inputs, outputs))
 
     def __call__(self, y: Array, p: Array) -> AtEvent:
         """Evaluate at the end of a leg."""
-        g, gx, gp, e, ex, ep = self._function.copied(y, p)
-        return AtEvent(g[:, 0], gx, gp, float(e[0, 0]), ex[0], ep[0])
+        *after, e, ex, ep = self._function.copied(y, p)
+        event = float(e[0, 0]), ex[0], ep[0]
+        if self.smooth:
+            return AtEvent.smooth_at(np.array(y[: self._n], float), *event)
+        g, gx, gp = after
+        return AtEvent(g[:, 0], gx, gp, *event)
 
 
 @dataclass(frozen=True)
@@ -82,6 +91,19 @@ class AtEvent:
     value: float  # e
     gradient: Array  # of e by states and multipliers (N + k,)
     by_parameters: Array  # of e (q,)
+    smooth: bool = False  # whether g is the identity
+
+    @classmethod
+    def smooth_at(cls, x: Array, value: float, gradient: Array, by_parameters: Array) -> AtEvent:
+        """An event at a state (N,) that does not change it."""
+        unit, none = _identity(len(x), len(gradient), len(by_parameters))
+        return cls(x, unit, none, value, gradient, by_parameters, True)
+
+
+@lru_cache(maxsize=64)
+def _identity(n: int, width: int, q: int) -> tuple[Array, Array]:
+    """The derivatives of a map that changes nothing, by states and by parameters."""
+    return np.broadcast_to(np.eye(n, width), (n, width)), np.broadcast_to(0.0, (n, q))
 
 
 def event_map(
@@ -116,14 +138,19 @@ def event_map(
 
 
 def instant_map(
-    system: FilippovSystem, mode: str, kind: str, element: int, letters: str = ""
+    system: FilippovSystem, mode: str, kind: str, element: int, letters: str = "", atom: int = -1
 ) -> EventMap:
-    """The map of a crossing, entry, stop, reset or impact as one of the extended states alone."""
+    """The map of a crossing, entry, stop, reset, jump or impact, of which alone the ``mode`` matters, as one of the
+    extended states; with the function of an ``atom`` of its condition."""
 
     def build() -> EventMap:
         d, i = system.definition, element
+        if kind == "jump":
+            function, after = jumped(system, element, letters)
+            return EventMap(system, system.extended_states, function, Guard("zero", 0, 0, i), after)
         if kind in ("stop", "reset"):
-            function = d.guards[i if kind == "stop" else len(system.stops) + i]
+            own = i if kind == "stop" else len(system.stops) + i
+            function = d.guards[own if atom < 0 else atom]
         elif kind == "impact":
             i -= len(system.entries)
             function = d.gaps[i]
@@ -134,7 +161,7 @@ def instant_map(
         after = _after(system, mode, guard, letters)
         return EventMap(system, system.extended_states, function, guard, after)
 
-    return system.cached(("instant map", mode, kind, element, letters), build)
+    return system.cached(("instant map", mode, kind, element, letters, atom), build)
 
 
 def function_map(system: FilippovSystem, mode: str, function: ca.SX) -> EventMap:

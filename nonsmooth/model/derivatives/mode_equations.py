@@ -6,6 +6,7 @@ import casadi as ca
 
 from ..definition.system import FilippovSystem
 from ..errors import DefinitionError
+from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
 from ..laws.explicit import explicit
 
@@ -19,9 +20,12 @@ def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
             raise DefinitionError(
                 f"mode {mode!r}: its multipliers are no functions of the states, so that it has no field."
             )
-        d, letters = system.definition, system.parse_letters(mode)
-        every = ca.vertcat(d.open_surfaces, d.gaps)
+        letters = system.parse_letters(mode)
+        coupled, contacts = coupled_of(system), len(system.impacts)
+        every, lower = coupled.kept, system.surface_count + 2 * contacts
         kept = [i for i, s in enumerate(letters) if s == 0 and i not in system.algebraic]
+        kept += [i + contacts for i in kept if i >= system.surface_count]
+        kept += range(lower, every.numel())  # derivatives of joints
         guards = [
             k
             for k, guard in enumerate(of_mode.guards)

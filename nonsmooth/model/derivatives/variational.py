@@ -184,11 +184,6 @@ class GuardedField(PlainField):
         return series_of([self.states, self.parameters], [self.field, self.motion.functions])
 
     @cached_property
-    def starts(self) -> Evaluator:
-        """(y, p) -> the first coefficients of states and guards, to order 3."""
-        return Evaluator(self.motion.jet_function(3))
-
-    @cached_property
     def gradients(self) -> Evaluator:
         """(y, p) -> gradients of the guards (g, N + k)."""
         return Evaluator(self.motion.gradient_function())

@@ -3,7 +3,7 @@
 A nonzero expression vanishes at random integers modulo the prime with a probability of about 2^-60.
 Elementary functions are random functions of their argument there, but for their exact values at 0
 and 1, so identities between them (exp(a) exp(b) = exp(a + b)) are not found; square roots are.
-Constants are the exact values of the doubles. Where this leaves it open, ``decide_zero`` looks at
+Constants are the exact values of the doubles, and what is only their rounding counts as zero. Where this leaves it open, ``decide_zero`` looks at
 doubles.
 
 Source: Schwartz 1980, "Fast probabilistic algorithms for verification of polynomial identities".
@@ -25,6 +25,7 @@ from ..values import Array
 from .cancel import NormalForms, ratio
 from .float_arithmetic import BINARY, UNARY
 from .graph import Node, evaluate, instructions
+from .rounded_numbers import zero_but_for_rounding
 
 PRIME = 2**61 - 1
 
@@ -123,6 +124,8 @@ def decide_zero(
     if not pieces:
         return True, EXACTLY
     found = _modular(pieces, surfaces, variables)
+    if found is False and zero_but_for_rounding(pieces, surfaces, variables):
+        return True, BUT_FOR_ROUNDING
     if found is not None:
         return found, EXACTLY
     return _in_doubles(pieces, surfaces, variables), IN_DOUBLES
@@ -201,6 +204,9 @@ def _on_surface(
 
 #: How it was decided: a nonzero value is a proof, zeros fail with a chance of about 2^-60.
 EXACTLY = "exact arithmetic modulo a prime"
+
+#: Not exactly, but no more than the rounding of its numbers makes of it.
+BUT_FOR_ROUNDING = "exact arithmetic, but for the rounding of numbers"
 
 #: Numbers at some points are no proof.
 IN_DOUBLES = "doubles at random points"

@@ -60,7 +60,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     roots = gate_roots(plain, _surfaces(system), x, ones)[1]
     columns = ca.jacobian(plain, lam)
     for members in system.entries:  # a set has one factor
-        if members[0] in (*system.half_lines, *system.joints):
+        if members[0] in (*system.half_lines, *system.joints, *system.definition.breakpoints):
             continue
         places = [(row, i) for i in members for row in columns[:, i].sparsity().row()]
         entries = [e for i in members for e in columns[:, i].nonzeros()]
@@ -161,6 +161,9 @@ class Coupled:
         stops = ca.densify(d.guards) if d.guards.numel() else ca.SX(0, 1)
         heights = ca.densify(ca.vertcat(h, d.gaps))
         factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
+        #: The field in states, multipliers, reactions and nu; switching functions and gaps; factors n_i of surfaces
+        #: and contacts, 1 where there is none; functions of stops and resets.
+        self.field, self.heights, self.factors, self.stops = field, heights, factor, stops
         self.outputs = [field, self.layer, heights, factor, stops]
         every = ca.vertcat(*unknowns, d.reactions)
         self.slope, self._every = ca.jacobian(self.layer, every), every
@@ -191,6 +194,8 @@ class Coupled:
         if surface in (*special, *self.system.joints):
             return False
         d, x = self.system.definition, self.system.extended_states
+        if surface in d.breakpoints:
+            return True
         pieces = [e for e in column if not e.is_zero()]
         return all(ca.depends_on(e, x) for e in pieces) and vanish_on(
             pieces, d.surfaces[surface], x
@@ -279,6 +284,19 @@ class Coupled:
         build = lambda: Evaluator(self.system.function("heights", lambda: [self.heights]))
         return self.system.cached("heights at", build).copied(x, p)[0].ravel()
 
+    def kept_at(self, x: Array, p: Array) -> tuple[Array, Array]:
+        """The functions of ``kept`` (k,) and their gradients (k, N) at an extended state."""
+
+        def build() -> Evaluator:
+            rows = ca.densify(self.kept)
+            states = self.system.extended_states
+            return Evaluator(
+                self.system.function("kept", lambda: [rows, ca.jacobian(rows, states)])
+            )
+
+        values, gradient = self.system.cached("kept at", build).copied(x, p)
+        return values.ravel(), gradient
+
     def sliding(self, mode: str) -> list[int]:
         """Surfaces that slide and contacts that are closed, with multipliers that are unknown."""
         signs = self.system.parse_letters(mode)
@@ -343,26 +361,6 @@ class Coupled:
         return mixed
 
     # expressions --------------------------------------------------------------------------------
-
-    @property
-    def field(self) -> ca.SX:
-        """The field in states, multipliers, reactions and nu."""
-        return self.outputs[0]
-
-    @property
-    def heights(self) -> ca.SX:
-        """Switching functions and gaps."""
-        return self.outputs[2]
-
-    @property
-    def factors(self) -> ca.SX:
-        """The factors n_i of surfaces and contacts; 1 where there is none."""
-        return self.outputs[3]
-
-    @property
-    def stops(self) -> ca.SX:
-        """Functions of stops and resets."""
-        return self.outputs[4]
 
     @property
     def multipliers(self) -> ca.SX:
@@ -436,6 +434,12 @@ class Coupled:
         found = self._layer_values.copied(self._inputs(x, multipliers, unknowns), p)
         layer, slope, factors = found
         return LayerValues(layer.ravel(), slope, factors.ravel())
+
+    def layer_gradients_at(self, x: Array, multipliers: Array, p: Array) -> Array:
+        """Derivatives of the layer by the extended state (m, N), where no unknown acts."""
+        build = lambda: self._evaluator([ca.densify(self.gradients[0])])
+        found = self.system.cached("layer gradients", build)
+        return found.copied(self._inputs(x, multipliers, np.zeros(self.count)), p)[0]
 
     def _inputs(self, x: Array, multipliers: Array, unknowns: Array) -> Array:
         scaled = self._scaled

@@ -8,14 +8,17 @@ multipliers are further states, with the rate that keeps the equations.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 
 from ..definition.system import FilippovSystem, require_system
 from ..errors import DefinitionError
+from ..expressions.identity import decide_zero
 from .coupled import combinable, coupled_of, raised_of
 from .motion import Motion, motion
-from .switches import Guarded
+from .switches import Guard, Guarded
 
 #: Rows of a matrix that are dependent to this part of its entries are so.
 _DEPENDENT = 1e-10
@@ -31,20 +34,28 @@ class Solved:
         coupled = raised_of(system) if rests_on(system, mode) else coupled_of(system)
         x = system.extended_states
         self.system, self.mode, self.coupled = system, mode, coupled
+        #: Surfaces whose unknown is lambda + c lambda^3, and their c: sliding ends where that is largest.
+        self.cubic: dict[int, ca.SX] = {}
+        self.unknowns: tuple[int, ...] = ()
+        if system.written.tables and 0 not in system.parse_letters(mode):
+            self.states, self.values, self.field = x, ca.SX(0, 1), system.field(mode)
+            return
         sliding = coupled.sliding(mode)
         own = [coupled.unknown(i) for i in sliding]
         symbols = ca.vertcat(*own) if own else ca.SX(0, 1)
         field, layer = coupled.held_at(mode, [coupled.field, coupled.layer])
+        for i in sliding:
+            if i < system.surface_count and system.nonlinear[i]:
+                field, layer = self._of_cubic(i, field, layer, symbols)
         residual = layer[sliding] if sliding else ca.SX(0, 1)
         residual = _with_rates(system, sliding, residual, symbols, field)
-        self.unknowns: tuple[int, ...] = ()
         self.states, self.values, self.field = x, symbols, field
         if not sliding:
             return
         slope = ca.jacobian(residual, symbols)
         if not ca.depends_on(slope, symbols):
             rest = ca.substitute(residual, symbols, 0)
-            dependent = system.complementarity or rests_on(system, mode)
+            dependent = system.complementarity or system.constraints or rests_on(system, mode)
             self.values = -(least_norm if dependent else solved)(slope, rest)
             self.field = ca.substitute(field, symbols, self.values)
             return
@@ -52,6 +63,26 @@ class Solved:
         self.states = ca.vertcat(x, symbols)
         drift = ca.mtimes(ca.jacobian(residual, x), field)
         self.field = ca.vertcat(field, -solved(slope, drift))
+
+    def _of_cubic(self, i: int, field: ca.SX, layer: ca.SX, symbols: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Field and layer in lambda + c lambda^3 if lambda_i enters as such, as friction that drops does."""
+        x, own = self.system.extended_states, self.coupled.unknown(i)
+        both = ca.vertcat(field, layer)
+        slopes, zero = [both], ca.SX(0)
+        for _ in range(4):
+            slopes.append(ca.jacobian(slopes[-1], own))
+        first, second = (ca.substitute(e, own, zero) for e in slopes[1:3])
+        third, n = slopes[3] / 6, field.numel()
+        row = [first[n + i], third[n + i]]
+        parts = ca.vertcat(first, third)
+        if not slopes[4].is_zero() or ca.depends_on(parts, symbols) or row[0].is_zero():
+            return field, layer
+        apart = [*ca.vertsplit(second), *ca.vertsplit(third * row[0] - first * row[1])]
+        if not decide_zero(apart, [], x)[0]:
+            return field, layer
+        self.cubic[i] = row[1] / row[0]
+        both = ca.densify(ca.substitute(both, own, zero) + first * own)
+        return both[:n], both[n:]
 
     def guarded(self) -> Guarded:
         """Guards of the mode, in the order of ``Coupled.guards``, and their functions."""
@@ -71,16 +102,23 @@ class Solved:
                 continue
             elif i not in sliding:
                 functions += [-layer[i], layer[i]]
+            elif i in self.cubic:
+                functions.append(-4 / (27 * self.cubic[i]) - self.values[sliding.index(i)] ** 2)
             else:
                 u, n = self.values[sliding.index(i)], factors[i]
                 turn = 1 if n.is_one() else n  # n^2 (1 -+ lambda) has the sign of 1 -+ lambda
                 functions += [turn * (n - u), turn * (n + u)]
         functions += ca.vertsplit(stops)[: stops.numel()]
-        guards = coupled.guards(self.mode)
+        guards = [g for g in coupled.guards(self.mode) if not (self._has_fold(g) and g.side < 0)]
+        guards = [replace(g, kind="branch", side=0) if self._has_fold(g) else g for g in guards]
         own = coupled.symbols_of(sliding)
         if own.numel() and not self.unknowns:
             functions = [ca.substitute(f, own, self.values) for f in functions]
         return list(zip(guards, functions, strict=True))
+
+    def _has_fold(self, guard: Guard) -> bool:
+        """Whether sliding ends at the fold of a cubic instead of where a multiplier is 1."""
+        return guard.kind == "exit" and guard.index in self.cubic
 
 
 def _with_rates(

@@ -1,4 +1,4 @@
-"""The smooth motion of one mode: its field, its guards, and their jets.
+"""The smooth motion of one mode: its field and its guards.
 
 A guard is a function that is positive inside the mode; the mode ends where it falls through zero:
 
@@ -16,12 +16,11 @@ import casadi as ca
 
 from ..definition.parse_definition import read_function
 from ..definition.system import FilippovSystem, require_system
-from ..expressions.jets import taylor
 from .switches import Guarded, Law, guards_of, kind_of
 
 
 class Motion:
-    """Field, guards and jets of one mode of a system; made by ``motion`` and ``followed``."""
+    """Field and guards of one mode of a system; made by ``motion`` and ``followed``."""
 
     def __init__(
         self,
@@ -41,15 +40,6 @@ class Motion:
         """Return (x, p) -> the field (N, 1) and the guard functions (m, 1)."""
         values = [self.field, self.functions]
         return self.system.function(("values", self.mode, self._key), lambda: values, self.states)
-
-    def jet_function(self, order: int) -> ca.Function:
-        """Return (x, p) -> jets of states (N, order+1) and of guard functions (m, order+1)."""
-        p = self.system.parameter_symbols
-
-        def build() -> Sequence[ca.SX]:
-            return taylor(self.field, self.functions, self.states, p, order)
-
-        return self.system.function(("jet", self.mode, order, self._key), build, self.states)
 
     def gradient_function(self) -> ca.Function:
         """Return (x, p) -> gradients of the guard functions (m, N), the error scale of rounding."""

@@ -19,15 +19,15 @@ def sliding_multipliers(
     kept: Array | None = None,
 ) -> list[Array]:
     """Multipliers (surfaces,) that keep the sliding surfaces of a mode."""
-    # Linear equations have one set; for others Newton's method starts from a grid (bilinear
-    # equations of two multipliers have at most two sets).
+    # Linear equations have one set, those of a mode may be linear although others are not; for others
+    # Newton's method starts from a grid (bilinear equations of two multipliers have at most two sets).
     sliding = of.sliding(mode)
     unknowns = np.zeros(of.count) if kept is None else kept.copy()
     if not sliding:
         return [unknowns]
     k = len(sliding)
     starts = [np.zeros(k)]
-    if not of.affine:
+    if not of.affine and not _is_linear(of, mode, x, unknowns, p):
         grid = np.linspace(-0.95, 0.95, 21 if k == 1 else 5 if k < 4 else 1)
         starts = list(np.stack(np.meshgrid(*[grid] * k), axis=-1).reshape(-1, k))
     found: list[Array] = []
@@ -39,6 +39,20 @@ def sliding_multipliers(
         if all(np.abs(lam - other).max() > 1e-7 for other in found):
             found.append(lam)
     return found
+
+
+def _is_linear(of: Coupled, mode: str, x: Array, unknowns: Array, p: Array) -> bool:
+    """Whether the slope of what slides is the same at some values of its multipliers, of which it is a polynomial."""
+    if any(of.system.nonlinear):
+        return False
+    held, sliding, slopes = of.known_multipliers(mode, x, unknowns, p), of.sliding(mode), []
+    for size in (-0.7, 0.3, 0.9):
+        moved = unknowns.copy()
+        moved[sliding] = size * np.linspace(1.0, 0.5, len(sliding))
+        at = of.layer_at(x, held, of.acting(mode, moved), p)
+        slopes.append(at.slope[np.ix_(sliding, sliding)])
+    change = max(float(np.abs(slope - slopes[0]).max()) for slope in slopes[1:])
+    return change <= 1e-13 * float(np.abs(slopes[0]).max())
 
 
 def _is_solution(

@@ -41,8 +41,10 @@ class Guard:
 
     def ends(self, kind: str, element: int, side: int) -> bool:
         """Whether its zero is the event of a kind, of an element, to a side (of an exit)."""
+        if self.kind == "branch":  # sliding ends there to any side
+            return kind in ("exit", "stability") and self.element == element
         given = kind if kind in ("stop", "reset") else ""
-        own = self.kind if self.kind in ("stop", "reset", "branch", "zero") else ""
+        own = self.kind if self.kind in ("stop", "reset", "zero") else ""
         return (own, self.element) == (given, element) and (
             self.kind != "exit" or self.side == side
         )

@@ -14,53 +14,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..expressions.graph import Node, reached
+from ..numbering import ARITHMETIC, LIBRARY, operation_in_c
 from .terms import MASKS, Graph, Terms
-
-#: C for operations on T; ``{0}`` and ``{1}`` are the arguments.
-_ARITHMETIC = {
-    "assign": "{0}",
-    "add": "{0} + {1}",
-    "sub": "{0} - {1}",
-    "mul": "{0} * {1}",
-    "neg": "-{0}",
-    "sq": "{0} * {0}",
-    "twice": "2.0 * {0}",
-    "inv": "1.0 / {0}",
-}
-
-#: Functions of the C library, applied lane by lane; the rest of the smooth operations.
-_LIBRARY = {
-    name: name
-    for name in "sqrt exp log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh "
-    "atan2 pow erf hypot expm1 log1p".split()
-} | {"constpow": "pow", "erfinv": "ns_erfinv"}
 
 #: Compilers take more than proportional time for long functions: statements of one that is not
 #: split, and of a part.
 _WHOLE, _PART = 5000, 250
+
+#: Statements of a function that is short.
+_SHORT = 150
 _NAME = re.compile(r"\b[vm]\d+\b")
 _DEFINED = re.compile(r"  const [TI] ([vm]\d+) =")
-
-#: What only parameters may go through; always on doubles.
-_PARAMETERS_ONLY = {
-    "sign": "ns_sign({0})",
-    "fabs": "fabs({0})",
-    "fmin": "fmin({0}, {1})",
-    "fmax": "fmax({0}, {1})",
-    "floor": "floor({0})",
-    "ceil": "ceil({0})",
-    "fmod": "fmod({0}, {1})",
-    "remainder": "remainder({0}, {1})",
-    "copysign": "copysign({0}, {1})",
-    "lt": "(double)({0} < {1})",
-    "le": "(double)({0} <= {1})",
-    "eq": "(double)({0} == {1})",
-    "ne": "(double)({0} != {1})",
-    "not": "(double)(!{0})",
-    "and": "(double)({0} && {1})",
-    "or": "(double)({0} || {1})",
-    "if_else_zero": "({0} ? {1} : 0.0)",
-}
 
 
 @dataclass(frozen=True)
@@ -190,7 +154,7 @@ class _Printed:
                     _literal(_value(self.nodes[a])) if self.constant[a] else f"v{a}"
                     for a in node.args
                 ]
-                value = _scalar(node.op, args)
+                value = operation_in_c(node.op, args)
             lines.append(f"  const double v{j} = {value};")
         lines += [f"  q[{k}] = v{j};" for j, k in self.prepared.items()]
         return (
@@ -220,7 +184,9 @@ class _Printed:
         arrays = "".join(f", T *restrict {a}" for a in function.arrays)
         head = f"{function.name}(const T *restrict x, const T *restrict q{extra}{arrays})"
         if len(lines) <= _WHOLE:
-            return _define(f"FUNCTION {head}", lines)
+            # Compilers see into short functions that are needed in parts: other outputs are then not computed.
+            short = len(lines) <= _SHORT and function.name.endswith("_values")
+            return _define(f"{'INLINE void' if short else 'FUNCTION'} {head}", lines)
         parts, size = _parts(lines)
         given = ["x", "q", *(f"e{k}" for k in range(len(self.types))), *function.arrays, "w"]
         text, calls = "", [f"  T w[{size}];"]
@@ -260,13 +226,13 @@ class _Printed:
         if j in self.sums:
             return self._sum(self.sums[j])
         args = [self.name(a) for a in node.args]
-        if node.op in _ARITHMETIC:
-            return _ARITHMETIC[node.op].format(*args)
+        if node.op in ARITHMETIC:
+            return ARITHMETIC[node.op].format(*args)
         if node.op == "select":
             return f"SELECT({args[0]}, {', '.join(map(self._broadcast, node.args[1:]))})"
         if node.op in MASKS:
             return f"(I)({args[0]} != 0)" if node.op == "nonzero" else " | ".join(args)
-        call = _LIBRARY[node.op].upper().replace("NS_", "") + "_"
+        call = LIBRARY[node.op].upper().replace("NS_", "") + "_"
         return f"{call}({', '.join(map(self._broadcast, node.args))})"
 
     def _broadcast(self, j: int) -> str:
@@ -306,11 +272,3 @@ def _literal(value: float) -> str:
         return "NAN" if math.isnan(value) else ("INFINITY" if value > 0 else "(-INFINITY)")
     text = repr(float(value))
     return f"({text})" if text.startswith("-") else text
-
-
-def _scalar(op: str, args: Sequence[str]) -> str:
-    if op in _ARITHMETIC:
-        return _ARITHMETIC[op].format(*args)
-    if op in _LIBRARY:
-        return f"{_LIBRARY[op]}({', '.join(args)})"
-    return _PARAMETERS_ONLY[op].format(*args)

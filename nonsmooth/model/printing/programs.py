@@ -15,11 +15,11 @@ import casadi as ca
 
 from ..definition.system import FilippovSystem
 from ..expressions.dependent_rows import in_span
-from ..expressions.jets import Expansion
 from ..expressions.linearity import bent
 from ..expressions.simplification import simplified
 from ..laws.coupled import Coupled, coupled_of
 from .ccode import Program
+from .jets import Expansion
 from .terms import OfTape, Term, Terms
 
 
@@ -34,13 +34,17 @@ class Shape:
     affine : list of bool
         Which guards are affine in the states.
     affine_modes : list of bool
-        Whether all is affine in them, sines of the time added, above, below and on the surface.
+        Whether all is affine in them, sines of the time added, above, below and on the surface; or off a set,
+        on it and where it is left.
+    own : list of int
+        The states that a set's functions are, if they are.
     """
 
     rows: list[int]
     slots: list[int]
     affine: list[bool]
     affine_modes: list[bool]
+    own: Sequence[int] = ()
 
 
 def lanes_program(system: FilippovSystem, order: int) -> tuple[str, Shape]:

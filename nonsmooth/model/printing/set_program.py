@@ -11,33 +11,18 @@ it (negative: since it), that point is at s = 3/w, and a step of a part f of the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 
 from ..laws.coupled import Coupled
 from .ccode import Program
+from .programs import Shape
 from .terms import Graph, OfTape, Term, Terms
-
-#: Lines of functions that are short.
-_SHORT = 150
 
 Rows = list[list["Term | None"]]
 
 
-@dataclass(frozen=True)
-class SetProgram:
-    """A program and its sizes."""
-
-    text: str
-    rows: tuple[int, ...]
-    on_rows: tuple[int, ...]
-    bent_slip: bool
-    bent_stops: bool
-    states: tuple[int, ...]
-
-
-def set_program(coupled: Coupled, order: int) -> SetProgram:
+def set_program(coupled: Coupled, order: int) -> tuple[str, Shape]:
     """Write the functions of a system with one set of codimension two or more and nothing else."""
     return _Writer(coupled, order).program()
 
@@ -68,16 +53,16 @@ class _Writer(OfTape):
             return [*(unknowns or multipliers or none)]
         return [*(multipliers or none), *(unknowns or none)]
 
-    def program(self) -> SetProgram:
+    def program(self) -> tuple[str, Shape]:
         graph, program = self.graph, Program(self.graph, ("T",) * (self.k + 1))
-        off, on, leave = self._off(), self._on(), self._leave()
-        for name, jet in (("off", off), ("on", on), ("leave", leave)):
+        jets = {"off": self._off(), "on": self._on(), "leave": self._leave()}
+        for name, jet in jets.items():
             arrays = {key: [e for row in rows for e in row] for key, rows in jet.items()}
             program.add(f"{name}_jet", **arrays)
         heights, height_slopes = self.surfaces()
         stops, stop_slopes = self.stops()
         slip, slip_slopes = self._slip()
-        program.add("height_values", h=heights, gradient=height_slopes)
+        program.add("surface_values", h=heights, gradient=height_slopes)
         negative = [None if e is None else -e for row in self.pull for e in row]
         program.add("frozen_values", a=self.rates, m=negative)
         free, field = (self.expansion((0,)).advance(0, [*self.x, *own])[0] for own in (
@@ -92,28 +77,12 @@ class _Writer(OfTape):
         program.add("flow_values", f=flow)
         program.add("stop_values", value=stops, gradient=stop_slopes)
         program.add("slip_values", value=slip, gradient=slip_slopes)
-        rows, on_rows, bent_slip, bent_stops = self._bent()
-        for name, jet, checked in (("off", off, rows), ("on", on, on_rows)):
-            own = [row[0] for row in jet["g"][1 : 1 + len(stops)]]
-            program.add(f"{name}_check", f=[jet["c"][i][1] for i in checked], value=own)
-        text = self._slopes(height=height_slopes, slip=slip_slopes, stop=stop_slopes)
-        found = [self.x.index(h) for h in heights if h in self.x]
-        states = tuple(found) if len(found) == self.k else ()
-        return SetProgram(
-            text + _short_inline(program.text()), rows, on_rows, bent_slip, bent_stops, states
-        )
-
-    def _slopes(self, **gradients: Terms) -> str:
-        """Which derivatives by states are not zero."""
-        lines = []
-        for name, values in gradients.items():
-            there = [str(int(e is not None)) for e in values]
-            rows = [", ".join(there[i : i + self.n]) for i in range(0, len(there), self.n)]
-            entries = ", ".join(f"{{{row}}}" for row in rows) or "{0}"
-            lines.append(
-                f"__attribute__((unused)) static const char {name.upper()}_SLOPES[][N] = {{{entries}}};\n"
-            )
-        return "".join(lines)
+        shape = self._shape([self.x.index(h) for h in heights if h in self.x])
+        for name in ("off", "on"):
+            series = [row[0] for row in jets[name]["g"]]
+            own = [series[j] if j < len(series) else None for j in shape.slots]
+            program.add(f"{name}_check", f=[jets[name]["c"][i][1] for i in shape.rows], g=own)
+        return program.text(), shape
 
     def _slip(self) -> tuple[list[Term | None], list[Term | None]]:
         """The unknowns that keep h' at zero and their limit, with their gradients."""
@@ -132,8 +101,8 @@ class _Writer(OfTape):
     def _times(self, matrix: Sequence[Terms], vector: Terms) -> list[Term | None]:
         return [self.graph.inner(row, vector) for row in matrix]
 
-    def _bent(self) -> tuple[tuple[int, ...], tuple[int, ...], bool, bool]:
-        """Rows of the field that are not affine off the set and on it; whether slip and stops are not."""
+    def _shape(self, states: list[int]) -> Shape:
+        """What is affine off the set and on it; the unknowns come after the guards."""
         of, k = self.coupled, self.k
         x, unknown = of.system.extended_states, of.symbols_of(range(k))
         lam = of.multipliers if self.scaled else ca.SX(0, 1)
@@ -141,11 +110,13 @@ class _Writer(OfTape):
         free = ca.substitute([field, layer], [unknown], [ca.SX.zeros(k, 1)])
         kept = -ca.mtimes(ca.inv(ca.jacobian(layer, unknown)), free[1])
         on, acts = ca.substitute(field, unknown, kept), of.columns_of_field.sparsity().row()
-        bent = [not ca.is_linear(e, x) for e in ca.vertsplit(free[0])]
-        rows = tuple(i for i in range(self.n) if bent[i] or i in acts)
-        on_rows = tuple(i for i in range(self.n) if not ca.is_linear(on[i], x))
-        slip = ca.vertcat(kept, of.factors[0])
-        return rows, on_rows, not ca.is_linear(slip, x), not ca.is_linear(of.stops, x)
+        rows = [i for i in range(self.n) if i in acts or not ca.is_linear(free[0][i], x)]
+        affine = [True, True, *(ca.is_linear(e, x) for e in ca.vertsplit(of.stops) if e.numel())]
+        slots = [j for j, known in enumerate(affine) if not known]
+        slip = ca.is_linear(ca.vertcat(kept, of.factors[0]), x)
+        modes = [False, slip and all(affine) and ca.is_linear(on, x), False]
+        slots += [] if slip else [len(affine) + i for i in range(k)]
+        return Shape(rows, slots, affine, modes, states if len(states) == k else ())
 
     # jets --------------------------------------------------------------------------------------
 
@@ -166,7 +137,8 @@ class _Writer(OfTape):
                 for row, value in zip(jet, self._stretched(fields), strict=True):
                     row.append(value)
         ends = [row[k] for row in direction.own for k in (self.order - 1, self.order)]
-        guards = [direction.root, *map(list, zip(*stops, strict=True))]
+        nothing: list[Term | None] = [None] * (self.order + 1)
+        guards = [direction.root, nothing, *map(list, zip(*stops, strict=True))]
         return dict(c=jet, g=guards, ends=[ends], radius=[[direction.radius]])
 
     def _on(self) -> dict[str, Rows]:
@@ -191,7 +163,7 @@ class _Writer(OfTape):
             for row in series:
                 square = graph.total(square, _square(graph, row, k))
             room.append(graph.difference(_square(graph, limit, k), square))
-        return dict(c=jet, g=[room, *map(list, zip(*stops, strict=True)), limit], nu=series)
+        return dict(c=jet, g=[room, limit, *map(list, zip(*stops, strict=True)), *series])
 
     def _leave(self) -> dict[str, Rows]:
         """Leaving the set at no rate yet."""
@@ -227,7 +199,8 @@ class _Writer(OfTape):
             stops.append(known[2])
             self._next(jet, known[0], k)
         distance = [*radius[2:], *[None] * (self.order + 3 - len(radius))]
-        return dict(c=jet, g=[distance, *map(list, zip(*stops, strict=True))], u=u)
+        nothing: list[Term | None] = [None] * (self.order + 1)
+        return dict(c=jet, g=[distance, nothing, *map(list, zip(*stops, strict=True)), *u])
 
     def _stretched(self, fields: Rows) -> list[Term | None]:
         """The next coefficients of states, from those of (1 - w s/3)^2 times the field."""
@@ -283,15 +256,6 @@ class _Direction:
         for row, own in zip(self.u, self.own, strict=True):
             row.append(graph.difference(own[k], _products(graph, row, self.root, 0, k - 1, k)))
         return [row[k] for row in self.u]
-
-
-def _short_inline(text: str) -> str:
-    """Let compilers see into short functions that are needed in parts: their other outputs are then not computed."""
-    for name in ("height", "frozen", "slip", "stop"):
-        head, body = f"FUNCTION {name}_values(", text.partition(f"FUNCTION {name}_values(")[2]
-        if body.partition("\n}\n")[0].count("\n") <= _SHORT:
-            text = text.replace(head, f"INLINE void {name}_values(")
-    return text
 
 
 def _products(graph: Graph, u: Terms, v: Terms, first: int, last: int, k: int) -> Term | None:

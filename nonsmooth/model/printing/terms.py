@@ -12,9 +12,9 @@ from typing import TypeAlias, cast
 
 from ..expressions.float_arithmetic import BINARY, UNARY
 from ..expressions.graph import Node, evaluate
-from ..expressions.jets import Expansion
 from ..expressions.taylor_rules import touched
 from ..laws.coupled import Coupled
+from .jets import Expansion
 from .tape import Entries, Values, tape_of
 
 Terms: TypeAlias = "Sequence[Term | None]"
@@ -152,7 +152,7 @@ class Graph:
         args = [mask, *(self.constant(0.0) if e is None else e for e in (a, b))]
         return self._term(Node("select", tuple(e.number for e in args)))
 
-    # the arithmetic of series: ``expressions.jets.Arithmetic`` -----------------------------------
+    # the arithmetic of series, with None for a structural zero ------------------------------------
 
     def number(self, value: float) -> Term | None:
         """Return a constant."""

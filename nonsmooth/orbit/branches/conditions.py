@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...flow.fixed import first_terms
 from ...model import Array, Evaluator, FilippovSystem, Guard
 from ...model.derivatives.event_maps import keeps_zero
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
@@ -94,7 +95,7 @@ def condition_row(
         if condition.what == "start":
             leg, before = problem.legs[i], problem.legs[i - 1]
             y = variational_field(problem.system, leg.mode).states_at(x, q)
-            first = guarded_field(problem.system, leg.mode).starts.copied(y, q)[1]
+            first = first_terms(guarded_field(problem.system, leg.mode), y, q)[1]
             rows = _starting(problem.system, i, leg, before)
             found = {test.name: float(first[k, order]) for k, order, test in rows}
             return found.get(condition.name, np.nan)

@@ -22,6 +22,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...flow.fixed import first_terms
 from ...model import Array, Guard
 from ...model.derivatives.variational import guarded_field
 from ..periodic.boundary_value_problem import (
@@ -210,10 +211,8 @@ def _leads_away(problem: BoundaryProblem, mode: str, surface: int, y: Array, p: 
     """Whether the field beyond a surface, tangent to it too, bends away from it."""
     field = guarded_field(problem.system, mode)
     own = [g.kind == "surface" and g.element == surface for g in field.motion.guards].index(True)
-    return (
-        float(field.starts.copied(Leg(mode).field(problem.system).states_at(y, p), p)[1][own, 2])
-        > 0.0
-    )
+    states = Leg(mode).field(problem.system).states_at(y, p)
+    return float(first_terms(field, states, p)[1][own, 2]) > 0.0
 
 
 def _soft(problem: BoundaryProblem, leg: Leg, surface: int) -> str:

@@ -24,6 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...flow.fixed import first_terms
 from ...local import Equilibrium, PseudoEquilibrium
 from ...local.checks import parameter_index
 from ...local.read_only import ReadOnly
@@ -637,7 +638,7 @@ def _beginnings(
     before = at.events[i - 1]
     rate = at.by_leg[i - 1].rate[: before.gradient.size]
     return {
-        "cusp with the other sliding bifurcation": float(field.starts(y, p)[1][k, order]),
+        "cusp with the other sliding bifurcation": float(first_terms(field, y, p)[1][k, order]),
         "two-fold": float(before.gradient @ rate),
     }
 

@@ -13,6 +13,7 @@ from ...local.point.regions import Region
 from ...local.point.surface_point import SIDES
 from ...local.scans.plane_scan import PlaneScan
 from ...model import Array, FilippovSystem, Stop
+from ...model.definition.elements import Complementarity
 from .evenly_spaced_orbits import Cut, SpacedOrbit, evenly_spaced, polyline, until_rest
 
 _TOLERANCE = 1e-8  # far below the resolution of a picture
@@ -25,7 +26,7 @@ _NEAR = 1e-4  # in units of the box: starts from a saddle, and the gap of a clos
 class PlaneOrbits:
     """Orbits through crossing and sliding, forward and backward, to a little outside the box."""
 
-    # Stops and resets of the system are ignored.
+    # They end where an event of the scan is due, at a gap, and backward at the boundary of a condition.
 
     def __init__(self, scan: PlaneScan, t_end: float | None = None):
         self.scan = scan
@@ -40,7 +41,7 @@ class PlaneOrbits:
     @cached_property
     def _systems(self) -> dict[bool, FilippovSystem]:
         """The system and its time reversal."""
-        return {ahead: _bounded(self.scan, 1 if ahead else -1) for ahead in (True, False)}
+        return {ahead: _bounded(self.scan, ahead) for ahead in (True, False)}
 
     def follow(
         self,
@@ -51,7 +52,7 @@ class PlaneOrbits:
         landing: bool = False,
     ) -> Array:
         """Follow one orbit, a few steps at a time, until ``cut`` shortens it."""
-        if not np.all(np.isfinite(start)):
+        if not np.all(np.isfinite(start)) or self.scan.is_excluded(start[None, :])[0]:
             return np.empty((0, 2))
         curve, x, t, events = start[None, :], start, 0.0, list[Array]()
         for _ in range(_LONGEST // _CHUNK):
@@ -65,7 +66,9 @@ class PlaneOrbits:
                 max_events=_EVENTS,
                 max_steps=_CHUNK,
             )
-            entry = next((e for e in part.events if landing and e.kind == "entry"), None)
+            entry = next(
+                (e for e in part.events if landing and e.kind in ("entry", "contact")), None
+            )
             until = None if entry is None else (entry.t, entry.x)
             curve = np.vstack([curve, polyline(part, self.scan.box.size, until=until)[1:]])
             kept = curve if cut is None else cut(curve)
@@ -105,11 +108,13 @@ class PlaneOrbits:
         for rest in self.scan.pseudo_equilibria:
             if rest.kind == "pseudo-saddle":
                 ahead = rest.region is not Region.ATTRACTING
-                for side in SIDES:
+                for side in self.scan.sides:
                     yield "separatrix", self._from(rest.point, ahead, side)
 
     def _from(self, start: Array, ahead: bool, mode: str | None = None) -> Array:
         """An orbit up to its end, which may be a focus, in the direction of time."""
+        if self.scan.where.one_sided:
+            mode = "o" if ahead else None
         curve = self.follow(start, ahead, self._to_rest, mode=mode)
         return curve[:: 1 if ahead else -1]
 
@@ -123,27 +128,36 @@ def _mode_at_end(run: Trajectory) -> str | None:
     mode, on_event = run.events[-1].mode_after, False
     if len(run.events) > 1:
         on_event = run.events[-2].t == run.t[-1]
-    return mode if "s" in mode or on_event else None
+    return mode if set("sc") & set(mode) or on_event else None
 
 
-def _bounded(scan: PlaneScan, direction: int) -> FilippovSystem:
-    """The system, or its time reversal, with stops a little outside the box."""
-    system, box = scan.where.system, scan.box
-    x, y = system.extended_states[0], system.extended_states[1]
+def _bounded(scan: PlaneScan, ahead: bool) -> FilippovSystem:
+    """The system, or its time reversal, with stops a little outside the box, at events and at gaps."""
+    where, box, direction = scan.where, scan.box, 1 if ahead else -1
+    x, y = where.system.extended_states[0], where.system.extended_states[1]
     dx, dy = 0.03 * box.size
     walls = [x - (box.x0 - dx), (box.x1 + dx) - x, y - (box.y0 - dy), (box.y1 + dy) - y]
-    symbols = [system.parameter_symbols[k] for k in range(len(scan.where.parameters))]
-    sides = SIDES if scan.where.mode else ("",)
-    fields = [[direction * system.field(side)[k] for k in (0, 1)] for side in sides]
+    stops = [Stop(wall, -1, f"wall {k}") for k, wall in enumerate(walls)]
+    gaps = scan.whole.definition.gaps
+    stops += [Stop(gaps[j], -1, f"gap {j}") for j in range(gaps.numel())]
+    stops += [event.stop(ahead) for event in scan.events]
+    sides = SIDES if where.mode else ("",)
+    fields = [[direction * where.system.field(s)[k] for k in (0, 1)] for s in sides]
     law: dict[str, Any] = {"field": fields[0]}
-    if scan.where.mode:
-        law = {"surface": system.surface_function(0), "above": fields[0], "below": fields[1]}
-    return FilippovSystem(
-        [x, y],
-        **law,
-        parameters=dict(zip(symbols, scan.where.parameters.tolist(), strict=True)),
-        stops=[Stop(wall, -1, f"wall {k}") for k, wall in enumerate(walls)],
-    )
+    if where.one_sided and ahead:
+        d = scan.whole.definition
+        law = {
+            "field": d.field,
+            "complementarity": Complementarity(d.surfaces[0], d.multipliers[0]),
+        }
+    elif where.one_sided:
+        stops.append(Stop(where.system.surface_function(), -1, "boundary"))
+    elif where.mode:
+        h = where.system.surface_function()
+        law = {"surface": h, "above": fields[0], "below": fields[1]}
+    symbols = [where.system.parameter_symbols[k] for k in range(len(where.parameters))]
+    values = dict(zip(symbols, where.parameters.tolist(), strict=True))
+    return FilippovSystem([x, y], **law, parameters=values, stops=stops)
 
 
 def _duration(scan: PlaneScan) -> float:

@@ -117,7 +117,7 @@ def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     """The return map on perturbations across the flow, in the smallest invariant subspace."""
     # in units of the orbit: sizes decide what is lost, and states and time have different units
     units = _units(problem, at)
-    passages(at.flows, *_events(problem, at))  # DegenerateError where an event is grazed
+    passages(at.flows.ended, *events_of(problem, at))  # DegenerateError where an event is grazed
     maps = leg_maps(problem, at) * (units / units[:, None])
     flow = at.flows.by_start[:, : problem.dimension] * (units / units[:, None])
     return reduced_map(maps, flow, _sliding_directions(problem, at, p, units))
@@ -181,7 +181,7 @@ def _range(matrix: Array, size: float) -> Array:
 
 def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
     """Product of state-transition and saltation matrices over the legs, (N, N)."""
-    jumps = saltations(at.flows, *_events(problem, at)).matrix
+    jumps = saltations(at.flows.ended, *events_of(problem, at)).matrix
     product: Array = np.eye(problem.dimension)
     for step in jumps @ at.flows.by_start:
         product = step @ product
@@ -201,7 +201,7 @@ def stability(values: NDArray[np.complex128], error: float) -> str:
     return "superstable" if values.size and not np.any(sizes) else "asymptotically stable"
 
 
-def _events(
+def events_of(
     problem: BoundaryProblem, at: Evaluation
 ) -> tuple[Array, Callable[[int], str], NDArray[np.bool_]]:
     """Fields after the events of legs, their names, and which legs have one."""

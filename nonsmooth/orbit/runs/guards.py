@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...flow.fixed import LegsWatch, passing, watched
+from ...flow.fixed import LegsWatch, first_terms, passing
 from ...flow.names import described, guard_name
 from ...model import Array, FilippovSystem, Guard
 from ...model.derivatives.event_maps import is_due_at
@@ -52,12 +52,12 @@ def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array
     """Find the extrema of all guards inside a leg, and the violations."""
     field = guarded_field(system, mode)
     y = variational_field(system, mode).states_at(x, p)
-    rows = watched(field, y, p, duration, _ENDS * duration)
+    ((rows,), _, _) = LegsWatch([field])([y], p, np.array([duration]), _ENDS)
     return Watch(_approaches(field, rows, p), _violations_along(field, rows, p))
 
 
 def is_met(field: GuardedField, row: Array, p: Array) -> bool:
-    """Whether something happens where the guard of a row of ``watched`` passes zero."""
+    """Whether something happens where the guard of a row of ``LegsWatch`` passes zero."""
     guard, system = field.motion.guards[int(row[0])], field.motion.system
     if guard.kind not in CONDITIONS:
         return True
@@ -143,14 +143,14 @@ def change_fault(
     own, rate = leg.at_end(system, end, p), leg.field(system).rate.copied(end, p)[0][:, 0]
     y = variational_field(system, following).states_at(after, p)
     field = guarded_field(system, following)
-    begin = np.vstack([part[:, :4] for part in field.starts.copied(y, p)])
+    begin = np.vstack(first_terms(field, y, p))
     return _change_fault(system, leg, float(own.gradient @ rate), field, begin, p)
 
 
 def begin_fault(system: FilippovSystem, leg: Leg, end: Array, p: Array) -> str:
     """A guard of a leg's mode that is negative where the leg ends; empty if there is none."""
     field = guarded_field(system, leg.mode)
-    values = np.vstack([part[:, :1] for part in field.starts.copied(end, p)])
+    values = np.vstack(first_terms(field, end, p, 0))
     return _negative(field, values, p)
 
 

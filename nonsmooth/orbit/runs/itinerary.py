@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...flow.fixed import first_terms
 from ...flow.follow import follow
 from ...flow.names import described, guard_name
 from ...flow.status import Status
@@ -275,7 +276,7 @@ class FixedItinerary:
         middle = system.extended_point(run(0.5 * (start + end)), 0.5 * (start + end))
         p = system.parameter_vector(self.parameters)
         y = variational_field(system, mode).states_at(middle, p)
-        values = guarded_field(system, mode).starts(y, p)[1][:, 0]
+        values = first_terms(guarded_field(system, mode), y, p)[1][:, 0]
         for guard, value in zip(of_mode.guards, values, strict=True):
             if guard.kind in _NEAR and value <= 0.0:
                 return f"{what}: {described(system, guard)} fails"

@@ -19,6 +19,7 @@ from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent
 from ...model.derivatives.variational import plain_field
 from .legs import Leg, LegFlow, integrate_leg, leg_name
+from .saltation import Ended
 
 #: Local errors of the steps in extended precision.
 EXTENDED = 2.0**-64
@@ -47,6 +48,12 @@ class LegFlows:
     value: Array
     gradient: Array
     value_parameters: Array
+
+    @property
+    def ended(self) -> Ended:
+        """Ends and events, for saltation matrices."""
+        maps = self.after_state, self.after_parameters
+        return Ended(self.rate, *maps, self.gradient, self.value_parameters)
 
     @cached_property
     def by_leg(self) -> tuple[LegFlow, ...]:

@@ -14,12 +14,12 @@ from itertools import product
 import numpy as np
 
 from ...flow.constants import TIE
-from ...flow.engine.columns import EndOfLeg
+from ...flow.engine.columns import CarriedLegs, EndOfLeg
 from ...flow.events import Event
 from ...flow.fixed import flow_for
 from ...flow.names import event_name, shown_mode
 from ...flow.trajectory import Trajectory
-from ...flow.variation import CarriedField
+from ...flow.variation import NONE, FlownLeg, carry_legs, require_done
 from ...model import Array, DegenerateError, FilippovSystem, coupled_of, multiplier_enters
 from ...model.derivatives.event_maps import (
     AtEvent,
@@ -83,30 +83,31 @@ class Leg:
         """The variational field of the mode."""
         return variational_field(system, self.mode, chosen)
 
-    def along(
-        self, system: FilippovSystem, chosen: tuple[int, ...] = ()
-    ) -> VariationalField | CarriedField:
-        """What carries states and derivatives along the leg."""
-        if not system.sets:
-            return self.field(system, chosen)
-        given = self.mode, chosen, self.left
-        return system.cached(("carried field", *given), lambda: CarriedField(system, *given))
+    def flown(self, system: FilippovSystem, x: Array, duration: float) -> FlownLeg:
+        """The leg from a start (N,) over a duration."""
+        return FlownLeg(self.mode, x, duration, self.ends(system), self.left)
 
     def ends(self, system: FilippovSystem) -> EndOfLeg | None:
-        """The end of a leg at a set, or of sliding or of a contact beside one, where the field is continuous."""
-        if not system.sets or self.kind not in ("entry", "exit", "release"):
+        """The end of a leg by its mode's law: at a surface or set, of sliding, of a contact beside a set."""
+        if self.kind not in ("crossing", "entry", "exit", "release") or self.further:
             return None
         if self.kind == "release":
             own = self.element - len(system.entries) + system.surface_count
-            return EndOfLeg(guard="release", number=own)
-        members = system.entries[self.element]
-        if self.kind == "entry":
-            return EndOfLeg(hit=members[0]) if len(members) > 1 else None
-        if self.mode[self.element] != "s":
-            return None  # a surface is crossed
-        if len(members) > 1:
+            return EndOfLeg(guard="release", number=own) if system.sets else None
+        members, slides = system.entries[self.element], self.mode[self.element] == "s"
+        if self.kind == "entry" and len(members) > 1:
+            return EndOfLeg(hit=members[0])
+        if self.kind == "exit" and slides and len(members) > 1:
             return EndOfLeg(guard="slip", number=members[0])
-        return EndOfLeg(guard="exit", number=members[0], side=self.side)
+        if not self._is_plain(system):
+            return None
+        if self.kind == "exit" and slides:
+            return EndOfLeg(guard="exit", number=members[0], side=self.side)
+        return EndOfLeg(guard="surface", number=members[0])
+
+    def _is_plain(self, system: FilippovSystem) -> bool:
+        """Whether its event is one of a surface without memory, whose multipliers enter linearly."""
+        return system.laws[self.element] == "surface" and not any(system.nonlinear)
 
     def map(self, system: FilippovSystem) -> EventMap | None:
         """The event's function and what it does to the state; None where a time ends the leg."""
@@ -126,6 +127,36 @@ class Leg:
             assert then is not None
             at = _composed(at, then(at.after, p))
         return at
+
+    def at_event(self, system: FilippovSystem, x: Array, p: Array) -> AtEvent:
+        """The same as functions of the extended states (N,) alone: multipliers follow them."""
+        at = self._own_event(system, x, p)
+        for leg in self.further:
+            at = _composed(at, leg._own_event(system, at.after, p))
+        return at
+
+    def _own_event(self, system: FilippovSystem, x: Array, p: Array) -> AtEvent:
+        at_once = self.kind in ("stop", "reset", "impact", "jump")
+        if (
+            system.sets
+            or at_once
+            or (self.kind in ("crossing", "entry") and self._is_plain(system))
+        ):
+            mode = system.widened(self.mode) if self.kind == "impact" else ""
+            given = mode, self.kind, self.element, self.letters, self.atom
+            return instant_map(system, *given)(x, p)
+        own, every = self.map(system), tuple(range(len(p)))
+        assert own is not None
+        start, n = self.field(system, every).initial(x, p), len(x)
+        at = own(start[:, 0], p)
+        moved, by_p = start[:, 1 : 1 + n], start[:, 1 + n :]
+        return replace(
+            at,
+            after_state=at.after_state @ moved,
+            after_parameters=at.after_parameters + at.after_state @ by_p,
+            gradient=at.gradient @ moved,
+            by_parameters=at.by_parameters + at.gradient @ by_p,
+        )
 
 
 def shown_itinerary(system: FilippovSystem, legs: Sequence[Leg]) -> str:
@@ -148,6 +179,7 @@ def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
         after=then.after,
         after_state=slope @ first.after_state,
         after_parameters=slope @ first.after_parameters + then.after_parameters,
+        smooth=first.smooth and then.smooth,
     )
 
 
@@ -164,6 +196,12 @@ class LegFlow:
     rate: Array
     #: Its event, where that is one of the law of the mode.
     at: AtEvent | None = None
+    #: (N,): The field at the start.
+    before: Array | None = None
+    #: (K, N, N + q): Derivatives at samples.
+    at_samples: Array | None = None
+    #: The legs of which it is one, with its number, along which rows are pulled back if they were recorded.
+    carried: tuple[CarriedLegs, int] | None = None
 
 
 def integrate_leg(
@@ -174,19 +212,53 @@ def integrate_leg(
     p: Array,
     chosen: tuple[int, ...] = (),
 ) -> LegFlow:
-    """The flow of a leg's mode from ``x`` (N,) over a duration, with derivatives."""
-    field = leg.along(system, chosen)
-    if isinstance(field, CarriedField):
-        ends = leg.ends(system)
-        found = field.flow(x, p, duration, ends)
-        n, own, at = len(x), found.gradient, None
-        if ends:
-            at = AtEvent(found.end, np.eye(n), np.zeros((n, len(p))), 0.0, own[:n], own[n:])
-        return LegFlow(found.end, found.by_start, found.by_parameters, found.end_rate, at)
-    start = field.start(x, p)
-    whole = field.matrix(flow_for(field, start, p, duration))
+    """The flow of a leg's mode from ``x`` (N,) over a duration of either sign, with derivatives."""
+    field = leg.field(system, chosen)
+    whole = field.matrix(flow_for(field, field.start(x, p), p, duration))
     n, end = field.by_start, whole[:, 0]
     return LegFlow(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], field.rate_at(end, p))
+
+
+def carry_leg(
+    system: FilippovSystem,
+    leg: Leg,
+    x: Array,
+    duration: float,
+    p: Array,
+    chosen: tuple[int, ...] = (),
+    times: Array = NONE,
+    back: bool = False,
+) -> LegFlow:
+    """The same of a leg of a run, by the states alone; at times since its start, or recorded to be taken ``back``."""
+    if not (system.sets or back or len(times)):  # one leg costs less by its own program
+        found, n = integrate_leg(system, leg, x, duration, p, chosen), len(x)
+        return LegFlow(found.end[:n], found.by_start[:n], found.by_parameters[:n], found.rate[:n])
+    flown = [leg.flown(system, x, duration)]
+    carried = carry_legs(system, flown, p, chosen, times, back=back)
+    require_done(system, flown, carried)
+    return flows_of(carried)[0]
+
+
+def rate_at(system: FilippovSystem, leg: Leg, x: Array, p: Array) -> Array:
+    """The field of a leg's mode at an extended state (N,)."""
+    flown = [FlownLeg(leg.mode, x, 0.0, None, leg.left)]
+    found = carry_legs(system, flown, p, back=True)
+    require_done(system, flown, found)
+    return found.before[0]
+
+
+def flows_of(found: CarriedLegs) -> list[LegFlow]:
+    """Legs that were carried, one by one."""
+    n, result, first = found.ends.shape[1], list[LegFlow](), found.given.first.tolist()
+    derivatives, at_samples = found.derivatives, found.at_samples
+    for i, ends in enumerate(found.given.ends):
+        at, by, own = None, derivatives[i], found.gradients[i]
+        if ends is not None:
+            at = AtEvent.smooth_at(found.ends[i], 0.0, own[:n], own[n:])
+        sampled = at_samples[first[i] : first[i + 1]]
+        kept = at, found.before[i], sampled, (found, i)
+        result.append(LegFlow(found.ends[i], by[:, :n], by[:, n:], found.rates[i], *kept))
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,9 +275,14 @@ class Stretch:
     after: Array
 
 
+def parameters_of(run: Trajectory) -> Array:
+    """Numbers for all parameters of a run."""
+    return np.array([run.parameters[name] for name in run.system.parameter_names], float)
+
+
 def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
     """Split a run into legs, one for each instant with events; ``begins``: those at its start count."""
-    system, p = run.system, run.system.parameter_vector(run.parameters)
+    system, p = run.system, parameters_of(run)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
     if any(coupled_of(system).carriers[i] for i in system.set_of):
@@ -347,10 +424,9 @@ def _located(
     size = 1.0 + float(np.abs(x).max())
     values = atoms_at(system, event.kind, event.element, x, p)
     vanishing = [k for k, value in values.items() if abs(value) <= _LOCATED * size]
-    y = leg.along(system).states_at(x, p)
     if len(vanishing) == 1:
-        found = leg if _is_zero(leg.at_end(system, y, p), y) else replace(leg, atom=vanishing[0])
-        if _is_zero(found.at_end(system, y, p), y):
+        found = leg if _is_zero(leg.at_event(system, x, p), x) else replace(leg, atom=vanishing[0])
+        if _is_zero(found.at_event(system, x, p), x):
             return found
     elif not vanishing and starts:
         return replace(leg, at_start=True)
@@ -425,9 +501,8 @@ def _require_one_condition(system: FilippovSystem, event: Event, p: Array) -> No
     for i in closed:
         if i in system.algebraic:
             continue  # the field is continuous there
-        y = Leg(event.mode_before).along(system).states_at(x, p)
-        own = event_map(system, event.mode_before, event.kind, event.element, event.side)(y, p)
-        if not parallel(surface_map(system, i)(x, p).gradient, own.gradient[: len(x)]):
+        own = Leg(event.mode_before, event.kind, event.element, event.side).at_event(system, x, p)
+        if not parallel(surface_map(system, i)(x, p).gradient, own.gradient):
             raise DegenerateError(corner(event.t, event.name, system.surface_names[i]))
 
 
@@ -443,12 +518,10 @@ def corner(t: float, one: str, other: str) -> str:
 def _letters(system: FilippovSystem, event: Event, p: Array) -> str:
     """The sides with which friction acted at an impact: those that give the state after it."""
     x = _extended(system, event.x, event.t)
-    mode = event.mode_before
-    y = Leg(mode).along(system).states_at(x, p)
+    own = Leg(event.mode_before, event.kind, event.element, event.side)
     after = _extended(system, event.x_after, event.t)
-    own = event.kind, event.element, event.side
-    choice = lambda letters: event_map(system, mode, *own, letters)(y, p)
-    return struck_letters(system, mode, event.element, choice, after)
+    choice = lambda letters: replace(own, letters=letters).at_event(system, x, p)
+    return struck_letters(system, event.mode_before, event.element, choice, after)
 
 
 def struck_letters(
@@ -474,27 +547,29 @@ def _caused(
     system: FilippovSystem, leg: Leg, further: Sequence[Leg], x: Array, p: Array, t: float
 ) -> tuple[Leg, ...]:
     """The resets among events that follow at once, each of which the ones before must cause."""
-    y = leg.along(system).states_at(x, p)
     kept: tuple[Leg, ...] = ()
     for then in further:
-        if leg.ends(system) or then.ends(system):
+        if system.sets and any(_ends_by_law(system, own) for own in (leg, then)):
             raise DegenerateError(corner(t, leg.name(system), then.name(system)))
-        at = replace(leg, further=kept).at_end(system, y, p)
-        start = then.along(system).initial(at.after, p)
-        other = then.at_end(system, start[:, 0], p)
-        n = len(at.after)
+        at = replace(leg, further=kept).at_event(system, x, p)
+        other = then.at_event(system, at.after, p)
         if then.kind == "jump":
             kept = (*kept, then)
             continue
-        if then.kind in ("reset", "stop") and not _is_zero(other, start[:, 0]):
+        if then.kind in ("reset", "stop") and not _is_zero(other, at.after):
             kept = (*kept, then) if then.kind == "reset" else kept
             continue  # a jump led clearly to its other side: it follows, whatever the times are
-        pulled = (other.gradient @ start[:, 1 : 1 + n]) @ at.after_state
-        if not parallel(pulled, at.gradient):
+        if not parallel(other.gradient @ at.after_state, at.gradient):
             raise DegenerateError(corner(t, leg.name(system), then.name(system)))
         if then.kind in ("reset", "impact"):
             kept = (*kept, then)
     return kept
+
+
+def _ends_by_law(system: FilippovSystem, leg: Leg) -> bool:
+    """Whether more than a function of the states ends a leg."""
+    ends = leg.ends(system)
+    return ends is not None and ends.guard != "surface"
 
 
 def parallel(a: Array, b: Array) -> bool:

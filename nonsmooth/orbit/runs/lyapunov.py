@@ -26,7 +26,7 @@ from ...model import (
     require_system,
     whole,
 )
-from .legs import LegFlow, Stretch, integrate_leg, stretches
+from .legs import LegFlow, Stretch, carry_leg, stretches
 from .variation import saltation_after
 
 #: Relative size of a column of R at an event below which a direction is lost, as in an entry to sliding.
@@ -252,7 +252,7 @@ class _Frame:
         return flow
 
     def _piece(self, part: Stretch, x: Array, t: float, duration: float, depth: int) -> LegFlow:
-        flow = integrate_leg(self.system, part.leg, x, duration, self.p)
+        flow = carry_leg(self.system, part.leg, x, duration, self.p)
         if not self.q.shape[1]:
             return flow
         q, r = np.linalg.qr(flow.by_start[: self.n, : self.n] @ self.q)
@@ -266,7 +266,7 @@ class _Frame:
         return flow
 
     def _event(self, part: Stretch, flow: LegFlow, following: Stretch | None) -> None:
-        event = saltation_after(self.run, part, flow, following, self.p)
+        event = saltation_after(self.run, part, flow, following, None, self.p)
         if event is None or part.leg.kind == "end" or not self.q.shape[1]:
             return
         matrix = event.matrix[: self.n, : self.n]

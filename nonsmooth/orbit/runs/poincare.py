@@ -25,7 +25,7 @@ from ...model import (
     require_system,
     whole,
 )
-from .legs import LegFlow, Stretch, integrate_leg, stretches
+from .legs import LegFlow, Stretch, carry_leg, stretches
 from .saltation import Saltation
 from .sensitivity import sensitivity
 from .variation import saltation_after
@@ -122,14 +122,15 @@ class PoincareOrbit(Savable, points="m n", t="m"):
             raise OptionError(
                 f"k = {k} is the last return, after which the field is not known. Compute one more return."
             )
-        rate = integrate_leg(system, following.leg, following.start, 0.0, p).rate
+        rate = carry_leg(system, following.leg, following.start, 0.0, p).rate
         return (event.matrix @ dx + np.outer(rate, moved))[:n, :n]
 
     def _passage(self, parts: list[Stretch], j: int, p: Array) -> tuple[LegFlow, Saltation]:
         """A leg and the event that ends it, with derivatives."""
         run, part = self.run, parts[j]
-        flow = integrate_leg(run.system, part.leg, part.start, part.duration, p)
-        event = saltation_after(run, part, flow, parts[j + 1] if parts[j + 1 :] else None, p)
+        flow = carry_leg(run.system, part.leg, part.start, part.duration, p)
+        following = parts[j + 1] if parts[j + 1 :] else None
+        event = saltation_after(run, part, flow, following, None, p)
         assert event is not None  # all legs up to a return end with an event
         return flow, event
 

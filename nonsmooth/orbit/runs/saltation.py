@@ -19,7 +19,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,55 +37,73 @@ _CONTINUOUS = 1e-10
 
 @dataclass(frozen=True)
 class Saltation:
-    """Derivatives through an event, or stacked through many."""
+    """Derivatives through an event, or stacked through many: S = g_x - (f+ - g_x f-) dt_x."""
 
-    matrix: Array  # S (N, N + k)
-    by_parameters: Array  # S_p (N, np)
-    time_by_state: Array  # of the event, (N + k,)
-    time_by_parameters: Array  # (np,)
+    after_state: Array  # g_x (N, N + k)
+    after_parameters: Array  # g_p (N, np)
+    jump: Array  # f+ - g_x f- (N,), zero where the derivative is continuous
+    time_by_state: Array  # dt_x of the event, (N + k,)
+    time_by_parameters: Array  # dt_p (np,)
     angle: Any  # |e_x f-|/(|e_x| |f-|), zero at a grazing
+    kept: Any = False  # whether the jump is zero
+    smooth: bool = False  # whether g is the identity
+
+    def _after(self, map_by: Array, time_by: Array) -> Array:
+        if np.all(self.kept):
+            return map_by
+        moved = np.where(np.asarray(self.kept)[..., None], 0.0, time_by)
+        return np.asarray(map_by - self.jump[..., :, None] * moved[..., None, :])
+
+    @cached_property
+    def matrix(self) -> Array:
+        """S (N, N + k)."""
+        return self._after(self.after_state, self.time_by_state)
+
+    @cached_property
+    def by_parameters(self) -> Array:
+        """S_p (N, np)."""
+        return self._after(self.after_parameters, self.time_by_parameters)
+
+    def of(self, k: int, smooth: bool) -> Saltation:
+        """One of many; ``smooth``: its g is the identity."""
+        return Saltation(
+            self.after_state[k],
+            self.after_parameters[k],
+            self.jump[k],
+            self.time_by_state[k],
+            self.time_by_parameters[k],
+            float(self.angle[k]),
+            bool(self.kept[k]),
+            smooth,
+        )
+
+    def pull(self, row: Array, by_parameters: Array) -> Array:
+        """A row (N,) after the event as one before it; what it gives by all parameters is added."""
+        back = row if self.smooth else row @ self.after_state
+        if not self.smooth:
+            by_parameters += row @ self.after_parameters
+        if self.kept:
+            return back
+        later = float(row @ self.jump)
+        by_parameters -= later * self.time_by_parameters
+        return np.asarray(back - later * self.time_by_state)
 
 
 def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> Saltation:
     """Saltation matrix of an event."""
-    found = saltations(_One.of(at, before), after[None], lambda _: what)
-    return Saltation(
-        found.matrix[0],
-        found.by_parameters[0],
-        found.time_by_state[0],
-        found.time_by_parameters[0],
-        float(found.angle[0]),
-    )
+    rows = (before, at.after_state, at.after_parameters, at.gradient, at.by_parameters)
+    found = saltations(Ended(*[row[None] for row in rows]), after[None], lambda _: what)
+    return found.of(0, at.smooth)
 
 
-class Ended(Protocol):
-    """Ends of legs with their events, stacked."""
-
-    @property
-    def rate(self) -> Array: ...
-    @property
-    def after_state(self) -> Array: ...
-    @property
-    def after_parameters(self) -> Array: ...
-    @property
-    def gradient(self) -> Array: ...
-    @property
-    def value_parameters(self) -> Array: ...
-
-
-class _One(NamedTuple):
-    """One event, stacked."""
+class Ended(NamedTuple):
+    """Ends of legs with their events, stacked: fields, maps and functions of the events with derivatives."""
 
     rate: Array
     after_state: Array
     after_parameters: Array
     gradient: Array
     value_parameters: Array
-
-    @classmethod
-    def of(cls, at: AtEvent, rate: Array) -> _One:
-        rows = (rate, at.after_state, at.after_parameters, at.gradient, at.by_parameters)
-        return cls(*[row[None] for row in rows])
 
 
 class Passed(NamedTuple):
@@ -137,13 +156,8 @@ def saltations(
         time_p = -ends.value_parameters / speed[:, None]
     if events is not None:
         time_x[~events], time_p[~events] = 0.0, 0.0
-    matrix, by_parameters = ends.after_state, ends.after_parameters
-    if not kept.all():
-        jump[kept] = 0.0
-        x, p = np.where(kept[:, None], 0.0, time_x), np.where(kept[:, None], 0.0, time_p)
-        matrix = matrix - jump[:, :, None] * x[:, None, :]
-        by_parameters = by_parameters - jump[:, :, None] * p[:, None, :]
-    return Saltation(matrix, by_parameters, time_x, time_p, angle)
+    jump[kept] = 0.0
+    return Saltation(ends.after_state, ends.after_parameters, jump, time_x, time_p, angle, kept)
 
 
 def _norms(rows: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,17 +13,25 @@ from ...flow.status import Status
 from ...flow.trajectory import Trajectory
 from ...model import (
     Array,
+    ConvergenceError,
     DegenerateError,
-    FilippovSystem,
     OptionError,
     ParameterError,
     PointError,
-    read_function,
     real_array,
     require_system,
 )
-from ...model.derivatives.event_maps import EventMap, function_map
-from .variation import Passage, Sensitivity, along, discrete_places, passages
+from ...model.derivatives.costs import cost_over
+from .legs import parameters_of
+from .variation import (
+    Passage,
+    Sensitivity,
+    along,
+    discrete_places,
+    passages,
+    places_of,
+    sample_times,
+)
 
 
 def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameters")) -> Sensitivity:
@@ -80,8 +88,7 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
            [1.  ]]), array([0.5]), array([[1. , 0.5]]))
     """
     require_system(_require_run(run).system, sets=True, complementarity=True, joints=True)
-    _, result = along(run, _names(run, wrt))
-    return result
+    return along(run, _names(run, wrt))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -108,9 +115,13 @@ class Gradient:
 
 
 def gradient(
-    run: Trajectory, cost: Any, *, wrt: str | Sequence[str] = ("x0", "parameters")
+    run: Trajectory,
+    cost: Any,
+    *,
+    samples: Mapping[Any, ArrayLike] | None = None,
+    wrt: str | Sequence[str] = ("x0", "parameters"),
 ) -> Gradient:
-    """Gradient of a cost at the end of a run, by the exact discrete adjoint.
+    """Gradient of a cost at the end of a run, or summed over its samples, by the exact discrete adjoint.
 
     Parameters
     ----------
@@ -118,6 +129,9 @@ def gradient(
         The run, from :func:`nonsmooth.simulate`.
     cost : expression
         Of the states at the end, parameters and time. An integral is a further state.
+    samples : mapping of symbol to array_like (K,), optional
+        The cost is a sum over the samples of the run (see :func:`vjp`). Symbols in it have these values there, such as
+        data to be fitted; ``{}`` where it has no symbols of its own.
     wrt : str or sequence of str, optional
         As in :func:`sensitivity`.
 
@@ -129,71 +143,81 @@ def gradient(
     Raises
     ------
     DegenerateError
-        As :func:`sensitivity`; a cost that is not finite at the end, or has no finite derivatives.
+        As :func:`sensitivity`; a cost that is not finite, or has no finite derivatives.
     DefinitionError, NotSmoothError
         A cost with foreign symbols, or with a kink or a jump.
-    OptionError
-        As :func:`sensitivity`.
+    OptionError, PointError
+        As :func:`vjp`; data of a wrong shape.
     ParameterError
         An unknown name in ``wrt``.
 
     Examples
     --------
     >>> import casadi as ca, nonsmooth as ns
-    >>> y, v, r = (ca.SX.sym(s) for s in "yvr")
+    >>> y, v, r, data = (ca.SX.sym(s) for s in ("y", "v", "r", "data"))
     >>> mass = ns.FilippovSystem(
     ...     [y, v], field=[v, -2.0], resets=ns.Reset(y, [y, -r * v], -1), parameters={r: 0.5})
-    >>> run = ns.simulate(mass, [0.25, 0.0], t_end=0.75)
+    >>> run = ns.simulate(mass, [0.25, 0.0], t_end=0.75, t_eval=[0.25, 0.75])
     >>> ns.gradient(run, y**2 + v)
     Gradient(value 0.00390625, x0 [3.03125, 1.0], parameters {r: 1.03125})
+    >>> ns.gradient(run, (y - data) ** 2, samples={data: [0.2, 0.1]})
+    Gradient(value 0.00171875, x0 [-0.04375, -0.00625], parameters {r: -0.01875})
     """
-    system, n = _require_run(run).system, run.system.dimension
-    names = _names(run, wrt)
-    chosen = tuple(system.parameter_names.index(name) for name in names)
-    parts = passages(run, chosen)
-    p = system.parameter_vector(run.parameters)
-    last = parts[-1]
-    at = _cost(system, last.stretch.leg.mode, cost)(last.flow.end, p)
-    row, by_parameters = _pulled(system, parts, at.gradient, chosen, stopped=_stopped(last))
-    by_parameters = by_parameters + at.by_parameters[list(chosen)]
-    numbers = dict(zip(names, by_parameters.tolist(), strict=True))
-    return _finite(Gradient(at.value, row[:n] + 0.0, numbers), run)
+    system = _require_run(run).system
+    names, p = _names(run, wrt), parameters_of(run)
+    chosen = places_of(run, names)
+    parts = _legs(run, chosen)
+    if samples is None:
+        states = _end(parts)[None]
+    else:
+        times, states = _require_samples(run)
+        states = np.column_stack([states, times]) if system.time_dependent else states
+    value, rows, by_parameters = cost_over(
+        system, cost, {} if samples is None else samples, states, p
+    )
+    row, none = np.zeros(states.shape[1]), np.zeros((len(sample_times(run)), states.shape[1]))
+    row, rows = (rows[0], none) if samples is None else (row, rows)
+    by_start, pulled = _pulled(run, parts, row, rows, chosen)
+    numbers = dict(zip(names, (by_parameters[list(chosen)] + pulled).tolist(), strict=True))
+    return _finite(Gradient(value, by_start + 0.0, numbers), run)
+
+
+def _end(parts: Sequence[Passage]) -> Array:
+    """The end of a run, integrated as its derivatives are; behind a jump as the run has it."""
+    last = parts[-1].stretch
+    return parts[-1].flow.end if np.array_equal(last.end, last.after) else last.after
 
 
 def _finite(found: Gradient, run: Trajectory) -> Gradient:
-    """Raise for a cost that is not finite at the end of a run, or has no finite derivatives."""
+    """Raise for a cost that is not finite, or has no finite derivatives."""
     if np.isfinite([found.value, *found.x0, *found.parameters.values()]).all():
         return found
     raise DegenerateError(
-        f"cost is not finite, or has derivatives that are not, at the end {run.x[-1].tolist()} of the run: "
-        f"{found!r}. Check logarithms, roots and divisions there."
+        f"cost is not finite, or has derivatives that are not, at the end {run.x[-1].tolist()} of the run, or at its "
+        f"samples: {found!r}. Check logarithms, roots and divisions there."
     )
 
 
-def _cost(system: FilippovSystem, mode: str, cost: Any) -> EventMap:
-    """A cost as a function of the last leg's states, cached for the same expression object."""
-    known = getattr(cost, "element_hash", None)
-    if known is None or cost.numel() != 1:
-        return function_map(system, mode, read_function(system.definition, cost, "cost"))
-
-    def build() -> tuple[Any, EventMap]:
-        # the expression is kept, so that its hash is not used again
-        return cost, function_map(system, mode, read_function(system.definition, cost, "cost"))
-
-    return system.cached(("cost", mode, known()), build)[1]
-
-
 def vjp(
-    run: Trajectory, cotangent: ArrayLike, *, wrt: str | Sequence[str] = ("x0", "parameters")
+    run: Trajectory,
+    cotangent: ArrayLike | None = None,
+    *,
+    samples: ArrayLike | None = None,
+    wrt: str | Sequence[str] = ("x0", "parameters"),
 ) -> tuple[Array, Array]:
-    """Product of a row with the derivatives of the end of a run, by the discrete adjoint.
+    """Product of rows with the derivatives of a run, by the discrete adjoint.
+
+    It costs a few runs, however many states, parameters and samples there are.
 
     Parameters
     ----------
     run : Trajectory
         The run, from :func:`nonsmooth.simulate`.
-    cotangent : array_like (n,)
+    cotangent : array_like (n,), optional
         Derivatives of something by the final state.
+    samples : array_like (K, n), optional
+        Its derivatives by the states ``run.sample_x`` at the times ``t_eval``, which are fixed. A sample at the time of
+        an event is taken on the side of ``sample_x``: after the event where the state does not jump.
     wrt : str or sequence of str, optional
         As in :func:`sensitivity`.
 
@@ -205,61 +229,118 @@ def vjp(
     Raises
     ------
     PointError
-        Cotangents of a wrong shape; otherwise as :func:`sensitivity`.
+        Cotangents of a wrong shape, or at samples that the run does not have; otherwise as :func:`sensitivity`.
+    OptionError
+        Neither ``cotangent`` nor ``samples``; samples at events, whose times move: :func:`nonsmooth.orbit.poincare` has
+        their derivatives.
 
     Examples
     --------
-    >>> import casadi as ca, nonsmooth as ns
+    >>> import casadi as ca, numpy as np, nonsmooth as ns
     >>> x, a = ca.SX.sym("x"), ca.SX.sym("a")
-    >>> run = ns.simulate(ns.FilippovSystem([x], field=[a], parameters={a: 2.0}), [0.0], t_end=3.0)
+    >>> system = ns.FilippovSystem([x], field=[a], parameters={a: 2.0})
+    >>> run = ns.simulate(system, [0.0], t_end=3.0, t_eval=[1.0, 2.0])
     >>> ns.vjp(run, [1.0])
     (array([1.]), array([3.]))
+    >>> ns.vjp(run, samples=2 * (run.sample_x - [[1.5], [4.5]]))  # of sum((x(t_k) - data_k)**2)
+    (array([0.]), array([-1.]))
     """
-    system, n = _require_run(run).system, run.system.dimension
-    row = real_array(cotangent, "cotangent")
+    n = _require_run(run).system.dimension
+    chosen = places_of(run, _names(run, wrt))
+    if cotangent is None and samples is None:
+        raise OptionError("cotangent is missing. Give it, or samples=.")
+    row = np.zeros(n) if cotangent is None else real_array(cotangent, "cotangent")
     if row.shape != (n,) or not np.all(np.isfinite(row)):
         shown = f"has shape {row.shape}" if row.shape != (n,) else f"is {row.tolist()}"
         raise PointError(
             f"cotangent {shown}, but the system has {n} states. Give one finite number for each."
         )
-    chosen = tuple(system.parameter_names.index(name) for name in _names(run, wrt))
-    parts = passages(run, chosen)
-    whole = np.zeros(len(parts[-1].flow.end))
-    whole[:n] = row
-    back, by_parameters = _pulled(system, parts, whole, chosen, stopped=_stopped(parts[-1]))
-    return back[:n], by_parameters
+    return _pulled(run, _legs(run, chosen), row, _rows_at(run, samples), chosen)
 
 
-def _stopped(last: Passage) -> bool:
-    return last.stretch.leg.kind == "stop"
+def _rows_at(run: Trajectory, samples: ArrayLike | None) -> Array:
+    """Rows at the samples that a run has."""
+    if samples is None:
+        return np.zeros((len(sample_times(run)), run.system.dimension))
+    rows, (times, states) = real_array(samples, "samples"), _require_samples(run)
+    shape = states.shape
+    if rows.shape != shape:
+        raise PointError(
+            f"samples has shape {rows.shape}, but the run has samples of shape {shape}. Give one row for each."
+        )
+    had = np.isfinite(times)
+    if not np.all(np.isfinite(rows[had])) or np.any(rows[~had] != 0.0):
+        raise PointError(
+            f"samples has rows that are not finite, or rows after the end of the run at t = {run.t[-1]:.6g} that are "
+            "not zero. Give finite numbers, and zeros where the run has no sample."
+        )
+    return np.asarray(rows[had])
+
+
+def _require_samples(run: Trajectory) -> tuple[Array, Array]:
+    """Times (K,) and states (K, n) of the samples of a run, which are not those of a section."""
+    if run.sample_t is None or run.sample_x is None:
+        raise OptionError("run has no samples. Simulate with t_eval=.")
+    if run.sampled_events:
+        raise OptionError(
+            "run has samples at events, whose times move with the start. Simulate with t_eval=, or take the derivatives "
+            "of nonsmooth.orbit.poincare."
+        )
+    return run.sample_t, run.sample_x
+
+
+def _legs(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
+    """Legs of a run along which rows can be pulled back."""
+    times = sample_times(run)
+    try:
+        return passages(run, chosen, times, back=True)
+    except ConvergenceError:  # a leg without Taylor series
+        return passages(run, chosen, times)
 
 
 def _pulled(
-    system: FilippovSystem,
+    run: Trajectory,
     parts: Sequence[Passage],
     row: Array,
-    chosen: Sequence[int],
-    stopped: bool,
+    rows: Array,
+    chosen: tuple[int, ...],
 ) -> tuple[Array, Array]:
-    """Pull a row at the end of the flow of the last leg back to the start."""
-    by_parameters = np.zeros(len(chosen))
-    last, event = parts[-1].flow, parts[-1].event
-    if stopped and event is not None:
-        along_flow = float(row @ last.rate)
-        by_parameters = by_parameters + along_flow * event.time_by_parameters[list(chosen)]
-        row = row + along_flow * event.time_by_state
-    elif event is not None:
-        by_parameters = (
-            by_parameters + row[: len(event.matrix)] @ event.by_parameters[:, list(chosen)]
-        )
-        row = row[: len(event.matrix)] @ event.matrix
-    by_parameters = by_parameters + row @ last.by_parameters
-    row = row @ last.by_start
-    for part in reversed(parts[:-1]):
-        row, more = part.backward(row, chosen)
-        by_parameters = by_parameters + more
+    """Pull a row (n,) at the end of a run, and rows (K, n) at its samples, back to the start."""
+    if len(row) < run.system.extended_dimension:  # nothing depends on the time
+        row, rows = np.append(row, 0.0), np.pad(rows, ((0, 0), (0, 1)))
+    found = _pulled_through(run, parts, row, rows, chosen)
+    if all(np.isfinite(part).all() for part in found):
+        return found
+    # Columns have no derivatives that are not finite where those would be multiplied by zero.
+    forward = passages(run, chosen, sample_times(run))
+    return _pulled_through(run, forward, row, rows, chosen)
+
+
+def _pulled_through(
+    run: Trajectory, parts: Sequence[Passage], row: Array, rows: Array, chosen: tuple[int, ...]
+) -> tuple[Array, Array]:
+    system, some, last, rows = run.system, list(chosen), parts[-1], np.ascontiguousarray(rows)
+    every = np.zeros(len(system.parameter_names))  # by all parameters
+    own = every if last.back else np.zeros(len(some))  # what legs give
+    if last.back and last.flow.carried is not None:
+        last.flow.carried[0].begin_pull(np.zeros(len(row)), every, rows)
+    row = row + rows[last.samples.stop :].sum(axis=0)
+    for part in reversed(parts):
+        event = part.event
+        if event is not None and part is last and part.stretch.leg.kind == "stop":
+            along_flow = float(row @ part.flow.rate)
+            every += along_flow * event.time_by_parameters
+            row = row + along_flow * event.time_by_state
+        elif event is not None:
+            row = event.pull(row, every)
+        row = part.backward(row, rows, own)
+    if parts[0].held is not None:
+        every += row @ parts[0].held[1]
+        row = row @ parts[0].held[0]
+    row = row.copy()
     row[discrete_places(system)] = 0.0
-    return row, by_parameters
+    by_parameters = every[some] if last.back else every[some] + own
+    return row[: system.dimension], by_parameters
 
 
 def _require_run(run: Trajectory) -> Trajectory:

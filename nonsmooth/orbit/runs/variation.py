@@ -13,13 +13,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...flow.names import described
 from ...flow.trajectory import Trajectory
+from ...flow.variation import NONE, carry_legs, require_done
 from ...model import (
     Array,
     ConvergenceError,
@@ -31,9 +30,19 @@ from ...model.derivatives.event_maps import AtEvent, function_map
 from ...model.laws.coupled import raised_of
 from ...model.laws.explicit import rests_on
 from .guards import watch
-from .leg_integration import LegFlows, LegIntegrator
-from .legs import Leg, LegFlow, Stretch, integrate_leg, leg_name, sets_left, stretches
-from .saltation import Saltation, saltation, saltations
+from .legs import (
+    Leg,
+    LegFlow,
+    Stretch,
+    carry_leg,
+    flows_of,
+    leg_name,
+    parameters_of,
+    rate_at,
+    sets_left,
+    stretches,
+)
+from .saltation import Ended, Saltation, saltation, saltations
 
 # Grazings within the error of a run ---------------------------------------------------------------
 
@@ -51,39 +60,34 @@ _INSTANT = 1e-5
 
 
 def _require_certain(system: FilippovSystem, parts: Sequence[Passage], p: Array) -> None:
-    """Raise for a run with a grazing that is within its own error."""
+    """Raise for a run with a grazing that is within its own error, and leaves the derivative not continuous."""
     flat = [
         k
         for k, part in enumerate(parts)
-        if part.event and part.flow.at is None and part.event.angle < _STEEP
+        if part.event and not part.event.kept and part.event.angle < _STEEP
     ]
-    if not flat:
-        return
-    n = system.extended_dimension
-    error = np.zeros(n)  # of the run, relative to the orbit from its start
-    for k, part in enumerate(parts[: flat[-1] + 1]):
-        error = part.flow.by_start @ error
-        error[:n] += part.stretch.end - part.flow.end[:n]
-        if part.event is None:
-            error = error[:n]
-            continue
+    error = np.zeros(system.extended_dimension)  # of the run, relative to the orbit from its start
+    for k, part in enumerate(parts[: flat[-1] + 1] if flat else ()):
+        flow, own = part.flow, part.stretch
+        if part.back:
+            flow = carry_leg(system, own.leg, own.start, own.duration, p)
+        error = flow.by_start @ error + own.end - flow.end
         if k in flat:
             _require_deep(system, part, error, p)
-        error = part.event.matrix @ error
+        if part.event is not None:
+            error = part.event.matrix @ error
 
 
 def _require_deep(system: FilippovSystem, part: Passage, error: Array, p: Array) -> None:
-    """Raise for a grazing that is no deeper than the error (N + k,) of the run."""
+    """Raise for a grazing that is no deeper than the error (N,) of the run."""
     leg, flow = part.stretch.leg, part.flow
-    at = leg.at_end(system, flow.end, p)
-    if part.event is None or np.array_equal(part.event.matrix, at.after_state):
-        return  # it leaves the derivative continuous
+    at = leg.at_event(system, flow.end, p)
     speed = _speed(at, flow.rate)
     size, length = math.hypot(*flow.end), math.hypot(*flow.rate)
     step = _INSTANT * min(part.stretch.duration, size / length if size and length else math.inf)
     before = flow.end - step * flow.rate
-    rate = leg.along(system).rate_at(before, p)
-    turning = (speed - _speed(leg.at_end(system, before, p), rate)) / step if step else 0.0
+    rate = rate_at(system, leg, before, p)
+    turning = (speed - _speed(leg.at_event(system, before, p), rate)) / step if step else 0.0
     if not turning * speed < 0.0:
         return  # it does not turn back
     depth = 0.5 * speed**2 / abs(turning)
@@ -229,11 +233,24 @@ class Passage:
     stretch: Stretch
     flow: LegFlow
     event: Saltation | None  # None where a time ends the leg
+    #: Where its samples are among those of the run.
+    samples: slice
+    #: Whether it was recorded so that rows can be pulled back, in place of derivatives.
+    back: bool = False
+    #: Derivatives of where it begins by the start of the run and by all parameters, if that is not free.
+    held: tuple[Array, Array] | None = None
 
     def forward(self, dx: Array, dp: Array) -> tuple[Array, Array]:
         """Carry derivatives by start (N, m) and parameters (N, q) to the end of the leg's flow."""
         by_start = self.flow.by_start
         return by_start @ dx, by_start @ dp + self.flow.by_parameters
+
+    def at_samples(self, dx: Array, dp: Array) -> tuple[Array, Array]:
+        """The same at the samples of the leg."""
+        found, n = self.flow.at_samples, len(dx)
+        assert found is not None
+        by_start = found[:, :, :n]
+        return by_start @ dx, by_start @ dp + found[:, :, n:]
 
     def through(self, dx: Array, dp: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
         """Carry derivatives at the end of the flow through the event."""
@@ -242,20 +259,28 @@ class Passage:
         s = self.event
         return s.matrix @ dx, s.matrix @ dp + s.by_parameters[:, list(chosen)]
 
-    def times(self, dx: Array, dp: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
+    def moments(self, dx: Array, dp: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
         """Derivatives of the time of the event, from those at the end of the flow."""
         assert self.event is not None
         s = self.event
         return s.time_by_state @ dx, s.time_by_state @ dp + s.time_by_parameters[list(chosen)]
 
-    def backward(self, cotangent: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
-        """Pull a row (N,) back through event and flow: the row at the start, and by parameters."""
-        by_parameters = np.zeros(len(chosen))
-        if self.event is not None:
-            by_parameters += cotangent @ self.event.by_parameters[:, list(chosen)]
-            cotangent = cotangent @ self.event.matrix
-        by_parameters += cotangent @ self.flow.by_parameters
-        return cotangent @ self.flow.by_start, by_parameters
+    def backward(self, row: Array, rows: Array, by_parameters: Array) -> Array:
+        """Pull a row (N,) at the end of the flow, and rows (K, N) at the samples of the run, back to the start, and add to
+        what they give by the parameters that were chosen, or by all where the legs were recorded."""
+        flow, n = self.flow, len(row)
+        if self.back and flow.carried is not None:
+            carried, leg = flow.carried
+            carried.row[:] = row
+            carried.pull(leg)
+            return carried.row
+        by_parameters += row @ flow.by_parameters
+        row, own = row @ flow.by_start, rows[self.samples]
+        if flow.at_samples is not None and len(own):
+            more = np.einsum("ki,kij->j", own, flow.at_samples)
+            row = row + more[:n]
+            by_parameters += more[n:]
+        return row
 
 
 def discrete_places(system: FilippovSystem) -> slice:
@@ -263,16 +288,89 @@ def discrete_places(system: FilippovSystem) -> slice:
     return slice(system.dimension - len(system.definition.discrete), system.dimension)
 
 
-def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
-    """Legs and events of a run, with derivatives by the start of each and by chosen parameters."""
-    first, *others = _passages(run, chosen)
-    at_rest = _rest_at(run.system, first.stretch, run.system.parameter_vector(run.parameters))
-    if at_rest is not None:
-        by_start, flow = first.flow.by_start, first.flow
-        by_p = flow.by_parameters + by_start @ at_rest[1][:, list(chosen)]
-        flow = replace(flow, by_start=by_start @ at_rest[0], by_parameters=by_p)
-        first = replace(first, flow=flow)
-    return [first, *others]
+def passages(
+    run: Trajectory, chosen: tuple[int, ...], times: Array = NONE, back: bool = False
+) -> list[Passage]:
+    """Legs and events of a run, with derivatives by the start of each and by chosen parameters, also at times of
+    samples; or recorded, so that rows can be pulled ``back``."""
+    system, p = run.system, parameters_of(run)
+    if system.sets:
+        require_plain(system, "sensitivity with sets")
+    parts = stretches(run)
+    ends, last = [part.t for part in parts[1:]], parts[-1]
+    if last.leg.kind not in ("end", "stop"):  # samples from it on are behind the event
+        ends.append(last.t + last.duration)
+    cuts = [0, *np.searchsorted(times, ends, side="left").tolist(), len(times)][: len(parts) + 1]
+    since = times
+    if len(times):
+        counts, spans = np.diff(cuts), np.array([(part.t, part.duration) for part in parts])
+        begun, durations = np.repeat(spans, counts, axis=0).T
+        since = np.clip(times[: cuts[-1]] - begun, 0.0, durations)
+    flows = _flows(run, parts, p, chosen, since, cuts, back)
+    events = _saltations(run, parts, flows, p)
+    samples = [slice(i, j) for i, j in pairwise(cuts)]
+    found = [Passage(*own, back) for own in zip(parts, flows, events, samples, strict=True)]
+    if not system.sets:
+        _require_certain(system, found, p)
+    at_rest = _rest_at(system, parts[0], p)
+    return [replace(found[0], held=at_rest), *found[1:]]
+
+
+def _flows(
+    run: Trajectory,
+    parts: Sequence[Stretch],
+    p: Array,
+    chosen: tuple[int, ...],
+    since: Array,
+    cuts: Sequence[int],
+    back: bool,
+) -> list[LegFlow]:
+    """Flows of legs, with samples at times ``since`` their starts that are cut by legs."""
+    system = run.system
+    flown = [part.leg.flown(system, part.start, part.duration) for part in parts]
+    found = carry_legs(system, flown, p, chosen, since, cuts, back)
+    if found.failed < 0:
+        return flows_of(found)
+    if back:
+        require_done(system, flown, found)
+    own = zip(parts, pairwise(cuts), strict=True)
+    return [_flow(run, part, since[i:j], p, chosen) for part, (i, j) in own]
+
+
+def _saltations(
+    run: Trajectory, parts: Sequence[Stretch], flows: Sequence[LegFlow], p: Array
+) -> list[Saltation | None]:
+    """Events of legs; None where a time ends one."""
+    system, result = run.system, list[Saltation | None]([None] * len(parts))
+    which, events, after = list[int](), list[AtEvent](), list[Array]()  # by one formula
+    for i, (part, flow, then) in enumerate(zip(parts[:-1], flows, flows[1:], strict=False)):
+        usual = then.before is not None and np.isfinite(then.before).all()
+        if usual and not (part.leg.timed or part.leg.at_start or system.sets):
+            which.append(i)
+            events.append(flow.at or part.leg.at_event(system, flow.end, p))
+            after.append(np.asarray(then.before))
+        else:
+            result[i] = saltation_after(run, part, flow, parts[i + 1], then, p)
+    result[-1] = saltation_after(run, parts[-1], flows[-1], None, None, p)
+    if which:
+        stacked = _stacked(events, [flows[i].rate for i in which])
+        made = saltations(stacked, np.array(after), lambda k: _at(system, parts[which[k]]))
+        for k, (i, at) in enumerate(zip(which, events, strict=True)):
+            result[i] = made.of(k, at.smooth)
+    return result
+
+
+def _stacked(events: Sequence[AtEvent], rates: Sequence[Array]) -> Ended:
+    """Events, stacked."""
+    count, n, q = len(events), len(rates[0]), len(events[0].by_parameters)
+    maps, by_p = np.broadcast_to(np.eye(n), (count, n, n)), np.broadcast_to(0.0, (count, n, q))
+    if not all(at.smooth for at in events):
+        maps = np.array([at.after_state for at in events])
+        by_p = np.array([at.after_parameters for at in events])
+    gradients = np.array([at.gradient for at in events])
+    return Ended(
+        np.array(rates), maps, by_p, gradients, np.array([at.by_parameters for at in events])
+    )
 
 
 def _rest_at(system: FilippovSystem, part: Stretch, p: Array) -> tuple[Array, Array] | None:
@@ -284,95 +382,42 @@ def _rest_at(system: FilippovSystem, part: Stretch, p: Array) -> tuple[Array, Ar
     kept = [
         e for i in resting for e in (system.definition.surfaces[i], *raised_of(system).lower[i])
     ]
-    y = part.leg.along(system).states_at(part.start, p)
+    y = part.leg.field(system).states_at(part.start, p)
     at = [function_map(system, mode, e)(y, p) for e in kept]
     rows = np.array([row.gradient[:n] for row in at])
     back = np.linalg.pinv(rows)
     return np.eye(n) - back @ rows, -back @ np.array([row.by_parameters for row in at])
 
 
-def _passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
-    system = run.system
-    p = system.parameter_vector(run.parameters)
-    parts = stretches(run)
-    if system.sets:
-        require_plain(system, "sensitivity with sets")
-        return _one_by_one(run, parts, p, chosen)
-    try:
-        flows = LegIntegrator(system, [part.leg for part in parts], chosen)(
-            np.array([part.start for part in parts]), np.array([part.duration for part in parts]), p
-        )
-    except ConvergenceError:
-        found = _one_by_one(run, parts, p, chosen)
-        _require_certain(system, found, p)
-        return found
-    found = _together(system, parts, flows)
-    if not parts[-1].leg.timed and run.events[-1].kind == "end":  # the run ends at the very event
-        last = found[-1]
-        jump = saltation_after(run, last.stretch, last.flow, None, p)
-        found[-1] = replace(last, event=jump)
-    _require_certain(system, found, p)
-    return found
-
-
-def _together(system: FilippovSystem, parts: Sequence[Stretch], flows: LegFlows) -> list[Passage]:
-    """Legs that were integrated together, with the saltation of their events."""
-    n = flows.after.shape[1]
-    after = np.roll(flows.before[:, :n], -1, axis=0)
-    carried = (flows.after_state @ flows.rate[:, :, None])[:, :, 0]
-    ends: NDArray[Any] = ~np.all(np.isfinite(after), axis=1)
-    ends[-1] = True
-    after[ends] = carried[ends]
-    events = np.array([not part.leg.timed for part in parts])
-    free = events & ~np.array([part.leg.at_start for part in parts])
-    found = saltations(flows, after, lambda k: _at(system, parts[k]), free)
-    rows = zip(
-        parts,
-        flows.by_leg,
-        events.tolist(),
-        found.matrix,
-        found.by_parameters,
-        found.time_by_state,
-        found.time_by_parameters,
-        found.angle.tolist(),
-        flows.sizes,
-        strict=True,
-    )
-    return [
-        Passage(part, flow, Saltation(s[:, :k], sp, t[:k], tp, angle) if event else None)
-        for part, flow, event, s, sp, t, tp, angle, k in rows
-    ]
-
-
 def _at(system: FilippovSystem, part: Stretch) -> str:
     return f"{part.leg.name(system)!r} at t = {part.t + part.duration:.10g}"
 
 
-def _one_by_one(
-    run: Trajectory, parts: Sequence[Stretch], p: Array, chosen: tuple[int, ...]
-) -> list[Passage]:
-    """Legs, some of which have no Taylor series at an end."""
-    result: list[Passage] = []
-    for k, part in enumerate(parts):
-        flow = _flow(run, part, p, chosen)
-        following = parts[k + 1] if k + 1 < len(parts) else None
-        result.append(Passage(part, flow, saltation_after(run, part, flow, following, p)))
-    return result
-
-
-def _flow(run: Trajectory, part: Stretch, p: Array, chosen: tuple[int, ...]) -> LegFlow:
+def _flow(
+    run: Trajectory, part: Stretch, times: Array, p: Array, chosen: tuple[int, ...]
+) -> LegFlow:
     try:
-        return integrate_leg(run.system, part.leg, part.start, part.duration, p, chosen)
+        return carry_leg(run.system, part.leg, part.start, part.duration, p, chosen, times)
     except ConvergenceError:
         if run.system.sets:
             what = leg_name(run.system, part.leg)
             raise DegenerateError(_without_derivative(what, part.t + part.duration)) from None
         # A field such as a power law has a derivative, but no Taylor series at zero.
-        return _collocated(run, part.leg, part.t, part.t + part.duration, p, chosen)
+        collocated = lambda t: _collocated(run, part.leg, part.t, part.t + t, p, chosen)
+        at = [collocated(float(t)) for t in times]
+        rows = [np.hstack([flow.by_start, flow.by_parameters]) for flow in at]
+        n = len(part.start)
+        stacked = np.array(rows).reshape(len(at), n, n + len(chosen))
+        return replace(collocated(part.duration), at_samples=stacked)
 
 
 def saltation_after(
-    run: Trajectory, part: Stretch, flow: LegFlow, following: Stretch | None, p: Array
+    run: Trajectory,
+    part: Stretch,
+    flow: LegFlow,
+    following: Stretch | None,
+    then: LegFlow | None,
+    p: Array,
 ) -> Saltation | None:
     """The saltation of the event that ends a leg; None where a time ends it."""
     # At the end of a run the field after it is that of the mode reached.
@@ -383,18 +428,23 @@ def saltation_after(
     if leg is None and ends.kind == "end":
         left = sets_left(system, part.leg.mode, ends.mode_before, part.after, p)
         leg = Leg(ends.mode_before, left=left)
-    at = flow.at or part.leg.at_end(system, flow.end, p)
+    at = flow.at or part.leg.at_event(system, flow.end, p)
     if system.sets and following is None and leg is not None:  # the run ends at the event
         every = tuple(range(len(p)))
-        landed = integrate_leg(system, leg, at.after, 0.0, p, every)
+        landed = carry_leg(system, leg, at.after, 0.0, p, every)
         by_state, by_p = landed.by_start @ at.after_state, landed.by_start @ at.after_parameters
-        at = replace(at, after_state=by_state, after_parameters=by_p + landed.by_parameters)
+        by_p = by_p + landed.by_parameters
+        at = replace(at, after_state=by_state, after_parameters=by_p, smooth=False)
     if part.leg.at_start:
         still = np.zeros(flow.rate.size), np.zeros(len(p))
-        return Saltation(at.after_state, at.after_parameters, *still, 1.0)
+        jump = np.zeros(len(at.after))
+        maps = at.after_state, at.after_parameters
+        return Saltation(*maps, jump, *still, 1.0, kept=True, smooth=at.smooth)
     if part.leg.kind == "stop" or leg is None:
         return saltation(at, flow.rate, at.after_state @ flow.rate, _at(system, part))
-    after = _rate_after(system, part, leg, at, p)
+    after = None if then is None or system.sets else then.before
+    if after is None or not np.isfinite(after).all():
+        after = _rate_after(system, part, leg, at, p)
     if after is None and part.leg.kind == "exit":  # the fields agree
         after = at.after_state @ flow.rate
     if after is None:
@@ -409,12 +459,12 @@ def _rate_after(
     system: FilippovSystem, part: Stretch, leg: Leg, at: AtEvent, p: Array
 ) -> Array | None:
     """The field after an event, also where a root of its function has rounding as its argument."""
-    n, field = len(part.start), leg.along(system)
+    n = len(part.start)
     e = at.gradient[:n]
     shift = _ROUNDING * float(np.abs(e) @ np.abs(part.after)) * e / max(float(e @ e), 1e-300)
     with np.errstate(all="ignore"):
         for x in (at.after, part.after, part.after + shift, part.after - shift):
-            rate = field.rate_at(field.states_at(x, p), p)[:n]
+            rate = rate_at(system, leg, x, p)
             if np.all(np.isfinite(rate)):
                 return rate
     return None
@@ -440,6 +490,9 @@ class Sensitivity:
         Names of the parameters.
     run : Trajectory
         The run that was differentiated.
+    dsample_dx0, dsample_dp : ndarray (K, n, n), (K, n, q) or None
+        Derivatives of ``run.sample_x``, at fixed times: None without samples, NaN where a sample is. A sample at the
+        time of an event is on the side of ``sample_x``, after it where both agree.
     """
 
     dx_dx0: Array
@@ -451,6 +504,8 @@ class Sensitivity:
     dt_end_dp: Array
     names: tuple[str, ...]
     run: Trajectory
+    dsample_dx0: Array | None = None
+    dsample_dp: Array | None = None
 
     @cached_property
     def clearance(self) -> float:
@@ -495,19 +550,42 @@ def _clearance(run: Trajectory) -> tuple[float, str]:
     return best
 
 
-def along(run: Trajectory, names: Sequence[str]) -> tuple[list[Passage], Sensitivity]:
-    """Passages of a run, and the derivatives that follow from them."""
+def sample_times(run: Trajectory) -> Array:
+    """Times of the samples of a run, just before an event where ``sample_x`` is the state before it."""
+    if run.sample_t is None or run.sample_x is None:
+        return NONE
+    found = run.sample_t[np.isfinite(run.sample_t)].copy()
+    for event in run.events:
+        for k in np.flatnonzero(found == event.t) if event.kind != "end" else ():
+            x = run.sample_x[k]
+            if np.array_equal(x, event.x) and not np.array_equal(x, event.x_after):
+                found[k] = np.nextafter(event.t, -np.inf)
+    return found
+
+
+def places_of(run: Trajectory, names: Sequence[str]) -> tuple[int, ...]:
+    """Numbers of parameters by their names."""
+    known = {name: k for k, name in enumerate(run.system.parameter_names)}
+    return tuple(known[name] for name in names)
+
+
+def along(run: Trajectory, names: Sequence[str]) -> Sensitivity:
+    """Derivatives of a run by its start and by parameters."""
     system, n = run.system, run.system.dimension
-    chosen = tuple(system.parameter_names.index(name) for name in names)
-    parts = passages(run, chosen)
+    chosen, at = places_of(run, names), sample_times(run)
+    parts = passages(run, chosen, at)
     dx, dp = np.eye(system.extended_dimension), np.zeros((system.extended_dimension, len(chosen)))
+    if (held := parts[0].held) is not None:
+        dx, dp = held[0], held[1][:, list(chosen)]
     dx[:, discrete_places(system)] = 0.0
     times, by_start, by_parameters = list[float](), list[Array](), list[Array]()
+    sampled = list[tuple[Array, Array]]()
     end_x, end_p = np.zeros(system.extended_dimension), np.zeros(len(chosen))
     for part in parts:
+        sampled.append(part.at_samples(dx, dp))
         dx, dp = part.forward(dx, dp)
         if part.event is not None:
-            t_x, t_p = part.times(dx, dp, chosen)
+            t_x, t_p = part.moments(dx, dp, chosen)
             times.append(part.stretch.t + part.stretch.duration)
             by_start.append(t_x[:n])
             by_parameters.append(t_p)
@@ -523,7 +601,10 @@ def along(run: Trajectory, names: Sequence[str]) -> tuple[list[Passage], Sensiti
         raise DegenerateError(
             _without_derivative(leg_name(system, first.stretch.leg), float(run.t[-1]))
         )
-    return parts, Sensitivity(
+    behind = len(at) - parts[-1].samples.stop
+    sampled.append((dx[None].repeat(behind, 0), dp[None].repeat(behind, 0)))
+    found = None if run.sample_t is None else len(run.sample_t)
+    return Sensitivity(
         dx_dx0=dx[:n, :n],
         dx_dp=dp[:n],
         event_times=np.array(times),
@@ -533,4 +614,13 @@ def along(run: Trajectory, names: Sequence[str]) -> tuple[list[Passage], Sensiti
         dt_end_dp=end_p,
         names=tuple(names),
         run=run,
+        dsample_dx0=None if found is None else _rows([k[:, :n, :n] for k, _ in sampled], found),
+        dsample_dp=None if found is None else _rows([k[:, :n] for _, k in sampled], found),
     )
+
+
+def _rows(found: Sequence[Array], count: int) -> Array:
+    """Derivatives at samples, stacked, with NaN where a run has ended."""
+    every = np.concatenate(found)
+    missing = np.full((count - len(every), *every.shape[1:]), np.nan)
+    return np.concatenate([every, missing])

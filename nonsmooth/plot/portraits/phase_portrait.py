@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from contourpy import contour_generator
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
 from ...local import Equilibrium, Fold, PseudoEquilibrium
@@ -17,7 +19,7 @@ from ...local.scans.plane_scan import Piece, PlaneScan
 from ...model import Array, FilippovSystem, Parameters, PointError
 from ...orbit.manifolds.plane_orbits import PlaneOrbits
 from .. import style
-from ..arguments import require_one_surface
+from ..arguments import Held, held, require_one_surface
 from ..drawing import Canvas, Colors, Drawn, canvas
 from ..labels import Labels
 from ..legends import beside
@@ -33,6 +35,8 @@ _PIECES: dict[str, tuple[str, float, Any, str]] = {
     "repelling": (style.ORANGE, 3.4, (0, (2.2, 1.0)), "sliding, repelling"),
     "crossing": (style.GREY, 1.2, "-", "crossing"),
 }
+#: What pieces of the boundary of a complementarity condition are.
+_CLOSED = {"attracting": "closed condition", "crossing": "condition that opens"}
 #: Markers by the last word of a kind.
 _MARKERS = {
     "fold": "D",
@@ -46,6 +50,9 @@ _MARKERS = {
     "degenerate": "P",
     "saddle": "X",
 }
+_EVENT_GRID = 161
+_EVENT_LINE: dict[str, Any] = {"color": style.PURPLE, "linewidth": 1.6, "linestyle": (0, (4, 2))}
+_NO_MOTION = "#E6E6E6"
 _ONE_MARK = 0.012  # points so close together, in units of the box, have one name
 Special = Fold | PseudoEquilibrium | Equilibrium
 
@@ -56,6 +63,7 @@ def phase_portrait(
     t_end: float | None = None,
     *,
     parameters: Parameters | None = None,
+    holding: Mapping[Any, float] | None = None,
     starts: ArrayLike | None = None,
     separatrices: bool = True,
     ax: Axes | None = None,
@@ -71,16 +79,24 @@ def phase_portrait(
     The directions of both fields, orbits through crossing and sliding, the surface in its
     attracting, repelling and crossing pieces, folds, equilibria, pseudo-equilibria and
     separatrices: invariant manifolds of saddles and pseudo-saddles and the orbits through visible
-    folds. Stops and resets of the system are ignored.
+    folds.
+
+    Of a system with discrete states, or a relay with hysteresis, each panel is for one value of them: orbits end where a
+    stop or reset is due, and there is no motion where one is due at once (``level=True``). Stops and resets of other
+    systems are ignored. There is no motion where a gap or the y of a complementarity condition is negative;
+    along the boundary of a condition pieces are attracting where it is closed.
 
     Parameters
     ----------
     system : FilippovSystem
-        Two states, one surface or none, no explicit time.
+        Two states besides discrete ones, one surface, relay or complementarity condition or none, no explicit time.
     box : (xmin, xmax, ymin, ymax) or ((xmin, xmax), (ymin, ymax))
         The window that is drawn, in the two states.
     parameters : mapping, optional
         Values that replace defaults.
+    holding : mapping, optional
+        Values of the discrete states; of a relay 1 or -1, by the name of its surface: ``{"h0": 1}``. By default all
+        that they may have, in panels.
     starts : array_like (k, 2), optional
         Where orbits start, followed forward only; by default orbits fill the box evenly.
     t_end : float, optional
@@ -110,9 +126,10 @@ def phase_portrait(
     Raises
     ------
     DefinitionError
-        The system is not planar, depends on time, or has several surfaces or discrete states.
+        The system is not planar, depends on time, or has several surfaces or constraints; discrete states whose values
+        are not known.
     OptionError
-        A box without an inside; a time or a size that is not positive; axes that are none.
+        A box without an inside; a time or a size that is not positive; axes that are none, or for several panels.
     PointError
         Starts that are no rows of two finite numbers.
     ParameterError
@@ -128,26 +145,44 @@ def phase_portrait(
     >>> figure.axes[0].get_xlabel()
     'x'
     """
-    require_one_surface(
-        system,
-        "phase_portrait",
-        2,
-        "Use two_fold for a two-fold in three states; trajectory for runs.",
-        smooth=True,
-    )
-    values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
-    scan = PlaneScan.of(system, values, Box.read(box))
-    with canvas(ax, size, (7.0, 4.8), colors=colors, look=look, title=title) as page:
-        axes = page.ax
-        portrait = _Portrait(page, scan, t_end)
-        portrait.draw(None if starts is None else _points(system, starts), separatrices)
-        names, limits = system.state_names, scan.box.limits
-        axes.set(xlim=limits[:2], ylim=limits[2:], xlabel=names[0], ylabel=names[1])
-        if legend:
-            portrait.legend()
-        if legend if labels is None else labels:
-            portrait.names()
+    shown = held(system, holding, "" if ax is None else "ax= is one picture")
+    for one in shown:
+        require_one_surface(
+            one.system,
+            "phase_portrait",
+            2,
+            "Use two_fold for a two-fold in three states; trajectory for runs.",
+            smooth=True,
+        )
+    points = None if starts is None else _points(shown[0].system, starts)
+    named, frame = legend if labels is None else labels, Box.read(box)
+    scans = [PlaneScan.of(one.system, _values(one, parameters), frame, one.events) for one in shown]
+    columns = min(len(shown), 3)
+    rows = -(-len(shown) // columns)
+    usual = (7.0, 4.8) if len(shown) == 1 else (4.2 * columns, 3.8 * rows + 0.6)
+    with canvas(
+        ax, size, usual, colors=colors, look=look, title=title, panels=len(shown) > 1
+    ) as page:
+        panels = page.panels(rows, columns) if len(shown) > 1 else [page]
+        portraits = [_Portrait(own, scan, t_end) for own, scan in zip(panels, scans, strict=False)]
+        for portrait, one in zip(portraits, shown, strict=True):
+            portrait.draw(points, separatrices)
+            names, limits = one.system.state_names, frame.limits
+            portrait.ax.set(xlim=limits[:2], ylim=limits[2:], xlabel=names[0], ylabel=names[1])
+            portrait.ax.set_title(one.name if title is None or len(shown) > 1 else title)
+            if named:
+                portrait.names()
+        if legend and len(shown) == 1:
+            beside(portraits[0].ax, portraits[0].handles())
+        elif legend:
+            handles = {h.get_label(): h for own in portraits for h in own.handles()}
+            page.figure.legend(handles=[*handles.values()], loc="outside lower center", ncols=3)
     return page.drawn
+
+
+def _values(one: Held, parameters: Parameters | None) -> dict[str, float]:
+    system = one.system
+    return dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
 
 
 def _points(system: FilippovSystem, starts: ArrayLike) -> Array:
@@ -172,9 +207,11 @@ class _Portrait:
         self.special: list[Special] = [*scan.equilibria, *scan.folds, *scan.pseudo_equilibria]
         self.special += scan.boundary_equilibria
         self.drawn: set[str] = set()
+        self.guards: dict[str, Array] = {}
 
     def draw(self, starts: Array | None, separatrices: bool) -> None:
         """Draw every part, from the back."""
+        self.events()
         self.directions()
         special = list(self.flow.separatrices()) if separatrices else []
         self.orbits(starts, [curve for _, curve in special])
@@ -186,6 +223,7 @@ class _Portrait:
     def directions(self) -> None:
         """Faint arrows of the field on each side."""
         mesh, size = self.scan.box.middles(19), self.scan.box.size
+        mesh = mesh[~self.scan.is_excluded(mesh)]
         numbers = self.scan.at(mesh)
         for k, (side, color) in enumerate(style.FIELDS.items()):
             chosen = numbers.h > 0 if side == "+" else numbers.h < 0
@@ -207,6 +245,24 @@ class _Portrait:
                 headlength=5,
                 zorder=1,
             )
+
+    def events(self) -> None:
+        """Where there is no motion, and dashed lines where a stop or reset is due."""
+        lines = self.scan.box.lines(_EVENT_GRID)
+        grid = self.scan.box.grid(_EVENT_GRID)
+        shape = (_EVENT_GRID, _EVENT_GRID)
+        none = self.scan.is_excluded(grid).reshape(shape)
+        if np.any(none):
+            look: Any = {"colors": [_NO_MOTION], "zorder": 0.5}
+            self.ax.contourf(*lines, none.astype(float), levels=[0.5, 1.5], **look)
+            self.drawn.add("no motion")
+        for event, value in zip(self.scan.events, self.scan.of_events(grid), strict=True):
+            curves: Any = contour_generator(*lines, value.reshape(shape)).lines(0.0)
+            for curve in curves:
+                line = self.page.named(event.name, **_EVENT_LINE)
+                self.ax.plot(*np.asarray(curve).T, gid=f"event {event.name}", zorder=2.5, **line)
+            if curves:
+                self.guards[event.name] = np.vstack([np.asarray(c) for c in curves])
 
     def orbits(self, starts: Array | None, avoid: list[Array]) -> None:
         """Orbits from given starts, or evenly spaced ones through the box."""
@@ -271,10 +327,11 @@ class _Portrait:
                 gid=name,
             )
 
-    def legend(self) -> None:
-        """Explain lines and marks beside the axes."""
-        handles = [
-            Line2D([], [], label=text, **self._piece(kind))
+    def handles(self) -> list[Any]:
+        """Lines and marks with what they are, for a legend."""
+        words = _CLOSED if self.scan.where.one_sided else {}
+        handles: list[Any] = [
+            Line2D([], [], label=words.get(kind, text), **self._piece(kind))
             for kind, (*_, text) in _PIECES.items()
             if any(piece.kind == kind for piece in self.scan.pieces)
         ]
@@ -285,18 +342,27 @@ class _Portrait:
         ]
         if "start" in self.drawn:
             handles.append(style.marker(".", "where they start", size=5))
-        beside(self.ax, handles)
+        if self.guards:
+            handles.append(
+                Line2D([], [], label="stops and resets", **self.page.named("event", **_EVENT_LINE))
+            )
+        if "no motion" in self.drawn:
+            handles.append(Patch(facecolor=_NO_MOTION, label="no motion"))
+        return handles
 
     def names(self) -> None:
         """Name the sides of the surface and the special points, beside them."""
         labels = Labels(self.ax)
         mesh = self.scan.box.middles(9)
+        mesh = mesh[~self.scan.is_excluded(mesh)]
         h = self.scan.at(mesh).h
         for side, color in style.FIELDS.items():
             chosen = mesh[h > 0 if side == "+" else h < 0]
-            if len(chosen):
+            if len(chosen) and self.scan.where.mode:
                 text = f"$h {'>' if side == '+' else '<'} 0$"
                 labels.name(text, chosen, color, inside=True, fontsize=style.points(10))
+        for name, curve in self.guards.items():
+            labels.name(name, curve, _EVENT_LINE["color"])
         for name, points in _together(self.special, self.scan.box.size).items():
             for point in points:
                 labels.name(name, point)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from ...local.scans.surface_scan import REGIONS, SurfaceScan
 from ...model import Array, FilippovSystem, Parameters, real, whole
 from ...orbit.manifolds.sliding_orbits import SlidingOrbits
 from .. import style
-from ..arguments import require_one_surface
+from ..arguments import held, require_one_surface
 from ..drawing import Canvas, Colors, Drawn, canvas
 from ..labels import Labels
 from ..legends import beside
@@ -50,6 +50,7 @@ def sliding_portrait(
     coordinates: Sequence[str] | None = None,
     guess: float = 0.0,
     parameters: Parameters | None = None,
+    holding: Mapping[Any, float] | None = None,
     orbits: int = 12,
     ax: Axes | None = None,
     size: tuple[float, float] | None = None,
@@ -70,7 +71,7 @@ def sliding_portrait(
     Parameters
     ----------
     system : FilippovSystem
-        Three states, one surface, no explicit time.
+        Three states besides discrete ones, one surface, no explicit time.
     box : (xmin, xmax, ymin, ymax) or ((xmin, xmax), (ymin, ymax))
         Limits of the two coordinates.
     coordinates : (str, str), optional
@@ -80,6 +81,8 @@ def sliding_portrait(
         Of the remaining state: where the search for the surface starts.
     parameters : mapping, optional
         Values that replace defaults.
+    holding : mapping, optional
+        Values of the discrete states, where the system has such.
     orbits : int, optional
         About how many sliding orbits would fit across the box; 0 for none.
     ax : matplotlib Axes, optional
@@ -109,7 +112,7 @@ def sliding_portrait(
         Not three states, explicit time, several surfaces, hidden dynamics; a state that is none;
         no surface in the box.
     OptionError
-        A box without an inside; a number of orbits or a size out of its range; axes that are none.
+        Discrete states without ``holding``; a box without an inside; a number of orbits or a size out of its range; axes that are none.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
 
@@ -121,6 +124,8 @@ def sliding_portrait(
     >>> figure.axes[0].get_xlabel()
     'z2'
     """
+    (one,) = held(system, holding, "this picture has no panels")
+    system = one.system
     require_one_surface(
         system,
         "sliding_portrait",

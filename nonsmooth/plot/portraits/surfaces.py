@@ -15,14 +15,17 @@ from .. import style
 def draw_surfaces(
     ax: Axes, system: FilippovSystem, parameters: Array, box: tuple[float, float, float, float]
 ) -> None:
-    """Draw the switching surfaces of a planar system in a box as grey lines."""
+    """Draw the switching surfaces of a planar system in a box as grey lines.
+
+    Conditions of complementarity that hold a multiplier are no functions of the state, and are not drawn.
+    """
     x, y = np.meshgrid(np.linspace(*box[:2], 161), np.linspace(*box[2:], 161))
     points = np.vstack([x.ravel(), y.ravel()])
-    count = system.surface_count
+    drawn = {*range(system.surface_count)} - {*system.algebraic, *system.joints}
     function = system.function(
-        ("plot surfaces",), lambda: [system.surface_function(i) for i in range(count)]
+        ("plot surfaces",), lambda: [system.surface_function(i) for i in sorted(drawn)]
     )
-    values = call(function, points, parameters) if count else []
+    values = call(function, points, parameters) if drawn else []
     for value in values:
         h = value.reshape(x.shape)
         look: Any = {"color": style.GREY, "linewidth": 2.2, "alpha": 0.7, "zorder": 1}

@@ -29,6 +29,12 @@ MARKERS = {
     "exit": ("^", "white", "exit from sliding"),
     "stop": ("s", style.BLACK, "stop"),
     "reset": ("D", "white", "reset"),
+    "impact": ("d", style.GREY, "impact"),
+    "contact": ("p", style.BLACK, "contact"),
+    "release": ("h", "white", "release"),
+    "jump": ("D", style.BLACK, "jump"),
+    "rest": ("*", style.BLACK, "rest"),
+    "rest_below": ("*", "white", "rest below a speed"),
     "zero": ("P", "white", "zero"),
     "end": ("X", style.GREY, "end"),
 }
@@ -39,6 +45,7 @@ _MODES = {
     "*": (style.ABOVE, "-", 1.5, "*  off the set, h ≠ 0"),
     "": (style.BLUE, "-", 1.5, "smooth"),
 }
+_JUMPS = ("reset", "impact", "jump")
 _CYCLE = (style.ABOVE, style.BLUE, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
 _GRID_FROM = 5  # states; fewer are stacked in one column
@@ -145,23 +152,23 @@ def trajectory(
 class _Part:
     """One segment with times and states at which it is drawn."""
 
-    def __init__(self, run: Trajectory, segment: Segment, samples: int, resets: Array):
+    def __init__(self, run: Trajectory, segment: Segment, samples: int, jumps: Array):
         span = abs(run.t[-1] - run.t[0]) or 1.0
         low, high = sorted((segment.t_start, segment.t_end))
         count = max(int(samples * (high - low) / span), 8)
         steps = run.t[(run.t > low) & (run.t < high)] if len(run.t) < samples else run.t[:0]
-        # stay inside: at the ends, a reset would show the state after it
+        # stay inside: at the ends, a jump would show the state after it
         inner = (high - low) * 1e-9
         times = np.union1d(np.linspace(low + inner, high - inner, count), steps)
-        resets = resets[(low < resets) & (resets < high)]
-        around = np.concatenate([resets - inner, resets + inner])
-        times = np.union1d(times, np.clip(around, low, high)) if len(resets) else times
+        jumps = jumps[(low < jumps) & (jumps < high)]
+        around = np.concatenate([jumps - inner, jumps + inner])
+        times = np.union1d(times, np.clip(around, low, high)) if len(jumps) else times
         x = run(times)
         # a jump is a gap in the curve
-        k = np.searchsorted(times, resets)
+        k = np.searchsorted(times, jumps)
         self.segment, self.t, self.x = (
             segment,
-            np.insert(times, k, resets),
+            np.insert(times, k, jumps),
             np.insert(x, k, np.nan, axis=0),
         )
 
@@ -181,10 +188,10 @@ class _Picture:
 
     def __init__(self, page: Canvas, runs: list[Trajectory], samples: int):
         self.page, self.runs, self.run = page, runs, runs[0]
-        resets = [run.events.t[run.events.column("kind") == "reset"] for run in runs]
+        jumps = [run.events.t[np.isin(run.events.column("kind"), _JUMPS)] for run in runs]
         self.parts = [
             _Part(run, segment, samples, own)
-            for run, own in zip(runs, resets, strict=True)
+            for run, own in zip(runs, jumps, strict=True)
             for segment in run.segments
         ]
         few = sum(len(run.events) for run in runs) <= _MANY
@@ -194,10 +201,10 @@ class _Picture:
     def _looks(self) -> tuple[dict[str, dict[str, Any]], dict[str, str]]:
         """Properties of the lines of each mode, and its explanation, in order of appearance."""
         modes = {self._name(part.segment): part.segment.mode for part in self.parts}
-        several = any(len(name) > 1 for name in modes)
+        several = any(mode not in _MODES or len(name) > 1 for name, mode in modes.items())
         looks, texts = dict[str, dict[str, Any]](), dict[str, str]()
         for k, (name, mode) in enumerate(modes.items()):
-            color, dashes, width, text = _MODES.get(mode, _MODES["*"])
+            color, dashes, width, text = _MODES.get(mode, _MODES[""])
             if several:
                 width, text = (3.0 if "s" in mode else 1.5), name.replace("-", "−")
                 color, dashes = _CYCLE[k % 6], "-" if "s" in mode else _DASHES[k % 4]
@@ -326,11 +333,13 @@ class _Picture:
 
     def _title(self) -> str:
         itinerary, width = self.run.itinerary.replace("-", "−"), self.page.figure.get_figwidth()
-        room = min(48, int(12 * width) - 12)  # letters in a line
+        line = int(12 * width)  # letters
+        room = min(48, line - 12)
         if len(itinerary) > room:
             itinerary = itinerary[: room - 4].rstrip() + " …"
-        gap = "   " if width > 4.6 else "\n"
-        return f"itinerary: {itinerary}{gap}status: {self.run.status}"
+        parts = f"itinerary: {itinerary}", f"status: {self.run.status}"
+        gap = "   " if sum(map(len, parts)) + 3 <= line else "\n"
+        return gap.join(parts)
 
     def _legend(self, plane: bool) -> list[Line2D | Patch]:
         handles: list[Line2D | Patch] = [
@@ -345,7 +354,8 @@ class _Picture:
             handles.append(Line2D([], [], linestyle="none", marker="o", label="start", **start))
         if any(run.accumulation_time is not None for run in self.runs):
             handles.append(style.line(style.PURPLE, "accumulation time", dashes=":"))
-        if plane and self.run.system.surface_count and not self.run.system.time_dependent:
+        lines = [line for ax in self.page.figure.axes for line in ax.lines]
+        if any(line.get_gid() == "surface" for line in lines):
             handles.append(style.line(style.GREY, "surface", 2.2, alpha=0.7))
         return handles
 

@@ -9,7 +9,10 @@ const Page = (() => {
     if (Number.isNaN(value)) return "undecided";
     if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
     if (value === 0) return "0";
-    return String(Number(value.toPrecision(digits))).replaceAll("-", "−");
+    const rounded = Number(value.toPrecision(digits));
+    const words =
+      Math.abs(rounded) < 1e6 ? String(rounded) : rounded.toExponential().replace("+", "");
+    return words.replaceAll("-", "−");
   }
 
   /** An element of SVG with attributes and children. */
@@ -187,8 +190,12 @@ const Page = (() => {
 
   const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
-  /** A point of a plane that is moved by pointer and by arrow keys (with Shift ten times as far). */
-  function draggable(plane, { name, step, get, set, say }) {
+  /**
+   * A point of a plane that is moved by pointer and by arrow keys (with Shift ten times as far). A pointer elsewhere
+   * in the plane moves it there, or does what `beside` says: functions `down`, `move` and `up`.
+   */
+  function draggable(plane, given) {
+    const { name, get, set, say, beside } = given;
     const handle = svg(
       "g",
       { class: "handle", tabindex: 0, role: "slider", "aria-label": name },
@@ -201,10 +208,15 @@ const Page = (() => {
       Math.min(Math.max(v, plane.y[0]), plane.y[1]),
     ];
     let held = false;
-    plane.element.classList.add("draggable");
+    if (!beside) plane.element.classList.add("draggable");
     plane.element.addEventListener("pointerdown", (event) => {
+      const isOutside = !handle.contains(event.target);
+      if (beside && isOutside && !event.button) {
+        beside.down(event);
+        plane.element.setPointerCapture(event.pointerId);
+      }
       // a finger beside the point scrolls the page; a tap, which is a click, moves the point there
-      if (event.button || (event.pointerType === "touch" && !handle.contains(event.target))) return;
+      if (event.button || (isOutside && (beside || event.pointerType === "touch"))) return;
       held = true;
       plane.element.setPointerCapture(event.pointerId);
       set(clamp(plane.underPointer(event)));
@@ -213,20 +225,23 @@ const Page = (() => {
     });
     plane.element.addEventListener("pointermove", (event) => {
       if (held) set(clamp(plane.underPointer(event)));
+      else beside?.move(event);
     });
     // touch-action is not heeded inside SVG everywhere: a finger on the point must not scroll
     handle.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
     plane.element.addEventListener("click", (event) => {
-      if (!handle.contains(event.target)) set(clamp(plane.underPointer(event)));
+      if (!beside && !handle.contains(event.target)) set(clamp(plane.underPointer(event)));
     });
     for (const end of ["pointerup", "pointercancel"]) {
-      plane.element.addEventListener(end, () => {
+      plane.element.addEventListener(end, (event) => {
         held = false;
+        beside?.up(event);
       });
     }
     handle.addEventListener("keydown", (event) => {
       const move = ARROWS[event.key];
       if (!move) return;
+      const { step } = given; // which may follow the plane's ranges
       const by = step * (event.shiftKey ? 10 : 1);
       // to multiples of the step, so that going and coming back meet
       set(clamp(get().map((v, k) => Math.round((v + by * move[k]) / step) * step)));

@@ -9,7 +9,7 @@ from bounce.cli import main
 def test_writes_the_page(tmp_path, capsys):
     path = tmp_path / "page.html"
     assert main(["explore", "--output", str(path)]) == 0
-    assert path.read_text(encoding="utf-8") == bounce.plot.explorer()
+    assert path.read_text(encoding="utf-8") == bounce.explore().html
     assert capsys.readouterr().out == f"wrote {path}\n"
 
 

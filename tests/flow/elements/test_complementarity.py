@@ -506,4 +506,4 @@ def test_an_impact_that_is_a_diode_names_complementarity():
 def test_functions_for_surfaces_refuse_it():
     matrices, start, _ = CIRCUITS["peak rectifier"]
     with pytest.raises(ns.DefinitionError, match="complementarity conditions"):
-        ns.classify(circuit(*matrices), start)
+        ns.manifold(circuit(*matrices), start)

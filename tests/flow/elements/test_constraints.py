@@ -481,7 +481,7 @@ def test_friction_by_the_reaction_of_a_joint_is_refused_with_what_to_write():
 
 def test_functions_for_other_systems_refuse_constraints():
     with pytest.raises(ns.DefinitionError, match="has constraints, which this function"):
-        ns.classify(pendulum(0.1), [1.0, 0.0, 0.0, 0.0])
+        ns.find_homoclinic(pendulum(0.1), [1.0, 0.0, 0.0, 0.0], "damping")
 
 
 def test_constraints_of_expressions_with_switches():

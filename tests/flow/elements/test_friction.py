@@ -109,6 +109,26 @@ def test_several_frictions_beside_a_surface_with_its_own_multiplier():
         ns.FilippovSystem([x, v], field=[v, first.force - lam], surfaces=[first, x], multipliers=[])
 
 
+def test_two_feet_have_one_slip_and_a_friction_each():
+    """Both loads are 1/2: it slides for 1/mu."""
+    first, second, b = (ca.SX.sym(s) for s in ("first", "second", "b"))
+    feet = [ns.Friction(v, load=r, kinetic=0.5) for r in (first, second)]
+    gaps = [
+        ns.Impact(y - b, reaction=first, name="left"),
+        ns.Impact(y + b, reaction=second, name="right"),
+    ]
+    spin, fall = ca.SX.sym("spin"), ca.SX.sym("fall")
+    block = ns.FilippovSystem(
+        [y, b, v, fall, spin],
+        field=[fall, spin, feet[0].force + feet[1].force, first + second - 1, second - first],
+        surfaces=feet,
+        impacts=gaps,
+    )
+    run = ns.simulate(block, [0, 0, 1, 0, 0], 3.0)
+    assert run.status is ns.Status.REACHED_END
+    assert abs(times(run, "entry")[0] - 2.0) < 1e-12
+
+
 def test_a_system_with_friction_is_saved_and_read(tmp_path):
     run = ns.simulate(pulled(ns.Friction(v, load=10, kinetic=0.3, static=0.4)), [0, 0], 20.0)
     run.save(tmp_path / "run.npz")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engine.device import card, machine
+from nonsmooth.flow.engine.device import card
 from nonsmooth.flow.ensembles.on_device import device_chunk
 
 
@@ -58,7 +58,7 @@ def test_other_devices_are_refused():
 
 @pytest.mark.skipif(importlib.util.find_spec("cuda") is not None, reason="cuda-core is there")
 def test_without_packages_the_error_says_what_to_install():
-    with pytest.raises(machine.DeviceError, match=r"cuda-core.*nonsmooth-dynamics\[cuda\]"):
+    with pytest.raises(card.DeviceError, match=r"cuda-core.*nonsmooth-dynamics\[cuda\]"):
         ns.ensemble(pair(), np.ones((3, 2)), 1.0, device="cuda")
 
 
@@ -67,5 +67,5 @@ def test_without_a_driver_the_error_says_so():
         def Device(self):
             raise RuntimeError("Ensure the NVIDIA display driver is installed.")
 
-    with pytest.raises(machine.DeviceError, match=r"NVIDIA.*display driver"):
+    with pytest.raises(card.DeviceError, match=r"NVIDIA.*display driver"):
         card.Card(Core())

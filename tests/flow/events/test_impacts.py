@@ -191,19 +191,6 @@ def test_an_oscillator_chatters_to_rest_at_its_wall_and_leaves_when_the_force_en
     assert run(np.linspace(0, 45, 3000))[:, 0].max() < wall + 1e-9
 
 
-def test_painleve_paradox_is_named():
-    """Friction turns the reaction round: with slip +, r (1 - 2) pulls the contact into the ground."""
-    system = ns.FilippovSystem(
-        [x, y, u, v],
-        field=[u, v, -0.1 * lam * r, r * (1 - 2 * lam) - G],
-        surface=u,
-        multipliers=lam,
-        impacts=ns.Impact(y, reaction=r),
-    )
-    run = ns.simulate(system, [0.0, 0.0, 1.0, 0.0], 1.0)
-    assert run.status is ns.Status.INCONSISTENT
-
-
 def test_wrong_impacts_are_refused():
     with pytest.raises(ns.DefinitionError, match="restitution of 'impact'"):
         ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=1.5))

@@ -27,9 +27,9 @@ def test_a_problem_is_as_known(data):
 @pytest.mark.slow
 @every
 def test_an_ensemble_ends_as_known(data):
-    if "end" not in data or data.get("slow"):
-        pytest.skip("nothing is known of its end, or it takes long")
     problem = Problem(data)
+    if "end" not in problem.data or data.get("slow"):
+        pytest.skip("nothing is known of its end, or it takes long")
     many = ns.ensemble(
         problem.system,
         np.tile(problem.start, (5, 1)),
@@ -38,7 +38,7 @@ def test_an_ensemble_ends_as_known(data):
         work=ns.Work(threads=1, progress=False),
     )
     assert ns.Status(int(many.status[2])).name == data.get("status", "REACHED_END")
-    assert problem.error(many.x[2], data["end"]) <= problem.within
+    assert problem.error(many.x[2], problem.data["end"]) <= problem.within
 
 
 @pytest.mark.slow
@@ -50,7 +50,7 @@ def test_an_integrator_of_contacts_ends_there_too(data):
     half = len(start) // 2
     step = problem.t_end / 150
     end = follow(problem.mechanism(), start[:half], start[half:], problem.t_end, step)
-    assert problem.error(end, data["end"]) < 1e-6
+    assert problem.error(end, problem.data["end"]) < 1e-6
 
 
 def test_time_does_not_run_backward():

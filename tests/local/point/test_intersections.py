@@ -22,6 +22,11 @@ CASES = {
     "spiral": (plane(-a + 2 * b, -2 * a - b), ["ss"], "attracting", "pseudo-equilibrium"),
     "two genes": (plane(-x + b, -y - a), ["ss"], "spiralling in", "pseudo-equilibrium"),
     "two genes that grow": (plane(x + b, y - a), ["ss"], "spiralling out", "pseudo-equilibrium"),
+    "twisting": (plane(y, -3 * a - b), ["ss"], "spiralling in", "pseudo-equilibrium"),
+    "twisting the other way": (plane(-y, 3 * a - b), ["ss"], "spiralling in", "pseudo-equilibrium"),
+    "twisting of the second": (plane(-3 * b - a, x), ["ss"], "spiralling in", "pseudo-equilibrium"),
+    "twisting out": (plane(y, -3 * a + b), ["ss"], "spiralling out", "pseudo-equilibrium"),
+    "no twisting": (plane(y, -3 * a), ["ss"], "not shown", "pseudo-equilibrium"),
     "a centre": (plane(b, -a), ["ss"], "not shown", "pseudo-equilibrium"),
     "pushed off one": (plane(3 - a, -b), ["+s"], "", "sliding"),
     "pushed off both": (plane(3 - a, -2 - b), ["+-"], "", "crossing"),
@@ -45,7 +50,21 @@ def test_modes_that_can_go_on_and_attraction(name):
     assert ("modes that can go on: " + ", ".join(m.mode for m in found.continuations)) in str(found)
 
 
-@pytest.mark.parametrize("name", [n for n in CASES if len(CASES[n][1]) == 1 and n != "a centre"])
+def test_a_search_finds_the_rest_of_twisting_stable():
+    found = ns.find_pseudo_equilibrium(plane(y, -3 * a - b), [0.1, 0.2], mode="ss")
+    assert found.stable and found.kind == "stable pseudo-node"
+
+
+def test_a_point_on_another_surface_is_told_so():
+    with pytest.raises(ns.PointError, match=r"one on surface 1\. Give surface=1"):
+        ns.classify(plane(y, -3 * a - b), [0.3, 0.0])
+    assert ns.classify(plane(y, -3 * a - b), [0.3, 0.0], surface=1).label == "crossing down"
+
+
+NOT_RUN = ("a centre", "twisting out")  # rest goes on in both, and so do orbits that leave
+
+
+@pytest.mark.parametrize("name", [n for n in CASES if len(CASES[n][1]) == 1 and n not in NOT_RUN])
 def test_a_run_goes_on_in_the_only_mode(name):
     system, (mode,), attraction, _ = CASES[name]
     run = ns.simulate(system, [0.0, 0.0], 1.0)

@@ -185,3 +185,17 @@ def test_following_the_advice_for_a_point_off_a_curved_surface():
             point = [float(v) for v in numbers.split(",")]
     else:
         raise AssertionError("not on the surface after the steps advised")
+
+
+def test_a_root_whose_slope_is_infinite_on_the_surface_is_crossed_or_slides():
+    """The field is finite on the surface, its derivative there is not."""
+    root = ca.sign(x) * ca.sqrt(ca.fabs(x))
+    twisting = ns.FilippovSystem.from_expression([x, y], [y - root, -ca.sign(x)])
+    assert ns.region(twisting, [0.0, 0.1]) is Region.CROSSING_UP
+    assert ns.classify(twisting, [0.0, 0.1]).label == "crossing up"
+    with pytest.raises(ns.PointError, match="derivatives"):
+        ns.classify(twisting, [0.0, 0.0])
+    relay = ns.FilippovSystem.from_expression([x, y], [-ca.sign(x) - root, 1])
+    assert ns.region(relay, [0.0, 0.1]) is Region.ATTRACTING
+    assert (alpha(relay, [0.0, 0.1]), *sliding_field(relay, [0.0, 0.1])) == (0.5, 0.0, 1.0)
+    assert ns.classify(relay, [0.0, 0.1]).label == "attracting sliding"

@@ -54,6 +54,23 @@ def test_points_of_such_surfaces(system, point, kind, label):
     assert (found.kind, found.label) == (kind, label)
 
 
+@pytest.mark.parametrize(
+    ("reset", "stability", "ratio"),
+    [
+        (ns.Reset(x, {v: 0.9 * v}), "stable", 0.81),
+        (ns.Reset(2 * x, {v: 0.9 * v}, -1), "stable", 0.9),
+        (ns.Reset(x, {v: -1.1 * v}), "unstable", 1.21),
+        (ns.Reset(v, {v: 0.5 * v}), "neutral", None),
+        (ns.Reset(x - 1, {v: 0.5 * v}), "neutral", None),
+    ],
+)
+def test_rest_of_a_block_that_jumps_where_it_changes_corners(reset, stability, ratio):
+    block = _sides([v, x - 1], [v, x + 1], resets=reset)
+    found = ns.classify(block, [0.0, 0.0])
+    assert (found.kind, found.label) == ("rest", f"{stability}, invisible on both sides")
+    assert found.evidence.get("jumps") == (ratio and pytest.approx(ratio))
+
+
 def test_what_needs_sliding_is_refused():
     soft = _sides([v, -x - z, z], [v, -x - z + x, z], (x, v, z))
     for verb in (ns.find_two_fold, ns.find_pseudo_equilibrium):

@@ -147,3 +147,15 @@ def test_explicit_time():
 def test_bad_input(call, error, message):
     with pytest.raises(error, match=message):
         call(jordan(2))
+
+
+def test_a_search_for_a_fold_that_ends_at_an_equilibrium_says_so():
+    """v' = 1000 (1 - x^2) v - x - sgn(v)/2 rests at x = -1/2 above; the search ends some 1e-21 beside it."""
+    v = ca.SX.sym("v")
+    field = [v, 1000 * (1 - x**2) * v - x]
+    stuck = ns.FilippovSystem(
+        [x, v], surface=v, above=[v, field[1] - 0.5], below=[v, field[1] + 0.5]
+    )
+    found = ns.find_fold(stuck, [-0.4, 0.0])
+    assert found.point == pytest.approx([-0.5, 0.0], abs=1e-12)
+    assert (found.order, found.kind) == (None, "degenerate")

@@ -47,6 +47,17 @@ def _two(surface, above, below, states=(x, v), **more):
     return ns.FilippovSystem(states, surface=surface, above=above, below=below, **more)
 
 
+@pytest.mark.parametrize(
+    ("stiffness", "gap", "push"), [(0.7, 0.1, 0.07), (5.3, 2.17, 11.501), (9.0, 0.3, 2.7)]
+)
+def test_a_stop_of_numbers_is_continuous_to_their_rounding(stiffness, gap, push):
+    """0.7 x - 0.07 is not zero at the double 0.1; a force of 1e-15 beside it is one that jumps."""
+    for more, kind in ((0.0, "continuous"), (1e-13, "velocity continuous")):
+        force = ca.if_else(x > gap, push + more - stiffness * x, 0)
+        system = ns.FilippovSystem.from_expression([x, v], [v, force - x])
+        assert system.switching().kind == kind
+
+
 BY_HAND = {
     "dashpot": (_two(x - 1, [v, -5 * (x - 1) - v], [v, 0]), "velocity continuous", 1, 1.5),
     "quadratic dashpot": (_two(x - 1, [v, x - 1 - v**2], [v, 0]), "velocity continuous", 2, 1.5),

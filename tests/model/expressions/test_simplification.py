@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nonsmooth.model.expressions.graph import depends_on, instructions
-from nonsmooth.model.expressions.jets import taylor
 from nonsmooth.model.expressions.simplification import simplified
 
 x, y, z, p, q = (ca.SX.sym(s) for s in "xyzpq")
@@ -86,20 +85,6 @@ def test_random_graphs_keep_their_values_and_cost_no_more(seed):
     both = ca.Function("f", [STATES, CONSTANTS], [ca.vertcat(*expressions), ca.vertcat(*after)])
     a, b = (np.array(v) for v in both([0.31, -0.83, 0.57], [0.71, -0.42]))
     assert np.allclose(a, b, rtol=1e-9, atol=1e-9)
-
-
-def test_jets_are_those_of_the_expression_as_it_stands():
-    """A contact force with shared factors, against repeated Lie derivatives."""
-    force = -(2 * p * (1 + z**2) * (1 - y) * z) - q**2 * (1 - y) * x
-    field = ca.vertcat(z, force, -y + p * force)
-    jet = taylor(field, force, STATES, CONSTANTS, 6)[1]
-    derivative, expected = force, []
-    for k in range(7):
-        expected.append(derivative)
-        derivative = ca.jtimes(derivative, STATES, field) / (k + 1)
-    f = ca.Function("f", [STATES, CONSTANTS], [jet, ca.horzcat(*expected)])
-    got, wanted = (np.array(v) for v in f([0.3, -0.2, 0.7], [0.4, 0.9]))
-    assert got == pytest.approx(wanted, rel=1e-12, abs=1e-13)
 
 
 def test_shapes_are_kept():

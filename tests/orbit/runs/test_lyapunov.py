@@ -110,7 +110,7 @@ def test_invalid_options_raise(options, error, message):
 def test_an_interrupt_keeps_the_exponents_so_far(monkeypatch):
     clock = ns.Clock(1.0, map=[x / 2])
     system = ns.FilippovSystem([x], field=[0.0 * x], clocks=clock)
-    interrupt(monkeypatch, lyapunov, "integrate_leg", 101)
+    interrupt(monkeypatch, lyapunov, "carry_leg", 101)
     found = ns.lyapunov_spectrum(system, [1.0, 0.0], t_end=200.0, transient=40.0, k=2)
     assert not found.complete and 10.0 <= found.t < 160.0 and "interrupted" in repr(found)
     assert np.allclose(np.sort(found.exponents), [-math.log(2), 0.0], atol=1e-9)

@@ -139,9 +139,9 @@ def test_gradients_are_products_of_the_derivatives():
     found = ns.gradient(run, x1**2 + c * x2)
     assert found.value == pytest.approx(one**2 + 0.5 * two, abs=1e-14)
     row = np.array([2 * one, 0.5, 0.0, 0.0])
-    assert found.x0 == pytest.approx(row @ s.dx_dx0, abs=1e-14)
+    assert found.x0 == pytest.approx(row @ s.dx_dx0, abs=1e-12)  # by steps of their own
     assert found.parameters == pytest.approx(
-        {"a": row @ s.dx_dp[:, 0], "c": row @ s.dx_dp[:, 1] + two}, abs=1e-13
+        {"a": row @ s.dx_dp[:, 0], "c": row @ s.dx_dp[:, 1] + two}, abs=1e-12
     )
     back = ns.vjp(run, row)
     assert back[0] == pytest.approx(row @ s.dx_dx0) and back[1] == pytest.approx(row @ s.dx_dp)

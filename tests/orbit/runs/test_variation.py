@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import pickle
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -416,3 +418,31 @@ def test_an_event_with_the_name_of_a_surface_has_its_own_derivative() -> None:
     # x = 0 at 1/2, 1 at 3/2; then x = 1/2 + (2 v - 1) (1.6 - t2), t2 = -x0/v + 1/(v - 1)
     expected = [[3 / 2, 2 * 0.1 + 3 * (1 / 4 + 1)], [0.0, 2.0]]
     assert np.abs(ns.sensitivity(run).dx_dx0 - expected).max() < 1e-12
+
+
+def test_the_order_in_which_two_surfaces_of_position_are_met_makes_a_corner():
+    """Case corner_product: the derivatives beside it differ by D (n_y/L_y - n_x/L_x)."""
+    cases = json.loads(Path("tests/cases/continuous_switching.json").read_text())
+    case = next(c for c in cases if c["id"] == "corner_product")
+    symbols = {s: ca.SX.sym(s) for s in (*case["system"]["states"], "l1", "l2")}
+    names = ("states", "field", "surfaces", "multipliers")
+    states, field, surfaces, multipliers = (
+        [eval(text, {}, symbols) for text in case["system"][name]] for name in names
+    )
+    system = ns.FilippovSystem(states, field=field, surfaces=surfaces, multipliers=multipliers)
+    before, after, off = 0.1, 0.2, 1e-9
+    # in mode -- the accelerations are 2 and -3, and the speeds at the corner 2 and 3
+    start = np.array(
+        [-2 * before + before**2, 2 - 2 * before, -3 * before - 1.5 * before**2, 3 + 3 * before]
+    )
+    found = [
+        ns.sensitivity(
+            ns.simulate(system, start + sign * off * np.eye(4)[0], before + after)
+        ).dx_dx0
+        for sign in (1, -1)
+    ]
+    flow = lambda time: np.kron(np.eye(2), [[1.0, time], [0.0, 1.0]])
+    jump = [float(value) for value in case["values"]["D"]]
+    corner = np.outer(jump, [-1 / 2, 0, 1 / 3, 0])
+    expected = flow(after) @ corner @ flow(before)
+    np.testing.assert_allclose(found[0] - found[1], expected, atol=1e-6)

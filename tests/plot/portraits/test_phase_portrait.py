@@ -167,3 +167,78 @@ def test_two_folds_in_one_point_are_named_together():
     fused = ns.FilippovSystem([x, y], surface=y, above=[1, -x - 0.1 * y], below=[-1, -x])
     ax = ns.plot.phase_portrait(fused, (-1, 1, -1, 1)).axes[0]
     assert "two invisible folds" in {text.get_text() for text in ax.findobj(Text)}
+
+
+# discrete states, relays, conditions and contacts -------------------------------------------------
+
+
+def _curves(ax, kind):
+    return [np.column_stack(ln.get_data()) for ln in ax.lines if ln.get_gid() == kind]
+
+
+def test_each_value_of_a_discrete_state_has_a_panel_in_which_orbits_end_at_its_events():
+    q = ca.SX.sym("q")
+    on = ns.Reset(x + y - 1, {q: 1}, 1, level=True, when=q == 0, name="on")
+    off = ns.Reset(ca.logic_and(x < -1, y < 2), {q: 0}, name="off", when=q == 1)
+    system = ns.FilippovSystem([x, y], field=[y, q - x], discrete={q: (0, 1)}, resets=[on, off])
+    box = (-3, 3, -3, 3)
+    left, right = ns.plot.phase_portrait(system, box).axes
+    assert (left.get_title(), right.get_title()) == ("q = 0", "q = 1")
+    (line,) = _curves(left, "event on")
+    assert_allclose(line.sum(axis=1), 1.0, atol=1e-12)
+    for curve in _curves(left, "orbit"):  # circles around (0, 0) that end on the line
+        assert curve.sum(axis=1).max() < 1.0 + 1e-6
+        assert np.ptp(np.hypot(*curve.T)) < 1e-6
+    assert not _curves(right, "event on") and _curves(right, "event off")
+    for curve in _curves(right, "orbit"):  # none goes on where x falls through -1
+        sides = np.sign(curve[np.abs(curve[:, 0] + 1) > 1e-6, 0] + 1)
+        assert np.all(np.diff(sides)[np.diff(sides) != 0] > 0)
+    belt = ns.FilippovSystem(  # its surface, with a fold at x = 2, is drawn where there is motion
+        [x, y], surface=y, above=[1, x - 2], below=[1, 1], discrete={q: (0, 1)}, resets=[on]
+    )
+    ax = ns.plot.phase_portrait(belt, box, holding={q: 0}, legend=False).axes[0]
+    ends = [c[:, 0].max() for kind in ("attracting", "crossing") for c in _curves(ax, kind)]
+    assert 0.9 < max(ends) <= 1.0 and not _curves(ax, "visible fold")
+    one = ns.plot.phase_portrait(system, box, holding={"q": 1}, legend=False).axes
+    assert len(one) == 1 and one[0].get_title() == "q = 1"
+    assert len(_curves(one[0], "orbit")) == len(_curves(right, "orbit"))
+
+
+def test_a_relay_has_a_panel_for_each_state():
+    u = ca.SX.sym("u")
+    system = ns.FilippovSystem(
+        [x, y], field=[y - 2 * u, -x], surfaces=[ns.Relay(x, on=0.5, off=-0.5)], multipliers=[u]
+    )
+    on, off = ns.plot.phase_portrait(system, (-4, 4, -4, 4), legend=False).axes
+    for ax, sign in ((on, 1), (off, -1)):
+        assert all(sign * c[:, 0].min() > -4.2 for c in _curves(ax, "orbit"))
+        for curve in _curves(ax, "orbit"):
+            assert (sign * curve[:, 0]).min() > -0.5 - 1e-6
+            assert np.ptp(np.hypot(curve[:, 0], curve[:, 1] - 2 * sign)) < 1e-6
+    with pytest.raises(ns.OptionError, match="the state of the relay"):
+        ns.plot.phase_portrait(system, (-4, 4, -4, 4), holding={"q": 1})
+
+
+def test_the_boundary_of_a_condition_is_closed_or_opens_and_has_no_orbits_behind():
+    u = ca.SX.sym("u")
+    diode = ns.Complementarity(x, multiplier=u, name="diode")
+    system = ns.FilippovSystem([x, y], field=[u - y, x - y + 0.5], complementarity=diode)
+    scan = PlaneScan.of(system, {}, Box(-1, 1, -1, 1))
+    kinds = {piece.kind: piece.points[:, 1] for piece in scan.pieces}
+    assert kinds["attracting"].min() > -1e-9 > kinds["crossing"].min()
+    (fold,), (rest,) = scan.folds, scan.pseudo_equilibria
+    assert_allclose([*fold.point, *rest.point], [0, 0, 0, 0.5], atol=1e-12)
+    assert (fold.kind, rest.kind, rest.stable) == ("invisible", "stable pseudo-node", True)
+    assert not scan.equilibria
+    ax = ns.plot.phase_portrait(system, (-1, 1, -1, 1)).axes[0]
+    curves = _curves(ax, "orbit")
+    assert len(curves) > 3 and all(curve[:, 0].min() > -1e-8 for curve in curves)
+    texts = {text.get_text() for text in ax.get_legend().get_texts()}
+    assert {"closed condition", "condition that opens", "no motion"} <= texts
+
+
+def test_orbits_end_at_a_contact():
+    ball = ns.FilippovSystem([x, y], field=[y, -1], impacts=ns.Impact(x - 0.2, 0.5))
+    ax = ns.plot.phase_portrait(ball, (-1, 2, -2, 2), legend=False).axes[0]
+    curves = _curves(ax, "orbit")
+    assert len(curves) > 3 and all(curve[:, 0].min() > 0.2 - 1e-8 for curve in curves)

@@ -16,6 +16,17 @@ def run():
     return ns.simulate(BLOCK, [3.0, 0.0], t_end=15.0)
 
 
+def test_conditions_that_hold_multipliers_are_no_lines_of_the_plane():
+    i, e = ca.SX.sym("i"), ca.SX.sym("e")
+    conducts = ns.Complementarity(v - x + 0.1 * i, multiplier=i)
+    full = ns.Complementarity(0.5 - v, multiplier=e)
+    system = ns.FilippovSystem([x, v], field=[-x, i - v - e], complementarity=[conducts, full])
+    figure = ns.plot.trajectory(ns.simulate(system, [1.0, 0.0], t_end=3.0))
+    (plane,) = [ax for ax in figure.axes if ax.get_xlabel() == "x"]
+    (line,) = [line for line in plane.lines if line.get_gid() == "surface"]
+    assert_allclose(line.get_ydata(), 0.5)
+
+
 def panel(figure, label):
     return next(ax for ax in figure.axes if ax.get_ylabel() == label and ax.get_xlabel() != "x")
 
@@ -154,6 +165,19 @@ def test_a_run_of_very_many_events_marks_its_end_and_shortens_its_title():
         line for ax in figure.axes for line in ax.lines if str(line.get_gid()).startswith("event")
     ]
     assert all(len(line.get_xdata()) == 1 for line in marks)
+
+
+def test_impacts_are_gaps_and_every_event_has_a_mark():
+    ball = ns.FilippovSystem([x, v], field=[v, -1.0], impacts=ns.Impact(x, restitution=0.5))
+    run = ns.simulate(ball, [1.0, 0.0], t_end=6.0)
+    figure = ns.plot.trajectory(run)
+    times, speeds = panel(figure, "v").lines[0].get_data()
+    impacts = [event.t for event in run.events if event.kind == "impact"][:10]
+    assert_allclose(times[np.isnan(speeds)][:10], impacts)
+    drawn = {str(line.get_gid())[6:] for line in panel(figure, "x").lines if line.get_gid()}
+    assert drawn == {"impact", "contact", "end"}
+    texts = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert texts == ["o", "c", "impact", "contact", "end", "start"]
 
 
 def test_a_run_of_a_hybrid_automaton_shows_its_discrete_states():

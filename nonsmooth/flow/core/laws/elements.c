@@ -254,7 +254,7 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
   int met = 0;
   for (int i = 0; i < r->width; i++) {
     int rests = fabs(h[i]) <= ON_SURFACE * scale[i], s = set_of(r, i), sure = i == certain;
-    if (has_law(r, i, RELAY_LAW) || has_law(r, i, JOINT_LAW)) continue; /* nothing is decided */
+    if (has_law(r, i, RELAY_LAW) || has_law(r, i, JOINT_LAW) || has_law(r, i, TABLE_LAW)) continue; /* nothing is decided */
     rests |= !keeps_height(r, i); /* its function holds unknowns: it is decided with them */
     if (s >= 0) {
       if (i == s) met = letter[s] <= OFF && !is_unloaded(r, letter, s, scale) && is_met(r, letter, s, h, scale);
@@ -276,6 +276,10 @@ static void serve_complementarity(Run *r, int row);
 static int settle_in(Run *r);
 static int change_kind(const Run *r, int before, int after);
 static void event(Run *r, int kind, int before, int guard, const double *x);
+static void enter_segment(Run *r, int mode);
+static void renote(Run *r);
+static void strike_due(Run *r);
+static void prepare(Run *r);
 
 /* The sign of a bound's first coefficient that is not zero; one that rounding has left before it passes zero is. */
 static double turn_of(const Run *r, int i, const double *factor, int count) {
@@ -383,6 +387,147 @@ static int8_t side_of_joint(const Run *r, int i, double h) {
   return 0;
 }
 
+/* Tables: the cell of the function among the breakpoints sets parameters of the field, which is continuous ------- */
+
+static const Cells *cells_of(const Run *r, int i) { return r->s->cells + i; }
+
+static void set_cell(Run *r, int i, int cell) {
+  const Cells *t = cells_of(r, i);
+  if (r->cell[i] == cell) return;
+  r->cell[i] = cell;
+  memcpy(r->p + t->first, t->value + (int64_t)cell * t->size, sizeof(double) * t->size);
+  r->now.mode = r->e.l.mode = r->trial.l.mode = -1;
+  forget_rows(r);
+  prepare(r);
+}
+
+static int cell_at(const Cells *t, double h) {
+  int low = 0, high = t->count;
+  while (low < high) {
+    int middle = (low + high) / 2;
+    if (h < t->level[middle]) high = middle; else low = middle + 1;
+  }
+  return low;
+}
+
+/* The breakpoint at a side of the present cell, or -1. */
+static int breakpoint(const Run *r, int i, int side) {
+  int k = side > 0 ? r->cell[i] - 1 : r->cell[i];
+  return k < cells_of(r, i)->count ? k : -1;
+}
+
+static int is_at_level(const Run *r, int i, int side, double h) {
+  int k = breakpoint(r, i, side);
+  double level = k < 0 ? 0 : cells_of(r, i)->level[k];
+  return k >= 0 && fabs(h - level) <= ON_SURFACE * (r->size + fabs(h) + fabs(level));
+}
+
+/* The cells of a state, of present ones those that it is in to rounding. */
+static void find_cells(Run *r) {
+  for (int i = 0; r->s->tables && i < r->m; i++) {
+    if (!has_law(r, i, TABLE_LAW)) continue;
+    double value = surface_values(r, r->x)[i];
+    int known = r->cell[i] >= 0 && (is_at_level(r, i, 1, value) || is_at_level(r, i, -1, value));
+    if (!known) set_cell(r, i, cell_at(cells_of(r, i), value));
+  }
+}
+
+/* The run ends where the function of a table that is in use has left its limits. */
+static void require_limits(Run *r) {
+  for (int i = 0; r->s->tables && i < r->m; i++) {
+    const int32_t *q = has_law(r, i, TABLE_LAW) ? cells_of(r, i)->limit : 0;
+    for (int k = 0; q && k < cells_of(r, i)->limits; k++, q += 3 + 2 * q[2]) {
+      int out = r->cell[i] < q[0] || r->cell[i] > q[1];
+      for (int j = 0; j < q[2]; j++) out &= r->letter[q[3 + 2 * j]] != -q[4 + 2 * j];
+      if (out) finish(r, NOT_FINITE, OUT_OF_TABLE, i);
+    }
+  }
+}
+
+/* The mode with the present letters and cells. */
+static void renumber(Run *r) {
+  lay_out(r, r->letter, &r->now);
+  r->mode = r->now.mode;
+  r->shown = shown_number(r, r->letter);
+  enter_segment(r, r->shown);
+  require_limits(r);
+}
+
+/* A state at a breakpoint is in the cell into which it moves. */
+static void turn_cells(Run *r) {
+  int turned = 0, is_known = 0;
+  const double *h = surface_values(r, r->x);
+  for (int i = 0; r->s->tables && r->status == RUNNING && i < r->m; i++)
+    for (int side = -1; side <= 1 && has_law(r, i, TABLE_LAW); side += 2) {
+      if (!is_at_level(r, i, side, h[i])) continue;
+      double value = 0;
+      if (!is_known) expand(r, r->letter, r->x, r->unknowns, &r->e);
+      is_known = 1;
+      h = surface_values(r, r->x);
+      for (int row = 0; row < r->now.atoms; row++)
+        if (r->now.index[row] == i && r->now.side[row] == side) leading(r, &r->e, row, 1, &value);
+      if (value < 0) { set_cell(r, i, r->cell[i] - side); turned = 1; break; }
+    }
+  if (turned) renumber(r);
+}
+
+/* Tables whose times cannot be told apart from that of a guard pass with it, as does its own. */
+static void pass_cells(Run *r, int row) {
+  double last = r->met_at[row] + TIE * time_scale(r);
+  const double *h = r->s->tables ? surface_values(r, r->x) : 0;
+  for (int k = 0; r->s->tables && k < r->now.atoms; k++) {
+    int i = r->now.index[k], side = r->now.side[k];
+    if (!has_law(r, i, TABLE_LAW)) continue;
+    int tied = r->met_at[k] >= 0 && r->met_at[k] <= last && is_at_level(r, i, side, h[i]);
+    if (k == row) r->passed = breakpoint(r, i, side);
+    if (k == row || tied) set_cell(r, i, r->cell[i] - side);
+    if (k == row || tied) h = surface_values(r, r->x);
+  }
+}
+
+static void lay_out_table(const Run *r, Layout *l, int i) {
+  (void)r;
+  add_row(l, SURFACE_GUARD, i, 1);
+  add_row(l, SURFACE_GUARD, i, -1);
+}
+
+static void guard_of_table(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
+  int i = l->index[row], side = l->side[row], k = breakpoint(r, i, side);
+  (void)series;
+  guard_of_height(r, l, row, count, g);
+  if (k < 0) { /* none: as far as can be */
+    memset(g, 0, sizeof(double) * count);
+    g[0] = 1;
+    return;
+  }
+  int is_at = count > 1 && is_at_level(r, i, side, side * g[0]);
+  g[0] = is_at ? 0 : g[0] - side * cells_of(r, i)->level[k];
+}
+
+static int8_t side_of_table(const Run *r, int i, double h) {
+  (void)r, (void)i, (void)h;
+  return 1;
+}
+
+static void serve_table(Run *r, int row) {
+  int before = r->mode, i = r->now.index[row], count = kept_by(r, r->letter, r->involved);
+  memset(r->levels, 0, sizeof(double) * count);
+  r->involved[count] = i;
+  r->levels[count] = cells_of(r, i)->level[r->passed];
+  project_to(r, r->involved, count + 1, r->levels);
+  renote(r);
+  renumber(r);
+  strike_due(r);
+  if (cells_of(r, i)->shown[r->passed] >= 0) event(r, CROSSING, before, row, r->x);
+}
+
+/* Number in results of the function whose guard was served. */
+static int shown_index(const Run *r) {
+  int i = r->met.index;
+  if (is_atom(r->met.kind)) return i;
+  return element(r, i)->shown + (has_law(r, i, TABLE_LAW) ? cells_of(r, i)->shown[r->passed] : 0);
+}
+
 static const Law LAWS[] = {
   [SURFACE_LAW] = {lay_out_surface, guard_of_surface, rounding_of_element, side_of_surface, serve_surface},
   [CONTACT_LAW] = {lay_out_contact, guard_of_half_line, rounding_of_element, side_of_half_line, serve_contact},
@@ -391,6 +536,7 @@ static const Law LAWS[] = {
   [SET_LAW] = {lay_out_set, guard_of_set, rounding_of_set, side_of_set, serve_set},
   [RELAY_LAW] = {lay_out_surface, guard_of_relay, rounding_of_element, side_of_relay, serve_relay},
   [JOINT_LAW] = {.lay_out = lay_out_joint, .side = side_of_joint},
+  [TABLE_LAW] = {lay_out_table, guard_of_table, rounding_of_element, side_of_table, serve_table},
 };
 
 static const Law *law_of(const Run *r, int i) { return LAWS + element(r, i)->law; }

@@ -11,8 +11,6 @@
 /* What rows are combined for: nothing yet, as they are given, their rates, a mode. */
 enum { UNKNOWN_ROWS, GIVEN_ROWS, RATE_ROWS, MODE_ROWS };
 
-static void prepare_implicit(Run *r);
-
 static void forget_rows(Run *r) {
   r->equations.kind = UNKNOWN_ROWS;
   r->equations.is_known = r->equations.is_raw = r->equations.count = 0;

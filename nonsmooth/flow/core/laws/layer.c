@@ -643,7 +643,10 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   guard_rows(r, &f->l, f->series, order + 1, f->guards);
   row = first_hit(r, f, s, &ds);
   memset(r->instant.passing, 0, r->s->rules.atoms);
-  for (int k = 0; k < f->l.rows; k++) if (f->l.kind[k] == BRANCH_GUARD && (last < 0 || k == row)) last = k;
+  for (int k = 0; k < f->l.rows; k++) {
+    int is_own = last < 0 || k == row || (f->l.index[k] == e->l.sliding[lead] && last != row);
+    if (f->l.kind[k] == BRANCH_GUARD && is_own) last = k;
+  }
   if (last < 0 || (row >= 0 && row != last && ds < s) || r->hold < s) return -1;
   note_sides(r, f, s);
   for (int i = 0; i < r->width; i++) end[i] = value_at(f->series + (int64_t)i * stride, order, s);

@@ -11,7 +11,8 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from ....model.numbering import OPERATIONS, TAPE_RULES
+from ....model.expressions.float_arithmetic import BINARY
+from ....model.numbering import OPERATIONS, TAPE_RULES, operation_in_c
 from ... import constants
 from ...status import Status
 
@@ -23,8 +24,11 @@ _FILES = """
     programs.h pairs.h linear.h banded.h radau.h state.c modes.c laws/hidden.c jets.c laws/stability.c laws/sets.c
     stepper.c near_zeros.c laws/elements.c record.c laws/spiral.c laws/vectors.c laws/blocks.c laws/decide.c laws/layer.c laws/contacts.c
     laws/complementarity.c laws/approach.c events.c collocation.c implicit.c stiffness.c driver.c accumulation.c laws/roots.c
-    entry.c variation.c
+    entry.c sample.c
 """.split()
+
+#: Legs of known durations with derivatives.
+_LEGS = "variation.c adjoint.c implicit_legs.c legs.c".split()
 
 
 #: The folder of those of the C files.
@@ -38,21 +42,31 @@ def driver_text(name: str) -> str:
 
 
 @lru_cache(maxsize=1)
-def core_source() -> str:
-    """C of the driver."""
+def run_source() -> str:
+    """C of runs: the driver without derivatives and flows of known durations."""
     # UNFUSED: the same bits on every processor.
     enumerations = [("OP", OPERATIONS), ("RULE", TAPE_RULES)]
     head = "".join(
         f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
         for prefix, names in enumerations
     )
+    given = {op: ("(x)", "(y)") if op in BINARY else ("(x)",) for op in OPERATIONS[2:]}
+    cases = [f"case OP_{op}: return {operation_in_c(op, own)};" for op, own in given.items()]
+    head += f"#define OPERATIONS_OF(x, y) {' '.join(cases)}\n"
     sizes = f"#define UNFUSED\n#define P {MOST_ORDER}\n"
     driver = [driver_text(f"core/{name}") for name in _FILES]
-    flows = [driver_text("core/flow.c"), _extended("programs.h", "flow.c")]
-    fixed = driver_text("core/implicit_flow.c") + driver_text("core/fixed.c")
-    return "".join(
-        [facts_header(), sizes, head, driver_text("core/common.h"), *driver, *flows, fixed]
+    return "".join([facts_header(), sizes, head, driver_text("core/common.h"), *driver])
+
+
+@lru_cache(maxsize=1)
+def core_source() -> str:
+    """C of the driver."""
+    legs = [driver_text(f"core/{name}") for name in _LEGS]
+    flow, *others = (
+        driver_text(f"core/{name}") for name in ("flow.c", "implicit_flow.c", "fixed.c")
     )
+    extended = _extended("programs.h", "flow.c")
+    return "".join([run_source(), *legs, flow, extended, *others])
 
 
 def _extended(*files: str) -> str:

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....model import OptionError
-from .machine import DEVICES, Argument, DeviceError, Machine, numbers
+from ....model import NonsmoothError, OptionError
 
 _INSTALL = (
     "pip install 'nonsmooth-dynamics[cuda]' on a machine with an NVIDIA card and its driver; without "
@@ -32,8 +31,13 @@ _STAGED = 1 << 24
 COMMON = "80"
 
 
+class DeviceError(NonsmoothError, RuntimeError):
+    """There is no GPU to run on, what drives it is missing, or it failed; the message says what to do."""
+
+
 class Card:
-    """One CUDA device of the module ``cuda.core``; DeviceError without a driver or a device."""
+    """One CUDA device of the module ``cuda.core``; DeviceError without a driver or a device. ``kept`` is memory that all
+    calls use, one after the other under the ``lock``. Tests put a processor in its place."""
 
     threads = _THREADS
 
@@ -151,7 +155,7 @@ class Card:
             return memory
         return self._core.Buffer.from_handle(int(memory.handle) + first, size, owner=memory)
 
-    def launch(self, kernels: Any, name: str, arguments: Sequence[Argument]) -> None:
+    def launch(self, kernels: Any, name: str, arguments: Sequence[Any]) -> None:
         """Run one of some kernels on all threads of all blocks."""
         with self._driven("run"):
             config = self._core.LaunchConfig(grid=self.blocks, block=self.threads)
@@ -170,8 +174,21 @@ def card(fused: bool = True) -> Card:
     return Card(core, fused)
 
 
-def machine_for(device: str) -> Machine:
+def machine_for(device: str) -> Card:
     """Return what runs ``device="cuda"``."""
-    if device not in DEVICES:
-        raise OptionError(f"device: expected None or one of {DEVICES}, received {device!r}.")
+    if device != "cuda":
+        raise OptionError(f"device: expected None or 'cuda', received {device!r}.")
     return card()
+
+
+def numbers(arguments: Sequence[Any]) -> list[Any]:
+    """Anys with their widths: integers and floats of 64 bits, 0 for no memory."""
+    made: list[Any] = []
+    for a in arguments:
+        if a is None:
+            made.append(np.int64(0))
+        elif isinstance(a, int):
+            made.append(np.int64(a))
+        else:
+            made.append(np.float64(a) if isinstance(a, float) else a)
+    return made

@@ -17,7 +17,7 @@ from ...options import Options
 from ...results import Chunk
 from ...status import Status
 from ..building.codegen import device_source
-from .machine import Machine
+from .card import Card
 from .records import Records, record_type, word_of
 
 #: Kinds of starts, by number in cuda.c.
@@ -91,7 +91,7 @@ class Reduced:
 class Kernel:
     """What runs a system's trajectories on a machine, compiled when first needed."""
 
-    def __init__(self, system: FilippovSystem, order: int, machine: Machine):
+    def __init__(self, system: FilippovSystem, order: int, machine: Card):
         self.system, self.order, self.machine = system, order, machine
         self.record = record_type(system)
         self.steps = _FIRST_STEPS  # of a launch

@@ -7,7 +7,7 @@ import numpy as np
 
 from nonsmooth.flow.engine import lanes as engine
 from nonsmooth.flow.engine.building.build import build
-from nonsmooth.flow.engine.device.machine import numbers
+from nonsmooth.flow.engine.device.card import numbers
 
 STAND = """
 extern "C" { extern const char nonsmooth_key[]; }

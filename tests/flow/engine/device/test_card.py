@@ -10,8 +10,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.flow.engine import find_compiler
 from nonsmooth.flow.engine.device import card as card_module
-from nonsmooth.flow.engine.device.card import Card
-from nonsmooth.flow.engine.device.machine import DeviceError
+from nonsmooth.flow.engine.device.card import Card, DeviceError
 from nonsmooth.flow.ensembles import on_device
 from tests.flow.engine.device.shim import Shim
 

@@ -1,143 +1,22 @@
-"""Jets: exact Taylor coefficients in time of a flow and of functions along it.
+"""Jets printed: Taylor coefficients in time of a flow and of functions along it, as terms.
 
-The solution of x' = f(x) is expanded order by order: from the coefficients 0..k of x follow those
-of f(x), and x_{k+1} = f_k/(k+1). Each rule of ``taylor_rules`` has one recurrence, below. They act on
-any arithmetic: on CasADi scalars, so that a jet is itself a CasADi expression, or on numbers.
-Structural zeros (constants, polynomials) are left out.
+Each rule of ``taylor_rules`` has one recurrence, below; ``flow/core/programs.h`` has them for numbers. Structural
+zeros (constants, polynomials) are None.
 
 Sources: Moore 1966; Jorba & Zou 2005, "A software package for the numerical integration of ODEs by
-means of high-order Taylor methods", Prop. 2.1. Declined: repeated CasADi ``jtimes`` (exponential
-growth of the expression with the order) and finite differences (not exact).
+means of high-order Taylor methods", Prop. 2.1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any
 
-import casadi as ca
+from ..expressions.graph import reached
+from ..expressions.taylor_rules import Rule, entered
 
-from .graph import depends_on, instructions, operation, reached
-from .simplification import simplified
-from .taylor_rules import Rule, entered, lower
-
-Coefficient: TypeAlias = "ca.SX | None"  # None is a structural zero
-
-
-class Arithmetic(Protocol):
-    """Numbers that coefficients are made of, with None for a structural zero."""
-
-    def number(self, value: float) -> Any:
-        """Return a constant, None for 0."""
-        ...
-
-    def clean(self, a: Any) -> Any:
-        """Return None for a value that is known to be zero."""
-        ...
-
-    def inner(self, u: Sequence[Any], v: Sequence[Any]) -> Any:
-        """Return the sum of products, from the first to the last."""
-        ...
-
-    def divide(self, a: Any, b: Any) -> Any:
-        """Return a quotient; a division by zero is no error."""
-        ...
-
-    def apply(self, op: str, args: Sequence[Any]) -> Any:
-        """Return an operation of values, with 0 for None."""
-        ...
-
-    def chosen(self, c: Sequence[Any], u: Any) -> Any:
-        """Return a coefficient where one of others is not zero, else zero."""
-        ...
-
-
-class Expressions:
-    """The arithmetic of CasADi scalars."""
-
-    def number(self, value: float) -> Coefficient:
-        """Return a constant."""
-        return None if value == 0 else ca.SX(value)
-
-    def clean(self, a: ca.SX) -> Coefficient:
-        """Return None for zero."""
-        return None if a.is_zero() else a
-
-    def inner(self, u: Sequence[Coefficient], v: Sequence[Coefficient]) -> Coefficient:
-        """Return the sum of products."""
-        total: Coefficient = None
-        for a, b in zip(u, v, strict=True):
-            if a is not None and b is not None:
-                term = self.clean(a * b)
-                total = (
-                    term if total is None else total if term is None else self.clean(total + term)
-                )
-        return total
-
-    def divide(self, a: ca.SX, b: Coefficient) -> ca.SX:
-        """Return a quotient."""
-        return a / value_of(b)
-
-    def apply(self, op: str, args: Sequence[Coefficient]) -> ca.SX:
-        """Return an operation of values."""
-        return operation(op, [value_of(a) for a in args])
-
-    def chosen(self, c: Sequence[Coefficient], u: Coefficient) -> Coefficient:
-        """Return a coefficient unless the others are zeros by structure."""
-        return None if all(v is None for v in c) else u
-
-
-def taylor(
-    rhs: ca.SX, functions: ca.SX, states: ca.SX, others: ca.SX, order: int
-) -> tuple[ca.SX, ca.SX]:
-    """Taylor coefficients of the flow of ``rhs`` and of ``functions`` along it."""
-    n, m = rhs.numel(), functions.numel()
-    expansion = expansion_of([rhs, functions], states, others)
-    jet: list[list[Coefficient]] = [[states[i]] for i in range(n)]
-    values: list[list[Coefficient]] = [[] for _ in range(m)]
-    for k in range(order + 1):
-        field, outputs = expansion.advance(k, [c[k] for c in jet])
-        for j in range(m):
-            values[j].append(outputs[j])
-        if k < order:
-            for i in range(n):
-                jet[i].append(scaled(field[i], 1.0 / (k + 1)))
-    return _matrix(jet, n, order + 1), _matrix(values, m, order + 1)
-
-
-def expansion_of(outputs: Sequence[ca.SX], states: ca.SX, others: ca.SX) -> Expansion:
-    """Return the expansion of expressions, simplified first; ``others`` are constant in time."""
-    inputs = [states, others]
-    nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
-    rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
-    rows = [[rule_of[j] for j in row] for row in rows]
-    still = [others[i] for i in range(others.numel())]
-    return Expansion(rules, rows, still, Expressions())
-
-
-def _matrix(rows: Sequence[Sequence[Coefficient]], n: int, width: int) -> ca.SX:
-    result = ca.SX.zeros(n, width)
-    for i, row in enumerate(rows):
-        for k, c in enumerate(row):
-            if c is not None:
-                result[i, k] = c
-    return result
-
-
-def scaled(a: Coefficient, factor: float) -> Coefficient:
-    """Multiply a coefficient by a number."""
-    if a is None or factor == 1.0:
-        return a
-    product = factor * a
-    return None if product.is_zero() else product
-
-
-def value_of(a: Coefficient) -> ca.SX:
-    """Return a coefficient as an expression, 0 for a structural zero."""
-    return ca.SX(0) if a is None else a
-
-
-# The recurrences -------------------------------------------------------------------------------
+if TYPE_CHECKING:
+    from .terms import Graph
 
 
 class Expansion:
@@ -148,9 +27,9 @@ class Expansion:
         rules: Sequence[Rule],
         rows: Sequence[Sequence[int]],
         still: Sequence[Any],
-        arithmetic: Arithmetic,
+        graph: Graph,
     ):
-        self._rows, self._still, self._on = rows, still, arithmetic
+        self._rows, self._still, self._on = rows, still, graph
         self.series: list[list[Any]] = [[] for _ in rules]
         self._moving: Sequence[Any] = ()
         self._moves = entered(rules, lambda _: True)
@@ -177,16 +56,6 @@ class Expansion:
         """Return coefficient k of every entry of every output."""
         return [[self.series[j][k] for j in row] for row in self._rows]
 
-    # arithmetic with structural zeros -----------------------------------------------------------
-
-    def _sum(self, a: Any, b: Any) -> Any:
-        return b if a is None else (a if b is None else self._on.clean(a + b))
-
-    def _difference(self, a: Any, b: Any) -> Any:
-        if b is None:
-            return a
-        return self._on.clean(-b) if a is None else self._on.clean(a - b)
-
     def _product(self, a: Any, b: Any) -> Any:
         return None if a is None or b is None else self._on.clean(a * b)
 
@@ -204,7 +73,7 @@ class Expansion:
         """Sum of i u_i v_(k-i) for i from first to last."""
         total = None
         for i in range(first, last + 1):
-            total = self._sum(total, self._product(self._scaled(u[i], float(i)), v[k - i]))
+            total = self._on.total(total, self._product(self._scaled(u[i], float(i)), v[k - i]))
         return total
 
     # one recurrence for each rule ---------------------------------------------------------------
@@ -232,16 +101,16 @@ class Expansion:
         return lambda k: None if k else value()
 
     def _add(self, _: Rule, __: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
-        return lambda k: self._sum(u[k], v[k])
+        return lambda k: self._on.total(u[k], v[k])
 
     def _sub(self, _: Rule, __: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
-        return lambda k: self._difference(u[k], v[k])
+        return lambda k: self._on.difference(u[k], v[k])
 
     def _neg(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:
-        return lambda k: self._difference(None, u[k])
+        return lambda k: self._on.difference(None, u[k])
 
     def _twice(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:
-        return lambda k: self._sum(u[k], u[k])
+        return lambda k: self._on.total(u[k], u[k])
 
     def _mul(self, rule: Rule, _: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
         moves, other = (self._moves[a] for a in rule.args)
@@ -254,13 +123,13 @@ class Expansion:
     def _sq(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:
         def square(k: int) -> Any:
             half = self._scaled(self._convolve(u, u, k, 0, (k + 1) // 2 - 1), 2.0)
-            return half if k % 2 else self._sum(half, self._product(u[k // 2], u[k // 2]))
+            return half if k % 2 else self._on.total(half, self._product(u[k // 2], u[k // 2]))
 
         return square
 
     def _div(self, _: Rule, w: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
         return lambda k: self._quotient_of(
-            self._difference(u[k], self._convolve(w, v, k, 0, k - 1)), v[0]
+            self._on.difference(u[k], self._convolve(w, v, k, 0, k - 1)), v[0]
         )
 
     def _sqrt(self, _: Rule, w: list[Any], u: list[Any]) -> Callable[[int], Any]:
@@ -268,7 +137,7 @@ class Expansion:
             if k == 0:
                 return self._on.apply("sqrt", [u[0]])
             known = self._convolve(w, w, k, 1, k - 1)
-            return self._quotient_of(self._scaled(self._difference(u[k], known), 0.5), w[0])
+            return self._quotient_of(self._scaled(self._on.difference(u[k], known), 0.5), w[0])
 
         return root
 
@@ -278,9 +147,9 @@ class Expansion:
                 return self._on.apply("pow", [u[0], v[0]])
             total = None
             for j in range(k):
-                factor = self._difference(self._scaled(v[0], float(k - j)), self._on.number(j))
+                factor = self._on.difference(self._scaled(v[0], float(k - j)), self._on.number(j))
                 term = self._product(factor, self._product(u[k - j], w[j]))
-                total = self._sum(total, term)
+                total = self._on.total(total, term)
             return self._scaled(self._quotient_of(total, u[0]), 1.0 / k)
 
         return power
@@ -288,7 +157,7 @@ class Expansion:
     def _affine(self, rule: Rule, _: list[Any], u: list[Any]) -> Callable[[int], Any]:
         offset, factor = rule.numbers
         constant = self._on.number(offset)
-        return lambda k: self._sum(None if k else constant, self._scaled(u[k], factor))
+        return lambda k: self._on.total(None if k else constant, self._scaled(u[k], factor))
 
     def _integral(
         self, rule: Rule, _: list[Any], u: list[Any], g: list[Any]
@@ -311,7 +180,7 @@ class Expansion:
             if k == 0:
                 return self._on.apply(rule.operation, [u[0]])
             known = self._weigh(w, g, k, 1, k - 1)
-            top = self._difference(self._scaled(u[k], sign * k), known)
+            top = self._on.difference(self._scaled(u[k], sign * k), known)
             return self._scaled(self._quotient_of(top, g[0]), 1.0 / k)
 
         return quotient
@@ -322,8 +191,8 @@ class Expansion:
         def angle(k: int) -> Any:
             if k == 0:
                 return self._on.apply("atan2", [y[0], x[0]])
-            turn = self._difference(self._weigh(y, x, k, 1, k), self._weigh(x, y, k, 1, k))
-            top = self._difference(turn, self._weigh(w, radius, k, 1, k - 1))
+            turn = self._on.difference(self._weigh(y, x, k, 1, k), self._weigh(x, y, k, 1, k))
+            top = self._on.difference(turn, self._weigh(w, radius, k, 1, k - 1))
             return self._scaled(self._quotient_of(top, radius[0]), 1.0 / k)
 
         return angle

@@ -1,0 +1,18 @@
+/* Values at many states: nonsmooth/plot/web/engine.js ---------------------------------------------------- */
+
+/* Of ``count`` states with given multipliers: rates of the n states, then of surfaces and gaps what their laws set to
+ * zero where they slide, then their functions, then those of stops and resets: n + 2 width + atoms numbers each. */
+void run_sample(Run *r, const double *p, const double *x, int64_t count, const double *held, double *out) {
+  int n = r->n, w = r->width, atoms = r->s->rules.atoms;
+  r->begun = (Pair){0, 0};
+  set_parameters(r, p);
+  memcpy(r->held, held, sizeof(double) * w);
+  for (; count > 0; count--, x += n, out += n + 2 * w + atoms) {
+    set_inputs(r, x, r->held, r->none);
+    first_values(r, 0);
+    for (int i = 0; i < n + w; i++) out[i] = row_of(r, i)[0];
+    memcpy(out + n + w, surface_values(r, x), sizeof(double) * w);
+    for (int i = 0; i < atoms; i++) out[n + 2 * w + i] = row_of(r, n + 3 * w + i)[0];
+  }
+  memset(r->held, 0, sizeof(double) * w);
+}

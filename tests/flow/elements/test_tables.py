@@ -1,0 +1,244 @@
+"""Runs through tables: cells in the driver, beside the same system with a surface for each breakpoint."""
+
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, v, t, q = (ca.SX.sym(s) for s in ("x", "v", "t", "q"))
+
+XS = np.array([-1.7, -1.1, -0.6, -0.2, 0.1, 0.7, 1.2, 1.6])
+YS = np.array([-1.0, -1.3, -0.4, -0.5, 0.2, 0.3, 1.4, 1.1])
+
+
+def labels(run):
+    return [(e.kind, e.name, e.mode_before, e.mode_after, e.element, e.side) for e in run.events]
+
+
+def agree(system, x0, t_end, **options):
+    run = ns.simulate(system, x0, t_end, tol=1e-11, **options)
+    other = ns.simulate(system.of_breakpoints, x0, t_end, tol=1e-11, **options)
+    assert labels(run) == labels(other) and run.itinerary == other.itinerary
+    assert run.status == other.status
+    np.testing.assert_allclose([e.t for e in run.events], [e.t for e in other.events], atol=1e-8)
+    np.testing.assert_allclose(run.x[-1], other.x[-1], atol=1e-8)
+    return run
+
+
+def lifted(rhs, states=(x, v), **parts):
+    return ns.FilippovSystem.from_expression([*states], [*rhs], **parts)
+
+
+CURVE, SPLINE = ns.table(x, XS, YS), ns.table(x, XS, YS, 3)
+SLIP = ns.table(ca.fabs(v - 0.3), [0.0, 0.05, 0.1, 0.3, 1.0], [0.6, 0.45, 0.4, 0.36, 0.35])
+SIGNAL = ns.table(t, np.linspace(0, 9, 19), np.tile([0.3, -0.6], 10)[:19])
+
+SYSTEMS = {
+    "a spring": lifted([v, -x - CURVE - 0.1 * v + ca.cos(t)], time=t),
+    "a spline": lifted([v, -x - SPLINE - 0.1 * v + ca.cos(t)], time=t),
+    "friction": lifted([v, -x - SLIP * ca.sign(v - 0.3)]),
+    "a signal": lifted([v, -x + SIGNAL - 0.2 * ca.sign(v)], time=t),
+    "two arguments": lifted([v, -x - CURVE - ns.table(v, XS / 2, -YS) + ca.sin(t)], time=t),
+    "a kink where friction sticks": lifted([v, -ns.table(x, [-1, 0, 1], [1, -1, 1]) - ca.sign(x)]),
+    "a jump over cells": lifted(
+        [v, -x - CURVE - 0.3 * v + ca.cos(t)], time=t, resets=ns.Reset(v, {x: 0.3 - 1.5 * x}, -1)
+    ),
+    "impacts": lifted([v, -1 - 0.3 * CURVE], impacts=ns.Impact(x + 1.5, restitution=0.8)),
+    "a diode": lifted(
+        [v, -x - CURVE + ca.cos(t) + q],
+        time=t,
+        complementarity=ns.Complementarity(v + 1, multiplier=q),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_runs_are_those_with_a_surface_for_each_breakpoint(name):
+    assert len(agree(SYSTEMS[name], [0.8, 0.4], 10.0).events) > 4
+
+
+@pytest.mark.parametrize("speed", [0.7, -0.7, 0.0])
+def test_a_start_at_a_breakpoint(speed):
+    run = agree(lifted([v, -x - CURVE]), [0.7, speed], 1.0)
+    assert run.events[0].t > 1e-3
+    assert run.events[0].mode_before == ("+++++---" if speed <= 0 else "++++++--")
+
+
+@pytest.mark.parametrize("restitution", [0.5, 0.0])
+def test_rest_on_a_contact_at_a_breakpoint(restitution):
+    # the driver does not decide on breakpoints: their letter there is that of a cell, not s
+    push = 1.6 * ca.sin(t) - 1 - 0.3 * ns.table(x, [-1.0, 0.0, 0.5, 1.5], [0.7, 0.4, 0.2, 0.9])
+    system = lifted([v, push], time=t, impacts=ns.Impact(x, restitution=restitution))
+    run, other = (
+        ns.simulate(s, [1.0, 0.3], 20.0, tol=1e-11) for s in (system, system.of_breakpoints)
+    )
+    kinds = [
+        [e.kind for e in one.events if e.kind in ("impact", "contact", "release")]
+        for one in (run, other)
+    ]
+    assert kinds[0] == kinds[1] and "release" in kinds[0]
+    np.testing.assert_allclose(
+        run(np.linspace(0, 20, 101)), other(np.linspace(0, 20, 101)), atol=1e-8
+    )
+
+
+def test_breakpoints_that_come_closer_and_closer_are_passed():
+    halves = 2.0 ** -np.arange(12, 0, -1.0)
+    agree(lifted([-1 - 0.01 * ns.table(x, halves, np.cos(9 * halves))], [x]), [1.0], 2.0)
+
+
+def test_runs_go_on_from_their_events():
+    system = SYSTEMS["a spring"]
+    run = ns.simulate(system, [0.8, 0.4], 10.0)
+    for event in run.events[:6]:
+        rest = ns.simulate(system, start=event, t_end=10.0)
+        assert [e.name for e in rest.events] == [e.name for e in run.events if e.t > event.t]
+        np.testing.assert_allclose(rest.x[-1], run.x[-1], atol=1e-8)
+
+
+def test_energy_is_kept_through_a_thousand_breakpoints():
+    xs = np.linspace(-2, 2, 1000)
+    ys = xs + 0.5 * np.sin(7 * xs)
+    run = ns.simulate(lifted([v, -ns.table(x, xs, ys)]), [1.5, 0.0], 3.0, tol=1e-12)
+    area = np.concatenate([[0.0], np.cumsum(np.diff(xs) * (ys[1:] + ys[:-1]) / 2)])
+
+    def energy(a, b):
+        k = min(np.searchsorted(xs, a) - 1, len(xs) - 2)
+        return b**2 / 2 + area[k] + (a - xs[k]) * (ys[k] + np.interp(a, xs, ys)) / 2
+
+    kept = [energy(*event.x) for event in run.events]
+    assert len(kept) > 500
+    np.testing.assert_allclose(kept, energy(1.5, 0.0), atol=1e-10)
+    # each breakpoint that is passed is one event, at the breakpoint
+    for event in run.events[:-1]:
+        assert abs(event.x[0] - xs[event.element]) < 1e-14 and event.name == f"h{event.element}"
+
+
+def test_a_noisy_spline_is_integrated_piece_by_piece():
+    xs, ys = np.linspace(-1, 1, 300), np.random.default_rng(0).normal(size=300)
+    system = ns.FilippovSystem.from_expression([x], [2 + 0.1 * ns.table(x, xs, ys, 3)])
+    run = ns.simulate(system, [-0.99], 0.9, tol=1e-12)
+    from scipy.integrate import quad
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(xs, ys, bc_type="clamped")
+    inner = xs[(xs > -0.99) & (xs < run.x[-1, 0])]
+    ends = [-0.99, *inner, run.x[-1, 0]]
+    times = [quad(lambda s: 1 / (2 + 0.1 * spline(s)), a, b)[0] for a, b in pairwise(ends)]
+    assert sum(times) == pytest.approx(0.9, abs=1e-9)
+    assert len(run.events) == len(inner) + 1
+
+
+def test_exact_times_in_a_table_of_the_time():
+    ts, ys = [0.0, 1.0, 2.5, 3.0, 7.0], [0.0, 2.0, -1.0, -1.0, 4.0]
+    run = ns.simulate(lifted([ns.table(t, ts, ys)], [x], time=t), [0.0], 9.0)
+    assert run.x[-1, 0] == pytest.approx(1.0 + 0.75 - 0.5 + 6.0 + 8.0, abs=1e-12)
+    assert [e.t for e in run.events[:-1]] == pytest.approx(ts[1:], abs=1e-14)
+
+
+def closed(argument=x, xs=(0.0, 1.0, 2.0)):
+    return ns.table(argument, xs, [0.0, 1.0, 3.0], outside="error")
+
+
+def test_a_run_ends_where_the_argument_leaves_its_range():
+    run = ns.simulate(lifted([1 + closed()], [x]), [0.0], 9.0)
+    assert run.status is ns.Status.NOT_FINITE
+    # x' = 1 + x, then 1 + 2 x - 1
+    assert run.t[-1] == pytest.approx(np.log(2) + np.log(2) / 2, abs=1e-9)
+    assert run.x[-1, 0] == pytest.approx(2.0, abs=1e-12)
+    assert "x of a table left its range at t = 1.0397" in run.message
+    assert [e.name for e in run.events] == ["h0", "NOT_FINITE"]
+    low = ns.simulate(lifted([-1 - closed()], [x]), [0.5], 9.0)
+    assert low.x[-1, 0] == pytest.approx(0.0, abs=1e-12) and low.t[-1] == pytest.approx(np.log(1.5))
+    outside = ns.simulate(lifted([-1 - closed()], [x]), [2.5], 9.0)
+    assert outside.status is ns.Status.NOT_FINITE and outside.t[-1] == 0.0
+
+
+def test_ends_of_a_flat_table_and_of_one_of_parameters():
+    flat = ns.table(x, [0.0, 1.0], [2.0, 2.0], outside="error")
+    run = ns.simulate(lifted([flat], [x]), [0.5], 5.0)
+    assert run.status is ns.Status.NOT_FINITE and run.t[-1] == pytest.approx(0.25, abs=1e-12)
+    system = lifted([closed(q) - x], [x], parameters={q: 0.5})
+    assert ns.simulate(system, [0.0], 5.0).status is ns.Status.REACHED_END
+    assert ns.simulate(system, [0.0], 5.0, parameters={q: 2.5}).status is ns.Status.NOT_FINITE
+    value = ca.Function("value", [x], [closed()])
+    assert float(value(1.5)) == 2.0 and np.isnan(float(value(2.5))) and np.isnan(float(value(-0.5)))
+
+
+@pytest.mark.parametrize(
+    ("rhs", "words"),
+    [
+        (lambda: ca.sign(closed() - 0.5), "within another switch"),
+        (lambda: ca.jacobian(closed(), x), "not for its derivative"),
+        (lambda: closed(3 + x**2), "from 3 to inf, and its breakpoints from 0 to 2"),
+    ],
+)
+def test_ends_that_cannot_be_watched_are_refused(rhs, words):
+    with pytest.raises(ns.DefinitionError, match=words):
+        lifted([rhs()], [x])
+
+
+@pytest.mark.parametrize(("part", "status"), [(1 + 1e-5, "REACHED_END"), (1 - 1e-5, "NOT_FINITE")])
+def test_a_motion_that_turns_before_the_end_goes_on(part, status):
+    # v^2 / 2 + x is kept: the top is at 2
+    force = ns.table(x, [-9.0, 0.5, 2 * part], [1.0, 1.0, 1.0 + 1e-12], outside="error")
+    run = ns.simulate(lifted([v, -force]), [0.0, 2.0], 4.5, tol=1e-12)
+    assert str(run.status) == status
+
+
+def test_limits_hold_only_where_a_table_is_in_use():
+    table = closed(ca.fabs(v), (0.25, 1.0, 3.0))
+    system = lifted([v, -1 + 0 * x - 0.1 * table * v])
+    for start in (1.5, -1.5):
+        assert ns.simulate(system, [0.0, start], 0.2).status is ns.Status.REACHED_END
+    run = ns.simulate(system, [0.0, 1.5], 9.0)
+    assert run.status is ns.Status.NOT_FINITE and run.x[-1, 1] == pytest.approx(0.25, abs=1e-12)
+    jumps = lifted([v, -1 - 0.1 * table * v], resets=ns.Reset(v - 0.5, {v: -5 * v}, -1))
+    run = ns.simulate(jumps, [0.0, 1.5], 9.0)
+    assert run.status is ns.Status.NOT_FINITE and run.x[-1, 1] == pytest.approx(-3.0, abs=1e-12)
+
+
+def test_sections_ensembles_and_files(tmp_path):
+    system = SYSTEMS["a spring"]
+    section = ns.simulate(system, [0.8, 0.4], 30.0, at=ns.Section("h4", direction=1))
+    other = ns.simulate(system.of_breakpoints, [0.8, 0.4], 30.0, at=ns.Section("h4", direction=1))
+    np.testing.assert_allclose(section.sample_x, other.sample_x, atol=1e-7)
+    assert len(section.sample_t) > 2 and abs(section.sample_x[:, 0] - 0.1).max() < 1e-12
+    starts = np.random.default_rng(0).uniform(-1, 1, (9, 2))
+    many = ns.ensemble(system, starts, 8.0)
+    for k, start in enumerate(starts):
+        run = ns.simulate(system, start, 8.0)
+        assert many.itinerary[k] == run.itinerary and (many.x[k] == run.x[-1]).all()
+    run.save(tmp_path / "run.npz")
+    again = ns.load(tmp_path / "run.npz")
+    assert again.system == system and labels(again) == labels(run)
+    assert (ns.simulate(again.system, starts[-1], 8.0).x == run.x).all()
+
+
+def test_stiff_runs_pass_breakpoints_too():
+    slope = ns.table(x, np.linspace(-1, 1, 21), 2e4 * np.linspace(-1, 1, 21) ** 3)
+    system = lifted([-slope - 1e4 * (x - ca.cos(t))], [x], time=t)
+    stiff = ns.simulate(system, [0.9], 3.0, tol=1e-9, method="stiff")
+    taylor = ns.simulate(system, [0.9], 3.0, tol=1e-9, method="taylor")
+    assert [e.name for e in stiff.events] == [e.name for e in taylor.events]
+    assert stiff.facts.implicit_steps > 0 and abs(stiff.x[-1] - taylor.x[-1]).max() < 1e-7
+
+
+def test_derivatives_and_orbits_pass_breakpoints():
+    k = ca.SX.sym("k")
+    system = lifted([v, -k * x - CURVE - 0.2 * v + ca.cos(t)], time=t, parameters={k: 1.0})
+    run = ns.simulate(system, [0.8, 0.4], 6.0, tol=1e-12)
+    found = ns.sensitivity(run)
+    for i, step in enumerate(1e-6 * np.eye(2)):
+        ends = [ns.simulate(system, [0.8, 0.4] + s * step, 6.0, tol=1e-12).x[-1] for s in (1, -1)]
+        np.testing.assert_allclose(found.dx_dx0[:, i], (ends[0] - ends[1]) / 2e-6, atol=1e-6)
+    orbits = [
+        ns.periodic_orbit(one, ns.simulate(one, [0.8, 0.4], 40 * np.pi), period=2 * np.pi)
+        for one in (system, system.of_breakpoints)
+    ]
+    assert orbits[0].itinerary == orbits[1].itinerary and "+" in orbits[0].itinerary
+    np.testing.assert_allclose(orbits[0].start, orbits[1].start, atol=1e-8)
+    np.testing.assert_allclose(*[np.sort_complex(o.multipliers) for o in orbits], atol=1e-6)

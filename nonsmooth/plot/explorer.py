@@ -79,9 +79,9 @@ class ExplorerPage:
 
 def explore(
     system: FilippovSystem | TwoFold,
-    *,
     start: ArrayLike | None = None,
     t_end: float = 30.0,
+    *,
     parameters: Mapping[Any, Sequence[float]] | None = None,
     box: Sequence[float] | None = None,
     title: str = "",

@@ -355,6 +355,7 @@ def _curve(value: Any) -> Curve:
     _require(pieces.shape == (k + 1, 5) and jumps.size == 4 * k, "a piece of each cell")
     _require(bool((np.diff(levels) > 0).all()), "breakpoints that increase")
     low, high = _parts(closed, 2, "ends of a curve")
+    _require(k > 0 or closed == [False, False], "breakpoints at the ends of a curve")
     rows, more = (tuple(map(tuple, a.tolist())) for a in (pieces, jumps.reshape(k, 4)))
     return Curve(tuple(levels.tolist()), rows, more, (_flag(low), _flag(high)))
 

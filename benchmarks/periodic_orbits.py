@@ -233,6 +233,18 @@ def branches(quick: bool) -> dict[str, Any]:
     return result
 
 
+def _network(count: int) -> tuple[ns.FilippovSystem, Any]:
+    """Neurons x' = -x + W relu(x), each entry of W a parameter, and a start."""
+    rng = np.random.default_rng(1)
+    x, w = ca.SX.sym("x", count), ca.SX.sym("w", count * count)
+    rate = -x + ca.reshape(w, count, count) @ ca.fmax(x, 0)
+    values = rng.normal(size=count * count) * 1.5 / np.sqrt(count)
+    given = dict(zip(ca.vertsplit(w), values, strict=True))
+    rates = ca.vertsplit(rate)
+    system = ns.FilippovSystem.from_expression(ca.vertsplit(x), rates, parameters=given)
+    return system, rng.normal(size=count)
+
+
 def gradients(quick: bool) -> dict[str, Any]:
     """Time of a gradient over that of the run, in turns."""
     relay = ns.textbook.multi_sliding_relay().system
@@ -240,10 +252,12 @@ def gradients(quick: bool) -> dict[str, Any]:
     runs = {
         "relay, 15 events": (relay, [0.0, -0.001, -0.02], 6.0),
         "forced friction, 7 events": (friction, [1.5, 0.0], 40.0),
+        "20 neurons with 400 weights": (*_network(20), 10.0),
     }
     result: dict[str, Any] = {}
     for name, (system, start, end) in runs.items():
-        names = system.parameter_names[: 6 - system.dimension]
+        few = system.dimension < 6
+        names = system.parameter_names[: 6 - system.dimension if few else None]
         run, row = ns.simulate(system, start, end), np.ones(system.dimension)
 
         def simulated(system: Any = system, start: Any = start, end: float = end) -> Any:

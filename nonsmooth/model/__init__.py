@@ -32,10 +32,9 @@ from .errors import (
 )
 from .laws.coupled import Coupled, coupled_of, driven_of, raised_of
 from .laws.evaluators import Evaluator, Surfaces, evaluator
-from .laws.explicit import mode_field
 from .laws.followed import Followed, followed
 from .laws.layer import Layer, LayerNumbers, layer_of
-from .laws.motion import Motion, motion, watched_functions
+from .laws.motion import Motion, mode_field, motion, watched_functions
 from .laws.multipliers import sliding_multipliers
 from .laws.one_surface import OneSurface, has_elements, one_surface
 from .laws.switches import Guard

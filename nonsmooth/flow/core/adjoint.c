@@ -214,9 +214,9 @@ static void pull_land(Run *r, Leg *l, Slopes *g, Rows *c) {
   for (int i = 0; i < r->n; i++) l->row[i] += c->states[(int64_t)i * r->stride];
 }
 
-/* Whether a time since the start of a leg is in a step that begins at one. */
+/* Whether a time of a sample is in a step that begins so long after the start of a leg. */
 static int is_within(const Leg *l, double begun, double t) {
-  return begun <= 0 || t > begun + 4 * EPSILON * l->duration;
+  return begun <= 0 || way_of_leg(l) * t > begun + 4 * EPSILON * length_of_leg(l);
 }
 
 /* From the end of a Taylor step, whose expansion is known, to its start. */
@@ -232,7 +232,7 @@ static void pull_step(Run *r, Leg *l, Slopes *g, Rows *c, double dt, double begu
   for (; *sample > 0 && is_within(l, begun, l->sample_t[*sample - 1]); --*sample) {
     const double *own = l->at_samples + (*sample - 1) * n;
     power = 1;
-    for (int k = 0; k <= order; k++, power *= l->sample_t[*sample - 1] - begun)
+    for (int k = 0; k <= order; k++, power *= l->sample_t[*sample - 1] - way_of_leg(l) * begun)
       for (int i = 0; i < n; i++) c->states[(int64_t)i * stride + k] += power * own[i];
   }
   measure_slopes(r, &r->e, g, 0);

@@ -201,6 +201,11 @@ static double first_in(const double *c, int n, double *b, double lo, double hi, 
   return x >= 0 ? x : first_in(c, n, b, mid, hi, depth + 1);
 }
 
+/* Coefficients of a polynomial in powers of the distance from t, all or the first ``count``. */
+static inline void move_origin(double *c, int n, double t, int count) {
+  for (int i = 0; i < count; i++) for (int k = n - 1; k >= i; k--) c[k] += t * c[k + 1];
+}
+
 /* Sum of the magnitudes of all terms but the first, odd and even ones apart: a chain of half the
  * length. */
 static inline double rest_of(const double *c, int n, double h) {
@@ -281,7 +286,7 @@ static int passes_once(const double *c, int n, double root, double low, double f
   double d[P + 1], noise = fabs(c[n]), spread = 0, width;
   memcpy(d, c, sizeof(double) * (n + 1));
   for (int k = n - 1; k >= 0; k--) noise = noise * root + (k < n - 1 ? LOW * ROUNDING : 1) * fabs(c[k]);
-  for (int i = 0; i < n; i++) for (int k = n - 1; k >= i; k--) d[k] += root * d[k + 1];
+  move_origin(d, n, root, n);
   width = (noise + LOW * floor) / fabs(d[1]);
   for (int k = n; k > 1; k--) spread = (spread + k * fabs(d[k])) * width;
   return spread <= 0.25 * fabs(d[1]) && width <= exact && fabs(low - root) <= 2 * width;
@@ -305,8 +310,7 @@ static double first_crossing(const double *given, int n, double h, int direction
   double rise = first_root(c, n, h);
   if (rise < 0 || direction == 0) return rise;
   if (n == 0 || rise >= h) return -1;
-  for (int i = 0; i < n; i++)
-    for (int k = n - 1; k >= i; k--) c[k] += rise * c[k + 1];
+  move_origin(c, n, rise, n);
   for (int k = 0; k <= n; k++) c[k] = -c[k];
   double fall = first_root(c + 1, n - 1, h - rise);
   return fall < 0 ? -1 : rise + fall;

@@ -25,8 +25,7 @@ static void adopt(Run *r, const Continuation *c) {
   memcpy(r->letter, c->letter, r->width);
   memcpy(r->drop, c->drop, sizeof(int32_t) * r->guards);
   memcpy(r->unknowns, c->unknowns, sizeof(double) * r->width);
-  lay_out(r, r->letter, &r->now);
-  r->mode = r->now.mode;
+  enter_mode(r);
   r->repelling = 0;
   if (alike) return;
   int shown = shown_number(r, r->letter);
@@ -146,8 +145,7 @@ static void start_in(Run *r, const int8_t *asked) {
   }
   if (r->s->sets) idle_sets(r, letter, 0);
   memcpy(r->letter, letter, r->width);
-  lay_out(r, r->letter, &r->now);
-  r->mode = r->now.mode;
+  enter_mode(r);
   if (r->s->joints > 1) find_dependent(r, &r->now, r->letter, r->unknowns);
   mode_solutions(r, &r->now, &all);
   if (all.count > 1) keep_stable(r, &r->now, &all);
@@ -176,8 +174,7 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   find_cells(r);
   measure_time(r);
   int finite = letters_of(r, r->letter);
-  lay_out(r, r->letter, &r->now);
-  r->mode = r->now.mode;
+  enter_mode(r);
   int before = r->mode, jumped = finite && become_consistent(r);
   if (!finite) { finish(r, NOT_FINITE, SURFACE, 0); return; }
   active_surfaces(r, -1, r->letter);

@@ -201,8 +201,7 @@ void run_begin(Run *r, const Options *o, const Output *out, const double *x, con
   set_parameters(r, p);
   if (finite_all(r->x, r->n)) { begin(r, start_mode, motion); return; }
   memset(r->letter, 1, r->width);
-  lay_out(r, r->letter, &r->now);
-  r->mode = r->now.mode;
+  enter_mode(r);
   finish(r, NOT_FINITE, SURFACE, 0);
 }
 
@@ -296,11 +295,9 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
 /* Whether a set is reached, or far and has been so for a step. */
 static int is_apart(Run *r, int f) {
   int k = size_of(r, f);
-  double scale = 0;
   if (r->letter[f] == 0 || r->letter[f] > OFF) return r->letter[f] == 0;
   const double *h = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
-  for (int i = f; i < f + k; i++) scale = larger(scales_of[i], scale);
-  return length_of(h + f, k) > CLOSE * scale;
+  return length_of(h + f, k) > CLOSE * scale_of_set(r, f, scales_of);
 }
 
 /* Whether lanes can go on from here: nothing is to be served or told apart, and only a surface's guard has

@@ -276,8 +276,7 @@ static int is_pressed(Run *r, int atom, int zeros, int sign) {
 static void keep_germ(const Run *r, const double *g, double dt, double *germ) {
   double c[P + 1];
   memcpy(c, g, sizeof(double) * (r->order + 1));
-  for (int i = 0; i <= GERM && i < r->order; i++)
-    for (int k = r->order - 1; k >= i; k--) c[k] += dt * c[k + 1];
+  move_origin(c, r->order, dt, r->order < GERM + 1 ? r->order : GERM + 1);
   memcpy(germ, c + 1, sizeof(double) * GERM);
 }
 

@@ -6,7 +6,7 @@
 
 /* Whether a decay rate holds steps of such a length, so that implicit ones are tried. */
 static int is_step_held(Run *r, const Leg *l, double h) {
-  if (!r->s->implicit || !can_collocate(r) || r->order < RADAU[1].s || RADAU[1].s * r->n > MOST_STATES / 2) return 0;
+  if (l->duration < 0 || !r->s->implicit || !can_collocate(r) || r->order < RADAU[1].s || RADAU[1].s * r->n > MOST_STATES / 2) return 0;
   if (!(l->left > FAR_AWAY * h) || !begin_implicit(r)) return 0;
   Collocation *c = &r->implicit->c;
   memcpy(r->implicit->unknowns, r->unknowns, sizeof(double) * r->width);

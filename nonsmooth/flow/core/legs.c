@@ -61,8 +61,9 @@ static double near_step(const Run *r, int f, double h) {
 
 /* What is read of columns at times within a step, or at the end of the leg: those from ``sample`` on. */
 static void read_columns(const Run *r, const Leg *l, const Columns *c, double begun, double dt, int64_t *sample) {
-  for (; *sample < l->samples && l->sample_t[*sample] <= begun + dt + 4 * EPSILON * l->duration; ++*sample) {
-    double *to = l->at_samples + *sample * l->columns * r->n, time = l->sample_t[*sample] - begun;
+  double sign = way_of_leg(l), end = begun + dt + 4 * EPSILON * length_of_leg(l);
+  for (; *sample < l->samples && sign * l->sample_t[*sample] <= end; ++*sample) {
+    double *to = l->at_samples + *sample * l->columns * r->n, time = l->sample_t[*sample] - sign * begun;
     for (int64_t i = 0; i < (int64_t)l->columns * r->n; i++)
       to[i] = c ? value_at(c->states + i * r->stride, r->order, time) : l->y[i];
   }
@@ -80,8 +81,8 @@ static double taylor_step(Run *r, Leg *l, Slopes *g, Columns *c) {
   double h = state_step(r, e);
   h = smaller(h, column_step(r, l, c, 0, l->starts)); /* those by the start, those by parameters */
   h = smaller(h, column_step(r, l, c, l->starts, l->columns - l->starts));
-  if (!(h > (l->hit < 0 ? FIXED_SHORTEST * l->duration : 0))) return 0;
-  if (l->hit >= 0) return near_step(r, l->hit, smaller(h, l->duration));
+  if (!(h > (l->hit < 0 ? FIXED_SHORTEST * length_of_leg(l) : 0))) return 0;
+  if (l->hit >= 0) return near_step(r, l->hit, smaller(h, length_of_leg(l)));
   return h >= l->left ? l->left : l->left < 1.5 * h ? smaller(h, 0.5 * l->left) : h;
 }
 
@@ -89,9 +90,9 @@ static double taylor_step(Run *r, Leg *l, Slopes *g, Columns *c) {
 static double make_taylor_step(Run *r, Leg *l, Slopes *g, Columns *c, double begun, int64_t *sample) {
   double h = taylor_step(r, l, g, c);
   if (!(h > 0)) return 0;
-  record(r, l, h, begun, 0, r->x, r->unknowns);
+  record(r, l, way_of_leg(l) * h, begun, 0, r->x, r->unknowns);
   read_columns(r, l, c, begun, h, sample);
-  move_columns(r, l, c, h);
+  move_columns(r, l, c, way_of_leg(l) * h);
   return h;
 }
 
@@ -109,20 +110,20 @@ static int carry(Run *r, Leg *l, Slopes *g, Columns *c) {
   int64_t sample = 0;
   int order = r->order, is_implicit = 0;
   Expansion *e = &r->e;
-  l->left = l->duration;
+  l->left = length_of_leg(l);
   l->step_count = 0;
   if (!begin_leg(r, l)) return LEG_NOT_UNIQUE;
   for (int64_t step = 0; step < l->most_steps; step++) {
     for (int i = 0; i < r->s->dimension; i++) size = larger(fabs(r->x[i]), size);
     r->o.atol = r->o.rtol * (size > 0 ? size : 1);
     r->size = size;
-    r->time_size = l->duration;
+    r->time_size = length_of_leg(l);
     int at_end = l->hit < 0 && l->left <= 0 && !l->gradient; /* where the field is all that is needed */
     r->order = at_end || (is_implicit && l->left > 0) ? 1 : order;
     expand(r, r->letter, r->x, r->unknowns, e);
     r->order = order;
     for (int i = 0; i < r->s->dimension; i++)
-      size = larger(fabs(e->states[(int64_t)i * r->stride + 1]) * l->duration, size);
+      size = larger(fabs(e->states[(int64_t)i * r->stride + 1]) * length_of_leg(l), size);
     for (int i = 0; i < r->n; i++) l->end_rate[i] = e->states[(int64_t)i * r->stride + 1];
     if (!finite_all(l->end_rate, r->n)) return LEG_STUCK;
     if (step == 0) {
@@ -135,7 +136,7 @@ static int carry(Run *r, Leg *l, Slopes *g, Columns *c) {
       read_columns(r, l, 0, 0, INFINITY, &sample);
       return LEG_DONE;
     }
-    double begun = l->duration - l->left, h;
+    double begun = length_of_leg(l) - l->left, h;
     if (is_implicit) {
       h = make_implicit_step(r, l, g, c, begun, &sample);
       is_implicit = h > 0;

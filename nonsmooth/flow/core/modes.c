@@ -95,6 +95,12 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
   for (int k = 0; k < l->rows; k++) if (is_bent(r, l->kind[k], l->index[k])) l->bent[l->bent_count++] = k;
 }
 
+/* The present letters are those of the mode. */
+static void enter_mode(Run *r) {
+  lay_out(r, r->letter, &r->now);
+  r->mode = r->now.mode;
+}
+
 /* Letters as the multipliers that are known: +1 and -1, 0 for what slides, open and closed contacts. */
 static const double *held_of(Run *r, const int8_t *letter) {
   for (int i = 0; i < r->width; i++) r->held[i] = is_half_line(r, i) ? 0 : letter[i] > 1 ? r->direction[i] : letter[i];

@@ -77,8 +77,7 @@ static double sure_crossing(Run *r, const Expansion *e, int row, int drop, doubl
   double rise = sure_root(r, e, row, c, n, h, 0, drop, 0);
   if (rise < 0 || direction == 0) return rise;
   if (n == 0 || rise >= h) return -1;
-  for (int i = 0; i < n; i++)
-    for (int k = n - 1; k >= i; k--) c[k] += rise * c[k + 1];
+  move_origin(c, n, rise, n);
   for (int k = 0; k <= n; k++) c[k] = -c[k];
   double fall = sure_root(r, e, row, c + 1, n - 1, h - rise, rise, 1, drop);
   return fall < 0 ? -1 : rise + fall;

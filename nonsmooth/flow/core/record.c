@@ -20,9 +20,7 @@ static void note_step(Run *r, const Expansion *e) {
   r->out.step_mode[k] = shown_mode(r) | (e->end ? IMPLICIT_STEP : 0);
   memcpy(c, e->states, sizeof(double) * r->n * stride);
   if (fabs(low) <= EPSILON * larger(1, time_scale(r))) return;
-  for (int i = 0; i < r->s->dimension; i++, c += stride)
-    for (int j = 0; j < r->order; j++)
-      for (int q = r->order - 1; q >= j; q--) c[q] -= low * c[q + 1];
+  for (int i = 0; i < r->s->dimension; i++, c += stride) move_origin(c, r->order, -low, r->order);
 }
 
 static void renote(Run *r) {

@@ -7,7 +7,7 @@
  * columns.
  */
 
-/* A leg: columns, each a row of n derivatives of the state and a direction of parameters: none (-1), one of them, or the
+/* A leg, of a duration of either sign: columns, each a row of n derivatives of the state and a direction of parameters: none (-1), one of them, or the
  * one ``dp`` (ALONG_DP). The first ``starts`` columns have one error scale. At ``samples`` times since its start columns are read (n for each, time after time), or rows are
  * added (adjoint.c). Its steps are recorded: length, time since the start, stages, state, unknowns; of each stage of an
  * implicit one once more the last two. */
@@ -38,6 +38,10 @@ typedef struct {
 /* Entries of the program's derivatives: where those by each of its inputs begin, terms of their series, at most so many;
  * the ones by what moves that count in a mode. */
 typedef struct { int32_t *first, *terms, *most, *active, count; } Slopes;
+
+/* Length of a leg, and the direction of time along it. */
+static double length_of_leg(const Leg *l) { return fabs(l->duration); }
+static double way_of_leg(const Leg *l) { return l->duration < 0 ? -1 : 1; }
 
 enum { ALONG_DP = -2 };
 enum { LEG_DONE, LEG_STUCK, LEG_NOT_UNIQUE };
@@ -298,7 +302,7 @@ static double column_step(const Run *r, const Leg *l, const Columns *c, int firs
     if (!(push > 0 && push < INFINITY)) continue;
     for (int64_t k = first; k < first + count; k++) rate = larger(push * fabs(c->series[(k * w + i) * stride]), rate);
   }
-  double allowed = l->tol * larger(most, rate * l->duration);
+  double allowed = l->tol * larger(most, rate * length_of_leg(l));
   if (allowed == 0) { /* nothing but higher terms */
     order -= 2;
     allowed = l->tol * second;

@@ -137,19 +137,20 @@ class CarriedLegs:
         """Derivatives at samples (K, n, columns)."""
         return self._samples.swapaxes(1, 2)
 
-    def begin_pull(self, row: Array, by_parameters: Array, rows: Array) -> None:
-        """Let ``pull`` change a row (n,) and what it gives by all parameters; ``rows`` (K, n) join it at samples."""
+    @contextmanager
+    def pulling(self, by_parameters: Array, rows: Array) -> Iterator[None]:
+        """Let ``pull`` add what the row gives by all parameters; ``rows`` (K, n) join it at samples."""
         c, width = self._c, 8 * rows.shape[1]
-        self.row, self._pulled = row, (by_parameters, rows)
-        c["row"], c["by_parameters"] = row.ctypes.data, by_parameters.ctypes.data
+        c["row"], c["by_parameters"] = self.row.ctypes.data, by_parameters.ctypes.data
         c["at_samples"] = rows.ctypes.data + width * self.given.first[:-1]
         self._at = int(c.ctypes.data)
+        with self._engine.state() as self._state:
+            yield
 
     def pull(self, leg: int) -> None:
-        """Pull the row from the end of a recorded leg back to its start."""
-        with self._engine.state() as state:
-            if library().pull_row(state, self._at + leg * self._c.itemsize) != DONE:
-                self.row[:] = np.nan
+        """Pull ``row`` (n,) from the end of a recorded leg back to its start."""
+        if library().pull_row(self._state, self._at + leg * self._c.itemsize) != DONE:
+            self.row[:] = np.nan
 
 
 class ColumnsEngine(TapeEngine):

@@ -67,7 +67,7 @@ class Lanes:
             batch = batch_of(x, padded, options.t_start, chunk, None, None)
             _call(self.library, batch, c_options, tree, _core(run, self.random), stop)
             used = np.flatnonzero(np.bincount(chunk.itinerary))
-            chunk.rename(tape.words(table, used.tolist())[1])
+            chunk.rename(tape.words(table, used.tolist()))
         return chunk
 
 

@@ -150,6 +150,7 @@ class TapeEngine:
         if entries is not None:
             self._c.derivatives = self._entries(entries)
         self._rooms: Rooms = rooms_of((0, 0, 0))
+        self._last_spelled: tuple[bytes | None, list[str]] = (None, [])
 
     def _derived(self) -> tuple[Series, Entries]:
         return self.system.cached("derived", lambda: derived_series_of(self.coupled))
@@ -419,19 +420,24 @@ class TapeEngine:
         known, found = active[: counts[10]], several[: counts[11]]
         return numbers[:], counts[:], known, found, rates[: len(found)]
 
-    def words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
-        """Modes that were met, and itineraries of some nodes of their tree."""
-        modes = self._modes(table)
-        spelled = [self.shown.system.spelled(letters) for letters in modes]
-        if self.system.definition.discrete:
-            rows = self._labels(table)
-            spelled = [
-                shown_mode(self.system, one, row) for one, row in zip(spelled, rows, strict=True)
-            ]
+    def words(self, table: int, nodes: list[int]) -> Mapping[int, str]:
+        """Itineraries of some nodes of the tree of the modes that were met."""
         size = library().table_size(table)
         parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
         library().table_read(table, address(parent), address(mode), None)
-        return modes, words_of(parent, mode, spelled, nodes)
+        # Chunks of an ensemble meet the same modes.
+        met, known = self._met(table).tobytes(), self._last_spelled
+        if known[0] != met:
+            self._last_spelled = known = met, self._all_spelled(table)
+        return words_of(parent, mode, known[1], nodes)
+
+    def _all_spelled(self, table: int) -> list[str]:
+        """Modes that were met as itineraries show them."""
+        spelled = [self.shown.system.spelled(letters) for letters in self._modes(table)]
+        rows = self._labels(table)
+        if not rows:
+            return spelled
+        return [shown_mode(self.system, one, row) for one, row in zip(spelled, rows, strict=True)]
 
     def _modes(self, table: int) -> list[str]:
         """Modes that were met, by number."""
@@ -500,5 +506,5 @@ class TapeEngine:
                 if stop():
                     raise Stopped
             used = np.flatnonzero(np.bincount(chunk.itinerary)).tolist()
-            chunk.rename(self.words(table, used)[1])
+            chunk.rename(self.words(table, used))
         return chunk

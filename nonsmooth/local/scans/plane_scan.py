@@ -70,24 +70,26 @@ class PlaneScan:
             where = LocalSurface(element.system, 0, mode, p, element)
         return cls(where, box, system, events)
 
+    @property
+    def _beyond(self) -> list[Any]:
+        """Functions of the state that are positive where an event is due at once or a gap is negative."""
+        gaps = self.whole.definition.gaps
+        found = [e.region for e in self.events if e.level]
+        return [*found, *[-gaps[j] for j in range(gaps.numel())]]
+
     @cached_property
     def excluded(self) -> list[Any]:
         """Functions of the state that are positive where there is no motion, as expressions."""
-        found, gaps = self._levels, self.whole.definition.gaps
-        found += [-gaps[j] for j in range(gaps.numel())]
-        return [*found, -self.where.system.surface_function()] if self.where.one_sided else found
-
-    @property
-    def _levels(self) -> list[Any]:
-        return [e.region for e in self.events if e.level]
+        own = [-self.where.system.surface_function()] if self.where.one_sided else []
+        return [*self._beyond, *own]
 
     def is_excluded(self, points: Array) -> NDArray[np.bool_]:
         """Whether there is no motion at points (k, 2)."""
         return self._any_positive(self.excluded, "excluded", points)
 
-    def is_due(self, points: Array) -> NDArray[np.bool_]:
-        """Whether an event is due at once at points (k, 2)."""
-        return self._any_positive(self._levels, "levels", points)
+    def is_beyond(self, points: Array) -> NDArray[np.bool_]:
+        """Whether an event is due at once or a gap is negative at points (k, 2)."""
+        return self._any_positive(self._beyond, "beyond", points)
 
     def _any_positive(self, functions: list[Any], name: str, points: Array) -> NDArray[np.bool_]:
         if not functions or not len(points):
@@ -138,8 +140,8 @@ class PlaneScan:
         return [part for pieces in found for piece in pieces for part in self._moving(piece)]
 
     def _moving(self, piece: Piece) -> list[Piece]:
-        """Parts of a piece at which no event is due at once."""
-        due = self.is_due(piece.points)
+        """Parts of a piece at which there is motion."""
+        due = self.is_beyond(piece.points)
         cuts = [0, *(np.flatnonzero(due[1:] != due[:-1]) + 1), len(due)]
         parts = [(a, b) for a, b in pairwise(cuts) if not due[a] and b - a > 1]
         return [Piece(piece.kind, piece.points[a:b]) for a, b in parts]
@@ -159,7 +161,7 @@ class PlaneScan:
             starts.append(curve[k] + share[:, None] * (curve[k + 1] - curve[k]))
         found = find_all(look, np.vstack(starts)[:_MOST])
         found = [f for f in found if self.box.contains(f.point)]
-        return [f for f in found if not self.is_due(f.point[None, :])[0]]
+        return [f for f in found if not self.is_beyond(f.point[None, :])[0]]
 
     @cached_property
     def tangencies(self) -> list[Fold]:

@@ -20,7 +20,7 @@ from ..expressions.graph import evaluate, instructions, operation
 from ..expressions.identity import vanish_on
 from ..laws.coupled import combinable, coupled_of
 from ..laws.evaluators import Evaluator
-from ..laws.explicit import explicit, solved
+from ..laws.motion import motion, solved
 from ..laws.switches import Guard
 from ..numbering import UNWATCHED
 from ..printing.tape import Values, values_of
@@ -120,7 +120,7 @@ def event_map(
         return instant_map(system, system.widened(mode), kind, element, letters)
 
     def build() -> EventMap:
-        of_mode = explicit(system, mode)
+        of_mode = motion(system, mode)
         if kind == "jump":
             function, after = jumped(system, element, letters)
             return EventMap(system, of_mode.states, function, Guard("zero", 0, 0, element), after)
@@ -170,7 +170,7 @@ def function_map(system: FilippovSystem, mode: str, function: ca.SX) -> EventMap
 
     def build() -> EventMap:
         guard = Guard("zero", 0, 0, 0)
-        states = symbols[0] if system.sets else explicit(system, mode).states
+        states = symbols[0] if system.sets else motion(system, mode).states
         return EventMap(system, states, function, guard)
 
     return system.cached(("function map", mode, Content(symbols, function)), build)

@@ -6,7 +6,7 @@ import casadi as ca
 
 from ..definition.system import FilippovSystem
 from ..laws.evaluators import Evaluator, evaluator
-from ..laws.explicit import mode_field
+from ..laws.motion import mode_field
 from ..laws.switches import Guard
 from .variational import guarded_field
 

@@ -8,14 +8,14 @@ from ..definition.system import FilippovSystem
 from ..errors import DefinitionError
 from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
-from ..laws.explicit import explicit
+from ..laws.motion import motion
 
 
 def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
     """(x, p) -> field, its derivative, functions that are kept at zero, theirs, and guards without events."""
 
     def build() -> Evaluator:
-        of_mode, x = explicit(system, mode), system.extended_states
+        of_mode, x = motion(system, mode), system.extended_states
         if of_mode.states.numel() != x.numel():
             raise DefinitionError(
                 f"mode {mode!r}: its multipliers are no functions of the states, so that it has no field."

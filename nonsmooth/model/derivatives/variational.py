@@ -15,8 +15,7 @@ from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
 from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
-from ..laws.explicit import explicit, solved
-from ..laws.motion import Motion
+from ..laws.motion import Motion, motion, solved
 from ..laws.multipliers import newton_multipliers, sliding_multipliers
 from ..printing.tape import Entries, Series, series_of, sparse_entries
 from ..values import Array
@@ -26,7 +25,7 @@ ORDER = 20
 
 
 class PlainField:
-    """One mode's flow as a smooth field, with all multipliers solved for (``explicit``)."""
+    """One mode's flow as a smooth field, with all multipliers solved for (``motion``)."""
 
     def __init__(self, of_mode: Motion):
         self.motion, self.states, self.field = of_mode, of_mode.states, of_mode.field
@@ -64,7 +63,7 @@ class PlainField:
 
 def plain_field(system: FilippovSystem, mode: str) -> PlainField:
     """Return the field of a mode without guards, built once per system."""
-    return system.cached(("plain field", mode), lambda: PlainField(explicit(system, mode)))
+    return system.cached(("plain field", mode), lambda: PlainField(motion(system, mode)))
 
 
 class VariationalField(PlainField):
@@ -113,10 +112,8 @@ class VariationalField(PlainField):
     @cached_property
     def _multipliers(self) -> Evaluator:
         """(y, p) -> derivatives of the multipliers that are states, by states and parameters."""
-        law, p = self.motion.law, self.parameters
+        p, residual = self.parameters, self.motion.multiplier_equations()
         x, u = self.motion.states[: self.by_start], self.motion.states[self.by_start :]
-        (layer,) = coupled_of(self.motion.system).held_at(self.motion.mode, [law.coupled.layer])  # type: ignore[attr-defined]
-        residual = layer[list(law.unknowns)]
         right = ca.horzcat(ca.jacobian(residual, x), ca.jacobian(residual, p)[:, list(self.chosen)])
         outputs = [ca.densify(-solved(ca.jacobian(residual, u), right))]
         return Evaluator(ca.Function("multipliers", [self.motion.states, p], outputs))
@@ -147,7 +144,7 @@ class VariationalField(PlainField):
 
     def _unknowns(self, x: Array, p: Array, near: Array | None) -> Array:
         system, mode = self.motion.system, self.motion.mode
-        coupled, which = coupled_of(system), list(self.motion.law.unknowns)
+        coupled, which = coupled_of(system), list(self.motion.unknowns)
         if near is not None:
             guess = np.zeros(coupled.count)
             guess[which] = near
@@ -170,7 +167,7 @@ def variational_field(
     """Return the variational field of a mode, built once per system."""
 
     def build() -> VariationalField:
-        return VariationalField(explicit(system, mode), chosen)
+        return VariationalField(motion(system, mode), chosen)
 
     return system.cached(("variational field", mode, chosen), build)
 
@@ -191,4 +188,4 @@ class GuardedField(PlainField):
 
 def guarded_field(system: FilippovSystem, mode: str) -> GuardedField:
     """Return the guarded field of a mode, built once per system."""
-    return system.cached(("guarded field", mode), lambda: GuardedField(explicit(system, mode)))
+    return system.cached(("guarded field", mode), lambda: GuardedField(motion(system, mode)))

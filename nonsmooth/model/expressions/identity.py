@@ -111,8 +111,8 @@ def vanish_on(expressions: Sequence[ca.SX], surface: ca.SX, variables: ca.SX) ->
     """Whether all expressions are zero wherever ``surface`` is."""
     forms = NormalForms([ca.vertcat(*ca.symvar(ca.vertcat(surface, *expressions)))])
     own = forms.of(surface)
-    if all(ratio(forms.of(e), own) for e in expressions):
-        return True  # visible multiples of it
+    if all(not form or ratio(form, own) for form in map(forms.of, expressions)):
+        return True  # zeros, and visible multiples of it
     return _modular(expressions, [surface], variables) is True
 
 

@@ -1,10 +1,10 @@
 """Laws of a mode: multipliers that hold a surface, and the smooth field that they give.
 
-- A kind of sliding: ``switches`` for one mode as symbols, ``coupled`` for all modes with multipliers as inputs.
+- All modes, with multipliers as inputs: ``coupled``; their guards: ``switches``.
 - An element whose multiplier enters a later derivative, or a root in the field: ``degree``, ``roots``.
 - Which mode continues, for uses without a run (``classify``): ``complementarity``, ``layer``; for sets of
   codimension two and more ``limit_directions``, ``frozen``. In a run the driver decides (``flow/engine``).
-- A mode as a system of its own: ``explicit``, ``motion``, ``followed``.
+- A mode as a system of its own: ``motion``, ``followed``.
 
 Classes of two-folds are in ``nonsmooth/local/two_folds``.
 """

@@ -32,7 +32,6 @@ from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .degree import Degree, degree_of
 from .evaluators import Evaluator
-from .switches import Guard, event_guards
 
 #: Slopes of conditions are regular if eigenvalues are above this part of them and of those of the rates.
 _REGULAR = 1e-3
@@ -261,24 +260,6 @@ class Coupled:
         signs[[*self.system.set_of, *self.system.half_lines]] = 0.0
         return signs
 
-    def known_multipliers(self, mode: str, x: Array, unknowns: Array, p: Array) -> Array:
-        """Multipliers at a state that are known in a mode."""
-        held = self.held(mode)
-        for members in self.moving_sets(mode):
-            own = list(members)
-            h = self.heights_at(x, p)[own] if mode[own[0]] == "*" else unknowns[own]
-            held[own] = unit(h)
-        return held
-
-    def moving_sets(self, mode: str) -> list[tuple[int, ...]]:
-        """Sets off which a mode is, or which it leaves."""
-        return [s for s in self.system.sets if self.system.widened(mode)[s[0]] in "*bl"]
-
-    def acting(self, mode: str, unknowns: Array) -> Array:
-        """Unknowns that multiply the field: not what is kept of sets that are left."""
-        slides = np.array(self.system.parse_letters(mode)) == 0
-        return np.where(slides, unknowns, 0.0) if self.system.sets else unknowns
-
     def heights_at(self, x: Array, p: Array) -> Array:
         """Switching functions and gaps (m,) at an extended state."""
         build = lambda: Evaluator(self.system.function("heights", lambda: [self.heights]))
@@ -309,22 +290,6 @@ class Coupled:
         carried = self.carriers[i]
         idle = bool(carried) and all(signs[self._surfaces + j] for j in carried)
         return self.continuous[i] or idle
-
-    def guards(self, mode: str) -> tuple[Guard, ...]:
-        """Guards of a mode: surfaces and exits, contacts, stops and resets."""
-        result, contacts = list[Guard](), len(self.system.entries)
-        for i, sign in enumerate(self.system.parse_letters(mode)):
-            j = i - self._surfaces
-            if i in self.system.half_lines:
-                kind, entry = "surface" if sign else "release", self.system.entry_of(i)
-                result.append(Guard(kind, i, sign, entry))
-            elif j >= 0:
-                result.append(Guard("impact" if sign else "release", j, sign, contacts + j))
-            elif sign:
-                result.append(Guard("surface", i, sign, self.system.entry_of(i)))
-            elif i not in self.system.joints:
-                result += [Guard("exit", i, side, self.system.entry_of(i)) for side in (1, -1)]
-        return (*result, *event_guards(self.system))
 
     @cached_property
     def slope_moves(self) -> NDArray[np.bool_]:
@@ -388,7 +353,7 @@ class Coupled:
             for k in range(rest.numel()):
                 if ca.is_equal(rest[k], own):
                     held[k] = own
-        return [ca.substitute(e, rest, held) for e in expressions]
+        return [ca.substitute(e, ca.vec(rest), held) for e in expressions]
 
     def awake(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Dense expressions in ``moving``, for numbers: terms that a mode leaves out are not evaluated."""
@@ -492,10 +457,3 @@ def driven_of(system: FilippovSystem) -> Coupled:
         return Coupled(system, by_degree, True) if combinable(system) else raised
 
     return system.cached("driven", build)
-
-
-def unit(h: Array) -> Array:
-    """Direction of a vector of any size; NaN for zero."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scaled = h / np.abs(h).max()
-        return np.asarray(scaled / np.linalg.norm(scaled))

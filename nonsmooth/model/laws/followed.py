@@ -10,31 +10,18 @@ import casadi as ca
 from ..cache import Content
 from ..definition.events import Stop
 from ..definition.system import FilippovSystem
-from .explicit import explicit
-from .motion import watched_functions
+from .motion import motion, watched_functions
 from .switches import Guard
 
 
 @dataclass(frozen=True)
 class Followed:
-    """A mode's flow.
+    """A mode's flow."""
 
-    Attributes
-    ----------
-    system : FilippovSystem
-        Of the states and of the multipliers that are states; backward in -t.
-    guards : tuple of Guard
-        Those of the mode, then the further functions.
-    stops : tuple of int
-        Guards of the system's stops; constant ones have none.
-    unknowns : tuple of int
-        Multipliers that are states.
-    """
-
-    system: FilippovSystem
-    guards: tuple[Guard, ...]
-    stops: tuple[int, ...]
-    unknowns: tuple[int, ...]
+    system: FilippovSystem  # of the states and of the multipliers that are states; backward in -t
+    guards: tuple[Guard, ...]  # those of the mode, then the further functions
+    stops: tuple[int, ...]  # guards of the system's stops; constant ones have none
+    unknowns: tuple[int, ...]  # multipliers that are states
 
 
 def followed(
@@ -51,7 +38,7 @@ def followed(
 def _made(
     system: FilippovSystem, mode: str, expressions: Sequence[ca.SX], backward: bool
 ) -> Followed:
-    of_mode, n = explicit(system, mode), system.dimension
+    of_mode, n = motion(system, mode), system.dimension
     functions = [of_mode.functions[k] for k in range(len(of_mode.guards))] + [*expressions]
     guards = (*of_mode.guards, *(Guard("zero", k, 0, k) for k in range(len(expressions))))
     own = ca.vertsplit(of_mode.states)
@@ -77,4 +64,4 @@ def _made(
         time=time,
         stops=list(stops.values()),
     )
-    return Followed(made, guards, tuple(stops), of_mode.law.unknowns)
+    return Followed(made, guards, tuple(stops), of_mode.unknowns)

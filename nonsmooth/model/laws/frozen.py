@@ -40,7 +40,11 @@ def frozen(
     coupled: Coupled, mode: str, x: Array, unknowns: Array, p: Array, own: Sequence[int]
 ) -> Frozen:
     """The rates of the switching functions ``own`` as a - M lambda."""
-    held = coupled.known_multipliers(mode, x, unknowns, p)
+    system, held = coupled.system, coupled.held(mode)
+    for members in system.sets:  # off which the mode is, or which it leaves
+        if (letter := system.widened(mode)[members[0]]) in "*bl":
+            h = coupled.heights_at(x, p) if letter == "*" else unknowns
+            held[list(members)] = unit(h[list(members)])
     held[list(own)] = 0.0
     at = coupled.layer_at(x, held, np.zeros(coupled.count), p)
     slope = at.slope * at.factors
@@ -56,3 +60,10 @@ def frozen(
         through = at.slope[np.ix_(chosen, others)] @ back
         a, d = a - through[:, 0], d - through[:, 1:]
     return Frozen(a, -d)
+
+
+def unit(h: Array) -> Array:
+    """Direction of a vector of any size; NaN for zero."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scaled = h / np.abs(h).max()
+        return np.asarray(scaled / np.linalg.norm(scaled))

@@ -11,18 +11,13 @@ from .coupled import Coupled
 
 
 def sliding_multipliers(
-    of: Coupled,
-    mode: str,
-    x: Array,
-    p: Array,
-    stable_only: bool = True,
-    kept: Array | None = None,
+    of: Coupled, mode: str, x: Array, p: Array, stable_only: bool = True
 ) -> list[Array]:
-    """Multipliers (surfaces,) that keep the sliding surfaces of a mode."""
+    """Multipliers (surfaces,) that keep the sliding surfaces of a mode of a system without sets."""
     # Linear equations have one set, those of a mode may be linear although others are not; for others
     # Newton's method starts from a grid (bilinear equations of two multipliers have at most two sets).
     sliding = of.sliding(mode)
-    unknowns = np.zeros(of.count) if kept is None else kept.copy()
+    unknowns = np.zeros(of.count)
     if not sliding:
         return [unknowns]
     k = len(sliding)
@@ -45,11 +40,11 @@ def _is_linear(of: Coupled, mode: str, x: Array, unknowns: Array, p: Array) -> b
     """Whether the slope of what slides is the same at some values of its multipliers, of which it is a polynomial."""
     if any(of.system.nonlinear):
         return False
-    held, sliding, slopes = of.known_multipliers(mode, x, unknowns, p), of.sliding(mode), []
+    held, sliding, slopes = of.held(mode), of.sliding(mode), []
     for size in (-0.7, 0.3, 0.9):
         moved = unknowns.copy()
         moved[sliding] = size * np.linspace(1.0, 0.5, len(sliding))
-        at = of.layer_at(x, held, of.acting(mode, moved), p)
+        at = of.layer_at(x, held, moved, p)
         slopes.append(at.slope[np.ix_(sliding, sliding)])
     change = max(float(np.abs(slope - slopes[0]).max()) for slope in slopes[1:])
     return change <= 1e-13 * float(np.abs(slopes[0]).max())
@@ -59,8 +54,7 @@ def _is_solution(
     of: Coupled, mode: str, x: Array, unknowns: Array, p: Array, stable_only: bool
 ) -> bool:
     sliding = of.sliding(mode)
-    held = of.known_multipliers(mode, x, unknowns, p)
-    at = of.layer_at(x, held, of.acting(mode, unknowns), p)
+    at = of.layer_at(x, of.held(mode), unknowns, p)
     slope = at.slope[np.ix_(sliding, sliding)]
     g = at.layer[sliding]
     small = np.abs(g).max() <= 1e-10 * (1.0 + np.abs(slope).max())
@@ -85,10 +79,10 @@ def newton_multipliers(
     of: Coupled, mode: str, x: Array, unknowns: Array, p: Array, iterations: int
 ) -> Array | None:
     """Newton's method for the multipliers of a mode, from those given."""
-    held, sliding = of.known_multipliers(mode, x, unknowns, p), of.sliding(mode)
+    held, sliding = of.held(mode), of.sliding(mode)
     result = unknowns.copy()
     for _ in range(iterations):
-        at = of.layer_at(x, held, of.acting(mode, result), p)
+        at = of.layer_at(x, held, result, p)
         try:
             step = np.linalg.solve(at.slope[np.ix_(sliding, sliding)], at.layer[sliding])
         except np.linalg.LinAlgError:

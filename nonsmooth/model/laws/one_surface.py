@@ -18,7 +18,7 @@ from ..reading import listed
 from ..values import Array
 from .coupled import Coupled, coupled_of
 from .evaluators import Evaluator
-from .explicit import least_norm
+from .motion import least_norm
 
 #: An ordinary surface; a condition of relative degree 0 or 1; a contact; nothing.
 Kind = Literal["surface", "algebraic", "one-sided", "contact", "none"]

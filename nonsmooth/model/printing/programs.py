@@ -25,26 +25,14 @@ from .terms import OfTape, Term, Terms
 
 @dataclass(frozen=True)
 class Shape:
-    """What the lanes' text needs to know of the functions.
+    """What the lanes' text needs to know of the functions."""
 
-    Attributes
-    ----------
-    rows, slots : list of int
-        Of the field and of the guards what a step has to be checked with.
-    affine : list of bool
-        Which guards are affine in the states.
-    affine_modes : list of bool
-        Whether all is affine in them, sines of the time added, above, below and on the surface; or off a set,
-        on it and where it is left.
-    own : list of int
-        The states that a set's functions are, if they are.
-    """
-
-    rows: list[int]
-    slots: list[int]
-    affine: list[bool]
+    rows: list[int]  # of the field, what a step has to be checked with
+    slots: list[int]  # of the guards
+    affine: list[bool]  # which guards are affine in the states
+    #: Whether all is, sines of the time added: above, below and on the surface; or off a set, on it and where it is left.
     affine_modes: list[bool]
-    own: Sequence[int] = ()
+    own: Sequence[int] = ()  # states that a set's functions are, if they are
 
 
 def lanes_program(system: FilippovSystem, order: int) -> tuple[str, Shape]:

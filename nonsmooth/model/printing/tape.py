@@ -27,36 +27,18 @@ Integers = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Values:
-    """Nodes of a graph.
-
-    Attributes
-    ----------
-    op, a, b : ndarray of int32
-        Operation and its arguments; vector and position of an input.
-    constant : ndarray
-        Values of constants.
-    still, moving : ndarray of int32
-        Nodes that are evaluated once for given parameters, and at every point; each in order.
-    free : ndarray of int32
-        Those of the latter that suffice where nothing slides.
-    outputs : ndarray of int32
-        Nodes of the outputs.
-    paired : ndarray of int32
-        Whether each node is evaluated in two numbers where the time is two; see ``flow/core/pairs.h``.
-    nodes : sequence of Node
-        The same nodes, to be printed.
-    """
+    """Nodes of a graph."""
 
     op: Integers
-    a: Integers
+    a: Integers  # arguments of the operation; vector and position of an input
     b: Integers
     constant: Array
-    still: Integers
-    moving: Integers
-    free: Integers
+    still: Integers  # nodes that are evaluated once for given parameters, in order
+    moving: Integers  # those that are evaluated at every point
+    free: Integers  # those of the latter that suffice where nothing slides
     outputs: Integers
-    paired: Integers
-    nodes: Sequence[Node]
+    paired: Integers  # whether each is two numbers where the time is; see ``flow/core/pairs.h``
+    nodes: Sequence[Node]  # the same nodes, to be printed
 
 
 #: A rule and a term of a sum as C reads them; see ``flow/core/programs.h``.

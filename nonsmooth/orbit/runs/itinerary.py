@@ -31,7 +31,7 @@ from ...model import (
 )
 from ...model.derivatives.event_maps import event_map, function_map
 from ...model.derivatives.variational import guarded_field, variational_field
-from ...model.laws.explicit import explicit
+from ...model.laws.motion import motion
 from ...model.laws.switches import event_guards
 from .guards import change_fault
 from .legs import Leg, LegFlow, integrate_leg
@@ -242,7 +242,7 @@ class FixedItinerary:
 
     def _ends(self, leg: Leg) -> tuple[object, ...]:
         """Events that may end a leg: its own, its sibling, and the end of the itinerary."""
-        names = {guard_name(self.system, g): g for g in explicit(self.system, leg.mode).guards}
+        names = {guard_name(self.system, g): g for g in motion(self.system, leg.mode).guards}
         exits = [name for name, g in names.items() if (g.kind, g.element) == ("exit", leg.element)]
         own = tuple(exits) if leg.kind == "exit" and exits else (leg.name(self.system),)
         end = isinstance(self.until, str) and (self.until not in names or self.until in own)
@@ -264,7 +264,7 @@ class FixedItinerary:
         start, end = float(run.t[0]), float(run.t[-1])
         if end <= start:
             return f"{what} has the duration {end - start:.3g}"
-        of_mode = explicit(system, mode)
+        of_mode = motion(system, mode)
         kinds = {guard_name(system, g): g for g in of_mode.guards if g.kind in _NEAR}
         for event in run.events:
             guard = kinds.get(event.name)
@@ -364,7 +364,7 @@ class FixedItinerary:
         mode = arrival.legs[-1].mode
         system, until = self.system, self.until
         if isinstance(until, str):
-            guards = explicit(system, mode).guards
+            guards = motion(system, mode).guards
             own = next(g for g in guards if guard_name(system, g) == until)
             at = event_map(system, mode, own.kind, own.element, own.side)(flow.end, p)
         else:

@@ -147,6 +147,8 @@ class Leg:
             return instant_map(system, *given)(x, p)
         own, every = self.map(system), tuple(range(len(p)))
         assert own is not None
+        if self.field(system).entries == len(x):
+            return own(x, p)
         start, n = self.field(system, every).initial(x, p), len(x)
         at = own(start[:, 0], p)
         moved, by_p = start[:, 1 : 1 + n], start[:, 1 + n :]
@@ -232,7 +234,9 @@ def carry_leg(
     """The same of a leg of a run, by the states alone; at times since its start, or recorded to be taken ``back``."""
     if not (system.sets or back or len(times)):  # one leg costs less by its own program
         found, n = integrate_leg(system, leg, x, duration, p, chosen), len(x)
-        return LegFlow(found.end[:n], found.by_start[:n], found.by_parameters[:n], found.rate[:n])
+        none = np.zeros((0, n, n + len(chosen)))
+        by = found.by_start[:n], found.by_parameters[:n]
+        return LegFlow(found.end[:n], *by, found.rate[:n], at_samples=none)
     flown = [leg.flown(system, x, duration)]
     carried = carry_legs(system, flown, p, chosen, times, back=back)
     require_done(system, flown, carried)
@@ -241,6 +245,9 @@ def carry_leg(
 
 def rate_at(system: FilippovSystem, leg: Leg, x: Array, p: Array) -> Array:
     """The field of a leg's mode at an extended state (N,)."""
+    if not system.sets:
+        field = leg.field(system)
+        return np.asarray(field.rate_at(field.states_at(x, p), p)[: len(x)])
     flown = [FlownLeg(leg.mode, x, 0.0, None, leg.left)]
     found = carry_legs(system, flown, p, back=True)
     require_done(system, flown, found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -322,18 +323,18 @@ def _pulled_through(
     system, some, last, rows = run.system, list(chosen), parts[-1], np.ascontiguousarray(rows)
     every = np.zeros(len(system.parameter_names))  # by all parameters
     own = every if last.back else np.zeros(len(some))  # what legs give
-    if last.back and last.flow.carried is not None:
-        last.flow.carried[0].begin_pull(np.zeros(len(row)), every, rows)
+    pulling = last.flow.carried[0].pulling(every, rows) if last.flow.carried else nullcontext()
     row = row + rows[last.samples.stop :].sum(axis=0)
-    for part in reversed(parts):
-        event = part.event
-        if event is not None and part is last and part.stretch.leg.kind == "stop":
-            along_flow = float(row @ part.flow.rate)
-            every += along_flow * event.time_by_parameters
-            row = row + along_flow * event.time_by_state
-        elif event is not None:
-            row = event.pull(row, every)
-        row = part.backward(row, rows, own)
+    with pulling:
+        for part in reversed(parts):
+            event = part.event
+            if event is not None and part is last and part.stretch.leg.kind == "stop":
+                along_flow = float(row @ part.flow.rate)
+                every += along_flow * event.time_by_parameters
+                row = row + along_flow * event.time_by_state
+            elif event is not None:
+                row = event.pull(row, every)
+            row = part.backward(row, rows, own)
     if parts[0].held is not None:
         every += row @ parts[0].held[1]
         row = row @ parts[0].held[0]

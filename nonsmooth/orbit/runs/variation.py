@@ -28,7 +28,7 @@ from ...model import (
 )
 from ...model.derivatives.event_maps import AtEvent, function_map
 from ...model.laws.coupled import raised_of
-from ...model.laws.explicit import rests_on
+from ...model.laws.motion import rests_on
 from .guards import watch
 from .legs import (
     Leg,
@@ -252,18 +252,23 @@ class Passage:
         by_start = found[:, :, :n]
         return by_start @ dx, by_start @ dp + found[:, :, n:]
 
-    def through(self, dx: Array, dp: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
-        """Carry derivatives at the end of the flow through the event."""
-        if self.event is None:
-            return dx, dp
-        s = self.event
-        return s.matrix @ dx, s.matrix @ dp + s.by_parameters[:, list(chosen)]
-
     def moments(self, dx: Array, dp: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
         """Derivatives of the time of the event, from those at the end of the flow."""
         assert self.event is not None
         s = self.event
         return s.time_by_state @ dx, s.time_by_state @ dp + s.time_by_parameters[list(chosen)]
+
+    def through(
+        self, dx: Array, dp: Array, t_x: Array, t_p: Array, chosen: Sequence[int]
+    ) -> tuple[Array, Array]:
+        """Carry derivatives at the end of the flow through the event, whose time has derivatives too."""
+        assert self.event is not None
+        s = self.event
+        if not s.smooth:
+            dx, dp = s.after_state @ dx, s.after_state @ dp + s.after_parameters[:, list(chosen)]
+        if s.kept:
+            return dx, dp
+        return dx - np.multiply.outer(s.jump, t_x), dp - np.multiply.outer(s.jump, t_p)
 
     def backward(self, row: Array, rows: Array, by_parameters: Array) -> Array:
         """Pull a row (N,) at the end of the flow, and rows (K, N) at the samples of the run, back to the start, and add to
@@ -342,19 +347,21 @@ def _saltations(
 ) -> list[Saltation | None]:
     """Events of legs; None where a time ends one."""
     system, result = run.system, list[Saltation | None]([None] * len(parts))
-    which, events, after = list[int](), list[AtEvent](), list[Array]()  # by one formula
-    for i, (part, flow, then) in enumerate(zip(parts[:-1], flows, flows[1:], strict=False)):
-        usual = then.before is not None and np.isfinite(then.before).all()
-        if usual and not (part.leg.timed or part.leg.at_start or system.sets):
+    before = np.array(
+        [np.full(len(f.end), np.nan) if f.before is None else f.before for f in flows]
+    )
+    usual = (np.isfinite(before).all(axis=1) & (not system.sets)).tolist()
+    which, events = list[int](), list[AtEvent]()  # by one formula
+    for i, (part, flow) in enumerate(zip(parts[:-1], flows, strict=False)):
+        if usual[i + 1] and not (part.leg.timed or part.leg.at_start):
             which.append(i)
             events.append(flow.at or part.leg.at_event(system, flow.end, p))
-            after.append(np.asarray(then.before))
         else:
-            result[i] = saltation_after(run, part, flow, parts[i + 1], then, p)
+            result[i] = saltation_after(run, part, flow, parts[i + 1], flows[i + 1], p)
     result[-1] = saltation_after(run, parts[-1], flows[-1], None, None, p)
     if which:
-        stacked = _stacked(events, [flows[i].rate for i in which])
-        made = saltations(stacked, np.array(after), lambda k: _at(system, parts[which[k]]))
+        stacked, after = _stacked(events, [flows[i].rate for i in which]), before[1:][which]
+        made = saltations(stacked, after, lambda k: _at(system, parts[which[k]]))
         for k, (i, at) in enumerate(zip(which, events, strict=True)):
             result[i] = made.of(k, at.smooth)
     return result
@@ -363,8 +370,9 @@ def _saltations(
 def _stacked(events: Sequence[AtEvent], rates: Sequence[Array]) -> Ended:
     """Events, stacked."""
     count, n, q = len(events), len(rates[0]), len(events[0].by_parameters)
-    maps, by_p = np.broadcast_to(np.eye(n), (count, n, n)), np.broadcast_to(0.0, (count, n, q))
-    if not all(at.smooth for at in events):
+    if all(at.smooth for at in events):
+        maps, by_p = np.broadcast_to(np.eye(n), (count, n, n)), np.broadcast_to(0.0, (count, n, q))
+    else:
         maps = np.array([at.after_state for at in events])
         by_p = np.array([at.after_parameters for at in events])
     gradients = np.array([at.gradient for at in events])
@@ -594,7 +602,7 @@ def along(run: Trajectory, names: Sequence[str]) -> Sensitivity:
                 rate = part.flow.rate
                 dx, dp = dx + np.outer(rate, t_x), dp + np.outer(rate, t_p)
                 continue
-        dx, dp = part.through(dx, dp, chosen)
+            dx, dp = part.through(dx, dp, t_x, t_p, chosen)
     m, q = len(times), len(chosen)
     if not (np.isfinite(dx).all() and np.isfinite(dp).all()):
         first = next((k for k in parts if not np.isfinite(k.flow.by_start).all()), parts[-1])

@@ -85,6 +85,7 @@ def test_coefficients_that_differ_by_rounding_are_the_same():
     system = ns.FilippovSystem([x, y], surface=y, above=[0.3 * x, 0], below=[3 * 0.1 * x, 0])
     values = system.evaluate(ns.local.mode_field(system, "s"), [2.0, 0.0])
     np.testing.assert_allclose(np.ravel(values), [0.6, 0.0], atol=1e-15)
+    assert coupled_of(system).continuous[0]  # so that runs slide too
 
 
 @pytest.mark.parametrize("unit", [1e-13, 1e-9, 1e-3, 1e9])

@@ -269,3 +269,16 @@ def test_three_friction_parameters_are_fitted_to_two_hundred_points() -> None:
     cost = ns.gradient(best, (x - symbol) ** 2 / 2, samples={symbol: data})
     assert cost.value == pytest.approx(exact.cost, rel=1e-12)
     assert list(cost.parameters.values()) == pytest.approx(exact.grad, abs=1e-9)
+
+
+def test_a_run_back_in_time_has_derivatives_too() -> None:
+    """A rotation about (-a, 0) by -1, along one mode."""
+    rotation = ns.FilippovSystem(
+        [x, v], surface=v, above=[v, -x - a], below=[v, -x + a], parameters={a: 0.3}
+    )
+    run = ns.flow.follow(rotation, [1.0, -0.5], -1.0, mode="-")
+    c, s = np.cos(1.0), np.sin(1.0)
+    found = ns.sensitivity(run)
+    assert np.abs(found.dx_dx0 - [[c, -s], [s, c]]).max() < 1e-14
+    by_start, by_a = ns.vjp(run, [1.0, 0.0])
+    assert by_start == pytest.approx([c, -s], rel=1e-14) and by_a == pytest.approx([1 - c])

@@ -242,3 +242,9 @@ def test_orbits_end_at_a_contact():
     ax = ns.plot.phase_portrait(ball, (-1, 2, -2, 2), legend=False).axes[0]
     curves = _curves(ax, "orbit")
     assert len(curves) > 3 and all(curve[:, 0].min() > 0.2 - 1e-8 for curve in curves)
+    slowed = ns.FilippovSystem(
+        [x, y], surface=y, above=[y, -2], below=[y, -1], impacts=ns.Impact(x)
+    )
+    ax = ns.plot.phase_portrait(slowed, (-1, 2, -2, 2), legend=False).axes[0]
+    (line,) = _curves(ax, "crossing")
+    assert 0.0 <= line[:, 0].min() < 0.1

@@ -93,8 +93,8 @@ static double shortest(const Run *r) { return pow(OVERFLOW, -1.0 / r->order); }
 static int is_met(Run *r, const int8_t *letter, int f, const double *h, const double *scales_of) {
   int k = size_of(r, f);
   int32_t own[3];
-  double a[3], m[9], scale = 0, radius = length_of(h + f, k), speed = 0;
-  for (int i = 0; i < k; i++) { own[i] = f + i; scale = larger(scales_of[f + i], scale); }
+  double a[3], m[9], scale = scale_of_set(r, f, scales_of), radius = length_of(h + f, k), speed = 0;
+  for (int i = 0; i < k; i++) own[i] = f + i;
   if (!(radius > 0) || radius <= VANISHES * scale || radius > CLOSE * scale) return !(radius > VANISHES * scale);
   if (!freeze(r, letter, r->x, r->unknowns, own, k, a, m)) return 0;
   for (int i = 0; i < k * k; i++) speed += m[i] * m[i];
@@ -116,16 +116,15 @@ static void keep_loads(Run *r, const int32_t *own, int k, double *a, const doubl
 static void near_set(Run *r, int row, int fell) {
   int f = r->now.index[row], k = size_of(r, f), n = r->n, before = r->mode;
   int32_t own[3];
-  double h[3], a[3], m[9], u[3], b[3], mean[3], frozen[3], scale = 0, dt, c = 0;
+  double h[3], a[3], m[9], u[3], b[3], mean[3], frozen[3], dt, c = 0;
   r->met = (Met){NEAR_GUARD, f, 0};
   if (r->letter[f] == 0) return; /* friction's limit has fallen: the next step sees its digits */
   const double *height = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
   for (int i = 0; i < k; i++) {
     own[i] = f + i;
     h[i] = r->letter[f] == LEFT_BEHIND ? r->unknowns[f + i] : height[f + i];
-    scale = larger(scales_of[f + i], scale);
   }
-  double radius = unit_of(h, k, u);
+  double scale = scale_of_set(r, f, scales_of), radius = unit_of(h, k, u);
   if (!freeze(r, r->letter, r->x, r->unknowns, own, k, a, m)) { finish(r, NOT_FINITE, FIELD, 0); return; }
   memcpy(frozen, a, sizeof a);
   if (r->c && radius > 0) keep_loads(r, own, k, a, m);
@@ -199,9 +198,8 @@ static void after_step(Run *r) {
     int k = size_of(r, f), letter = r->letter[f];
     if (letter != LEAVING && letter != LEFT_BEHIND) continue;
     if (!scales_of) { surface_values(r, r->x); scales_of = surface_scales(r, r->x); }
-    double scale = 0;
-    for (int i = f; i < f + k; i++) scale = larger(scales_of[i], scale);
-    int next = letter == LEAVING || length_of(r->unknowns + f, k) <= LEFT * scale ? LEFT_BEHIND : OFF;
+    double least = LEFT * scale_of_set(r, f, scales_of);
+    int next = letter == LEAVING || length_of(r->unknowns + f, k) <= least ? LEFT_BEHIND : OFF;
     for (int i = f; i < f + k; i++) {
       r->letter[i] = (int8_t)next;
       if (next == OFF) r->unknowns[i] = 0;
@@ -211,8 +209,7 @@ static void after_step(Run *r) {
   }
   if (carried) project_to(r, r->involved, carried, level);
   if (!changed) return;
-  lay_out(r, r->letter, &r->now);
-  r->mode = r->now.mode;
+  enter_mode(r);
 }
 
 /* Nodes of a program that are zero whatever moves, from the values of those that do not. */
@@ -253,8 +250,7 @@ static void look_at_sets(Run *r) {
     int f = r->now.index[row], k = size_of(r, f);
     if (r->now.kind[row] != NEAR_GUARD || r->letter[f] < OFF || r->drop[row]) continue;
     const double *h = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
-    double scale = 0, radius = length_of(r->letter[f] == LEFT_BEHIND ? r->unknowns + f : h + f, k);
-    for (int i = f; i < f + k; i++) scale = larger(scales_of[i], scale);
-    if (radius <= CLOSE * scale) { near_set(r, row, 0); return; }
+    double radius = length_of(r->letter[f] == LEFT_BEHIND ? r->unknowns + f : h + f, k);
+    if (radius <= CLOSE * scale_of_set(r, f, scales_of)) { near_set(r, row, 0); return; }
   }
 }

@@ -9,6 +9,13 @@ static double length_of(const double *h, int k) {
   return most > 0 ? most * sqrt(sum) : sum;
 }
 
+/* Rounding in the functions of a set, times epsilon. */
+static double scale_of_set(const Run *r, int f, const double *scales_of) {
+  double scale = 0;
+  for (int i = f; i < f + size_of(r, f); i++) scale = larger(scales_of[i], scale);
+  return scale;
+}
+
 static double unit_of(const double *h, int k, double *u) {
   double r = length_of(h, k);
   for (int i = 0; i < k; i++) u[i] = h[i] / r;

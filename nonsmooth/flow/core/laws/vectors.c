@@ -103,7 +103,7 @@ static int limit_directions(const double *given, const double *matrix, int k, do
   for (int i = 0; i < k; i++) a[i] = given[i] / size;
   for (int i = 0; i < k * k; i++) m[i] = matrix[i] / size;
   secular(a, m, k, p);
-  for (int i = 0; i < degree; i++) for (int j = degree - 1; j >= i; j--) p[j] += at * p[j + 1];
+  move_origin(p, degree, at, degree);
   while (count < 2 * k && zeros < degree) {
     double sign = ns_sign(p[zeros]), c[P + 1], left = 2 * k - at, root;
     if (sign == 0) { zeros++; continue; }
@@ -111,7 +111,7 @@ static int limit_directions(const double *given, const double *matrix, int k, do
     root = first_root(c + zeros, degree - zeros, left);
     if (root < 0) break;
     at += root;
-    for (int i = 0; i < degree; i++) for (int j = degree - 1; j >= i; j--) p[j] += root * p[j + 1];
+    move_origin(p, degree, root, degree);
     p[0] = 0;
     zeros = 1;
     count += direction_at(a, m, k, at, u[count]);

@@ -126,7 +126,7 @@ def _continue(
             if stop():
                 raise Stopped
         used = np.flatnonzero(np.bincount(out.itinerary)).tolist()
-        words = {k: _shown(word) for k, word in engine.words(table, used)[1].items()}
+        words = {k: _shown(word) for k, word in engine.words(table, used).items()}
     frozen = np.flatnonzero((records["code"] & FROZEN) != 0)
     for code in np.unique(records["code"][frozen]).tolist():
         number = max(words) + 1

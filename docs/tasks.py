@@ -44,7 +44,7 @@ TASKS = {
         "Arrays of starts or of parameters, in threads, on a cluster, in a store on disk; and which "
         "attractor each start goes to.",
         "nonsmooth",
-        "ensemble Ensemble Grid RandomStarts Work outcomes flow.Outcomes basins orbit.Basins",
+        "ensemble Ensemble Grid RandomStarts Work outcomes flow.Outcomes basins attractors orbit.Basins orbit.Attractor",
     ),
     "points": _task(
         "Ask what a point is",

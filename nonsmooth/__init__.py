@@ -80,6 +80,7 @@ from .model.definition.elements import Complementarity, Relay
 from .model.definition.friction import Friction
 from .model.definition.table import table
 from .orbit import (
+    attractors,
     basins,
     continue_bifurcation,
     continue_equilibrium,
@@ -141,6 +142,7 @@ __all__ = [
     "Trajectory",
     "Work",
     "alpha",
+    "attractors",
     "basins",
     "call",
     "certify",

@@ -2,7 +2,7 @@
 
 from ..notebook import add_cards
 from ..solvers import continuation
-from .basins import Basins, basins
+from .basins import Attractor, Basins, attractors, basins
 from .branches.bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifurcation
 from .branches.branch import Branch, BranchEnd, BranchEvent, FarSide
 from .branches.equilibrium_branches import continue_equilibrium
@@ -35,6 +35,7 @@ from .runs.variation import Sensitivity
 
 __all__ = [
     "Arrival",
+    "Attractor",
     "Basins",
     "BifurcationCurve",
     "Branch",
@@ -65,6 +66,7 @@ __all__ = [
     "StartCurve",
     "TraceError",
     "VirtualOrbitError",
+    "attractors",
     "basins",
     "continuation",
     "continue_bifurcation",

@@ -76,12 +76,12 @@ def test_statuses_are_labels():
     assert "stopped 25.00%" in repr(found)
 
 
-def test_escape_to_infinity_in_finite_time_is_labelled_failed():
+def test_escape_to_infinity_in_finite_time_has_a_label():
     """x' = x^2 - 1 from 2 is infinite at ln(3)/2; from 0 it comes to -1."""
     found = ns.basins(
         ns.FilippovSystem([x], field=[x**2 - 1]), [[0.0], [2.0]], t_end=40.0, work=QUIET
     )
-    assert found.labels.tolist() == [1, -4] and found.name(-4) == "failed"
+    assert found.labels.tolist() == [1, -5] and found.name(-5) == "to infinity"
 
 
 def test_a_chaotic_attractor_is_one():

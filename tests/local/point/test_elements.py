@@ -55,6 +55,7 @@ def test_points_where_no_condition_changes():
     assert ns.classify(COIL, at.point).label == "stable pseudo-node"
 
 
+@pytest.mark.slow
 @at_most(6)
 @given(SEEDS)
 def test_a_condition_of_degree_one_is_the_limit_of_a_strong_field_below(seed):
@@ -248,6 +249,7 @@ def test_equilibria_folds_and_rest_of_a_pendulum_with_joints():
     assert ns.classify(joint, one.point).label == one.kind
 
 
+@pytest.mark.slow
 @at_most(4)
 @given(SEEDS)
 def test_second_derivatives_are_those_along_a_bent_joint(seed):

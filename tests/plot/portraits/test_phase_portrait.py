@@ -176,6 +176,7 @@ def _curves(ax, kind):
     return [np.column_stack(ln.get_data()) for ln in ax.lines if ln.get_gid() == kind]
 
 
+@pytest.mark.slow
 def test_each_value_of_a_discrete_state_has_a_panel_in_which_orbits_end_at_its_events():
     q = ca.SX.sym("q")
     on = ns.Reset(x + y - 1, {q: 1}, 1, level=True, when=q == 0, name="on")
@@ -237,6 +238,7 @@ def test_the_boundary_of_a_condition_is_closed_or_opens_and_has_no_orbits_behind
     assert {"closed condition", "condition that opens", "no motion"} <= texts
 
 
+@pytest.mark.slow
 def test_orbits_end_at_a_contact():
     ball = ns.FilippovSystem([x, y], field=[y, -1], impacts=ns.Impact(x - 0.2, 0.5))
     ax = ns.plot.phase_portrait(ball, (-1, 2, -2, 2), legend=False).axes[0]

@@ -1,0 +1,161 @@
+"""Attractors by returns: closed forms, any section, and what is no attractor."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, v, t = (ca.SX.sym(s) for s in ("x", "v", "t"))
+QUIET = ns.Work(threads=1, progress=False)
+AXIS = np.linspace(-1.9, 2.1, 5)
+GRID = {"x": AXIS, "v": AXIS}
+_DATA = json.loads((Path(__file__).parents[1] / "data" / "orbits_2.json").read_text())
+KICKED = next(case["values"] for case in _DATA if case["id"] == "BA1")
+
+
+def kicked():
+    kick = ns.Reset(x, [x, v + 0.3], direction=1, name="kick")
+    return ns.FilippovSystem([x, v], field=[v, -x - 0.1 * v], resets=kick)
+
+
+def van_der_pol():
+    return ns.FilippovSystem([x, v], field=[v, (1 - x * x) * v - x])
+
+
+def belt():
+    slip = v - 0.5
+    drop = lambda s: 1 / (1 + 2 * s)
+    return ns.FilippovSystem(
+        [x, v], surface=slip, above=[v, -x - drop(slip)], below=[v, -x + drop(-slip)]
+    )
+
+
+def logistic(r):
+    return ns.FilippovSystem([x], field=[0.0 * x], clocks=ns.Clock(1.0, map=[r * x * (1 - x)]))
+
+
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("near", [pytest.param(0.01, marks=SLOW), 0.05])
+@pytest.mark.parametrize("section", ["kick", pytest.param(x, marks=SLOW), ns.Section(v, -1), None])
+def test_kicked_oscillator_has_one_attractor(section, near):
+    """BA1: the return map is v -> k (v + .3)."""
+    for t_end in (300.0, 1000.0):
+        found = ns.basins(kicked(), GRID, t_end, section=section, near=near, work=QUIET)
+        assert found.fractions == {1: 1.0} and len(found.attractors) == 1
+        (one,) = found.attractors
+        if section is None:
+            assert one.kind == "recurrent"
+            continue
+        assert one.kind == "cycle"
+        assert abs(one.period - float(KICKED["period"])) < 1e-11
+        assert abs(one.multipliers[1] - float(KICKED["k"])) < 1e-11
+        if section == "kick":
+            assert abs(one.points[0, 1] - float(KICKED["v before the kick"])) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("build", "section", "t_end", "period"),
+    [(van_der_pol, s, 100.0, 6.663286859) for s in (v, ns.Section(v, -1), x, x - v - 0.3)]
+    + [(belt, s, 60.0, 8.133713023) for s in ("h0", x)]
+    + [pytest.param(belt, s, 60.0, 8.133713023, marks=SLOW) for s in ("entry", "exit")],
+)
+def test_any_section_finds_the_one_cycle(build, section, t_end, period):
+    (one,) = ns.attractors(build(), GRID, t_end, section=section, work=QUIET)
+    assert one.kind == "cycle" and abs(one.period - period) < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("r", "p"), [pytest.param(2.9, 1, marks=SLOW), (3.2, 2), (3.5, 4), (3.83, 3)]
+)
+def test_cycles_of_the_logistic_map(r, p):
+    starts = np.stack([np.linspace(0.013, 0.987, 12), np.zeros(12)], axis=-1)
+    (one,) = ns.attractors(logistic(r), starts, 512.0, section="clock", work=QUIET)
+    assert one.kind == "cycle" and len(one.points) == p and abs(one.period - p) < 1e-12
+    values = one.points[:, 0]
+    assert np.abs(np.roll(r * values * (1 - values), 1) - values).max() < 1e-9
+    slope = float(np.prod(r * (1 - 2 * values)))
+    if len(one.multipliers):
+        assert min(np.abs(one.multipliers - slope)) < 1e-7 * max(1.0, abs(slope))
+
+
+def test_every_second_return_of_a_doubled_cycle_are_two():
+    starts = np.stack([np.linspace(0.013, 0.987, 12), np.zeros(12)], axis=-1)
+    second = ns.Section("clock", every=2)
+    found = ns.attractors(logistic(3.2), starts, 512.0, section=second, work=QUIET)
+    values = sorted(float(a.points[0, 0]) for a in found)
+    root = math.sqrt((3.2 - 3) * (3.2 + 1))
+    assert np.allclose(values, [(4.2 - root) / 6.4, (4.2 + root) / 6.4], atol=1e-9)
+    assert all(len(a.points) == 1 and abs(a.period - 2) < 1e-12 for a in found)
+
+
+def test_forced_cycles_have_no_multiples():
+    """Duffing's oscillator: one orbit of the forcing's period in each well, none of twice that."""
+    duffing = ns.FilippovSystem([x, v], field=[v, -0.15 * v + x - x**3 + 0.2 * ca.cos(t)], time=t)
+    found = ns.attractors(duffing, GRID, 600 * math.pi, section=2 * math.pi, work=QUIET)
+    assert [len(a.points) for a in found] == [1, 1]
+    assert all(abs(a.period - 2 * math.pi) < 1e-12 for a in found)
+    assert found[0].points[0, 0] * found[1].points[0, 0] < 0
+
+
+@pytest.mark.parametrize("section", [None, "h0"])
+def test_rest_on_a_set_and_infinity(section):
+    """Dry friction of force 1 beside a spring, with damping and without any at high speed."""
+    dry = ns.FilippovSystem([x, v], surface=v, above=[v, -x - 0.2], below=[v, -x + 0.2])
+    found = ns.basins(dry, GRID, 100.0, section=section, work=QUIET)
+    assert found.fractions == {1: 1.0} and [a.kind for a in found.attractors] == ["rest"]
+    assert np.abs(found.attractors[0].points[:, 0]).max() <= 0.2 + 1e-9
+    anti = ns.FilippovSystem(
+        [x, v], surface=v, above=[v, -x + 0.1 * v - 1], below=[v, -x + 0.1 * v + 1]
+    )
+    axis = np.linspace(-30, 30, 7)
+    found = ns.basins(anti, {"x": axis, "v": axis}, 200.0, section=section, work=QUIET)
+    (inside,) = np.unique(found.labels[3, 3])
+    assert set(np.unique(found.labels)) == {-5, inside} and found.name(-5) == "to infinity"
+    assert found.attractors[inside - 1].kind == "rest"
+
+
+@pytest.mark.parametrize("section", [None, v, "h0"])
+def test_a_point_and_a_cycle_that_never_meets_the_section(section):
+    r2 = x**2 + v**2
+    system = ns.FilippovSystem(
+        [x, v],
+        surface=r2 - 1,
+        above=[x * (4 - r2) - 5 * v, v * (4 - r2) + 5 * x],
+        below=[-x - v, x - v],
+    )
+    found = ns.basins(system, GRID, 40.0, section=section, work=QUIET)
+    inside = AXIS[:, None] ** 2 + AXIS**2 < 1
+    rest = int(found.labels[2, 2])
+    assert np.array_equal(found.labels == rest, inside) and set(np.unique(found.labels)) == {1, 2}
+    assert found.attractors[rest - 1].kind == "point"
+    assert np.abs(found.attractors[rest - 1].points).max() < 1e-9
+    other = found.attractors[2 - rest]
+    assert other.kind == ("cycle" if section is v else "recurrent")
+    assert np.abs(np.hypot(*other.points.T) - 2.0).max() < 1e-6
+
+
+@pytest.mark.parametrize("section", [None, pytest.param(v, marks=SLOW)])
+def test_a_centre_has_no_attractor(section):
+    centre = ns.FilippovSystem([x, v], field=[v, -x])
+    found = ns.basins(centre, GRID, 100.0, section=section, work=QUIET)
+    assert not found.attractors and set(np.unique(found.labels)) == {0}
+
+
+def test_kinds_survive_a_file(tmp_path):
+    found = ns.basins(kicked(), GRID, 300.0, section="kick", work=QUIET)
+    found.save(tmp_path / "basins.npz")
+    (again,) = ns.load(tmp_path / "basins.npz").attractors
+    (one,) = found.attractors
+    assert (again.kind, again.period) == (one.kind, one.period)
+    assert np.array_equal(again.multipliers, one.multipliers) and "cycle of period 6.29" in repr(
+        again
+    )

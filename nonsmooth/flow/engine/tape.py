@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
+from ...model import Array, Coupled, FilippovSystem, OptionError, driven_of
 from ...model.printing.tape import (
     LISTS,
     Entries,
@@ -139,7 +139,7 @@ class TapeEngine:
     def __init__(self, system: FilippovSystem, order: int, derived: bool = False):
         self.shown, self.order = Shown(system.of_breakpoints if derived else system), order
         self.system = self.shown.driven
-        self.coupled = raised_of(self.system)
+        self.coupled = driven_of(self.system)
         tape = self.system.cached("tape", lambda: tape_of(self.coupled))
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         entries = None
@@ -207,7 +207,7 @@ class TapeEngine:
             "curved": coupled.linearity.curved_guards,
         }
         made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
-        made.joints = len(system.joints)
+        made.joints, made.combined = len(system.joints), len(coupled.combined)
         made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
         table = (structure("Element") * (len(elements) + 1))(*elements)
         made.element = self._at(np.frombuffer(bytes(table), np.uint8))

@@ -321,7 +321,7 @@ def _pulled_through(
     run: Trajectory, parts: Sequence[Passage], row: Array, rows: Array, chosen: tuple[int, ...]
 ) -> tuple[Array, Array]:
     system, some, last, rows = run.system, list(chosen), parts[-1], np.ascontiguousarray(rows)
-    every = np.zeros(len(system.parameter_names))  # by all parameters
+    every = np.zeros(len(last.stretch.p))  # by all parameters
     own = every if last.back else np.zeros(len(some))  # what legs give
     pulling = last.flow.carried[0].pulling(every, rows) if last.flow.carried else nullcontext()
     row = row + rows[last.samples.stop :].sum(axis=0)

@@ -64,6 +64,10 @@ ROOT_REST = 1e-7
 #: Steps of Newton's method to where complementarity conditions jump, and part of a state by which it is differenced.
 JUMP_STEPS, DIFFERENCED = 60, 1e-7
 
+#: Impulses through conditions of degree zero are those of multipliers that act for this part of the time in which they
+#: would move the states as fast, or for longer ones by the step.
+IMPULSIVE, IMPULSIVE_STEP = 1e-9, 100.0
+
 #: Part of the time in which the states change by their size over which a rate is differenced.
 REACH = 1e-6
 
@@ -129,6 +133,13 @@ PARALLEL = 1e-13
 
 #: Solutions and motions that differ by this part are one; pivots below this part are zero.
 MERGED, SINGULAR = 1e-8, 1e-12
+
+#: Rounding in an unknown is not that of its own row of the law where its slope there is below this part of others.
+WEAK = 1e-3
+
+#: The slope of a complementarity condition by a multiplier is none where it delays the motion by this part of its time:
+#: the multiplier is below rounding then, and its part in the condition below this.
+UNDELAYED = 1e-8
 
 #: Orders of the law that are solved; terms of the series by which motions are compared.
 ORDERS, COMPARED = 9, 4

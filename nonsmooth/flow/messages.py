@@ -84,8 +84,8 @@ DELAYS = (", at once or after sliding for a while", "")
 
 #: Said of diodes and other conditions without a solution, and of steps that a decay rate holds.
 EQUATIONS = (
-    " No multipliers keep y >= 0: a sign is wrong, or closed conditions leave an equation of the states alone "
-    "(a resistance of 0, capacities that diodes join). Then write y as a function of the states."
+    " No multipliers keep y >= 0: a sign is wrong, or a source forces a current through diodes that block or a voltage "
+    "on diodes that conduct. Give it a resistance."
 )
 IMPLICIT = "method='auto' takes implicit steps."
 NO_IMPLICIT = "Systems with vector multipliers have no implicit steps."

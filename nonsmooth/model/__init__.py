@@ -30,7 +30,7 @@ from .errors import (
     PointError,
     explain,
 )
-from .laws.coupled import Coupled, coupled_of, raised_of
+from .laws.coupled import Coupled, coupled_of, driven_of, raised_of
 from .laws.evaluators import Evaluator, Surfaces, evaluator
 from .laws.followed import Followed, followed
 from .laws.layer import Layer, LayerNumbers, layer_of
@@ -75,6 +75,7 @@ __all__ = [
     "clock_periods",
     "coupled_of",
     "discrete_values",
+    "driven_of",
     "evaluator",
     "explain",
     "followed",

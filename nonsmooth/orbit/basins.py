@@ -109,7 +109,9 @@ class Attractor:
     multipliers: NDArray[np.complex128] = field(default_factory=lambda: np.zeros(0, complex))
 
     def __repr__(self) -> str:
-        middle = ", ".join(f"{v:.6g}" for v in self.points.mean(axis=0))
+        small = 1e-9 * float(np.abs(self.points).max(initial=0.0))
+        means = self.points.mean(axis=0)
+        middle = ", ".join(f"{v if abs(v) > small else 0:.6g}" for v in means)
         period = f" of period {self.period:.10g}" if self.kind == "cycle" else ""
         points = f"{len(self.points)} point" + "s" * (len(self.points) != 1)
         return f"Attractor({self.kind}{period}, {points} about ({middle}))"

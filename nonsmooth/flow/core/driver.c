@@ -234,6 +234,7 @@ static void release(Run *r, int row) {
   int before = r->mode, i = r->now.index[row];
   Known known[] = {{RELEASE_GUARD, i, 0, 1}, {IMPACT_GUARD, i, 1, degree_of(r, i) + 1}};
   if (has_law(r, i, COMPLEMENTARITY_LAW)) known[1].kind = SURFACE_GUARD;
+  known[1].zeros += is_held_alone(r, i);
   active_surfaces(r, i, r->letter);
   if (r->status != RUNNING) return;
   memcpy(r->start, r->letter, r->width);
@@ -411,6 +412,7 @@ static int implicit_piece(Run *r, double left, Piece *q) {
   int last = h == left, row = first_hit(r, e, last ? h + AT_END * (time_scale(r) + h) : h, &dt);
   dt = row >= 0 ? smaller(dt, h) : h;
   if (r->hold < dt) { dt = r->hold; row = -1; } else r->hold = INFINITY;
+  if (dt == 0) e->end = 0; /* the state is that of the start */
   if (dt < h && dt > 0 && !end_at(r, e, row, &dt)) { r->implicit->c.h = 0.5 * dt; return 0; }
   r->length_mode = -1;
   *q = (Piece){dt, row, last && dt == h};

@@ -41,10 +41,23 @@ static size_t place_decision(Run *r, char *base, size_t used) {
   return used;
 }
 
+static size_t place_equations(Run *to, char *base, size_t used) {
+  size_t w = to->width, q = to->s->combined;
+  Equations *h = &to->equations;
+  h->letter = LETTERS(w);
+  h->row = INTEGERS(q);
+  h->own = INTEGERS(q);
+  h->mark = INTEGERS(3 * q + w);
+  h->slope = DOUBLES(q * w);
+  h->gradient = DOUBLES(q * to->n);
+  h->work = DOUBLES(q ? 2 * q * q + 2 * q * w + w + q : 0);
+  return used;
+}
+
 static size_t place_run(Run *to, char *base) {
   const System *s = to->s;
   size_t n = to->n, m = to->m, w = to->width, c = to->c, all = to->kept_rows, rows = to->guards, stride = to->stride;
-  size_t used = 0, jumping = 0, tried = m < MOST_ENUMERATED ? m : MOST_ENUMERATED, sums = tried * (tried - (tried > 0)) / 2;
+  size_t used = 0, jumping = 0, q = s->combined, tried = m < MOST_ENUMERATED ? m : MOST_ENUMERATED, sums = tried * (tried - (tried > 0)) / 2;
   size_t most = s->point.size > s->columns.size ? s->point.size : s->columns.size;
   for (size_t i = 0; i < m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;
   used = place_layout(&to->now, base, used, to->width, to->guards);
@@ -54,6 +67,7 @@ static size_t place_run(Run *to, char *base) {
   for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, to->width, to->guards);
   used = place_decision(to, base, used);
   used = place_instant(&to->instant, base, used, s);
+  used = place_equations(to, base, used);
   RUN_ARRAYS(PLACED)
   return used;
 }
@@ -136,6 +150,7 @@ static void prepare(Run *r) {
 static void set_parameters(Run *r, const double *p) {
   memcpy(r->p, p, sizeof(double) * r->s->parameters);
   for (int i = 0; i < r->m; i++) r->cell[i] = -1;
+  forget_rows(r);
   prepare(r);
 }
 

@@ -211,6 +211,20 @@ static int may_be_singular(const Run *r, const Layout *l) {
   return l->slides > 1 || (l->slides && is_half_line(r, l->sliding[0]));
 }
 
+/* Entries of the inverse of m that rounding has left: what does not act on an unknown leaves it zero. */
+static void clean_inverse(const double *m, int n, double *inverse) {
+  for (int i = 0; i < n; i++) {
+    double most = 0;
+    for (int pass = 0; pass < 2; pass++)
+      for (int j = 0; j < n; j++) {
+        double row = 0;
+        for (int k = 0; k < n; k++) row = larger(fabs(m[j * n + k]), row);
+        if (pass == 0) most = larger(fabs(inverse[i * n + j]) * row, most);
+        else if (!(fabs(inverse[i * n + j]) * row > VANISHES * most)) inverse[i * n + j] = 0;
+      }
+  }
+}
+
 /* Inverse of the layer's slope in a mode. Where it has none, as for two contacts whose slips are one function, one
  * with which the unknowns change as little as can be, in units of their bounds; the motion does not depend on it. */
 static int invert_layer(Run *r, const Layout *l, const double *unknowns, double *inverse) {
@@ -221,6 +235,7 @@ static int invert_layer(Run *r, const Layout *l, const double *unknowns, double 
   is_regular = invert(a, n, inverse);
   for (int i = 0; n > 1 && i < n; i++) /* the same in all units of rows and columns */
     for (int j = 0; j < n; j++) is_regular &= fabs(m[i * n + j] * inverse[j * n + i]) < 1 / SINGULAR;
+  if (is_regular && r->s->combined) clean_inverse(m, n, inverse);
   if (is_regular || !may_be_singular(r, l)) return 1;
   for (int i = 0; i < n; i++) {
     int own = l->sliding[i];
@@ -312,7 +327,7 @@ static int improve(Run *r, const Layout *l, const double *x, double *unknowns, i
       for (int j = 0; j < slides; j++) a[i * slides + j] = r->slope[l->sliding[i] * w + l->sliding[j]];
       b[i] = layer_of(r, l->sliding[i]);
     }
-    if (r->dependent == l->mode || !solve(a, b, slides)) if (!step_dependent(r, l, unknowns, b)) return 0;
+    if (r->dependent == l->mode || r->s->combined || !solve(a, b, slides)) if (!step_dependent(r, l, unknowns, b)) return 0;
     for (int i = 0; i < slides; i++) {
       unknowns[l->sliding[i]] -= b[i];
       largest = larger(fabs(b[i]), largest);

@@ -187,13 +187,20 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
   Sums of = {layer, height, stop, factor};
   point_sums(r, l->is_free, vector, finite_only, &of);
   if (!l->is_free) {
-    for (int i = 0; i < slides; i++) {
-      through[i] = 0;
-      for (int j = 0; j < slides; j++) {
-        double a = fabs(e->inverse[i * slides + j]);
-        if (a != 0) through[i] += a * layer[l->sliding[j]];
+    for (int again = 0; again < (r->s->combined ? 2 : 1); again++) { /* rows may hold unknowns alone, that others bring */
+      for (int j = 0; j < slides && again; j++)
+        for (int k = 0; k < slides; k++) layer[l->sliding[j]] += fabs(r->slope[l->sliding[j] * w + l->sliding[k]]) * through[k];
+      for (int i = 0; i < slides; i++) {
+        through[i] = 0;
+        for (int j = 0; j < slides; j++) {
+          double a = fabs(e->inverse[i * slides + j]);
+          if (a != 0) through[i] += a * layer[l->sliding[j]];
+        }
       }
     }
+    for (int i = 0; r->s->combined && i < r->m; i++)
+      for (int k = 0; k < slides && l->letter[i] != 0 && degree_of(r, i) == 0; k++)
+        height[i] += fabs(r->slope[i * w + l->sliding[k]]) * through[k];
     for (int i = 0; i < slides; i++) layer[l->sliding[i]] = through[i];
     for (int i = 0; i < r->m; i++) layer[i] += factor[i];
     for (int i = 0; i < w; i++) worst = larger(layer[i], worst);

@@ -61,7 +61,8 @@ typedef struct {
    * the time, nothing to be checked; the latter: 0 if affine in states and time, polynomials are exact. */
   const int32_t *bent, *bent_free, *bent_guards, *curved;
   int32_t affine; /* whether all unknowns enter linearly together */
-  int32_t sets, kept_rows, impact_law, joints, tables; /* sets: of codimension two and more; kept_rows: see Element */
+  /* sets: of codimension two and more; kept_rows: see Element; combined: conditions whose rows are sums (hidden.c) */
+  int32_t sets, kept_rows, impact_law, joints, tables, combined;
   const int32_t *mixed; /* (m + c, m + c): pairs of unknowns that do not enter linearly together */
   Rules rules;
   Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
@@ -149,6 +150,11 @@ typedef struct {
   Motion motion[SEVERAL];
 } Decision;
 
+/* Equations of the states alone that closed conditions leave (hidden.c): letters of the mode for which rows are
+ * combined, and what for; how many of those that are closed depend on others; numbers of the rows that are combined;
+ * slopes of all conditions by the unknowns, gradients of their functions, the part by which dropped slopes are off. */
+typedef struct { int8_t *letter; int32_t kind, is_raw, is_known, dependent, count, *row, *own, *mark; double *slope, *gradient, *work, off; } Equations;
+
 /* Modes met, by number: their letters. */
 typedef struct { Tree tree; int32_t width, count, room; int8_t *letter; int32_t *bucket, buckets; } Table;
 
@@ -195,6 +201,7 @@ typedef struct {
   const double *times, *read_at; /* times of samples in the row; times at which any run is read */
   int64_t read_count;
   double *sample_t, *sample_x;
+  Equations equations;
   double t_error; /* the largest of what is ``hidden`` of events that move a state by more than the tolerance */
   int32_t shown, has_roots, held_steps, wants_program; /* held_steps: steps in a row that a decay rate held */
   Implicit *implicit;
@@ -208,19 +215,19 @@ typedef struct {
   OF(double, speed, w) OF(double, at_root, 3 * n) OF(double, at_work, n) /* speed: of each at its last zero */ \
   OF(double, unknowns, w) OF(double, tried, w) OF(double, solutions, SOLUTIONS * w) /* that enter nonlinearly */ \
   OF(int8_t, tried_letter, 2 * w) OF(int32_t, drop, rows) OF(int32_t, active, w) \
-  OF(int32_t, involved, 3 * w + 4 * all + 1) \
+  OF(int32_t, involved, 3 * w + 4 * all + q + 1) \
   /* programs' values, inputs, error scales */ \
-  OF(double, p, s->parameters) OF(double, series, series_room(&s->series, stride)) \
+  OF(double, p, s->parameters + 2 * q * q) OF(double, series, series_room(&s->series, stride)) \
   OF(double, rounding, s->series.size * stride) OF(double, point, pair_room(s->point.size, 1)) \
   OF(double, heights, pair_room(s->surfaces.size, 1)) OF(double, maps, pair_room(s->maps.size, 1)) \
   OF(double, restitution, pair_room(s->restitution.size, 1)) OF(double, columns, pair_room(s->columns.size, 1)) \
   OF(double, input, n + 2 * w) OF(double, held, w) OF(double, none, w) OF(double, slope, w * w) \
   OF(double, vector, 3 * n + 2 * w) OF(double, sample, 3 * (n + w + rows)) \
-  OF(double, work, 6 * w * w + 8 * w + (rows + w) * stride + rows) OF(double, gradient_row, all * n + 2 * all) \
+  OF(double, work, 6 * w * w + 8 * w + (rows + w) * stride + rows) OF(double, gradient_row, (all + q) * n + 2 * (all + q)) \
   OF(double, rates, 2 * all + 2 * c) OF(double, lam, 2 * w) OF(double, matrix, w * w + 9 * w + all + 2 * c) \
   OF(double, small, 4 * w + s->rules.atoms) OF(double, atom_work, pair_room(s->atoms.size, 1)) \
   OF(double, choice_work, pair_room(s->choices.size, 1)) \
-  OF(int32_t, pending, 6 * w + 2 * all) OF(int32_t, sparse, w * w + 2 * w + 1) \
+  OF(int32_t, pending, 6 * w + 2 * (all + q)) OF(int32_t, sparse, w * w + 2 * w + 1) \
   /* of sets: multipliers, room, whether they move */ \
   OF(double, direction, w) OF(double, later, w) OF(double, heights_of, w) OF(double, aside, 2 * n) \
   OF(int8_t, moving, w) OF(int8_t, turned, rows) OF(double, rates_of_several, SEVERAL * n) \

@@ -5,14 +5,14 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, Coupled, FilippovSystem, OptionError, raised_of
+from ...model import Array, Coupled, FilippovSystem, OptionError, driven_of
 from ...model.printing.tape import (
     LISTS,
     Entries,
@@ -49,6 +49,9 @@ Block = NDArray[Any] | ctypes.Structure | ctypes.Array[Any]
 
 #: Steps by which a run is known to be stiff.
 _PROBED = 400
+
+#: Modes whose letters are kept.
+_KNOWN = 4096
 
 
 @lru_cache(maxsize=1)
@@ -139,7 +142,7 @@ class TapeEngine:
     def __init__(self, system: FilippovSystem, order: int, derived: bool = False):
         self.shown, self.order = Shown(system.of_breakpoints if derived else system), order
         self.system = self.shown.driven
-        self.coupled = raised_of(self.system)
+        self.coupled = driven_of(self.system)
         tape = self.system.cached("tape", lambda: tape_of(self.coupled))
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         entries = None
@@ -150,6 +153,7 @@ class TapeEngine:
         if entries is not None:
             self._c.derivatives = self._entries(entries)
         self._rooms: Rooms = rooms_of((0, 0, 0))
+        self._known_modes = dict[bytes, str]()
         self._last_spelled: tuple[bytes | None, list[str]] = (None, [])
 
     def _derived(self) -> tuple[Series, Entries]:
@@ -207,7 +211,7 @@ class TapeEngine:
             "curved": coupled.linearity.curved_guards,
         }
         made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
-        made.joints = len(system.joints)
+        made.joints, made.combined = len(system.joints), len(coupled.combined)
         made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
         table = (structure("Element") * (len(elements) + 1))(*elements)
         made.element = self._at(np.frombuffer(bytes(table), np.uint8))
@@ -393,7 +397,7 @@ class TapeEngine:
     def _letters(self, mode: str | None) -> NDArray[np.int8] | None:
         return None if mode is None else np.array([*self.shown.narrowed(mode), 0], np.int8)
 
-    @property
+    @cached_property
     def _width(self) -> int:
         """Bytes of a mode: letters, then values of discrete states."""
         system = self.system
@@ -441,9 +445,17 @@ class TapeEngine:
 
     def _modes(self, table: int) -> list[str]:
         """Modes that were met, by number."""
+        met, width, known = self._met(table).tobytes(), self._width, self._known_modes
+        rows = [met[k : k + width] for k in range(0, len(met), width)] if width else [b""]
+        if len(known) > _KNOWN:
+            known.clear()
+        return [known.get(row) or known.setdefault(row, self._letters_of(row)) for row in rows]
+
+    def _letters_of(self, row: bytes) -> str:
+        """Letters of a mode, of which all bytes are given."""
         width = self.system.surface_count + len(self.system.impacts)
-        letters = [self._spelled(row) for row in self._met(table)[:, :width].tolist()]
-        return [*map(self.shown.widened, letters, self._values(table)[:, self._discrete :])]
+        letters = self._spelled(np.frombuffer(row[:width], np.int8).tolist())
+        return self.shown.widened(letters, np.frombuffer(row[width:])[self._discrete :])
 
     @property
     def _discrete(self) -> int:

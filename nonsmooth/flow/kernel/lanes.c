@@ -83,15 +83,6 @@ INLINE void drop_zeros(const Lanes *s, T *a, int j) {
 #endif
 }
 
-#if RARE_CASES_HERE
-/* Shorten steps until the series of all guards converge within them, as in the interpreter. */
-static __attribute__((noinline)) void resolve_steps(T g[SERIES][P + 1], I second, I which, T *h) {
-  for (int j = 0; j < SLOTS; j++) {
-    resolve_step(g[j], M > 0 && j == 1 ? which & second : which, h);
-  }
-}
-#endif
-
 /* Returns the lanes whose surface or exit guard is not positive. */
 INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j, I second, I *too_long) {
   T *a = v->a[j];
@@ -221,7 +212,7 @@ INLINE I sort_guards(const Lanes *s, Guards *v, T g[SERIES][P + 1], I second, T 
     UNROLL for (int j = 0; j < SLOTS; j++) unclear |= sort_guard(s, v, g[j], power, j, second, &too_long);
     if (!first || !any(too_long)) return unclear;
 #if RARE_CASES_HERE
-    resolve_steps(g, second, too_long, h);
+    for (int j = 0; j < SLOTS; j++) resolve_step(g[j], M > 0 && j == 1 ? too_long & second : too_long, h);
 #else
     return unclear | too_long;
 #endif

@@ -194,9 +194,7 @@ static __attribute__((noinline)) void resolve_step(const T *g, I active, T *h) {
     *h = SELECT(active, step * 0.99 * EXP2(LOG2(rest / last) * (1.0 / (P - 1))), step);
   }
 }
-#endif
 
-#if RARE_CASES_HERE
 /* The root of one lane of any polynomial, and the slope there: of a stop that is passed in its direction, or of another
  * guard (a negative number). NAN where errors hide which root is the first, or a stop has an earlier one. */
 static __attribute__((noinline)) double hard_root(const T *a, int l, int stop, int flipped, int hides, double *slope) {

@@ -170,11 +170,13 @@ def multipliers_of(entries: Sequence[Entry], given: Any) -> list[Any]:
     return [next(following) if own is None else own for own in brought]
 
 
-def multipliers_of_conditions(conditions: Any) -> ca.SX:
-    """Multipliers of complementarity conditions."""
-    given = [conditions] if isinstance(conditions, Complementarity) else listed(conditions)
-    own = [c.entry().multiplier for c in given if isinstance(c, Complementarity)]
-    return ca.vertcat(*own) if own else ca.SX(0, 1)
+def unknowns_of(elements: Any) -> ca.SX:
+    """Multipliers and reactions that complementarity conditions, impacts or constraints bring."""
+    given = listed(elements) if isinstance(elements, (list, tuple)) else [elements]
+    own = [getattr(e, "multiplier", getattr(e, "reaction", None)) for e in given]
+    names = [f"unknown of {getattr(e, 'name', e)!r}" for e in given]
+    found = [symbols([e], what) for e, what in zip(own, names, strict=True) if e is not None]
+    return ca.vertcat(*found) if found else ca.SX(0, 1)
 
 
 def functions_of(entries: Sequence[Entry]) -> ca.SX:

@@ -100,8 +100,8 @@ def _flat(value: Any, matrix: bool) -> list[Any]:
     return value if matrix and isinstance(value, list) else [value]
 
 
-def read_dae(dae: Any, parameters: Any) -> dict[str, Any]:
-    """States, right-hand side, time and parameters of CasADi's dictionary of a DAE."""
+def read_dae(dae: Any, parameters: Any, events: Mapping[str, Any]) -> dict[str, Any]:
+    """States, right-hand side, time and parameters of CasADi's dictionary of a DAE, with events in its symbols."""
     if not isinstance(dae, Mapping) or not {"x", "ode"} <= set(dae):
         raise DefinitionError(
             f"dae: expected a mapping with 'x' and 'ode', and 't' and 'p' where there are any, received {dae!r}."
@@ -116,7 +116,7 @@ def read_dae(dae: Any, parameters: Any) -> dict[str, Any]:
             f"dae: it has the entries {further}, but only 'x', 't', 'p' and 'ode' are read. Algebraic equations with "
             "one solution are solved for z in advance; joints are constraints=, ideal diodes complementarity=."
         )
-    given = in_scalar_symbols({name: dae.get(name) for name in _OF_DAE})
+    given = in_scalar_symbols({**{name: dae.get(name) for name in _OF_DAE}, **events})
     symbols = _entries(given["p"])
     values = {str(k): v for k, v in dict(parameters or {}).items()}
     unknown = sorted(set(values) - {str(s) for s in symbols})
@@ -129,6 +129,7 @@ def read_dae(dae: Any, parameters: Any) -> dict[str, Any]:
         "rhs": _entries(given["ode"]),
         "time": given["t"],
         "parameters": {s: values.get(str(s)) for s in symbols},
+        **{name: given[name] for name in events},
     }
 
 

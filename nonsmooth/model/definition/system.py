@@ -28,7 +28,7 @@ from ..values import Array, state_values
 from .complementarity import holds
 from .constraints import Constraint
 from .discrete_states import held_values, with_values
-from .elements import Complementarity, multipliers_of_conditions
+from .elements import Complementarity, unknowns_of
 from .events import Clock, Impact, Reset, Stop, with_added_states
 from .lift import LiftedSwitch, lift
 from .matrix_symbols import in_scalar_symbols, read_dae
@@ -183,6 +183,7 @@ class FilippovSystem:
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
         complementarity: Sequence[Complementarity] | Complementarity = (),
+        constraints: Sequence[Constraint] | Constraint = (),
         clocks: Sequence[Clock] | Clock = (),
         discrete: Discrete = (),
         hidden: bool = False,
@@ -196,10 +197,10 @@ class FilippovSystem:
 
         Parameters
         ----------
-        states, parameters, time, stops, resets, impacts, complementarity, clocks, discrete
-            As for the class. Gaps and y must be smooth.
+        states, parameters, time, stops, resets, impacts, complementarity, constraints, clocks, discrete
+            As for the class. Gaps, y and functions of constraints must be smooth.
         rhs : sequence of n expressions
-            In states, parameters and time, with switches.
+            In states, parameters and time, multipliers and reactions that elements bring, with switches.
         hidden : bool, optional
             Keep switches that enter nonlinearly as they are written (hidden dynamics).
 
@@ -228,7 +229,7 @@ class FilippovSystem:
         """
         given = {"states": states, "rhs": rhs, "parameters": parameters, "time": time}
         given |= {"stops": stops, "resets": resets, "impacts": impacts, "hidden": hidden}
-        given["complementarity"] = complementarity
+        given |= {"complementarity": complementarity, "constraints": constraints}
         given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
         clocks, discrete = given.pop("clocks"), given.pop("discrete")
         column(given["rhs"], "rhs", len(listed(given["states"])))  # before clocks are added
@@ -237,7 +238,8 @@ class FilippovSystem:
         own = {name: given[name] for name in ("parameters", "time")}
         frame = cls(given["states"], field=[0] * n, **own).definition
         entries = column(rhs, "rhs", n)
-        held = ca.vertcat(frame.parameters, multipliers_of_conditions(given["complementarity"]))
+        brought = (given[name] for name in ("complementarity", "impacts", "constraints"))
+        held = ca.vertcat(frame.parameters, *[unknowns_of(elements) for elements in brought])
         known = ca.vertcat(frame.extended_states, held)
         require_known(entries, known, "rhs", **frame.names)
         found = lift(entries, frame.states, frame.time, held, hidden=hidden)
@@ -274,7 +276,7 @@ class FilippovSystem:
         parameters : mapping, optional
             Values of entries of ``p``, by name or symbol.
         **events
-            As for ``from_expression``: stops, resets, ...
+            As for ``from_expression``: stops, resets, complementarity, constraints, ...
 
         Returns
         -------
@@ -296,7 +298,7 @@ class FilippovSystem:
         >>> ns.FilippovSystem.from_dae({"x": x, "p": p, "ode": ode}, parameters={"mu": 0.1})
         FilippovSystem(2 states: x_0, x_1; 1 surface: x_1; parameters: mu)
         """
-        return cls.from_expression(**read_dae(dae, parameters), **events)
+        return cls.from_expression(**read_dae(dae, parameters, events))
 
     def holding(self, values: Mapping[Any, float]) -> FilippovSystem:
         """Hold the discrete states at values: the system between two events, without stops and resets.

@@ -18,7 +18,7 @@ from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
 from ..expressions.graph import evaluate, instructions, operation
 from ..expressions.identity import vanish_on
-from ..laws.coupled import coupled_of
+from ..laws.coupled import combinable, coupled_of
 from ..laws.evaluators import Evaluator
 from ..laws.motion import motion, solved
 from ..laws.switches import Guard
@@ -243,6 +243,11 @@ def jumping(system: FilippovSystem, x: Array, after: Array, p: Array) -> str:
     """Letters of the complementarity conditions: closed (c) where one takes an impulse in a jump to ``after``."""
     from scipy.optimize import nnls  # slow to import
 
+    if combinable(system):
+        raise DegenerateError(
+            "jump: its derivatives are implemented where no y of a complementarity condition holds a multiplier. Start "
+            "after it."
+        )
     coupled, own = coupled_of(system), [i for i in system.half_lines if i not in system.algebraic]
     columns = lambda: [ca.jacobian(coupled.field, coupled.symbols_of(own))]
     made = lambda: Evaluator(system.function(("columns of conditions",), columns))

@@ -22,6 +22,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ..definition.complementarity import rate_of
 from ..definition.roots import gate_roots, roots_of
 from ..definition.system import FilippovSystem
 from ..expressions.cancel import cancel_common_factor
@@ -31,6 +32,9 @@ from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .degree import Degree, degree_of
 from .evaluators import Evaluator
+
+#: Slopes of conditions are regular if eigenvalues are above this part of them and of those of the rates.
+_REGULAR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -85,10 +89,31 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     return field, factors, unknowns
 
 
-class Coupled:
-    """Series of states, surfaces, stops and multipliers of a system in any mode."""
+def combinable(system: FilippovSystem) -> tuple[int, ...]:
+    """Conditions of degree 0 whose closed ones may leave equations of the states alone, with constant weights."""
+    d, x, own = system.definition, system.extended_states, list(system.algebraic)
+    if not own:
+        return ()
+    slope = ca.densify(ca.jacobian(d.surfaces[own], d.multipliers))
+    if ca.depends_on(slope, x):
+        return ()
+    rate = ca.densify(ca.jacobian(rate_of(d, d.surfaces[own]), d.multipliers))
+    if slope.is_constant() and rate.is_constant() and len(own) == len(system.half_lines):
+        matrix, of_rate = (np.array(ca.DM(e[:, own])) for e in (slope, rate))
+        least = np.linalg.eigvalsh((matrix + matrix.T) / 2)[0]
+        if least > _REGULAR * max(abs(matrix).max(), abs(of_rate).max()):
+            return ()  # no matrix of closed ones is singular, or nearly so
+    return tuple(own)
 
-    def __init__(self, system: FilippovSystem, by_degree: bool = False):
+
+class Coupled:
+    """Series of states, surfaces, stops and multipliers of a system in any mode.
+
+    With ``combines`` the layer's rows of conditions of degree 0 are sums over all of them, with weights that follow
+    the parameters: of y first, then of the rates of y without those of the multipliers (``flow/core/laws/hidden.c``).
+    """
+
+    def __init__(self, system: FilippovSystem, by_degree: bool = False, combines: bool = False):
         self.system, d = system, system.definition
         self._surfaces = system.surface_count
         #: Surfaces and impacts: the letters of a mode.
@@ -115,13 +140,14 @@ class Coupled:
         )
         extra = [n for n, scaled in zip(unknowns, self.scaled, strict=True) if scaled]
         self.moving = ca.vertcat(x, lam, d.reactions, *extra)
-        self._symbols = [self.moving, system.parameter_symbols]
         h = ca.SX(d.surfaces)
         if system.algebraic:
             h = ca.substitute(h, d.multipliers, lam)
         self.layer = ca.densify(ca.jtimes(ca.vertcat(h, d.gap_rates), x, field))
-        for i in system.algebraic:
-            self.layer[i] = h[i]
+        #: Conditions whose rows of the layer are combined.
+        self.combined = list(combinable(system)) if combines else []
+        weights = self._combine(h)
+        self._symbols = [self.moving, ca.vertcat(system.parameter_symbols, weights)]
         #: Of each surface, derivatives that vanish while it rests; the layer has the next one.
         self.lower: list[tuple[ca.SX, ...]] = [()] * self._surfaces
         degrees = self.degrees(field, lam, unknowns) if by_degree or system.joints else []
@@ -147,6 +173,19 @@ class Coupled:
         #: Of layer, of surfaces and gaps, of stops and resets, and of factors, by the states.
         self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)
+
+    def _combine(self, h: ca.SX) -> ca.SX:
+        """Rows of conditions of degree 0: y, or sums of all y and of their rates with weights, which are returned."""
+        rates, q = self.layer[self.combined], len(self.combined)
+        for i in self.system.algebraic:
+            self.layer[i] = h[i]
+        weights = ca.SX.sym("weight", 2 * q * q)
+        if q:
+            of_y, of_rates = (ca.reshape(w, q, q).T for w in ca.vertsplit(weights, q * q))
+            sums = of_y @ h[self.combined] + of_rates @ rates
+            for k, i in enumerate(self.combined):
+                self.layer[i] = sums[k]
+        return weights
 
     def _is_continuous(self, surface: int, column: Sequence[ca.SX]) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""
@@ -338,7 +377,13 @@ class Coupled:
     @property
     def derivatives(self) -> ca.SX:
         """Of field, layer, surfaces and gaps, and factors by ``moving`` and the parameters, sparse."""
-        return ca.jacobian(ca.vertcat(*self.outputs[:4]), ca.vertcat(*self._symbols))
+        symbols = ca.vertcat(self.moving, self.system.parameter_symbols)
+        return ca.jacobian(ca.vertcat(*self.outputs[:4]), symbols)
+
+    @property
+    def parameter_symbols(self) -> ca.SX:
+        """Parameters, and behind them weights of rows that are combined."""
+        return self._symbols[1]
 
     # numbers -----------------------------------------------------------------------------------
 
@@ -401,3 +446,14 @@ def raised_of(system: FilippovSystem) -> Coupled:
         return Coupled(system, by_degree=True) if raised else plain
 
     return system.cached("raised", build)
+
+
+def driven_of(system: FilippovSystem) -> Coupled:
+    """Return the same as the driver reads it, with rows of conditions of degree 0 combined."""
+
+    def build() -> Coupled:
+        raised = raised_of(system)
+        by_degree = raised is not coupled_of(system)
+        return Coupled(system, by_degree, True) if combinable(system) else raised
+
+    return system.cached("driven", build)

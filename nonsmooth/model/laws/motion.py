@@ -19,7 +19,7 @@ from ..definition.parse_definition import read_function
 from ..definition.system import FilippovSystem, require_system
 from ..errors import DefinitionError
 from ..expressions.identity import decide_zero
-from .coupled import coupled_of, raised_of
+from .coupled import combinable, coupled_of, raised_of
 from .switches import Guard, event_guards
 
 #: Rows of a matrix that are dependent to this part of its entries are so.
@@ -72,7 +72,7 @@ class Motion:
             self._values = -solved(*rates)
             self.field = free + column * self._values
             return
-        residual = layer[sliding]
+        residual = _with_rates(self.system, sliding, layer[sliding], symbols, field)
         slope = ca.jacobian(residual, symbols)
         if not ca.depends_on(slope, symbols):
             rest = ca.substitute(residual, symbols, 0)
@@ -160,6 +160,31 @@ def motion(system: FilippovSystem, mode: str) -> Motion:
     return system.cached(("motion", mode), lambda: Motion(system, mode))
 
 
+def _with_rates(
+    system: FilippovSystem, sliding: list[int], residual: ca.SX, symbols: ca.SX, field: ca.SX
+) -> ca.SX:
+    """Equations of a mode, those that closed conditions of degree 0 leave of the states alone by their rates."""
+    rows = [k for k, i in enumerate(sliding) if i in combinable(system)]
+    if not rows:
+        return residual
+    x, own = system.extended_states, residual[rows]
+    slope = ca.densify(ca.jacobian(own, symbols))
+    if not slope.is_constant():
+        return residual
+    values, kept = np.array(ca.DM(slope)), list[int]()
+    for k in range(len(rows)):
+        known = values[kept]
+        factors = np.linalg.lstsq(known.T, values[k], rcond=None)[0]
+        if abs(values[k] - factors @ known).max() > _DEPENDENT * max(1.0, abs(values[k]).max()):
+            kept.append(k)
+            continue
+        of_states = ca.substitute(
+            own[k] - sum(float(f) * own[j] for f, j in zip(factors, kept, strict=True)), symbols, 0
+        )
+        residual[rows[k]] = ca.jtimes(of_states, x, field)
+    return residual
+
+
 def solved(matrix: ca.SX, right: ca.SX) -> ca.SX:
     """Solution of linear equations, written out for few unknowns."""
     k = matrix.shape[0]
@@ -195,6 +220,8 @@ def least_norm(matrix: ca.SX, right: ca.SX) -> ca.SX:
             rows = more
     if len(rows) == len(values):
         return solved(matrix, right)
+    if not rows:
+        return ca.SX.zeros(matrix.shape[1], 1)
     own = matrix[rows, :]
     return ca.mtimes(own.T, solved(ca.mtimes(own, own.T), right[rows]))
 

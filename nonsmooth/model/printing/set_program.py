@@ -33,6 +33,7 @@ class _Writer(OfTape):
     def __init__(self, coupled: Coupled, order: int):
         super().__init__(coupled)
         self.order, self.k, self.scaled = order, self.m, coupled.scaled[0]
+        self._none: list[Term | None] = [None] * (order + 1)
         *self.lam, self.stretch = self.graph.inputs(2, self.k + 1)
         point = self.point(self._acting(None))
         self.rates, self.factor = point.layer, point.factors[0]
@@ -137,8 +138,7 @@ class _Writer(OfTape):
                 for row, value in zip(jet, self._stretched(fields), strict=True):
                     row.append(value)
         ends = [row[k] for row in direction.own for k in (self.order - 1, self.order)]
-        nothing: list[Term | None] = [None] * (self.order + 1)
-        guards = [direction.root, nothing, *map(list, zip(*stops, strict=True))]
+        guards = [direction.root, self._none, *map(list, zip(*stops, strict=True))]
         return dict(c=jet, g=guards, ends=[ends], radius=[[direction.radius]])
 
     def _on(self) -> dict[str, Rows]:
@@ -199,8 +199,7 @@ class _Writer(OfTape):
             stops.append(known[2])
             self._next(jet, known[0], k)
         distance = [*radius[2:], *[None] * (self.order + 3 - len(radius))]
-        nothing: list[Term | None] = [None] * (self.order + 1)
-        return dict(c=jet, g=[distance, nothing, *map(list, zip(*stops, strict=True)), *u])
+        return dict(c=jet, g=[distance, self._none, *map(list, zip(*stops, strict=True)), *u])
 
     def _stretched(self, fields: Rows) -> list[Term | None]:
         """The next coefficients of states, from those of (1 - w s/3)^2 times the field."""

@@ -114,19 +114,20 @@ def tape_of(coupled: Coupled) -> Tape:
     atoms = d.guards if d.guards.numel() else ca.SX(0, 1)
     gradient = sparse_entries(ca.jacobian(atoms, x) if d.guards.numel() else ca.SX(0, x.numel()))
     output, moves, slopes = _moving_slopes(coupled)
+    every = coupled.parameter_symbols
     point = [coupled.layer, coupled.factors, *[nonzeros for nonzeros, _ in matrices]]
     series, free = _series_of_modes(coupled, slopes)
     time = _time_of(coupled)
     return Tape(
         series=series,
         free=free,
-        point=values_of([coupled.moving, p], coupled.awake(point), (4, 5), time),
+        point=values_of([coupled.moving, every], coupled.awake(point), (4, 5), time),
         surfaces=values_of([x, p], [kept, surface_gradient[0]], (), time),
         maps=values_of([x, p], [d.maps], (), time),
         atoms=values_of([x, p], [atoms, gradient[0]], (), time),
         choices=values_of([x, p], [d.whens, d.priorities, d.periods], (), time),
         restitution=values_of([x, p], [d.restitutions], (), time),
-        columns=values_of([coupled.moving, p], coupled.awake([column[0]]), (), time),
+        columns=values_of([coupled.moving, every], coupled.awake([column[0]]), (), time),
         slope=slope[1],
         layer_gradient=gradients[0][1],
         height_gradient=gradients[1][1],
@@ -210,7 +211,7 @@ def series_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Series:
 def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
     """Rules of all that a mode needs: in any, and in one where nothing slides. They are numbered alike."""
     n, m = coupled.system.extended_dimension, coupled.system.surface_count
-    inputs = [coupled.moving, coupled.system.parameter_symbols]
+    inputs = [coupled.moving, coupled.parameter_symbols]
     program = _rules_of(inputs, coupled.awake([*coupled.outputs, slopes]))
     of_sets = {n + i for i in coupled.system.set_of}
     held = {n + i for i in range(m) if coupled.scaled[i]} - of_sets
@@ -244,7 +245,7 @@ def derived_series_of(coupled: Coupled) -> tuple[Series, Entries]:
     n, size = coupled.system.extended_dimension, coupled.moving.numel()
     derivatives, entries = sparse_entries(coupled.derivatives)
     outputs = [*coupled.outputs, _moving_slopes(coupled)[2], derivatives]
-    inputs = [coupled.moving, coupled.system.parameter_symbols]
+    inputs = [coupled.moving, coupled.parameter_symbols]
     program = _rules_of(inputs, coupled.awake(outputs))
     held = {n + i for i, own in enumerate(coupled.scaled) if own} - {
         n + i for i in coupled.system.set_of

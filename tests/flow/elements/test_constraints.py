@@ -482,3 +482,41 @@ def test_friction_by_the_reaction_of_a_joint_is_refused_with_what_to_write():
 def test_functions_for_other_systems_refuse_constraints():
     with pytest.raises(ns.DefinitionError, match="has constraints, which this function"):
         ns.find_homoclinic(pendulum(0.1), [1.0, 0.0, 0.0, 0.0], "damping")
+
+
+def test_constraints_of_expressions_with_switches():
+    """A pendulum with dry friction in its joint, by its angle, as from an expression and as CasADi's dictionary."""
+    angle, rate, r = ca.SX.sym("angle"), ca.SX.sym("rate"), ca.MX.sym("r")
+    plain = ns.FilippovSystem.from_expression(
+        [angle, rate], [rate, -ca.sin(angle) - 0.1 * ca.sign(rate)]
+    )
+    expected = ns.simulate(plain, [np.pi / 2, 0.0], t_end=9.0, tol=1e-11)
+    x = ca.MX.sym("x", 4)
+    turn = 0.1 * ca.sign(x[0] * x[3] - x[1] * x[2])
+    rod = ns.Constraint(x[0] ** 2 + x[1] ** 2 - 1, reaction=r, name="rod")
+    rhs = [x[2], x[3], r * x[0] + turn * x[1], r * x[1] - 1 - turn * x[0]]
+    by_expression = ns.FilippovSystem.from_expression([x], rhs, constraints=rod)
+    by_dae = ns.FilippovSystem.from_dae({"x": x, "ode": ca.vertcat(*rhs)}, constraints=[rod])
+    for system in (by_expression, by_dae):
+        assert system.constraints == ("rod",)
+        run = ns.simulate(system, [1.0, 0.0, 0.0, 0.0], t_end=9.0, tol=1e-11)
+        assert len(run.events) == len(expected.events) > 2
+        assert run.x[-1, 0] == pytest.approx(np.sin(expected.x[-1, 0]), abs=1e-10)
+    with pytest.raises(ns.DefinitionError, match="contains"):
+        ns.FilippovSystem.from_expression([x], rhs)
+
+
+def test_elements_of_a_dictionary_are_in_its_symbols():
+    """A diode, and a ball with its reaction, beside switches."""
+    x, i, r = ca.MX.sym("x"), ca.MX.sym("i"), ca.MX.sym("r")
+    diode = ns.Complementarity(x, multiplier=i, name="diode")
+    system = ns.FilippovSystem.from_dae({"x": x, "ode": ca.sign(x - 1) + i}, complementarity=diode)
+    falling = ns.simulate(system, [0.5], t_end=2.0)
+    assert falling.events[0].t == pytest.approx(0.5)
+    assert falling.x[-1, 0] == pytest.approx(0, abs=1e-12)
+    state = ca.MX.sym("h", 2)
+    ode = ca.vertcat(state[1], -1 - 0.1 * ca.sign(state[1]) + r)
+    ball = ns.FilippovSystem.from_dae(
+        {"x": state, "ode": ode}, impacts=ns.Impact(state[0], 0.5, reaction=r)
+    )
+    assert ns.simulate(ball, [1.0, 0.0], t_end=9.0).x[-1] == pytest.approx([0, 0], abs=1e-9)

@@ -10,49 +10,56 @@ from scipy.optimize import brentq
 SOON = (1e-6, 1e-5, 1e-4)
 
 
+#: Modes of a run at most.
+MOST = 200
+
+
 class Circuit:
-    """x' = A x + B nu, y = C x + D nu, 0 <= y, nu >= 0, y nu = 0: rows of D that are zero have degree one."""
+    """x' = A x + B nu, y = C x + D nu, 0 <= y, nu >= 0, y nu = 0: what D leaves undetermined follows from the rates."""
 
     def __init__(self, a, b, c, d):
         self.a, self.b, self.c, self.d = (np.array(part, float) for part in (a, b, c, d))
-        later = ~self.d.any(axis=1)
-        self.later = np.flatnonzero(later)
-        self.by_x, self.by_nu = self.c.copy(), self.d.copy()
-        self.by_x[later], self.by_nu[later] = self.c[later] @ self.a, self.c[later] @ self.b
         every = (itertools.combinations(range(len(c)), size) for size in range(len(c) + 1))
-        modes = [(own, self.mode(list(own))) for one in every for own in one]
-        self.modes = [(own, made) for own, made in modes if made is not None]
+        modes = [self.mode(list(own)) for one in every for own in one]
+        self.modes = [made for made in modes if made is not None]
 
     def mode(self, own):
-        """The field and the guards of a mode as matrices; None where its multipliers do not exist."""
-        gain = np.zeros((len(self.c), len(self.a)))
+        """The field, guards and equations of the states of a mode as matrices; None where it has no multipliers."""
+        gain, held = np.zeros((len(self.c), len(self.a))), np.zeros((0, len(self.a)))
         if own:
-            block = self.by_nu[np.ix_(own, own)]
-            gain[own] = -np.linalg.pinv(block, rcond=1e-10) @ self.by_x[own]
-            if abs(self.by_x[own] + block @ gain[own]).max() > 1e-8:
+            block, by_x = self.d[np.ix_(own, own)], self.c[own]
+            u, s, _ = np.linalg.svd(block)
+            left, null = u[:, s > 1e-9].T, u[:, s <= 1e-9].T
+            by_nu = np.vstack([left @ block, null @ by_x @ self.b[:, own]])
+            right = np.vstack([left @ by_x, null @ by_x @ self.a])
+            gain[own] = -np.linalg.pinv(by_nu, rcond=1e-9) @ right
+            if abs(right + by_nu @ gain[own]).max() > 1e-8:
                 return None
+            held = null @ by_x
         guards = self.c + self.d @ gain
         guards[own] = gain[own]
-        return self.a + self.b @ gain, guards
+        return self.a + self.b @ gain, guards, held
 
     def choose(self, x):
-        """The mode whose guards are positive next."""
+        """The mode whose guards are positive next, or None."""
         best, found = -np.inf, None
-        for own, made in self.modes:
-            if any(abs(self.c[i] @ x) > 1e-9 for i in own if i in self.later):
+        for made in self.modes:
+            if abs(made[2] @ x).max(initial=0) > 1e-8:
                 continue
             soon = min((made[1] @ flow(made[0], x, s)).min() / s for s in SOON)
             score = min(1e-6 * soon, (made[1] @ x).min())
             if score > best + 1e-13:
                 best, found = score, made
-        assert best > -1e-9, "no mode continues"
-        return found
+        return found if best > -1e-6 else None
 
     def run(self, x, t_end, steps=400):
-        """The state at the end; steps without an event are exact."""
-        x, t, h = np.array(x, float), 0.0, t_end / steps
+        """The state at the end, or None where no mode continues; steps without an event are exact."""
+        x, t, h, switches = np.array(x, float), 0.0, t_end / steps, 0
         while t_end - t > 1e-13:
-            field, guards = self.choose(x)
+            made, switches = self.choose(x), switches + 1
+            if made is None or switches > MOST:
+                return None
+            field, guards, _ = made
             step = expm(field * h)
             while t_end - t > 1e-13:
                 dt = min(h, t_end - t)

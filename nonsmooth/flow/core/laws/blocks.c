@@ -12,7 +12,7 @@ enum { UNDECIDED, AT_TOP, AT_BOTTOM, INSIDE, ABOVE, BELOW };
 /* Where nu is in a trial: inside its set with w = 0, or at a bound. */
 enum { HELD, TOP, BOTTOM };
 
-enum { MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4 };
+enum { MOST_TRIED = 8, TRIED = 1 << MOST_TRIED, DIODES_TRIED = 1 << 12, MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4 };
 
 /* One block of elements that act on one another, with copies of its part of the law at one order. */
 typedef struct {

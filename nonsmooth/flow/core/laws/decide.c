@@ -411,12 +411,14 @@ static Block part_of_law(Decision *d, int order, int which) {
   return b;
 }
 
-/* Rounding of the unknowns through an inverse of the matrix, and of the rates by them: a row may hold no own unknown,
- * and no state, as those of a diode bridge. */
+/* Rounding of the unknowns through an inverse of the matrix, and of the rates by them: a row may hold hardly anything of
+ * its own unknown, and no state, as those of a diode bridge. */
 static void add_rounding(Decision *d, Block *b) {
   int n = b->size, any = 0;
   double *room = b->share + n * n, *inverse = d->work, *ones = inverse + n * n;
-  for (int i = 0; i < n; i++) any |= b->is_contact[i] && b->matrix[i * (n + 1)] == 0;
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n && b->is_contact[i]; j++)
+      any |= fabs(b->matrix[i * (n + 1)]) < WEAK * fabs(b->matrix[i * n + j]) || b->matrix[i * (n + 1)] == 0;
   if (n < 2 || !any) return;
   for (int i = 0; i < n; i++) ones[i] = 1;
   if (!invert_any(b->matrix, n, ones, inverse, ones + n, d->pivot)) return;
@@ -778,6 +780,7 @@ static int is_determined(Run *r, const Layout *l, const int8_t *letter) {
 
 /* Note a mode whose unknowns are not determined; whether the motion is, in spite of that. */
 static int find_dependent(Run *r, const Layout *l, const int8_t *letter, const double *unknowns) {
+  combine_rows(r, letter, r->x);
   error_scales(r, r->x, held_of(r, letter), unknowns);
   if (l->slides < 2 || invert_layer(r, l, unknowns, r->matrix)) return 1;
   r->dependent = l->mode;
@@ -917,6 +920,7 @@ static int no_motion(Run *r, const int8_t *letter) {
 static int is_mixed(const Run *r, const int32_t *own, int count);
 static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count);
 static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count);
+static int follow_step(Run *r, const int8_t *letter, const Known *known, int known_count);
 
 /* The law at the point of the active elements; 0 where it is no number. */
 static int begin_law(Run *r, const int8_t *letter, const Known *known, int known_count) {
@@ -933,6 +937,20 @@ static int begin_law(Run *r, const int8_t *letter, const Known *known, int known
   return 1;
 }
 
+/* Whether multipliers of a motion are not determined in the order in which they enter: the closed conditions depend on one
+ * another, or leave equations of the states. */
+static int has_hidden(Run *r, const Decision *d) {
+  if (!r->s->combined || r->status != RUNNING) return 0;
+  for (int i = 0; i < d->motions; i++) {
+    letters_of_motion(r, d, d->motion + i, r->found.letter);
+    combine_rows(r, r->found.letter, r->x);
+    lay_out(r, r->found.letter, &r->trial.l);
+    error_scales(r, r->x, held_of(r, r->found.letter), r->none);
+    if (r->equations.dependent || !invert_layer(r, &r->trial.l, r->none, r->matrix)) return 1;
+  }
+  return d->motions != 1;
+}
+
 /* Choose, as r->chosen, the motion that continues from a point of the active elements; 0 if the run ends.
  * ``letter`` has those of the other elements. */
 static int decide(Run *r, const int8_t *letter, const Known *known, int known_count) {
@@ -946,8 +964,13 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
     return 0;
   }
   r->several_count = 0;
-  if (!begin_law(r, letter, known, known_count)) return try_modes(r, letter, known, known_count);
-  explore(r, d, 0, 0);
+  r->equations.is_raw = 1;
+  int has_law = begin_law(r, letter, known, known_count);
+  if (has_law) explore(r, d, 0, 0);
+  r->equations.is_raw = 0;
+  int is_hidden = has_law && has_hidden(r, d), are_many = is_hidden && k > MOST_TRIED;
+  if (are_many && follow_step(r, letter, known, known_count)) return 1;
+  if (!has_law || (is_hidden && !(are_many && d->motions))) return try_modes(r, letter, known, known_count);
   if (!d->motions || r->status != RUNNING) return no_motion(r, letter);
   for (int i = 0; i < d->motions; i++) {
     int is_new = 1;

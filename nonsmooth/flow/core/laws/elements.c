@@ -23,26 +23,36 @@ static const double *surface_scales(Run *r, const double *x) {
  * made orthogonal one after the other, those that can overlap (a dependent row drops out). */
 static void project_to(Run *r, const int32_t *which, int count, const double *level) {
   const Entries *g = &r->s->surface_gradient;
-  int all = r->kept_rows, nd = r->s->dimension;
-  double *rows = r->gradient_row, *size = rows + (int64_t)all * r->n, *residual = size + all;
+  int all = r->kept_rows, more = r->s->combined, nd = r->s->dimension;
+  double *rows = r->gradient_row, *size = rows + (int64_t)(all + more) * r->n, *residual = size + all + more;
   for (int iteration = 0; count && iteration < 3; iteration++) {
     int any = 0, k = 0;
     const double *h = surface_values(r, r->x);
-    int32_t *place = r->pending, *kept = place + all;
-    for (int i = 0; i < all; i++) place[i] = -1;
-    for (int i = 0; i < count; i++) { place[which[i]] = i; any |= h[which[i]] != (level ? level[i] : 0); }
+    int32_t *place = r->pending, *kept = place + all + more;
+    for (int i = 0; i < all + more; i++) place[i] = -1;
+    for (int i = 0; i < count; i++) {
+      place[which[i]] = i;
+      residual[i] = (which[i] < all ? h[which[i]] : hidden_value(r, which[i] - all, h)) - (level ? level[i] : 0);
+      any |= residual[i] != 0;
+    }
     if (!any) break;
     memset(rows, 0, sizeof(double) * count * r->n);
-    for (int q = 0; q < g->count; q++)
-      if (place[g->row[q]] >= 0 && g->column[q] < nd)
-        rows[(int64_t)place[g->row[q]] * r->n + g->column[q]] = out_of(&r->s->surfaces, r->heights, all + q);
+    for (int q = 0; q < g->count; q++) {
+      double slope = out_of(&r->s->surfaces, r->heights, all + q);
+      if (g->column[q] >= nd) continue;
+      if (place[g->row[q]] >= 0) rows[(int64_t)place[g->row[q]] * r->n + g->column[q]] = slope;
+      for (int i = 0; i < more; i++)
+        for (int j = 0; j < r->equations.count && r->equations.own[i] == g->row[q]; j++) {
+          int to = place[all + r->equations.row[j]];
+          if (to >= 0) rows[(int64_t)to * r->n + g->column[q]] += weights_of(r)[(more + r->equations.row[j]) * more + i] * slope;
+        }
+    }
     for (int i = 0; i < count; i++) {
       double *row = rows + (int64_t)i * r->n, full = 0;
       for (int l = 0; l < nd; l++) full += row[l] * row[l];
-      residual[i] = h[which[i]] - (level ? level[i] : 0);
       for (int j = 0; j < k; j++) {
         int other = kept[j];
-        if (r->s->component[which[other]] != r->s->component[which[i]]) continue;
+        if (which[i] < all && which[other] < all && r->s->component[which[other]] != r->s->component[which[i]]) continue;
         const double *base = rows + (int64_t)other * r->n;
         double s = 0;
         for (int l = 0; l < nd; l++) s += row[l] * base[l];
@@ -120,11 +130,25 @@ static int gather(const Run *r, int certain, int width, int32_t *which) {
 }
 
 /* Functions that a mode keeps at zero, and derivatives. */
-static int kept_by(const Run *r, const int8_t *letter, int32_t *which) {
+static int kept_by(Run *r, const int8_t *letter, int32_t *which) {
   int count = 0;
+  combine_rows(r, letter, r->x);
   for (int i = 0; i < r->width; i++) if (letter[i] == 0 && keeps_height(r, i)) which[count++] = i;
   for (int i = 0; i < r->width; i++) if (letter[i] == 0) count += lower_rows(r, i, which + count);
+  for (int k = 0; k < r->equations.count; k++) which[count++] = r->kept_rows + r->equations.row[k];
   return count;
+}
+
+/* Whether a state satisfies the equations that a mode leaves. */
+static int satisfies(Run *r, const int8_t *letter) {
+  if (!r->s->combined) return 1;
+  combine_rows(r, letter, r->x);
+  const double *h = surface_values(r, r->x), *scale = surface_scales(r, r->x);
+  for (int k = 0; k < r->equations.count; k++) {
+    int row = r->equations.row[k];
+    if (!(fabs(hidden_value(r, row, h)) <= (TIED + r->equations.off) * hidden_scale(r, row, scale))) return 0;
+  }
+  return 1;
 }
 
 /* Whether a surface is one of the time alone, onto which no step of the states leads. */
@@ -373,6 +397,7 @@ static void set_cell(Run *r, int i, int cell) {
   r->cell[i] = cell;
   memcpy(r->p + t->first, t->value + (int64_t)cell * t->size, sizeof(double) * t->size);
   r->now.mode = r->e.l.mode = r->trial.l.mode = -1;
+  forget_rows(r);
   prepare(r);
 }
 

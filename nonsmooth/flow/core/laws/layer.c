@@ -2,16 +2,14 @@
  * products, sets of codimension two and more). A mode can continue if each of its guards that vanishes here becomes
  * positive at once: its first coefficient that is not zero is positive. */
 
-/* Modes that are tried at most. */
-#define TRIED 256
 
 static int bits(int a) { return (a & 1) + (a >> 1 & 1) + (a >> 2 & 1); }
 
-/* Number of the modes that are possible, or one more than are tried. */
-static int choices_of(const int8_t *possible, int count) {
-  int total = 1;
-  for (int i = 0; i < count && total <= TRIED; i++) total *= bits(possible[i]);
-  return total <= TRIED ? total : TRIED + 1;
+/* Number of the modes that are possible, or 0 where they are more than are tried. */
+static int choices_of(const Run *r, const int8_t *possible, int count) {
+  int total = 1, most = r->s->combined ? DIODES_TRIED : TRIED;
+  for (int i = 0; i < count && total <= most; i++) total *= bits(possible[i]);
+  return total <= most ? total : 0;
 }
 
 /* Coefficients that are no numbers decide nothing. */
@@ -47,6 +45,11 @@ static int others_stay(const Run *r, const int8_t *letter, int but) {
   return 1;
 }
 
+/* Whether a guard is zero to a part of its terms. */
+static int is_zero_to(Run *r, Expansion *e, int row, double part) {
+  return fabs(e->guards[(int64_t)row * r->stride]) <= part * scales(r, e)[row];
+}
+
 /* Whether the motion can continue in a mode with given unknowns: its guards that vanish here become positive. */
 static int continues(Run *r, const int8_t *letter, const Known *known, int known_count, Continuation *result) {
   Expansion *e = &r->trial;
@@ -67,8 +70,10 @@ static int continues(Run *r, const int8_t *letter, const Known *known, int known
     for (int i = 0; i < r->active_count; i++) active |= r->active[i] == index;
     if (!active) continue;
     for (int i = 0; i < known_count; i++)
-      if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row] && others_stay(r, letter, index))
+      if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row] && others_stay(r, letter, index)
+          && (!r->s->combined || is_zero_to(r, e, row, KNOWN_TO * r->o.rtol))) /* unknowns that keep equations may jump */
         zeros = known[i].zeros;
+    if (!zeros && is_half_line(r, index) && is_zero_to(r, e, row, r->equations.off)) zeros = 1;
     int least = kind == SURFACE_GUARD || kind == NEAR_GUARD || kind == IMPACT_GUARD ? degree_of(r, index) : 0;
     if (zeros < least) zeros = least;
     double value;
@@ -95,8 +100,19 @@ static int rests(const Run *r, const int8_t *letter) {
 /* Modes that can continue, so far. */
 typedef struct { int strict, found, resting; } Tally;
 
+/* Whether a mode that continues, that of r->trial, has the motion of the first one: loads that are not determined may be
+ * anywhere. It is kept if it is the first. */
+static int is_found(Run *r, const Tally *t) {
+  Motion *first = r->decision->motion, *own = first + 1;
+  first->terms = own->terms = COMPARED;
+  for (int i = 0; i < r->n; i++)
+    memcpy((t->strict ? own : first)->series + i * COMPARED, r->trial.states + (int64_t)i * r->stride + 1, sizeof(double) * COMPARED);
+  return t->strict && is_same_motion(r, first, own);
+}
+
 /* Count r->found, of r->trial. */
 static void count_found(Run *r, Tally *t) {
+  if (r->s->combined && r->found.strict && is_found(r, t)) return;
   if (r->found.strict && t->strict++ == 0) copy_continuation(r, &r->one, &r->found);
   if (r->found.strict && r->several_count < SEVERAL) r->several[r->several_count++] = r->trial.l.mode;
   if (t->found++ == 0) copy_continuation(r, &r->first, &r->found);
@@ -367,7 +383,7 @@ static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
   for (int i = 0; r->s->sets && i < r->m; i++)
     if (l->letter[i] == LEAVING) { solutions_of_leaving(r, l, found); return; }
   if (!is_mixed(r, l->sliding, l->slides)) {
-    if (l->slides && !improve(r, l, r->x, unknowns, 2)) return;
+    if (!satisfies(r, l->letter) || (l->slides && !improve(r, l, r->x, unknowns, 2))) return;
     memcpy(found->each, unknowns, sizeof(double) * w);
     found->count = 1;
     return;
@@ -474,10 +490,10 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
   Tally tally = {0};
   for (int i = 0; i < k; i++) {
     int own = r->active[i], s = set_of(r, own);
-    possible[i] = s >= 0 && own != s ? 4 : s == own || own >= r->m ? 5 : 7;
+    possible[i] = s >= 0 && own != s ? 4 : s == own || is_half_line(r, own) ? 5 : 7;
   }
-  int total = choices_of(possible, k);
-  if (total > TRIED) { finish(r, NON_UNIQUE, POSSIBLY_SEVERAL, 0); return 0; }
+  int total = choices_of(r, possible, k);
+  if (!total) { finish(r, NON_UNIQUE, POSSIBLY_SEVERAL, 0); return 0; }
   r->several_count = 0;
   for (int number = 0; number < total && r->status == RUNNING; number++) {
     spell_choice(r, letter, possible, number, trial);

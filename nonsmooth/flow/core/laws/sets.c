@@ -26,6 +26,7 @@ static double unit_of(const double *h, int k, double *u) {
  * being left. */
 static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns) {
   const double *h = 0;
+  combine_rows(r, letter, x);
   EACH_SET(r, f) {
     int k = size_of(r, f);
     double *u = r->direction + f;
@@ -43,6 +44,7 @@ static void aim(Run *r, const int8_t *letter, const double *x, const double *unk
 
 /* As the expansion began. */
 static void aim_again(Run *r, const Expansion *e) {
+  combine_rows(r, e->l.letter, r->x);
   for (int i = 0; r->s->sets && i < r->m; i++) {
     r->moving[i] = e->l.letter[i] > 1 && e->l.letter[i] != IDLE;
     r->direction[i] = set_of(r, i) < 0 ? 0 : e->lambda[(int64_t)i * r->stride];

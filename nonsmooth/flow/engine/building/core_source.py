@@ -21,8 +21,8 @@ MOST_ORDER = 48
 
 #: The driver in C, in the order in which it is read: one text.
 _FILES = """
-    programs.h pairs.h linear.h banded.h radau.h state.c modes.c jets.c laws/stability.c laws/sets.c stepper.c
-    near_zeros.c laws/elements.c record.c laws/spiral.c laws/vectors.c laws/blocks.c laws/decide.c laws/layer.c laws/contacts.c
+    programs.h pairs.h linear.h banded.h radau.h state.c modes.c laws/hidden.c jets.c laws/stability.c laws/sets.c
+    stepper.c near_zeros.c laws/elements.c record.c laws/spiral.c laws/vectors.c laws/blocks.c laws/decide.c laws/layer.c laws/contacts.c
     laws/complementarity.c laws/approach.c events.c collocation.c implicit.c stiffness.c driver.c accumulation.c laws/roots.c
     entry.c sample.c
 """.split()

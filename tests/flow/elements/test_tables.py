@@ -297,3 +297,22 @@ def test_exponents_and_returns_pass_breakpoints():
     np.testing.assert_allclose(found.sum_check, truth.sum_check, atol=1e-8)
     returns = [ns.orbit.poincare(one, "h4", [0.8, 0.4], count=3, tol=1e-12) for one in both]
     np.testing.assert_allclose(*[one.jacobian(2) for one in returns], atol=1e-9)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("speed", [-1.0, 0.0, 1.0])
+def test_starts_and_jumps_at_both_ends_of_a_range(side, speed):
+    line, s = ns.table(x, [-1, 0, 1], [-1.0, 0.0, 1.0], outside="error"), ca.SX.sym("s")
+    landing = ns.Reset(s - 1, {x: side, v: side * speed, s: 0.0}, direction=1)
+    still = ns.simulate(lifted([v, line - x]), [side, 0.0], 1.5)
+    assert still.status == ns.Status.REACHED_END and still.x[-1].tolist() == [side, 0.0]
+    start = ns.simulate(lifted([v, line - 2 * x]), [side, side * speed], 1.5, tol=1e-11)
+    jumping = lifted([v, line - 2 * x, 1], (x, v, s), resets=landing)
+    jump = ns.simulate(jumping, [0.0, 0.0, 0.0], 1.5, tol=1e-11)
+    for run, begin in ((start, 0.0), (jump, 1.0)):
+        if speed > 0:
+            assert run.status == ns.Status.NOT_FINITE and abs(run.t[-1] - begin) < 1e-9
+            continue
+        gone = 1.5 - begin
+        assert run.status == ns.Status.REACHED_END
+        assert abs(run.x[-1, 0] - side * (np.cos(gone) + speed * np.sin(gone))) < 1e-9

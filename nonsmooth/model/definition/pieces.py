@@ -144,6 +144,18 @@ def places_of(d: Definition) -> list[int]:
     return [*accumulate((counts.get(i, 1) for i in range(d.surfaces.numel())), initial=0)]
 
 
+def beyond_cells(d: Definition, signs: Sequence[float]) -> set[int]:
+    """Surfaces of breakpoints that are not beside the cell where surfaces have signs: others are met before them."""
+    places, found = places_of(d), set[int]()
+    for table in d.tables:
+        first = places[table.element]
+        own = signs[first : first + table.count]
+        above = own.count(1)
+        if own[:above].count(1) == above and own.count(-1) == table.count - above:
+            found |= {*range(first, first + table.count)} - {first + above - 1, first + above}
+    return found
+
+
 def in_cells(d: Definition, signs: Sequence[float]) -> ca.SX | None:
     """The field where surfaces and breakpoints have signs; None where these are of no cell."""
     places, (_, values), found = places_of(d), _parted(d), list[ca.SX]()

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...notebook import Markup, card
-from ..cache import Cache, Content
+from ..cache import CAPACITY, Cache, Content
 from ..calls import call
 from ..checks import real
 from ..errors import DefinitionError, PointError
@@ -47,6 +47,9 @@ T = TypeVar("T")
 _CLASSES_SHOWN = 8
 _EQUATIONS_SHOWN = 12
 _FUNCTIONS_SHOWN = 24
+#: What is made for an orbit in each cell of a table is kept: so many results more for each breakpoint.
+_OF_CELL = 8
+
 _SIDES = (("+", "above"), ("-", "below"))
 
 Discrete = Sequence[Expression] | Mapping[Any, Sequence[float] | None]
@@ -358,7 +361,7 @@ class FilippovSystem:
         self.state_names = tuple(names["states"])
         self.parameter_names = tuple(names["parameters"])
         self._extended_states = definition.extended_states
-        self._cache = Cache()
+        self._cache = Cache(CAPACITY + _OF_CELL * len(definition.breakpoints))
 
     @cached_property
     def nonlinear(self) -> Any:
@@ -633,6 +636,11 @@ class FilippovSystem:
             ]
         return tuple(result)
 
+    @cached_property
+    def _known_letters(self) -> tuple[str, ...]:
+        """Letters of all switching functions."""
+        return tuple(map(self._letters, range(self.surface_count)))
+
     def _letters(self, i: int) -> str:
         """Letters of a switching function; in runs those of sets are more."""
         if i in self.joints:
@@ -668,7 +676,8 @@ class FilippovSystem:
         m, c, wide = self.surface_count, len(self.impacts), self.widened(mode)
         whole = wide + "o" * c if isinstance(wide, str) and len(wide) == m else wide
         fits = isinstance(whole, str) and len(whole) == m + c and not set(whole[m:]) - set("oc")
-        if not fits or any(letter not in self._letters(i) for i, letter in enumerate(whole[:m])):
+        known = self._known_letters
+        if not fits or any(a not in b for a, b in zip(whole, known, strict=False)):
             raise DefinitionError(self._letters_expected(mode))
         return tuple(letters[letter] for letter in whole)
 

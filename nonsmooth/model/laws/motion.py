@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from ..definition.parse_definition import read_function
+from ..definition.pieces import beyond_cells
 from ..definition.system import FilippovSystem, require_system
 from ..errors import DefinitionError
 from ..expressions.identity import decide_zero
@@ -111,7 +112,11 @@ class Motion:
             self.mode, [coupled.layer, coupled.heights, coupled.factors, coupled.stops]
         )
         sliding = coupled.sliding(self.mode)
-        for i, sign in enumerate(system.parse_letters(self.mode)):
+        letters = system.parse_letters(self.mode)
+        beyond = beyond_cells(system.written, letters)
+        for i, sign in enumerate(letters):
+            if i in beyond:
+                continue
             of = (i, system.entry_of(i)) if i < m else (i - m, len(system.entries) + i - m)
             guard = lambda kind, side, of=of: Guard(kind, of[0], side, of[1])
             if sign:

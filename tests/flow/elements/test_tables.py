@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.model.laws.motion import motion
 
 x, v, t, q = (ca.SX.sym(s) for s in ("x", "v", "t", "q"))
 
@@ -316,3 +317,27 @@ def test_starts_and_jumps_at_both_ends_of_a_range(side, speed):
         gone = 1.5 - begin
         assert run.status == ns.Status.REACHED_END
         assert abs(run.x[-1, 0] - side * (np.cos(gone) + speed * np.sin(gone))) < 1e-9
+
+
+@pytest.mark.parametrize("count", [40, pytest.param(300, marks=pytest.mark.slow)])
+def test_an_orbit_through_many_breakpoints(count):
+    xs = np.linspace(-2, 2, count)
+    curve = ns.table(x, xs, np.sin(3 * xs) + 0.3 * xs)
+    system = lifted([v, -curve - x - 0.2 * v + ca.cos(t)], time=t)
+    run = ns.simulate(system, [0.8, 0.4], 40 * np.pi)
+    orbit = ns.periodic_orbit(system, run, period=2 * np.pi)
+    assert orbit.itinerary.count(" ") > count
+    again = orbit.trajectory
+    np.testing.assert_allclose(again.x[-1], orbit.start, atol=1e-9)
+    by_run = np.linalg.eigvals(ns.sensitivity(again).dx_dx0)
+    np.testing.assert_allclose(*map(np.sort_complex, (orbit.multipliers, by_run)), atol=1e-8)
+
+
+def test_modes_of_tables_watch_the_breakpoints_beside_their_cell():
+    system = SYSTEMS["two arguments"]
+    run = ns.simulate(system, [0.8, 0.4], 3.0)
+    for event in [*run.events][:-1]:
+        guards = motion(system, event.mode_before).guards
+        assert 2 <= len(guards) <= 4 and event.element in [g.element for g in guards]
+        letters = event.mode_before
+        assert all(letters[g.element] == "-+"[g.side > 0] for g in guards)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from ...flow.fixed import flow_for
 from ...flow.names import event_name, shown_mode
 from ...flow.trajectory import Trajectory
 from ...flow.variation import NONE, FlownLeg, carry_legs, require_done
-from ...model import Array, DegenerateError, FilippovSystem, coupled_of, multiplier_enters
+from ...model import Array, DegenerateError, FilippovSystem, Surfaces, coupled_of, multiplier_enters
 from ...model.derivatives.event_maps import (
     AtEvent,
     EventMap,
@@ -32,7 +32,9 @@ from ...model.derivatives.event_maps import (
     jumping,
     struck_by,
     surface_map,
+    takes_in_space,
 )
+from ...model.derivatives.impact_in_space import ImpactInSpace, ways_of
 from ...model.derivatives.variational import VariationalField, variational_field
 
 #: Errors of located events, relative to the size of the states.
@@ -40,6 +42,12 @@ _LOCATED = 1e-7
 
 #: Switching functions of a set that was held are zero at this part of what they are made of.
 _ON_SET = 1e-14
+
+#: Impulses and bounds that are negative by this part of the error of a location are zero.
+_ROUNDED = 1e-4
+
+#: Ways in which contacts and friction may take part in an impact, of which so many are tried.
+_MOST_WAYS = 512
 
 #: Directions that differ by less than this are one: the gradients of events at one instant.
 _PARALLEL = 1e-7
@@ -292,10 +300,6 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
     system, p = run.system, parameters_of(run)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
-    if any(coupled_of(system).carriers[i] for i in system.set_of):
-        raise DegenerateError(
-            "run: derivatives of friction in space that the reaction of a contact bounds are not implemented."
-        )
     if len(system.joints) > 1:
         _require_independent(system, run.events[0].mode_before, x, p)
     if system.sets:
@@ -367,8 +371,11 @@ def _require_independent(system: FilippovSystem, mode: str, x: Array, p: Array) 
 
 def _require_held(system: FilippovSystem, mode: str, x: Array, p: Array) -> None:
     """Refuse a start (N,) on a set off which the mode is, which neighbours leave from elsewhere."""
-    h, letters = coupled_of(system).heights_at(x, p), system.parse_letters(mode)
+    coupled, letters = coupled_of(system), system.parse_letters(mode)
+    h, is_open = coupled.heights_at(x, p), letters[system.surface_count :]
     for members in system.sets:
+        if (own := coupled.carriers[members[0]]) and all(is_open[j] for j in own):
+            continue  # friction without load
         leaves = letters[members[0]] and not h[list(members)].any()
         if leaves and multiplier_enters(system, members, p):
             raise DegenerateError(
@@ -527,8 +534,31 @@ def _letters(system: FilippovSystem, event: Event, p: Array) -> str:
     x = _extended(system, event.x, event.t)
     own = Leg(event.mode_before, event.kind, event.element, event.side)
     after = _extended(system, event.x_after, event.t)
+    mode, contact = system.widened(event.mode_before), event.element - len(system.entries)
+    if takes_in_space(system, mode, contact):
+        return _letters_in_space(system, mode, contact, x, after, p)
     choice = lambda letters: replace(own, letters=letters).at_event(system, x, p)
     return struck_letters(system, event.mode_before, event.element, choice, after)
+
+
+def _letters_in_space(
+    system: FilippovSystem, mode: str, contact: int, x: Array, after: Array, p: Array
+) -> str:
+    """The ways in which contacts and friction took part in an impact with friction in space."""
+    h, gradient = Surfaces(system).values(after, p)
+    h = np.where(np.abs(h) > _LOCATED * (np.abs(gradient) @ (1.0 + np.abs(after))), h, 0.0)
+    near = _LOCATED * (1.0 + float(np.abs(after).max()))
+    for letters in islice(ways_of(system, mode, contact, h), _MOST_WAYS):
+        element = len(system.entries) + contact
+        struck = instant_map(system, mode, "impact", element, letters)
+        assert isinstance(struck, ImpactInSpace)
+        at, margin = struck.at(x, p)
+        if margin >= -_ROUNDED * near and float(np.abs(at.after - after).max()) <= near:
+            return letters
+    raise DegenerateError(
+        f"impact of {system.impacts[contact]!r}: its derivatives are implemented where one contact closes, impulses "
+        "are determined, and friction in space clearly holds or clearly slips. Start after it, or move the start."
+    )
 
 
 def struck_letters(

@@ -21,7 +21,7 @@ from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
 from ..laws.switches import Guard
 from ..values import Array
-from .event_maps import AtEvent, EventMap, struck_by
+from .event_maps import AtEvent, EventMap, struck_by, takes_in_space
 
 #: Part of its bound up to which friction is taken to hold: closer to it, derivatives are one-sided.
 _HOLDS = 1 - 1e-6
@@ -234,6 +234,16 @@ class _Parties:
         which = ca.vertcat(*[reactions[j] for j in impulses])
         factor = ca.substitute(self._coupled.factors[first], which, ca.vertcat(*impulses.values()))
         return self._at(factor, x)
+
+
+def holding(system: FilippovSystem, mode: str, contact: int, letters: str) -> list[int]:
+    """First functions of the sets of friction that holds to the end of an impact."""
+    if not takes_in_space(system, mode := system.widened(mode), contact):
+        return []
+    parties = _Parties(system, mode, contact)
+    last = letters[-len(parties.letters_of_phase) :]
+    pairs = zip(parties.frictions, last, strict=False)
+    return [members[0] for members, letter in pairs if letter == "s" and len(members) > 1]
 
 
 def ways_of(system: FilippovSystem, mode: str, contact: int, after: Array) -> Iterator[str]:

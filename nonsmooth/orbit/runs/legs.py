@@ -34,7 +34,7 @@ from ...model.derivatives.event_maps import (
     surface_map,
     takes_in_space,
 )
-from ...model.derivatives.impact_in_space import ImpactInSpace, ways_of
+from ...model.derivatives.impact_in_space import ImpactInSpace, holding, ways_of
 from ...model.derivatives.variational import VariationalField, variational_field
 
 #: Errors of located events, relative to the size of the states.
@@ -331,7 +331,9 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
             own = x[system.dimension - discrete : system.dimension]
             leg = replace(leg, discrete=tuple(own.tolist()))
         if result and system.sets:
-            leg = replace(leg, left=sets_left(system, result[-1].leg.mode, leg.mode, x, p))
+            leg = replace(
+                leg, left=sets_left(system, held_before(system, result[-1].leg), leg.mode, x, p)
+            )
         result.append(Stretch(leg, t, first.t - t, x, x_end, after))
         t, x = last.t, after
     return result
@@ -343,6 +345,17 @@ def _extended(system: FilippovSystem, x: Array, t: float) -> Array:
     extended = np.empty(len(x) + 1)
     extended[:-1], extended[-1] = x, t
     return extended
+
+
+def held_before(system: FilippovSystem, leg: Leg) -> str:
+    """The mode of a leg, where friction in space holds if it did so at the impact that ends the leg."""
+    if leg.kind != "impact":
+        return leg.mode
+    contact = leg.element - len(system.entries)
+    holds = holding(system, leg.mode, contact, leg.letters)
+    letters = zip(leg.mode, system.entries, strict=False)
+    own = "".join("s" if members[0] in holds else letter for letter, members in letters)
+    return own + leg.mode[len(own) :]
 
 
 def sets_left(

@@ -37,6 +37,7 @@ from .legs import (
     Stretch,
     carry_leg,
     flows_of,
+    held_before,
     leg_name,
     parameters_of,
     rate_at,
@@ -435,7 +436,7 @@ def saltation_after(
     system, ends = run.system, run.events[-1]
     leg = following.leg if following else None
     if leg is None and ends.kind == "end":
-        left = sets_left(system, part.leg.mode, ends.mode_before, part.after, p)
+        left = sets_left(system, held_before(system, part.leg), ends.mode_before, part.after, p)
         leg = Leg(ends.mode_before, left=left)
     at = flow.at or part.leg.at_event(system, flow.end, p)
     if system.sets and following is None and leg is not None:  # the run ends at the event

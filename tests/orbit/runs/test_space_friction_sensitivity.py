@@ -38,6 +38,25 @@ def box(law="newton", plate=(0, 0), push=(0, 0), inertia=((0, 0), (0, 0)), floor
     )
 
 
+def valley(law):
+    """A body in a valley y = 0.3 x1^2, with two spins in the units of the slip."""
+    x = [ca.SX.sym(name) for name in ("x1", "x2", "y", "v1", "v2", "vy", "w1", "w2")]
+    x1, _, y, v1, v2, vy, w1, w2 = x
+    lam, r = ca.SX.sym("lam", 2), ca.SX.sym("r")
+    length = ca.sqrt(1 + (0.6 * x1) ** 2)
+    along, up = 1 / length, 0.6 * x1 / length
+    one, two = -MU * r * lam[0], -MU * r * lam[1]
+    force = [one * along - r * up, two, one * up + r * along - G]
+    return ns.FilippovSystem(
+        x,
+        field=[v1, v2, vy, *force, 2.5 * one, 2.5 * two],
+        surfaces=[ca.vertcat(v1 * along + vy * up + w1, v2 + w2)],
+        multipliers=[lam],
+        impacts=ns.Impact(y - 0.3 * x1**2, reaction=r, restitution=E, law=law),
+        parameters={MU: 0.1, A: 1.0, E: 0.5},
+    )
+
+
 def require_central_differences(system, start, end, values, itinerary, tol=1e-7, h=2e-4):
     """Derivatives of a run, forward and back, are differences of order four of runs; what holds by contact is kept."""
     start, names = np.array(start, float), ("mu", "a", "e")
@@ -136,6 +155,15 @@ def test_impacts_that_slip_and_hold_are_central_differences(law, mu):
     system = box(law, inertia=BODY, lift=0.2)
     start = [0, 0, 1, 2, 0.5, 0, 1, -0.7]
     require_central_differences(system, start, 0.7, [mu, 1, 0.5], "*o")
+
+
+@pytest.mark.parametrize(
+    ("e", "end", "itinerary"), [(0.5, 0.9, "*o"), (0.0, 0.5, "*o *c"), (0.0, 0.7, "*o *c sc")]
+)
+def test_a_ball_in_a_valley_is_central_differences(e, end, itinerary):
+    """A plastic impact takes all slip, and the ball slips at once from there."""
+    start = [0.5, 0, 1, 0.6, 0.5, 0, 1, -0.7]
+    require_central_differences(valley("newton"), start, end, [0.1, 1, e], itinerary)
 
 
 def test_an_impact_that_just_holds_has_no_derivative():

@@ -23,11 +23,12 @@ def guard_name(system: FilippovSystem, guard: Guard) -> str:
         return system.impacts[k - len(system.entries)]
     if _is_condition(system, k):
         return system.surface_names[system.entries[k][0]]
+    number = system.numbers[k]
     if kind in ("surface", "near"):
-        return f"h{k}"
+        return f"h{number}"
     if len(system.entries[k]) > 1:
-        return f"|lambda{k}| = 1"
-    return f"lambda{k} = {guard.side}" if guard.side else "stability of sliding"
+        return f"|lambda{number}| = 1"
+    return f"lambda{number} = {guard.side}" if guard.side else "stability of sliding"
 
 
 def _is_condition(system: FilippovSystem, k: int) -> bool:
@@ -41,9 +42,9 @@ def described(system: FilippovSystem, guard: Guard) -> str:
     if _is_condition(system, k) and guard.kind in ("surface", "release"):
         return f"{'y' if guard.kind == 'surface' else 'the multiplier'} of {name!r} >= 0"
     if guard.kind == "surface":
-        return f"h{k} {'>' if guard.side > 0 else '<'} 0"
+        return f"h{system.numbers[k]} {'>' if guard.side > 0 else '<'} 0"
     if guard.kind == "exit":
-        return f"lambda{k} {'<= 1' if guard.side > 0 else '>= -1'}"
+        return f"lambda{system.numbers[k]} {'<= 1' if guard.side > 0 else '>= -1'}"
     of = {"impact": "gap", "release": "reaction"}.get(guard.kind)
     return f"the {of} of {name!r} >= 0" if of else name
 

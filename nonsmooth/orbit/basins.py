@@ -109,7 +109,9 @@ class Attractor:
     multipliers: NDArray[np.complex128] = field(default_factory=lambda: np.zeros(0, complex))
 
     def __repr__(self) -> str:
-        middle = ", ".join(f"{v:.6g}" for v in self.points.mean(axis=0))
+        small = 1e-9 * float(np.abs(self.points).max(initial=0.0))
+        means = self.points.mean(axis=0)
+        middle = ", ".join(f"{v if abs(v) > small else 0:.6g}" for v in means)
         period = f" of period {self.period:.10g}" if self.kind == "cycle" else ""
         points = f"{len(self.points)} point" + "s" * (len(self.points) != 1)
         return f"Attractor({self.kind}{period}, {points} about ({middle}))"
@@ -195,7 +197,10 @@ class Search:
         """Set the unit of distances and the box beyond which runs are lost, from states (m, n)."""
         finite = x[np.all(np.isfinite(x), axis=1)]
         low, high = finite.min(axis=0), finite.max(axis=0)
-        self.scale = np.where(high > low, high - low, 1.0)
+        rounding = self.tolerances.atol + self.tolerances.rtol * np.maximum(
+            np.abs(low), np.abs(high)
+        )
+        self.scale = np.where(high - low > 10 * rounding, high - low, 1.0)
         self.box = low - 100 * self.scale, high + 100 * self.scale
 
     def known(self, attractor: Attractor) -> int:
@@ -419,7 +424,11 @@ class Search:
             found = self._polished(at, i, row, p, period)
             self._failures += found is None
         x = at.x[i, : last + 1]
-        if found is None and np.abs((x[last] - x[last - p]) / self.scale).max() <= _STILL:
+        back = x[
+            last - p * np.arange(1, 1 + max(1, last // 4 // p))
+        ]  # a slow focus comes nearer yet
+        change = np.abs((x[last] - back) / self.scale).max(axis=1)
+        if found is None and change[0] <= _STILL and change.max() <= 0.1 * _EQUAL:
             if np.abs((x[p:] - x[:-p]) / self.scale).max() < 1e3 * _STILL:
                 return UNDECIDED  # it came nearer to nothing
             if not self._moves(x[last], period):
@@ -455,10 +464,9 @@ class Search:
         section, count = self.section, int(at.number[i])
         assert section is not None
         end = float(at.t[i, count - 1])
-        about = self.period / section.every if self.period is not None else period
         try:
             run = simulate(self.system, self.x0[row], end, t_start=self.t_start, **given)
-            orbit = periodic_orbit(self.system, run, period=about, **given)
+            orbit = self._orbit(run, period)
             turns = round(period / orbit.period)
             if abs(turns * orbit.period - period) > 0.05 * orbit.period:
                 return None
@@ -474,6 +482,20 @@ class Search:
         ]
         period, points = turns * orbit.period * same[0] / p, points[: same[0]]
         return Attractor(points, "cycle", period, orbit.multipliers ** round(period / orbit.period))
+
+    def _orbit(self, run: Any, period: float) -> PeriodicOrbit:
+        """The orbit to which a run comes, of which a period of returns may hold some turns."""
+        assert self.section is not None
+        given: dict[str, Any] = {"parameters": self.parameters}
+        every = self.section.every
+        if self.period is not None:
+            return periodic_orbit(self.system, run, period=self.period / every, **given)
+        for turns in (d for d in range(every, 1, -1) if every % d == 0):
+            try:
+                return periodic_orbit(self.system, run, period=period / turns, **given)
+            except NonsmoothError:  # it is a longer one
+                continue
+        return periodic_orbit(self.system, run, period=period, **given)
 
     def _points(self, orbit: PeriodicOrbit, p: int, period: float, x: Array) -> Array | None:
         """Points (p, n) of a cycle on the section, of which the last is near a state; None if none is."""

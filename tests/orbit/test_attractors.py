@@ -159,3 +159,30 @@ def test_kinds_survive_a_file(tmp_path):
     assert np.array_equal(again.multipliers, one.multipliers) and "cycle of period 6.29" in repr(
         again
     )
+
+
+@pytest.mark.parametrize("every", [1, 2, 6])
+def test_two_cycles_on_a_line_where_a_state_is_zero(every):
+    """r' = -k (r - 1) (r - 1.05) (r - 1.1), from and with returns to v = 0."""
+    r = ca.sqrt(x**2 + v**2)
+    rate = -200 * (r - 1) * (r - 1.05) * (r - 1.1)
+    system = ns.FilippovSystem([x, v], field=[rate * x - v, rate * v + x])
+    section = ns.Section(v, 1, every=every)
+    starts = {"x": [0.8, 0.9, 1.04, 1.06, 1.2, 1.5], "v": 0.0}
+    found = ns.basins(system, starts, 500.0, section=section, work=QUIET)
+    inner, outer = found.labels[[0, -1]]
+    assert found.labels.tolist() == 3 * [inner] + 3 * [outer] and {inner, outer} == {1, 2}
+    for label, radius in ((inner, 1.0), (outer, 1.1)):
+        one = found.attractors[label - 1]
+        factor = math.exp(-200 * radius * 0.05 * 0.1 * 2 * math.pi * every)
+        assert one.kind == "cycle" and abs(one.period - 2 * math.pi * every) < 1e-9
+        assert np.abs(one.points - [radius, 0.0]).max() < 1e-9
+        assert abs(one.multipliers[1] - factor) < 1e-6
+
+
+@pytest.mark.slow
+def test_a_slow_focus_is_no_cycle():
+    focus = ns.FilippovSystem([x, v], field=[v, -x - 0.002 * v])
+    starts = {"x": np.linspace(-1, 1, 4), "v": 0.5}
+    found = ns.basins(focus, starts, 20000.0, section=ns.Section(v, 1), work=QUIET)
+    assert found.fractions == {1: 1.0} and [a.kind for a in found.attractors] == ["point"]

@@ -44,7 +44,7 @@ class EndOfLeg(NamedTuple):
 
 
 class GivenLegs(NamedTuple):
-    """Legs: letters of their modes (L, w), starts (L, n), durations (L,), ends; parameters, error, most steps of a leg;
+    """Legs: letters of their modes (L, w), starts (L, n), durations (L,), ends; parameters (np,) or (L, np), error, most steps of a leg;
     times of samples since the starts (K,), and where those of each leg begin (L + 1,)."""
 
     letters: NDArray[np.int8]
@@ -74,11 +74,14 @@ class CarriedLegs:
         legs, n = given.starts.shape
         self._engine, self.given = engine, given
         self.ends, self.before, self.rates = (np.empty((legs, n)) for _ in range(3))
-        self.gradients = np.empty((legs, n + len(given.p)))
+        self.gradients = np.empty((legs, n + given.p.shape[-1]))
         self._y, self._samples = np.zeros((legs, count, n)), np.empty((len(given.times), count, n))
         self._y[:, range(min(n, count)), range(min(n, count))] = 1.0
         self._kept = [np.ascontiguousarray(a) for a in given[:3]]
-        self._kept += [np.append(given.p, 0.0), np.ascontiguousarray(given.times, float)]
+        self._kept += [
+            np.append(given.p, np.zeros((*given.p.shape[:-1], 1)), -1),
+            np.ascontiguousarray(given.times, float),
+        ]
         self.failed, self.status, self.left = -1, DONE, 0.0
         self.row = np.zeros(n)
         self._c = self._structures(count, starts)
@@ -104,6 +107,8 @@ class CarriedLegs:
             a.ctypes.data + row for a in (self.before, self.rates)
         )
         made["y"], made["p"] = self._y.ctypes.data + row * count, p.ctypes.data
+        if p.ndim > 1:
+            made["p"] = p.ctypes.data + np.arange(legs) * 8 * p.shape[1]
         made["sample_t"] = times.ctypes.data + 8 * given.first[:-1]
         made["at_samples"] = self._samples.ctypes.data + 8 * n * count * given.first[:-1]
         gradients = self.gradients.ctypes.data + np.arange(legs) * 8 * self.gradients.shape[1]
@@ -186,7 +191,7 @@ class ColumnsEngine(TapeEngine):
     def record(self, given: GivenLegs) -> CarriedLegs:
         """Carry states over legs by steps that rows can take back: short enough for two columns; implicit ones end at
         samples."""
-        (legs, n), q = given.starts.shape, len(given.p)
+        (legs, n), q = given.starts.shape, given.p.shape[-1]
         some = 1.0 + 0.5 * np.cos(np.arange(max(n, q)))
         room = _ROOM + _STEPS * legs
         while True:

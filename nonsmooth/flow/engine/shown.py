@@ -35,8 +35,9 @@ class Shown:
 
     def with_cells(self, p: Array) -> Array:
         """Parameters (..., np) with room for those of cells."""
-        more = np.zeros((*p.shape[:-1], self._cells + 1))
-        return np.ascontiguousarray(np.append(p, more, axis=-1), float)
+        whole = np.zeros((*p.shape[:-1], p.shape[-1] + self._cells + 1))
+        whole[..., : p.shape[-1]] = p
+        return whole
 
     def where(self, reason: str, function: int) -> int:
         """Where a run ended, in results."""

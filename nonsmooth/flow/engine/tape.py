@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import chain
 from typing import Any
 
@@ -49,6 +49,9 @@ Block = NDArray[Any] | ctypes.Structure | ctypes.Array[Any]
 
 #: Steps by which a run is known to be stiff.
 _PROBED = 400
+
+#: Modes whose letters are kept.
+_KNOWN = 4096
 
 
 @lru_cache(maxsize=1)
@@ -150,6 +153,7 @@ class TapeEngine:
         if entries is not None:
             self._c.derivatives = self._entries(entries)
         self._rooms: Rooms = rooms_of((0, 0, 0))
+        self._known_modes = dict[bytes, str]()
         self._last_spelled: tuple[bytes | None, list[str]] = (None, [])
 
     def _derived(self) -> tuple[Series, Entries]:
@@ -393,7 +397,7 @@ class TapeEngine:
     def _letters(self, mode: str | None) -> NDArray[np.int8] | None:
         return None if mode is None else np.array([*self.shown.narrowed(mode), 0], np.int8)
 
-    @property
+    @cached_property
     def _width(self) -> int:
         """Bytes of a mode: letters, then values of discrete states."""
         system = self.system
@@ -441,9 +445,17 @@ class TapeEngine:
 
     def _modes(self, table: int) -> list[str]:
         """Modes that were met, by number."""
+        met, width, known = self._met(table).tobytes(), self._width, self._known_modes
+        rows = [met[k : k + width] for k in range(0, len(met), width)] if width else [b""]
+        if len(known) > _KNOWN:
+            known.clear()
+        return [known.get(row) or known.setdefault(row, self._letters_of(row)) for row in rows]
+
+    def _letters_of(self, row: bytes) -> str:
+        """Letters of a mode, of which all bytes are given."""
         width = self.system.surface_count + len(self.system.impacts)
-        letters = [self._spelled(row) for row in self._met(table)[:, :width].tolist()]
-        return [*map(self.shown.widened, letters, self._values(table)[:, self._discrete :])]
+        letters = self._spelled(np.frombuffer(row[:width], np.int8).tolist())
+        return self.shown.widened(letters, np.frombuffer(row[width:])[self._discrete :])
 
     @property
     def _discrete(self) -> int:

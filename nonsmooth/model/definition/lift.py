@@ -126,6 +126,11 @@ class Switches:
         self.all.append(Switch(h, lam, even, form, [origin]))
         return k, 1
 
+    def reduced(self, e: ca.SX) -> ca.SX:
+        """An expression, as a number where all else in it cancels."""
+        form = self._forms.of(e)
+        return ca.SX(form.get((), 0.0)) if not form.keys() - {()} else e
+
     def value(self, curve: Curve, u: ca.SX, sides: Sides) -> ca.SX:
         """The value of a curve at an argument, a symbol."""
         form = self._forms.of(u)
@@ -407,10 +412,9 @@ class _Lifter:
             return _Value(curve.of(argument.e))
 
         def value(args: list[_Value], sides: Sides = ()) -> _Value:
-            constant = not ca.depends_on(args[0].e, self.moving)
-            return _Value(
-                curve.of(args[0].e) if constant else self.switches.value(curve, args[0].e, sides)
-            )
+            u = self.switches.reduced(args[0].e)
+            constant = not ca.depends_on(u, self.moving)
+            return _Value(curve.of(u) if constant else self.switches.value(curve, u, sides))
 
         return self._over_sides([argument], argument.inside, value)
 

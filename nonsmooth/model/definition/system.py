@@ -372,6 +372,9 @@ class FilippovSystem:
             return self
         system = type(self).__new__(type(self))
         system._adopt(by_pieces(self.written))
+        counts = {table.element: table.count for table in self.written.tables}
+        sizes = [counts.get(members[0], 1) for members in system.entries]
+        system.numbers = tuple(accumulate(sizes, initial=0))
         return system
 
     @cached_property
@@ -511,6 +514,11 @@ class FilippovSystem:
         return tuple(tuple(range(f, f + k)) for f, k in zip(firsts, sizes, strict=False))
 
     @cached_property
+    def numbers(self) -> tuple[int, ...]:
+        """Number of each surface or set in names and in modes that are shown, and how many there are."""
+        return tuple(range(len(self.entries) + 1))
+
+    @cached_property
     def layer_widths(self) -> tuple[float, ...]:
         """Widths of the layers of the switching functions."""
         return self.definition.layer_widths or (1.0,) * self.surface_count
@@ -559,7 +567,7 @@ class FilippovSystem:
     @cached_property
     def surface_names(self) -> tuple[str, ...]:
         """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set, or as given."""
-        names = [f"h{k}" for k, members in enumerate(self.entries) for _ in members]
+        names = [f"h{self.numbers[k]}" for k, own in enumerate(self.entries) for _ in own]
         for i, name in zip(self.half_lines, self.complementarity, strict=True):
             names[i] = name
         return tuple(names)

@@ -34,7 +34,9 @@ def table(
     Nothing is interpolated behind the solver's back: a step ends at each breakpoint that it passes, where the
     curve has a kink (order 1) or a jump of its third derivative (order 3). Breakpoints that the argument cannot
     pass, as that at 0 of the absolute value of something, are none. A run has the cell of a table between two
-    breakpoints as its state: what a step costs does not depend on their number.
+    breakpoints as its state: what a step costs does not depend on their number, and neither do the derivatives of a leg
+    (``sensitivity``, ``gradient``, ``vjp``, ``lyapunov_spectrum``). Elsewhere, as in ``periodic_orbit``, each breakpoint is
+    a switch.
 
     Parameters
     ----------

@@ -219,7 +219,7 @@ def _without_events(
         x = np.append(run(low), low) if run.system.time_dependent else run(low)
         periods = (high - low) / period if period else 0.0
         leg = type(part.leg)(part.leg.mode)
-        cut = Stretch(leg, low, high - low, x, x, x)
+        cut = replace(part, leg=leg, t=low, duration=high - low, start=x, end=x, after=x)
         found.append(_Recurrence((cut,), round(2 * periods) / 2, distance))
     best = min((r.distance for r in found), default=np.inf)
     good = [r for r in found if r.distance <= max(3.0 * best, 1e-9)]

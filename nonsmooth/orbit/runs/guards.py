@@ -7,9 +7,10 @@ without samples.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 
@@ -48,12 +49,24 @@ class Watch:
     faults: list[str]
 
 
-def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array) -> Watch:
+#: What is watched of tables, by function: each breakpoint beside the cell with its guard as results show it.
+Beside = Mapping[int, Sequence[tuple[float, Guard]]]
+
+
+def watch(
+    system: FilippovSystem,
+    mode: str,
+    x: Array,
+    duration: float,
+    p: Array,
+    beside: Beside = MappingProxyType({}),
+) -> Watch:
     """Find the extrema of all guards inside a leg, and the violations."""
     field = guarded_field(system, mode)
     y = variational_field(system, mode).states_at(x, p)
     ((rows,), _, _) = LegsWatch([field])([y], p, np.array([duration]), _ENDS)
-    return Watch(_approaches(field, rows, p), _violations_along(field, rows, p))
+    faults = [] if beside else _violations_along(field, rows, p)
+    return Watch(_approaches(field, rows, p, beside), faults)
 
 
 def is_met(field: GuardedField, row: Array, p: Array) -> bool:
@@ -64,11 +77,19 @@ def is_met(field: GuardedField, row: Array, p: Array) -> bool:
     return is_due_at(system, guard, row[4 : 4 + system.extended_dimension], p)
 
 
-def _approaches(field: GuardedField, rows: Array, p: Array) -> list[Approach]:
+def _approaches(field: GuardedField, rows: Array, p: Array, beside: Beside) -> list[Approach]:
     """Extrema at which guards come near to zero."""
     guards, found = field.motion.guards, list[Approach]()
     for row in rows:
         guard, (t, value, bend) = guards[int(row[0])], row[1:4].tolist()
+        near = beside.get(guard.index, ()) if guard.kind == "surface" else ()
+        for level, own in near if bend else ():
+            size = float(np.linalg.norm(field.gradients.copied(row[4:], p)[0][int(row[0])]))
+            if bend * own.side > 0.0 and size > 0.0:
+                distance = own.side * (value - level)
+                found.append(Approach(own, t, distance, distance / size))
+        if near or (guard.kind == "surface" and guard.index in beside):
+            continue
         if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_met(field, row, p):
             slope = field.gradients.copied(row[4:], p)[0][int(row[0])]
             size = math.sqrt(float(slope @ slope))

@@ -36,6 +36,7 @@ from ...model.derivatives.event_maps import (
 )
 from ...model.derivatives.impact_in_space import ImpactInSpace, holding, ways_of
 from ...model.derivatives.variational import VariationalField, variational_field
+from .cells import cells_of
 
 #: Errors of located events, relative to the size of the states.
 _LOCATED = 1e-7
@@ -114,8 +115,8 @@ class Leg:
         return EndOfLeg(guard="surface", number=members[0])
 
     def _is_plain(self, system: FilippovSystem) -> bool:
-        """Whether its event is one of a surface without memory, whose multipliers enter linearly."""
-        return system.laws[self.element] == "surface" and not any(system.nonlinear)
+        """Whether its event is one of a table or a surface without memory, whose multipliers enter linearly."""
+        return system.laws[self.element] in ("surface", "table") and not any(system.nonlinear)
 
     def map(self, system: FilippovSystem) -> EventMap | None:
         """The event's function and what it does to the state; None where a time ends the leg."""
@@ -288,6 +289,11 @@ class Stretch:
     start: Array
     end: Array
     after: Array
+    #: The system of its mode, and all its parameters.
+    system: FilippovSystem
+    p: Array
+    #: The same leg as results show it.
+    shown: Leg
 
 
 def parameters_of(run: Trajectory) -> Array:
@@ -295,19 +301,29 @@ def parameters_of(run: Trajectory) -> Array:
     return np.array([run.parameters[name] for name in run.system.parameter_names], float)
 
 
-def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
-    """Split a run into legs, one for each instant with events; ``begins``: those at its start count."""
-    system, p = run.system, parameters_of(run)
+def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> list[Stretch]:
+    """Split a run into legs, one for each instant with events; ``begins``: those at its start count; ``driven``: with
+    the system of pieces, whose tables have cells."""
+    cells, own_p = cells_of(run.system) if driven else None, parameters_of(run)
+    system = cells.system if cells else run.system
+    mode, p = run.events[0].mode_before, own_p
+    if cells:
+        mode, p = cells.mode(mode), cells.parameters(p, mode)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
     if len(system.joints) > 1:
-        _require_independent(system, run.events[0].mode_before, x, p)
+        _require_independent(system, mode, x, p)
     if system.sets:
-        _require_held(system, run.events[0].mode_before, x, p)
+        _require_held(system, mode, x, p)
     known: dict[tuple[object, ...], Leg] = {}
     discrete = len(system.definition.discrete)
     for group in _instants(run.events):
-        first, last = group[0], group[-1]
+        first, last, shown = group[0], group[-1], group[0]
+        if cells:
+            p = cells.parameters(own_p, first.mode_before)
+            group = [e for e in group if not cells.is_breakpoint(e)] or group[:1]
+            shown, group = group[0], [cells.event(e) for e in group]
+            first, last = group[0], group[-1]
         _require_countable(group, len(system.entries))
         x_end = _extended(system, first.x, first.t)
         if len(group) == 1 and first.kind in ("crossing", "entry", "exit"):
@@ -331,10 +347,12 @@ def stretches(run: Trajectory, begins: bool = True) -> list[Stretch]:
             own = x[system.dimension - discrete : system.dimension]
             leg = replace(leg, discrete=tuple(own.tolist()))
         if result and system.sets:
-            leg = replace(
-                leg, left=sets_left(system, held_before(system, result[-1].leg), leg.mode, x, p)
-            )
-        result.append(Stretch(leg, t, first.t - t, x, x_end, after))
+            before = held_before(system, result[-1].leg)
+            leg = replace(leg, left=sets_left(system, before, leg.mode, x, p))
+        as_shown = leg
+        if cells and cells.tables:
+            as_shown = replace(leg, mode=shown.mode_before, element=shown.element)
+        result.append(Stretch(leg, t, first.t - t, x, x_end, after, system, p, as_shown))
         t, x = last.t, after
     return result
 

@@ -213,7 +213,6 @@ class _Frame:
     def __init__(self, run: Trajectory, count: int, begin: float):
         self.run, self.system = run, run.system
         self.n = self.system.dimension - len(self.system.definition.discrete)
-        self.p = run.system.parameter_vector(run.parameters)
         # Directions in general position: coordinate axes may lie in invariant subspaces.
         self.q = np.linalg.qr(np.random.default_rng(0).normal(size=(self.n, count)))[0]
         self.bounds = np.linspace(begin, float(run.t[-1]), _BLOCKS + 1)
@@ -222,7 +221,7 @@ class _Frame:
 
     def follow(self, progress: bool) -> LyapunovSpectrum:
         """Follow the run and return its exponents."""
-        parts = stretches(self.run)
+        parts = stretches(self.run, driven=True)
         bar = progress_bar(len(parts), progress, "leg")
         complete = True
         try:
@@ -252,7 +251,7 @@ class _Frame:
         return flow
 
     def _piece(self, part: Stretch, x: Array, t: float, duration: float, depth: int) -> LegFlow:
-        flow = carry_leg(self.system, part.leg, x, duration, self.p)
+        flow = carry_leg(part.system, part.leg, x, duration, part.p)
         if not self.q.shape[1]:
             return flow
         q, r = np.linalg.qr(flow.by_start[: self.n, : self.n] @ self.q)
@@ -262,11 +261,11 @@ class _Frame:
             return self._piece(part, half.end[: len(x)], t + duration / 2, duration / 2, depth + 1)
         self._count(q, growth, t + duration / 2)
         if t >= self.bounds[0] and self.q.shape[1] == self.n:
-            self.volume += self._divergence(part.leg.mode, t, duration)
+            self.volume += self._divergence(part, t, duration)
         return flow
 
     def _event(self, part: Stretch, flow: LegFlow, following: Stretch | None) -> None:
-        event = saltation_after(self.run, part, flow, following, None, self.p)
+        event = saltation_after(self.run, part, flow, following, None)
         if event is None or part.leg.kind == "end" or not self.q.shape[1]:
             return
         matrix = event.matrix[: self.n, : self.n]
@@ -292,7 +291,7 @@ class _Frame:
 
     def _diverging(self, matrix: Array, part: Stretch) -> DegenerateError:
         return DegenerateError(
-            f"{part.leg.name(self.system)!r} at t = {self.t:.10g} has derivatives up to {np.abs(matrix).max():.2g}, too "
+            f"{part.shown.name(self.system)!r} at t = {self.t:.10g} has derivatives up to {np.abs(matrix).max():.2g}, too "
             f"large to resolve the other directions. The run diverges, or its states need other units: the "
             f"last one is {part.end[: self.n].tolist()}."
         )
@@ -308,9 +307,9 @@ class _Frame:
         found = np.searchsorted(self.bounds, t - AT_END * max(1.0, abs(t)), side="left")
         return min(int(found) - 1, _BLOCKS - 1)
 
-    def _divergence(self, mode: str, t: float, duration: float) -> float:
+    def _divergence(self, part: Stretch, t: float, duration: float) -> float:
         """Integral of the divergence of a mode's field along the run, by Gauss's rule on each step."""
-        run, system = self.run, self.system
+        run, system, mode = self.run, part.system, part.leg.mode
         if len(mode) > system.surface_count or mode.count("s") > 1 or any(system.nonlinear):
             return math.nan
 
@@ -327,7 +326,7 @@ class _Frame:
         x = run(times)
         if system.time_dependent:
             x = np.column_stack([x, times])
-        values = np.array(function(x.T, self.p)).reshape(-1, 8)
+        values = np.array(function(x.T, part.p)).reshape(-1, 8)
         return float(half @ (values @ weights))
 
     def _spectrum(self, complete: bool) -> LyapunovSpectrum:

@@ -100,19 +100,18 @@ class PoincareOrbit(Savable, points="m n", t="m"):
 
     def _between_events(self, k: int, since: int) -> Array:
         run, system, n = self.run, self.run.system, self.run.system.dimension
-        p = system.parameter_vector(run.parameters)
-        parts = stretches(run)
+        parts = stretches(run, driven=True)
         ends = np.array([part.t + part.duration for part in parts])
         last = int(np.argmin(np.abs(ends - self.t[k])))
         first = 0 if since < 0 else int(np.argmin(np.abs(ends - self.t[since])))
         dx = np.eye(system.extended_dimension)
         for j in range(first, last):
-            flow, event = self._passage(parts, j, p)
+            flow, event = self._passage(parts, j)
             if j == first and since >= 0:  # from the section itself
                 dx = dx if self.section.after else event.matrix[:, : len(dx)]
             else:
                 dx = event.matrix @ (flow.by_start @ dx)
-        flow, event = self._passage(parts, last, p)
+        flow, event = self._passage(parts, last)
         dx = flow.by_start @ dx
         moved = event.time_by_state @ dx
         if not self.section.after:
@@ -122,15 +121,15 @@ class PoincareOrbit(Savable, points="m n", t="m"):
             raise OptionError(
                 f"k = {k} is the last return, after which the field is not known. Compute one more return."
             )
-        rate = carry_leg(system, following.leg, following.start, 0.0, p).rate
+        rate = carry_leg(following.system, following.leg, following.start, 0.0, following.p).rate
         return (event.matrix @ dx + np.outer(rate, moved))[:n, :n]
 
-    def _passage(self, parts: list[Stretch], j: int, p: Array) -> tuple[LegFlow, Saltation]:
+    def _passage(self, parts: list[Stretch], j: int) -> tuple[LegFlow, Saltation]:
         """A leg and the event that ends it, with derivatives."""
         run, part = self.run, parts[j]
-        flow = carry_leg(run.system, part.leg, part.start, part.duration, p)
+        flow = carry_leg(part.system, part.leg, part.start, part.duration, part.p)
         following = parts[j + 1] if parts[j + 1 :] else None
-        event = saltation_after(run, part, flow, following, None, p)
+        event = saltation_after(run, part, flow, following, None)
         assert event is not None  # all legs up to a return end with an event
         return flow, event
 

@@ -112,7 +112,8 @@ class Gradient:
 
     def __repr__(self) -> str:
         of = ", ".join(f"{k}: {v:.6g}" for k, v in self.parameters.items())
-        return f"Gradient(value {self.value:.6g}, x0 {self.x0.tolist()}, parameters {{{of}}})"
+        x0 = ", ".join(f"{v:.6g}" for v in self.x0)
+        return f"Gradient(value {self.value:.6g}, x0 [{x0}], parameters {{{of}}})"
 
 
 def gradient(
@@ -160,9 +161,9 @@ def gradient(
     ...     [y, v], field=[v, -2.0], resets=ns.Reset(y, [y, -r * v], -1), parameters={r: 0.5})
     >>> run = ns.simulate(mass, [0.25, 0.0], t_end=0.75, t_eval=[0.25, 0.75])
     >>> ns.gradient(run, y**2 + v)
-    Gradient(value 0.00390625, x0 [3.03125, 1.0], parameters {r: 1.03125})
+    Gradient(value 0.00390625, x0 [3.03125, 1], parameters {r: 1.03125})
     >>> ns.gradient(run, (y - data) ** 2, samples={data: [0.2, 0.1]})
-    Gradient(value 0.00171875, x0 [-0.04375, -0.00625], parameters {r: -0.01875})
+    Gradient(value 0.0015625, x0 [-0.04375, -0.00625], parameters {r: -0.01875})
     """
     system = _require_run(run).system
     names, p = _names(run, wrt), parameters_of(run)
@@ -321,7 +322,7 @@ def _pulled_through(
     run: Trajectory, parts: Sequence[Passage], row: Array, rows: Array, chosen: tuple[int, ...]
 ) -> tuple[Array, Array]:
     system, some, last, rows = run.system, list(chosen), parts[-1], np.ascontiguousarray(rows)
-    every = np.zeros(len(system.parameter_names))  # by all parameters
+    every = np.zeros(len(last.stretch.p))  # by all parameters
     own = every if last.back else np.zeros(len(some))  # what legs give
     pulling = last.flow.carried[0].pulling(every, rows) if last.flow.carried else nullcontext()
     row = row + rows[last.samples.stop :].sum(axis=0)

@@ -30,6 +30,7 @@ from ...model import (
 from ...model.derivatives.event_maps import AtEvent, function_map
 from ...model.laws.coupled import raised_of
 from ...model.laws.motion import rests_on
+from .cells import cells_of
 from .guards import watch
 from .legs import (
     Leg,
@@ -61,28 +62,30 @@ _ROUNDING = 16.0 * float(np.finfo(float).eps)
 _INSTANT = 1e-5
 
 
-def _require_certain(system: FilippovSystem, parts: Sequence[Passage], p: Array) -> None:
+def _require_certain(run: Trajectory, parts: Sequence[Passage]) -> None:
     """Raise for a run with a grazing that is within its own error, and leaves the derivative not continuous."""
     flat = [
         k
         for k, part in enumerate(parts)
         if part.event and not part.event.kept and part.event.angle < _STEEP
     ]
-    error = np.zeros(system.extended_dimension)  # of the run, relative to the orbit from its start
+    error = np.zeros(
+        run.system.extended_dimension
+    )  # of the run, relative to the orbit from its start
     for k, part in enumerate(parts[: flat[-1] + 1] if flat else ()):
         flow, own = part.flow, part.stretch
         if part.back:
-            flow = carry_leg(system, own.leg, own.start, own.duration, p)
+            flow = carry_leg(own.system, own.leg, own.start, own.duration, own.p)
         error = flow.by_start @ error + own.end - flow.end
         if k in flat:
-            _require_deep(system, part, error, p)
+            _require_deep(run, part, error)
         if part.event is not None:
             error = part.event.matrix @ error
 
 
-def _require_deep(system: FilippovSystem, part: Passage, error: Array, p: Array) -> None:
+def _require_deep(run: Trajectory, part: Passage, error: Array) -> None:
     """Raise for a grazing that is no deeper than the error (N,) of the run."""
-    leg, flow = part.stretch.leg, part.flow
+    leg, flow, system, p = part.stretch.leg, part.flow, part.stretch.system, part.stretch.p
     at = leg.at_event(system, flow.end, p)
     speed = _speed(at, flow.rate)
     size, length = math.hypot(*flow.end), math.hypot(*flow.rate)
@@ -98,7 +101,7 @@ def _require_deep(system: FilippovSystem, part: Passage, error: Array, p: Array)
     if depth > _CERTAIN * wrong:
         return
     raise DegenerateError(
-        f"{leg_name(system, leg)} at t = {part.stretch.t + part.stretch.duration:.10g} is a grazing: the orbit turns "
+        f"{leg_name(run.system, part.stretch.shown)} at t = {part.stretch.t + part.stretch.duration:.10g} is a grazing: the orbit turns "
         f"back {depth:.1e} beyond it, with an error of {wrong:.1e}. Simulate with a smaller tol, or move the "
         "start or a parameter away from the grazing."
     )
@@ -122,29 +125,25 @@ _COARSE, _FINE = (0.0, 0.25, 1.0), (0.0, 0.0625, 0.25, 0.5, 1.0)
 _COLLOCATED = 1e-6
 
 
-def _collocated(
-    run: Trajectory, leg: Leg, t_start: float, t_end: float, p: Array, chosen: tuple[int, ...]
-) -> LegFlow:
-    """Derivatives of a leg of a run between two times, by Gauss collocation graded to both ends."""
-    coarse, end, rate = _by_panels(run, leg, t_start, t_end, p, chosen, _COARSE)
-    derivatives, _, _ = _by_panels(run, leg, t_start, t_end, p, chosen, _FINE)
+def _collocated(run: Trajectory, part: Stretch, t_end: float, chosen: tuple[int, ...]) -> LegFlow:
+    """Derivatives of a leg of a run to a time, by Gauss collocation graded to both ends."""
+    coarse, end, rate = _by_panels(run, part, t_end, chosen, _COARSE)
+    derivatives, _, _ = _by_panels(run, part, t_end, chosen, _FINE)
     wrong = float(np.abs(derivatives - coarse).max())
     if not wrong <= _COLLOCATED * max(1.0, float(np.abs(derivatives).max())):
-        raise DegenerateError(_without_derivative(leg_name(run.system, leg), t_end))
+        raise DegenerateError(_without_derivative(leg_name(run.system, part.shown), t_end))
     n = len(end)
     return LegFlow(end, derivatives[:, :n], derivatives[:, n:], rate)
 
 
 def _by_panels(
     run: Trajectory,
-    leg: Leg,
-    t_start: float,
+    part: Stretch,
     t_end: float,
-    p: Array,
     chosen: tuple[int, ...],
     cuts: tuple[float, ...],
 ) -> tuple[Array, Array, Array]:
-    field = leg.field(run.system, chosen)
+    field, t_start, p = part.leg.field(part.system, chosen), part.t, part.p
     n, starts = field.by_start, run.steps.starts
     first = max(int(np.searchsorted(starts, t_start, side="right")) - 1, 0)
     last = max(int(np.searchsorted(starts, t_end, side="left")), first + 1)
@@ -168,7 +167,9 @@ def _by_panels(
                 derivatives = derivatives + _increment(a, b, derivatives, inner, weights)
             except np.linalg.LinAlgError:
                 at = float(starts[k]) + float(times[0])
-                raise DegenerateError(_without_derivative(leg_name(run.system, leg), at)) from None
+                raise DegenerateError(
+                    _without_derivative(leg_name(run.system, part.shown), at)
+                ) from None
     end, rate = _polynomial(run, last - 1, t_end - float(starts[last - 1]), n)
     return derivatives, end, rate
 
@@ -300,10 +301,10 @@ def passages(
 ) -> list[Passage]:
     """Legs and events of a run, with derivatives by the start of each and by chosen parameters, also at times of
     samples; or recorded, so that rows can be pulled ``back``."""
-    system, p = run.system, parameters_of(run)
+    system = run.system
     if system.sets:
         require_plain(system, "sensitivity with sets")
-    parts = stretches(run)
+    parts = stretches(run, driven=True)
     ends, last = [part.t for part in parts[1:]], parts[-1]
     if last.leg.kind not in ("end", "stop"):  # samples from it on are behind the event
         ends.append(last.t + last.duration)
@@ -313,39 +314,39 @@ def passages(
         counts, spans = np.diff(cuts), np.array([(part.t, part.duration) for part in parts])
         begun, durations = np.repeat(spans, counts, axis=0).T
         since = np.clip(times[: cuts[-1]] - begun, 0.0, durations)
-    flows = _flows(run, parts, p, chosen, since, cuts, back)
-    events = _saltations(run, parts, flows, p)
+    flows = _flows(run, parts, chosen, since, cuts, back)
+    events = _saltations(run, parts, flows)
     samples = [slice(i, j) for i, j in pairwise(cuts)]
     found = [Passage(*own, back) for own in zip(parts, flows, events, samples, strict=True)]
     if not system.sets:
-        _require_certain(system, found, p)
-    at_rest = _rest_at(system, parts[0], p)
+        _require_certain(run, found)
+    at_rest = _rest_at(parts[0])
     return [replace(found[0], held=at_rest), *found[1:]]
 
 
 def _flows(
     run: Trajectory,
     parts: Sequence[Stretch],
-    p: Array,
     chosen: tuple[int, ...],
     since: Array,
     cuts: Sequence[int],
     back: bool,
 ) -> list[LegFlow]:
     """Flows of legs, with samples at times ``since`` their starts that are cut by legs."""
-    system = run.system
+    system = parts[0].system
     flown = [part.leg.flown(system, part.start, part.duration) for part in parts]
+    p = np.array([part.p for part in parts]) if system is not run.system else parts[0].p
     found = carry_legs(system, flown, p, chosen, since, cuts, back)
     if found.failed < 0:
         return flows_of(found)
     if back:
         require_done(system, flown, found)
     own = zip(parts, pairwise(cuts), strict=True)
-    return [_flow(run, part, since[i:j], p, chosen) for part, (i, j) in own]
+    return [_flow(run, part, since[i:j], chosen) for part, (i, j) in own]
 
 
 def _saltations(
-    run: Trajectory, parts: Sequence[Stretch], flows: Sequence[LegFlow], p: Array
+    run: Trajectory, parts: Sequence[Stretch], flows: Sequence[LegFlow]
 ) -> list[Saltation | None]:
     """Events of legs; None where a time ends one."""
     system, result = run.system, list[Saltation | None]([None] * len(parts))
@@ -357,13 +358,13 @@ def _saltations(
     for i, (part, flow) in enumerate(zip(parts[:-1], flows, strict=False)):
         if usual[i + 1] and not (part.leg.timed or part.leg.at_start):
             which.append(i)
-            events.append(flow.at or part.leg.at_event(system, flow.end, p))
+            events.append(flow.at or part.leg.at_event(part.system, flow.end, part.p))
         else:
-            result[i] = saltation_after(run, part, flow, parts[i + 1], flows[i + 1], p)
-    result[-1] = saltation_after(run, parts[-1], flows[-1], None, None, p)
+            result[i] = saltation_after(run, part, flow, parts[i + 1], flows[i + 1])
+    result[-1] = saltation_after(run, parts[-1], flows[-1], None, None)
     if which:
         stacked, after = _stacked(events, [flows[i].rate for i in which]), before[1:][which]
-        made = saltations(stacked, after, lambda k: _at(system, parts[which[k]]))
+        made = saltations(stacked, after, lambda k: _at(run, parts[which[k]]))
         for k, (i, at) in enumerate(zip(which, events, strict=True)):
             result[i] = made.of(k, at.smooth)
     return result
@@ -383,8 +384,9 @@ def _stacked(events: Sequence[AtEvent], rates: Sequence[Array]) -> Ended:
     )
 
 
-def _rest_at(system: FilippovSystem, part: Stretch, p: Array) -> tuple[Array, Array] | None:
+def _rest_at(part: Stretch) -> tuple[Array, Array] | None:
     """Derivatives, by start (N,) and parameters, of the nearest state at which a mode rests; None where none does."""
+    system, p = part.system, part.p
     resting = rests_on(system, part.leg.mode)
     if not resting:
         return None
@@ -399,21 +401,19 @@ def _rest_at(system: FilippovSystem, part: Stretch, p: Array) -> tuple[Array, Ar
     return np.eye(n) - back @ rows, -back @ np.array([row.by_parameters for row in at])
 
 
-def _at(system: FilippovSystem, part: Stretch) -> str:
-    return f"{part.leg.name(system)!r} at t = {part.t + part.duration:.10g}"
+def _at(run: Trajectory, part: Stretch) -> str:
+    return f"{part.shown.name(run.system)!r} at t = {part.t + part.duration:.10g}"
 
 
-def _flow(
-    run: Trajectory, part: Stretch, times: Array, p: Array, chosen: tuple[int, ...]
-) -> LegFlow:
+def _flow(run: Trajectory, part: Stretch, times: Array, chosen: tuple[int, ...]) -> LegFlow:
     try:
-        return carry_leg(run.system, part.leg, part.start, part.duration, p, chosen, times)
+        return carry_leg(part.system, part.leg, part.start, part.duration, part.p, chosen, times)
     except ConvergenceError:
         if run.system.sets:
-            what = leg_name(run.system, part.leg)
+            what = leg_name(run.system, part.shown)
             raise DegenerateError(_without_derivative(what, part.t + part.duration)) from None
         # A field such as a power law has a derivative, but no Taylor series at zero.
-        collocated = lambda t: _collocated(run, part.leg, part.t, part.t + t, p, chosen)
+        collocated = lambda t: _collocated(run, part, part.t + t, chosen)
         at = [collocated(float(t)) for t in times]
         rows = [np.hstack([flow.by_start, flow.by_parameters]) for flow in at]
         n = len(part.start)
@@ -427,21 +427,23 @@ def saltation_after(
     flow: LegFlow,
     following: Stretch | None,
     then: LegFlow | None,
-    p: Array,
 ) -> Saltation | None:
     """The saltation of the event that ends a leg; None where a time ends it."""
     # At the end of a run the field after it is that of the mode reached.
     if part.leg.timed:
         return None
-    system, ends = run.system, run.events[-1]
-    leg = following.leg if following else None
+    system, p, ends = part.system, part.p, run.events[-1]
+    leg, after_p = (following.leg, following.p) if following else (None, p)
     if leg is None and ends.kind == "end":
-        left = sets_left(system, held_before(system, part.leg), ends.mode_before, part.after, p)
-        leg = Leg(ends.mode_before, left=left)
+        cells = cells_of(run.system)
+        mode = cells.mode(ends.mode_before)
+        after_p = cells.parameters(parameters_of(run), ends.mode_before)
+        left = sets_left(system, held_before(system, part.leg), mode, part.after, p)
+        leg = Leg(mode, left=left)
     at = flow.at or part.leg.at_event(system, flow.end, p)
     if system.sets and following is None and leg is not None:  # the run ends at the event
         every = tuple(range(len(p)))
-        landed = carry_leg(system, leg, at.after, 0.0, p, every)
+        landed = carry_leg(system, leg, at.after, 0.0, after_p, every)
         by_state, by_p = landed.by_start @ at.after_state, landed.by_start @ at.after_parameters
         by_p = by_p + landed.by_parameters
         at = replace(at, after_state=by_state, after_parameters=by_p, smooth=False)
@@ -451,30 +453,28 @@ def saltation_after(
         maps = at.after_state, at.after_parameters
         return Saltation(*maps, jump, *still, 1.0, kept=True, smooth=at.smooth)
     if part.leg.kind == "stop" or leg is None:
-        return saltation(at, flow.rate, at.after_state @ flow.rate, _at(system, part))
+        return saltation(at, flow.rate, at.after_state @ flow.rate, _at(run, part))
     after = None if then is None or system.sets else then.before
     if after is None or not np.isfinite(after).all():
-        after = _rate_after(system, part, leg, at, p)
+        after = _rate_after(part, leg, at, after_p)
     if after is None and part.leg.kind == "exit":  # the fields agree
         after = at.after_state @ flow.rate
     if after is None:
         raise DegenerateError(
-            f"{_at(system, part)}: the field after the event is not finite at {part.after.tolist()}. "
+            f"{_at(run, part)}: the field after the event is not finite at {part.after.tolist()}. "
             "Start or end the run on one side of it."
         )
-    return saltation(at, flow.rate, after, _at(system, part))
+    return saltation(at, flow.rate, after, _at(run, part))
 
 
-def _rate_after(
-    system: FilippovSystem, part: Stretch, leg: Leg, at: AtEvent, p: Array
-) -> Array | None:
+def _rate_after(part: Stretch, leg: Leg, at: AtEvent, p: Array) -> Array | None:
     """The field after an event, also where a root of its function has rounding as its argument."""
     n = len(part.start)
     e = at.gradient[:n]
     shift = _ROUNDING * float(np.abs(e) @ np.abs(part.after)) * e / max(float(e @ e), 1e-300)
     with np.errstate(all="ignore"):
         for x in (at.after, part.after, part.after + shift, part.after - shift):
-            rate = rate_at(system, leg, x, p)
+            rate = rate_at(part.system, leg, x, p)
             if np.all(np.isfinite(rate)):
                 return rate
     return None
@@ -545,18 +545,21 @@ class Sensitivity:
 
 def _clearance(run: Trajectory) -> tuple[float, str]:
     """Smallest distance from a guard that a run passed without reaching it, with its name and time."""
-    p, best = run.system.parameter_vector(run.parameters), (math.inf, "")
-    for part in stretches(run):
+    cells, best = cells_of(run.system), (math.inf, "")
+    for part in stretches(run, driven=True):
         if part.duration <= 0.0:
             continue
+        beside = cells.beside(part.shown.mode)
         try:
-            seen = watch(run.system, part.leg.mode, part.start, part.duration, p).approaches
+            given = part.leg.mode, part.start, part.duration, part.p
+            seen = watch(part.system, *given, beside).approaches
         except ConvergenceError:
             continue  # no Taylor series at an end
         for near in seen:
             if abs(near.distance) < best[0]:
-                when = f"{described(run.system, near.guard)} at t = {part.t + near.t:.6g}"
-                best = (abs(near.distance), when)
+                is_shown = near.guard.kind == "surface" and near.guard.index in beside
+                guard = described(run.system if is_shown else part.system, near.guard)
+                best = (abs(near.distance), f"{guard} at t = {part.t + near.t:.6g}")
     return best
 
 
@@ -609,7 +612,7 @@ def along(run: Trajectory, names: Sequence[str]) -> Sensitivity:
     if not (np.isfinite(dx).all() and np.isfinite(dp).all()):
         first = next((k for k in parts if not np.isfinite(k.flow.by_start).all()), parts[-1])
         raise DegenerateError(
-            _without_derivative(leg_name(system, first.stretch.leg), float(run.t[-1]))
+            _without_derivative(leg_name(system, first.stretch.shown), float(run.t[-1]))
         )
     behind = len(at) - parts[-1].samples.stop
     sampled.append((dx[None].repeat(behind, 0), dp[None].repeat(behind, 0)))

@@ -1,5 +1,6 @@
 """Runs through tables: cells in the driver, beside the same system with a surface for each breakpoint."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import casadi as ca
@@ -242,3 +243,91 @@ def test_derivatives_and_orbits_pass_breakpoints():
     assert orbits[0].itinerary == orbits[1].itinerary and "+" in orbits[0].itinerary
     np.testing.assert_allclose(orbits[0].start, orbits[1].start, atol=1e-8)
     np.testing.assert_allclose(*[np.sort_complex(o.multipliers) for o in orbits], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_derivatives_are_those_with_a_surface_for_each_breakpoint(name):
+    system = SYSTEMS[name]
+    run = ns.simulate(system, [0.8, 0.4], 3.0, tol=1e-12, t_eval=np.linspace(0.1, 2.9, 8))
+    other = replace(run, system=system.of_breakpoints)
+    found, truth = ns.sensitivity(run), ns.sensitivity(other)
+    assert len(found.event_times) == len(run.events) - 1 > 0
+    size = 1 + abs(truth.dx_dx0).max()
+    for of in ("dx_dx0", "event_times", "dt_dx0", "dsample_dx0"):
+        np.testing.assert_allclose(getattr(found, of), getattr(truth, of), atol=1e-11 * size)
+    assert found.nearest == truth.nearest
+    np.testing.assert_allclose(found.clearance, truth.clearance, rtol=1e-9)
+    rows = [1.0, 0.5], np.random.default_rng(1).normal(size=(8, 2))
+    pulled = [ns.vjp(one, rows[0], samples=rows[1])[0] for one in (run, other)]
+    np.testing.assert_allclose(*pulled, atol=1e-11 * size)
+
+
+@pytest.mark.parametrize("order", [1, 3])
+def test_derivatives_through_a_thousand_breakpoints(order):
+    a, c = ca.SX.sym("a"), ca.SX.sym("c")
+    xs = np.linspace(-2, 2, 1000)
+    curve = ns.table(a * x + c, xs, np.sin(3 * xs) + 0.3 * xs, order)
+    system = lifted([v, -curve - 0.1 * v], parameters={a: 1.1, c: 0.1})
+    end = lambda y, p: ns.simulate(
+        system, y, 6.0, tol=1e-12, parameters=dict(zip("ac", p, strict=True))
+    ).x[-1]
+    run = ns.simulate(system, [1.5, 0.3], 6.0, tol=1e-12)
+    assert len(run.events) > 200
+    found = ns.sensitivity(run)
+    h, start, given = 1e-5, np.array([1.5, 0.3]), np.array([1.1, 0.1])
+    for k, step in enumerate(h * np.eye(2)):
+        by_start = end(start + step, given) - end(start - step, given)
+        by_parameter = end(start, given + step) - end(start, given - step)
+        np.testing.assert_allclose(found.dx_dx0[:, k], by_start / (2 * h), atol=3e-6)
+        np.testing.assert_allclose(found.dx_dp[:, k], by_parameter / (2 * h), atol=3e-6)
+    grown = ns.gradient(run, x**2 + v)
+    row = np.array([2 * run.x[-1, 0], 1.0])
+    np.testing.assert_allclose(grown.x0, row @ found.dx_dx0, atol=1e-11)
+    np.testing.assert_allclose([*grown.parameters.values()], row @ found.dx_dp, atol=1e-11)
+    assert 0 < found.clearance < 4e-3 and found.nearest.startswith("h")
+
+
+def test_exponents_and_returns_pass_breakpoints():
+    system = SYSTEMS["a spring"]
+    both = system, system.of_breakpoints
+    found, truth = (
+        ns.lyapunov_spectrum(one, [0.8, 0.4], 20.0, tol=1e-11, progress=False) for one in both
+    )
+    np.testing.assert_allclose(found.exponents, truth.exponents, atol=1e-8)
+    np.testing.assert_allclose(found.sum_check, truth.sum_check, atol=1e-8)
+    returns = [ns.orbit.poincare(one, "h4", [0.8, 0.4], count=3, tol=1e-12) for one in both]
+    np.testing.assert_allclose(*[one.jacobian(2) for one in returns], atol=1e-9)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("speed", [-1.0, 0.0, 1.0])
+def test_starts_and_jumps_at_both_ends_of_a_range(side, speed):
+    line, s = ns.table(x, [-1, 0, 1], [-1.0, 0.0, 1.0], outside="error"), ca.SX.sym("s")
+    landing = ns.Reset(s - 1, {x: side, v: side * speed, s: 0.0}, direction=1)
+    still = ns.simulate(lifted([v, line - x]), [side, 0.0], 1.5)
+    assert still.status == ns.Status.REACHED_END and still.x[-1].tolist() == [side, 0.0]
+    start = ns.simulate(lifted([v, line - 2 * x]), [side, side * speed], 1.5, tol=1e-11)
+    jumping = lifted([v, line - 2 * x, 1], (x, v, s), resets=landing)
+    jump = ns.simulate(jumping, [0.0, 0.0, 0.0], 1.5, tol=1e-11)
+    for run, begin in ((start, 0.0), (jump, 1.0)):
+        if speed > 0:
+            assert run.status == ns.Status.NOT_FINITE and abs(run.t[-1] - begin) < 1e-9
+            continue
+        gone = 1.5 - begin
+        assert run.status == ns.Status.REACHED_END
+        assert abs(run.x[-1, 0] - side * (np.cos(gone) + speed * np.sin(gone))) < 1e-9
+
+
+@pytest.mark.parametrize("begin", [0.0, 1.0, 2.5])
+def test_a_run_over_the_whole_range_of_a_signal_reaches_its_end(begin):
+    at, values = [0, 1, 2, 3], [0.0, 1.0, -1.0, 0.5]
+    system = lifted([ns.table(t, at, values, outside="error")], (x,), time=t)
+    run = ns.simulate(system, [0.0], 3.0, t_start=begin)
+    own = np.append(begin, [s for s in at if s > begin])
+    true = np.trapezoid(np.interp(own, at, values), own)
+    assert run.status == ns.Status.REACHED_END and run.t[-1] == 3.0
+    assert abs(run.x[-1, 0] - true) < 1e-14
+    many = ns.ensemble(system, [[0.0]], 3.0, t_start=begin)
+    assert many.status[0] == ns.Status.REACHED_END and many.x[0, 0] == run.x[-1, 0]
+    later = ns.simulate(system, [0.0], 3.001, t_start=begin)
+    assert later.status == ns.Status.NOT_FINITE and later.t[-1] == 3.0

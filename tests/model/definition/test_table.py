@@ -47,6 +47,25 @@ def test_values_are_those_of_scipy(order, outside, seed):
     np.testing.assert_allclose(found, beside(xs, ys, order, outside, at), atol=1e-11)
 
 
+def test_a_table_of_a_table_that_is_constant_at_a_breakpoint():
+    inner, outer = ([-2, 0, 2], [2, -1, 1]), ([-2, -1, 0, 1, 2], [0.0, 1.0, -1.0, 2.0, 0.0])
+    table = ns.table(ns.table(x, *inner), *outer)
+    system = ns.FilippovSystem.from_expression([x, v], [v, -x - table])
+    run = ns.simulate(system, [1.7, 0.0], 5.0, tol=1e-11)
+    value = lambda u: np.interp(np.interp(u, *inner), *outer)
+    true = solve_ivp(
+        lambda _, u: [u[1], -u[0] - value(u[0])],
+        (0, 5),
+        [1.7, 0.0],
+        rtol=1e-10,
+        atol=1e-12,
+        method="DOP853",
+        max_step=0.005,
+    )
+    assert np.abs(run.x[-1] - true.y[:, -1]).max() < 1e-7
+    assert (np.diff([e.t for e in run.events]) > 1e-3).all()
+
+
 @pytest.mark.parametrize(("order", "outside"), [(1, "constant"), (1, "linear"), (3, "linear")])
 def test_breakpoints_have_the_class_that_they_have(order, outside):
     xs, ys = random_table(0, 5)

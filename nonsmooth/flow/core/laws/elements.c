@@ -422,19 +422,32 @@ static int is_at_level(const Run *r, int i, int side, double h) {
   return k >= 0 && fabs(h - level) <= ON_SURFACE * (r->size + fabs(h) + fabs(level));
 }
 
+/* At an end of a table the state is in the cell within, from which its motion may lead out. */
+static void enter_limits(Run *r, int i, double h) {
+  const int32_t *q = cells_of(r, i)->limit;
+  for (int k = 0; k < cells_of(r, i)->limits; k++, q += 3 + 2 * q[2]) {
+    int side = r->cell[i] == q[1] + 1 ? 1 : r->cell[i] == q[0] - 1 ? -1 : 0;
+    if (side && is_at_level(r, i, side, h)) set_cell(r, i, r->cell[i] - side);
+  }
+}
+
 /* The cells of a state, of present ones those that it is in to rounding. */
 static void find_cells(Run *r) {
   for (int i = 0; r->s->tables && i < r->m; i++) {
     if (!has_law(r, i, TABLE_LAW)) continue;
     double value = surface_values(r, r->x)[i];
     int known = r->cell[i] >= 0 && (is_at_level(r, i, 1, value) || is_at_level(r, i, -1, value));
-    if (!known) set_cell(r, i, cell_at(cells_of(r, i), value));
+    if (known) continue;
+    set_cell(r, i, cell_at(cells_of(r, i), value));
+    enter_limits(r, i, value);
   }
 }
 
-/* The run ends where the function of a table that is in use has left its limits. */
+/* The run ends where the function of a table that is in use has left its limits, unless it ends there anyway. */
 static void require_limits(Run *r) {
-  for (int i = 0; r->s->tables && i < r->m; i++) {
+  double gone = time_scale(r);
+  int ends = gone > 0 && r->t >= r->o.t_end - TIE * gone;
+  for (int i = 0; r->s->tables && !ends && i < r->m; i++) {
     const int32_t *q = has_law(r, i, TABLE_LAW) ? cells_of(r, i)->limit : 0;
     for (int k = 0; q && k < cells_of(r, i)->limits; k++, q += 3 + 2 * q[2]) {
       int out = r->cell[i] < q[0] || r->cell[i] > q[1];

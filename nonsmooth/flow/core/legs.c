@@ -11,6 +11,7 @@ static int begin_leg(Run *r, const Leg *l) {
   EACH_SET(r, f) {
     if (r->letter[f] == 0) continue;
     int k = size_of(r, f), stays = r->idle[f] && !(length_of(h + f, k) > 0); /* friction that a parameter may bring acts */
+    stays |= is_unloaded(r, r->letter, f, 0);
     for (int i = f; i < f + k; i++) {
       r->letter[i] = stays ? IDLE : r->letter[i] == OFF ? LEFT_BEHIND : LEAVING;
       r->unknowns[i] = h[i];

@@ -153,6 +153,10 @@ def instant_map(
             function = d.guards[own if atom < 0 else atom]
         elif kind == "impact":
             i -= len(system.entries)
+            if takes_in_space(system, mode, i):
+                from .impact_in_space import ImpactInSpace  # which needs this module
+
+                return ImpactInSpace(system, mode, i, letters)
             function = d.gaps[i]
         else:
             i = system.entries[element][0]
@@ -206,6 +210,11 @@ def struck_by(system: FilippovSystem, mode: str, contact: int) -> Struck:
     closed = [j for j in range(len(system.impacts)) if not signs[m + j] and j != contact]
     carried = [i for i in range(m) if any(j in (contact, *closed) for j in coupled.carriers[i])]
     return Struck(tuple(carried), tuple(closed))
+
+
+def takes_in_space(system: FilippovSystem, mode: str, contact: int) -> bool:
+    """Whether friction in space may take part in the impact of a contact."""
+    return any(i in system.set_of for i in struck_by(system, mode, contact).carried)
 
 
 def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -> ca.SX:

@@ -113,6 +113,11 @@ def master_stability(
     ConvergenceError
         kappa is too large to integrate.
 
+    Notes
+    -----
+    At an impact the states jump as those of one oscillator: a coupling in the rate of a gap, as of positions that
+    pull positions, is not in the law of restitution.
+
     Examples
     --------
     Relay oscillators that are coupled by their positions; alone they have the multiplier .531802.

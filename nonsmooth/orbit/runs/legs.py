@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from ...flow.fixed import flow_for
 from ...flow.names import event_name, shown_mode
 from ...flow.trajectory import Trajectory
 from ...flow.variation import NONE, FlownLeg, carry_legs, require_done
-from ...model import Array, DegenerateError, FilippovSystem, coupled_of, multiplier_enters
+from ...model import Array, DegenerateError, FilippovSystem, Surfaces, coupled_of, multiplier_enters
 from ...model.derivatives.event_maps import (
     AtEvent,
     EventMap,
@@ -32,7 +32,9 @@ from ...model.derivatives.event_maps import (
     jumping,
     struck_by,
     surface_map,
+    takes_in_space,
 )
+from ...model.derivatives.impact_in_space import ImpactInSpace, holding, ways_of
 from ...model.derivatives.variational import VariationalField, variational_field
 from .cells import cells_of
 
@@ -41,6 +43,12 @@ _LOCATED = 1e-7
 
 #: Switching functions of a set that was held are zero at this part of what they are made of.
 _ON_SET = 1e-14
+
+#: Impulses and bounds that are negative by this part of the error of a location are zero.
+_ROUNDED = 1e-4
+
+#: Ways in which contacts and friction may take part in an impact, of which so many are tried.
+_MOST_WAYS = 512
 
 #: Directions that differ by less than this are one: the gradients of events at one instant.
 _PARALLEL = 1e-7
@@ -303,10 +311,6 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
         mode, p = cells.mode(mode), cells.parameters(p, mode)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
-    if any(coupled_of(system).carriers[i] for i in system.set_of):
-        raise DegenerateError(
-            "run: derivatives of friction in space that the reaction of a contact bounds are not implemented."
-        )
     if len(system.joints) > 1:
         _require_independent(system, mode, x, p)
     if system.sets:
@@ -343,7 +347,8 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
             own = x[system.dimension - discrete : system.dimension]
             leg = replace(leg, discrete=tuple(own.tolist()))
         if result and system.sets:
-            leg = replace(leg, left=sets_left(system, result[-1].leg.mode, leg.mode, x, p))
+            before = held_before(system, result[-1].leg)
+            leg = replace(leg, left=sets_left(system, before, leg.mode, x, p))
         as_shown = leg
         if cells and cells.tables:
             as_shown = replace(leg, mode=shown.mode_before, element=shown.element)
@@ -358,6 +363,17 @@ def _extended(system: FilippovSystem, x: Array, t: float) -> Array:
     extended = np.empty(len(x) + 1)
     extended[:-1], extended[-1] = x, t
     return extended
+
+
+def held_before(system: FilippovSystem, leg: Leg) -> str:
+    """The mode of a leg, where friction in space holds if it did so at the impact that ends the leg."""
+    if leg.kind != "impact":
+        return leg.mode
+    contact = leg.element - len(system.entries)
+    holds = holding(system, leg.mode, contact, leg.letters)
+    letters = zip(leg.mode, system.entries, strict=False)
+    own = "".join("s" if members[0] in holds else letter for letter, members in letters)
+    return own + leg.mode[len(own) :]
 
 
 def sets_left(
@@ -386,8 +402,11 @@ def _require_independent(system: FilippovSystem, mode: str, x: Array, p: Array) 
 
 def _require_held(system: FilippovSystem, mode: str, x: Array, p: Array) -> None:
     """Refuse a start (N,) on a set off which the mode is, which neighbours leave from elsewhere."""
-    h, letters = coupled_of(system).heights_at(x, p), system.parse_letters(mode)
+    coupled, letters = coupled_of(system), system.parse_letters(mode)
+    h, is_open = coupled.heights_at(x, p), letters[system.surface_count :]
     for members in system.sets:
+        if (own := coupled.carriers[members[0]]) and all(is_open[j] for j in own):
+            continue  # friction without load
         leaves = letters[members[0]] and not h[list(members)].any()
         if leaves and multiplier_enters(system, members, p):
             raise DegenerateError(
@@ -546,8 +565,31 @@ def _letters(system: FilippovSystem, event: Event, p: Array) -> str:
     x = _extended(system, event.x, event.t)
     own = Leg(event.mode_before, event.kind, event.element, event.side)
     after = _extended(system, event.x_after, event.t)
+    mode, contact = system.widened(event.mode_before), event.element - len(system.entries)
+    if takes_in_space(system, mode, contact):
+        return _letters_in_space(system, mode, contact, x, after, p)
     choice = lambda letters: replace(own, letters=letters).at_event(system, x, p)
     return struck_letters(system, event.mode_before, event.element, choice, after)
+
+
+def _letters_in_space(
+    system: FilippovSystem, mode: str, contact: int, x: Array, after: Array, p: Array
+) -> str:
+    """The ways in which contacts and friction took part in an impact with friction in space."""
+    h, gradient = Surfaces(system).values(after, p)
+    h = np.where(np.abs(h) > _LOCATED * (np.abs(gradient) @ (1.0 + np.abs(after))), h, 0.0)
+    near = _LOCATED * (1.0 + float(np.abs(after).max()))
+    for letters in islice(ways_of(system, mode, contact, h), _MOST_WAYS):
+        element = len(system.entries) + contact
+        struck = instant_map(system, mode, "impact", element, letters)
+        assert isinstance(struck, ImpactInSpace)
+        at, margin = struck.at(x, p)
+        if margin >= -_ROUNDED * near and float(np.abs(at.after - after).max()) <= near:
+            return letters
+    raise DegenerateError(
+        f"impact of {system.impacts[contact]!r}: its derivatives are implemented where one contact closes, impulses "
+        "are determined, and friction in space clearly holds or clearly slips. Start after it, or move the start."
+    )
 
 
 def struck_letters(

@@ -38,6 +38,7 @@ from .legs import (
     Stretch,
     carry_leg,
     flows_of,
+    held_before,
     leg_name,
     parameters_of,
     rate_at,
@@ -437,7 +438,7 @@ def saltation_after(
         cells = cells_of(run.system)
         mode = cells.mode(ends.mode_before)
         after_p = cells.parameters(parameters_of(run), ends.mode_before)
-        left = sets_left(system, part.leg.mode, mode, part.after, p)
+        left = sets_left(system, held_before(system, part.leg), mode, part.after, p)
         leg = Leg(mode, left=left)
     at = flow.at or part.leg.at_event(system, flow.end, p)
     if system.sets and following is None and leg is not None:  # the run ends at the event

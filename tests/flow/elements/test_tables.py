@@ -341,3 +341,18 @@ def test_modes_of_tables_watch_the_breakpoints_beside_their_cell():
         assert 2 <= len(guards) <= 4 and event.element in [g.element for g in guards]
         letters = event.mode_before
         assert all(letters[g.element] == "-+"[g.side > 0] for g in guards)
+
+
+@pytest.mark.parametrize("begin", [0.0, 1.0, 2.5])
+def test_a_run_over_the_whole_range_of_a_signal_reaches_its_end(begin):
+    at, values = [0, 1, 2, 3], [0.0, 1.0, -1.0, 0.5]
+    system = lifted([ns.table(t, at, values, outside="error")], (x,), time=t)
+    run = ns.simulate(system, [0.0], 3.0, t_start=begin)
+    own = np.append(begin, [s for s in at if s > begin])
+    true = np.trapezoid(np.interp(own, at, values), own)
+    assert run.status == ns.Status.REACHED_END and run.t[-1] == 3.0
+    assert abs(run.x[-1, 0] - true) < 1e-14
+    many = ns.ensemble(system, [[0.0]], 3.0, t_start=begin)
+    assert many.status[0] == ns.Status.REACHED_END and many.x[0, 0] == run.x[-1, 0]
+    later = ns.simulate(system, [0.0], 3.001, t_start=begin)
+    assert later.status == ns.Status.NOT_FINITE and later.t[-1] == 3.0

@@ -443,9 +443,11 @@ static void find_cells(Run *r) {
   }
 }
 
-/* The run ends where the function of a table that is in use has left its limits. */
+/* The run ends where the function of a table that is in use has left its limits, unless it ends there anyway. */
 static void require_limits(Run *r) {
-  for (int i = 0; r->s->tables && i < r->m; i++) {
+  double gone = time_scale(r);
+  int ends = gone > 0 && r->t >= r->o.t_end - TIE * gone;
+  for (int i = 0; r->s->tables && !ends && i < r->m; i++) {
     const int32_t *q = has_law(r, i, TABLE_LAW) ? cells_of(r, i)->limit : 0;
     for (int k = 0; q && k < cells_of(r, i)->limits; k++, q += 3 + 2 * q[2]) {
       int out = r->cell[i] < q[0] || r->cell[i] > q[1];

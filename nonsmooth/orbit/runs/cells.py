@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import replace
 
 import numpy as np
 
@@ -57,7 +56,8 @@ class Cells:
         before, after = self.mode(event.mode_before), self.mode(event.mode_after)
         own = event.element
         own = own if event.kind in _WITHOUT_LETTER or own < 0 else self.element(own)
-        return replace(event, mode_before=before, mode_after=after, element=own)
+        kept = event.name, event.x_after, own, event.side, event.motion
+        return Event(event.kind, event.t, event.x, before, after, *kept)
 
     def _above(self, table: Table, mode: str) -> int:
         """How many surfaces of a table are below its cell."""

@@ -292,8 +292,14 @@ class Stretch:
     #: The system of its mode, and all its parameters.
     system: FilippovSystem
     p: Array
-    #: The same leg as results show it.
-    shown: Leg
+    #: Its mode and the element of its event as results show them.
+    as_shown: tuple[str, int]
+
+    @property
+    def shown(self) -> Leg:
+        """The leg as results show it."""
+        mode, element = self.as_shown
+        return replace(self.leg, mode=mode, element=element)
 
 
 def parameters_of(run: Trajectory) -> Array:
@@ -349,9 +355,7 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
         if result and system.sets:
             before = held_before(system, result[-1].leg)
             leg = replace(leg, left=sets_left(system, before, leg.mode, x, p))
-        as_shown = leg
-        if cells and cells.tables:
-            as_shown = replace(leg, mode=shown.mode_before, element=shown.element)
+        as_shown = shown.mode_before, shown.element
         result.append(Stretch(leg, t, first.t - t, x, x_end, after, system, p, as_shown))
         t, x = last.t, after
     return result

@@ -272,9 +272,13 @@ def test_dividing_curve_is_that_of_python(browser, page):
 
 # What one sees --------------------------------------------------------------------------------------
 
-SHOWN = """
+READY = """
 while (document.documentElement.dataset.ready !== "yes") await new Promise((go) => setTimeout(go, 10));
-await new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)));
+"""
+
+SHOWN = (
+    READY
+    + """await new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)));
 const text = (id) => document.getElementById(id).textContent;
 return {
   hash: location.hash, verdict: text("verdict"), story: text("story"), facts: text("facts"),
@@ -285,6 +289,7 @@ return {
   say: document.querySelector(".handle").getAttribute("aria-valuetext"),
 };
 """
+)
 
 
 def name_of(shot):
@@ -335,7 +340,9 @@ def test_names_of_regions_are_not_cut_by_the_frame(browser, page, width):
     assert browser.run(INSIDE) == []
 
 
-COVERED = """
+COVERED = (
+    READY
+    + """
 const words = [...document.querySelectorAll("#slip .halo, #slip .inset")];
 const met = [];
 for (const word of words) {
@@ -353,6 +360,7 @@ for (const word of words) {
 }
 return [words.length, met];
 """
+)
 
 
 @pytest.mark.browser

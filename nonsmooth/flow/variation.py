@@ -24,7 +24,7 @@ from .fixed import MOST_STEPS, TOLERANCE, stuck
 NONE = np.zeros(0)
 
 
-class FlownLeg(NamedTuple):
+class Arc(NamedTuple):
     """A leg: its mode, start, duration and end; ``left``: switching functions of the sets on which it begins, and which
     it leaves."""
 
@@ -37,7 +37,7 @@ class FlownLeg(NamedTuple):
 
 def carry_legs(
     system: FilippovSystem,
-    legs: Sequence[FlownLeg],
+    legs: Sequence[Arc],
     p: Array,
     chosen: Sequence[int] = (),
     times: Array = NONE,
@@ -69,7 +69,7 @@ def carry_legs(
     return engine.record(given) if back else engine.carry(given, chosen)
 
 
-def require_done(system: FilippovSystem, legs: Sequence[FlownLeg], found: CarriedLegs) -> None:
+def require_done(system: FilippovSystem, legs: Sequence[Arc], found: CarriedLegs) -> None:
     """Raise for a leg that does not reach its end."""
     if found.status == DONE:
         return

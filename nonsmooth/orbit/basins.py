@@ -1,14 +1,14 @@
 """Attractors and basins of attraction, by returns to a section.
 
-Runs are sampled at returns (events, a period) or, without a section, at times. Those that have not come to an
-attractor yet are followed from their starts to twice as many returns, so that none is restarted at an event.
+Runs are sampled at returns (events, a period) or, without a section, at times. A run without a label is
+integrated again from its start, to twice as many returns. No run restarts at an event, where a reset would be lost.
 
-- A run whose returns come together p by p is near a cycle, which Newton's method on its legs polishes
-  (``periodic_orbit``), with its multipliers. Two are one where the polished points agree.
-- A run that returns no more, or whose samples come together, rests: at a point to which neighbours come back, or on
-  a set of such points, which is one attractor.
-- What does none of this for all returns is compared with itself: a run that comes back near all its later
-  points shows an attractor, such as a chaotic one, or a cycle without a section.
+- Cycles: every p-th return of a run approaches one point. Newton's method on the legs (``periodic_orbit``) gives the
+  cycle and its multipliers. Two cycles are the same if their points on the section agree.
+- Rest: the run has no more returns, or its samples converge. It is a point if neighbours converge to it; other
+  rest points form one set.
+- Recurrence: the last quarter of a run stays near its earlier samples, and neighbours do too. Chaotic attractors are
+  found so, and cycles without a section.
 
 Source: Datseris & Wagemakers 2022 (Chaos 32, 023104) for the last of these.
 """
@@ -68,13 +68,13 @@ _HELD = 2**24
 #: Largest number of returns in a cycle that is recognised before it has been followed to the end.
 _LONGEST = 8
 
-#: Distance beside a point at which runs must come back to it, in units of ``near``.
+#: Distance of neighbours that must converge to a point of rest, in units of ``near``.
 _ISOLATED = 0.01
 
-#: Starts beside what recurs, of which a third must come back: from one side is enough.
+#: Neighbours of a recurrent run; a third must converge to it, as a cycle may attract from one side only.
 _BESIDE = 24
 
-#: How far beside, in units of ``near``.
+#: Distance of these neighbours, in units of ``near``.
 _BESIDE_BY = 10.0
 
 #: Relative distance within which points of two attractors are one.
@@ -223,7 +223,7 @@ class Search:
                 self._trees = [_tree(a.points / self.scale) for a in self.found]
             self._follow(chosen, "seeds", dense)
             self._follow(np.flatnonzero(self.labels == UNDECIDED), "round")
-            if self._by_events:  # what returns no more
+            if self._by_events:  # runs without further returns
                 self.section = None
                 self._follow(np.flatnonzero(self.labels == UNDECIDED), "times")
         except KeyboardInterrupt:
@@ -395,7 +395,7 @@ class Search:
         return found
 
     def _radius(self, k: int) -> float:
-        """Distance from an attractor's points within which a run that comes nearer goes to it."""
+        """Distance from an attractor's points within which a run that approaches them belongs to it."""
         others = [a.points for i, a in enumerate(self.found) if i != k]
         if not others:
             return self.near
@@ -430,7 +430,7 @@ class Search:
         change = np.abs((x[last] - back) / self.scale).max(axis=1)
         if found is None and change[0] <= _STILL and change.max() <= 0.1 * _EQUAL:
             if np.abs((x[p:] - x[:-p]) / self.scale).max() < 1e3 * _STILL:
-                return UNDECIDED  # it came nearer to nothing
+                return UNDECIDED  # its returns never approached a limit
             if not self._moves(x[last], period):
                 end, still = self._settled(at.end[i : i + 1])
                 return self._at_rest(end[0]) if still[0] else UNDECIDED
@@ -741,10 +741,10 @@ def basins(
         starts and runs. It must be less than the distance from an attractor to the boundary of its
         basin.
     samples : int, optional
-        Returns after which runs are looked at first, then after twice as many, and so on. Also how many must be
-        near an attractor that is recurrent or given.
+        Number of returns in the first integration; it doubles for runs without a label. A run belongs to a given or
+        recurrent attractor if so many samples in a row are near it.
     rounds : int, optional
-        Without a section ``samples * rounds`` times are looked at, evenly spaced to ``t_end``.
+        Without a section, runs are sampled at ``samples * rounds`` equal time steps.
     t_start, parameters, tol, rtol, atol : optional
         As in :func:`simulate`; parameters are numbers.
     work : Work, optional

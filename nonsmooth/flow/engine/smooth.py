@@ -98,7 +98,7 @@ class ValuesProgram:
         self.results, self.work = len(values.outputs), len(values.op)
 
 
-class FlownLegs(NamedTuple):
+class IntegratedLegs(NamedTuple):
     """Legs integrated in one call."""
 
     ends: Array
@@ -134,7 +134,7 @@ class LegsProgram:
 
     def __call__(
         self, z: Array, p: Array, durations: Array, tol: float, most_steps: int
-    ) -> FlownLegs:
+    ) -> IntegratedLegs:
         """Fly all legs from states (L, width)."""
         memory, _ = self._given(z, p, durations)
         left = ctypes.c_double()
@@ -146,7 +146,7 @@ class LegsProgram:
         ends, before, after, results = (
             kept[at[k] - at[1] : at[k + 1] - at[1]].reshape(count, -1) for k in (1, 3, 4, 5)
         )
-        return FlownLegs(ends, before, after, results, failed, left.value)
+        return IntegratedLegs(ends, before, after, results, failed, left.value)
 
     def _given(self, z: Array, p: Array, durations: Array) -> tuple[Array, list[Array]]:
         memory, at = np.empty(self._size), self._places

@@ -19,7 +19,7 @@ from ...flow.events import Event
 from ...flow.fixed import flow_for
 from ...flow.names import event_name, shown_mode
 from ...flow.trajectory import Trajectory
-from ...flow.variation import NONE, FlownLeg, carry_legs, require_done
+from ...flow.variation import NONE, Arc, carry_legs, require_done
 from ...model import Array, DegenerateError, FilippovSystem, Surfaces, coupled_of, multiplier_enters
 from ...model.derivatives.event_maps import (
     AtEvent,
@@ -92,9 +92,9 @@ class Leg:
         """The variational field of the mode."""
         return variational_field(system, self.mode, chosen)
 
-    def flown(self, system: FilippovSystem, x: Array, duration: float) -> FlownLeg:
+    def arc(self, system: FilippovSystem, x: Array, duration: float) -> Arc:
         """The leg from a start (N,) over a duration."""
-        return FlownLeg(self.mode, x, duration, self.ends(system), self.left)
+        return Arc(self.mode, x, duration, self.ends(system), self.left)
 
     def ends(self, system: FilippovSystem) -> EndOfLeg | None:
         """The end of a leg by its mode's law: at a surface or set, of sliding, of a contact beside a set."""
@@ -246,9 +246,9 @@ def carry_leg(
         none = np.zeros((0, n, n + len(chosen)))
         by = found.by_start[:n], found.by_parameters[:n]
         return LegFlow(found.end[:n], *by, found.rate[:n], at_samples=none)
-    flown = [leg.flown(system, x, duration)]
-    carried = carry_legs(system, flown, p, chosen, times, back=back)
-    require_done(system, flown, carried)
+    arcs = [leg.arc(system, x, duration)]
+    carried = carry_legs(system, arcs, p, chosen, times, back=back)
+    require_done(system, arcs, carried)
     return flows_of(carried)[0]
 
 
@@ -257,9 +257,9 @@ def rate_at(system: FilippovSystem, leg: Leg, x: Array, p: Array) -> Array:
     if not system.sets:
         field = leg.field(system)
         return np.asarray(field.rate_at(field.states_at(x, p), p)[: len(x)])
-    flown = [FlownLeg(leg.mode, x, 0.0, None, leg.left)]
-    found = carry_legs(system, flown, p, back=True)
-    require_done(system, flown, found)
+    arcs = [Arc(leg.mode, x, 0.0, None, leg.left)]
+    found = carry_legs(system, arcs, p, back=True)
+    require_done(system, arcs, found)
     return found.before[0]
 
 

@@ -334,13 +334,13 @@ def _flows(
 ) -> list[LegFlow]:
     """Flows of legs, with samples at times ``since`` their starts that are cut by legs."""
     system = parts[0].system
-    flown = [part.leg.flown(system, part.start, part.duration) for part in parts]
+    arcs = [part.leg.arc(system, part.start, part.duration) for part in parts]
     p = np.array([part.p for part in parts]) if system is not run.system else parts[0].p
-    found = carry_legs(system, flown, p, chosen, since, cuts, back)
+    found = carry_legs(system, arcs, p, chosen, since, cuts, back)
     if found.failed < 0:
         return flows_of(found)
     if back:
-        require_done(system, flown, found)
+        require_done(system, arcs, found)
     own = zip(parts, pairwise(cuts), strict=True)
     return [_flow(run, part, since[i:j], chosen) for part, (i, j) in own]
 

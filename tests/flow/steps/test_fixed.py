@@ -14,7 +14,7 @@ LINEAR = ns.FilippovSystem([x, y], field=[y, -k * x - 0.3 * y], parameters={k: 4
 PENDULUM = ns.FilippovSystem([x, y], field=[y, -k * ca.sin(x)], parameters={k: 1.0})
 
 
-def flown(system, start, duration):
+def integrated(system, start, duration):
     """The matrix (x, X, P) after a duration."""
     field, p = variational_field(system, "", (0,)), system.parameter_vector()
     end = fixed.flow_for(field, field.start(np.array(start), p), p, duration)
@@ -24,14 +24,14 @@ def flown(system, start, duration):
 @pytest.mark.parametrize("duration", [0.0, 1e-9, 0.7, -0.7, 25.0])
 def test_a_linear_field_has_the_exponential(duration):
     a = np.array([[0.0, 1.0], [-4.0, -0.3]])
-    whole = flown(LINEAR, [1.0, -0.5], duration)
+    whole = integrated(LINEAR, [1.0, -0.5], duration)
     np.testing.assert_allclose(whole[:, 1:3], expm(a * duration), rtol=0, atol=1e-13)
     np.testing.assert_allclose(whole[:, 0], expm(a * duration) @ [1.0, -0.5], rtol=0, atol=1e-13)
 
 
 def test_back_and_forth_and_the_area():
-    there = flown(PENDULUM, [0.5, 1.0], 3.0)
-    back = flown(PENDULUM, there[:, 0], -3.0)
+    there = integrated(PENDULUM, [0.5, 1.0], 3.0)
+    back = integrated(PENDULUM, there[:, 0], -3.0)
     np.testing.assert_allclose(back[:, 0], [0.5, 1.0], rtol=0, atol=1e-14)
     assert np.linalg.det(there[:, 1:3]) == pytest.approx(1.0, abs=1e-14)
     np.testing.assert_allclose(back[:, 1:3] @ there[:, 1:3], np.eye(2), rtol=0, atol=1e-13)
@@ -39,7 +39,7 @@ def test_back_and_forth_and_the_area():
 
 def test_derivatives_by_a_parameter_are_those_of_rescaled_time():
     """x(t; k) = x(t sqrt(k); 1) with x' scaled: P follows from the field at the end."""
-    whole = flown(PENDULUM, [0.5, 0.0], 2.0)
+    whole = integrated(PENDULUM, [0.5, 0.0], 2.0)
     angle, rate = whole[:, 0]
     np.testing.assert_allclose(whole[:, 3], [rate, 0.5 * rate - np.sin(angle)], rtol=0, atol=1e-13)
 
@@ -47,4 +47,4 @@ def test_derivatives_by_a_parameter_are_those_of_rescaled_time():
 def test_what_is_not_finite_is_refused():
     system = ns.FilippovSystem([x, y], field=[1, x**2 + y**2 + k], parameters={k: 0.0})
     with pytest.raises(ns.ConvergenceError, match="duration"):
-        flown(system, [0.0, 1.0], 5.0)
+        integrated(system, [0.0, 1.0], 5.0)

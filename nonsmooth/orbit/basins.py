@@ -215,7 +215,11 @@ class Search:
             finite = np.flatnonzero(np.all(np.isfinite(self.x0), axis=1))
             chosen = np.random.default_rng(0).permutation(finite)[:_SEEDS]
             dense = _DENSE if self.section is None else 1
-            first = self._sample(self.x0[chosen], self.samples, "scale", dense).x
+            count = (
+                min(self.samples, self.most) * _DENSE
+            )  # at times: on a section states may be zero
+            times = self.t_start + self.step / _DENSE * np.arange(1, count + 1)
+            first = self._ensemble(self.x0[chosen], times[-1], "scale", t_eval=times).sample_x
             seen = first[np.all(np.isfinite(first), axis=2)]
             if len(seen):  # without the outer 5 %: some runs may diverge
                 ends = np.quantile(seen, [0.05, 0.95], axis=0)

@@ -106,6 +106,20 @@ def test_forced_cycles_have_no_multiples():
     assert found[0].points[0, 0] * found[1].points[0, 0] < 0
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e9])
+def test_two_close_cycles_in_any_unit_with_starts_on_the_section(unit):
+    """r' = -200 r (r - 1)(r - 1.05)(r - 1.1): starts beside the unstable cycle go to either side."""
+    r = ca.sqrt(x * x + v * v) / unit
+    rate = -200 * (r - 1) * (r - 1.05) * (r - 1.1)
+    system = ns.FilippovSystem([x, v], field=[x * rate - v, v * rate + x])
+    radii = np.array([0.9, 0.99, 1.04, 1.06, 1.12, 1.3])
+    starts = np.stack([radii * unit, np.zeros(6)], axis=-1)
+    found = ns.basins(system, starts, 60.0, section=ns.Section(v, 1), work=QUIET)
+    values = [float(a.points[0, 0]) / unit for a in found.attractors]
+    assert np.allclose(sorted(values), [1.0, 1.1], atol=1e-9)
+    assert np.allclose(np.array(values)[found.labels - 1], [1, 1, 1, 1.1, 1.1, 1.1], atol=1e-9)
+
+
 @pytest.mark.parametrize("section", [None, "h0"])
 def test_rest_on_a_set_and_infinity(section):
     """Dry friction of force 1 beside a spring, with damping and without any at high speed."""

@@ -54,7 +54,7 @@ class PhaseResponse:
     leg : ndarray (m,) of int
         The leg of each row.
     error : float
-        Largest difference of Z . f from 1, and of Z after one period.
+        Largest difference of Z . f from 1, and of the phase after one period, as a part of the period.
     """
 
     orbit: PeriodicOrbit
@@ -200,7 +200,8 @@ def phase_response(orbit: PeriodicOrbit, *, samples: int = 200) -> PhaseResponse
     first = _eigenvector(orbit)
     t, x, z, leg, speed = _along(orbit, first, samples)
     error = max(
-        float(np.abs(speed - 1.0).max()), float(np.abs((z[0] - first) * x.std(axis=0)).max())
+        float(np.abs(speed - 1.0).max()),
+        float(np.abs((z[0] - first) * x.std(axis=0)).max()) / orbit.period,
     )
     if orbit.symmetric:
         wrap, half, count = orbit.problem.wrap, 0.5 * orbit.period, len(orbit.problem.legs)
@@ -214,17 +215,19 @@ def _eigenvector(orbit: PeriodicOrbit) -> Array:
     at = orbit.evaluation
     n = orbit.system.dimension
     matrix, field = monodromy(orbit.problem, at), at.flows.before[0, :n]
-    # in units in which the states have one size, so that no equation is lost beside the others
-    units = orbit.problem.scales(orbit.unknowns)[:n]
-    rows = np.vstack([(matrix * units / units[:, None] - np.eye(n)).T, field / units])
+    # states in units of the orbit and the field as a direction: rows of one size whatever the units are
+    units = np.ptp(orbit.trajectory.x, axis=0)
+    units[units == 0.0] = 1.0
+    speed = float(np.linalg.norm(field / units))
+    rows = np.vstack([(matrix * units / units[:, None] - np.eye(n)).T, field / units / speed])
     free = n - len(orbit.problem.kept)
     sizes = np.linalg.svd(rows, compute_uv=False)
     if sizes[free - 1] < _FAMILY * sizes[0]:
         raise DegenerateError(
-            "orbit: expected one that stands alone, received one of a family (the multiplier 1 twice): "
-            "the phase that a kick leads to is not determined to first order."
+            "orbit: it belongs to a family of periodic orbits (the multiplier 1 twice), so that the phase after a "
+            "kick is not determined to first order. Change a parameter until the orbit is isolated."
         )
-    wanted = np.concatenate([np.zeros(n), [1.0]])
+    wanted = np.concatenate([np.zeros(n), [1.0 / speed]])
     found = np.linalg.lstsq(rows, wanted, rcond=_FAMILY)[0]
     return np.asarray(found / units)
 

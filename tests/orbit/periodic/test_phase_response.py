@@ -107,6 +107,26 @@ def test_thermostat_with_a_relay():
         assert abs(response(t)[0] * rate - 1.0) < 1e-11
 
 
+@pytest.mark.parametrize(("time", "length"), [(1e-6, 1e4), (1e7, 1e-9), (1.0, -1.0)])
+def test_units_of_time_and_state_do_not_matter(time, length):
+    x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    rate = lambda s: (-x / length - 0.2 * v * time / length + s) * length / time**2
+    side = 1 if length > 0 else -1
+    fields = {"above": [v, rate(side)], "below": [v, rate(-side)]}
+    system = ns.FilippovSystem([x, v], surface=v, **fields)
+    start, small = [-6.4 * length, 0.01 * length / time], 1e-12 * abs(length) * min(1.0, 1 / time)
+    run = ns.simulate(system, start, 40 * time, rtol=1e-12, atol=small)
+    orbit = ns.periodic_orbit(system, run)
+    response = phase_response(orbit)
+    reference = phase_response(ns.periodic_orbit(relay(), [-6.4, 0.01]))
+    ours, theirs = (
+        next(leg.t for leg in r.orbit.legs if leg.mode == mode)
+        for r, mode in ((response, "+" if length > 0 else "-"), (reference, "+"))
+    )
+    found = response(ours + 0.7 * time) * [length / time, length / time**2]
+    assert np.abs(found - reference(theirs + 0.7)).max() < 1e-12
+
+
 @pytest.mark.parametrize("t", [0.3, 2.9, 4.8])
 def test_kicks_of_a_relay_oscillator_shift_the_phase(t):
     orbit = ns.periodic_orbit(relay(), [-6.4, 0.01], parameters={"d": 0.3})

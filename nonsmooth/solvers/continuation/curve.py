@@ -81,6 +81,7 @@ class Curve:
     parameter: int | None = None
     branching: bool = False
     snaps: bool = False
+    regular: bool = False  # Newton's method converges quadratically though tangents are chords
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         """Return the values of the equations and their Jacobian; every subclass defines it.
@@ -249,7 +250,7 @@ class Curve:
 
         def attempt() -> Array | None:
             # exact derivatives converge quadratically: near a branch point rounding is magnified
-            noise = 1e-8 if self.exact else 1e-11
+            noise = 1e-8 if self.exact or self.regular else 1e-11
             return converge(
                 bordered,
                 start,
@@ -283,10 +284,10 @@ class Curve:
         arclength : float
             From the start of the arc, in scaled unknowns.
         """
-        if not self.exact:
-            plain = Point(u, chord, arclength)
-            return Point(u, chord, arclength, tests=read_tests(self.tests(plain)))
         try:
+            if not self.exact:
+                plain = Point(u, chord, arclength)
+                return Point(u, chord, arclength, tests=read_tests(self.tests(plain)))
             jacobian = self.equations(u)[1] * self.scale
             tangent, sign = self.along(jacobian, before)
             tests: dict[str, float] = {}

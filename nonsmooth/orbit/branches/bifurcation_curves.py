@@ -151,6 +151,9 @@ def continue_bifurcation(
 
     def follow(departure: Departure) -> Arc:
         curve = departure.curve
+        assert isinstance(curve, (EventCurve, ConnectionCurve))
+        u = departure.rows[-1]
+        curve.base.restart(curve.without(u) if isinstance(curve, EventCurve) else u)
         if isinstance(curve, EventCurve):
             curve.secant.forget()
         k = departure.rows[-1].size - 2
@@ -179,7 +182,8 @@ def continue_bifurcation(
                 for arc in [follow(departure)]
             )
         assert event.point is not None
-        base, start = event.curve.freed(event.point.u, _free(event.curve, names), widths)
+        base, start = event.curve.begun_later(event.point.u)
+        base, start = base.freed(start, _free(base, names), widths)
         curve: EventCurve | ConnectionCurve
         if isinstance(base, ConnectionCurve):  # its equations are of codimension one
             curve = base

@@ -177,7 +177,7 @@ def _with_fewer_legs(at: Meeting) -> Meeting:
     found = _changed(base, other, u)
     if found is None or not found.test:
         return at
-    shorter, start = base.with_problem(found.problem, found.u), np.append(found.u, u[-2:])
+    shorter, start = _with(base, u, found)
     if not _known(shorter, start, found.test):
         return at
     own = _same(base, u, replace(first, t=at.touch), shorter, start)
@@ -248,9 +248,9 @@ def _degenerate(curve: EventCurve, base: OrbitCurve, u: Array, names: set[str]) 
     own = _own_guard(before, start, surface, order, guard)
     if own is None or count < 2:
         return None
-    regular = base.with_problem(before.problem, before.u)
     point = Degenerate(start, own, order)
-    located = _located(regular, np.append(before.u, u[k:]), point)
+    regular, guess = _with(base, u, before)
+    located = _located(regular, guess, point)
     return None if located is None else Meeting(regular, located, curve, "", at=point)
 
 
@@ -298,6 +298,12 @@ def _changed(base: OrbitCurve, at: Condition, u: Array, kind: str = "") -> Chang
         return changed_itinerary(base.problem, kind, [at], u[: base.problem.size], p)
     except NonsmoothError:
         return None
+
+
+def _with(base: OrbitCurve, u: Array, at: ChangedItinerary) -> tuple[OrbitCurve, Array]:
+    """The equations with another itinerary, and the unknowns there."""
+    curve = base.with_problem(at.problem, at.u, base.parameters_at(u))
+    return curve, np.append(at.u, u[base.problem.size :])
 
 
 # Curves that leave --------------------------------------------------------------------------------
@@ -366,22 +372,21 @@ def _with_legs(base: OrbitCurve, u: Array, at: Condition, name: str) -> Iterator
     """The curve of a smooth bifurcation of the orbit beyond an event, whose legs grow from zero."""
     beyond = _changed(base, at, u)
     if beyond is not None and beyond.fresh:
-        start = np.append(beyond.u, u[base.problem.size :])
-        yield _from(base.with_problem(beyond.problem, beyond.u), name, start, beyond.fresh)
+        longer, start = _with(base, u, beyond)
+        yield _from(longer, name, start, beyond.fresh)
 
 
 def _two_events(
     base: OrbitCurve, u: Array, first: Condition, other: Condition
 ) -> Iterator[Candidate]:
     """Two events at one time: each with and without the legs that the other one adds."""
-    more = u[base.problem.size :]
     yield _from(base, first, u)
     yield _from(base, other, u)
     for own, added in ((first, other), (other, first)):
         beyond = _changed(base, added, u)
         if beyond is None or not beyond.fresh:
             continue
-        longer, start = base.with_problem(beyond.problem, beyond.u), np.append(beyond.u, more)
+        longer, start = _with(base, u, beyond)
         at = _same(base, u, own, longer, start)
         if at is not None:
             yield _from(longer, at, start, beyond.fresh)
@@ -458,9 +463,9 @@ def _at_tangency(base: OrbitCurve, u: Array, at: Degenerate) -> Iterator[Candida
         yield _from(base, start, u)
         beyond = _changed(base, start, u, "switching-sliding")
         if beyond is not None and beyond.fresh:
-            longer, (k,) = base.with_problem(beyond.problem, beyond.u), beyond.fresh
+            (longer, guess), (k,) = _with(base, u, beyond), beyond.fresh
             crossing = Condition("start", k, _surface_guard(longer, k, surface))
-            yield _from(longer, crossing, np.append(beyond.u, u[base.problem.size :]), (k,))
+            yield _from(longer, crossing, guess, (k,))
         return
     touch = Condition("interior", flight, _surface_guard(base, flight, surface))
     if at.order:

@@ -108,7 +108,8 @@ class Equilibria(BranchCurve):
     def occurs(self, test: str, u: Array) -> bool:
         """Not a Hopf point at a neutral saddle, where two real eigenvalues have the sum 0."""
         values = self.eigenvalues(u)
-        return test != "Hopf" or bool(values[_critical_pair(values)[0]].imag != 0.0)
+        turning = values[_critical_pair(values)[0]].imag != 0.0
+        return test != "Hopf" or bool(turning) or self.double_zero(u)
 
     def double_zero(self, u: Array) -> bool:
         sizes = np.sort(np.abs(self.eigenvalues(u)))

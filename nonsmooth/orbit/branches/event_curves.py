@@ -45,7 +45,17 @@ CUSP, HIGHER = "tangency of higher order", "touch of higher order"
 AT_START, AT_END = "touch at the start", "touch at the end"
 
 #: Tests of an event itself, beyond whose zeros it is another one.
-OWN_ENDS = (TWO_FOLD, SECOND, CUSP, HIGHER, AT_START, AT_END, "1:1 resonance", "1:2 resonance")
+OWN_ENDS = (
+    TWO_FOLD,
+    SECOND,
+    CUSP,
+    HIGHER,
+    AT_START,
+    AT_END,
+    "1:1 resonance",
+    "1:2 resonance",
+    "Hopf",
+)
 
 #: Times of two touches of a leg differ by more than this part of its duration.
 _APART = 1e-6
@@ -180,31 +190,52 @@ class EventCurve(Curve):
         return np.append(values, test), np.vstack([jacobian, row / self.scale])
 
     def _touching_rows(self, u: Array, inner: Array) -> tuple[Array, Array]:
-        """The guard and its rate at the touch, and differences of them by the unknowns."""
+        """The guard and its rate at the touch, and their derivatives by the unknowns."""
+        # Where the touch is only the point of the flow matters; there both are differentiated numerically.
+        leg, x, _, p = self._leg(inner)
         assert self.condition is not None
-        i, n, k = self.condition.leg, self.problem.dimension, self.columns
-        columns = [*range(i * n, (i + 1) * n), k, k + 1, k + 2]
-        rows, terms = np.zeros((2, u.size)), self.terms(u)[:2]
-        rows[0, k], rows[1, k] = terms[1], 2.0 * self.terms(u)[2]
-        for j in columns:
-            if j != k:
-                step = 1e-6 * max(abs(float(u[j])), float(self.scale[j]) * 1e-3) * np.eye(u.size)[j]
-                rows[:, j] = (self.terms(u + step) - self.terms(u - step))[:2] / (2.0 * step[j])
-        return terms, rows
+        n, k, free = self.problem.dimension, self.columns, self.base.free
+        begin, t = self.condition.leg * n, float(u[k])
+        flow = integrate_leg(self.base.system, leg, x, t, p, free)
+        terms, y, rows = self._guard(leg, flow.end, p), flow.end, np.zeros((2, u.size))
+        by_state = np.empty((2, y.size))
+        for j in range(y.size):
+            step = 1e-6 * max(abs(float(y[j])), 1e-3) * np.eye(y.size)[j]
+            change = self._guard(leg, y + step, p) - self._guard(leg, y - step, p)
+            by_state[:, j] = change[:2] / (2.0 * step[j])
+        rows[:, begin : begin + n] = by_state @ flow.by_start
+        rows[:, k] = terms[1], 2.0 * terms[2]
+        for j, index in enumerate(free):
+            step = 1e-6 * max(abs(float(p[index])), 1e-3) * np.eye(p.size)[index]
+            change = self._guard(leg, y, p + step) - self._guard(leg, y, p - step)
+            rows[:, k + 1 + j] = change[:2] / (2.0 * step[index])
+            rows[:, k + 1 + j] += by_state @ flow.by_parameters[:, j]
+        return terms[:2], rows
+
+    def _guard(self, leg: Leg, y: Array, p: Array) -> Array:
+        """Coefficients of the guard of the condition along the flow from a state."""
+        field = guarded_field(self.base.system, leg.mode)
+        assert self.condition is not None
+        return np.asarray(
+            first_terms(field, y, p)[1][field.motion.guards.index(self.condition.guard)]
+        )
 
     def terms(self, u: Array) -> Array:
         """Coefficients of the guard in the time from the touch: its value, rate, half the second derivative, ..."""
         leg, x, _, p = self._leg(self.without(u))
-        system = self.base.system
-        y = integrate_leg(system, leg, x, float(u[self.columns]), p).end
-        field = guarded_field(system, leg.mode)
-        assert self.condition is not None
-        k = field.motion.guards.index(self.condition.guard)
-        return np.asarray(first_terms(field, y, p)[1][k])
+        y = integrate_leg(self.base.system, leg, x, float(u[self.columns]), p).end
+        return self._guard(leg, y, p)
 
     def renewed(self, point: Point) -> Point | None:
-        tangent = self.base.turned(point.u, point.tangent)
-        return None if tangent is None else self.point(point.u, tangent, tangent, point.arclength)
+        tangent = self.base.turned(self.without(point.u), self.without(point.tangent))
+        if tangent is None:
+            return None
+        tangent = np.insert(tangent, self.columns, 0.0) if self.touches else tangent
+        tangent = self.along(self.scaled(point.u / self.scale)[1], tangent)[0]
+        return self.point(point.u, tangent, tangent, point.arclength)
+
+    def singular(self, name: str) -> bool:
+        return self.base.singular(name)
 
     # ends ---------------------------------------------------------------------------------------
 
@@ -225,8 +256,10 @@ class EventCurve(Curve):
 
     def _sides(self, u: Array) -> dict[str, float]:
         """Functions that are positive while a touch is an extremum inside its leg."""
-        duration, t = self._leg(self.without(u))[2], float(u[self.columns])
-        return {AT_START: t, AT_END: duration - t, HIGHER: self.sign * float(self.terms(u)[2])}
+        leg, _, duration, _ = self._leg(self.without(u))
+        t, found = float(u[self.columns]), {HIGHER: self.sign * float(self.terms(u)[2])}
+        # an orbit without events begins nowhere
+        return found if leg.timed else found | {AT_START: t, AT_END: duration - t}
 
     def _bend(self) -> float:
         """The sign of a guard's second derivative at an extremum beside which it holds."""

@@ -131,6 +131,9 @@ _COLLAPSED = 1e-6
 #: Share of the way to an event at which the orbit before it is checked.
 _JUST = 0.99
 
+#: Share of an orbit without events by which it may begin later, where a guard is touched at its start.
+_LATER = 0.381966
+
 #: Order of the conditions that name an event at which several vanish.
 _PRIORITY = ("duration", "start", "end", "interior", "transversality")
 
@@ -142,9 +145,9 @@ _OBLIQUE, _LEFT = 0.9, 0.5
 class OrbitCurve(OrbitEquations):
     """Periodic orbits of one itinerary, with their tests and events."""
 
-    def with_problem(self, problem: BoundaryProblem, u: Array) -> OrbitCurve:
-        """The same parameters with another itinerary."""
-        return OrbitCurve(problem, self.p, self.free, self.widths, u, self.longest)
+    def with_problem(self, problem: BoundaryProblem, u: Array, p: Array) -> OrbitCurve:
+        """The same free parameters with another itinerary, at parameters p."""
+        return OrbitCurve(problem, p, self.free, self.widths, u, self.longest)
 
     def tests(self, point: Point) -> Mapping[str, float]:
         at, p, self._last = self.evaluation(point.u), self.parameters_at(point.u), b""
@@ -271,6 +274,9 @@ class OrbitCurve(OrbitEquations):
         """Violated guards."""
         return faults_of(self.problem, self.evaluation(u), self.parameters_at(u))
 
+    def admissible(self, u: Array) -> bool:
+        return not self.faults(u)
+
     def require_valid(self, u: Array) -> None:
         """Raise for half orbits of a system whose symmetry the parameter breaks."""
         if self.problem.symmetry is not None:
@@ -318,6 +324,10 @@ class OrbitCurve(OrbitEquations):
         if shrunk is not None:
             return shrunk
         conditions = self._vanishing(zero)
+        if conditions[0].what == "start":
+            later = self._at_another_phase(u, conditions[0])
+            if later is not None:
+                return later
         at, p = self.evaluation(u), self.parameters_at(u)
         kind = kind_of(self.problem, conditions[0], at, p)
         beyond = self._edited(kind, conditions, u, p)
@@ -327,7 +337,7 @@ class OrbitCurve(OrbitEquations):
             side = far_side(self.problem, kind, conditions[0], at, p, itinerary, beyond)
             return self._event(kind, self, zero.point, conditions[0].name, side)
         itinerary = shown_itinerary(self.system, beyond.problem.legs)
-        curve = self.with_problem(beyond.problem, beyond.u)
+        curve = self.with_problem(beyond.problem, beyond.u, p)
         point = curve.located(np.append(beyond.u, u[-len(self.free) :]), beyond.test)
         if point is None:
             side = FarSide(itinerary, "not located on the side with fewer legs")
@@ -337,6 +347,24 @@ class OrbitCurve(OrbitEquations):
         back = curve._edited(kind, [test], point.u, p) if kind == "corner" else None
         side = far_side(curve.problem, kind, test, at, p, itinerary, back)
         return self._event(kind, curve, point, beyond.test, side)
+
+    def begun_later(self, u: Array) -> tuple[BranchCurve, Array]:
+        if self.problem.phase is None or not self.system.time_dependent:
+            return self, u
+        k, p = self.problem.size, self.parameters_at(u)
+        (x,), (duration,) = self.problem.split(u[:k])
+        n, leg = self.problem.dimension, self.problem.legs[0]
+        begin = integrate_leg(self.system, leg, x, _LATER * float(duration), p).end[None, :n]
+        unknowns = self.problem.pack(begin, np.array([duration]))
+        curve = self.with_problem(replace(self.problem, reference=begin[0]), unknowns, p)
+        return curve, np.append(unknowns, u[k:])
+
+    def _at_another_phase(self, u: Array, at: Condition) -> BranchEvent | None:
+        """The touch of an orbit without events where it begins, located from another start."""
+        (curve, guess), name = self.begun_later(u), replace(at, what="interior").name
+        assert isinstance(curve, OrbitCurve)
+        point = None if curve is self else curve.located(guess, name)
+        return None if point is None else curve.event(Zero(name, point, 0.0, (name,)))
 
     def _vanishing(self, zero: Zero) -> list[Condition]:
         """Conditions that vanish together at a zero, of the kind that names the event."""
@@ -426,13 +454,16 @@ class OrbitCurve(OrbitEquations):
         if is_smooth(zero.name) or event.point is None or not isinstance(event.curve, OrbitCurve):
             return None
         curve, u = event.curve, event.point.u
+        if curve is not self and curve.problem.legs == self.problem.legs:  # from another start
+            return curve.onward(event, Zero(event.test, event.point, 0.0, (event.test,)))
         if curve is not self:  # located on the side with fewer legs, which is ahead
             return curve.leave(u, ())
-        beyond = self._edited(event.kind, self._vanishing(zero), u, self.parameters_at(u))
+        p = self.parameters_at(u)
+        beyond = self._edited(event.kind, self._vanishing(zero), u, p)
         if beyond is None:
             return None
         start = np.append(beyond.u, u[-len(self.free) :])
-        return self.with_problem(beyond.problem, beyond.u).leave(start, beyond.fresh)
+        return self.with_problem(beyond.problem, beyond.u, p).leave(start, beyond.fresh)
 
     def leave(self, u: Array, fresh: Sequence[int]) -> Departure | None:
         """Leave an event into the side where the itinerary holds, new legs growing from zero."""
@@ -521,7 +552,7 @@ def _part(
     curve: OrbitCurve, problem: BoundaryProblem, part: Array, zero: Zero, kind: str
 ) -> Located | None:
     """The event of a part of the orbit, if its return map has the multiplier -1."""
-    made = curve.with_problem(problem, part)
+    made = curve.with_problem(problem, part, curve.parameters_at(zero.point.u))
     u = np.append(part, zero.point.u[-len(curve.free) :])
     try:
         tangent = np.linalg.svd(made.scaled(u / made.scale)[1])[2][-1]
@@ -630,7 +661,7 @@ def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
         double = replace(problem, legs=legs, symmetry=None, periods=2 * problem.periods)
         unknowns = double.pack(np.concatenate([starts, second]), np.concatenate([durations] * 2))
         way = double.pack(np.concatenate([changes, turned]), np.concatenate([times, -times]))
-    new = curve.with_problem(double, unknowns)
+    new = curve.with_problem(double, unknowns, p)
     way = np.append(way, np.zeros(len(curve.free))) / new.scale
     return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
 

@@ -104,21 +104,26 @@ def assert_real(curve: BifurcationCurve) -> None:
     assert not virtual, (curve, virtual)
 
 
-@pytest.mark.parametrize("name", ROWS)
+_FAST = ("CT1", "CT4", "CT5", "CT7")
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in _FAST else pytest.param(name, marks=pytest.mark.slow) for name in ROWS]
+)
 def test_curves_end_where_others_leave(name: str) -> None:
     system, guess, free, known, bounds, values, kind, leaving = ROWS[name]
     orbit = ns.periodic_orbit(system, ns.simulate(system, guess, 60.0))
     branch = ns.continue_orbit(orbit, free, bounds=bounds["ab".index(free)])
     ((event_kind, residual),) = known.items()
     event = next(e for e in branch.events if e.kind == event_kind)
-    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=bounds)
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=bounds, step=0.05)
     assert_real(curve)
     assert np.abs(residual(*curve.values.T)).max() < 1e-10
     point = next(p for p in curve.special if p.kind == kind)
     assert np.abs(np.abs(point.values) - np.abs(values)).max() < 1e-9
     if not name.startswith("CT7"):
         assert BranchEnd.EVENT in curve.ends
-    found = ns.continue_bifurcation(point, ("a", "b"), bounds=bounds)
+    found = ns.continue_bifurcation(point, ("a", "b"), bounds=bounds, step=0.05)
     kinds = [one.kind for one in found]
     assert {one: kinds.count(one) for one in kinds} == leaving
     every = LINE | GRAZING | ADDING if name.startswith("CT") else known
@@ -140,6 +145,7 @@ _CLOSED: dict[str, Known] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "key", "k"),
     [("crossing-sliding", "crossing-sliding (landing at t = pi + s, s < 0), s = -0.3, -0.1: (A, m)", k) for k in (0, 1)]

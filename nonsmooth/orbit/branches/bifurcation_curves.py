@@ -173,10 +173,16 @@ class EventCurve(Curve):
 
     def renewed(self, point: Point) -> Point | None:
         tangent = self.base.turned(point.u, point.tangent)
-        return None if tangent is None else self.point(point.u, tangent, tangent, point.arclength)
+        if tangent is None:
+            return None
+        tangent = self.along(self.scaled(point.u / self.scale)[1], tangent)[0]
+        return self.point(point.u, tangent, tangent, point.arclength)
 
     def ends(self, name: str) -> bool:
         return self.base.ends_curve(name)
+
+    def singular(self, name: str) -> bool:
+        return self.base.singular(name)
 
     def tests(self, point: Point) -> Mapping[str, float]:
         """Functions that vanish at other events and at degenerate ones."""
@@ -278,6 +284,7 @@ def continue_bifurcation(
     for way in (-tangent, tangent):
         if halves and halves[0].end in ("closed", "interrupted"):
             break
+        base.restart(start)
         if isinstance(curve, EventCurve):
             curve.secant.forget()
         ends = [(k + i, low, high) for i, (low, high) in enumerate(limits)]

@@ -153,9 +153,9 @@ _OBLIQUE, _LEFT = 0.9, 0.5
 class OrbitCurve(OrbitEquations):
     """Periodic orbits of one itinerary, with their tests and events."""
 
-    def with_problem(self, problem: BoundaryProblem, u: Array) -> OrbitCurve:
-        """The same parameters with another itinerary."""
-        return OrbitCurve(problem, self.p, self.free, self.widths, u, self.longest)
+    def with_problem(self, problem: BoundaryProblem, u: Array, p: Array) -> OrbitCurve:
+        """The same free parameters with another itinerary, at parameters p."""
+        return OrbitCurve(problem, p, self.free, self.widths, u, self.longest)
 
     def tests(self, point: Point) -> Mapping[str, float]:
         at, p, self._last = self.evaluation(point.u), self.parameters_at(point.u), b""
@@ -282,6 +282,9 @@ class OrbitCurve(OrbitEquations):
         """Violated guards."""
         return faults_of(self.problem, self.evaluation(u), self.parameters_at(u))
 
+    def admissible(self, u: Array) -> bool:
+        return not self.faults(u)
+
     def require_valid(self, u: Array) -> None:
         """Raise for half orbits of a system whose symmetry the parameter breaks."""
         if self.problem.symmetry is not None:
@@ -331,7 +334,7 @@ class OrbitCurve(OrbitEquations):
             side = far_side(self.problem, kind, conditions[0], at, p, itinerary, beyond)
             return self._event(kind, self, zero.point, conditions[0].name, side)
         itinerary = shown_itinerary(self.system, beyond.problem.legs)
-        curve = self.with_problem(beyond.problem, beyond.u)
+        curve = self.with_problem(beyond.problem, beyond.u, p)
         point = curve.located(np.append(beyond.u, u[-len(self.free) :]), beyond.test)
         if point is None:
             side = FarSide(itinerary, "not located on the side with fewer legs")
@@ -432,11 +435,12 @@ class OrbitCurve(OrbitEquations):
         curve, u = event.curve, event.point.u
         if curve is not self:  # located on the side with fewer legs, which is ahead
             return curve.leave(u, ())
-        beyond = self._edited(event.kind, self._vanishing(zero), u, self.parameters_at(u))
+        p = self.parameters_at(u)
+        beyond = self._edited(event.kind, self._vanishing(zero), u, p)
         if beyond is None:
             return None
         start = np.append(beyond.u, u[-len(self.free) :])
-        return self.with_problem(beyond.problem, beyond.u).leave(start, beyond.fresh)
+        return self.with_problem(beyond.problem, beyond.u, p).leave(start, beyond.fresh)
 
     def leave(self, u: Array, fresh: Sequence[int]) -> Departure | None:
         """Leave an event into the side where the itinerary holds, new legs growing from zero."""
@@ -538,7 +542,7 @@ def _part(
     curve: OrbitCurve, problem: BoundaryProblem, part: Array, zero: Zero, kind: str
 ) -> Located | None:
     """The event of a part of the orbit, if its return map has the multiplier -1."""
-    made = curve.with_problem(problem, part)
+    made = curve.with_problem(problem, part, curve.parameters_at(zero.point.u))
     u = np.append(part, zero.point.u[-len(curve.free) :])
     try:
         tangent = np.linalg.svd(made.scaled(u / made.scale)[1])[2][-1]
@@ -558,7 +562,7 @@ def _part(
 _RESONANCES = {"1:1": 1.0, "1:2": -1.0, "1:3": -0.5, "1:4": 0.0}
 
 #: Points at which a curve ends.
-_ENDS = ("1:1 resonance", "1:2 resonance")
+_ENDS = ("1:1 resonance", "1:2 resonance", "Hopf")
 
 
 def _degenerate(
@@ -620,7 +624,7 @@ def _touches(
     with np.errstate(all="ignore"):  # at the two-fold itself the map has a pole
         try:
             numbers = contact_numbers(problem, condition, at, p)
-        except np.linalg.LinAlgError:
+        except (NonsmoothError, np.linalg.LinAlgError):  # a second event is grazed
             return found
     found["fold with contact"] = numbers["det(I - A_i)"]
     found["period doubling with contact"] = numbers["det(I + A_i)"]
@@ -738,7 +742,7 @@ def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
         double = replace(problem, legs=legs, symmetry=None, periods=2 * problem.periods)
         unknowns = double.pack(np.concatenate([starts, second]), np.concatenate([durations] * 2))
         way = double.pack(np.concatenate([changes, turned]), np.concatenate([times, -times]))
-    new = curve.with_problem(double, unknowns)
+    new = curve.with_problem(double, unknowns, p)
     way = np.append(way, np.zeros(len(curve.free))) / new.scale
     return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
 

@@ -2,8 +2,9 @@
 
 A run with a fixed itinerary is a chain of smooth maps. Each leg has its state-transition matrix X and its
 derivatives P by parameters, each event its saltation matrices (``saltation``). Derivatives of the end are
-their product; events that accumulate have a limit (``limits``). Gradients of a cost are the same product from the other end, without X and P: rows are pulled
-back through the recursion of each step's series (``flow/core/adjoint.c``). That is the exact discrete adjoint,
+their product; events that accumulate have a limit (``limits``). Gradients of a cost are the same product from the
+other end, without X and P: rows are pulled back through the recursion of each step's series
+(``flow/core/legs/adjoint.c``). That is the exact discrete adjoint,
 without backward integration, which is impossible through an entry to sliding.
 """
 

@@ -81,6 +81,8 @@ class Curve:
     parameter: int | None = None
     branching: bool = False
     snaps: bool = False
+    #: The words of the error that made the last correction fail; else empty.
+    refused: str = ""
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         """Return the values of the equations and their Jacobian; every subclass defines it.
@@ -265,8 +267,10 @@ class Curve:
             source = getattr(self, "secant", None)
             if found is None and isinstance(source, Secant) and source.forget():
                 found = attempt()
-        except NonsmoothError:
+        except NonsmoothError as error:
+            self.refused = str(error)
             return None
+        self.refused = ""
         return None if found is None else found * self.scale
 
     def point(self, u: Array, before: Array, chord: Array, arclength: float) -> Point | None:
@@ -295,7 +299,8 @@ class Curve:
             if self.branching:
                 tests["branch point"] = sign
             own = self.tests(Point(u, tangent, arclength, jacobian))
-        except (NonsmoothError, np.linalg.LinAlgError):
+        except (NonsmoothError, np.linalg.LinAlgError) as error:
+            self.refused = str(error)
             return None
         tests.update(read_tests(own))
         return Point(u, tangent, arclength, jacobian, tests)

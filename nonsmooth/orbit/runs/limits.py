@@ -116,6 +116,20 @@ def tail_of(parts: Sequence[Stretch]) -> tuple[range, int]:
     return best
 
 
+def limits_of(parts: Sequence[Stretch]) -> dict[int, tuple[Limit, range]]:
+    """Limits of events by the legs that they end, with the legs whose events accumulate."""
+    found = dict[int, tuple[Limit, range]]()
+    for i, part in enumerate(parts):
+        if part.leg.kind != "limit":
+            continue
+        first = 1 + max(found, default=-1)
+        tail, block = tail_of(parts[first:i])
+        tail = range(first + tail.start, first + tail.stop)
+        what = f"limit of events at t = {part.t + part.duration:.10g}"
+        found[i] = limit_of(parts, tail, block, what), tail
+    return found
+
+
 def limit_of(parts: Sequence[Stretch], tail: range, block: int, what: str) -> Limit:
     """The limit of the events that end the legs of a tail: the best of extrapolations that end sooner and later."""
     times = np.array([parts[i].t + parts[i].duration for i in tail])

@@ -181,24 +181,24 @@ def _extrapolated(times: Array, states: Array, points: tuple[int, ...]) -> Limit
     for _ in range(8):
         if not 0.0 < sigma < 1.0:
             return None
-        own = _weights(complex(sigma, _STEP), steps)
+        own = extrapolation_weights(complex(sigma, _STEP), steps)
         sigma, last = float(own.real @ ratios), sigma
         if abs(sigma - last) <= _EPSILON:
             break
     if not 0.0 < sigma < 1.0:
         return None
-    own = _weights(complex(sigma, _STEP), steps)
+    own = extrapolation_weights(complex(sigma, _STEP), steps)
     of_ratios = own.real / (1.0 - own.imag @ (ratios - ratios[-1]) / _STEP)
     of_spans = np.append(0.0, of_ratios / spans[:-1])
     of_spans[:-1] -= of_ratios * ratios / spans[:-1]
-    w = _weights(complex(sigma, _STEP), len(spans))
+    w = extrapolation_weights(complex(sigma, _STEP), len(spans))
     q = np.column_stack([times, states])
     moved = q - q[-1]
     by_times = np.append(0.0, of_spans) - np.append(of_spans, 0.0)
     return Limit(points, q[-1] + w.real @ moved, w.real, by_times, w.imag @ moved / _STEP, 0.0)
 
 
-def _weights(sigma: complex, m: int) -> Array:
+def extrapolation_weights(sigma: complex, m: int) -> Array:
     """Weights w_i of m + 1 values, with their derivatives by the ratio as imaginary parts."""
     w, power = np.ones(1, complex), 1.0 + 0.0j
     for _ in range(m):

@@ -581,7 +581,7 @@ class Sensitivity:
     names : tuple of str
         Names of the parameters.
     run : Trajectory
-        The run that was differentiated.
+        The run that was differentiated; for one-sided derivatives its nearest neighbour.
     dsample_dx0, dsample_dp : ndarray (K, n, n), (K, n, q) or None
         Derivatives of ``run.sample_x``, at fixed times: None without samples, NaN where a sample is. A sample at the
         time of an event is on the side of ``sample_x``, after it where both agree.

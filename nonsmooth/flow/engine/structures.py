@@ -10,8 +10,8 @@ from functools import cache
 from .building.core_source import driver_text
 
 #: Sources with structures that Python fills, and with functions of the driver that it calls.
-_STRUCTURES = "common.h programs.h state.c flow.c fixed.c variation.c".split()
-_CALLED = "state.c entry.c fixed.c legs.c".split()
+_STRUCTURES = "common.h programs.h state.c legs/flow.c legs/fixed.c legs/variation.c".split()
+_CALLED = "state.c entry.c legs/fixed.c legs/legs.c".split()
 
 _NUMBERS = {
     "double": ctypes.c_double,

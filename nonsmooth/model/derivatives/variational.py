@@ -1,6 +1,6 @@
 """The variational equations of a mode: X' = Df X and P' = Df P + f_p beside the state.
 
-X and P are the derivatives by the start and by parameters; ``flow/core/flow.c`` carries their columns.
+X and P are the derivatives by the start and by parameters; ``flow/core/legs/flow.c`` carries their columns.
 """
 
 from __future__ import annotations

@@ -184,8 +184,10 @@ static int vanishing(Run *r, const double *near, int32_t *which) {
 /* Close the contacts of impacts that accumulate, unless further impacts are to be served. */
 static void close_contacts(Run *r, int block, double left, double error) {
   double speed, *near = r->before, *x = r->saved;
-  int count = gathered(r, block, r->involved, &speed), before = r->mode, at_once = is_instant(r, left), switches = 0;
+  int count = gathered(r, block, r->involved, &speed), before = r->mode, at_once = is_instant(r, left), switches = 0, open = 0;
   for (int k = 1; k <= block; k++) switches |= back(r, k)->kind != IMPACT;
+  for (int i = 0; i < count; i++) open |= r->letter[r->m + r->involved[i]] != 0;
+  if (!open) return; /* the last impact has closed them */
   if (!at_once && (speed * left > r->o.atol || !is_sure(r, error))) return;
   int32_t *surface = r->involved + r->c;
   for (int i = 0; i < r->n; i++) near[i] = (left + error) * fabs(r->e.states[(int64_t)i * r->stride + 1]);

@@ -9,7 +9,7 @@ k = 2, with drilling friction k = 3. With k = 1 the set is a surface.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import accumulate
 from typing import Any
@@ -52,7 +52,8 @@ from .read_events import direction_of, read_maps, read_rules, read_when, require
 #: No expressions.
 _NONE = ca.SX(0, 1)
 
-#: Expressions of a definition, in the order in which they are written down.
+#: Symbols of a definition, and its expressions, in the order in which they are written down.
+INPUTS = ("states", "time", "parameters", "multipliers", "reactions")
 OUTPUTS = (
     *("field", "surfaces", "guards", "maps", "gaps", "restitutions"),
     *("whens", "priorities", "periods", "hysteresis"),
@@ -156,30 +157,17 @@ class Definition:
             "parameters": [s.name() for s in listed(self.parameters)],
         }
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the expressions that are written down: the last only where it has entries."""
-        return OUTPUTS if self.hysteresis.numel() else OUTPUTS[:-1]
-
     def state(self) -> dict[str, Any]:
-        """Plain values from which ``from_state`` makes an equal definition."""
-        inputs = [self.states, self.time, self.parameters, self.multipliers, self.reactions]
-        outputs = [getattr(self, name) for name in self.outputs]
-        some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed, "rules": self.rules}
-        some |= {"clocks": self.clocks, "discrete": self.discrete}
-        some |= {"layer_widths": self.layer_widths, "laws": self.laws}
-        some |= {"complementarity": self.complementarity, "constraints": self.constraints}
-        some |= {"tables": self.tables}
-        some |= {"impact_law": self.impact_law} if self.impact_law != "newton" else {}
+        """Plain values from which ``from_state`` makes an equal definition; defaults are left out."""
+        inputs = [getattr(self, name) for name in INPUTS]
+        outputs = OUTPUTS if self.hysteresis.numel() else OUTPUTS[:-1]
+        plain = {name: getattr(self, name) for name in PLAIN}
         return {
-            **{name: value for name, value in some.items() if value},
-            "definition": ca.Function("definition", inputs, outputs).serialize(),
+            **{name: v for name, v in plain.items() if v != getattr(Definition, name, None)},
+            "definition": ca.Function(
+                "definition", inputs, [getattr(self, n) for n in outputs]
+            ).serialize(),
             "names": [[str(s) for s in listed(v)] for v in inputs],
-            "defaults": self.defaults,
-            "stops": self.stops,
-            "resets": self.resets,
-            "impacts": self.impacts,
-            "hidden": self.hidden,
         }
 
     @classmethod
@@ -189,16 +177,12 @@ class Definition:
         vectors = [ca.vertcat(*map(ca.SX.sym, names)) for names in state["names"]]
         vectors = [v if v.numel() else ca.SX(0, 1) for v in vectors]
         expressions = [ca.SX(e) for e in function.call(vectors)]
-        inputs = ("states", "time", "parameters", "multipliers", "reactions")
-        rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
-        parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=False))
-        some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths", "laws")
-        tuples: dict[str, Any] = {
-            name: tuple(state.get(name, ()))
-            for name in (*some, "complementarity", "constraints", "tables")
-        }
-        law = state.get("impact_law", "newton")
-        return cls(**parts, **rest, **tuples, impact_law=law)
+        parts = dict(zip((*INPUTS, *OUTPUTS), (*vectors, *expressions), strict=False))
+        return cls(**parts, **{name: state[name] for name in PLAIN if name in state})
+
+
+#: Parts of a definition that are no expressions, and what follows from others.
+PLAIN = tuple(f.name for f in fields(Definition) if f.type not in ("ca.SX", "frozenset[int]"))
 
 
 class _Deferred:

@@ -256,10 +256,7 @@ class FilippovSystem:
         made = read_definition(**given)
         names = {value.name() for value in found.values}
         defaults = {name: value for name, value in made.defaults.items() if name not in names}
-        system = cls.__new__(cls)
-        system._adopt(replace(made, tables=found.tables, defaults=defaults))
-        system.lifted = found.switches
-        return system
+        return cls._of(replace(made, tables=found.tables, defaults=defaults), found.switches)
 
     @classmethod
     def from_dae(
@@ -341,13 +338,17 @@ class FilippovSystem:
         """
         key = tuple(held_values(self.definition, values))
 
-        def made() -> FilippovSystem:
-            system = type(self).__new__(type(self))
-            system._adopt(with_values(self.written, list(key)))
-            system.lifted = self.lifted
-            return system
+        return self.cached(
+            ("holding", key), lambda: self._of(with_values(self.written, list(key)), self.lifted)
+        )
 
-        return self.cached(("holding", key), made)
+    @classmethod
+    def _of(cls, written: Definition, lifted: tuple[LiftedSwitch, ...] = ()) -> FilippovSystem:
+        """Return the system of a definition that was read, and of the switches that were found for it."""
+        system = cls.__new__(cls)
+        system._adopt(written)
+        system.lifted = lifted
+        return system
 
     def _adopt(self, written: Definition) -> None:
         #: The definition with tables as elements of one argument each; ``definition`` has their breakpoints.
@@ -373,8 +374,7 @@ class FilippovSystem:
         """The system that runs integrate: with tables as elements, whose cells set parameters."""
         if not self.written.tables:
             return self
-        system = type(self).__new__(type(self))
-        system._adopt(by_pieces(self.written))
+        system = self._of(by_pieces(self.written))
         counts = {table.element: table.count for table in self.written.tables}
         sizes = [counts.get(members[0], 1) for members in system.entries]
         system.numbers = tuple(accumulate(sizes, initial=0))
@@ -383,12 +383,7 @@ class FilippovSystem:
     @cached_property
     def of_breakpoints(self) -> FilippovSystem:
         """The system whose breakpoints are surfaces in runs too."""
-        if not self.written.tables:
-            return self
-        system = type(self).__new__(type(self))
-        system._adopt(self.definition)
-        system.lifted = self.lifted
-        return system
+        return self._of(self.definition, self.lifted) if self.written.tables else self
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.written.state(), "lifted": self.lifted}

@@ -108,7 +108,13 @@ class Multipliers:
         if on and margin > _UNSURE:
             return f"not determined: the error of the multipliers is {self.error:.1e}"
         if on:
-            return f"neutral to first order, {on} multiplier{'s' * (on > 1)} on the unit circle"
+            family = not self.problem.system.time_dependent and bool(
+                (np.abs(self.logarithms) <= margin).any()
+            )
+            return (
+                f"neutral to first order, {on} multiplier{'s' * (on > 1)} on the unit circle"
+                f"{': 1 twice, as in a family of orbits' * family}"
+            )
         if self.zeros and not sizes.size:
             return "superstable"
         return f"{'strongly' if sizes.size and sizes[0] < _STRONG else 'asymptotically'} stable"

@@ -26,6 +26,7 @@ from ..reading import (
     Expression,
     Parameters,
     column,
+    items_of,
     listed,
     require_finite,
     require_known,
@@ -36,7 +37,7 @@ from ..reading import (
 from ..values import Array, parameter_values
 from .complementarity import rate_of, require_complementarity
 from .conditions import Atoms, Rule, located, passages
-from .constraints import joints_of, read_constraints, require_constraints
+from .constraints import Constraint, joints_of, require_constraints
 from .elements import (
     Complementarity,
     functions_of,
@@ -149,6 +150,14 @@ class Definition:
         """Rates of the gaps (c,), in states, parameters and time."""
         return rate_of(self, self.gaps) if self.gaps.numel() else ca.SX(0, 1)
 
+    def frame(self) -> dict[str, Any]:
+        """States, parameters with their defaults, and time, as arguments of a system."""
+        return {
+            "states": listed(self.states),
+            "parameters": dict(zip(listed(self.parameters), self.defaults.values(), strict=True)),
+            "time": self.time if self.time.numel() else None,
+        }
+
     @property
     def names(self) -> dict[str, list[str]]:
         """Names of the states and of the parameters."""
@@ -200,15 +209,10 @@ class _Deferred:
 
 Definition.field = _Deferred()
 
-_DIRECTIONS = (-1, 0, 1)
-
 
 def read_definition(
     states: Any,
     *,
-    surface: Any,
-    above: Any,
-    below: Any,
     field: Any,
     multipliers: Any,
     surfaces: Any,
@@ -218,23 +222,32 @@ def read_definition(
     resets: Any,
     impacts: Any,
     hidden: bool,
-    complementarity: Any = (),
-    constraints: Any = (),
-    clocks: Sequence[Clock] = (),
-    discrete: Sequence[tuple[float, ...] | None] = (),
+    complementarity: Any,
+    constraints: Any,
+    clocks: Sequence[Clock],
+    discrete: Sequence[tuple[float, ...] | None],
+    surface: Any = None,
+    above: Any = None,
+    below: Any = None,
     layer_widths: Any = None,
 ) -> Definition:
     """Read and check the arguments of FilippovSystem."""
-    x = _states(states)
-    t, (p, defaults) = _time(time), _parameters(parameters)
+    x, (p, defaults) = symbols(states, "states"), _parameters(parameters)
+    if x.numel() == 0:
+        raise DefinitionError("states: expected at least one symbol, received none.")
+    t = _NONE if time is None else symbols([time], "time")
     entries = read_entries(surface, surfaces)
     sizes = tuple(len(entry.functions) for entry in entries)
     lam, f = _multipliers_and_field(entries, above, below, field, multipliers, x.numel())
     widths = _widths(layer_widths, sum(sizes))
-    given = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
-    given.append((complementarity, Complementarity, "complementarity"))
-    items = [*[_items(*one) for one in given], read_constraints(constraints)]
+    items = [
+        *(items_of(stops, Stop, "stops"), items_of(resets, Reset, "resets")),
+        items_of(impacts, Impact, "impacts"),
+        items_of(complementarity, Complementarity, "complementarity"),
+        items_of(constraints, Constraint, "constraints", "function, reaction=..."),
+    ]
     (stops, resets, impacts, conditions, joined), renamed = _distinct(items, _own_names(sizes))
+    _require_directions([*stops, *resets])
     reactions, f = _reactions(impacts, "gap", x, t, f)
     _require_one_field(above, joined)
     held, f = _reactions(joined, "function", x, t, f)
@@ -282,10 +295,6 @@ def _multipliers_and_field(
     return lam, f
 
 
-def _time(time: Any) -> ca.SX:
-    return ca.SX(0, 1) if time is None else symbols([time], "time")
-
-
 def _require_one_field(above: Any, constraints: Sequence[Any]) -> None:
     """Refuse reactions of constraints in two fields."""
     if above is not None and any(own.reaction is not None for own in constraints):
@@ -293,13 +302,6 @@ def _require_one_field(above: Any, constraints: Sequence[Any]) -> None:
             "constraints: their reactions are in above= and below=, of which one holds at a time. Give field= with "
             "multipliers= and surfaces=, which holds them once."
         )
-
-
-def _states(states: Any) -> ca.SX:
-    x = symbols(states, "states")
-    if x.numel() == 0:
-        raise DefinitionError("states: expected at least one symbol, received none.")
-    return x
 
 
 def _contacts(impacts: Sequence[Impact]) -> dict[str, Any]:
@@ -381,6 +383,15 @@ def _widths(values: Any, count: int) -> tuple[float, ...]:
     return widths if len(set(widths)) > 1 else ()
 
 
+def _require_directions(events: Sequence[Stop | Reset]) -> None:
+    for event in events:
+        if isinstance(event.direction, bool) or event.direction not in (-1, 0, 1):
+            raise DefinitionError(
+                f"direction of {event.name!r}: expected -1 (falling), 0 (both) or 1 (rising), "
+                f"received {event.direction!r}."
+            )
+
+
 def _one_multiplier_each(lam: ca.SX, h: ca.SX) -> None:
     if lam.numel() != h.numel():
         raise DefinitionError(
@@ -415,26 +426,6 @@ def _parameters(
         for s, v in zip(given, values, strict=True)
     }
     return p, defaults
-
-
-def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
-    """Read stops=, resets=, impacts= or complementarity=: one, or a sequence of them."""
-    items = [values] if isinstance(values, kind) else listed(values)
-    for i, item in enumerate(items):
-        if not isinstance(item, kind):
-            raise DefinitionError(
-                f"{what}[{i}]: expected a {kind.__name__}, received {item!r} "
-                f"({type(item).__name__}). Write {what}=[nonsmooth.{kind.__name__}(function, "
-                "...)]."
-            )
-        if kind in (Impact, Complementarity):
-            continue
-        if isinstance(item.direction, bool) or item.direction not in _DIRECTIONS:
-            raise DefinitionError(
-                f"direction of {item.name!r}: expected -1 (falling), 0 (both) or 1 (rising), "
-                f"received {item.direction!r}."
-            )
-    return items
 
 
 def _own_names(sizes: Sequence[int]) -> set[str]:
@@ -487,9 +478,9 @@ def _two_fields(
 
 def _direction(name: str, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
     """Direction of a reaction that is not given: the gradient of a function's rate by the velocities."""
-    positions = _depends_on_each(gap, x)
     push = ca.densify(ca.gradient(rate, x))
-    velocities = [i for i in range(x.numel()) if not positions[i] and not push[i].is_zero()]
+    moved = [i for i in range(x.numel()) if not push[i].is_zero()]
+    velocities = [i for i in moved if not ca.depends_on(gap, x[i])]
     if velocities and not ca.is_linear(rate, ca.vertcat(*[x[i] for i in velocities])):
         raise DefinitionError(
             f"reaction of {name!r}: the rate {rate} of {gap} is not linear in the states "
@@ -497,11 +488,6 @@ def _direction(name: str, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
             "reaction=, a symbol in the field."
         )
     return ca.vertcat(*[push[i] if i in velocities else 0 for i in range(x.numel())])
-
-
-def _depends_on_each(function: ca.SX, x: ca.SX) -> list[bool]:
-    """Which of some symbols an expression depends on."""
-    return [bool(ca.depends_on(function, x[i])) for i in range(x.numel())]
 
 
 def _reactions(

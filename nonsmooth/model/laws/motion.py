@@ -140,19 +140,6 @@ class Motion:
                     yield guard("exit", side), function
         yield from zip(event_guards(system), ca.vertsplit(stops)[: stops.numel()], strict=True)
 
-    def value_function(self) -> ca.Function:
-        """Return (x, p) -> the field (N, 1) and the guard functions (m, 1)."""
-        values = [self.field, self.functions]
-        return self.system.function(("values", self.mode), lambda: values, self.states)
-
-    def gradient_function(self) -> ca.Function:
-        """Return (x, p) -> gradients of the guard functions (m, N), the error scale of rounding."""
-
-        def build() -> Sequence[ca.SX]:
-            return [ca.jacobian(self.functions, self.states)]
-
-        return self.system.function(("gradient", self.mode), build, self.states)
-
     def multiplier_equations(self) -> ca.SX:
         """Equations of the multipliers that are states."""
         (layer,) = self._coupled.held_at(self.mode, [self._coupled.layer])

@@ -547,7 +547,9 @@ def _sentence(name: str, half: _Half) -> str:
     """Why a branch ends."""
     if half.end is BranchEnd.EVENT and half.events:
         last = half.events[-1]
-        return f"At {name} = {last.parameter:.10g} there is an event, {last.kind} ({last.far_side})."
+        return (
+            f"At {name} = {last.parameter:.10g} there is an event, {last.kind} ({last.far_side})."
+        )
     said = half.reason and f" {half.reason}"
     return half.end.advice + said
 

@@ -22,13 +22,13 @@ from ..numbering import IMPACT_LAWS, LAWS, MOST_CODES, OPERATIONS
 from ..reading import listed
 from ..schema import Validator, savable, type_hints
 from ..values import Array
-from .conditions import OR, Rule
-from .curves import Curve
 from .elements import LARGEST
+from .events.conditions import OR, Rule
 from .lift import LiftedSwitch
 from .parse_definition import INPUTS, OUTPUTS, PLAIN, Definition, require_consistent
-from .pieces import Table
 from .system import FilippovSystem
+from .tables.curves import Curve
+from .tables.pieces import Table
 
 #: Most instructions, and entries, of a system in a file, and most that are nested: CasADi prints nested ones
 #: by recursion.

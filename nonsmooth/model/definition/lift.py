@@ -50,8 +50,8 @@ from ..expressions.graph import (
     operation,
     power_of,
 )
-from .curves import Curve, with_curves
-from .pieces import Argument, Sides, Table, twins_of
+from .tables.curves import Curve, with_curves
+from .tables.pieces import Argument, Sides, Table, twins_of
 
 
 @dataclass(frozen=True)

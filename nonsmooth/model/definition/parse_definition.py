@@ -36,7 +36,6 @@ from ..reading import (
 )
 from ..values import Array, parameter_values
 from .complementarity import rate_of, require_complementarity
-from .conditions import Atoms, Rule, located, passages
 from .constraints import Constraint, joints_of, require_constraints
 from .elements import (
     Complementarity,
@@ -47,8 +46,15 @@ from .elements import (
     read_entries,
 )
 from .events import Clock, Impact, Reset, Stop
-from .pieces import Table
-from .read_events import direction_of, read_maps, read_rules, read_when, require_no_endless_level
+from .events.conditions import Atoms, Rule, located, passages
+from .events.read_events import (
+    direction_of,
+    read_maps,
+    read_rules,
+    read_when,
+    require_no_endless_level,
+)
+from .tables.pieces import Table
 
 #: No expressions.
 _NONE = ca.SX(0, 1)
@@ -210,6 +216,14 @@ class _Deferred:
 Definition.field = _Deferred()
 
 
+#: Classes of what a system is made of besides surfaces, their arguments, and how one is written.
+_ELEMENTS: tuple[tuple[Any, ...], ...] = (
+    *((Stop, "stops"), (Reset, "resets"), (Impact, "impacts")),
+    (Complementarity, "complementarity"),
+    (Constraint, "constraints", "function, reaction=..."),
+)
+
+
 def read_definition(
     states: Any,
     *,
@@ -232,20 +246,16 @@ def read_definition(
     layer_widths: Any = None,
 ) -> Definition:
     """Read and check the arguments of FilippovSystem."""
+    t = _NONE if time is None else symbols([time], "time")
     x, (p, defaults) = symbols(states, "states"), _parameters(parameters)
     if x.numel() == 0:
         raise DefinitionError("states: expected at least one symbol, received none.")
-    t = _NONE if time is None else symbols([time], "time")
     entries = read_entries(surface, surfaces)
     sizes = tuple(len(entry.functions) for entry in entries)
     lam, f = _multipliers_and_field(entries, above, below, field, multipliers, x.numel())
     widths = _widths(layer_widths, sum(sizes))
-    items = [
-        *(items_of(stops, Stop, "stops"), items_of(resets, Reset, "resets")),
-        items_of(impacts, Impact, "impacts"),
-        items_of(complementarity, Complementarity, "complementarity"),
-        items_of(constraints, Constraint, "constraints", "function, reaction=..."),
-    ]
+    given = (stops, resets, impacts, complementarity, constraints)
+    items = [items_of(values, *own) for values, own in zip(given, _ELEMENTS, strict=True)]
     (stops, resets, impacts, conditions, joined), renamed = _distinct(items, _own_names(sizes))
     _require_directions([*stops, *resets])
     reactions, f = _reactions(impacts, "gap", x, t, f)

@@ -37,9 +37,9 @@ from .parse_definition import (
     consistent_parameters,
     read_definition,
 )
-from .pieces import by_breakpoints, by_pieces, in_cells
 from .roots import roots_of
 from .switching import Switching, class_of
+from .tables.pieces import by_breakpoints, by_pieces, in_cells
 
 T = TypeVar("T")
 

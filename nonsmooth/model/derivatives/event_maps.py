@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ..cache import Content
-from ..definition.conditions import decides
+from ..definition.events.conditions import decides
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
 from ..expressions.graph import Expressions, evaluate, instructions, operation

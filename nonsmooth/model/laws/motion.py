@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 
 from ..definition.parse_definition import read_function
-from ..definition.pieces import beyond_cells
 from ..definition.system import FilippovSystem, require_system
+from ..definition.tables.pieces import beyond_cells
 from ..errors import DefinitionError
 from ..expressions.identity import decide_zero
 from .coupled import combinable, coupled_of, raised_of

@@ -9,11 +9,11 @@ from typing import Any
 
 import casadi as ca
 
-from ..errors import DefinitionError
+from ...errors import DefinitionError
+from ..discrete_states import held_values
+from ..system import FilippovSystem
 from .conditions import ABOVE, BELOW, ZERO, folded
-from .discrete_states import held_values
-from .events import Stop
-from .system import FilippovSystem
+from .declarations import Stop
 
 #: A condition that always holds, or never.
 _ALWAYS = float("inf")

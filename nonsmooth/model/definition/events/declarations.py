@@ -8,10 +8,10 @@ from typing import Any
 
 import casadi as ca
 
-from ..checks import real
-from ..errors import DefinitionError
-from ..reading import Expression, column, items_of, listed, scalar
-from .discrete_choices import without_choices
+from ...checks import real
+from ...errors import DefinitionError
+from ...reading import Expression, column, items_of, listed, scalar
+from ..discrete_choices import without_choices
 
 
 @dataclass(frozen=True)

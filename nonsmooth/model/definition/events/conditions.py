@@ -12,9 +12,9 @@ from typing import TypeVar
 
 import casadi as ca
 
-from ..errors import DefinitionError
-from ..expressions.graph import IN_A_GUARD, require_smooth
-from ..numbering import UNWATCHED
+from ...errors import DefinitionError
+from ...expressions.graph import IN_A_GUARD, require_smooth
+from ...numbering import UNWATCHED
 
 #: Signs of an atom in the mask of a relation.
 BELOW, ZERO, ABOVE = 1, 2, 4

@@ -202,6 +202,10 @@ def require_known(
             f"{clash} has the name of a declared symbol but is another symbol: create each symbol "
             "once and reuse it."
             if clash
+            else "It is the multiplier of a Friction: give that in surfaces=."
+            if any(str(s).startswith("friction(") for s in foreign)
+            else "It is the phase of a Clock: give that in clocks=."
+            if any(str(s).endswith("_phase") for s in foreign)
             else "Add it to states=, parameters= or time=, or give it a number."
         )
         raise DefinitionError(

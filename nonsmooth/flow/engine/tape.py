@@ -110,6 +110,10 @@ def values_structure(v: Values, kept: list[NDArray[Any]]) -> ctypes.Structure:
     return structure("Values")(*sizes, *[a.ctypes.data for a in arrays])
 
 
+#: What a run says at its end.
+_Numbers, _Counts = ctypes.c_double * 4, ctypes.c_int64 * 15
+
+
 class _Held:
     """Something of C's that is freed when a block ends."""
 
@@ -336,8 +340,10 @@ class TapeEngine:
         with self.held_table() as table, self.held_run(table) as state:
             c_options = ctypes.byref(options_of(self.shown.system, options, dense=True))
             given = (address(x), address(p), address(start))
-            library().run_read_at(state, address(read_at), 0 if read_at is None else len(read_at))
-            library().run_remember(state, address(known))
+            if read_at is not None:
+                library().run_read_at(state, address(read_at), len(read_at))
+            if known is not None:
+                library().run_remember(state, address(known))
             library().run_begin(
                 state, c_options, output.pointer, *given, options.t_start, address(motion)
             )
@@ -351,10 +357,11 @@ class TapeEngine:
             recorded = recorder.finished(counts[7:10])
             self._rooms = recorder.rooms if dense else self._rooms  # the next run is often similar
             modes, labels = self._modes(table), self._labels(table)
-            final = np.zeros(width)
-            library().run_motion(state, address(final))
             if width == 1 and options.t_start == 0:  # times of events are known to rounding
-                final = final[:0]
+                width = 0
+            final = np.zeros(width)
+            if width:
+                library().run_motion(state, address(final))
         return Run(
             status=counts[0],
             reason=counts[1],
@@ -422,7 +429,7 @@ class TapeEngine:
         return _Held(state, made.run_free)
 
     def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
-        numbers, counts = (ctypes.c_double * 4)(), (ctypes.c_int64 * 15)()
+        numbers, counts = _Numbers(), _Counts()
         width = self.system.surface_count + len(self.system.impacts)
         active, several = (ctypes.c_int32 * (width + 1))(), (ctypes.c_int32 * SEVERAL)()
         rates = np.empty((SEVERAL, self.system.extended_dimension))

@@ -253,11 +253,9 @@ def read_definition(
     entries = read_entries(surface, surfaces)
     sizes = tuple(len(entry.functions) for entry in entries)
     lam, f = _multipliers_and_field(entries, above, below, field, multipliers, x.numel())
-    widths = _widths(layer_widths, sum(sizes))
     given = (stops, resets, impacts, complementarity, constraints)
     items = [items_of(values, *own) for values, own in zip(given, _ELEMENTS, strict=True)]
     (stops, resets, impacts, conditions, joined), renamed = _distinct(items, _own_names(sizes))
-    _require_directions([*stops, *resets])
     reactions, f = _reactions(impacts, "gap", x, t, f)
     _require_one_field(above, joined)
     held, f = _reactions(joined, "function", x, t, f)
@@ -277,7 +275,7 @@ def read_definition(
         hidden=hidden or any(entry.hidden for entry in entries),
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
-        layer_widths=(*widths, *[1.0] * len(own)) if widths else (),
+        layer_widths=_widths(layer_widths, sum(sizes) - len(own), len(own)),
         constraints=joints.names,
         laws=laws_of(entries),
         hysteresis=hysteresis_of(entries),
@@ -334,6 +332,7 @@ def _events(
     p: ca.SX,
 ) -> dict[str, Any]:
     """Parts of a definition that stops, resets, clocks and discrete states make."""
+    _require_directions([*stops, *resets])
     maps, named = read_maps(resets, x)
     moving = ca.vertcat(x[: x.numel() - len(discrete)], t)
     atoms = Atoms(ca.vertcat(x, t), moving, p)
@@ -380,8 +379,8 @@ def _of_impacts(impacts: Sequence[Any], what: str) -> ca.SX:
     return ca.vertcat(*[column([getattr(i, what)], f"{what} of {i.name!r}", 1) for i in impacts])
 
 
-def _widths(values: Any, count: int) -> tuple[float, ...]:
-    """Widths of the layers of the surfaces; nothing where they are equal."""
+def _widths(values: Any, count: int, more: int) -> tuple[float, ...]:
+    """Widths of the layers of the surfaces, and of more functions that have none; nothing where they are equal."""
     if values is None:
         return ()
     widths = tuple(real(v, "layer_widths") for v in listed(values))
@@ -390,7 +389,7 @@ def _widths(values: Any, count: int) -> tuple[float, ...]:
             f"layer_widths is {values!r}, but the system has {count} switching functions. Give a "
             "positive number for each."
         )
-    return widths if len(set(widths)) > 1 else ()
+    return (*widths, *[1.0] * more) if len(set(widths)) > 1 else ()
 
 
 def _require_directions(events: Sequence[Stop | Reset]) -> None:

@@ -18,7 +18,7 @@ from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
 from ..expressions.graph import Expressions, evaluate, instructions, operation
 from ..expressions.identity import vanish_on
-from ..laws.coupled import combinable, coupled_of
+from ..laws.coupled import combinable, coupled_of, raised_of
 from ..laws.evaluators import Evaluator, evaluator
 from ..laws.motion import motion, solved
 from ..laws.switches import Guard
@@ -311,6 +311,17 @@ def kept_maps(system: FilippovSystem, surfaces: Sequence[int]) -> list[EventMap]
             build = partial(EventMap, system, x, rate, Guard("zero", i, 0, i))
             found.append(system.cached(("rate map", i, k), build))
     return found
+
+
+def rest_maps(system: FilippovSystem, mode: str, elements: Sequence[int]) -> list[EventMap]:
+    """What is zero where surfaces, sets and contacts rest, by their positions in a mode: functions and their rates."""
+    d, lower, count, kept = system.definition, raised_of(system).lower, len(system.entries), []
+    for k in elements:
+        if k < count:
+            kept += [e for i in system.entries[k] for e in (d.open_surfaces[i], *lower[i])]
+        else:
+            kept += [d.gaps[k - count], d.gap_rates[k - count]]
+    return [function_map(system, mode, e) for e in kept]
 
 
 def atoms_at(

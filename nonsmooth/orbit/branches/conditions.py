@@ -24,14 +24,14 @@ from ...model import Array, Evaluator, FilippovSystem, Guard, evaluator
 from ...model.derivatives.event_maps import keeps_zero
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
-from ..periodic.multipliers import finite_return_map
+from ..periodic.multipliers import Multipliers, finite_return_map
 from ..runs.guards import CONDITIONS, LegGuards, is_met, watch
 from ..runs.legs import Leg, surface_of
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
 
-#: Entries of a return map beyond this say nothing of its multipliers.
-_NO_DIGITS = 1e10
+#: Entries of a return map beyond which its small multipliers have lost their digits.
+_NO_DIGITS = 1e6
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,8 @@ def conditions_of(
         known.setdefault(name, condition)
         if math.isfinite(value):
             found[name] = value
-    found.update((name, v) for name, v in smooth_tests(problem, at).items() if math.isfinite(v))
+    smooth = smooth_tests(problem, at, p)
+    found.update((name, v) for name, v in smooth.items() if math.isfinite(v))
     return found
 
 
@@ -114,17 +115,21 @@ def condition_row(
     return value(x, p), row
 
 
-def smooth_tests(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
+def smooth_tests(problem: BoundaryProblem, at: Evaluation, p: Array) -> dict[str, float]:
     """Tests by the multipliers of the legs' map."""
     # An eigenvalue -1 of the half map of a symmetric orbit breaks its symmetry: a pitchfork.
     reduced = finite_return_map(problem, at)
-    if reduced is None or not float(np.abs(reduced).max()) < _NO_DIGITS:  # an event is grazed
+    if reduced is None:  # an event is grazed
         return {}
+    values: NDArray[Any] = np.linalg.eigvals(reduced)
+    if not float(np.abs(reduced).max()) < _NO_DIGITS:
+        found = Multipliers(problem, at, p).of_map
+        values = np.append(found, np.zeros(len(reduced) - found.size, complex))
+    k, l = _pairs(values.size)
     with np.errstate(all="ignore"):
-        values = np.linalg.eigvals(reduced)
-        k, l = _pairs(values.size)
-        torus = float(np.multiply.reduce(values[k] * values[l] - 1.0).real)
-        flip = float(np.multiply.reduce(values + 1.0).real)
+        pairs = values[k] * values[l]
+        torus = float(np.multiply.reduce((pairs - 1.0) / (1.0 + np.abs(pairs))).real)
+        flip = float(np.multiply.reduce((values + 1.0) / (1.0 + np.abs(values))).real)
     name = "period doubling" if problem.symmetry is None else "pitchfork"
     return {name: flip, "Neimark-Sacker": torus}
 

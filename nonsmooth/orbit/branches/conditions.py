@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...flow.fixed import first_terms
-from ...model import Array, Evaluator, FilippovSystem, Guard
+from ...model import Array, Evaluator, FilippovSystem, Guard, evaluator
 from ...model.derivatives.event_maps import keeps_zero
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
@@ -236,7 +236,9 @@ def _ending(
 def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
     """(y, p) -> field and guards of a mode; built once."""
     motion = guarded_field(system, mode).motion
-    return system.cached(("guard values", mode), lambda: Evaluator(motion.value_function()))
+    return evaluator(
+        system, ("values", mode), lambda: [motion.field, motion.functions], motion.states
+    )
 
 
 def _interior(

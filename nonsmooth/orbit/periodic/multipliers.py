@@ -97,6 +97,13 @@ class Multipliers:
         return math.nan if self.refusal else max(self._carried[1], self._product.error)
 
     @property
+    def repeats(self) -> bool:
+        """Whether an autonomous orbit has the multiplier 1 twice, as in a family of orbits."""
+        if self.refusal or self.problem.system.time_dependent:
+            return False
+        return bool((np.abs(self.logarithms) <= max(_NEUTRAL, 10.0 * self.error)).any())
+
+    @property
     def stability(self) -> str:
         """Stability in words, from the multipliers that are not the 1 of the flow."""
         if self.refusal:
@@ -108,13 +115,7 @@ class Multipliers:
         if on and margin > _UNSURE:
             return f"not determined: the error of the multipliers is {self.error:.1e}"
         if on:
-            family = not self.problem.system.time_dependent and bool(
-                (np.abs(self.logarithms) <= margin).any()
-            )
-            return (
-                f"neutral to first order, {on} multiplier{'s' * (on > 1)} on the unit circle"
-                f"{': 1 twice, as in a family of orbits' * family}"
-            )
+            return f"neutral to first order, {on} multiplier{'s' * (on > 1)} on the unit circle"
         if self.zeros and not sizes.size:
             return "superstable"
         return f"{'strongly' if sizes.size and sizes[0] < _STRONG else 'asymptotically'} stable"
@@ -169,7 +170,10 @@ class Multipliers:
         """Derivatives (S, N) of the parts of each leg, by starts in units of the orbit, and fields at their ends."""
         flows = self.at.flows
         legs = enumerate(zip(flows.by_start * self._units, flows.rate, strict=True))
-        return [[(x, rate)] if self._even(x) else self._cut(i, x) for i, (x, rate) in legs]
+        whole = [bool(leg.repeats) for leg in self.problem.legs]
+        return [
+            [(x, rate)] if whole[i] or self._even(x) else self._cut(i, x) for i, (x, rate) in legs
+        ]
 
     def _even(self, part: Array) -> bool:
         """Whether derivatives (S, N) do not grow too differently."""

@@ -26,18 +26,32 @@ typedef struct {
   double *row, *by_parameters; /* a row at the end, then at the start; what it gives by parameters */
 } Leg;
 
-/* Columns on their way: h of sets (m each), series of states and of unknowns (h is carried there). Of the column that
- * is derived: series by what the program is derived by, with as many terms as are not zero; sums of an order. */
+/* One term of the recursion: to coefficient k of ``to`` the sum of products of coefficients of ``by``, from ``first`` to
+ * below ``terms``, with those of ``from`` up to k + ahead, times a factor. */
+typedef struct { double *to, *from; const double *by; int32_t first, terms, ahead, factor; } Link;
+enum { PLUS, MINUS, TIMES_ORDER, OVER_ORDER }; /* the last two: k + 1 and its inverse */
+
+/* Links in the order in which they are used: distances of sets at the start; of an order directions of sets, sums,
+ * unknowns or the right sides of those in which sets are left, what these add to the sums, coefficients k + 1. */
+enum { AT_START, DIRECTIONS, SUMS, UNKNOWNS, LATE, NEXT, GROUPS };
+
+/* Derivatives on their way through the recursion, of a column or, back, of a row by all of these: series of states, of
+ * unknowns (h is carried there), sums of all orders (n + 3 width rows), and of sets directions, h in units of |h|, its
+ * root, distances, right sides of equations. Of all columns: series of states and unknowns, h of sets (m each) at the
+ * start. What parameters have of a row. */
 typedef struct {
-  double *h, *states, *series, *sum, *push; /* push: what parameters add to the sums of all orders */
-  const double **of;
-  int32_t *terms;
-  int8_t *late; /* whether that is an unknown of sliding, or the direction in which a set is left */
-} Columns;
+  double *states, *series, *sum, *lambda, *apart, *root, *rates, *right;
+  size_t room;
+  double *of_states, *of_series, *h, *p;
+} Variation;
 
 /* Entries of the program's derivatives: where those by each of its inputs begin, terms of their series, at most so many;
- * the ones by what moves that count in a mode. */
-typedef struct { int32_t *first, *terms, *most, *active, count; } Slopes;
+ * the ones by what moves that count in a mode. The recursion that they give. */
+typedef struct {
+  int32_t *first, *terms, *most, *active, count, leaving, begin[GROUPS + 1];
+  Link *link;
+  Variation *v;
+} Slopes;
 
 /* Length of a leg, and the direction of time along it. */
 static double length_of_leg(const Leg *l) { return fabs(l->duration); }
@@ -57,14 +71,31 @@ static int is_wanted(const Run *r, const Expansion *e, int row, int at_point) {
   return letter == 0 || letter == LEAVING || letter == LEFT_BEHIND;
 }
 
-static size_t place_slopes(const Run *r, Slopes *g, char *base, size_t used) {
-  size_t entries = r->s->derivatives.count;
+static size_t place_variation(const Run *r, size_t columns, Slopes *g, Variation *v, char *base) {
+  size_t entries = r->s->derivatives.count, n = r->n, w = r->width, stride = r->stride, sets = r->s->sets ? r->m : 0, used = 0;
+  g->v = v;
   g->first = INTEGERS(moving_size(r) + r->s->parameters + 1);
   g->terms = INTEGERS(entries);
   g->most = INTEGERS(entries);
   g->active = INTEGERS(entries);
+  g->link = place(base, &used, sizeof(Link), 2 * entries + w * w + n + 16 * w);
+  v->h = DOUBLES((columns + 1) * r->m);
+  v->of_states = DOUBLES(columns * n * stride);
+  v->of_series = DOUBLES(columns * w * stride);
+  v->room = (2 * n + 4 * w + 3 * sets) * stride + sets * (stride + 1) + 2 * sets * stride;
+  v->states = DOUBLES(v->room);
+  v->series = v->states + n * stride;
+  v->sum = v->series + w * stride;
+  v->lambda = v->sum + (n + 3 * w) * stride;
+  v->apart = v->lambda + sets * stride;
+  v->root = v->apart + sets * stride;
+  v->rates = v->root + sets * stride;
+  v->right = v->rates + sets * (stride + 1);
+  v->p = DOUBLES(r->s->parameters);
   return used;
 }
+
+static void clear_variation(const Variation *v) { memset(v->states, 0, sizeof(double) * v->room); }
 
 static void begin_slopes(const Run *r, Slopes *g) {
   const Entries *e = &r->s->derivatives;
@@ -87,8 +118,113 @@ static void begin_slopes(const Run *r, Slopes *g) {
   free(moves);
 }
 
-/* Those of an expansion. */
-static void measure_slopes(const Run *r, const Expansion *e, Slopes *g, int at_point) {
+static void add_link(Slopes *g, double *to, double *from, const double *by, int first, int terms, int ahead, int factor) {
+  g->link[g->begin[GROUPS]++] = (Link){to, from, by, first, terms, ahead, factor};
+}
+
+/* A link of coefficients of one order. */
+static void add_single(Slopes *g, double *to, double *from, const double *by, int factor) {
+  static const double one = 1;
+  add_link(g, to, from, by ? by : &one, 0, 1, 0, factor);
+}
+
+/* Where the derivatives by an input of the program are: a state, the direction of a set, an unknown of sliding or none. */
+static double *derived_by(const Run *r, const Expansion *e, const Variation *v, int input) {
+  int i = input < r->n ? -1 : unknown_at(r, input);
+  if (input < r->n) return v->states + (int64_t)input * r->stride;
+  if (i >= 0 && is_moving(r, i)) return v->lambda + (int64_t)i * r->stride;
+  return i >= 0 && e->l.letter[i] == 0 ? v->series + (int64_t)i * r->stride : 0;
+}
+
+/* Whether coefficients of an input follow from the sums of their order: of sliding, or of a direction in which a set is
+ * left. */
+static int is_late(const Run *r, const Expansion *e, int input) {
+  int i = input < r->n ? -1 : unknown_at(r, input), letter = i < 0 ? 1 : e->l.letter[i];
+  return letter == 0 || letter == LEAVING;
+}
+
+/* Of the direction h/|h| from h that is carried. */
+static void link_direction(const Run *r, const Expansion *e, Slopes *g, int f) {
+  const Variation *v = g->v;
+  int64_t stride = r->stride, size = size_of(r, f);
+  const double *length = e->root + f * stride;
+  double *root = v->root + f * stride;
+  for (int64_t i = f; i < f + size; i++) add_single(g, v->apart + i * stride, v->series + i * stride, e->per_radius + f, PLUS);
+  for (int64_t i = f; i < f + size; i++) add_link(g, root, v->apart + i * stride, e->apart + i * stride, 0, r->stride, 0, PLUS);
+  add_link(g, root, root, length, 1, r->stride, 0, MINUS);
+  for (int64_t i = f * stride; i < (f + size) * stride; i += stride) {
+    add_single(g, v->lambda + i, v->apart + i, 0, PLUS);
+    add_link(g, v->lambda + i, root, e->lambda + i, 0, r->stride, 0, MINUS);
+    add_link(g, v->lambda + i, v->lambda + i, length, 1, r->stride, 0, MINUS);
+  }
+}
+
+/* Right sides of the equations of directions in which sets are left, and of what slides beside (leaving_matrix). */
+static void link_right_sides(Run *r, const Expansion *e, Slopes *g) {
+  const Variation *v = g->v;
+  int64_t stride = r->stride;
+  int n, all = leaving_matrix(r, e, 1, &n), at = e->l.slides, column = n;
+  (void)all;
+  for (int i = 0; i < n; i++) add_single(g, v->right + i * stride, v->sum + (r->n + r->pending[i]) * stride, 0, MINUS);
+  EACH_SET(r, f) {
+    if (e->l.letter[f] != LEAVING) continue;
+    double *change = v->rates + f * (stride + 1);
+    for (int64_t i = f * stride; i < (f + size_of(r, f)) * stride; i += stride, at++) {
+      add_link(g, v->right + at * stride, v->lambda + i, e->rates + f * (stride + 1), 2, r->stride + 1, 1, TIMES_ORDER);
+      add_link(g, v->right + at * stride, change, e->lambda + i, 1, r->stride, 1, TIMES_ORDER);
+      add_link(g, v->right + column * stride, v->lambda + i, e->lambda + i, 1, r->stride, 0, MINUS);
+    }
+    column++;
+  }
+}
+
+/* Of coefficients k + 1 of the states and of h. */
+static void link_next(const Run *r, const Expansion *e, Slopes *g) {
+  const Variation *v = g->v;
+  int64_t stride = r->stride;
+  for (int64_t i = 0; i < r->n * stride; i += stride) add_single(g, v->states + i + 1, v->sum + i, 0, OVER_ORDER);
+  for (int64_t i = 0; i < r->m; i++) {
+    double *h = v->series + i * stride + 1;
+    if (e->l.letter[i] == LEFT_BEHIND) add_single(g, h, v->sum + (r->n + i) * stride, 0, OVER_ORDER);
+    if (e->l.letter[i] != LEAVING) continue;
+    int64_t f = set_of(r, i) * (stride + 1);
+    add_link(g, h, v->lambda + i * stride, e->rates + f, 1, r->stride + 1, 1, PLUS);
+    add_link(g, h, v->rates + f, e->lambda + i * stride, 0, r->stride, 1, PLUS);
+  }
+}
+
+/* The recursion that an expansion and the slopes that count in it give. */
+static void link_up(Run *r, const Expansion *e, Slopes *g) {
+  const Variation *v = g->v;
+  const Entries *at = &r->s->derivatives;
+  int slides = e->l.slides;
+  int64_t stride = r->stride;
+  g->leaving = g->begin[GROUPS] = 0;
+  for (int group = 0; group < GROUPS; group++) {
+    g->begin[group] = g->begin[GROUPS];
+    for (int a = 0; a < g->count && (group == SUMS || group == LATE); a++) {
+      int q = g->active[a], late = is_late(r, e, at->column[q]), terms = group == LATE ? 1 : g->terms[q];
+      double *from = derived_by(r, e, v, at->column[q]);
+      if (group == SUMS || late) add_link(g, v->sum + at->row[q] * stride, from, derivative_row(r, q), group == SUMS && late, terms, 0, PLUS);
+    }
+    EACH_SET(r, f) {
+      g->leaving |= e->l.letter[f] == LEAVING;
+      if (group == DIRECTIONS && e->l.letter[f] == LEFT_BEHIND) link_direction(r, e, g, f);
+      for (int64_t i = f; group == AT_START && e->l.letter[f] == LEAVING && i < f + size_of(r, f); i++)
+        add_single(g, v->rates + f * (stride + 1), v->series + i * stride, e->lambda + i * stride, PLUS);
+    }
+    for (int i = 0; i < slides && group == UNKNOWNS && !g->leaving; i++)
+      for (int j = 0; j < slides; j++) {
+        const double *a = e->inverse + i * slides + j;
+        if (*a != 0) add_single(g, v->series + e->l.sliding[i] * stride, v->sum + (r->n + e->l.sliding[j]) * stride, a, MINUS);
+      }
+    if (group == UNKNOWNS && g->leaving) link_right_sides(r, e, g);
+    if (group == NEXT) link_next(r, e, g);
+  }
+}
+
+/* Entries of an expansion that count, and their recursion. */
+static void measure_slopes(Run *r, const Expansion *e, Slopes *g, int at_point) {
   int size = moving_size(r);
   g->count = 0;
   for (int j = 0; j < size + r->s->parameters; j++) {
@@ -101,195 +237,92 @@ static void measure_slopes(const Run *r, const Expansion *e, Slopes *g, int at_p
       if (g->terms[q] && j < size) g->active[g->count++] = q;
     }
   }
+  link_up(r, e, g);
 }
 
-/* What the program's derivatives are multiplied with, of a column. */
-static void aim_column(const Run *r, const Expansion *e, const Expansion *d, const Leg *l, int column, const Slopes *g, const Columns *c) {
-  int size = moving_size(r), stride = r->stride;
-  memset(c->push, 0, sizeof(double) * (r->n + 3 * r->width) * stride);
-  int own = l->direction[column], first = own < 0 ? 0 : own, last = own == ALONG_DP ? r->s->parameters : own + 1;
+/* What links of a group add at an order. */
+static void follow_links(const Slopes *g, int group, int k) {
+  for (const Link *l = g->link + g->begin[group], *end = g->link + g->begin[group + 1]; l < end; l++) {
+    int at = k + l->ahead, first = at < l->terms ? 0 : at + 1 - l->terms, last = terms_of(l->from, at + 1 - l->first) - 1;
+    if (first > last) continue;
+    double sum = first < last ? convolve(l->from, l->by, at, first, last) : l->from[first] * l->by[at - first];
+    l->to[k] += l->factor == PLUS ? sum : l->factor == MINUS ? -sum : l->factor == TIMES_ORDER ? (k + 1) * sum : sum * PART[k + 1];
+  }
+}
+
+/* The same in a mode in which sets are left: unknowns by their equations, or what their right sides have of them. */
+static void solve_leaving(Run *r, const Expansion *e, const Variation *v, int k, int is_back) {
+  int64_t stride = r->stride;
+  int slides = e->l.slides, n, all = leaving_matrix(r, e, k, &n), row = n;
+  double *a = r->work, *b = a + (int64_t)all * all, *unknown[all];
+  for (int i = 0; i < n; i++) unknown[i] = (i < slides ? v->series : v->lambda) + r->pending[i] * stride + k;
+  EACH_SET(r, f)
+    if (e->l.letter[f] == LEAVING) unknown[row++] = v->rates + f * (stride + 1) + k + 1;
+  for (int i = 0; i < all; i++) b[i] = is_back ? *unknown[i] : v->right[i * stride + k];
+  for (int i = 0; i < all && is_back; i++)
+    for (int j = 0; j < i; j++) swap(a + i * all + j, a + j * all + i, 1);
+  if (!solve(a, b, all)) for (int i = 0; i < all; i++) b[i] = NAN;
+  for (int i = 0; i < all; i++) *(is_back ? v->right + i * stride + k : unknown[i]) = b[i];
+}
+
+/* Coefficients of a column to an order, from the first of states and of h. */
+static void column_series(Run *r, const Expansion *e, const Slopes *g, int order) {
+  follow_links(g, AT_START, 0);
+  for (int k = 0; k <= order; k++)
+    for (int group = DIRECTIONS; group <= (k < r->order ? NEXT : LATE); group++) {
+      follow_links(g, group, k);
+      if (group == UNKNOWNS && g->leaving) solve_leaving(r, e, g->v, k, 0);
+    }
+}
+
+/* A column as the beginning of its series, with what parameters add to the sums of all orders. */
+static void begin_column(Run *r, const Leg *l, const Slopes *g, int column) {
+  const Variation *v = g->v;
+  int size = moving_size(r), own = l->direction[column], stride = r->stride;
+  int first = own < 0 ? 0 : own, last = own == ALONG_DP ? r->s->parameters : own + 1;
+  clear_variation(v);
+  for (int i = 0; i < r->n; i++) v->states[(int64_t)i * stride] = l->y[column * r->n + i];
+  for (int i = 0; i < r->m; i++) v->series[(int64_t)i * stride] = v->h[column * r->m + i];
   for (int j = first; j < last; j++)
     for (int q = g->first[size + j]; q < g->first[size + j + 1]; q++) {
-      double *to = c->push + (int64_t)r->s->derivatives.row[q] * stride;
+      double *to = v->sum + (int64_t)r->s->derivatives.row[q] * stride;
       const double *slope = derivative_row(r, q);
       for (int k = 0; k < g->terms[q]; k++) to[k] += slope[k] * (own < 0 ? l->dp[j] : 1);
     }
-  for (int j = 0; j < size; j++) {
-    int i = j < r->n ? -1 : unknown_at(r, j), letter = i < 0 ? 1 : e->l.letter[i];
-    c->of[j] = 0;
-    c->late[j] = letter == 0 || letter == LEAVING;
-    c->terms[j] = 0;
-    if (j < r->n) c->of[j] = d->states + (int64_t)j * stride;
-    else if (i >= 0 && is_moving(r, i)) c->of[j] = d->lambda + (int64_t)i * stride;
-    else if (letter == 0) c->of[j] = d->series + (int64_t)i * stride;
-  }
-}
-
-/* Sums of order k: derivatives of field, layer, surfaces and gaps, factors along the column. */
-static void derive(const Run *r, const Slopes *g, const Columns *c, int k) {
-  const Entries *at = &r->s->derivatives;
-  int size = moving_size(r);
-  for (int i = 0; i < r->n + 3 * r->width; i++) c->sum[i] = c->push[(int64_t)i * r->stride + k];
-  for (int j = 0; j < size; j++) if (c->of[j] && c->of[j][k] != 0) c->terms[j] = k + 1;
-  for (int a = 0; a < g->count; a++) {
-    int q = g->active[a], j = at->column[q];
-    c->sum[at->row[q]] += product_of(c->of[j], c->terms[j], derivative_row(r, q), g->terms[q], k);
-  }
-}
-
-/* Add what coefficients k of unknowns do that were zero. */
-static void derive_late(const Run *r, const Slopes *g, const Columns *c, int k) {
-  const Entries *at = &r->s->derivatives;
-  for (int a = 0; a < g->count; a++) {
-    int q = g->active[a], j = at->column[q];
-    if (!c->late[j] || c->of[j][k] == 0) continue;
-    c->sum[at->row[q]] += derivative_row(r, q)[0] * c->of[j][k];
-    c->terms[j] = k + 1;
-  }
-}
-
-/* Coefficient k of the derivative of h/|h| from that of h. */
-static void turn_direction(Run *r, const Expansion *e, Expansion *d, int f, int k) {
-  int size = size_of(r, f), stride = r->stride;
-  const double *length = e->root + (int64_t)f * stride;
-  double *root = d->root + (int64_t)f * stride, sum = 0;
-  for (int i = f; i < f + size; i++) {
-    double *own = d->apart + (int64_t)i * stride;
-    own[k] = d->series[(int64_t)i * stride + k] * e->per_radius[f];
-    sum += convolve(e->apart + (int64_t)i * stride, own, k, 0, k);
-  }
-  root[k] = sum - convolve(length, root, k, 1, k);
-  for (int i = f; i < f + size; i++) {
-    double *u = d->lambda + (int64_t)i * stride;
-    u[k] = d->apart[(int64_t)i * stride + k] - convolve(e->lambda + (int64_t)i * stride, root, k, 0, k)
-           - convolve(length, u, k, 1, k);
-  }
-}
-
-/* Coefficients k of the derivatives of directions in which sets are left, with those of what slides. */
-static void turn_leaving(Run *r, const Expansion *e, Expansion *d, const Columns *c, int k) {
-  int slides = e->l.slides, stride = r->stride, n, all = leaving_matrix(r, e, k, &n), at = slides, column = n;
-  const int32_t *which = r->pending;
-  double *a = r->work, *b = a + (int64_t)all * all;
-  for (int i = 0; i < n; i++) b[i] = -c->sum[r->n + which[i]];
-  EACH_SET(r, f) {
-    int size = size_of(r, f), last = k < r->order ? k + 1 : k;
-    if (e->l.letter[f] != LEAVING) continue;
-    const double *radius = e->rates + (int64_t)f * (stride + 1), *change = d->rates + (int64_t)f * (stride + 1);
-    b[column] = 0;
-    for (int i = f; i < f + size; i++, at++) {
-      const double *u = e->lambda + (int64_t)i * stride, *own = d->lambda + (int64_t)i * stride;
-      b[at] += (k + 1) * (convolve(own, radius, k + 1, 0, k - 1) + convolve(u, change, k + 1, 1, last));
-      b[column] -= convolve(u, own, k, 1, k);
-    }
-    column++;
-  }
-  if (!solve(a, b, all)) for (int i = 0; i < all; i++) b[i] = NAN;
-  for (int i = 0; i < slides; i++) d->series[(int64_t)which[i] * stride + k] = b[i];
-  for (int i = slides; i < n; i++) d->lambda[(int64_t)which[i] * stride + k] = b[i];
-  EACH_SET(r, f)
-    if (e->l.letter[f] == LEAVING) d->rates[(int64_t)f * (stride + 1) + k + 1] = b[n++];
-}
-
-/* Coefficients k of the derivatives of multipliers of sliding. */
-static void turn_sliding(const Run *r, const Expansion *e, Expansion *d, const Columns *c, int k) {
-  int slides = e->l.slides;
-  for (int i = 0; i < slides; i++) {
-    double sum = 0;
-    for (int j = 0; j < slides; j++) {
-      double a = e->inverse[i * slides + j];
-      if (a != 0) sum += a * c->sum[r->n + e->l.sliding[j]];
-    }
-    d->series[(int64_t)e->l.sliding[i] * r->stride + k] = -sum;
-  }
-}
-
-/* Coefficients k + 1 of the derivatives of states and of h. */
-static void next_terms(const Run *r, const Expansion *e, Expansion *d, const Columns *c, int k) {
-  int stride = r->stride;
-  double part = 1.0 / (k + 1);
-  for (int i = 0; i < r->n; i++) d->states[(int64_t)i * stride + k + 1] = c->sum[i] * part;
-  for (int i = 0; i < r->m; i++) {
-    int letter = e->l.letter[i];
-    double *h = d->series + (int64_t)i * stride + k + 1;
-    if (letter == LEFT_BEHIND) *h = c->sum[r->n + i] * part;
-    if (letter != LEAVING) continue;
-    int64_t s = (int64_t)set_of(r, i) * (stride + 1);
-    *h = convolve(d->lambda + (int64_t)i * stride, e->rates + s, k + 1, 0, k)
-         + convolve(e->lambda + (int64_t)i * stride, d->rates + s, k + 1, 0, k + 1);
-  }
-}
-
-/* Coefficients of a column to an order, from the first of states and of h; sums of the last order. */
-static void column_series(Run *r, const Expansion *e, Expansion *d, const Leg *l, int column, const Slopes *g, Columns *c, int order) {
-  int leaving = 0, stride = r->stride;
-  EACH_SET(r, f) {
-    if (e->l.letter[f] != LEAVING) continue;
-    double *change = d->rates + (int64_t)f * (stride + 1);
-    leaving = 1;
-    change[0] = 0;
-    for (int i = f; i < f + size_of(r, f); i++)
-      change[0] += e->lambda[(int64_t)i * stride] * d->series[(int64_t)i * stride];
-  }
-  if (r->s->sets) memset(d->lambda, 0, sizeof(double) * r->m * stride);
-  aim_column(r, e, d, l, column, g, c);
-  for (int k = 0; k <= order; k++) {
-    EACH_SET(r, f)
-      if (e->l.letter[f] == LEFT_BEHIND) turn_direction(r, e, d, f, k);
-    derive(r, g, c, k);
-    if (leaving) turn_leaving(r, e, d, c, k); else turn_sliding(r, e, d, c, k);
-    if (leaving || e->l.slides) derive_late(r, g, c, k);
-    if (k < r->order) next_terms(r, e, d, c, k);
-  }
-}
-
-/* A column as the beginning of its series. */
-static Expansion column_of(Run *r, const Columns *c, int k, const double *y) {
-  int n = r->n, w = r->width, stride = r->stride;
-  Expansion d = r->trial;
-  d.states = c->states + (int64_t)k * n * stride;
-  d.series = c->series + (int64_t)k * w * stride;
-  memset(d.series, 0, sizeof(double) * w * stride);
-  for (int i = 0; i < n; i++) d.states[(int64_t)i * stride] = y ? y[i] : 0;
-  for (int i = 0; i < r->m; i++) d.series[(int64_t)i * stride] = c->h[k * r->m + i];
-  return d;
 }
 
 /* Derivatives of h of the sets at the start, and columns from which what leads off sets is taken. */
-static void land(Run *r, const Leg *l, Slopes *g, Columns *c) {
+static void land(Run *r, const Leg *l, Slopes *g) {
   const Expansion *e = &r->e;
-  const Entries *at = &r->s->derivatives;
-  int n = r->n, slides = e->l.slides;
+  const Variation *v = g->v;
+  int64_t n = r->n, slides = e->l.slides, stride = r->stride;
   if (!r->s->sets) return;
   measure_slopes(r, e, g, 1);
   for (int k = 0; k < l->columns; k++) {
-    double *y = l->y + k * n, *h = c->h + k * r->m;
+    double *y = l->y + k * n, *h = v->h + k * r->m;
     memset(h, 0, sizeof(double) * r->m);
-    Expansion d = column_of(r, c, k, y);
-    memset(d.lambda, 0, sizeof(double) * r->m * r->stride);
-    aim_column(r, e, &d, l, k, g, c);
-    derive(r, g, c, 0);
-    for (int i = 0; i < r->m; i++) if (set_of(r, i) >= 0) h[i] = c->sum[n + r->width + i];
+    begin_column(r, l, g, k);
+    follow_links(g, SUMS, 0);
+    for (int i = 0; i < r->m; i++) if (set_of(r, i) >= 0) h[i] = v->sum[(n + r->width + i) * stride];
     for (int i = 0; i < slides; i++)
       for (int j = 0; j < slides; j++)
         if (set_of(r, e->l.sliding[j]) >= 0)
-          d.series[(int64_t)e->l.sliding[i] * r->stride] -= e->inverse[i * slides + j] * h[e->l.sliding[j]];
-    for (int a = 0; a < g->count; a++) {
-      int q = g->active[a], j = at->column[q];
-      if (c->late[j] && at->row[q] < n) y[at->row[q]] += derivative_row(r, q)[0] * c->of[j][0];
-    }
+          v->series[e->l.sliding[i] * stride] -= e->inverse[i * slides + j] * h[e->l.sliding[j]];
+    memset(v->sum, 0, sizeof(double) * n * stride);
+    follow_links(g, LATE, 0);
+    for (int i = 0; i < n; i++) y[i] += v->sum[i * stride];
     for (int i = 0; i < r->m; i++) if (e->l.letter[i] == 0) h[i] = 0;
   }
 }
 
 /* The longest step for which the last two terms of columns stay below the tolerance: a part of them, or of what they
  * change by; what multipliers of sliding cancel counts, as its rounding stays. */
-static double column_step(const Run *r, const Leg *l, const Columns *c, int first, int count) {
+static double column_step(const Run *r, const Leg *l, const Variation *v, int first, int count) {
   const Entries *g = &r->s->derivatives;
   int n = r->n, w = r->width, size = moving_size(r), order = r->order, stride = r->stride;
   double most = 0, rate = 0, second = 0, before = 0, last = 0, h = INFINITY;
   for (int64_t i = (int64_t)first * n; i < (int64_t)(first + count) * n; i++) {
-    const double *own = c->states + i * stride;
+    const double *own = v->of_states + i * stride;
     most = larger(fabs(own[0]), most);
     rate = larger(fabs(own[1]), rate);
     second = larger(fabs(own[2]), second);
@@ -300,7 +333,7 @@ static double column_step(const Run *r, const Leg *l, const Columns *c, int firs
     int i = g->row[q] < n && g->column[q] >= n && g->column[q] < size ? unknown_at(r, g->column[q]) : -1;
     double push = i >= 0 && r->letter[i] == 0 ? fabs(derivative_row(r, q)[0]) : 0;
     if (!(push > 0 && push < INFINITY)) continue;
-    for (int64_t k = first; k < first + count; k++) rate = larger(push * fabs(c->series[(k * w + i) * stride]), rate);
+    for (int64_t k = first; k < first + count; k++) rate = larger(push * fabs(v->of_series[(k * w + i) * stride]), rate);
   }
   double allowed = l->tol * larger(most, rate * length_of_leg(l));
   if (allowed == 0) { /* nothing but higher terms */

@@ -58,7 +58,18 @@ def run_source() -> str:
     head += f"#define OPERATIONS_OF(x, y) {' '.join(cases)}\n"
     sizes = f"#define UNFUSED\n#define P {MOST_ORDER}\n"
     driver = [driver_text(f"core/{name}") for name in _FILES]
-    return "".join([facts_header(), sizes, head, driver_text("core/common.h"), *driver])
+    at = _FILES.index("state.c") + 1
+    texts = [*driver[:at], _declarations(driver[at:]), *driver[at:]]
+    return "".join([facts_header(), sizes, head, driver_text("core/common.h"), *texts])
+
+
+def _declarations(texts: Sequence[str]) -> str:
+    """Declare the functions of some files, so that each may call all others, but those that take types of these files."""
+    text = "".join(texts)
+    own = re.findall(r"^(?:\} |typedef struct (?:\w+ |\{[^}]*\} ))(\w+);", text, re.MULTILINE)
+    heads = re.findall(r"^static [\w *]+\([^;{}]*\)(?= \{)", text, re.MULTILINE)
+    foreign = re.compile(rf"\b(?:{'|'.join(own)})\b")
+    return "".join(f"{head};\n" for head in heads if not foreign.search(head))
 
 
 @lru_cache(maxsize=1)

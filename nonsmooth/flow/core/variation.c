@@ -282,6 +282,29 @@ static void land(Run *r, const Leg *l, Slopes *g, Columns *c) {
   }
 }
 
+/* Move a state off the sets on which it is held onto them, as ``land`` does with columns; whether it was off. */
+static int land_state(Run *r, Slopes *g) {
+  const Expansion *e = &r->e;
+  const Entries *at = &r->s->derivatives;
+  int slides = e->l.slides, is_off = 0;
+  if (!r->s->sets) return 0;
+  measure_slopes(r, e, g, 1);
+  const double *h = surface_values(r, r->x);
+  double *push = r->work;
+  memset(push, 0, sizeof(double) * r->width);
+  for (int i = 0; i < slides; i++)
+    for (int j = 0; j < slides; j++) {
+      double own = set_of(r, e->l.sliding[j]) >= 0 ? h[e->l.sliding[j]] : 0;
+      is_off |= own != 0;
+      push[e->l.sliding[i]] -= e->inverse[i * slides + j] * own;
+    }
+  for (int a = 0; a < g->count && is_off; a++) {
+    int q = g->active[a], i = at->column[q] < r->n ? -1 : unknown_at(r, at->column[q]);
+    if (i >= 0 && e->l.letter[i] == 0 && at->row[q] < r->n) r->x[at->row[q]] += derivative_row(r, q)[0] * push[i];
+  }
+  return is_off;
+}
+
 /* The longest step for which the last two terms of columns stay below the tolerance: a part of them, or of what they
  * change by; what multipliers of sliding cancel counts, as its rounding stays. */
 static double column_step(const Run *r, const Leg *l, const Columns *c, int first, int count) {

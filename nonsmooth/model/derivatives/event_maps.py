@@ -116,7 +116,7 @@ def event_map(
     atom: int = -1,
 ) -> EventMap:
     """The map of an event of a mode, with the function of an ``atom`` of its condition; built once."""
-    if system.sets:
+    if system.sets and kind not in ("exit", "release"):
         return instant_map(system, system.widened(mode), kind, element, letters)
 
     def build() -> EventMap:

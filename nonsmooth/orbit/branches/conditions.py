@@ -259,7 +259,7 @@ def minima(
     """Values of the guard of an interior condition at all its minima inside a leg."""
     if duration <= 0.0:
         return []
-    seen = watch(system, leg.mode, x, duration, p).approaches
+    seen = watch(system, leg, x, duration, p).approaches
     return [_signed(near.guard, near.value) for near in seen if near.guard == condition.guard]
 
 
@@ -267,6 +267,6 @@ def touching(
     system: FilippovSystem, leg: Leg, guard: Guard, x: Array, duration: float, p: Array
 ) -> float:
     """Time since its start at which a leg comes nearest to a guard."""
-    seen = watch(system, leg.mode, x, duration, p).approaches
+    seen = watch(system, leg, x, duration, p).approaches
     own = [near for near in seen if near.guard == guard]
     return min(own, key=lambda near: abs(near.value)).t if own else 0.5 * duration

@@ -29,7 +29,7 @@ from ...model import Array, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, EventMap, kept_maps
 from ...model.derivatives.forcing import Forcing
 from ..runs.leg_integration import LegFlows, LegIntegrator, leg_integrator
-from ..runs.legs import Leg, LegFlow, integrate_leg, surface_of
+from ..runs.legs import Leg, LegFlow, integrate_leg, rate_at, surface_of
 
 
 class JacobianIndices(NamedTuple):
@@ -127,12 +127,10 @@ class BoundaryProblem:
     kept: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        sliding = [
-            i
-            for i in range(self.system.surface_count)
-            if all(leg.mode[i] == "s" for leg in self.legs)
-        ]
-        object.__setattr__(self, "kept", tuple(sliding))
+        modes = [self.system.widened(leg.mode) for leg in self.legs]
+        surfaces = range(self.system.surface_count)
+        kept = [i for i in surfaces if all(mode[i] == "s" for mode in modes)]
+        object.__setattr__(self, "kept", tuple(kept))
 
     @cached_property
     def held(self) -> list[EventMap]:
@@ -321,8 +319,7 @@ class BoundaryProblem:
         if self.phase is None or self.system.time_dependent:
             return self
         start, leg = self.split(u)[0][0], self.legs[0]
-        field = leg.field(self.system)
-        rate = field.rate.copied(field.states_at(start, p), p)[0][: self.dimension, 0]
+        rate = rate_at(self.system, leg, start, p)
         speed = float(np.linalg.norm(rate))
         if not speed > 0.0:
             return self
@@ -393,15 +390,15 @@ def mirrored(problem: BoundaryProblem, leg: Leg) -> Leg:
 
 
 def _turning(problem: BoundaryProblem) -> list[bool]:
-    """Which switching functions the symmetry maps to their negatives."""
+    """Which surfaces have functions that the symmetry maps to their negatives."""
     system = problem.system
     x = np.cos(1.0 + np.arange(system.dimension))
     back = np.linalg.inv(problem.symmetry) if problem.symmetry is not None else np.eye(x.size)
     result = []
-    for k in range(system.surface_count):
-        h = system.surface_function(k)
+    for first, *more in system.entries:
+        h = system.surface_function(first)
         a, b = (float(system.evaluate(h, v, None)[0, 0]) for v in (x, back @ x))
-        result.append(a * b < 0.0)
+        result.append(not more and a * b < 0.0)  # a set has no sides
     return result
 
 

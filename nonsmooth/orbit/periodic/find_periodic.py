@@ -124,7 +124,7 @@ def periodic_orbit(
     >>> orbit.stability
     'asymptotically stable'
     """
-    require_system(system, complementarity=True, joints=True)
+    require_system(system, sets=True, complementarity=True, joints=True)
     max_iterations = whole(max_iterations, "max_iterations")
     if not isinstance(virtual, (bool, np.bool_)):
         raise OptionError(f"virtual: expected True or False, received {virtual!r}.")

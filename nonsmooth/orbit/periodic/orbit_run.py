@@ -9,6 +9,7 @@ import numpy as np
 
 from ...flow.events import Event, Events, Segment, Segments
 from ...flow.follow import follow
+from ...flow.simulate import simulate
 from ...flow.status import Status
 from ...flow.trajectory import Steps, Trajectory
 from ...model import Array, FilippovSystem
@@ -66,22 +67,19 @@ def orbit_run(
     for k, leg in enumerate(legs):
         if leg.duration <= 0.0:
             continue
-        run = follow(
-            system,
-            leg.start,
-            leg.t + leg.duration,
-            mode=leg.mode,
-            t_start=leg.t,
-            parameters=parameters,
-            tol=1e-12,
-        )
+        given = {"t_start": leg.t, "parameters": parameters, "tol": 1e-12}
+        end = leg.t + leg.duration
+        if system.sets:  # at an end on a set one mode has no field
+            run = simulate(system, leg.start, end, **given)
+        else:
+            run = follow(system, leg.start, end, mode=leg.mode, **given)
         first = len(coefficients)
         times.append(run.t)
         states.append(run.x)
         starts += run.steps.starts.tolist()
         coefficients += list(run.steps.coefficients)
         implicit += run.steps.implicit.tolist()
-        end, following = leg.t + leg.duration, legs[(k + 1) % len(legs)]
+        following = legs[(k + 1) % len(legs)]
         values = tuple(leg.start[held:].tolist())
         segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients), values))
         if leg.event:

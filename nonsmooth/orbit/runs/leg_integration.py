@@ -13,11 +13,13 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
+from ...flow.engine.columns import CarriedLegs
 from ...flow.engine.smooth import LegsProgram
 from ...flow.fixed import MOST_STEPS, TOLERANCE, legs_program, stuck
+from ...flow.variation import carry_legs, require_done
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
-from ...model.derivatives.event_maps import AtEvent
-from ...model.derivatives.variational import plain_field
+from ...model.derivatives.event_maps import AtEvent, surface_map
+from ...model.derivatives.variational import VariationalField, plain_field
 from .legs import Leg, LegFlow, integrate_leg, leg_name
 from .saltation import Ended
 
@@ -88,13 +90,26 @@ class LegIntegrator:
 
     def __init__(self, system: FilippovSystem, legs: Sequence[Leg], chosen: tuple[int, ...] = ()):
         self.system, self.legs, self.chosen = system, tuple(legs), chosen
-        distinct = {leg: leg.field(system, chosen) for leg in set(self.legs)}
-        self.fields = [distinct[leg] for leg in self.legs]
-        self.sizes = tuple(field.entries for field in self.fields)
-        self._most = max(self.sizes)
         # events at one instant follow from each other: composed in Python
         self._composed = [i for i, leg in enumerate(self.legs) if leg.further and not leg.timed]
         self._plain = [i for i, leg in enumerate(self.legs) if leg.timed]
+
+    @cached_property
+    def fields(self) -> list[VariationalField]:
+        """The field of each leg."""
+        distinct = {leg: leg.field(self.system, self.chosen) for leg in set(self.legs)}
+        return [distinct[leg] for leg in self.legs]
+
+    @cached_property
+    def sizes(self) -> tuple[int, ...]:
+        """States of each leg, with multipliers that are."""
+        if self.system.sets:
+            return (self.system.extended_dimension,) * len(self.legs)
+        return tuple(field.entries for field in self.fields)
+
+    @property
+    def _most(self) -> int:
+        return max(self.sizes)
 
     @cached_property
     def _program(self) -> LegsProgram:
@@ -105,7 +120,7 @@ class LegIntegrator:
     @cached_property
     def _plain_program(self) -> LegsProgram | None:
         """Legs without derivatives, where each is a flow of the states to one event."""
-        if self._plain or self._composed:
+        if self._plain or self._composed or self.system.sets:
             return None
         maps = {leg: leg.map(self.system) for leg in set(self.legs)}
         if any(field.entries > field.by_start for field in self.fields):
@@ -140,6 +155,8 @@ class LegIntegrator:
         self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE
     ) -> LegFlows:
         """Integrate all legs."""
+        if self.system.sets:
+            return self._by_modes(starts, durations, p)
         if len(set(self.sizes)) > 1:
             return self._one_by_one(starts, durations, p)
         n, most = starts.shape[1], self._most
@@ -190,6 +207,9 @@ class LegIntegrator:
         for i in self._composed:
             k = self.sizes[i]
             self._fill(flows, i, self.legs[i].at_end(self.system, flows.end[i, :k], p))
+        return self._without_events(flows)
+
+    def _without_events(self, flows: LegFlows) -> LegFlows:
         n = flows.after.shape[1]
         for i in self._plain:
             flows.after[i] = flows.end[i, :n]
@@ -204,6 +224,41 @@ class LegIntegrator:
         flows.after[i], flows.after_state[i, :, :k] = at.after, at.after_state
         flows.after_parameters[i], flows.value[i] = at.after_parameters, at.value
         flows.gradient[i, :k], flows.value_parameters[i] = at.gradient, at.by_parameters
+
+    def _by_modes(self, starts: Array, durations: Array, p: Array) -> LegFlows:
+        """Integrate all legs by the law of their modes."""
+        system, n, given = self.system, starts.shape[1], zip(self.legs, starts, durations, strict=True)
+        arcs = [leg.arc(system, x, float(duration)) for leg, x, duration in given]
+        onto = {i: _onto_set(system, leg, starts[i], p) for i, leg in enumerate(self.legs) if leg.left}
+        for i, (x, _, _) in onto.items():
+            arcs[i] = arcs[i]._replace(start=x)
+        found = carry_legs(system, arcs, p, self.chosen)
+        try:
+            require_done(system, arcs, found)
+        except (ConvergenceError, DegenerateError) as error:
+            raise type(error)(f"{self._named(found.failed)}: {error}", point=error.point) from None
+        by = found.derivatives
+        for i, (_, by_start, by_p) in onto.items():
+            by[i, :, n:] += by[i, :, :n] @ by_p[:, list(self.chosen)]
+            by[i, :, :n] = by[i, :, :n] @ by_start
+        legs = found.ends, found.before, found.rates, by[:, :, :n], by[:, :, n:]
+        events = self._events(np.zeros((len(arcs), 0)), n, p.size)
+        flows = LegFlows(self.sizes, *legs, *events)
+        for i, leg in enumerate(self.legs):
+            if arcs[i].ends is not None and arcs[i].ends.hit >= 0:
+                self._fill(flows, i, self._reached(flows, found, i, p))
+            elif not leg.timed:
+                self._fill(flows, i, leg.at_event(system, flows.end[i], p))
+        return self._without_events(flows)
+
+    def _reached(self, flows: LegFlows, found: CarriedLegs, i: int, p: Array) -> AtEvent:
+        """The end of a leg at a set: the motion goes on over the whole duration as it reaches the set."""
+        n, members = flows.after.shape[1], self.system.entries[self.legs[i].element]
+        h = [surface_map(self.system, k)(flows.end[i], p).value for k in members]
+        left, gradient = float(found.left[i]), found.gradients[i]
+        flows.end[i] += left * flows.rate[i]
+        value = float(np.linalg.norm(h)) + left * float(gradient[:n] @ flows.rate[i])
+        return AtEvent.smooth_at(flows.end[i], value, gradient[:n], gradient[n:])
 
     def _one_by_one(self, starts: Array, durations: Array, p: Array) -> LegFlows:
         count, n, most, q = len(self.legs), starts.shape[1], self._most, len(self.chosen)
@@ -237,6 +292,16 @@ class LegIntegrator:
 
     def _named(self, i: int) -> str:
         return f"leg {i + 1} {leg_name(self.system, self.legs[i])}"
+
+
+def _onto_set(system: FilippovSystem, leg: Leg, x: Array, p: Array) -> tuple[Array, Array, Array]:
+    """The state to first order on the sets that a leg leaves, with derivatives by state and parameters."""
+    at = [surface_map(system, i)(x, p) for i in leg.left]
+    rows = np.array([own.gradient for own in at])
+    back = np.zeros(rows.T.shape)
+    back[: system.dimension] = np.linalg.pinv(rows[:, : system.dimension])  # at the same time
+    by_p = -back @ np.array([own.by_parameters for own in at])
+    return x - back @ [own.value for own in at], np.eye(len(x)) - back @ rows, by_p
 
 
 def leg_integrator(

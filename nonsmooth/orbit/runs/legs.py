@@ -145,12 +145,10 @@ class Leg:
         return at
 
     def _own_event(self, system: FilippovSystem, x: Array, p: Array) -> AtEvent:
-        at_once = self.kind in ("stop", "reset", "impact", "jump")
-        if (
-            system.sets
-            or at_once
-            or (self.kind in ("crossing", "entry") and self._is_plain(system))
-        ):
+        by_states = ["stop", "reset", "impact", "jump"]
+        if system.sets or (self.kind in ("crossing", "entry") and self._is_plain(system)):
+            by_states += ["crossing", "entry", "contact"]
+        if self.kind in by_states:
             mode = system.widened(self.mode) if self.kind == "impact" else ""
             given = mode, self.kind, self.element, self.letters, self.atom
             return instant_map(system, *given)(x, p)
@@ -224,10 +222,21 @@ def integrate_leg(
     chosen: tuple[int, ...] = (),
 ) -> LegFlow:
     """The flow of a leg's mode from ``x`` (N,) over a duration of either sign, with derivatives."""
+    if system.sets:
+        arcs = [Arc(leg.mode, x, duration, None, _still_left(system, leg, x, p))]
+        carried = carry_legs(system, arcs, p, chosen)
+        require_done(system, arcs, carried)
+        return flows_of(carried)[0]
     field = leg.field(system, chosen)
     whole = field.matrix(flow_for(field, field.start(x, p), p, duration))
     n, end = field.by_start, whole[:, 0]
     return LegFlow(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], field.rate_at(end, p))
+
+
+def _still_left(system: FilippovSystem, leg: Leg, x: Array, p: Array) -> tuple[int, ...]:
+    """The sets that a leg leaves, if a state (N,) is where it begins."""
+    at = [surface_map(system, i)(x, p) for i in leg.left]
+    return leg.left if all(_is_zero(h, x) for h in at) else ()
 
 
 def carry_leg(
@@ -319,7 +328,7 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
     result: list[Stretch] = []
     if len(system.joints) > 1:
         _require_independent(system, mode, x, p)
-    if system.sets:
+    if begins and system.sets:
         _require_held(system, mode, x, p)
     known: dict[tuple[object, ...], Leg] = {}
     discrete = len(system.definition.discrete)
@@ -652,5 +661,5 @@ def parallel(a: Array, b: Array) -> bool:
 
 def surface_of(system: FilippovSystem, leg: Leg) -> int:
     """The switching surface of a leg's event; -1 if it has none."""
-    own = leg.kind in ("crossing", "entry", "exit") and leg.element < system.surface_count
-    return leg.element if own else -1
+    own = leg.kind in ("crossing", "entry", "exit") and leg.element < len(system.entries)
+    return leg.element if own and len(system.entries[leg.element]) == 1 else -1

@@ -984,8 +984,8 @@ def require_system(
     if value.sets and not sets:
         raise DefinitionError(
             f"system: {value!r} has vector multipliers, which this function does not support. Sets of "
-            "codimension two and three work in simulate, ensemble, sensitivity, region and "
-            "limit_directions."
+            "codimension two and three work in simulate, ensemble, sensitivity, region, limit_directions, "
+            "poincare, attractors, periodic_orbit, continue_orbit and phase_response."
         )
     if value.remembering and not hysteresis:
         raise DefinitionError(

@@ -123,14 +123,22 @@ class BoundaryProblem:
     phase: Array | None = None
     #: (N,) or None
     reference: Array | None = None
-    #: Surfaces on which every leg slides.
+    #: Surfaces on which every leg slides, and behind them contacts that are closed in every leg.
     kept: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         modes = [self.system.widened(leg.mode) for leg in self.legs]
-        surfaces = range(self.system.surface_count)
-        kept = [i for i in surfaces if all(mode[i] == "s" for mode in modes)]
+        kept = [i for i, own in enumerate(zip(*modes, strict=True)) if self._is_kept(i, set(own))]
         object.__setattr__(self, "kept", tuple(kept))
+
+    def _is_kept(self, i: int, letters: set[str]) -> bool:
+        return letters == {"s" if i < self.system.surface_count else "c"}
+
+    @cached_property
+    def with_rates(self) -> list[int]:
+        """Joints and contacts that are kept: their rates are, too."""
+        contacts = [i for i in self.kept if i >= self.system.surface_count]
+        return [*self.system.joints, *contacts]
 
     @cached_property
     def held(self) -> list[EventMap]:
@@ -244,11 +252,9 @@ class BoundaryProblem:
         return Evaluation(residual, whole, flows, starts, durations, self._allowed(starts[0], p))
 
     def _allowed(self, start: Array, p: Array) -> Array | None:
-        if not self.system.joints:
+        if not self.with_rates:
             return None
-        rows = np.array(
-            [own(start, p).gradient for own in kept_maps(self.system, self.system.joints)]
-        )
+        rows = np.array([own(start, p).gradient for own in kept_maps(self.system, self.with_rates)])
         return np.asarray(np.eye(self.dimension) - np.linalg.pinv(rows) @ rows)
 
     def residual(self, u: Array, p: Array, extended: bool = False) -> Array | None:

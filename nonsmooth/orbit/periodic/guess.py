@@ -528,6 +528,10 @@ def _from_word(
     """Integrate the legs of an itinerary to their events, or one mode over periods of the forcing."""
     if forcing is not None and mirror is None and (leg := lone_leg(system, itinerary)) is not None:
         return _from_mode(system, x, leg, forcing, p)
+    if system.sets:
+        raise OptionError(
+            "itinerary= is one mode for a system with vector multipliers. Give a run of the itinerary as the guess."
+        )
     legs = word_legs(system, itinerary, mirror is not None)
     starts, durations = _followed(system, legs, x, p)
     periods = 0.0
@@ -648,6 +652,9 @@ def _mode(system: FilippovSystem, x: Array, p: Array) -> str:
 def _natural_time(system: FilippovSystem, x: Array, p: Array, mode: str | None = None) -> float:
     """The time in which the state changes by its size."""
     leg = Leg(_mode(system, x, p) if mode is None else mode)
-    rate = rate_at(system, leg, x, p)[: system.dimension]
+    try:
+        rate = rate_at(system, leg, x, p)[: system.dimension]
+    except NonsmoothError:  # on a set
+        return 1.0
     size, speed = math.hypot(*x[: system.dimension]), math.hypot(*rate)
     return size / speed if size > 0.0 and speed > 0.0 and math.isfinite(speed) else 1.0

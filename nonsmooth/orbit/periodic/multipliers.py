@@ -55,7 +55,7 @@ class Multipliers:
     @cached_property
     def error(self) -> float:
         """Distance of the structural multipliers of ``matrix`` from 1 and 0."""
-        whole, joints = np.linalg.eigvals(self.matrix), self.problem.system.joints
+        whole, joints = np.linalg.eigvals(self.matrix), self.problem.with_rates
         held = sum(i not in joints for i in self.problem.kept)
         # the sliding field keeps h whatever it is: off a surface that is never left its matrix has a 1
         ones = np.argsort(np.abs(whole - 1.0))[: 1 + held]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -67,7 +68,7 @@ def orbit_run(
     for k, leg in enumerate(legs):
         if leg.duration <= 0.0:
             continue
-        given = {"t_start": leg.t, "parameters": parameters, "tol": 1e-12}
+        given: dict[str, Any] = {"t_start": leg.t, "parameters": parameters, "tol": 1e-12}
         end = leg.t + leg.duration
         if system.sets:  # at an end on a set one mode has no field
             run = simulate(system, leg.start, end, **given)

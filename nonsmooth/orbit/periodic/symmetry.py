@@ -192,7 +192,9 @@ def _surface_missed(orbit: PeriodicOrbit) -> str:
     legs, count = orbit.legs, len(orbit.problem.legs)
     units = orbit.problem.scales(orbit.unknowns)[: system.dimension]
     for leg, after in pairwise([*legs[count - 1 :], legs[0]]):
-        changed = [leg.mode[k] != after.mode[k] or after.mode[k] == "s" for k in range(len(entries))]
+        changed = [
+            leg.mode[k] != after.mode[k] or after.mode[k] == "s" for k in range(len(entries))
+        ]
         on = [i for own, members in zip(changed, entries, strict=True) if own for i in members]
         if not on or leg.kind in ("reset", "impact"):
             continue

@@ -25,6 +25,9 @@ from .legs import Leg, integrate_leg, leg_name
 #: Part of a leg's duration beside its ends that belongs to the ends, where guards are zero.
 _ENDS = 1e-6
 
+#: Guards that change by less than this part of their size in a step are constant.
+_CONSTANT = 1e-13
+
 #: Newton steps to an extremum between two steps of the driver.
 _REFINED = 4
 
@@ -149,13 +152,16 @@ def _by_steps(
     series, rows = np.array([terms(y)[n:] for y in states]), list[Array]()
     for (k, j), value in np.ndenumerate(series[:, :, 0]):
         rows.append(np.array([j, times[k], value, 0.0, *states[k]]))
-    for k, j in zip(*np.nonzero(series[:-1, :, 1] * series[1:, :, 1] < 0.0), strict=True):
-        a, b = series[k, j, 1], series[k + 1, j, 1]
-        t = (times[k + 1] - times[k]) * a / (a - b)
+    rates, spans = series[:, :, 1], np.diff(times)
+    turns = (rates[:-1] * rates[1:] < 0.0) & (
+        np.abs(np.diff(rates, axis=0)) * spans[:, None] > _CONSTANT * np.abs(series[1:, :, 0])
+    )
+    for k, j in zip(*np.nonzero(turns), strict=True):
+        t = spans[k] * rates[k, j] / (rates[k, j] - rates[k + 1, j])
         for _ in range(_REFINED):
             y = moved(states[k], inside, float(t))
             own = terms(y)[n + j]
-            t = min(max(t - own[1] / (2 * own[2]), 0.0), times[k + 1] - times[k])
+            t = min(max(t - own[1] / (2 * own[2]), 0.0), spans[k])
         rows.append(np.array([j, times[k] + t, own[0], 2 * own[2], *y]))
     return np.array(rows).reshape(-1, 4 + n), begin, terms(found.ends[0])[n:, 0]
 

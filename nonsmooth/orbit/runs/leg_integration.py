@@ -6,7 +6,8 @@ The results of :func:`~nonsmooth.orbit.runs.legs.integrate_leg` and
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
@@ -227,16 +228,20 @@ class LegIntegrator:
 
     def _by_modes(self, starts: Array, durations: Array, p: Array) -> LegFlows:
         """Integrate all legs by the law of their modes."""
-        system, n, given = self.system, starts.shape[1], zip(self.legs, starts, durations, strict=True)
+        system, n, given = (
+            self.system,
+            starts.shape[1],
+            zip(self.legs, starts, durations, strict=True),
+        )
         arcs = [leg.arc(system, x, float(duration)) for leg, x, duration in given]
-        onto = {i: _onto_set(system, leg, starts[i], p) for i, leg in enumerate(self.legs) if leg.left}
+        onto = {
+            i: _onto_set(system, leg, starts[i], p) for i, leg in enumerate(self.legs) if leg.left
+        }
         for i, (x, _, _) in onto.items():
             arcs[i] = arcs[i]._replace(start=x)
         found = carry_legs(system, arcs, p, self.chosen)
-        try:
+        with self._naming(found.failed):
             require_done(system, arcs, found)
-        except (ConvergenceError, DegenerateError) as error:
-            raise type(error)(f"{self._named(found.failed)}: {error}", point=error.point) from None
         by = found.derivatives
         for i, (_, by_start, by_p) in onto.items():
             by[i, :, n:] += by[i, :, :n] @ by_p[:, list(self.chosen)]
@@ -245,7 +250,7 @@ class LegIntegrator:
         events = self._events(np.zeros((len(arcs), 0)), n, p.size)
         flows = LegFlows(self.sizes, *legs, *events)
         for i, leg in enumerate(self.legs):
-            if arcs[i].ends is not None and arcs[i].ends.hit >= 0:
+            if leg.reaches_set(system):
                 self._fill(flows, i, self._reached(flows, found, i, p))
             elif not leg.timed:
                 self._fill(flows, i, leg.at_event(system, flows.end[i], p))
@@ -273,15 +278,10 @@ class LegIntegrator:
         )
         for i, leg in enumerate(self.legs):
             k, field = self.sizes[i], self.fields[i]
-            try:
+            with self._naming(i):
                 part = integrate_leg(
                     self.system, leg, starts[i], float(durations[i]), p, self.chosen
                 )
-            except ConvergenceError as error:
-                message = f"{self._named(i)}: {error}"
-                raise ConvergenceError(message, point=error.point) from None
-            except DegenerateError as error:
-                raise DegenerateError(f"{self._named(i)}: {error}") from None
             flows.end[i, :k], flows.rate[i, :k] = part.end, part.rate
             flows.by_start[i, :k], flows.by_parameters[i, :k] = part.by_start, part.by_parameters
             at = field.states_at(starts[i], p)
@@ -289,6 +289,16 @@ class LegIntegrator:
             if not leg.timed:
                 self._fill(flows, i, leg.at_end(self.system, part.end, p))
         return self._completed(flows, p)
+
+    @contextmanager
+    def _naming(self, i: int) -> Iterator[None]:
+        """Say in errors of a leg which it is."""
+        try:
+            yield
+        except ConvergenceError as error:
+            raise ConvergenceError(f"{self._named(i)}: {error}", point=error.point) from None
+        except DegenerateError as error:
+            raise DegenerateError(f"{self._named(i)}: {error}") from None
 
     def _named(self, i: int) -> str:
         return f"leg {i + 1} {leg_name(self.system, self.legs[i])}"

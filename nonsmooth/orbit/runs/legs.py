@@ -114,6 +114,11 @@ class Leg:
             return EndOfLeg(guard="exit", number=members[0], side=self.side)
         return EndOfLeg(guard="surface", number=members[0])
 
+    def reaches_set(self, system: FilippovSystem) -> bool:
+        """Whether its event is that of reaching a set."""
+        ends = self.ends(system)
+        return ends is not None and ends.hit >= 0
+
     def _is_plain(self, system: FilippovSystem) -> bool:
         """Whether its event is one of a table or a surface without memory, whose multipliers enter linearly."""
         return system.laws[self.element] in ("surface", "table") and not any(system.nonlinear)
@@ -220,10 +225,15 @@ def integrate_leg(
     duration: float,
     p: Array,
     chosen: tuple[int, ...] = (),
+    to_end: bool = False,
 ) -> LegFlow:
-    """The flow of a leg's mode from ``x`` (N,) over a duration of either sign, with derivatives."""
+    """The flow of a leg's mode from ``x`` (N,) over a duration of either sign, with derivatives.
+
+    ``to_end``: to the set that ends it, if one does, where the mode has no field.
+    """
     if system.sets:
-        arcs = [Arc(leg.mode, x, duration, None, _still_left(system, leg, x, p))]
+        hit = leg.ends(system) if to_end and leg.reaches_set(system) else None
+        arcs = [Arc(leg.mode, x, duration, hit, _still_left(system, leg, x, p))]
         carried = carry_legs(system, arcs, p, chosen)
         require_done(system, arcs, carried)
         return flows_of(carried)[0]

@@ -7,9 +7,6 @@
  */
 enum { LEVEL = 1, BY_JUMPS = 2, PERSISTENT = 4, AT_TRIGGER = 8 };
 
-static void serve(Run *r, int row);
-static int settle_in(Run *r);
-
 static int is_true(const int32_t *code, int count, const int8_t *side) {
   int8_t stack[MOST_CODES];
   int top = 0;

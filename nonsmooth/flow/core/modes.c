@@ -82,7 +82,7 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
   for (int i = 0; i < r->width; i++) {
     l->is_free &= letter[i] != 0 && letter[i] != LEAVING;
     if (letter[i] == 0 && !is_idle(r, letter, i)) l->sliding[l->slides++] = i;
-    if (i == element(r, i)->first) law_of(r, i)->lay_out(r, l, i);
+    if (i == element(r, i)->first && law_of(r, i)->lay_out) law_of(r, i)->lay_out(r, l, i);
   }
   l->atoms = l->rows;
   for (int a = 0; a < s->rules.atoms; a++) {

@@ -5,7 +5,6 @@
  * codimension two and more move and are met.
  */
 
-
 /* Entries of a sparse matrix in the order of a program's outputs. */
 typedef struct { int32_t count, pad; const int32_t *row, *column; } Entries;
 
@@ -168,6 +167,9 @@ typedef struct {
 /* The guard that is served. */
 typedef struct { int kind, index, side; } Met;
 
+/* Of a guard that ended the mode before so many coefficients vanish. */
+typedef struct { int kind, index, side, zeros; } Known;
+
 /* An event that may be one of many that accumulate: the time since the one before, and what was served. */
 typedef struct { double interval; int64_t pattern; int32_t kind; Met met; } Happened;
 
@@ -255,23 +257,6 @@ typedef struct {
   int8_t (*side)(const Run *r, int i, double h); /* letter off its zero, where it has two by the present one */
   void (*serve)(Run *r, int row); /* at the zero of a guard */
 } Law;
-
-static const Law *law_of(const Run *r, int i);
-static void add_branches(const Run *r, Layout *l);
-static double branch_scale(const Run *r, const Layout *l, int row);
-static void branch_row(const Run *r, const Layout *l, int row, int count, double *g);
-static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns);
-static void aim_again(Run *r, const Expansion *e);
-static void begin_sets(Run *r, Expansion *e, const double *unknowns);
-static int begin_directions(Run *r, Expansion *e);
-static void follow_sets(Run *r, Expansion *e, int k);
-static void leave_sets(Run *r, Expansion *e, int k);
-static void close_sets(Run *r, Expansion *e, int k);
-static void direction_bounds(const Run *r, const Expansion *e, double *last, double *before);
-static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h);
-static void measure_limits(Run *r, Expansion *e);
-static void keep_carried(const Run *r, const int8_t *letter, double *unknowns);
-static void prepare_implicit(Run *r);
 
 static void finish(Run *r, int status, int reason, int where) {
   if (r->status == RUNNING) { r->status = status; r->reason = reason; r->where = where; }

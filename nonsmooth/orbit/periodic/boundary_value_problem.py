@@ -16,6 +16,7 @@ legs in place of collocation.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -25,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...flow.fixed import TOLERANCE
-from ...model import Array, FilippovSystem
+from ...model import Array, ConvergenceError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, EventMap, kept_maps
 from ...model.derivatives.forcing import Forcing
 from ..runs.leg_integration import LegFlows, LegIntegrator, leg_integrator
@@ -344,11 +345,13 @@ class BoundaryProblem:
         span = float(np.abs(durations).sum()) or 1.0
         seen = starts
         if p is not None and len(self.legs) <= _FEW:
-            inside = [
-                integrate_leg(self.system, leg, x, part * float(duration), p).end[: self.dimension]
-                for leg, x, duration in zip(self.legs, starts, durations, strict=True)
-                for part in (0.2, 0.4, 0.6, 0.8)
-            ]
+            n = self.dimension
+            inside = list[Array]()
+            with suppress(ConvergenceError):  # a virtual leg may not exist
+                for leg, x, duration in zip(self.legs, starts, durations, strict=True):
+                    for part in (0.2, 0.4, 0.6, 0.8):
+                        flow = integrate_leg(self.system, leg, x, part * float(duration), p)
+                        inside.append(flow.end[:n])
             seen = np.vstack([starts, *inside])
         size, n = np.abs(seen).max(axis=0).tolist(), self.system.dimension
         largest = max(*size[:n], 1e-300)  # the time has units of its own

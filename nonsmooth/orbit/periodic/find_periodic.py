@@ -469,7 +469,8 @@ def require_simple(orbit: PeriodicOrbit) -> None:
                 f"{leg_name(system, leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
                 f"{end[: system.dimension].tolist()}. The orbit is not unique there: vary a parameter."
             )
-    orbit.floquet  # noqa: B018  # DegenerateError where an event is grazed
+    if orbit.floquet.refusal:
+        raise DegenerateError(orbit.floquet.refusal)
 
 
 class VirtualOrbitError(ConvergenceError):

@@ -17,7 +17,7 @@ from ...notebook import card, circle
 from ..runs.guards import faults_along, watch
 from ..runs.legs import Leg, integrate_leg
 from .boundary_value_problem import BoundaryProblem, Evaluation, mirrored
-from .multipliers import Multipliers, multipliers_of, stability
+from .multipliers import Multipliers, monodromy
 from .orbit_run import OrbitLeg, orbit_leg, orbit_run
 
 
@@ -162,15 +162,16 @@ class PeriodicOrbit:
 
     @cached_property
     def floquet(self) -> Multipliers:
-        """Multipliers with their structure, and the matrices that they are of."""
-        return multipliers_of(self.problem, self.evaluation, self.parameter_vector)
+        """Multipliers with their logarithms and structure."""
+        return Multipliers(self.problem, self.evaluation, self.parameter_vector)
 
     @property
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers, (n,), the structural ones exact.
 
         Of an autonomous system with the 1 of the flow, first; then by size. Of a forced one those of
-        the stroboscopic map: the 1 of the time is left out.
+        the stroboscopic map: the 1 of the time is left out. NaN where an event is grazed, so that the
+        return map has no derivative; ``stability`` says which.
         """
         rest = self.floquet.values
         return rest if self.system.time_dependent else np.concatenate([[1.0 + 0.0j], rest])
@@ -187,7 +188,7 @@ class PeriodicOrbit:
     @property
     def monodromy(self) -> Array:
         """Derivative of the flow over one period by the start, (n, n); with the time if there is forcing."""
-        matrix = self.floquet.matrix
+        matrix = monodromy(self.problem, self.evaluation)
         return matrix @ matrix if self.symmetric else matrix
 
     @property
@@ -201,13 +202,13 @@ class PeriodicOrbit:
 
     @property
     def error_estimate(self) -> float:
-        """Distance of the structural multipliers from 1 and 0, as computed with rounding."""
+        """Error of the multipliers, estimated; relative to those outside of the unit circle."""
         return self.floquet.error
 
     @property
     def stability(self) -> str:
         """Stability in words, such as ``"asymptotically stable"``."""
-        return stability(self.floquet.values, self.error_estimate)
+        return self.floquet.stability
 
     @property
     def residual(self) -> float:
@@ -255,7 +256,7 @@ class PeriodicOrbit:
             f"{kind} of period {self.period:.13g}, itinerary {shown!r} "
             f"({len(self.legs)} leg{'s' * (len(self.legs) != 1)}{odd}), {self.stability}",
             f"  multipliers {', '.join(_number(m) for m in self.multipliers)}"
-            f" (structural ones are exact; their computed distance is {self.error_estimate:.1e})",
+            f" (structural ones are exact; the estimated error is {self.error_estimate:.1e})",
         ]
         if self.margins:
             near = self.margins[0]

@@ -200,7 +200,8 @@ def _violations(
                 name = guard_name(system, guard)
                 return [f"{guard.kind} {name!r} reaches zero {t:.6g} after its start"]
         return []
-    low = [(t, v) for t, v, scale in ordered if v < -_NEGATIVE * scale]
+    largest = max((abs(v) for _, v, _ in ordered), default=0.0)  # where the gradient vanishes
+    low = [(t, v) for t, v, scale in ordered if v < -_NEGATIVE * max(scale, largest)]
     if not low:
         return []
     t, v = min(low, key=lambda entry: entry[1])

@@ -44,6 +44,9 @@ _LOCATED = 1e-7
 #: Switching functions of a set that was held are zero at this part of what they are made of.
 _ON_SET = 1e-14
 
+#: Between impacts at speeds that are lost in rounding is less than this part of the time between those before.
+_LOST = 1e-6
+
 #: Impulses and bounds that are negative by this part of the error of a location are zero.
 _ROUNDED = 1e-4
 
@@ -349,7 +352,6 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
             group = [e for e in group if not cells.is_breakpoint(e)] or group[:1]
             shown, group = group[0], [cells.event(e) for e in group]
             first, last = group[0], group[-1]
-        _require_countable(group, len(system.entries))
         x_end = _extended(system, first.x, first.t)
         if len(group) == 1 and first.kind in ("crossing", "entry", "exit"):
             key = (first.mode_before, first.kind, first.element, first.side, first.mode_after)
@@ -377,6 +379,18 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
         as_shown = shown.mode_before, shown.element
         result.append(Stretch(leg, t, first.t - t, x, x_end, after, system, p, as_shown))
         t, x = last.t, after
+        if _closes(
+            result, last.mode_after
+        ):  # the last of many impacts, at a speed that is lost in rounding
+            none = Leg(leg.mode, "limit", leg.element)
+            result.append(Stretch(none, t, 0.0, x, x, x, system, p, as_shown))
+    if run.accumulation_time is not None:  # the run ends where no motion follows the limit
+        if result[-1].leg.timed:
+            t, x = result[-1].t, result.pop().start
+        mode = run.events[-1].mode_before
+        leg = Leg(cells.mode(mode) if cells else mode, "limit")
+        left = run.accumulation_time - t
+        result.append(Stretch(leg, t, left, x, x, x, system, p, (mode, -1)))
     return result
 
 
@@ -451,25 +465,27 @@ def _instants(events: Sequence[Event]) -> list[list[Event]]:
     return groups
 
 
-def _require_countable(group: Sequence[Event], contacts: int) -> None:
-    for event in group:
-        if event.kind == "rest":
-            raise DegenerateError(
-                f"event at t = {event.t:.10g}: expected finitely many events before {event.name!r} rests, "
-                "received events that accumulate. Infinitely many legs have no fixed itinerary: end the run before."
-            )
-        if event.kind == "contact" and event.element >= contacts:
-            raise DegenerateError(
-                f"event at t = {event.t:.10g}: expected finitely many impacts before a contact "
-                f"closes, received impacts on {event.name!r} that accumulate. Infinitely many legs "
-                "have no fixed itinerary: end the run before, or give a restitution of 0."
-            )
+def _is_limit(event: Event, entries: int) -> bool:
+    """Whether events accumulate at an event, without end."""
+    return event.kind == "rest" or (event.kind == "contact" and event.element >= entries)
+
+
+def _closes(parts: Sequence[Stretch], letters: str) -> bool:
+    """Whether the last impact closes a contact that impacts before it left open."""
+    if len(parts) < 2 or parts[-1].leg.kind != "impact":
+        return False
+    before, leg = parts[-2].leg, parts[-1].leg
+    same = (before.kind, before.element, before.mode) == (leg.kind, leg.element, leg.mode)
+    lost = parts[-1].duration < _LOST * max(part.duration for part in parts[-6:])
+    return same and lost and letters[leg.element] == "c" != leg.mode[leg.element]
 
 
 def leg_of(system: FilippovSystem, event: Event, p: Array) -> Leg:
     """The leg that an event of a run ends."""
     if event.kind == "end":
         return Leg(event.mode_before)
+    if _is_limit(event, len(system.entries)):
+        return Leg(event.mode_before, "limit", event.element)
     _require_one_surface(system, event, p)
     letters = _letters(system, event, p) if event.kind == "impact" else ""
     if event.kind == "jump":

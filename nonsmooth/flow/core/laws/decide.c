@@ -9,9 +9,6 @@
  * Source: Acary & Brogliato 2008, Numerical Methods for Nonsmooth Dynamical Systems, chapter 4.
  */
 
-/* Of a guard that ended the mode before so many coefficients vanish. */
-typedef struct { int kind, index, side, zeros; } Known;
-
 /* The law at a point --------------------------------------------------------------------------------- */
 
 /* Bounds that are negative turn the law around: the unknown changes its sign. */
@@ -535,28 +532,16 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
 
 /* Whether all eigenvalues have positive real parts: powers of (A + c)^-1 (A - c) vanish. A is lost. */
 static int is_positive_stable(double *a, int n, double *work) {
-  double c = 0, *inverse = work, *power = inverse + (int64_t)n * n, *next = power + (int64_t)n * n;
+  double c = sqrt(dot(a, a, n * n) / n), *inverse = work, *power = inverse + (int64_t)n * n, *next = power + (int64_t)n * n;
   if (n == 1) return a[0] > 0;
-  for (int i = 0; i < n * n; i++) c += a[i] * a[i];
-  c = sqrt(c / n);
-  for (int i = 0; i < n * n; i++) next[i] = a[i];
+  memcpy(next, a, sizeof(double) * n * n);
   for (int i = 0; i < n; i++) { a[i * n + i] += c; next[i * n + i] -= c; }
   if (!(c > 0) || !invert(a, n, inverse)) return 0;
-  for (int i = 0; i < n; i++)
-    for (int j = 0; j < n; j++) {
-      power[i * n + j] = 0;
-      for (int l = 0; l < n; l++) power[i * n + j] += inverse[i * n + l] * next[l * n + j];
-    }
+  multiply(inverse, next, n, power);
   for (int again = 0; again < DEPTH; again++) {
-    double size = 0;
-    for (int i = 0; i < n * n; i++) size = larger(fabs(power[i]), size);
     if (!finite_all(power, n * n)) return 0;
-    if (size < TIED) return 1;
-    for (int i = 0; i < n; i++)
-      for (int j = 0; j < n; j++) {
-        next[i * n + j] = 0;
-        for (int l = 0; l < n; l++) next[i * n + j] += power[i * n + l] * power[l * n + j];
-      }
+    if (largest_of(power, n * n) < TIED) return 1;
+    multiply(power, power, n, next);
     double *t = power; power = next; next = t;
   }
   return 0;
@@ -591,9 +576,8 @@ static int layer_matrix(const Run *r, const Decision *d, int which, int orders, 
 
 /* Move the eigenvalues that are zero because elements depend on one another: they move nothing. */
 static void lift_null_space(double *a, int n, double *work, int32_t *pivot) {
-  double *z = work, *rest = z + (int64_t)n * n, most = 0;
+  double *z = work, *rest = z + (int64_t)n * n, most = largest_of(a, n * n);
   int count = null_space(a, n, n, z, rest, pivot);
-  for (int i = 0; i < n * n; i++) most = larger(fabs(a[i]), most);
   for (int l = 0; l < count; l++) {
     double *own = z + (int64_t)l * n;
     if (!orthonormal(own, z, l, n, 1)) continue;
@@ -763,8 +747,7 @@ static int is_determined(Run *r, const Layout *l, const int8_t *letter) {
   values_at(&r->s->columns, r->input, r->p, r->columns);
   const Entries *column = &r->s->column;
   for (int q = 0; q < count; q++) {
-    double *terms = change + r->n, most = 0;
-    for (int j = 0; j < n; j++) most = larger(fabs(z[(int64_t)q * n + j]), most);
+    double *terms = change + r->n, most = largest_of(z + (int64_t)q * n, n);
     for (int i = 0; i < 2 * r->n; i++) change[i] = 0;
     for (int e = 0; e < column->count; e++)
       for (int j = 0; j < n; j++) {
@@ -916,11 +899,6 @@ static int no_motion(Run *r, const int8_t *letter) {
   else finish(r, NON_UNIQUE, DEGENERATE, 0);
   return 0;
 }
-
-static int is_mixed(const Run *r, const int32_t *own, int count);
-static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count);
-static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count);
-static int follow_step(Run *r, const int8_t *letter, const Known *known, int known_count);
 
 /* The law at the point of the active elements; 0 where it is no number. */
 static int begin_law(Run *r, const int8_t *letter, const Known *known, int known_count) {

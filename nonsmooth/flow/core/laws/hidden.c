@@ -140,17 +140,13 @@ static int is_held_alone(Run *r, int own) {
   return found;
 }
 
-/* Equation k of a mode, from the functions y with multipliers zero. */
-static double hidden_value(const Run *r, int row, const double *h) {
+/* The equation in a row of a mode, from the functions y with multipliers zero; its rounding from theirs. */
+static double hidden_sum(const Run *r, int row, const double *of, int is_rounding) {
   int q = r->s->combined;
+  const double *weight = weights_of(r) + (q + row) * q;
   double sum = 0;
-  for (int i = 0; i < q; i++) sum += weights_of(r)[(q + row) * q + i] * h[r->equations.own[i]];
+  for (int i = 0; i < q; i++) sum += (is_rounding ? fabs(weight[i]) : weight[i]) * of[r->equations.own[i]];
   return sum;
 }
-
-static double hidden_scale(const Run *r, int row, const double *scale) {
-  int q = r->s->combined;
-  double sum = 0;
-  for (int i = 0; i < q; i++) sum += fabs(weights_of(r)[(q + row) * q + i]) * scale[r->equations.own[i]];
-  return sum;
-}
+static double hidden_value(const Run *r, int row, const double *h) { return hidden_sum(r, row, h, 0); }
+static double hidden_scale(const Run *r, int row, const double *scale) { return hidden_sum(r, row, scale, 1); }

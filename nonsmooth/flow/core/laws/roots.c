@@ -13,9 +13,7 @@ static double field_at_root(Run *r, int i, const double *x, int with_root, doubl
   aim(r, r->letter, x, unknowns);
   held_of(r, r->letter);
   if (!with_root) { unknowns[i] = r->held[i]; r->held[i] = 0; }
-  set_inputs(r, x, r->held, unknowns);
-  first_values(r, 0);
-  for (int k = 0; k < r->n; k++) field[k] = row_of(r, k)[0];
+  field_of(r, x, r->held, unknowns, field);
   surface_values(r, x);
   for (int k = 0; k < g->count; k++)
     if (g->row[k] == i) rate += out_of(&r->s->surfaces, r->heights, r->kept_rows + k) * field[g->column[k]];

@@ -80,16 +80,8 @@ static void determinant_series(double *a, int n, int count, int stride, double *
     for (int i = k; i < n; i++)
       for (int j = k; j < n; j++)
         if (fabs(a[(i * n + j) * stride]) > fabs(a[(row * n + column) * stride])) { row = i; column = j; }
-    for (int j = 0; j < n && row != k; j++)
-      for (int q = 0; q < count; q++) {
-        double *one = a + (k * n + j) * stride + q, *two = a + (row * n + j) * stride + q, t = *one;
-        *one = *two; *two = t;
-      }
-    for (int i = 0; i < n && column != k; i++)
-      for (int q = 0; q < count; q++) {
-        double *one = a + (i * n + k) * stride + q, *two = a + (i * n + column) * stride + q, t = *one;
-        *one = *two; *two = t;
-      }
+    if (row != k) swap(a + k * n * stride, a + row * n * stride, n * stride);
+    for (int i = 0; i < n && column != k; i++) swap(a + (i * n + k) * stride, a + (i * n + column) * stride, count);
     if ((row != k) != (column != k)) sign = -sign;
     const double *pivot = a + (k * n + k) * stride;
     for (int i = k + 1; i < n && pivot[0] != 0; i++) {

@@ -59,7 +59,7 @@ static void expand_stage(Run *r, const double *x, const double *unknowns, Slopes
 }
 
 /* Move state and columns by the step whose stages are known; 0 where that is not possible. */
-static int move_implicit(Run *r, Leg *l, Slopes *g, Columns *c, double h, double begun) {
+static int move_implicit(Run *r, Leg *l, Slopes *g, double h, double begun) {
   Implicit *m = r->implicit;
   const Radau *t = m->c.method;
   int n = r->n, s = t->s, size = s * n, is_solved = 1;
@@ -75,9 +75,9 @@ static int move_implicit(Run *r, Leg *l, Slopes *g, Columns *c, double h, double
     is_solved = add_stage(r, t, i, x, h, 0, matrix);
     expand_stage(r, x, unknowns, g);
     for (int k = 0; k < l->columns; k++) {
-      Expansion d = column_of(r, c, k, l->y + k * n);
-      column_series(r, &r->e, &d, l, k, g, c, 0);
-      memcpy(change + (int64_t)k * size + i * n, c->sum, sizeof(double) * n);
+      begin_column(r, l, g, k);
+      column_series(r, &r->e, g, 0);
+      for (int j = 0; j < n; j++) change[(int64_t)k * size + i * n + j] = g->v->sum[(int64_t)j * r->stride];
     }
   }
   is_solved = is_solved && factor_real(matrix, size, size - 1, pivot);
@@ -94,7 +94,8 @@ static int move_implicit(Run *r, Leg *l, Slopes *g, Columns *c, double h, double
 }
 
 /* From the end of a recorded implicit step, and samples there, to its start; 0 where that is not possible. */
-static int pull_implicit(Run *r, Leg *l, Slopes *g, Rows *c, const double *row, int64_t *sample) {
+static int pull_implicit(Run *r, Leg *l, Slopes *g, const double *row, int64_t *sample) {
+  const Variation *v = g->v;
   const Radau *t = RADAU + 1;
   int n = r->n, s = t->s, size = s * n, is_solved = 1;
   double *matrix = calloc((int64_t)size * size + 2 * size, sizeof(double));
@@ -115,10 +116,10 @@ static int pull_implicit(Run *r, Leg *l, Slopes *g, Rows *c, const double *row, 
   for (int i = 0; i < s && is_solved; i++) {
     const double *at = row + (i + 1) * row_width(r) + 3;
     expand_stage(r, at, at + n, g);
-    clear_rows(c);
-    for (int k = 0; k < n; k++) c->sum[(int64_t)k * r->stride] = own[i * n + k];
-    pull_series(r, &r->e, g, c, 0);
-    for (int k = 0; k < n; k++) l->row[k] += c->states[(int64_t)k * r->stride];
+    clear_variation(v);
+    for (int k = 0; k < n; k++) v->sum[(int64_t)k * r->stride] = own[i * n + k];
+    pull_series(r, &r->e, g, 0);
+    for (int k = 0; k < n; k++) l->row[k] += v->states[(int64_t)k * r->stride];
   }
   free(matrix);
   return is_solved;

@@ -17,11 +17,12 @@ import numpy as np
 from ...flow.engine.columns import CarriedLegs
 from ...flow.engine.smooth import LegsProgram
 from ...flow.fixed import MOST_STEPS, TOLERANCE, legs_program, stuck
-from ...flow.variation import carry_legs, require_done
+from ...flow.variation import Arc, carry_legs, require_done
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, surface_map
 from ...model.derivatives.variational import VariationalField, plain_field
 from .legs import Leg, LegFlow, integrate_leg, leg_name
+from .limit_leg import limit_flow
 from .saltation import Ended
 
 #: Local errors of the steps in extended precision.
@@ -91,6 +92,7 @@ class LegIntegrator:
 
     def __init__(self, system: FilippovSystem, legs: Sequence[Leg], chosen: tuple[int, ...] = ()):
         self.system, self.legs, self.chosen = system, tuple(legs), chosen
+        self._limits = any(leg.repeats for leg in self.legs)
         # events at one instant follow from each other: composed in Python
         self._composed = [i for i, leg in enumerate(self.legs) if leg.further and not leg.timed]
         self._plain = [i for i, leg in enumerate(self.legs) if leg.timed]
@@ -105,8 +107,9 @@ class LegIntegrator:
     def sizes(self) -> tuple[int, ...]:
         """States of each leg, with multipliers that are."""
         if self.system.sets:
-            return (self.system.extended_dimension,) * len(self.legs)
-        return tuple(field.entries for field in self.fields)
+            return tuple(self.system.extended_dimension + bool(leg.repeats) for leg in self.legs)
+        both = zip(self.fields, self.legs, strict=True)
+        return tuple(field.entries + bool(leg.repeats) for field, leg in both)
 
     @property
     def _most(self) -> int:
@@ -121,7 +124,7 @@ class LegIntegrator:
     @cached_property
     def _plain_program(self) -> LegsProgram | None:
         """Legs without derivatives, where each is a flow of the states to one event."""
-        if self._plain or self._composed or self.system.sets:
+        if self._plain or self._composed or self._limits or self.system.sets:
             return None
         maps = {leg: leg.map(self.system) for leg in set(self.legs)}
         if any(field.entries > field.by_start for field in self.fields):
@@ -158,7 +161,7 @@ class LegIntegrator:
         """Integrate all legs."""
         if self.system.sets:
             return self._by_modes(starts, durations, p)
-        if len(set(self.sizes)) > 1:
+        if len(set(self.sizes)) > 1 or self._limits:
             return self._one_by_one(starts, durations, p)
         n, most = starts.shape[1], self._most
         columns = 1 + n + len(self.chosen)
@@ -228,64 +231,78 @@ class LegIntegrator:
 
     def _by_modes(self, starts: Array, durations: Array, p: Array) -> LegFlows:
         """Integrate all legs by the law of their modes."""
-        system, n, given = (
-            self.system,
-            starts.shape[1],
-            zip(self.legs, starts, durations, strict=True),
-        )
-        arcs = [leg.arc(system, x, float(duration)) for leg, x, duration in given]
-        onto = {
-            i: _onto_set(system, leg, starts[i], p) for i, leg in enumerate(self.legs) if leg.left
-        }
-        for i, (x, _, _) in onto.items():
-            arcs[i] = arcs[i]._replace(start=x)
+        system, (count, n), q = self.system, starts.shape, len(self.chosen)
+        arcs, onto = list[Arc](), dict[int, list[Array]]()
+        for i, (leg, x, t) in enumerate(zip(self.legs, starts, durations.tolist(), strict=True)):
+            if leg.left:
+                x, *onto[i] = _onto_set(system, leg, x, p)
+            arcs.append(leg.arc(system, x, 0.0 if leg.repeats else t))
         found = carry_legs(system, arcs, p, self.chosen)
         with self._naming(found.failed):
             require_done(system, arcs, found)
         by = found.derivatives
-        for i, (_, by_start, by_p) in onto.items():
+        for i, (by_start, by_p) in onto.items():
             by[i, :, n:] += by[i, :, :n] @ by_p[:, list(self.chosen)]
             by[i, :, :n] = by[i, :, :n] @ by_start
-        legs = found.ends, found.before, found.rates, by[:, :, :n], by[:, :, n:]
-        events = self._events(np.zeros((len(arcs), 0)), n, p.size)
-        flows = LegFlows(self.sizes, *legs, *events)
+        flows, most = self._empty(count, n, q, p.size), slice(n)
+        flows.end[:, most], flows.before[:, most], flows.rate[:, most] = (
+            found.ends,
+            found.before,
+            found.rates,
+        )
+        flows.by_start[:, most], flows.by_parameters[:, most] = by[:, :, :n], by[:, :, n:]
         for i, leg in enumerate(self.legs):
-            if leg.reaches_set(system):
+            if leg.repeats:
+                self._to_limit(flows, i, starts[i], float(durations[i]), p)
+            elif leg.reaches_set(system):
                 self._fill(flows, i, self._reached(flows, found, i, p))
             elif not leg.timed:
-                self._fill(flows, i, leg.at_event(system, flows.end[i], p))
+                self._fill(flows, i, leg.at_event(system, flows.end[i, :n], p))
         return self._without_events(flows)
+
+    def _empty(self, count: int, n: int, q: int, parameters: int) -> LegFlows:
+        """Flows of ``count`` legs of zeros."""
+        most = self._most
+        end, before, rate = (np.zeros((count, most)) for _ in range(3))
+        x, by_p = np.zeros((count, most, n)), np.zeros((count, most, q))
+        events = self._events(np.zeros((count, 0)), n, parameters)
+        return LegFlows(self.sizes, end, before, rate, x, by_p, *events)
+
+    def _to_limit(self, flows: LegFlows, i: int, x: Array, duration: float, p: Array) -> None:
+        """Fill in a leg of infinitely many events."""
+        leg, following = self.legs[i], (i + 1) % len(self.legs)
+        with self._naming(i):
+            then = flows.before[following, : len(x)]
+            part = limit_flow(self.system, leg, x, duration, p, self.chosen, then)
+        flows.end[i], flows.rate[i] = part.end, part.rate
+        flows.by_start[i], flows.by_parameters[i] = part.by_start, part.by_parameters
+        self._fill(flows, i, leg.at_end(self.system, part.end, p))
 
     def _reached(self, flows: LegFlows, found: CarriedLegs, i: int, p: Array) -> AtEvent:
         """The end of a leg at a set: the motion goes on over the whole duration as it reaches the set."""
         n, members = flows.after.shape[1], self.system.entries[self.legs[i].element]
-        h = [surface_map(self.system, k)(flows.end[i], p).value for k in members]
+        end, rate = flows.end[i, :n], flows.rate[i, :n]
+        h = [surface_map(self.system, k)(end, p).value for k in members]
         left, gradient = float(found.left[i]), found.gradients[i]
-        flows.end[i] += left * flows.rate[i]
-        value = float(np.linalg.norm(h)) + left * float(gradient[:n] @ flows.rate[i])
-        return AtEvent.smooth_at(flows.end[i], value, gradient[:n], gradient[n:])
+        end += left * rate
+        value = float(np.linalg.norm(h)) + left * float(gradient[:n] @ rate)
+        return AtEvent.smooth_at(end, value, gradient[:n], gradient[n:])
 
     def _one_by_one(self, starts: Array, durations: Array, p: Array) -> LegFlows:
-        count, n, most, q = len(self.legs), starts.shape[1], self._most, len(self.chosen)
-        flows = LegFlows(
-            self.sizes,
-            np.zeros((count, most)),
-            np.zeros((count, most)),
-            np.zeros((count, most)),
-            np.zeros((count, most, n)),
-            np.zeros((count, most, q)),
-            *self._events(np.zeros((count, 0)), n, p.size),
-        )
+        n = starts.shape[1]
+        flows = self._empty(len(self.legs), n, len(self.chosen), p.size)
+        for i, field in enumerate(self.fields):
+            at = field.states_at(starts[i], p)
+            flows.before[i, : field.entries] = field.rate.copied(at, p)[0][:, 0]
         for i, leg in enumerate(self.legs):
-            k, field = self.sizes[i], self.fields[i]
+            if leg.repeats:
+                self._to_limit(flows, i, starts[i], float(durations[i]), p)
+                continue
+            k, own = self.sizes[i], (self.system, leg, starts[i], float(durations[i]), p)
             with self._naming(i):
-                part = integrate_leg(
-                    self.system, leg, starts[i], float(durations[i]), p, self.chosen
-                )
+                part = integrate_leg(*own, self.chosen)
             flows.end[i, :k], flows.rate[i, :k] = part.end, part.rate
             flows.by_start[i, :k], flows.by_parameters[i, :k] = part.by_start, part.by_parameters
-            at = field.states_at(starts[i], p)
-            flows.before[i, :k] = field.rate.copied(at, p)[0][:, 0]
             if not leg.timed:
                 self._fill(flows, i, leg.at_end(self.system, part.end, p))
         return self._completed(flows, p)

@@ -125,23 +125,12 @@ static void end_implicit(Run *r) {
 
 /* Polynomials ------------------------------------------------------------------------------------------------ */
 
-/* Write s coefficients after the first of series, for powers of the time. */
-static void write_powers(const Radau *t, const double *powers, int n, double h, int stride, double *series) {
-  double part = 1;
-  for (int k = 0; k < t->s; k++) {
-    part /= h;
-    for (int i = 0; i < n; i++) series[(int64_t)i * stride + k + 1] = powers[k * n + i] * part;
-  }
-  for (int i = 0; i < n; i++)
-    memset(series + (int64_t)i * stride + t->s + 1, 0, sizeof(double) * (stride - t->s - 1));
-}
-
 /* The guards' series, through their values at the stages. */
 static void interpolate_guards(Run *r, Expansion *e, double h) {
   Implicit *m = r->implicit;
   const Radau *t = m->c.method;
   int n = r->n, s = t->s, w = r->width, rows = e->l.rows;
-  double *values = m->guards, *powers = values + (int64_t)s * rows, *x = m->c.work;
+  double *values = m->guards, *x = m->c.work;
   for (int i = 0; i < s; i++) {
     double *unknowns = m->unknowns + (i + 1) * w;
     for (int k = 0; k < n; k++) x[k] = e->states[(int64_t)k * r->stride] + m->c.z[i * n + k];
@@ -150,8 +139,7 @@ static void interpolate_guards(Run *r, Expansion *e, double h) {
     for (int row = 0; row < rows; row++)
       values[i * rows + row] = g[(int64_t)row * r->stride] - e->guards[(int64_t)row * r->stride];
   }
-  powers_of(t, values, rows, powers);
-  write_powers(t, powers, rows, h, r->stride, e->guards);
+  interpolate(t, values, rows, h, r->stride, e->guards);
 }
 
 /* Series of states, of unknowns and of guards. */
@@ -159,13 +147,12 @@ static void write_step(Run *r, Expansion *e, double h) {
   Implicit *m = r->implicit;
   const Radau *t = m->c.method;
   int n = r->n, s = t->s, w = r->width;
-  double *values = m->guards, *powers = values + (int64_t)s * w;
+  double *values = m->guards;
   write_powers(t, m->c.powers, n, h, r->stride, e->states);
   for (int i = 0; i < w; i++) e->series[(int64_t)i * r->stride] = r->unknowns[i];
   for (int i = 0; i < s; i++)
     for (int k = 0; k < w; k++) values[i * w + k] = m->unknowns[(i + 1) * w + k] - r->unknowns[k];
-  powers_of(t, values, w, powers);
-  write_powers(t, powers, w, h, r->stride, e->series);
+  interpolate(t, values, w, h, r->stride, e->series);
   interpolate_guards(r, e, h);
   e->end = m->c.end;
 }
@@ -196,18 +183,28 @@ static int guards_agree(Run *r, Expansion *e, double h) {
 
 /* A step ------------------------------------------------------------------------------------------------------ */
 
+/* Values and first coefficients of a mode. */
+static void expand_first(Run *r, const double *x, const double *unknowns, Expansion *e) {
+  int order = r->order;
+  r->order = 1;
+  expand(r, r->letter, x, unknowns, e);
+  r->order = order;
+}
+
+/* A step from the present state, of which an expansion is known. */
+static void begin_stages(Run *r, const Expansion *e) {
+  Implicit *m = r->implicit;
+  memcpy(m->c.x, r->x, sizeof(double) * r->n);
+  for (int k = 0; k <= m->c.method->s; k++) memcpy(m->unknowns + k * r->width, r->unknowns, sizeof(double) * r->width);
+  for (int i = 0; i < r->n; i++) m->c.start_rate[i] = e->states[(int64_t)i * r->stride + 1];
+}
+
 /* What a step begins with: first coefficients of guards, what is allowed, the field. */
 static int begin_step(Run *r, Expansion *e) {
   Collocation *m = &r->implicit->c;
-  int order = r->order;
-  r->order = 1;
-  expand(r, r->letter, r->x, r->unknowns, e);
-  r->order = order;
+  expand_first(r, r->x, r->unknowns, e);
   if (!e->finite) return 0;
-  memcpy(m->x, r->x, sizeof(double) * r->n);
-  for (int k = 0; k <= m->method->s; k++)
-    memcpy(r->implicit->unknowns + k * r->width, r->unknowns, sizeof(double) * r->width);
-  for (int i = 0; i < r->n; i++) m->start_rate[i] = e->states[(int64_t)i * r->stride + 1];
+  begin_stages(r, e);
   for (int i = 0; i < r->s->dimension; i++) m->weight[i] = r->o.atol + r->o.rtol * fabs(r->x[i]);
   return 1;
 }

@@ -1,15 +1,12 @@
 /* Flows of known durations that decay faster than they change: implicit steps, with columns of derivatives.
- *
- * Columns are the exact derivatives of the discrete step: (A/h - J) dz = J y at the stages, each with its own J.
  */
 
-/* A flow, the collocation of its field, and of a step with columns: derivatives of the field at the stages, the matrix
- * of all stages with its pivots, a column's changes at the stages. */
+/* A flow, the collocation of its field, derivatives of the field at a stage, columns, values of what is watched. */
 typedef struct {
   Flow *w;
   Collocation c;
-  int32_t *pivot;
-  double *at_stages, *matrix, *changes;
+  double *at_stage, *watched;
+  const double *y;
   void *memory;
 } ImplicitFlow;
 
@@ -50,57 +47,36 @@ static int flow_jacobian(Flow *w, const double *x, double *all, double *work, do
     for (int i = 0; i < n; i++) jacobian[i * n + k] = (moved[i] - rate[i]) / (there[k] - x[k]);
     there[k] = x[k];
   }
-  return finite_all(jacobian, n * n);
+  return finite_all(all, n * width) && finite_all(jacobian, n * n);
 }
 
 static int flow_jacobian_at(void *of, int stage, const double *x, double *jacobian) {
   ImplicitFlow *m = of;
   (void)stage;
-  return flow_jacobian(m->w, x, m->at_stages, m->c.work, jacobian);
+  return flow_jacobian(m->w, x, m->at_stage, m->c.work, jacobian);
 }
 
 static size_t place_flow(ImplicitFlow *m, char *base) {
   const Field *f = m->w->field;
   size_t n = f->n, s = m->c.method->s, width = n + f->columns - f->starts, used = place_collocation(&m->c, base, 0);
-  m->at_stages = DOUBLES(s * n * width);
-  m->matrix = DOUBLES(f->columns ? s * n * s * n : 0);
-  m->changes = DOUBLES(2 * s * (n > (size_t)f->watched ? n : (size_t)f->watched));
-  m->pivot = INTEGERS(s * n);
+  m->at_stage = DOUBLES(n * width);
+  m->watched = DOUBLES(2 * s * f->watched);
   return used;
 }
 
-/* Move all columns by the step whose stages are known; 0 where that is not possible. */
-static int move_flow_columns(ImplicitFlow *m, double h, double *z) {
+/* Rates of all columns at a stage, of which the derivatives are known. */
+static void push_flow(void *with, int stage, const double *x, double *rates, int64_t apart) {
+  const ImplicitFlow *m = with;
   const Field *f = m->w->field;
-  const Radau *t = m->c.method;
-  int n = f->n, s = t->s, size = s * n, width = n + f->columns - f->starts;
-  if (!f->columns) return 1;
-  for (int i = 0; i < s; i++) {
-    double *x = m->c.work;
-    for (int k = 0; k < n; k++) x[k] = m->c.x[k] + m->c.z[i * n + k];
-    field_at(m->w, x, m->c.rates);
-    flow_derivatives(m->w, m->at_stages + (int64_t)i * n * width);
-  }
-  if (!finite_all(m->at_stages, size * width)) return 0;
-  memset(m->matrix, 0, sizeof(double) * size * size);
-  for (int i = 0; i < s; i++)
-    for (int k = 0; k < n; k++) {
-      double *row = m->matrix + (int64_t)(i * n + k) * size;
-      for (int j = 0; j < s; j++) row[j * n + k] = t->slopes[i * s + j] / h;
-      for (int l = 0; l < n; l++) row[i * n + l] -= m->at_stages[(int64_t)(i * n + k) * width + l];
+  int n = f->n, width = n + f->columns - f->starts;
+  (void)stage, (void)x;
+  for (int column = 0; column < f->columns; column++)
+    for (int i = 0; i < n; i++) {
+      const double *row = m->at_stage + (int64_t)i * width, *y = m->y + (int64_t)column * n;
+      double rate = column < f->starts ? 0 : row[n + column - f->starts];
+      for (int l = 0; l < n; l++) rate += row[l] * y[l];
+      rates[column * apart + i] = rate;
     }
-  if (!factor_real(m->matrix, size, size - 1, m->pivot)) return 0;
-  for (int column = 0; column < f->columns; column++) {
-    double *y = z + (int64_t)(column + 1) * n;
-    for (int i = 0; i < size; i++) {
-      const double *row = m->at_stages + (int64_t)i * width;
-      m->changes[i] = column < f->starts ? 0 : row[n + column - f->starts];
-      for (int l = 0; l < n; l++) m->changes[i] += row[l] * y[l];
-    }
-    solve_real(m->matrix, size, size - 1, m->pivot, m->changes);
-    for (int k = 0; k < n; k++) y[k] += m->changes[(s - 1) * n + k];
-  }
-  return 1;
 }
 
 /* Scales of errors: of a group of states its size. */
@@ -117,13 +93,20 @@ static void weigh_flow(ImplicitFlow *m, const double *z) {
   }
 }
 
-/* Implicit steps from one of a length on; 0 where there is no memory. */
-static int begin_flow(Flow *w, double h) {
+static void end_flow(Flow *w) {
+  ImplicitFlow *m = w->implicit;
+  if (m) free(m->memory);
+  free(m);
+  w->implicit = 0;
+}
+
+/* Whether a decay rate holds a step of the flow; steps are implicit then. */
+static int begin_flow(Flow *w, const double *z, double h) {
   const Field *f = w->field;
   ImplicitFlow *m = calloc(1, sizeof(ImplicitFlow));
   if (!m) return 0;
   m->w = w;
-  m->c = (Collocation){.method = RADAU + 1, .n = f->n, .moving = f->n, .rtol = IMPLICIT_FLOW, .h = h, .error = 1};
+  m->c = (Collocation){.method = RADAU + 1, .n = f->n, .moving = f->n, .rtol = IMPLICIT_FLOW};
   m->c.of = m;
   m->c.rate_at = flow_rate_at;
   m->c.jacobian_at = flow_jacobian_at;
@@ -131,15 +114,9 @@ static int begin_flow(Flow *w, double h) {
   if (!m->memory) { free(m); return 0; }
   place_flow(m, m->memory);
   w->implicit = m;
-  return 1;
-}
-
-static void end_flow(Flow *w) {
-  ImplicitFlow *m = w->implicit;
-  if (!m) return;
-  free(m->memory);
-  free(m);
-  w->implicit = 0;
+  if (flow_jacobian_at(m, 0, z, m->c.jacobian) && begin_lengths(&m->c, h, w->tol)) return 1;
+  end_flow(w);
+  return 0;
 }
 
 /* Series of what is watched, through its values at the stages. */
@@ -147,7 +124,7 @@ static void interpolate_watched(ImplicitFlow *m, const double *z, double h) {
   const Flow *w = m->w;
   const Field *f = w->field;
   int s = m->c.method->s, stride = f->order + 1;
-  double *values = m->changes, *x = m->c.work;
+  double *values = m->watched, *x = m->c.work;
   for (int i = 0; i <= s; i++) {
     for (int k = 0; k < f->n; k++) x[k] = z[k] + (i ? m->c.z[(i - 1) * f->n + k] : 0);
     series_inputs(&f->series, 0, x, w->rules);
@@ -157,8 +134,7 @@ static void interpolate_watched(ImplicitFlow *m, const double *z, double h) {
       if (i) values[(i - 1) * f->watched + j] = value - *begun; else *begun = value;
     }
   }
-  powers_of(m->c.method, values, f->watched, values + s * f->watched);
-  write_powers(m->c.method, values + s * f->watched, f->watched, h, stride, w->watched);
+  interpolate(m->c.method, values, f->watched, h, stride, w->watched);
 }
 
 /* The length of an implicit step, whose polynomials are those of the flow; 0 where there is none. */
@@ -176,19 +152,6 @@ static double implicit_flow_step(Flow *w, const double *z) {
   return h;
 }
 
-/* Whether a decay rate holds a step of the flow. */
-static int is_held(Flow *w, const double *z, double h) {
-  const Field *f = w->field;
-  int n = f->n, width = n + f->columns - f->starts;
-  double *all = calloc((int64_t)n * width + (int64_t)n * n + 5 * n, sizeof(double)), rho = 0;
-  if (!all) return 0;
-  double *jacobian = all + (int64_t)n * width;
-  Collocation c = {.n = n, .fast = jacobian + n * n, .work = jacobian + n * n + n};
-  if (flow_jacobian(w, z, all, c.work, jacobian)) rho = fastest(&c, jacobian, 8);
-  free(all);
-  return h * rho > HELD_PART * (3 - 0.5 * log10(w->tol));
-}
-
 /* The length of the next step, of the kind that costs less; not above zero where there is none. */
 static double next_step(Flow *w, const double *z, int64_t step) {
   const Field *f = w->field;
@@ -200,7 +163,7 @@ static double next_step(Flow *w, const double *z, int64_t step) {
   }
   double h = expand_flow(w, z) ? flow_step(w) : 0;
   if (step % LOOK_AGAIN < LOOK_AGAIN - 1 || !(w->left > FAR_AWAY * h) || w->sign < 0 || !is_whole) return h;
-  if (f->order < RADAU[1].s || RADAU[1].s * f->n > MOST_STATES / 2 || !is_held(w, z, h) || !begin_flow(w, EIGHTFOLD * h)) return h;
+  if (f->order < RADAU[1].s || RADAU[1].s * f->n > MOST_STATES / 2 || !begin_flow(w, z, h)) return h;
   double longer = implicit_flow_step(w, z);
   if (longer > 0) return longer;
   end_flow(w);
@@ -211,7 +174,8 @@ static double next_step(Flow *w, const double *z, int64_t step) {
 static void make_step(Flow *w, double h, double *z) {
   ImplicitFlow *m = w->implicit;
   if (!m) { advance_flow(w, h, z); return; }
-  if (!move_flow_columns(m, h, z)) z[0] = NAN;
+  m->y = z + w->field->n;
+  if (w->field->columns && !move_through_stages(&m->c, h, w->field->columns, z + w->field->n, m, push_flow)) z[0] = NAN;
   else memcpy(z, m->c.end, sizeof(double) * w->field->n);
   go_on_from(&m->c, 1);
   w->left = h == w->left ? 0 : w->left - h;

@@ -17,11 +17,14 @@ struct Implicit {
   void *arena;
 };
 
+/* Coefficients of a row of that program. */
+static int stride_of_implicit(const Run *r) { return r->s->implicit == &r->s->series ? r->stride : 1; }
+
 static size_t place_implicit(Implicit *m, const Run *r, char *base) {
   size_t n = r->n, w = r->width, s = m->c.method->s, used = place_collocation(&m->c, base, 0);
   m->unknowns = DOUBLES((s + 1) * w);
   m->guards = DOUBLES(2 * s * (w > (size_t)r->guards ? w : (size_t)r->guards));
-  m->program = DOUBLES(r->s->implicit ? series_room(r->s->implicit, 1) : 0);
+  m->program = DOUBLES(r->s->implicit ? series_room(r->s->implicit, stride_of_implicit(r)) : 0);
   m->layer = DOUBLES(w * n);
   m->by_unknown = DOUBLES(w * n);
   m->slope = DOUBLES(w * w);
@@ -41,6 +44,21 @@ static int rate_at_stage(void *of, int stage, const double *x, double *rate) {
   return finite_all(rate, r->n);
 }
 
+/* The field's derivative by differences, where no program has it: it only steers Newton's method. */
+static int differences(Run *r, int stage, const double *x, double *jacobian) {
+  int n = r->n;
+  double *rate = r->implicit->c.work, *moved = rate + n, *there = moved + n, most = largest_of(x, n);
+  if (!rate_at_stage(r, stage, x, rate)) return 0;
+  memcpy(there, x, sizeof(double) * n);
+  for (int k = 0; k < n; k++) {
+    there[k] = x[k] + sqrt(EPSILON) * larger(fabs(x[k]), ROOT_SHARE * most > 0 ? ROOT_SHARE * most : 1);
+    if (!rate_at_stage(r, stage, there, moved)) return 0;
+    for (int i = 0; i < n; i++) jacobian[i * n + k] = (moved[i] - rate[i]) / (there[k] - x[k]);
+    there[k] = x[k];
+  }
+  return finite_all(jacobian, n * n);
+}
+
 /* The field's derivative by the states, multipliers of what slides following them. */
 static int jacobian_at_stage(void *of, int stage, const double *x, double *jacobian) {
   Run *r = of;
@@ -51,11 +69,12 @@ static int jacobian_at_stage(void *of, int stage, const double *x, double *jacob
   const Entries *g = &r->s->derivatives;
   int n = r->n, w = r->width, slides = l->slides, size = moving_size(r), *where = r->pending;
   int first = n + 3 * w + r->s->rules.atoms + r->s->slope_outputs;
+  if (!g->count) return differences(r, stage, x, jacobian);
   for (int i = 0; i < w; i++) where[i] = -1;
   for (int i = 0; i < slides; i++) where[l->sliding[i]] = i;
   aim(r, l->letter, x, unknowns);
   set_inputs(r, x, held_of(r, l->letter), unknowns);
-  series_at(t, &t->values, 0, 1, r->input, m->program);
+  series_at(t, &t->values, 0, stride_of_implicit(r), r->input, m->program);
   memset(jacobian, 0, sizeof(double) * n * n);
   memset(m->layer, 0, sizeof(double) * slides * n);
   memset(m->by_unknown, 0, sizeof(double) * slides * n);
@@ -89,7 +108,7 @@ static int jacobian_at_stage(void *of, int stage, const double *x, double *jacob
 static void prepare_implicit(Run *r) {
   if (!r->implicit || !r->s->implicit) return;
   series_prepare(r->s->implicit, r->p, r->implicit->program);
-  pairs_begin(r->s->implicit->size, 1, r->begun, r->implicit->program);
+  pairs_begin(r->s->implicit->size, stride_of_implicit(r), r->begun, r->implicit->program);
 }
 
 /* Memory for implicit steps; 0 where there is none. */

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import bounce
 import nonsmooth as ns
-from nonsmooth.flow import archive
+from nonsmooth.flow.saving import archive
 from nonsmooth.model import instruction_form, reversed_system, with_section
 from nonsmooth.model.expressions.graph import operation
 from nonsmooth.textbook import PROBLEMS

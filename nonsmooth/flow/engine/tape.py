@@ -47,6 +47,9 @@ _ENTRIES = tuple(field.name for field in fields(Tape) if field.type == "Entries"
 #: What an address of the driver's structures points to.
 Block = NDArray[Any] | ctypes.Structure | ctypes.Array[Any]
 
+#: Makes what goes on with a batch, from a run of the driver, the batch and its options: 0 where it is done.
+Calls = Callable[[int, Any, Any], Callable[[], int]]
+
 #: Steps by which a run is known to be stiff.
 _PROBED = 400
 
@@ -177,53 +180,58 @@ class TapeEngine:
 
     def _structure(self, coupled: Coupled, tape: Tape) -> Any:
         system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
-        made = structure("System")(
-            n=system.extended_dimension,
-            dimension=system.dimension,
-            timed=int(system.time_dependent),
-            m=m,
-            c=c,
-            parameters=len(system.parameter_names),
-            stops=len(system.stops),
-            resets=len(system.resets),
-            order=self.order,
-            slope_outputs=tape.slope_outputs,
-            series=self._series(tape.series, self.order),
-            free=self._series(tape.free, self.order),
-            affine=int(coupled.affine),
-            linear=int(coupled.linearity.everywhere),
-            linear_free=int(coupled.linearity.free),
-        )
-        for name in _VALUES:
-            setattr(made, name, values_structure(getattr(tape, name), self._kept))
-        for name in _ENTRIES:
-            setattr(made, name, self._entries(getattr(tape, name)))
         carries = np.zeros((m, c))
         for i, carried in enumerate(coupled.carriers):
             carries[i, carried] = 1
-        elements = _elements(coupled, self.shown.functions)
-        tables: dict[str, Any] = {
+        elements, linearity = _elements(coupled, self.shown.functions), coupled.linearity
+        table = (structure("Element") * (len(elements) + 1))(*elements)
+        parts: dict[str, Any] = {
+            "n": system.extended_dimension,
+            "dimension": system.dimension,
+            "timed": int(system.time_dependent),
+            "m": m,
+            "c": c,
+            "parameters": len(system.parameter_names),
+            "stops": len(system.stops),
+            "resets": len(system.resets),
+            "order": self.order,
+            "slope_outputs": tape.slope_outputs,
+            "series": self._series(tape.series, self.order),
+            "free": self._series(tape.free, self.order),
+            "affine": int(coupled.affine),
+            "linear": int(linearity.everywhere),
+            "linear_free": int(linearity.free),
             "carries": carries.ravel(),
             "component": tape.component,
             "slope_output": tape.slope_output,
             "slope_moves": tape.slope_moves,
             "slope_symmetric": tape.slope_symmetric,
             "mixed": coupled.mixed.ravel(),
-            "bent": coupled.linearity.bent_rows,
-            "bent_free": coupled.linearity.bent_free_rows,
-            "bent_guards": coupled.linearity.bent_guards,
-            "curved": coupled.linearity.curved_guards,
+            "bent": linearity.bent_rows,
+            "bent_free": linearity.bent_free_rows,
+            "bent_guards": linearity.bent_guards,
+            "curved": linearity.curved_guards,
+            "sets": len(system.sets),
+            "kept_rows": int(coupled.kept.numel()),
+            "joints": len(system.joints),
+            "combined": len(coupled.combined),
+            "impact_law": IMPACT_LAWS.index(system.definition.impact_law),
+            "element": self._at(np.frombuffer(bytes(table), np.uint8)),
+            "tables": len(self.shown.tables),
+            "cells": self._cells(),
+            "rules": self._rules(),
         }
-        made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
-        made.joints, made.combined = len(system.joints), len(coupled.combined)
-        made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
-        table = (structure("Element") * (len(elements) + 1))(*elements)
-        made.element = self._at(np.frombuffer(bytes(table), np.uint8))
-        made.tables, made.cells = len(self.shown.tables), self._cells()
-        for name, values in tables.items():
-            setattr(made, name, self._at(np.array([*values, 0], np.int32)))
-        made.rules = self._rules()
-        return made
+        for name in _VALUES:
+            parts[name] = values_structure(getattr(tape, name), self._kept)
+        for name in _ENTRIES:
+            parts[name] = self._entries(getattr(tape, name))
+        return self._filled("System", parts)
+
+    def _filled(self, name: str, parts: Mapping[str, Any]) -> Any:
+        """A structure of numbers, structures, and rows of integers by their addresses."""
+        rows = {k: v for k, v in parts.items() if isinstance(v, (list, np.ndarray))}
+        own = {k: self._at(np.array([*v, 0], np.int32)) for k, v in rows.items()}
+        return structure(name)(**{**parts, **own})
 
     def _cells(self) -> int:
         """Tables as C reads them, by their functions."""
@@ -266,18 +274,16 @@ class TapeEngine:
         atoms, keeps = d.guards.numel(), any(rule.at_trigger for rule in d.rules)
         width = 1 + (5 + 4 * atoms + len(conditions) + 3 * len(d.clocks)) * (atoms > 0)
         width += len(conditions) * self.system.extended_dimension * keeps
-        made: Any = structure("Rules")(
-            atoms=atoms,
-            triggers=len(conditions),
-            clocks=len(d.clocks),
-            discrete=len(d.discrete),
-            keeps=int(keeps),
-            width=width,
-        )
-        for name, table in tables.items():
-            setattr(made, name, self._at(np.array([*table, 0], np.int32)))
-        made.value = self._at(np.array([*[v for own in values for v in own], 0.0], float))
-        return made
+        numbers = {
+            "atoms": atoms,
+            "triggers": len(conditions),
+            "clocks": len(d.clocks),
+            "discrete": len(d.discrete),
+            "keeps": int(keeps),
+            "width": width,
+            "value": self._at(np.array([*chain(*values), 0.0], float)),
+        }
+        return self._filled("Rules", tables | numbers)
 
     def _at(self, array: NDArray[Any]) -> int:
         self._kept.append(array)
@@ -507,19 +513,20 @@ class TapeEngine:
         out: Chunk | None = None,
         stop: Callable[[], bool] = lambda: False,
         times: Array | None = None,
+        calls: Calls | None = None,
     ) -> Chunk:
-        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
-        # As ``Engine.run_many``, which is faster where many trajectories share a system.
+        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,), by ``calls`` of C."""
         chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
-        x = np.ascontiguousarray(x, float)
-        p = self.shown.with_cells(p)
+        x, p = np.ascontiguousarray(x, float), self.shown.with_cells(p)
         batch = batch_of(x, p, options.t_start, chunk, times, None)
         start, done = self._letters(options.start_mode), np.zeros(1, np.int64)
         c_options = options_of(self.shown.system, options, dense=False, at=at)
+        given = (ctypes.byref(batch), ctypes.byref(c_options))
         with self.held_table() as table, self.held_run(table) as state:
-            call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
-            while status := library().run_many(*call, address(start), BURST):
+            own = lambda: library().run_many(state, address(done), *given, address(start), BURST)
+            more = own if calls is None else calls(state, *given)
+            while status := more():
                 if status == NEEDS_PROGRAM:
                     self.add_implicit()
                 if stop():

@@ -10,7 +10,7 @@ import casadi as ca
 
 from ..cache import Content
 from ..errors import DefinitionError
-from .conditions import Rule, passages
+from .events.conditions import Rule, passages
 from .parse_definition import read_function
 from .system import FilippovSystem
 

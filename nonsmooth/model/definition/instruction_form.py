@@ -17,18 +17,18 @@ from numpy.typing import NDArray
 
 from ..errors import DefinitionError
 from ..expressions.float_arithmetic import BINARY
-from ..expressions.graph import Node, evaluate, instructions, operation
+from ..expressions.graph import Expressions, Node, evaluate, instructions, shaped
 from ..numbering import IMPACT_LAWS, LAWS, MOST_CODES, OPERATIONS
 from ..reading import listed
 from ..schema import Validator, savable, type_hints
 from ..values import Array
-from .conditions import OR, Rule
-from .curves import Curve
 from .elements import LARGEST
+from .events.conditions import OR, Rule
 from .lift import LiftedSwitch
 from .parse_definition import INPUTS, OUTPUTS, PLAIN, Definition, require_consistent
-from .pieces import Table
 from .system import FilippovSystem
+from .tables.curves import Curve
+from .tables.pieces import Table
 
 #: Most instructions, and entries, of a system in a file, and most that are nested: CasADi prints nested ones
 #: by recursion.
@@ -143,25 +143,9 @@ class Graph:
         vectors = [
             ca.vertcat(*map(ca.SX.sym, names)) if names else ca.SX(0, 1) for names in self.names
         ]
-        values = evaluate(self.nodes, _Expressions(vectors))
-        ends = accumulate((r * c for r, c in self.shapes), initial=0)
-        found = list[ca.SX]()
-        for (a, b), shape in zip(pairwise(ends), self.shapes, strict=True):
-            entries = [values[k] for k in self.outputs[a:b].tolist()]
-            found.append(ca.reshape(ca.vertcat(*entries) if entries else ca.SX(*shape), *shape))
-        return vectors, found
-
-
-class _Expressions:
-    """Expressions over some vectors of symbols, as an algebra of graphs."""
-
-    def __init__(self, vectors: Sequence[ca.SX]):
-        self.symbols = [listed(v) for v in vectors]
-        self.constant = ca.SX
-        self.apply = operation
-
-    def symbol(self, vector: int, position: int) -> ca.SX:
-        return self.symbols[vector][position]
+        values = evaluate(self.nodes, Expressions([listed(v) for v in vectors]))
+        outputs = [ca.SX(*shape) for shape in self.shapes]
+        return vectors, shaped(outputs, [values[k] for k in self.outputs.tolist()])
 
 
 def _within(values: NDArray[Any], count: int | NDArray[Any]) -> bool:

@@ -13,13 +13,13 @@ import casadi as ca
 import numpy as np
 
 from ..cache import Content
-from ..definition.conditions import decides
+from ..definition.events.conditions import decides
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
-from ..expressions.graph import evaluate, instructions, operation
+from ..expressions.graph import Expressions, evaluate, instructions, operation
 from ..expressions.identity import vanish_on
 from ..laws.coupled import combinable, coupled_of, raised_of
-from ..laws.evaluators import Evaluator
+from ..laws.evaluators import Evaluator, evaluator
 from ..laws.motion import motion, solved
 from ..laws.switches import Guard
 from ..numbering import UNWATCHED
@@ -259,8 +259,7 @@ def jumping(system: FilippovSystem, x: Array, after: Array, p: Array) -> str:
         )
     coupled, own = coupled_of(system), [i for i in system.half_lines if i not in system.algebraic]
     columns = lambda: [ca.jacobian(coupled.field, coupled.symbols_of(own))]
-    made = lambda: Evaluator(system.function(("columns of conditions",), columns))
-    b = system.cached(("columns of conditions",), made).copied(after, p)[0]
+    b = evaluator(system, "columns of conditions", columns).copied(after, p)[0]
     impulses = nnls(b, after - x)[0]
     taking = {i for i, impulse in zip(own, impulses, strict=True) if impulse > 0.0}
     return "".join("c" if i in taking else "o" for i in system.half_lines)
@@ -369,8 +368,7 @@ def choices_at(
         return np.zeros(0), np.zeros((0, len(x)))
     own = ca.vertcat(*seen)
     outputs = lambda: [own, ca.jacobian(own, system.extended_states)]
-    made = lambda: Evaluator(system.function(("choices", kind, element), outputs))
-    values, gradient = system.cached(("choices of", kind, element), made).copied(x, p)
+    values, gradient = evaluator(system, ("choices", kind, element), outputs).copied(x, p)
     return values.ravel(), gradient
 
 
@@ -396,21 +394,16 @@ def _values_at(
     x: Array,
     p: Array,
 ) -> list[float]:
-    outputs = lambda: [ca.vertcat(*build(), 0)]
-    made = lambda: Evaluator(system.function(key, outputs))
-    found: list[float] = system.cached(("values", key), made).copied(x, p)[0].ravel().tolist()
-    return found[:-1]
+    found = evaluator(system, key, lambda: [ca.vertcat(*build(), 0)]).copied(x, p)[0]
+    return found.ravel().tolist()[:-1]
 
 
-class _Differences:
+class _Differences(Expressions):
     """Expressions of a graph, and the differences by which its operations choose."""
 
     def __init__(self, vectors: list[ca.SX]):
-        self._vectors, self.seen = vectors, list[ca.SX]()
-        self.constant = ca.SX
-
-    def symbol(self, vector: int, position: int) -> ca.SX:
-        return self._vectors[vector][position]
+        super().__init__(vectors)
+        self.seen = list[ca.SX]()
 
     def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
         if op in ("lt", "le", "eq", "ne", "fmin", "fmax"):

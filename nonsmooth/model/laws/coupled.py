@@ -31,7 +31,7 @@ from ..expressions.linearity import linearity
 from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .degree import Degree, degree_of
-from .evaluators import Evaluator
+from .evaluators import Evaluator, evaluator
 
 #: Slopes of conditions are regular if eigenvalues are above this part of them and of those of the rates.
 _REGULAR = 1e-3
@@ -262,20 +262,14 @@ class Coupled:
 
     def heights_at(self, x: Array, p: Array) -> Array:
         """Switching functions and gaps (m,) at an extended state."""
-        build = lambda: Evaluator(self.system.function("heights", lambda: [self.heights]))
-        return self.system.cached("heights at", build).copied(x, p)[0].ravel()
+        heights = evaluator(self.system, "heights", lambda: [self.heights])
+        return heights.copied(x, p)[0].ravel()
 
     def kept_at(self, x: Array, p: Array) -> tuple[Array, Array]:
         """The functions of ``kept`` (k,) and their gradients (k, N) at an extended state."""
-
-        def build() -> Evaluator:
-            rows = ca.densify(self.kept)
-            states = self.system.extended_states
-            return Evaluator(
-                self.system.function("kept", lambda: [rows, ca.jacobian(rows, states)])
-            )
-
-        values, gradient = self.system.cached("kept at", build).copied(x, p)
+        rows = self.kept
+        build = lambda: [rows, ca.jacobian(rows, self.system.extended_states)]
+        values, gradient = evaluator(self.system, ("kept", rows.numel()), build).copied(x, p)
         return values.ravel(), gradient
 
     def sliding(self, mode: str) -> list[int]:

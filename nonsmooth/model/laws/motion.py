@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 
 from ..definition.parse_definition import read_function
-from ..definition.pieces import beyond_cells
 from ..definition.system import FilippovSystem, require_system
+from ..definition.tables.pieces import beyond_cells
 from ..errors import DefinitionError
 from ..expressions.identity import decide_zero
 from .coupled import combinable, coupled_of, raised_of
@@ -139,19 +139,6 @@ class Motion:
                         function = turn * (factors[i] - side * self._values[sliding.index(i)])
                     yield guard("exit", side), function
         yield from zip(event_guards(system), ca.vertsplit(stops)[: stops.numel()], strict=True)
-
-    def value_function(self) -> ca.Function:
-        """Return (x, p) -> the field (N, 1) and the guard functions (m, 1)."""
-        values = [self.field, self.functions]
-        return self.system.function(("values", self.mode), lambda: values, self.states)
-
-    def gradient_function(self) -> ca.Function:
-        """Return (x, p) -> gradients of the guard functions (m, N), the error scale of rounding."""
-
-        def build() -> Sequence[ca.SX]:
-            return [ca.jacobian(self.functions, self.states)]
-
-        return self.system.function(("gradient", self.mode), build, self.states)
 
     def multiplier_equations(self) -> ca.SX:
         """Equations of the multipliers that are states."""

@@ -290,6 +290,10 @@ class BranchCurve(Curve):
         """The same equations with other free parameters of the scales ``widths``, and the point there."""
         raise NotImplementedError
 
+    def begun_later(self, u: Array) -> tuple[BranchCurve, Array]:
+        """The same equations and solution; a forced orbit without events begins at another phase."""
+        return self, u
+
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
         """The event at the end of a branch, if one can be named."""
         return None
@@ -309,13 +313,17 @@ class BranchCurve(Curve):
         tangent = self.turned(point.u, point.tangent)
         return None if tangent is None else self.point(point.u, tangent, tangent, point.arclength)
 
-    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+    def codimension_two(self, name: str, u: Array, touch: float | None) -> Mapping[str, float]:
         """Further functions whose zeros on a curve of events are of codimension two."""
         return {}
 
-    def ends_curve(self, name: str) -> bool:
-        """Whether a curve of events ends at a point of codimension two."""
-        return False
+    def ends_curve(self, event: str, name: str) -> bool:
+        """Whether the curve of an event ends at a zero of another test."""
+        return self.ends(name)
+
+    def faults(self, u: Array) -> list[str]:
+        """Violated guards at a point of the curve."""
+        return []
 
     def test_row(self, test: str, u: Array) -> tuple[float, Array] | None:
         """A test and its derivatives by the unknowns, where known in closed form; else None."""
@@ -324,6 +332,10 @@ class BranchCurve(Curve):
     def named(self, test: str, u: Array) -> str:
         """The bifurcation at a zero of a test."""
         return test
+
+    def occurs(self, test: str, u: Array) -> bool:
+        """Whether the bifurcation occurs at a zero of its test, which may vanish elsewhere too."""
+        return True
 
     def double_zero(self, u: Array) -> bool:
         """Whether two eigenvalues vanish together at a point."""

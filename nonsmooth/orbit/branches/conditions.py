@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...flow.fixed import first_terms
-from ...model import Array, Evaluator, FilippovSystem, Guard
+from ...model import Array, Evaluator, FilippovSystem, Guard, evaluator
 from ...model.derivatives.event_maps import keeps_zero
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
@@ -44,11 +44,14 @@ class Condition:
     leg : int
     guard : Guard or None
         Of the leg's mode.
+    t : float or None
+        Which extremum of the guard is meant, by the time since the start of the leg; the nearest to zero.
     """
 
     what: str
     leg: int
     guard: Guard | None = None
+    t: float | None = field(default=None, compare=False)
 
     @cached_property
     def name(self) -> str:
@@ -100,8 +103,7 @@ def condition_row(
             rows = _starting(problem.system, i, leg, before)
             found = {test.name: float(first[k, order]) for k, order, test in rows}
             return found.get(condition.name, np.nan)
-        values = minima(problem.system, problem.legs[i], condition, x, duration, q)
-        return min(values, key=abs, default=np.nan)  # the one that touches, not the least
+        return touching(problem.system, problem.legs[i], condition, x, duration, q)[1]
 
     row, x = np.zeros(count + len(free)), starts[i]
     sizes = 1e-6 * np.maximum(np.abs(starts).max(axis=0), 1e-3)
@@ -234,7 +236,9 @@ def _ending(
 def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
     """(y, p) -> field and guards of a mode; built once."""
     motion = guarded_field(system, mode).motion
-    return system.cached(("guard values", mode), lambda: Evaluator(motion.value_function()))
+    return evaluator(
+        system, ("values", mode), lambda: [motion.field, motion.functions], motion.states
+    )
 
 
 def _interior(
@@ -259,19 +263,25 @@ def _signed(guard: Guard, value: float) -> float:
 
 
 def minima(
-    system: FilippovSystem, leg: Leg, condition: Condition, x: Array, duration: float, p: Array
-) -> list[float]:
-    """Values of the guard of an interior condition at all its minima inside a leg."""
-    if duration <= 0.0:
-        return []
-    seen = watch(system, leg.mode, x, duration, p).approaches
-    return [_signed(near.guard, near.value) for near in seen if near.guard == condition.guard]
+    system: FilippovSystem, leg: Leg, guard: Guard, x: Array, duration: float, p: Array
+) -> list[tuple[float, float]]:
+    """Times since its start and values at which a leg is extremal to a guard, the nearest approach first."""
+    seen = watch(system, leg.mode, x, duration, p).approaches if duration > 0.0 else []
+    own = [(near.t, _signed(guard, near.value)) for near in seen if near.guard == guard]
+    return sorted(own, key=lambda pair: abs(pair[1]))
 
 
 def touching(
-    system: FilippovSystem, leg: Leg, guard: Guard, x: Array, duration: float, p: Array
-) -> float:
-    """Time since its start at which a leg comes nearest to a guard."""
-    seen = watch(system, leg.mode, x, duration, p).approaches
-    own = [near for near in seen if near.guard == guard]
-    return min(own, key=lambda near: abs(near.value)).t if own else 0.5 * duration
+    system: FilippovSystem,
+    leg: Leg,
+    condition: Condition,
+    x: Array,
+    duration: float,
+    p: Array,
+) -> tuple[float, float]:
+    """Time and value of the extremum of a guard that an interior condition means."""
+    assert condition.guard is not None
+    found, near = minima(system, leg, condition.guard, x, duration, p), condition.t
+    if near is not None:
+        return min(found, key=lambda pair: abs(pair[0] - near), default=(near, np.nan))
+    return found[0] if found else (0.5 * duration, np.nan)

@@ -19,12 +19,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from ...flow.fixed import first_terms
-from ...model import Array, Guard
+from ...model import Array, Guard, NonsmoothError
 from ...model.derivatives.variational import guarded_field
+from ...solvers.continuation import Departure
 from ..periodic.boundary_value_problem import (
     TURNED,
     BoundaryProblem,
@@ -181,8 +183,9 @@ def _grazed(
         )
     if guard.kind == "release":
         return "release"
-    t = touching(problem.system, leg, guard, at.starts[test.leg], float(at.durations[test.leg]), p)
-    y = integrate_leg(problem.system, leg, at.starts[test.leg], t, p).end[: problem.dimension]
+    x, duration = at.starts[test.leg], float(at.durations[test.leg])
+    t = touching(problem.system, leg, test, x, duration, p)[0]
+    y = integrate_leg(problem.system, leg, x, t, p).end[: problem.dimension]
     other = (
         leg.mode[: guard.element] + ("-" if guard.side > 0 else "+") + leg.mode[guard.element + 1 :]
     )
@@ -259,7 +262,7 @@ def _longer(
         return None
     problem = before.problem
     leg, x, duration = editor.legs[i], editor.starts[i], editor.durations[i]
-    t = touching(problem.system, leg, at.guard, x, duration, p)
+    t = touching(problem.system, leg, at, x, duration, p)[0]
     y = integrate_leg(problem.system, leg, x, t, p).end[: problem.dimension]
     added = _added(problem, leg, at.guard, kind, y, p)
     if added is None:
@@ -564,3 +567,38 @@ def grown(problem: BoundaryProblem, u: Array, p: Array, fresh: Sequence[int], by
             flow = integrate_leg(problem.system, legs[k], starts[k], float(durations[k]), p)
             starts[k + 1] = flow.end[: problem.dimension]
     return problem.pack(starts, durations)
+
+
+# Leaving an event ---------------------------------------------------------------------------------
+
+#: Durations of new legs, or distances along the curve, with which it leaves an event, relative to the orbit.
+_STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
+
+
+def departures(curve: Any, u: Array, fresh: Sequence[int]) -> list[Departure]:
+    """Ways to leave an event into the side where the itinerary holds, new legs growing from zero."""
+    for size in _STARTS:
+        ways: list[tuple[Array, Array]] = []
+        try:
+            tangent = np.linalg.svd(curve.scaled(u / curve.scale)[1])[2][-1]
+        except (NonsmoothError, np.linalg.LinAlgError):  # no derivatives there
+            return []
+        if fresh:
+            problem, axis = curve.problem, np.zeros(u.size)
+            axis[[problem.size - len(problem.legs) + i for i in fresh]] = len(fresh) ** -0.5
+            by = size * float(curve.scale[problem.size - 1])
+            ways.append((curve.grown(u, fresh, by), axis))
+        ways += [(u + s * size * tangent * curve.scale, tangent) for s in (1.0, -1.0)]
+        result = list[Departure]()
+        for guess, axis in ways:
+            found = curve.correct(guess, axis)
+            if found is None or np.abs((found - u) / curve.scale).max() > 0.2:
+                continue
+            if not curve.faults(found):
+                step = (found - u) / curve.scale
+                result.append(Departure(curve, [u, found], step / np.linalg.norm(step)))
+                if fresh:
+                    break
+        if result:
+            return result
+    return []

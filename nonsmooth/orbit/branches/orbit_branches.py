@@ -5,13 +5,6 @@ ends at a zero of one of its tests (``conditions``). Of the two itineraries that
 fewer legs is regular, so the event is located in it, and the branch goes on in the other one
 (``itinerary_changes``).
 
-On curves of bifurcations in two parameters, points of codimension two are zeros of further tests. On a curve
-of grazing-sliding the touching is of higher order (L11 = 0), or at a two-fold (L2 = 0), or a multiplier with
-contact is 1 or -1, or the orbit touches a second time; on one of crossing- or switching-sliding L11 = 0 turns
-one into the other. On a curve of Neimark-Sacker points the angle is resonant; where the pair meets at 1 or -1
-the curve ends, as the numbers beyond are a neutral saddle's. There and on curves of period doublings the cubic
-coefficient of the normal form may vanish.
-
 Source: Kowalczyk, di Bernardo, Champneys et al. 2006 (Int. J. Bifurcation Chaos 16, 601); Kuznetsov 2004,
 ch. 9.
 """
@@ -24,14 +17,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...flow.fixed import first_terms
 from ...local import Equilibrium, PseudoEquilibrium
 from ...local.checks import parameter_index
 from ...local.read_only import ReadOnly
 from ...model import Array, ConvergenceError, DefinitionError, NonsmoothError, whole
 from ...model.checks import positive
-from ...model.derivatives.event_maps import surface_map
-from ...model.derivatives.variational import guarded_field, variational_field
+from ...model.derivatives.variational import variational_field
 from ...solvers.continuation import Departure, Point, Zero, other_direction
 from ...solvers.newton import converge
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, eliminated
@@ -48,12 +39,13 @@ from .branch import (
     check_bounds,
     follow_branch,
 )
-from .conditions import Condition, condition_row, conditions_of, is_smooth, minima
+from .conditions import Condition, condition_row, conditions_of, is_smooth
+from .event_curves import OWN_ENDS, degenerate_tests
 from .family_ends import extent, hopf_point, surface_end
 from .homoclinic_curves import homoclinic_end
-from .itinerary_changes import ChangedItinerary, changed_itinerary, grown, kind_of
+from .itinerary_changes import ChangedItinerary, changed_itinerary, departures, grown, kind_of
 from .normal_forms import normal_form, torus_pair
-from .unfoldings import contact_at, contact_numbers, far_side, touched
+from .unfoldings import far_side
 
 # Equations of periodic orbits with free parameters ----------------------------------------------------
 
@@ -126,9 +118,6 @@ class OrbitEquations(BranchCurve):
         return eliminated(self.problem, matrix, np.zeros(len(matrix))).determinant()
 
 
-#: Durations of new legs, or distances along the branch, with which it leaves an event, relative to the orbit.
-_STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
-
 #: Relative growth of a long period, over a change of the parameter by its bounds, at which it diverges.
 _STEEP = 30.0
 
@@ -141,6 +130,9 @@ _COLLAPSED = 1e-6
 
 #: Share of the way to an event at which the orbit before it is checked.
 _JUST = 0.99
+
+#: Share of an orbit without events by which it may begin later, where a guard is touched at its start.
+_LATER = 0.381966
 
 #: Order of the conditions that name an event at which several vanish.
 _PRIORITY = ("duration", "start", "end", "interior", "transversality")
@@ -304,18 +296,25 @@ class OrbitCurve(OrbitEquations):
         p, unknowns = self.parameters_at(u), u[: self.problem.size]
         return condition_row(self.problem, unknowns, p, self.free, self.known[test])
 
-    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+    def codimension_two(self, name: str, u: Array, touch: float | None) -> Mapping[str, float]:
         at, p = self.evaluation(u), self.parameters_at(u)
-        return _degenerate(self.problem, self.known.get(name), name, at, p)
+        return degenerate_tests(self.problem, self.known.get(name), name, at, p, touch)
 
-    def ends_curve(self, name: str) -> bool:
-        return name in _ENDS
+    def ends_curve(self, event: str, name: str) -> bool:
+        return name in OWN_ENDS or (name in self.known and not is_smooth(name))
 
     def named(self, test: str, u: Array) -> str:
         if is_smooth(test) or test not in self.known:
             return test
         condition = self.known[test]
         return kind_of(self.problem, condition, self.evaluation(u), self.parameters_at(u))
+
+    def occurs(self, test: str, u: Array) -> bool:
+        """Not a Neimark-Sacker point at a neutral saddle, where two real multipliers have the product 1."""
+        if test != "Neimark-Sacker":
+            return True
+        values = np.linalg.eigvals(return_map(self.problem, self.evaluation(u)))
+        return bool(abs(values[torus_pair(values)[0]].imag) >= _REAL)
 
     def event(self, zero: Zero) -> BranchEvent | None:
         u = zero.point.u
@@ -325,6 +324,10 @@ class OrbitCurve(OrbitEquations):
         if shrunk is not None:
             return shrunk
         conditions = self._vanishing(zero)
+        if conditions[0].what == "start":
+            later = self._at_another_phase(u, conditions[0])
+            if later is not None:
+                return later
         at, p = self.evaluation(u), self.parameters_at(u)
         kind = kind_of(self.problem, conditions[0], at, p)
         beyond = self._edited(kind, conditions, u, p)
@@ -344,6 +347,24 @@ class OrbitCurve(OrbitEquations):
         back = curve._edited(kind, [test], point.u, p) if kind == "corner" else None
         side = far_side(curve.problem, kind, test, at, p, itinerary, back)
         return self._event(kind, curve, point, beyond.test, side)
+
+    def begun_later(self, u: Array) -> tuple[BranchCurve, Array]:
+        if self.problem.phase is None or not self.system.time_dependent:
+            return self, u
+        k, p = self.problem.size, self.parameters_at(u)
+        (x,), (duration,) = self.problem.split(u[:k])
+        n, leg = self.problem.dimension, self.problem.legs[0]
+        begin = integrate_leg(self.system, leg, x, _LATER * float(duration), p).end[None, :n]
+        unknowns = self.problem.pack(begin, np.array([duration]))
+        curve = self.with_problem(replace(self.problem, reference=begin[0]), unknowns, p)
+        return curve, np.append(unknowns, u[k:])
+
+    def _at_another_phase(self, u: Array, at: Condition) -> BranchEvent | None:
+        """The touch of an orbit without events where it begins, located from another start."""
+        (curve, guess), name = self.begun_later(u), replace(at, what="interior").name
+        assert isinstance(curve, OrbitCurve)
+        point = None if curve is self else curve.located(guess, name)
+        return None if point is None else curve.event(Zero(name, point, 0.0, (name,)))
 
     def _vanishing(self, zero: Zero) -> list[Condition]:
         """Conditions that vanish together at a zero, of the kind that names the event."""
@@ -433,6 +454,8 @@ class OrbitCurve(OrbitEquations):
         if is_smooth(zero.name) or event.point is None or not isinstance(event.curve, OrbitCurve):
             return None
         curve, u = event.curve, event.point.u
+        if curve is not self and curve.problem.legs == self.problem.legs:  # from another start
+            return curve.onward(event, Zero(event.test, event.point, 0.0, (event.test,)))
         if curve is not self:  # located on the side with fewer legs, which is ahead
             return curve.leave(u, ())
         p = self.parameters_at(u)
@@ -444,28 +467,12 @@ class OrbitCurve(OrbitEquations):
 
     def leave(self, u: Array, fresh: Sequence[int]) -> Departure | None:
         """Leave an event into the side where the itinerary holds, new legs growing from zero."""
-        k = len(u) - len(self.free)
-        for size in _STARTS:
-            ways: list[tuple[Array, Array]] = []
-            try:
-                tangent = np.linalg.svd(self.scaled(u / self.scale)[1])[2][-1]
-            except (NonsmoothError, np.linalg.LinAlgError):  # no derivatives there
-                return None
-            if fresh:
-                axis = np.zeros(u.size)
-                axis[[k - len(self.problem.legs) + i for i in fresh]] = len(fresh) ** -0.5
-                by = size * float(self.scale[k - 1])
-                guess = grown(self.problem, u[:k], self.parameters_at(u), fresh, by)
-                ways.append((np.append(guess, u[k:]), axis))
-            ways += [(u + s * size * tangent * self.scale, tangent) for s in (1.0, -1.0)]
-            for guess, axis in ways:
-                found = self.correct(guess, axis)
-                if found is None or np.abs((found - u) / self.scale).max() > 0.2:
-                    continue
-                if not self.faults(found):
-                    step = (found - u) / self.scale
-                    return Departure(self, [u, found], step / np.linalg.norm(step))
-        return None
+        return next(iter(departures(self, u, fresh)), None)
+
+    def grown(self, u: Array, fresh: Sequence[int], by: float) -> Array:
+        """Unknowns near an orbit whose legs ``fresh`` last for ``by``."""
+        k = self.problem.size
+        return np.append(grown(self.problem, u[:k], self.parameters_at(u), fresh, by), u[k:])
 
 
 # Smooth bifurcations ------------------------------------------------------------------------------
@@ -477,6 +484,9 @@ _VERDICTS = {
     "pitchfork": "two orbits without the symmetry branch off",
     "Neimark-Sacker": "an invariant torus is born",
 }
+
+#: Imaginary part below which a multiplier is real.
+_REAL = 1e-9
 
 #: Distance of an angle from a strong resonance within which the normal form does not hold.
 _RESONANT = 1e-4
@@ -492,7 +502,7 @@ def _smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) 
     if kind == "Neimark-Sacker":
         critical = torus_pair(values)
         one = values[critical[0]]
-        if abs(one.imag) < 1e-9:
+        if abs(one.imag) < _REAL:
             return None  # a neutral saddle: two real multipliers with the product 1
         numbers["angle"] = angle = float(abs(np.angle(one)))
         if min(abs(3.0 * angle - 2.0 * np.pi), abs(4.0 * angle - 2.0 * np.pi)) < _RESONANT:
@@ -554,97 +564,6 @@ def _part(
         return None
     side = _smooth_side(problem, at, made.parameters_at(u), kind)
     return None if side is None else (kind, made, point, kind, side)
-
-
-# Points of codimension two ------------------------------------------------------------------------
-
-#: Cosines of the angles of resonances.
-_RESONANCES = {"1:1": 1.0, "1:2": -1.0, "1:3": -0.5, "1:4": 0.0}
-
-#: Points at which a curve ends.
-_ENDS = ("1:1 resonance", "1:2 resonance", "Hopf")
-
-
-def _degenerate(
-    problem: BoundaryProblem, condition: Condition | None, name: str, at: Evaluation, p: Array
-) -> dict[str, float]:
-    """Functions that vanish at points of codimension two on the curve of one event."""
-    if name == "Neimark-Sacker":
-        return _resonances(problem, at) | _cubic(problem, at, p, name)
-    if name in ("period doubling", "pitchfork"):
-        return _cubic(problem, at, p, name)
-    if condition is None or condition.guard is None:
-        return {}
-    if condition.what == "interior":
-        return _touches(problem, condition, at, p)
-    return _beginnings(problem, condition, at, p) if condition.what == "start" else {}
-
-
-def _cubic(problem: BoundaryProblem, at: Evaluation, p: Array, name: str) -> dict[str, float]:
-    """The coefficient of the normal form, at whose zeros a curve of folds begins."""
-    kind = "Chenciner" if name == "Neimark-Sacker" else f"degenerate {name}"
-    try:
-        found = normal_form(problem, at, p, name)
-    except np.linalg.LinAlgError:  # another multiplier is 1
-        return {}
-    return {kind: next(iter(found.values()))} if found else {}
-
-
-def _resonances(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
-    values = np.linalg.eigvals(return_map(problem, at))
-    pair = torus_pair(values)
-    cosine = float((values[pair[0]] + values[pair[1]]).real) / 2.0
-    found = {f"{ratio} resonance": cosine - value for ratio, value in _RESONANCES.items()}
-    others = np.delete(values, pair)  # the pair itself passes 1 and -1 at the ends of the curve
-    found["fold"] = float(np.prod(1.0 - others[np.abs(others) > 1e-9]).real)
-    found["period doubling"] = float(np.prod(1.0 + others[np.abs(others) > 1e-9]).real)
-    return found
-
-
-def _touches(
-    problem: BoundaryProblem, condition: Condition, at: Evaluation, p: Array
-) -> dict[str, float]:
-    i, guard = condition.leg, condition.guard
-    assert guard is not None
-    leg, x, duration = problem.legs[i], at.starts[i], float(at.durations[i])
-    found: dict[str, float] = {}
-    values = sorted(minima(problem.system, leg, condition, x, duration, p), key=abs)
-    if len(values) > 1:
-        found["a second touch"] = min(values[1:])
-    if guard.kind != "surface":
-        return found
-    y = touched(problem, condition, at, p)
-    try:
-        _, other, second = contact_at(problem, leg, guard.element, guard.side, y, p)
-    except NonsmoothError:
-        return found  # the leg slides elsewhere
-    normal = guard.side * surface_map(problem.system, guard.element)(y, p).gradient
-    found["two-fold"] = float(normal[: other.size] @ other)
-    found["touch of higher order"] = guard.side * float(second["L11"])
-    with np.errstate(all="ignore"):  # at the two-fold itself the map has a pole
-        try:
-            numbers = contact_numbers(problem, condition, at, p)
-        except (NonsmoothError, np.linalg.LinAlgError):  # a second event is grazed
-            return found
-    found["fold with contact"] = numbers["det(I - A_i)"]
-    found["period doubling with contact"] = numbers["det(I + A_i)"]
-    return {key: value for key, value in found.items() if np.isfinite(value)}
-
-
-def _beginnings(
-    problem: BoundaryProblem, condition: Condition, at: Evaluation, p: Array
-) -> dict[str, float]:
-    i, guard, system = condition.leg, condition.guard, problem.system
-    field = guarded_field(system, problem.legs[i].mode)
-    k = field.motion.guards.index(guard)
-    y = variational_field(system, problem.legs[i].mode).states_at(at.starts[i], p)
-    order = 2 if problem.legs[i - 1].kind == "crossing" else 1
-    before = at.events[i - 1]
-    rate = at.by_leg[i - 1].rate[: before.gradient.size]
-    return {
-        "cusp with the other sliding bifurcation": float(first_terms(field, y, p)[1][k, order]),
-        "two-fold": float(before.gradient @ rate),
-    }
 
 
 # Branch switching ---------------------------------------------------------------------------------

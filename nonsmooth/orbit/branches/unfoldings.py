@@ -182,7 +182,7 @@ def touched(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     i, guard = test.leg, test.guard
     assert guard is not None
     x, duration = at.starts[i], float(at.durations[i])
-    t = touching(problem.system, problem.legs[i], guard, x, duration, p)
+    t = touching(problem.system, problem.legs[i], test, x, duration, p)[0]
     return integrate_leg(problem.system, problem.legs[i], x, t, p).end[: problem.dimension]
 
 
@@ -210,7 +210,7 @@ def _around(
     system, n, i, guard = problem.system, problem.dimension, test.leg, test.guard
     assert guard is not None
     leg, x, duration = problem.legs[i], at.starts[i], float(at.durations[i])
-    t = touching(system, leg, guard, x, duration, p)
+    t = touching(system, leg, test, x, duration, p)[0]
     first = integrate_leg(system, leg, x, t, p)
     across = np.eye(n) - np.outer(own, section) / float(section @ own)
     maps = leg_maps(problem, at)

@@ -34,6 +34,7 @@ from ...model.derivatives.variational import plain_field
 from ..runs.guards import march
 from ..runs.itinerary import Itinerary, lone_leg, word_legs
 from ..runs.legs import Leg, Stretch, integrate_leg, leg_name, stretches
+from ..runs.limit_leg import merged
 from .boundary_value_problem import BoundaryProblem
 from .orbit import PeriodicOrbit, named
 
@@ -123,7 +124,7 @@ def recurrence(
     about: float | None = None,
 ) -> _Recurrence | None:
     """The legs of a run that nearly close; None if there are none."""
-    parts = [part for part in stretches(run, begins=False) if part.duration > 0.0]
+    parts = [part for part in merged(stretches(run, begins=False)) if part.duration > 0.0]
     if len(parts) > 1 and parts[-1].leg.timed:
         if parts[-1].duration > _QUIET * sum(part.duration for part in parts):
             found = _without_events(run, parts[-1:], symmetry, period, first, about)

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...flow.fixed import flow_for
-from ...flow.names import described, shown_mode
+from ...flow.names import described
 from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
 from ...model import Array, FilippovSystem, ParameterError, Surfaces
 from ...model.derivatives.variational import variational_field
 from ...notebook import card, circle
 from ..runs.guards import faults_along, watch
-from ..runs.legs import integrate_leg
+from ..runs.legs import Leg, integrate_leg, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation, mirrored
 from .multipliers import Multipliers, monodromy
 from .orbit_run import OrbitLeg, orbit_leg, orbit_run
@@ -150,10 +150,12 @@ class PeriodicOrbit:
     def itinerary(self) -> str:
         """Modes of the whole orbit in order, separated by blanks."""
         n, count = self.system.dimension, len(self.system.definition.discrete)
-        shown = [
-            shown_mode(self.system, leg.mode, leg.start[n - count :].tolist()) for leg in self.legs
+        values = [tuple(leg.start[n - count :].tolist()) for leg in self.legs]
+        legs = [
+            Leg(leg.mode, leg.kind, discrete=own)
+            for leg, own in zip(self.legs, values, strict=True)
         ]
-        return " ".join(mode or "o" for mode in shown)
+        return shown_itinerary(self.system, legs)
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -315,7 +317,7 @@ def faults_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
 def _fault_of_run(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
     """Whether the motion, with all conditions of events, has the events of the legs."""
     system, legs = problem.system, problem.legs
-    if problem.symmetry is not None or any(leg.timed for leg in legs):
+    if problem.symmetry is not None or any(leg.timed or leg.repeats for leg in legs):
         return []
     half, n = 0.5 * float(at.durations[0]), system.dimension
     start = integrate_leg(system, legs[0], at.starts[0], half, p).end
@@ -346,7 +348,7 @@ def _margins(orbit: PeriodicOrbit) -> list[Margin]:
             name = leg.name(problem.system)
             angle = float(at.events[i].gradient @ at.by_leg[i].rate) / length
             result.append(Margin(i, f"meets {name} at the angle", angle, angle, ends))
-        if duration <= 0.0:
+        if duration <= 0.0 or leg.repeats:
             continue
         for near in watch(problem.system, leg.mode, at.starts[i], duration, p).approaches:
             what = f"keeps {described(problem.system, near.guard)} at its nearest by"

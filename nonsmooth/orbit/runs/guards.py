@@ -104,12 +104,16 @@ class LegGuards:
     def __init__(self, system: FilippovSystem, legs: Sequence[Leg]):
         self.fields = [guarded_field(system, leg.mode) for leg in legs]
         self._plain = [variational_field(system, leg.mode) for leg in legs]
+        self._limits = [i for i, leg in enumerate(legs) if leg.repeats]
         self._watch = LegsWatch(self.fields)
 
     def __call__(
         self, starts: Array, p: Array, durations: Array
     ) -> tuple[list[Array], list[Array], list[Array]]:
-        """As of LegsWatch; legs of no positive duration have no inside."""
+        """As of LegsWatch; legs of no positive duration have no inside, nor have those of infinitely many events."""
+        if self._limits:
+            durations = durations.copy()
+            durations[self._limits] = 0.0
         states = [field.states_at(x, p) for field, x in zip(self._plain, starts, strict=True)]
         return self._watch(states, p, durations, _ENDS)
 
@@ -148,7 +152,8 @@ def _violations(
                 name = guard_name(system, guard)
                 return [f"{guard.kind} {name!r} reaches zero {t:.6g} after its start"]
         return []
-    low = [(t, v) for t, v, scale in ordered if v < -_NEGATIVE * scale]
+    largest = max((abs(v) for _, v, _ in ordered), default=0.0)  # where the gradient vanishes
+    low = [(t, v) for t, v, scale in ordered if v < -_NEGATIVE * max(scale, largest)]
     if not low:
         return []
     t, v = min(low, key=lambda entry: entry[1])
@@ -179,8 +184,9 @@ def _change_fault(
     system: FilippovSystem, leg: Leg, speed: float, field: GuardedField, begin: Array, p: Array
 ) -> str:
     """The same from the rate of the event's function, and from the first coefficients of the next leg."""
-    own = leg.map(system)
-    assert own is not None
+    own = None if leg.repeats else leg.map(system)
+    if own is None:
+        return _following_fault(field, begin, p)
     guard = own.guard
     if guard.kind in ("surface", "exit", "impact", "release") and speed > 0.0:
         condition, name = described(system, guard), leg.name(system)
@@ -237,7 +243,8 @@ def faults_along(
                 f"leg {i + 1} {leg_name(system, leg)} has the duration {durations[i]:.6g}"
             )
             continue
-        found, following = _violations_along(fields[i], rows[i], p), (i + 1) % count
+        found = [] if leg.repeats else _violations_along(fields[i], rows[i], p)
+        following = (i + 1) % count
         if not leg.timed and (closes or following):
             field, begin = fields[following], begins[following]
             fault = _change_fault(system, leg, float(speeds[i]), field, begin, p)

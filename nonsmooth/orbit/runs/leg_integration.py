@@ -19,6 +19,7 @@ from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent
 from ...model.derivatives.variational import plain_field
 from .legs import Leg, LegFlow, integrate_leg, leg_name
+from .limit_leg import limit_flow
 from .saltation import Ended
 
 #: Local errors of the steps in extended precision.
@@ -90,7 +91,9 @@ class LegIntegrator:
         self.system, self.legs, self.chosen = system, tuple(legs), chosen
         distinct = {leg: leg.field(system, chosen) for leg in set(self.legs)}
         self.fields = [distinct[leg] for leg in self.legs]
-        self.sizes = tuple(field.entries for field in self.fields)
+        self._limits = any(leg.repeats for leg in self.legs)
+        both = zip(self.fields, self.legs, strict=True)
+        self.sizes = tuple(field.entries + bool(leg.repeats) for field, leg in both)
         self._most = max(self.sizes)
         # events at one instant follow from each other: composed in Python
         self._composed = [i for i, leg in enumerate(self.legs) if leg.further and not leg.timed]
@@ -105,7 +108,7 @@ class LegIntegrator:
     @cached_property
     def _plain_program(self) -> LegsProgram | None:
         """Legs without derivatives, where each is a flow of the states to one event."""
-        if self._plain or self._composed:
+        if self._plain or self._composed or self._limits:
             return None
         maps = {leg: leg.map(self.system) for leg in set(self.legs)}
         if any(field.entries > field.by_start for field in self.fields):
@@ -140,7 +143,7 @@ class LegIntegrator:
         self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE
     ) -> LegFlows:
         """Integrate all legs."""
-        if len(set(self.sizes)) > 1:
+        if len(set(self.sizes)) > 1 or self._limits:
             return self._one_by_one(starts, durations, p)
         n, most = starts.shape[1], self._most
         columns = 1 + n + len(self.chosen)
@@ -216,12 +219,16 @@ class LegIntegrator:
             np.zeros((count, most, q)),
             *self._events(np.zeros((count, 0)), n, p.size),
         )
+        for i, field in enumerate(self.fields):
+            at = field.states_at(starts[i], p)
+            flows.before[i, : field.entries] = field.rate.copied(at, p)[0][:, 0]
         for i, leg in enumerate(self.legs):
-            k, field = self.sizes[i], self.fields[i]
+            k, own = self.sizes[i], (self.system, leg, starts[i], float(durations[i]), p)
             try:
-                part = integrate_leg(
-                    self.system, leg, starts[i], float(durations[i]), p, self.chosen
-                )
+                if leg.repeats:
+                    part = limit_flow(*own, self.chosen, flows.before[(i + 1) % count, :n])
+                else:
+                    part = integrate_leg(*own, self.chosen)
             except ConvergenceError as error:
                 message = f"{self._named(i)}: {error}"
                 raise ConvergenceError(message, point=error.point) from None
@@ -229,8 +236,6 @@ class LegIntegrator:
                 raise DegenerateError(f"{self._named(i)}: {error}") from None
             flows.end[i, :k], flows.rate[i, :k] = part.end, part.rate
             flows.by_start[i, :k], flows.by_parameters[i, :k] = part.by_start, part.by_parameters
-            at = field.states_at(starts[i], p)
-            flows.before[i, :k] = field.rate.copied(at, p)[0][:, 0]
             if not leg.timed:
                 self._fill(flows, i, leg.at_end(self.system, part.end, p))
         return self._completed(flows, p)

@@ -62,7 +62,8 @@ class Leg:
     """One mode and the event that ends it."""
 
     mode: str
-    #: Of the event: crossing, entry, exit, reset, impact, release, stop; end where a time ends it.
+    #: Of the event: crossing, entry, exit, reset, impact, release, stop; limit where infinitely many accumulate; end where
+    #: a time ends it.
     kind: str = "end"
     #: element, side: As of Event.
     element: int = -1
@@ -79,6 +80,8 @@ class Leg:
     at_start: bool = False
     #: Switching functions of the sets on which it begins, and which it leaves.
     left: tuple[int, ...] = ()
+    #: Of a leg of infinitely many events: those that repeat, behind the last of which it begins.
+    repeats: tuple[Leg, ...] = ()
 
     @property
     def timed(self) -> bool:
@@ -87,8 +90,8 @@ class Leg:
 
     def name(self, system: FilippovSystem) -> str:
         """Of its event; empty where a time ends it."""
-        if self.timed:
-            return ""
+        if self.timed or self.kind == "limit":
+            return "limit" * (not self.timed)
         return event_name(system, self.mode, self.kind, self.element, self.side)
 
     def field(self, system: FilippovSystem, chosen: tuple[int, ...] = ()) -> VariationalField:
@@ -131,6 +134,8 @@ class Leg:
 
     def at_end(self, system: FilippovSystem, y: Array, p: Array) -> AtEvent:
         """Event function and state after the event, with derivatives; further resets included."""
+        if self.repeats:
+            return _at_limit(y, p)
         own = self.map(system)
         assert own is not None
         at = own(y, p)
@@ -173,9 +178,18 @@ class Leg:
         )
 
 
+def _at_limit(y: Array, p: Array) -> AtEvent:
+    """The end of a leg of infinitely many events: where no time is left to their limit, the last of its states."""
+    unit, none = np.eye(len(y)), np.zeros((len(y), len(p)))
+    return AtEvent(y[:-1].copy(), unit[:-1], none[:-1], float(y[-1]), unit[-1], none[-1])
+
+
 def shown_itinerary(system: FilippovSystem, legs: Sequence[Leg]) -> str:
-    """Modes of legs with the values of the discrete states, separated by blanks."""
-    return " ".join(shown_mode(system, leg.mode, leg.discrete) or "o" for leg in legs)
+    """Modes of legs with the values of the discrete states, separated by blanks; of infinitely many events with dots."""
+    shown = [shown_mode(system, leg.mode, leg.discrete) or "o" for leg in legs]
+    return " ".join(
+        mode + "..." * (leg.kind == "limit") for mode, leg in zip(shown, legs, strict=True)
+    )
 
 
 def leg_name(system: FilippovSystem, leg: Leg) -> str:
@@ -227,6 +241,10 @@ def integrate_leg(
     chosen: tuple[int, ...] = (),
 ) -> LegFlow:
     """The flow of a leg's mode from ``x`` (N,) over a duration of either sign, with derivatives."""
+    if leg.repeats:
+        from .limit_leg import limit_flow  # which needs this module
+
+        return limit_flow(system, leg, x, duration, p, chosen)
     field = leg.field(system, chosen)
     whole = field.matrix(flow_for(field, field.start(x, p), p, duration))
     n, end = field.by_start, whole[:, 0]

@@ -45,7 +45,7 @@ from .legs import (
     sets_left,
     stretches,
 )
-from .limits import AtLimit, limit_of, rest_at, tail_of
+from .limits import AtLimit, Nearest, limits_of, rest_at
 from .saltation import Ended, Saltation, saltation, saltations
 
 # Grazings within the error of a run ---------------------------------------------------------------
@@ -242,7 +242,7 @@ class Passage:
     #: Whether it was recorded so that rows can be pulled back, in place of derivatives.
     back: bool = False
     #: Derivatives of where it begins by the start of the run and by all parameters, if that is not free.
-    held: tuple[Array, Array] | None = None
+    held: Nearest | None = None
     #: The limit of events that ends it.
     limit: AtLimit | None = None
     #: Whether its event is one of those that accumulate.
@@ -319,16 +319,7 @@ def passages(
         counts, spans = np.diff(cuts), np.array([(part.t, part.duration) for part in parts])
         begun, durations = np.repeat(spans, counts, axis=0).T
         since = np.clip(times[: cuts[-1]] - begun, 0.0, durations)
-    flows = _flows(run, parts, chosen, since, cuts, back)
-    limits, repeating = _limits(run, parts, flows)
-    events = _saltations(run, parts, flows, repeating)
-    samples = [slice(i, j) for i, j in pairwise(cuts)]
-    found = [
-        Passage(part, flow, event, own, back, limit=limits.get(i), repeats=i in repeating)
-        for i, (part, flow, event, own) in enumerate(
-            zip(parts, flows, events, samples, strict=True)
-        )
-    ]
+    found = _passages(run, parts, chosen, since, cuts, back)
     if not system.sets:
         _require_certain(run, found)
     first = parts[0]
@@ -336,6 +327,64 @@ def passages(
     resting = list(dict.fromkeys(first.system.entry_of(i) for i in own))
     held = rest_at(first.system, first.leg, resting, first.start, first.p)
     return [replace(found[0], held=held), *found[1:]]
+
+
+def passages_to(
+    run: Trajectory, parts: Sequence[Stretch], i: int, first: int = 0, chosen: tuple[int, ...] = ()
+) -> list[Passage]:
+    """Legs and events of a run from leg ``first`` to the limit that ends leg i, and where the next one starts."""
+    own = list(parts[first : i + 2])
+    if i + 1 < len(parts):
+        then = own[-1]
+        own[-1] = replace(
+            then, leg=Leg(then.leg.mode), duration=0.0, end=then.start, after=then.start
+        )
+    return _passages(run, own, chosen, NONE, [0] * (len(own) + 1), False)
+
+
+def _passages(
+    run: Trajectory,
+    parts: Sequence[Stretch],
+    chosen: tuple[int, ...],
+    since: Array,
+    cuts: Sequence[int],
+    back: bool,
+) -> list[Passage]:
+    flows = _flows(run, parts, chosen, since, cuts, back)
+    limits, repeating = _limits(parts, flows)
+    events = _saltations(run, parts, flows, repeating)
+    every = zip(parts, flows, events, pairwise(cuts), strict=True)
+    return [
+        Passage(part, flow, event, slice(*own), back, limit=limits.get(i), repeats=i in repeating)
+        for i, (part, flow, event, own) in enumerate(every)
+    ]
+
+
+def carried(
+    parts: Sequence[Passage], dx: Array, dp: Array, chosen: tuple[int, ...]
+) -> Iterator[tuple[Passage, tuple[Array, Array], tuple[Array, Array] | None, tuple[Array, Array]]]:
+    """Legs with derivatives, by the start (N, m) and parameters (N, q), where they begin, of the times of their events, and
+    behind these."""
+    needed = {k for part in parts if part.limit for k in part.limit.limit.points}
+    seen, width = dict[int, tuple[Array, Array]](), dx.shape[1]
+    given = np.zeros((len(parts[0].stretch.p), width + len(chosen)))
+    given[list(chosen), width + np.arange(len(chosen))] = 1.0
+    for i, part in enumerate(parts):
+        begin, times = (dx, dp), None
+        dx, dp = part.forward(dx, dp)
+        if part.limit is not None:
+            found = part.limit.through([seen[k] for k in part.limit.limit.points], given)
+            times, (dx, dp) = ((k[..., :width], k[..., width:]) for k in found)
+        elif part.event is not None:
+            times = part.moments(dx, dp, chosen)
+            if part.stretch.leg.kind == "stop":
+                rate = part.flow.rate
+                dx, dp = (k + np.outer(rate, t) for k, t in zip((dx, dp), times, strict=True))
+            else:
+                dx, dp = part.through(dx, dp, *times, chosen)
+            if i in needed:
+                seen[i] = np.concatenate(times), np.hstack([dx, dp])
+        yield part, begin, times, (dx, dp)
 
 
 def _flows(
@@ -360,27 +409,21 @@ def _flows(
 
 
 def _limits(
-    run: Trajectory, parts: Sequence[Stretch], flows: Sequence[LegFlow]
+    parts: Sequence[Stretch], flows: Sequence[LegFlow]
 ) -> tuple[dict[int, AtLimit], set[int]]:
     """Limits of events by the legs that they end, and the legs whose events accumulate."""
     found, repeating = dict[int, AtLimit](), set[int]()
-    for i, part in enumerate(parts):
-        if part.leg.kind != "limit":
-            continue
-        first = 1 + max(found, default=-1)
-        tail, block = tail_of(parts[first:i])
-        tail = range(first + tail.start, first + tail.stop)
-        limit = limit_of(
-            parts, tail, block, f"limit of events at t = {part.t + part.duration:.10g}"
-        )
+    for i, (limit, tail) in limits_of(parts).items():
+        part = parts[i]
         rates = np.array([_rate_at_start(parts[k + 1], flows[k + 1]) for k in limit.points])
         rest = after = None
         if i + 1 < len(parts):
             then = parts[i + 1]
             letters = enumerate(zip(part.leg.mode, then.leg.mode, strict=True))
             resting = [k for k, (one, two) in letters if one != two and two in "sc"]
-            rest = rest_at(then.system, then.leg, resting, then.start, then.p)
-            after = _rate_at_start(then, flows[i + 1])
+            rest = rest_at(then.system, then.leg, resting, limit.value[1:], then.p)
+            x = limit.value[1:] if rest is None else rest.x
+            after = rate_at(then.system, then.leg, x, then.p)
         found[i] = AtLimit(limit, rates, rest, after)
         repeating.update(tail)
     return found, repeating
@@ -539,7 +582,7 @@ class Sensitivity:
     names : tuple of str
         Names of the parameters.
     run : Trajectory
-        The run that was differentiated.
+        The run that was differentiated; for one-sided derivatives its nearest neighbour.
     dsample_dx0, dsample_dp : ndarray (K, n, n), (K, n, q) or None
         Derivatives of ``run.sample_x``, at fixed times: None without samples, NaN where a sample is. A sample at the
         time of an event is on the side of ``sample_x``, after it where both agree.
@@ -629,39 +672,21 @@ def along(run: Trajectory, names: Sequence[str]) -> Sensitivity:
     parts = passages(run, chosen, at)
     dx, dp = np.eye(system.extended_dimension), np.zeros((system.extended_dimension, len(chosen)))
     if (held := parts[0].held) is not None:
-        dx, dp = held[0], held[1][:, list(chosen)]
+        dx, dp = held.by_state, held.by_parameters[:, list(chosen)]
     dx[:, discrete_places(system)] = 0.0
     times, by_start, by_parameters = list[float](), list[Array](), list[Array]()
     sampled = list[tuple[Array, Array]]()
-    end_x, end_p = np.zeros(system.extended_dimension), np.zeros(len(chosen))
-    needed = {k for part in parts if part.limit for k in part.limit.limit.points}
-    seen = dict[int, tuple[Array, Array]]()
-    given = np.zeros((len(parts[0].stretch.p), dx.shape[1] + len(chosen)))
-    given[list(chosen), dx.shape[1] + np.arange(len(chosen))] = 1.0
-    for i, part in enumerate(parts):
-        sampled.append(part.at_samples(dx, dp))
-        dx, dp = part.forward(dx, dp)
-        if part.limit is not None:
-            t_all, x_all = part.limit.through([seen[k] for k in part.limit.limit.points], given)
-            (t_x, t_p), (dx, dp) = (np.split(k, [dx.shape[1]], axis=-1) for k in (t_all, x_all))
+    end_x, end_p, last = np.zeros(len(dx)), np.zeros(len(chosen)), (dx, dp)
+    for part, begin, moved, end in carried(parts, dx, dp, chosen):
+        sampled.append(part.at_samples(*begin))
+        if moved is not None:
             times.append(part.stretch.t + part.stretch.duration)
-            by_start.append(t_x[:n])
-            by_parameters.append(t_p)
-            if part is parts[-1]:
-                end_x, end_p = t_x, t_p
-        if part.event is not None:
-            t_x, t_p = part.moments(dx, dp, chosen)
-            times.append(part.stretch.t + part.stretch.duration)
-            by_start.append(t_x[:n])
-            by_parameters.append(t_p)
-            if part.stretch.leg.kind == "stop":
-                end_x, end_p = t_x, t_p
-                rate = part.flow.rate
-                dx, dp = dx + np.outer(rate, t_x), dp + np.outer(rate, t_p)
-                continue
-            dx, dp = part.through(dx, dp, t_x, t_p, chosen)
-            if i in needed:
-                seen[i] = np.append(t_x, t_p), np.hstack([dx, dp])
+            by_start.append(moved[0][:n])
+            by_parameters.append(moved[1])
+            if part is parts[-1] and (part.limit or part.stretch.leg.kind == "stop"):
+                end_x, end_p = moved
+        last = end
+    dx, dp = last
     m, q = len(times), len(chosen)
     if not (np.isfinite(dx).all() and np.isfinite(dp).all()):
         first = next((k for k in parts if not np.isfinite(k.flow.by_start).all()), parts[-1])

@@ -190,7 +190,8 @@ class _Tracing:
 
     def _shorten(self, last: Point, fault: str, bend: float, failed: bool) -> None:
         """Halve a step that failed; end the arc where what ends it can be solved for."""
-        lost = failed and (self.curve.snaps or not self.curve.exact)
+        solved = type(self.curve).snap is not Curve.snap  # what ends it
+        lost = failed and solved and (self.curve.snaps or not self.curve.exact)
         self.closing = self.closing or bool(fault) or lost
         if self.closing:
             snapped = self.curve.snap(last.u, last.tangent, 2 * self.size)

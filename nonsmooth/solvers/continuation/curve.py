@@ -81,6 +81,7 @@ class Curve:
     parameter: int | None = None
     branching: bool = False
     snaps: bool = False
+    regular: bool = False  # Newton's method converges quadratically though tangents are chords
     #: The words of the error that made the last correction fail; else empty.
     refused: str = ""
 
@@ -251,7 +252,7 @@ class Curve:
 
         def attempt() -> Array | None:
             # exact derivatives converge quadratically: near a branch point rounding is magnified
-            noise = 1e-8 if self.exact else 1e-11
+            noise = 1e-8 if self.exact or self.regular else 1e-11
             return converge(
                 bordered,
                 start,
@@ -287,17 +288,16 @@ class Curve:
         arclength : float
             From the start of the arc, in scaled unknowns.
         """
-        if not self.exact:
-            plain = Point(u, chord, arclength)
-            return Point(u, chord, arclength, tests=read_tests(self.tests(plain)))
         try:
-            jacobian = self.equations(u)[1] * self.scale
-            tangent, sign = self.along(jacobian, before)
             tests: dict[str, float] = {}
-            if self.parameter is not None:
-                tests["fold"] = float(tangent[self.parameter])
-            if self.branching:
-                tests["branch point"] = sign
+            jacobian, tangent = np.zeros((0, 0)), chord
+            if self.exact:
+                jacobian = self.equations(u)[1] * self.scale
+                tangent, sign = self.along(jacobian, before)
+                if self.parameter is not None:
+                    tests["fold"] = float(tangent[self.parameter])
+                if self.branching:
+                    tests["branch point"] = sign
             own = self.tests(Point(u, tangent, arclength, jacobian))
         except (NonsmoothError, np.linalg.LinAlgError) as error:
             self.refused = str(error)

@@ -18,10 +18,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import FilippovSystem, NonsmoothError, OptionError, instruction_form
-from ..model.schema import CLASSES, Validator, savable
+from ...model import FilippovSystem, NonsmoothError, OptionError, instruction_form
+from ...model.schema import CLASSES, Validator, savable
+from ..status import Status
 from . import archive, files
-from .status import Status
 
 _FORMAT = 4
 

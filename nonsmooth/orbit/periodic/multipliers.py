@@ -170,6 +170,8 @@ class Multipliers:
 
     def _even(self, part: Array) -> bool:
         """Whether derivatives (S, N) do not grow too differently."""
+        if self.problem.system.sets:  # what they take is lost, however short the leg is
+            return True
         moved = part[: self._units.size] / self._units[:, None]
         sizes = np.linalg.svd(moved, compute_uv=False)
         count = self._count + 1  # discrete states do not move

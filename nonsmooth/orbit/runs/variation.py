@@ -616,7 +616,7 @@ class Sensitivity:
 
     @cached_property
     def _nearest(self) -> tuple[float, str]:
-        return (math.inf, "") if self.run.system.sets else _clearance(self.run)
+        return _clearance(self.run)
 
     def __repr__(self) -> str:
         near = f"; clearance {self.clearance:.3g} ({self.nearest})" if self.nearest else ""
@@ -634,7 +634,7 @@ def _clearance(run: Trajectory) -> tuple[float, str]:
             continue
         beside = cells.beside(part.shown.mode)
         try:
-            given = part.leg.mode, part.start, part.duration, part.p
+            given = part.leg, part.start, part.duration, part.p
             seen = watch(part.system, *given, beside).approaches
         except ConvergenceError:
             continue  # no Taylor series at an end

@@ -14,7 +14,7 @@ from functools import cached_property
 import casadi as ca
 
 from ..definition.system import FilippovSystem
-from ..expressions.dependent_rows import in_span
+from ..expressions.cancel import in_span
 from ..expressions.linearity import bent
 from ..expressions.simplification import simplified
 from ..laws.coupled import Coupled, coupled_of

@@ -266,7 +266,7 @@ def minima(
     system: FilippovSystem, leg: Leg, guard: Guard, x: Array, duration: float, p: Array
 ) -> list[tuple[float, float]]:
     """Times since its start and values at which a leg is extremal to a guard, the nearest approach first."""
-    seen = watch(system, leg.mode, x, duration, p).approaches if duration > 0.0 else []
+    seen = watch(system, leg, x, duration, p).approaches if duration > 0.0 else []
     own = [(near.t, _signed(guard, near.value)) for near in seen if near.guard == guard]
     return sorted(own, key=lambda pair: abs(pair[1]))
 

@@ -30,7 +30,7 @@ from ...model import Array, ConvergenceError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, EventMap, kept_maps
 from ...model.derivatives.forcing import Forcing
 from ..runs.leg_integration import LegFlows, LegIntegrator, leg_integrator
-from ..runs.legs import Leg, LegFlow, integrate_leg, surface_of
+from ..runs.legs import Leg, LegFlow, integrate_leg, rate_at, surface_of
 
 
 class JacobianIndices(NamedTuple):
@@ -124,16 +124,22 @@ class BoundaryProblem:
     phase: Array | None = None
     #: (N,) or None
     reference: Array | None = None
-    #: Surfaces on which every leg slides.
+    #: Surfaces on which every leg slides, and behind them contacts that are closed in every leg.
     kept: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        sliding = [
-            i
-            for i in range(self.system.surface_count)
-            if all(leg.mode[i] == "s" for leg in self.legs)
-        ]
-        object.__setattr__(self, "kept", tuple(sliding))
+        modes = [self.system.widened(leg.mode) for leg in self.legs]
+        kept = [i for i, own in enumerate(zip(*modes, strict=True)) if self._is_kept(i, set(own))]
+        object.__setattr__(self, "kept", tuple(kept))
+
+    def _is_kept(self, i: int, letters: set[str]) -> bool:
+        return letters == {"s" if i < self.system.surface_count else "c"}
+
+    @cached_property
+    def with_rates(self) -> list[int]:
+        """Joints and contacts that are kept: their rates are, too."""
+        contacts = [i for i in self.kept if i >= self.system.surface_count]
+        return [*self.system.joints, *contacts]
 
     @cached_property
     def held(self) -> list[EventMap]:
@@ -247,11 +253,9 @@ class BoundaryProblem:
         return Evaluation(residual, whole, flows, starts, durations, self._allowed(starts[0], p))
 
     def _allowed(self, start: Array, p: Array) -> Array | None:
-        if not self.system.joints:
+        if not self.with_rates:
             return None
-        rows = np.array(
-            [own(start, p).gradient for own in kept_maps(self.system, self.system.joints)]
-        )
+        rows = np.array([own(start, p).gradient for own in kept_maps(self.system, self.with_rates)])
         return np.asarray(np.eye(self.dimension) - np.linalg.pinv(rows) @ rows)
 
     def residual(self, u: Array, p: Array, extended: bool = False) -> Array | None:
@@ -322,8 +326,7 @@ class BoundaryProblem:
         if self.phase is None or self.system.time_dependent:
             return self
         start, leg = self.split(u)[0][0], self.legs[0]
-        field = leg.field(self.system)
-        rate = field.rate.copied(field.states_at(start, p), p)[0][: self.dimension, 0]
+        rate = rate_at(self.system, leg, start, p)
         speed = float(np.linalg.norm(rate))
         if not speed > 0.0:
             return self
@@ -396,15 +399,15 @@ def mirrored(problem: BoundaryProblem, leg: Leg) -> Leg:
 
 
 def _turning(problem: BoundaryProblem) -> list[bool]:
-    """Which switching functions the symmetry maps to their negatives."""
+    """Which surfaces have functions that the symmetry maps to their negatives."""
     system = problem.system
     x = np.cos(1.0 + np.arange(system.dimension))
     back = np.linalg.inv(problem.symmetry) if problem.symmetry is not None else np.eye(x.size)
     result = []
-    for k in range(system.surface_count):
-        h = system.surface_function(k)
+    for first, *more in system.entries:
+        h = system.surface_function(first)
         a, b = (float(system.evaluate(h, v, None)[0, 0]) for v in (x, back @ x))
-        result.append(a * b < 0.0)
+        result.append(not more and a * b < 0.0)  # a set has no sides
     return result
 
 

@@ -54,14 +54,15 @@ def periodic_orbit(
     Parameters
     ----------
     system : FilippovSystem
-        With scalar multipliers; it may slide, jump, hit, and depend periodically on time.
+        It may slide, jump, hit, rub in a plane or in space, and depend periodically on time.
     guess : Trajectory, state (n,) or PeriodicOrbit
         A run whose end is near the orbit; a state near it, from which the system is simulated; an
         orbit at other parameters, whose itinerary is kept.
     itinerary : str or sequence, optional
         Modes of the legs in order, e.g. ``"- s"``, or pairs of a mode and the name of the event that
         ends it; with a state as the guess. One mode alone means an orbit of a forced system without
-        events, over as many periods of the forcing (up to 16) as close best.
+        events, over as many periods of the forcing (up to 16) as close best. With vector multipliers
+        only that.
     period : expression in parameters or float, optional
         The period of the forcing, if the system depends on time. Found by itself where the time only
         enters sines and cosines of one frequency. The orbit may take several. Of a system without
@@ -93,7 +94,7 @@ def periodic_orbit(
     DegenerateError
         The orbit grazes, or passes a two-fold or a corner.
     DefinitionError
-        ``system`` is none, or has vector multipliers; a mode of the itinerary that it does not have.
+        ``system`` is none; a mode of the itinerary that it does not have.
     OptionError
         No period, though the system depends on time and none is found, or one that is no positive
         time; a symmetry that is none; with a run or an orbit as the guess an itinerary, a ``t_start``,
@@ -124,7 +125,7 @@ def periodic_orbit(
     >>> orbit.stability
     'asymptotically stable'
     """
-    require_system(system, complementarity=True, joints=True)
+    require_system(system, sets=True, complementarity=True, joints=True)
     max_iterations = whole(max_iterations, "max_iterations")
     if not isinstance(virtual, (bool, np.bool_)):
         raise OptionError(f"virtual: expected True or False, received {virtual!r}.")

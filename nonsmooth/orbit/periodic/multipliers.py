@@ -163,10 +163,15 @@ class Multipliers:
         """Derivatives (S, N) of the parts of each leg, by starts in units of the orbit, and fields at their ends."""
         flows = self.at.flows
         legs = enumerate(zip(flows.by_start * self._units, flows.rate, strict=True))
-        return [[(x, rate)] if self._even(x) else self._cut(i, x) for i, (x, rate) in legs]
+        whole = [bool(leg.repeats) for leg in self.problem.legs]
+        return [
+            [(x, rate)] if whole[i] or self._even(x) else self._cut(i, x) for i, (x, rate) in legs
+        ]
 
     def _even(self, part: Array) -> bool:
         """Whether derivatives (S, N) do not grow too differently."""
+        if self.problem.system.sets:  # what they take is lost, however short the leg is
+            return True
         moved = part[: self._units.size] / self._units[:, None]
         sizes = np.linalg.svd(moved, compute_uv=False)
         count = self._count + 1  # discrete states do not move

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,7 +54,8 @@ class Limit:
     by_times: Array
     #: (1 + N,): Derivative of ``value`` by the ratio.
     by_ratio: Array
-    #: Estimated error, relative to the change of the events.
+    #: Estimated errors, relative to the change of the events: of ``value``, and of derivatives.
+    change: float
     error: float
 
     def arrive(self, dt: Array, dx: Array) -> tuple[Array, Array]:
@@ -68,6 +70,14 @@ class Limit:
         return self.weights * time + self.by_times * ratio, np.outer(self.weights, row)
 
 
+class Nearest(NamedTuple):
+    """A nearest state (N,), with derivatives by a state (N, N) and by all parameters (N, np)."""
+
+    x: Array
+    by_state: Array
+    by_parameters: Array
+
+
 @dataclass(frozen=True, eq=False)
 class AtLimit:
     """What happens to derivatives at a limit of events."""
@@ -75,8 +85,8 @@ class AtLimit:
     limit: Limit
     #: (m + 1, N): Fields after its events.
     rates: Array
-    #: (N, N), (N, np): What rests from there: derivatives of the state by that at the limit, and by all parameters.
-    rest: tuple[Array, Array] | None
+    #: The state there, at which what rests is at rest.
+    rest: Nearest | None
     #: (N,): The field behind it, None where the run ends there.
     after: Array | None
 
@@ -88,13 +98,15 @@ class AtLimit:
         time, state = self.limit.arrive(dt, dx)
         if self.after is not None:
             state = state - np.outer(self.after, time)
-        return time, state if self.rest is None else self.rest[0] @ state + self.rest[1] @ given
+        if self.rest is not None:
+            state = self.rest.by_state @ state + self.rest.by_parameters @ given
+        return time, state
 
     def pull(self, row: Array, by_parameters: Array) -> dict[int, tuple[Array, float]]:
         """A row (N,) behind it as rows after its events, by their legs, with derivatives by their times."""
         if self.rest is not None:
-            by_parameters += row @ self.rest[1]
-            row = row @ self.rest[0]
+            by_parameters += row @ self.rest.by_parameters
+            row = row @ self.rest.by_state
         time = 0.0 if self.after is None else -float(row @ self.after)
         times, rows = self.limit.pull(time, row)
         times = times + (rows * self.rates).sum(axis=1)
@@ -152,7 +164,7 @@ def limit_of(parts: Sequence[Stretch], tail: range, block: int, what: str) -> Li
             f"{what}: events accumulate, and the last {len(tail)} of them do not give the derivatives of their limit. "
             "Simulate with a smaller tol, or end the run before."
         )
-    return best
+    return replace(best, value=min(found, key=lambda limit: limit.change).value)
 
 
 def _extrapolations(
@@ -168,7 +180,7 @@ def _extrapolations(
             break
         change = float(np.max(np.abs(limit.value - before) / scale))
         error = max(change, _EPSILON) + noise * float(np.abs(limit.weights).sum())
-        found.append(replace(limit, error=error))
+        found.append(replace(limit, change=change, error=error))
         before = limit.value
     return found
 
@@ -195,7 +207,7 @@ def _extrapolated(times: Array, states: Array, points: tuple[int, ...]) -> Limit
     q = np.column_stack([times, states])
     moved = q - q[-1]
     by_times = np.append(0.0, of_spans) - np.append(of_spans, 0.0)
-    return Limit(points, q[-1] + w.real @ moved, w.real, by_times, w.imag @ moved / _STEP, 0.0)
+    return Limit(points, q[-1] + w.real @ moved, w.real, by_times, w.imag @ moved / _STEP, 0.0, 0.0)
 
 
 def extrapolation_weights(sigma: complex, m: int) -> Array:
@@ -209,9 +221,8 @@ def extrapolation_weights(sigma: complex, m: int) -> Array:
 
 def rest_at(
     system: FilippovSystem, leg: Leg, elements: Sequence[int], x: Array, p: Array
-) -> tuple[Array, Array] | None:
-    """Derivatives, by a state (N,) and by parameters, of the nearest one of its time at which elements of a leg rest; None
-    without elements."""
+) -> Nearest | None:
+    """The nearest state of a time at which elements of a leg rest, with derivatives; None without elements."""
     if not len(elements):
         return None
     n = system.extended_dimension
@@ -219,4 +230,6 @@ def rest_at(
     at = [own(y, p) for own in rest_maps(system, leg.mode, elements)]
     rows, back = np.array([row.gradient[:n] for row in at]), np.zeros((n, len(at)))
     back[: system.dimension] = np.linalg.pinv(rows[:, : system.dimension])
-    return np.eye(n) - back @ rows, -back @ np.array([row.by_parameters for row in at])
+    by_parameters = -back @ np.array([row.by_parameters for row in at])
+    nearest = x - back @ [row.value for row in at]
+    return Nearest(nearest, np.eye(n) - back @ rows, by_parameters)

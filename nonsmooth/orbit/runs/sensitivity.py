@@ -398,8 +398,8 @@ def _pulled_through(
                 row = event.pull(row, every)
             row = part.backward(row, rows, own)
     if parts[0].held is not None:
-        every += row @ parts[0].held[1]
-        row = row @ parts[0].held[0]
+        every += row @ parts[0].held.by_parameters
+        row = row @ parts[0].held.by_state
     row = row.copy()
     row[discrete_places(system)] = 0.0
     by_parameters = every[some] if last.back else every[some] + own

@@ -45,7 +45,7 @@ from .legs import (
     sets_left,
     stretches,
 )
-from .limits import AtLimit, limits_of, rest_at
+from .limits import AtLimit, Nearest, limits_of, rest_at
 from .saltation import Ended, Saltation, saltation, saltations
 
 # Grazings within the error of a run ---------------------------------------------------------------
@@ -242,7 +242,7 @@ class Passage:
     #: Whether it was recorded so that rows can be pulled back, in place of derivatives.
     back: bool = False
     #: Derivatives of where it begins by the start of the run and by all parameters, if that is not free.
-    held: tuple[Array, Array] | None = None
+    held: Nearest | None = None
     #: The limit of events that ends it.
     limit: AtLimit | None = None
     #: Whether its event is one of those that accumulate.
@@ -421,8 +421,9 @@ def _limits(
             then = parts[i + 1]
             letters = enumerate(zip(part.leg.mode, then.leg.mode, strict=True))
             resting = [k for k, (one, two) in letters if one != two and two in "sc"]
-            rest = rest_at(then.system, then.leg, resting, then.start, then.p)
-            after = _rate_at_start(then, flows[i + 1])
+            rest = rest_at(then.system, then.leg, resting, limit.value[1:], then.p)
+            x = limit.value[1:] if rest is None else rest.x
+            after = rate_at(then.system, then.leg, x, then.p)
         found[i] = AtLimit(limit, rates, rest, after)
         repeating.update(tail)
     return found, repeating
@@ -615,7 +616,7 @@ class Sensitivity:
 
     @cached_property
     def _nearest(self) -> tuple[float, str]:
-        return (math.inf, "") if self.run.system.sets else _clearance(self.run)
+        return _clearance(self.run)
 
     def __repr__(self) -> str:
         near = f"; clearance {self.clearance:.3g} ({self.nearest})" if self.nearest else ""
@@ -633,7 +634,7 @@ def _clearance(run: Trajectory) -> tuple[float, str]:
             continue
         beside = cells.beside(part.shown.mode)
         try:
-            given = part.leg.mode, part.start, part.duration, part.p
+            given = part.leg, part.start, part.duration, part.p
             seen = watch(part.system, *given, beside).approaches
         except ConvergenceError:
             continue  # no Taylor series at an end
@@ -671,7 +672,7 @@ def along(run: Trajectory, names: Sequence[str]) -> Sensitivity:
     parts = passages(run, chosen, at)
     dx, dp = np.eye(system.extended_dimension), np.zeros((system.extended_dimension, len(chosen)))
     if (held := parts[0].held) is not None:
-        dx, dp = held[0], held[1][:, list(chosen)]
+        dx, dp = held.by_state, held.by_parameters[:, list(chosen)]
     dx[:, discrete_places(system)] = 0.0
     times, by_start, by_parameters = list[float](), list[Array](), list[Array]()
     sampled = list[tuple[Array, Array]]()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....model import Array, FilippovSystem
-from ...constants import HAND_OVER, SIMPLE_KINDS
+from ...constants import HAND_OVER, NEEDS_PROGRAM, SIMPLE_KINDS
 from ...options import Options
 from ...results import Chunk, Stopped
 from ..arrays import BURST, address, batch_of, options_of
@@ -117,7 +117,9 @@ def _continue(
     with engine.held_table() as table, engine.held_run(table) as run:
         library().lanes_tree(run)  # modes have the numbers that they have in codes
         call = (run, address(done), ctypes.byref(batch), ctypes.byref(c_options))
-        while library().run_left(*call, *rest):
+        while status := library().run_left(*call, *rest):
+            if status == NEEDS_PROGRAM:
+                engine.add_implicit()
             if stop():
                 raise Stopped
         used = np.flatnonzero(np.bincount(out.itinerary)).tolist()

@@ -24,7 +24,7 @@ from ...model import (
 )
 from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
-from ..runs.legs import leg_name, shown_itinerary
+from ..runs.legs import Leg, leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
 from .guess import Start, about_of, is_about, start_of
 from .orbit import PeriodicOrbit, faults_of, named
@@ -453,17 +453,27 @@ def require_duration(problem: BoundaryProblem, at: Evaluation, about: float | No
     )
 
 
+#: L of the other field at an exit, relative to its gradient and the state, at which the exit is at a two-fold.
+_TWO_FOLD = 1e-9
+
+
+def at_two_fold(
+    system: FilippovSystem, leg: Leg, end: Array, p: Array, part: float = _TWO_FOLD
+) -> bool:
+    """Whether a slide on one surface ends where L_F1 h and L_F2 h both vanish."""
+    if leg.kind != "exit" or system.coupled:
+        return False
+    other = replace(leg, side=-leg.side).at_end(system, end, p)
+    size = float(np.linalg.norm(other.gradient) * np.linalg.norm(end)) or 1.0
+    return abs(other.value) <= part * size
+
+
 def require_simple(orbit: PeriodicOrbit) -> None:
-    """Refuse orbits through two-folds; grazing is refused by the multipliers."""
-    system, p = orbit.system, orbit.parameter_vector
+    """Refuse orbits through two-folds, and grazing."""
+    system, p, flows = orbit.system, orbit.parameter_vector, orbit.evaluation.flows
     for i, leg in enumerate(orbit.problem.legs):
-        if leg.kind != "exit" or system.coupled:
-            continue
-        flows = orbit.evaluation.flows
         end = flows.end[i, : flows.sizes[i]]
-        at = replace(leg, side=-leg.side).at_end(system, end, p)
-        size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
-        if abs(at.value) <= 1e-9 * size:
+        if at_two_fold(system, leg, end, p):
             raise DegenerateError(
                 f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
                 f"{leg_name(system, leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "

@@ -13,8 +13,9 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
-from .graph import evaluate, instructions, operation
+from .graph import NOT_SMOOTH, evaluate, instructions, operation
 
 Monomial = tuple[tuple[int, int], ...]  # ((atom, power), ...) sorted by atom
 Sum = dict[Monomial, float]
@@ -152,11 +153,17 @@ class NormalForms:
 
     def __init__(self, inputs: Sequence[ca.SX]):
         self._inputs, self._algebra = list(inputs), _Normal(inputs)
+        self.forms = self._algebra.forms
+
+    def rows(self, outputs: Sequence[ca.SX]) -> list[list[Sum]]:
+        """The sums of coefficients times monomials of the entries of each output."""
+        nodes, rows = instructions(self._inputs, outputs)
+        values = evaluate(nodes, self._algebra)
+        return [[values[k].form for k in row] for row in rows]
 
     def of(self, expression: ca.SX) -> Sum:
-        """The sum of coefficients times monomials of a scalar."""
-        nodes, rows = instructions(self._inputs, [expression])
-        return evaluate(nodes, self._algebra)[rows[0][0]].form
+        """The same of a scalar."""
+        return self.rows([expression])[0][0]
 
 
 def ratio(first: Sum, second: Sum) -> float:
@@ -168,29 +175,13 @@ def ratio(first: Sum, second: Sum) -> float:
     return c if all(abs(r - c) <= 2 * _ROUNDING * abs(c) for r in ratios) else 0.0
 
 
-def normal_forms(
-    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
-) -> tuple[Forms, list[list[Sum]]]:
-    """Sums of coefficients times monomials for each entry of each output, and their atoms."""
-    nodes, rows = instructions(inputs, outputs)
-    algebra = _Normal(inputs)
-    values = evaluate(nodes, algebra)
-    return algebra.forms, [[values[k].form for k in row] for row in rows]
-
-
 def _combine(forms: Forms, op: str, args: list[Sum], expression: ca.SX) -> Sum:
-    if op == "add":
-        return forms.add(args[0], args[1])
-    if op == "sub":
-        return forms.add(args[0], args[1], -1.0)
+    if op in ("add", "sub", "twice"):
+        return forms.add(args[0], args[-1], -1.0 if op == "sub" else 1.0)
     if op == "neg":
         return forms.add({}, args[0], -1.0)
-    if op == "twice":
-        return forms.add(args[0], args[0])
-    if op == "mul":
-        return forms.multiply(args[0], args[1])
-    if op == "sq":
-        return forms.multiply(args[0], args[0])
+    if op in ("mul", "sq"):
+        return forms.multiply(args[0], args[-1])
     if op == "div" and args[1]:
         return forms.multiply(args[0], forms.reciprocal(args[1]))
     if op == "inv" and args[0]:
@@ -200,35 +191,31 @@ def _combine(forms: Forms, op: str, args: list[Sum], expression: ca.SX) -> Sum:
 
 def powers(expression: ca.SX, variables: ca.SX, others: ca.SX) -> list[tuple[ca.SX, int]]:
     """Visible factors of a scalar expression, with their powers."""
-    forms, rows = normal_forms([variables, others], [expression])
-    if not rows[0][0]:
-        return []
-    _, monomial = forms.factor(rows[0][0])
-    return [(forms.atoms[atom], power) for atom, power in monomial]
+    normal = NormalForms([variables, others])
+    form, forms = normal.of(expression), normal.forms
+    return [(forms.atoms[a], power) for a, power in forms.factor(form)[1]] if form else []
 
 
 def simple_zeros(expression: ca.SX, variables: ca.SX, others: ca.SX) -> ca.SX:
     """Return an expression of the same sign without its visible powers."""
-    forms, rows = normal_forms([variables, others], [expression])
-    if not rows[0][0]:
-        return expression
-    c, monomial = forms.factor(rows[0][0])
+    normal = NormalForms([variables, others])
+    form = normal.of(expression)
+    c, monomial = normal.forms.factor(form) if form else (0.0, ())
     if all(abs(power) < 2 for _, power in monomial):
         return expression
-    return forms.product(c, tuple((atom, 1) for atom, power in monomial if power % 2))
+    return normal.forms.product(c, tuple((atom, 1) for atom, power in monomial if power % 2))
 
 
 def cancel_common_factor(
     expressions: Sequence[ca.SX], variables: ca.SX, others: ca.SX
 ) -> tuple[list[ca.SX], ca.SX]:
     """Divide scalar expressions by the factors that all of them have."""
-    forms, rows = normal_forms([variables, others], expressions)
-    sums = [row[0] for row in rows]
+    normal = NormalForms([variables, others])
+    forms, sums = normal.forms, [row[0] for row in normal.rows(expressions)]
     factored = [forms.factor(s) if s else None for s in sums]
     monomials = [f[1] for f in factored if f is not None]
-    if not monomials:
-        return list(expressions), ca.SX(1)
-    common = tuple((atom, power) for atom, power in _common(monomials) if power > 0)
+    shared = _common(monomials) if monomials else ()
+    common = tuple((atom, power) for atom, power in shared if power > 0)
     if not common:
         return list(expressions), ca.SX(1)
     reduced = [
@@ -236,3 +223,46 @@ def cancel_common_factor(
         for f in factored
     ]
     return reduced, forms.product(1.0, common)
+
+
+# Dependent rows -----------------------------------------------------------------------------------
+
+# A step whose field was checked need not be checked with what is a linear combination of its rows and of an affine
+# function, as normal forces and Lie derivatives are.
+
+#: Part of a function that may be left over by rounding.
+_LEFT = 1e-9
+
+
+def in_span(
+    functions: Sequence[ca.SX], rows: Sequence[ca.SX], variables: ca.SX, others: ca.SX
+) -> list[bool]:
+    """Whether each function is found to be a combination of rows and an affine function."""
+    # The coefficients may depend on ``others``, smoothly.
+    nodes, _ = instructions([variables, others], [ca.vertcat(*rows, *functions)])
+    if any(node.op in NOT_SMOOTH for node in nodes):
+        return [False for _ in functions]  # other values of ``others`` have other combinations
+    numbers = np.random.default_rng(1).uniform(0.3, 1.7, others.numel())
+    fixed = [ca.substitute(ca.SX(e), others, ca.DM(numbers)) for e in [*rows, *functions]]
+    normal = NormalForms([variables, others])
+    bent = [_nonlinear(row[0], normal.forms) for row in normal.rows(fixed)]
+    monomials = sorted({m for form in bent for m in form})
+    table = np.array([[form.get(m, 0.0) for m in monomials] for form in bent])
+    table = table.reshape(len(bent), len(monomials))
+    known = table[: len(rows)]
+    basis, result = known[np.isfinite(known).all(axis=1)].T, []
+    for function, target in zip(functions, table[len(rows) :], strict=True):
+        unseen = not target.any() and not ca.is_linear(function, variables)
+        if unseen or not np.isfinite(target).all():
+            result.append(False)
+            continue  # coefficients below the least number, or none for these ``others``
+        weights = np.linalg.lstsq(basis, target, rcond=None)[0] if basis.size else np.zeros(0)
+        left = target - basis @ weights if basis.size else target
+        result.append(bool(np.abs(left).max(initial=0.0) <= _LEFT * np.abs(target).max(initial=0)))
+    return result
+
+
+def _nonlinear(form: Sum, forms: Forms) -> dict[Monomial, float]:
+    """Leave out the constant and multiples of one variable."""
+    linear = lambda m: len(m) == 1 and m[0][1] == 1 and forms.atoms[m[0][0]].is_symbolic()
+    return {m: c for m, c in form.items() if m and not linear(m)}

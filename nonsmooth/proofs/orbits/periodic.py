@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 from ...model import OptionError, require_plain
 from ...orbit import PeriodicOrbit
 from ..arithmetic.decimals import given
-from ..arithmetic.eigenvalues import eigenvalues
+from ..arithmetic.eigenvalues import eigenvalues, numbered
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.equations import Equations, column
 from ..arithmetic.flint import arb, arb_mat, ctx
@@ -255,11 +255,7 @@ class OrbitInstance:
             return Classification("", self.kind, why, values=values, claims=claims)
         sizes = [(re * re + im * im).sqrt() for re, im in found]
         order = sorted(range(len(found)), key=lambda k: -float(sizes[k].mid()))
-        for k, j in enumerate(order):
-            re, im = found[j]
-            values[f"multiplier{k + 2}" + ("" if im.is_zero() else "_real")] = re
-            if not im.is_zero():
-                values[f"multiplier{k + 2}_imaginary"] = im
+        values |= numbered("multiplier", [found[j] for j in order], 2)
         outside = sum(bool(s > 1) for s in sizes)
         if all(s < 1 for s in sizes):
             label = "asymptotically stable"

@@ -366,12 +366,3 @@ def _sliding(
         graph.apply("sub", [f, graph.apply("mul", [ratio, g])])
         for f, g in zip(fields[0], difference.direction, strict=True)
     ]
-
-
-def mode_after(l1: arb, l2: arb) -> tuple[str, int] | None:
-    """The mode after a point of the surface, and how many coefficients of h are zero in it."""
-    if l1 < 0 and l2 > 0:
-        return "s", 0
-    if l1 > 0 and l2 > 0:
-        return "+", 1
-    return ("-", 1) if l1 < 0 and l2 < 0 else None

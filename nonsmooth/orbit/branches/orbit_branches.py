@@ -39,13 +39,21 @@ from .branch import (
     check_bounds,
     follow_branch,
 )
+from .chatter_end import chatter_end
 from .conditions import Condition, condition_row, conditions_of, is_smooth
 from .event_curves import OWN_ENDS, degenerate_tests
 from .family_ends import extent, hopf_point, surface_end
 from .homoclinic_curves import homoclinic_end
-from .itinerary_changes import ChangedItinerary, changed_itinerary, departures, grown, kind_of
+from .itinerary_changes import (
+    CHATTER_END,
+    ChangedItinerary,
+    changed_itinerary,
+    departures,
+    grown,
+    kind_of,
+)
 from .normal_forms import normal_form, torus_pair
-from .unfoldings import far_side
+from .unfoldings import VERDICTS, far_side
 
 # Equations of periodic orbits with free parameters ----------------------------------------------------
 
@@ -248,10 +256,15 @@ class OrbitCurve(OrbitEquations):
         return bool(growth > _STEEP * float(u[durations].sum()) * abs(float(tangent[-1])))
 
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
-        """The point to which the orbit shrinks, or the homoclinic orbit at which its period diverges."""
+        """The point to which the orbit shrinks, the end of its chatter, or the homoclinic orbit at which its period diverges."""
         shrunk = self._shrunk(u, _SMALL)
         if shrunk is not None:
             return shrunk
+        chatter = chatter_end(self.problem, u, self.scale, self.equations)
+        if chatter is not None:
+            value, near = chatter
+            side = FarSide("", VERDICTS[CHATTER_END])
+            return BranchEvent(CHATTER_END, value, self.describe(near), side, curve=self)
         if end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u):
             return None
         name = self.system.parameter_names[self.free[-1]]
@@ -726,7 +739,7 @@ def continue_orbit(
         doubling"``, ``"Neimark-Sacker"``, ``"pitchfork"`` (of symmetric orbits), ``"branch
         point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
         ``"adding-sliding"``, ``"impact grazing"``, ``"grazing of a soft switch"``,
-        ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``; ``"Hopf"`` where orbits without events shrink to an equilibrium,
+        ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``, ``"end of complete chatter"``; ``"Hopf"`` where orbits without events shrink to an equilibrium,
         ``"boundary equilibrium"`` (with its class) or ``"two-fold"`` where others shrink to a point of a
         surface.
 

@@ -35,7 +35,7 @@ _RATIO, _MOST, _REPEATS = 0.6, 14, 3
 _MORE = 3
 
 #: Durations of the last block, relative to the longest, at which an extrapolation may end.
-_LASTS = tuple(10.0**-k for k in range(2, 9))
+_LASTS = tuple(10.0**-k for k in range(3, 7))
 
 #: Error of an extrapolation, relative to the change of the events, above which it has no derivatives.
 _UNRESOLVED = 1e-3
@@ -180,6 +180,19 @@ def limit_of(parts: Sequence[Stretch], tail: range, block: int, what: str) -> Li
         f"{what}: events accumulate, and the last {len(tail)} of them do not give the derivatives of their limit. "
         "Simulate with a smaller tol, or end the run before."
     )
+
+
+def geometric_limit(values: Array) -> tuple[float, float]:
+    """The limit of values (k,) whose changes fall nearly by a ratio, and its change by more of them, relative to them."""
+    change = np.diff(values)
+    if len(change) < 2 or not (change.all() and (change * change[0] > 0.0).all()):
+        return math.nan, math.inf
+    q = (np.sign(change[0]) * values)[:, None]
+    found = _estimates(q, np.arange(len(q)), float(np.abs(change).max()), 0.0)
+    best = min(found, key=lambda estimate: estimate.change, default=None)
+    if best is None:
+        return math.nan, math.inf
+    return float(np.sign(change[0]) * best.value[0]), best.change
 
 
 class _Estimate(NamedTuple):

@@ -78,7 +78,7 @@ from .model import (
 from .model.definition.constraints import Constraint
 from .model.definition.elements import Complementarity, Relay
 from .model.definition.friction import Friction
-from .model.definition.table import table
+from .model.definition.tables.table import table
 from .orbit import (
     attractors,
     basins,

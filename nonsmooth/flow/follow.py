@@ -32,7 +32,7 @@ from .engine.convert import message_of
 from .engine.tape import tape_for
 from .events import Event, Events, Segment, Segments
 from .names import guard_name
-from .options import Options, tolerances
+from .options import Options
 from .status import ADVICE, Status
 from .trajectory import Steps, Trajectory
 
@@ -106,24 +106,17 @@ def follow(
     """
     require_system(system, complementarity=True)
     t_start, t_end = real(t_start, "t_start"), real(t_end, "t_end")
-    rtol, atol = tolerances(tol, rtol, atol)
     backward = t_end < t_start
-    options = Options(
-        t_end=-t_end if backward else t_end,
-        t_start=-t_start if backward else t_start,
-        rtol=rtol,
-        atol=atol,
-        max_step=max_step,
-        max_steps=max_steps,
-    )
+    ends = {"t_end": -t_end, "t_start": -t_start} if backward else {}
+    options = Options.of(locals() | ends)
     system.parse_mode(mode)
-    ends, further = _several(until), _several(watch)
-    expressions = [u for u in ends if not isinstance(u, str)]
+    untils, further = _several(until), _several(watch)
+    expressions = [u for u in untils if not isinstance(u, str)]
     p = system.parameter_vector(parameters)
     made = followed(system, mode, expressions + further, backward)
     names = [guard_name(system, g) for g in made.guards]
     ending = {f"f{k}" for k in range(len(expressions))}
-    for name in (u for u in ends if isinstance(u, str)):
+    for name in (u for u in untils if isinstance(u, str)):
         if name not in names:
             raise OptionError(
                 f"until has {name!r}, which is no event function. Give a name among {names} or an "
@@ -134,14 +127,8 @@ def follow(
     x = system.extended_point(point, t_start)
     unknowns = sliding_multipliers(coupled_of(system), mode, x, p, stable_only=False)
     if made.unknowns and len(unknowns) != 1:
-        return _stuck(
-            system,
-            mode,
-            x,
-            p,
-            t_start,
-            _said("start_solutions", start_mode=mode, where=len(unknowns)),
-        )
+        said = _said("start_solutions", start_mode=mode, where=len(unknowns))
+        return _stuck(system, mode, x, p, t_start, said)
     start = x[: system.dimension]
     if made.unknowns:
         start = np.concatenate([start, unknowns[0][list(made.unknowns)]])

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 from ..model import OptionError, real, whole
 from .constants import EPSILON, METHODS, SAFETY
@@ -86,6 +87,13 @@ class Options:
             )
         for name in ("max_steps", "max_events", "max_jumps"):
             self._set(name, whole(getattr(self, name), name))
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Options:
+        """Return the options among the arguments of a function, by name."""
+        own = {f.name: given[f.name] for f in fields(cls) if f.name in given}
+        tol = tolerances(given["tol"], given["rtol"], given["atol"])
+        return cls(**own | tol._asdict())
 
     @property
     def begins_late(self) -> bool:

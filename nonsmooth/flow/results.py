@@ -129,12 +129,19 @@ class Chunk:
         self.itinerary[:] = table.take(self.itinerary)
 
 
+def _require_statuses(many: Ensemble) -> None:
+    """Raise ValueError where a number is no status."""
+    if not np.isin(many.status, [int(s) for s in Status]).all():
+        raise ValueError("Ensemble.status: it has no status")
+
+
 @dataclass(frozen=True, repr=False)
 class Ensemble(
     Savable,
+    check=_require_statuses,
     x="... n nan",
     t="... nan",
-    status="... status",
+    status="...",
     itinerary_code="... <itineraries",
     events="...",
     event_x="... n nan",

@@ -13,7 +13,7 @@ from .engine.convert import trajectory
 from .engine.tape import tape_for
 from .ensembles.starts import require_start, require_start_mode
 from .events import Event
-from .options import Options, tolerances
+from .options import Options
 from .section import Section, read_sampling, sampled, sectioned
 from .trajectory import Trajectory
 
@@ -130,20 +130,7 @@ def simulate(
     if t_end is None:
         raise OptionError("t_end is missing. Give the time at which the run ends.")
     _require_flag(dense)
-    rtol, atol = tolerances(tol, rtol, atol)
-    options = Options(
-        t_end=t_end,
-        t_start=t_start,
-        rtol=rtol,
-        atol=atol,
-        max_step=max_step,
-        max_steps=max_steps,
-        max_events=max_events,
-        max_jumps=max_jumps,
-        rest_below=rest_below,
-        start_mode=start_mode,
-        method=method,
-    )
+    options = Options.of(locals())
     system, at = sectioned(system, at)
     x = system.extended_point(x0, options.t_start)
     p = system.parameter_vector(parameters)

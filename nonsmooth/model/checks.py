@@ -47,6 +47,8 @@ def real(
     error: type[NonsmoothError] = OptionError,
 ) -> float:
     """Return a finite number from ``low`` to ``high`` or raise."""
+    if type(value) is float and low <= value <= high and math.isfinite(value):
+        return value
     if not is_real(value) or not low <= float(value) <= high:
         raise error(f"{what}: expected {expected}, received {value!r}. {advice}".rstrip())
     return float(value)
@@ -54,6 +56,8 @@ def real(
 
 def whole(value: Any, what: str, *, least: int = 1, advice: str = "") -> int:
     """Return a whole number of at least ``least`` or raise OptionError; 1e6 is one too."""
+    if type(value) is int and value >= least:
+        return value
     exact = isinstance(value, int)  # one beyond 2**53 may be no float
     if not is_real(value) or not (exact or float(value) == int(value)) or value < least:
         expected = "a positive whole number" if least == 1 else f"a whole number >= {least}"

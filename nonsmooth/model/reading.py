@@ -34,6 +34,18 @@ def listed(value: Any) -> list[Any]:
     return list(value)
 
 
+def items_of(values: Any, kind: type[Any], what: str, form: str = "function, ...") -> list[Any]:
+    """Read one object of a class or a sequence of them; ``form`` is how one is written."""
+    items = [values] if isinstance(values, kind) else listed(values)
+    for i, item in enumerate(items):
+        if not isinstance(item, kind):
+            raise DefinitionError(
+                f"{what}[{i}]: expected a {kind.__name__}, received {item!r} ({type(item).__name__}). Write "
+                f"{what}=[nonsmooth.{kind.__name__}({form})]."
+            )
+    return items
+
+
 def scalar(value: Any, what: str) -> ca.SX:
     """Read a scalar expression or number."""
     return _without_calls(_scalar(value, what), what)
@@ -190,6 +202,10 @@ def require_known(
             f"{clash} has the name of a declared symbol but is another symbol: create each symbol "
             "once and reuse it."
             if clash
+            else "It is the multiplier of a Friction: give that in surfaces=."
+            if any(str(s).startswith("friction(") for s in foreign)
+            else "It is the phase of a Clock: give that in clocks=."
+            if any(str(s).endswith("_phase") for s in foreign)
             else "Add it to states=, parameters= or time=, or give it a number."
         )
         raise DefinitionError(

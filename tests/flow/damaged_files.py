@@ -236,11 +236,9 @@ def rewired(rng, data):
     tree = _tree_of(parts)
     if not tree["systems"] or rng.random() < 0.3:
         return retold(rng, data, "systems" if tree["systems"] else None)
-    mapping = tree["systems"][0]["mapping"]
-    arrays = [
-        value["array"] for _, value in mapping if isinstance(value, dict) and "array" in value
-    ]
-    operations = dict((key, value) for key, value in mapping if isinstance(key, str))["operations"]
+    graph = dict(tree["systems"][0]["mapping"])["graph"]["fields"]
+    arrays = [v["array"] for v in graph.values() if "array" in v]
+    operations = graph["operations"]["tuple"]
     for _ in range(rng.integers(1, 4)):
         kind, start, shape = arrays[rng.integers(len(arrays))]
         content, last = (

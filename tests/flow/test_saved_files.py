@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import bounce
 import nonsmooth as ns
-from nonsmooth.flow import archive
+from nonsmooth.flow.saving import archive
 from nonsmooth.model import instruction_form, reversed_system, with_section
 from nonsmooth.model.expressions.graph import operation
 from nonsmooth.textbook import PROBLEMS
@@ -71,8 +71,10 @@ def test_systems_of_bounces_are_the_same(model):
 
 
 def test_sections_reversed_and_regularised_systems_are_the_same():
-    relay = PROBLEMS["planar_relay"]().system
+    relay, y = PROBLEMS["planar_relay"]().system, ca.SX.sym("y")
     for system in (
+        ns.FilippovSystem([x, v], field=[v, -9.81], impacts=ns.Impact(x, 0.5, law="moreau")),
+        ns.FilippovSystem([x, y, v], field=[v, 0, 0], constraints=ns.Constraint(x + y, name="rod")),
         with_section(BLOCK, x**2 * v, 1),  # a section may have multiple zeros
         reversed_system(relay),
         *(ns.regularise(BLOCK, transition=t) for t in ("tanh", "erf", "algebraic", "arctan")),

@@ -124,18 +124,24 @@ static int decide_among(Run *r, const int32_t *which, int count) {
   return r->status == RUNNING && decide(r, r->start, 0, 0) && rests_unstably(r, r->chosen.letter) < 0;
 }
 
+/* Put the state where some elements rest. */
+static void put_at_rest(Run *r, const int32_t *element, int count) {
+  int32_t *which = r->involved + r->width;
+  int kept = count;
+  memmove(which, element, sizeof(int32_t) * count);
+  for (int i = 0; i < count; i++) kept += lower_rows(r, element[i], which + kept);
+  project(r, which, with_joints(r, which, kept));
+}
+
 /* The mode of closed contacts, and of surfaces whose events accumulate with theirs, as r->chosen, and the state in it as
  * r->x; 0 if there is none. */
 static int choose_closed(Run *r, const int32_t *contact, int count, const int32_t *surface, int surfaces) {
-  int kept = 0, m = r->m, c = r->c;
   int32_t *which = r->involved + r->width;
   if (!strike(r, contact, count, 1, r->at_work)) return 0;
   memcpy(r->x, r->at_work, sizeof(double) * r->n);
-  for (int i = 0; i < count; i++) which[kept++] = m + contact[i];
-  for (int i = 0; i < surfaces; i++) which[kept++] = surface[i];
-  for (int i = 0; i < count; i++) which[kept++] = m + c + contact[i];
-  for (int i = 0; i < surfaces; i++) kept += lower_rows(r, surface[i], which + kept);
-  project(r, which, with_joints(r, which, kept));
+  for (int i = 0; i < count; i++) which[i] = r->m + contact[i];
+  memcpy(which + count, surface, sizeof(int32_t) * surfaces);
+  put_at_rest(r, which, count + surfaces);
   return decide_among(r, which, count + surfaces);
 }
 
@@ -166,7 +172,7 @@ static int vanishing(Run *r, const double *near, int32_t *which) {
   int count = 0;
   surface_values(r, r->x);
   for (int i = 0; i < r->n; i++) own[i] = 4 * near[i] + ON_SURFACE * (size_of_state(r, i) + fabs(r->x[i])); /* rates may jump */
-  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, own, 1, change);
+  kept_sums(r, own, change);
   for (int i = 0; i < r->m; i++) {
     int small = has_law(r, i, SURFACE_LAW) && fabs(r->rates[i]) <= change[i], first = element(r, i)->lower;
     for (int k = first; k < first + degree_of(r, i) - 1; k++) small &= fabs(r->rates[k]) <= change[k];
@@ -178,8 +184,10 @@ static int vanishing(Run *r, const double *near, int32_t *which) {
 /* Close the contacts of impacts that accumulate, unless further impacts are to be served. */
 static void close_contacts(Run *r, int block, double left, double error) {
   double speed, *near = r->before, *x = r->saved;
-  int count = gathered(r, block, r->involved, &speed), before = r->mode, at_once = is_instant(r, left), switches = 0;
+  int count = gathered(r, block, r->involved, &speed), before = r->mode, at_once = is_instant(r, left), switches = 0, open = 0;
   for (int k = 1; k <= block; k++) switches |= back(r, k)->kind != IMPACT;
+  for (int i = 0; i < count; i++) open |= r->letter[r->m + r->involved[i]] != 0;
+  if (!open) return; /* the last impact has closed them */
   if (!at_once && (speed * left > r->o.atol || !is_sure(r, error))) return;
   int32_t *surface = r->involved + r->c;
   for (int i = 0; i < r->n; i++) near[i] = (left + error) * fabs(r->e.states[(int64_t)i * r->stride + 1]);
@@ -206,12 +214,9 @@ static void close_contacts(Run *r, int block, double left, double error) {
  * there is none, or where that is farther than ``near`` allows. */
 static int choose_rest(Run *r, const int32_t *element, int count, const double *near) {
   double *x = r->saved;
-  int kept = 0, close = 1, status = r->status;
-  int32_t *which = r->involved + r->width;
+  int close = 1, status = r->status;
   memcpy(x, r->x, sizeof(double) * r->n);
-  for (int i = 0; i < count; i++) which[kept++] = element[i];
-  for (int i = 0; i < count; i++) kept += lower_rows(r, element[i], which + kept);
-  project(r, which, with_joints(r, which, kept));
+  put_at_rest(r, element, count);
   for (int i = 0; near && i < r->n; i++)
     close &= fabs(r->x[i] - x[i]) <= 4 * near[i] + VANISHES * (r->size + fabs(x[i]));
   if (close && decide_among(r, element, count)) {

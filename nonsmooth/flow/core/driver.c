@@ -64,8 +64,6 @@ static int spirals_out(Run *r, const int8_t *letter) {
   return -1;
 }
 
-static int leaves_by_root(Run *r);
-
 /* Adopt the mode that continues; 0 where there is none or more than one. */
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count) {
   if (r->active_count) {
@@ -154,7 +152,6 @@ static int can_start(Run *r) {
 }
 
 static void start_in(Run *r, const int8_t *asked) {
-  Solutions all = {0};
   int8_t *letter = r->start;
   for (int i = 0; i < r->width; i++) {
     int active = 0;
@@ -167,10 +164,8 @@ static void start_in(Run *r, const int8_t *asked) {
   memcpy(r->letter, letter, r->width);
   enter_mode(r);
   if (r->s->joints > 1) find_dependent(r, &r->now, r->letter, r->unknowns);
-  mode_solutions(r, &r->now, &all);
-  if (all.count > 1) keep_stable(r, &r->now, &all);
-  if (all.count != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, all.count); return; }
-  memcpy(r->unknowns, all.each, sizeof(double) * r->width);
+  int found = find_unknowns(r, &r->now);
+  if (found != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, found); return; }
   if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
 }
 
@@ -268,14 +263,10 @@ static int only_sliding(const Run *r) {
   return found;
 }
 
-static int nears_root(Run *r);
-
 static void watch_two_fold(Run *r) {
   int s = only_sliding(r);
   if (s >= 0 && !(r->has_roots && nears_root(r)) && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
 }
-
-static int rest_at_limit(Run *r, int before);
 
 /* The motion from a guard of a surface or set, where the first coefficients of some guards are known to vanish. */
 static void pass(Run *r, int row, const Known *known, int known_count) {
@@ -305,12 +296,11 @@ static void serve_set(Run *r, int row) {
   if (r->now.kind[row] == NEAR_GUARD) near_set(r, row, 1); else pass(r, row, known, 2);
 }
 
-static void serve_complementarity(Run *r, int row) {
-  if (r->now.kind[row] == SURFACE_GUARD) pass(r, row, 0, 0); else release(r, row);
-}
-
-static void serve_contact(Run *r, int row) {
-  if (r->now.kind[row] == IMPACT_GUARD) impact(r, row); else release(r, row);
+static void serve_half_line(Run *r, int row) {
+  int kind = r->now.kind[row];
+  if (kind == RELEASE_GUARD) release(r, row);
+  else if (kind == IMPACT_GUARD) impact(r, row);
+  else pass(r, row, 0, 0);
 }
 
 static void serve(Run *r, int row) {
@@ -360,9 +350,6 @@ static int advance(Run *r, const Expansion *e, double dt) {
   note(r);
   return 1;
 }
-
-static int ends_at_singular(Run *r);
-static int pass_root(Run *r, double left);
 
 /* A step from a point where only low derivatives exist; guards are evaluated at its end. */
 static void leave_singular(Run *r, Expansion *e, double left) {

@@ -7,9 +7,6 @@
  */
 enum { LEVEL = 1, BY_JUMPS = 2, PERSISTENT = 4, AT_TRIGGER = 8 };
 
-static void serve(Run *r, int row);
-static int settle_in(Run *r);
-
 static int is_true(const int32_t *code, int count, const int8_t *side) {
   int8_t stack[MOST_CODES];
   int top = 0;
@@ -38,7 +35,7 @@ static void look(Run *r, const double *x) {
   Instant *i = &r->instant;
   double *weight = r->vector;
   values_at(&s->atoms, x, r->p, r->atom_work);
-  for (int k = 0; k < r->n; k++) weight[k] = size_of_state(r, k) + fabs(x[k]);
+  weigh_state(r, x, weight);
   gradient_sums(r, &s->atoms, r->atom_work, s->rules.atoms, &s->atom_gradient, s->rules.atoms, weight, 1, i->noise);
   for (int a = 0; a < s->rules.atoms; a++) {
     i->value[a] = out_of(&s->atoms, r->atom_work, a);

@@ -167,6 +167,13 @@ static void first_values(Run *r, int is_free) {
   series_at(t, &t->values, 0, r->stride, r->input, r->series);
 }
 
+/* The field at a state with given multipliers and unknowns. */
+static void field_of(Run *r, const double *x, const double *held, const double *unknowns, double *field) {
+  set_inputs(r, x, held, unknowns);
+  first_values(r, 0);
+  for (int i = 0; i < r->n; i++) field[i] = row_of(r, i)[0];
+}
+
 /* Rounding of the values at r->input, in units of EPSILON. */
 static void weigh_rounding(Run *r, int is_free, double size) {
   const Series *t = is_free ? &r->s->free : &r->s->series;

@@ -3,6 +3,31 @@
  * Matrices are row by row. What is zero is skipped, so that separate blocks cost what they cost alone.
  */
 
+static inline double dot(const double *a, const double *b, int n) {
+  double sum = 0;
+  for (int i = 0; i < n; i++) sum += a[i] * b[i];
+  return sum;
+}
+static inline double largest_of(const double *a, int n) {
+  double most = 0;
+  for (int i = 0; i < n; i++) most = larger(fabs(a[i]), most);
+  return most;
+}
+static inline void swap(double *a, double *b, int n) {
+  for (int i = 0; i < n; i++) { double t = a[i]; a[i] = b[i]; b[i] = t; }
+}
+
+/* Products of square matrices, and of one with a vector. */
+static void multiply(const double *a, const double *b, int n, double *product) {
+  memset(product, 0, sizeof(double) * n * n);
+  for (int i = 0; i < n; i++)
+    for (int l = 0; l < n; l++)
+      for (int j = 0; j < n; j++) product[i * n + j] += a[i * n + l] * b[l * n + j];
+}
+static inline void apply(const double *a, const double *x, int n, double *product) {
+  for (int i = 0; i < n; i++) product[i] = dot(a + (int64_t)i * n, x, n);
+}
+
 /* Inverse by Gauss and Jordan with the largest pivots; 0 and NaN where there is none. ``a`` is lost. */
 static int invert(double *a, int n, double *inverse) {
   memset(inverse, 0, sizeof(double) * n * n);
@@ -15,9 +40,9 @@ static int invert(double *a, int n, double *inverse) {
       for (int i = 0; i < n * n; i++) inverse[i] = NAN;
       return 0;
     }
-    for (int j = 0; j < n && best != k; j++) {
-      double t = a[k * n + j]; a[k * n + j] = a[best * n + j]; a[best * n + j] = t;
-      t = inverse[k * n + j]; inverse[k * n + j] = inverse[best * n + j]; inverse[best * n + j] = t;
+    if (best != k) {
+      swap(a + k * n, a + best * n, n);
+      swap(inverse + k * n, inverse + best * n, n);
     }
     for (int j = 0; j < n; j++) {
       if (a[k * n + j] != 0) a[k * n + j] /= pivot;
@@ -33,23 +58,32 @@ static int invert(double *a, int n, double *inverse) {
   return 1;
 }
 
-/* Solve a x = b in place of b; 0 where a is singular. ``a`` is lost. */
-static int solve(double *a, double *b, int n) {
+/* Gauss's elimination with the largest pivots, in place, with one right side or none: the sign of the exchange of rows,
+ * 0 where a is singular. */
+static inline int triangle(double *a, double *b, int n) {
+  int sign = 1;
   for (int k = 0; k < n; k++) {
     int best = k;
     for (int i = k + 1; i < n; i++) if (fabs(a[i * n + k]) > fabs(a[best * n + k])) best = i;
     if (!(fabs(a[best * n + k]) > 0)) return 0;
-    for (int j = k; j < n && best != k; j++) {
-      double t = a[k * n + j]; a[k * n + j] = a[best * n + j]; a[best * n + j] = t;
+    if (best != k) {
+      swap(a + k * n + k, a + best * n + k, n - k);
+      if (b) swap(b + k, b + best, 1);
+      sign = -sign;
     }
-    double t = b[k]; b[k] = b[best]; b[best] = t;
     for (int i = k + 1; i < n; i++) {
       if (a[i * n + k] == 0) continue;
       double f = a[i * n + k] / a[k * n + k];
       for (int j = k + 1; j < n; j++) a[i * n + j] -= f * a[k * n + j];
-      b[i] -= f * b[k];
+      if (b) b[i] -= f * b[k];
     }
   }
+  return sign;
+}
+
+/* Solve a x = b in place of b; 0 where a is singular. ``a`` is lost. */
+static int solve(double *a, double *b, int n) {
+  if (!triangle(a, b, n)) return 0;
   for (int k = n - 1; k >= 0; k--) {
     for (int j = k + 1; j < n; j++) if (a[k * n + j] != 0) b[k] -= a[k * n + j] * b[j];
     b[k] /= a[k * n + k];
@@ -59,14 +93,13 @@ static int solve(double *a, double *b, int n) {
 
 /* Linear equations that may be singular ------------------------------------------------------------ */
 
-/* Gauss and Jordan with full pivoting on (rows, columns) with ``more`` right sides behind, after scaling of rows and
- * columns; the rank is returned, the column of each pivot's row in ``pivot``, columns' scales in ``unit``. */
-static int eliminate(double *a, int rows, int columns, int more, int32_t *pivot, double *unit) {
-  int width = columns + more, rank = 0;
+/* Rows, and the ``right`` side, over their largest elements, then columns over theirs, which are ``unit``. */
+static void equilibrate(double *a, int rows, int columns, int width, double *right, double *unit) {
   for (int i = 0; i < rows; i++) {
-    double *row = a + (int64_t)i * width, most = 0;
-    for (int j = 0; j < columns; j++) most = larger(fabs(row[j]), most);
-    if (most > 0) for (int j = 0; j < width; j++) row[j] /= most;
+    double *row = a + (int64_t)i * width, most = largest_of(row, columns);
+    if (!(most > 0)) continue;
+    for (int j = 0; j < width; j++) row[j] /= most;
+    if (right) right[i] /= most;
   }
   for (int j = 0; j < columns; j++) {
     unit[j] = 0;
@@ -74,6 +107,13 @@ static int eliminate(double *a, int rows, int columns, int more, int32_t *pivot,
     if (unit[j] > 0) for (int i = 0; i < rows; i++) a[(int64_t)i * width + j] /= unit[j];
     else unit[j] = 1;
   }
+}
+
+/* Gauss and Jordan with full pivoting on (rows, columns) with ``more`` right sides behind, after scaling of rows and
+ * columns; the rank is returned, the column of each pivot's row in ``pivot``, columns' scales in ``unit``. */
+static int eliminate(double *a, int rows, int columns, int more, int32_t *pivot, double *unit) {
+  int width = columns + more, rank = 0;
+  equilibrate(a, rows, columns, width, 0, unit);
   while (rank < rows && rank < columns) {
     int row = rank, column = -1;
     double best = SINGULAR;
@@ -84,7 +124,7 @@ static int eliminate(double *a, int rows, int columns, int more, int32_t *pivot,
       }
     if (column < 0) break;
     double *one = a + (int64_t)rank * width, *other = a + (int64_t)row * width;
-    for (int j = 0; j < width && row != rank; j++) { double t = one[j]; one[j] = other[j]; other[j] = t; }
+    if (row != rank) swap(one, other, width);
     double head = one[column];
     for (int j = 0; j < width; j++) one[j] /= head;
     for (int i = 0; i < rows; i++) {
@@ -122,33 +162,35 @@ static int solve_any(double *a, double *b, int n, double tie, double *work, int3
   return !(rest > tie * most) && finite_all(b, n);
 }
 
+/* The vector that an elimination leaves free in a column, in units of the unknowns' sizes or of 1; 0 where none is. */
+static int free_vector(const double *a, int width, int columns, int rank, const int32_t *pivot, const double *unit,
+                       const double *size, int column, double *own) {
+  for (int i = 0; i < rank; i++) if (pivot[i] == column) return 0;
+  memset(own, 0, sizeof(double) * columns);
+  own[column] = 1 / (unit[column] * (size ? size[column] : 1));
+  for (int i = 0; i < rank; i++)
+    own[pivot[i]] = -a[(int64_t)i * width + column] / (unit[pivot[i]] * (size ? size[pivot[i]] : 1));
+  return 1;
+}
+
 /* Vectors z with E z = 0 for E (rows, columns), one after the other; their number. */
 static int null_space(const double *e, int rows, int columns, double *z, double *work, int32_t *pivot) {
   double *unit = work, *a = work + columns;
   memcpy(a, e, sizeof(double) * rows * columns);
   int rank = eliminate(a, rows, columns, 0, pivot, unit), count = 0;
-  for (int j = 0; j < columns; j++) {
-    int is_free = 1;
-    for (int i = 0; i < rank; i++) is_free &= pivot[i] != j;
-    if (!is_free) continue;
-    double *own = z + (int64_t)count++ * columns;
-    memset(own, 0, sizeof(double) * columns);
-    own[j] = 1 / unit[j];
-    for (int i = 0; i < rank; i++) own[pivot[i]] = -a[(int64_t)i * columns + j] / unit[pivot[i]];
-  }
+  for (int j = 0; j < columns; j++)
+    count += free_vector(a, columns, columns, rank, pivot, unit, 0, j, z + (int64_t)count * columns);
   return count;
 }
 
 /* Make a vector orthogonal to ``count`` unit vectors of ``z``, and of length 1; 0 where nothing of it is left. */
 static int orthonormal(double *own, const double *z, int count, int n, int passes) {
-  double length = 0;
   for (int pass = 0; pass < passes; pass++)
     for (int l = 0; l < count; l++) {
-      double part = 0;
-      for (int i = 0; i < n; i++) part += own[i] * z[(int64_t)l * n + i];
+      double part = dot(own, z + (int64_t)l * n, n);
       for (int i = 0; i < n; i++) own[i] -= part * z[(int64_t)l * n + i];
     }
-  for (int i = 0; i < n; i++) length += own[i] * own[i];
+  double length = dot(own, own, n);
   if (!(length > 0)) return 0;
   for (int i = 0; i < n; i++) own[i] /= sqrt(length);
   return 1;
@@ -168,14 +210,8 @@ static int invert_any(const double *m, int n, const double *size, double *invers
   for (int i = 0; i < rank; i++)
     for (int j = 0; j < n; j++) inverse[pivot[i] * n + j] = a[2 * (int64_t)i * n + n + j] / unit[pivot[i]];
   for (int j = 0; j < n; j++) { /* directions that make no difference, orthogonal one after the other */
-    int is_free = 1;
     double *own = z + (int64_t)count * n;
-    for (int i = 0; i < rank; i++) is_free &= pivot[i] != j;
-    if (!is_free) continue;
-    memset(own, 0, sizeof(double) * n);
-    own[j] = 1 / (unit[j] * size[j]);
-    for (int i = 0; i < rank; i++) own[pivot[i]] = -a[2 * (int64_t)i * n + j] / (unit[pivot[i]] * size[pivot[i]]);
-    count += orthonormal(own, z, count, n, 2);
+    if (free_vector(a, 2 * n, n, rank, pivot, unit, size, j, own)) count += orthonormal(own, z, count, n, 2);
   }
   for (int l = 0; l < count; l++) {
     const double *own = z + (int64_t)l * n;
@@ -201,26 +237,6 @@ static int is_definite(double *a, int n, double margin) {
     }
   }
   return 1;
-}
-
-static double determinant(const double *a, int n, const int *rows, int k) {
-  double b[MOST_MINORS * MOST_MINORS], sign = 1, product = 1;
-  for (int i = 0; i < k; i++) for (int j = 0; j < k; j++) b[i * k + j] = a[rows[i] * n + rows[j]];
-  for (int c = 0; c < k; c++) {
-    int best = c;
-    for (int i = c + 1; i < k; i++) if (fabs(b[i * k + c]) > fabs(b[best * k + c])) best = i;
-    if (b[best * k + c] == 0) return 0;
-    if (best != c) sign = -sign;
-    for (int j = 0; j < k && best != c; j++) {
-      double t = b[c * k + j]; b[c * k + j] = b[best * k + j]; b[best * k + j] = t;
-    }
-    product *= b[c * k + c];
-    for (int i = c + 1; i < k; i++) {
-      double f = b[i * k + c] / b[c * k + c];
-      for (int j = c; j < k; j++) b[i * k + j] -= f * b[c * k + j];
-    }
-  }
-  return sign * product;
 }
 
 /* A matrix of unit diagonal as D^-1 A D, symmetric, if a positive diagonal D makes it so. */
@@ -272,8 +288,12 @@ static int is_dominant(const double *a, int n, double *work) {
 static int has_positive_minors(const double *a, int n) {
   for (unsigned set = 1; set < 1u << n; set++) {
     int rows[MOST_MINORS], k = 0;
+    double b[MOST_MINORS * MOST_MINORS];
     for (int i = 0; i < n; i++) if (set >> i & 1) rows[k++] = i;
-    if (k > 1 && !(determinant(a, n, rows, k) > SINGULAR)) return 0;
+    for (int i = 0; i < k; i++) for (int j = 0; j < k; j++) b[i * k + j] = a[rows[i] * n + rows[j]];
+    double product = triangle(b, 0, k);
+    for (int i = 0; i < k; i++) product *= b[i * (k + 1)];
+    if (k > 1 && !(product > SINGULAR)) return 0;
   }
   return 1;
 }

@@ -70,10 +70,6 @@ static void count_hit(Run *r, int kind, int guard, int index, int side, const do
   else if (is_last) finish(r, STOPPED, SAMPLED, (int)o->hit_count);
 }
 
-static void remember(Run *r, int kind, int guard);
-static void see_limit(Run *r);
-static void write_motion(const Run *r, double *to);
-
 /* ``x`` is the state at the event, the present one unless the event changed it; ``guard`` a row of the mode
  * before, or -1. */
 static void event(Run *r, int kind, int before, int guard, const double *x) {

@@ -5,7 +5,6 @@
  * codimension two and more move and are met.
  */
 
-
 /* Entries of a sparse matrix in the order of a program's outputs. */
 typedef struct { int32_t count, pad; const int32_t *row, *column; } Entries;
 
@@ -168,6 +167,9 @@ typedef struct {
 /* The guard that is served. */
 typedef struct { int kind, index, side; } Met;
 
+/* Of a guard that ended the mode before so many coefficients vanish. */
+typedef struct { int kind, index, side, zeros; } Known;
+
 /* An event that may be one of many that accumulate: the time since the one before, and what was served. */
 typedef struct { double interval; int64_t pattern; int32_t kind; Met met; } Happened;
 
@@ -180,30 +182,33 @@ typedef struct {
   int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
   /* The time is t + t_low: that of an event is no number of its own where times are large. */
   Pair begun;
-  double t, t_low, since, limit, at_t;
+  double t, t_low, limit, at_t;
   const int8_t *remembered; /* letters from which elements with hysteresis go on, or none */
   Layout now; /* of the present mode */
-  Met met;
   Instant instant;
-  int32_t mode, status, reason, where, due_impact, falls, repelling, folded, passed; /* passed: the breakpoint */
-  int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history;
-  int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
+  int32_t mode, status, reason, due_impact, falls, folded, passed; /* passed: the breakpoint */
+  int32_t segment_mode, length_mode, prepared; /* prepared: whether the parameters are known, in lanes */
+  /* Zero where a run begins, up to ``past``: held_steps are those in a row that a decay rate held; facts are about the
+   * decisions; t_error is the largest of what is ``hidden`` of events that move a state by more than the tolerance. */
+  double since, length, shortened, held_length, t_error;
+  int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history, hits, kept;
+  int32_t where, repelling, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
+  Met met;
   Happened past[HISTORY];
-  double size, time_size, length, shortened, held_length, hold; /* hold: the step's end before zeros of a guard that are not told apart */
-  int32_t over, length_mode, active_count, several_count, several[SEVERAL];
+  int32_t several[SEVERAL];
+  double size, time_size, hold; /* hold: the step's end before zeros of a guard that are not told apart */
   Expansion e, trial;
-  Continuation chosen, one, first, rest, found;
+  Continuation chosen, found;
   Decision *decision;
-  int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
+  int32_t dependent; /* the last mode whose unknowns are not unique */
   int32_t turned_mode; /* the mode of start_mode, whose guards of stability begin with the signs ``turned`` */
   Output out;
-  int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
+  int64_t stamp, room; /* of the section, and samples kept: in the row of the results */
   const double *times, *read_at; /* times of samples in the row; times at which any run is read */
   int64_t read_count;
   double *sample_t, *sample_x;
   Equations equations;
-  double t_error; /* the largest of what is ``hidden`` of events that move a state by more than the tolerance */
-  int32_t shown, has_roots, held_steps, wants_program; /* held_steps: steps in a row that a decay rate held */
+  int32_t shown, has_roots;
   Implicit *implicit;
   const Expansion *expansion;
   void *arena;
@@ -255,23 +260,6 @@ typedef struct {
   int8_t (*side)(const Run *r, int i, double h); /* letter off its zero, where it has two by the present one */
   void (*serve)(Run *r, int row); /* at the zero of a guard */
 } Law;
-
-static const Law *law_of(const Run *r, int i);
-static void add_branches(const Run *r, Layout *l);
-static double branch_scale(const Run *r, const Layout *l, int row);
-static void branch_row(const Run *r, const Layout *l, int row, int count, double *g);
-static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns);
-static void aim_again(Run *r, const Expansion *e);
-static void begin_sets(Run *r, Expansion *e, const double *unknowns);
-static int begin_directions(Run *r, Expansion *e);
-static void follow_sets(Run *r, Expansion *e, int k);
-static void leave_sets(Run *r, Expansion *e, int k);
-static void close_sets(Run *r, Expansion *e, int k);
-static void direction_bounds(const Run *r, const Expansion *e, double *last, double *before);
-static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h);
-static void measure_limits(Run *r, Expansion *e);
-static void keep_carried(const Run *r, const int8_t *letter, double *unknowns);
-static void prepare_implicit(Run *r);
 
 static void finish(Run *r, int status, int reason, int where) {
   if (r->status == RUNNING) { r->status = status; r->reason = reason; r->where = where; }

@@ -306,10 +306,6 @@ static int leading(Run *r, Expansion *e, int row, int zeros, double *value) {
   return r->order + 1;
 }
 
-static double sure_root(Run *r, const Expansion *e, int row, const double *c, int n, double h, double from, int drop,
-                        int known);
-static double sure_crossing(Run *r, const Expansion *e, int row, int drop, double h, int direction);
-
 static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   const double *g = e->guards + (int64_t)row * r->stride, *c = g + drop;
   int kind = e->l.kind[row];

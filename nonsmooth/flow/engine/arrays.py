@@ -65,7 +65,7 @@ class Run:
     sample_x: Array  # (K, n): states at the times to be read before the end, unless it is dense
     event_count: int  # without the end
     make_happened: Callable[[], Happened]  # events and segments, when they are first read
-    few: Mapping[str, NDArray[Any]] | None  # what the driver wrote, if events and steps are few
+    few: Any  # arrays by name, what the driver wrote, if events and steps are few
 
     @cached_property
     def happened(self) -> Happened:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from .arrays import Run, guard_of
 
 def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> Trajectory:
     """Convert a run."""
-    status, few = Status(run.status), run.few or None
+    status, few = Status(run.status), run.few
     limit = None if math.isnan(run.limit) else run.limit
     events = Events.when_read(
         partial(_events, system, run), few and partial(_few_events, system, run)
@@ -63,13 +64,14 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
 
 def _few_events(system: FilippovSystem, run: Run) -> list[Event]:
     """Events of a short run, one by one."""
-    n, own, found, kept = system.dimension, run.few or {}, list[Event](), len(run.motion) > 0
+    own, n, kept = run.few, system.dimension, len(run.motion) > 0
     columns = (own[f"event_{name}"].tolist() for name in ("kind", "before", "after", "guard"))
-    keys, times = [*zip(*columns, strict=True)], own["event_t"].tolist()
-    for k, (label, t) in enumerate(zip(_labels(system, run, keys), times, strict=True)):
-        x, after = (own[name][k, :n].copy() for name in ("event_x", "event_after_x"))
-        motion = own["event_motion"][k].copy() if run.dense else NOT_KEPT
-        found.append(label.event(t, x, after, motion if kept else None))
+    labels, times = _labels(system, run, [*zip(*columns, strict=True)]), own["event_t"].tolist()
+    before, after = (own[name][:, :n].copy() for name in ("event_x", "event_after_x"))
+    motions: Any = repeat(None if not kept else NOT_KEPT, len(labels))
+    if kept and run.dense:
+        motions = own["event_motion"].copy()
+    found = [*map(Label.event, labels, times, before, after, motions)]
     last = run.motion if kept else None
     if run.status != Status.STOPPED:
         end, x = float(run.t[-1]), run.x[-1].copy()
@@ -129,7 +131,7 @@ def _label(system: FilippovSystem, kind: int, before: str, after: str, code: int
 
 def _few_segments(system: FilippovSystem, run: Run) -> list[Segment]:
     """Segments of a short run, one by one."""
-    own = run.few or {}
+    own = run.few
     modes = (own["step_mode"] & ~IMPLICIT_STEP).tolist()
     starts, end = own["start"].tolist(), float(run.t[-1])
     shown, discrete = run.letters, len(system.definition.discrete)

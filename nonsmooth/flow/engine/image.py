@@ -7,54 +7,27 @@ module's memory adds where it is.
 from __future__ import annotations
 
 import ctypes
-import struct
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from .structures import structure
 from .tape import TapeEngine
 
-_POINTER = ctypes.c_void_p
-
-
-@dataclass(frozen=True)
-class Layout:
-    """A structure with addresses of 4 bytes: its size and alignment, and of each field the offset and the kind.
-
-    A kind is a code of ``struct``, ``P`` for an address, or the layout of a structure inside.
-    """
-
-    size: int
-    align: int
-    fields: dict[str, tuple[int, str | Layout]]
-
-
-def layout_of(own: type[ctypes.Structure]) -> Layout:
-    """Lay out a structure of ctypes for a machine of 32 bits."""
-    at, widest, fields = 0, 1, dict[str, tuple[int, str | Layout]]()
-    for name, kind, *_ in own._fields_:
-        inner: str | Layout
-        if kind is _POINTER:
-            size = align = 4
-            inner = "P"
-        elif issubclass(kind, ctypes.Structure):
-            inner = layout_of(kind)
-            size, align = inner.size, inner.align
-        else:
-            size = align = ctypes.sizeof(kind)
-            inner = str(cast(Any, kind)._type_)
-        at = _up(at, align)
-        fields[name] = (at, inner)
-        at, widest = at + size, max(widest, align)
-    return Layout(_up(at, widest), widest, fields)
+#: An address there.
+_ADDRESS = ctypes.c_uint32
 
 
 def exchanged() -> dict[str, dict[str, Any]]:
-    """Layouts of what a page writes for the driver, for JSON."""
-    found = {name: layout_of(structure(name)) for name in ("Options", "Batch", "Output")}
-    return {name: {"size": own.size, "fields": own.fields} for name, own in found.items()}
+    """Sizes of what a page writes for the driver, and of each field the offset and the kind, for JSON."""
+    found = dict[str, dict[str, Any]]()
+    for name in ("Options", "Batch", "Output"):
+        own: Any = structure(name, _ADDRESS)
+        kinds = {field: "P" if kind is _ADDRESS else kind._type_ for field, kind in own._fields_}
+        fields = {field: (getattr(own, field).offset, kind) for field, kind in kinds.items()}
+        found[name] = {"size": ctypes.sizeof(own), "fields": fields}
+    return found
 
 
 @dataclass
@@ -76,43 +49,43 @@ class Image:
 def image_of(engine: TapeEngine) -> Image:
     """Write a system as an image."""
     system, blocks = engine.blocks()
-    layout, image, known = layout_of(type(system)), Image(), dict[int, int]()
+    image, known = Image(), dict[int, int]()
 
     def room(size: int) -> int:
-        at = _up(len(image.bytes), 8)
+        at = -(-len(image.bytes) // 8) * 8
         image.bytes.extend(bytes(at + size - len(image.bytes)))
         return at
+
+    def put(content: bytes, at: int) -> None:
+        image.bytes[at : at + len(content)] = content
 
     def placed(address: int) -> int:
         if address not in known:
             block = blocks[address]
             if isinstance(block, (ctypes.Structure, ctypes.Array)):
                 several = [*block] if isinstance(block, ctypes.Array) else [block]
-                inner = layout_of(type(several[0]))
-                known[address] = room(inner.size * len(several))
+                size = ctypes.sizeof(structure(type(several[0]).__name__, _ADDRESS))
+                known[address] = room(size * len(several))
                 for k, one in enumerate(several):
-                    write(one, inner, known[address] + k * inner.size)
+                    put(bytes(narrow(one, known[address] + k * size)), known[address] + k * size)
             else:
                 content = np.ascontiguousarray(block).tobytes()
                 known[address] = room(len(content) + 8)  # an empty array has a place too
-                image.bytes[known[address] : known[address] + len(content)] = content
+                put(content, known[address])
         return known[address]
 
-    def write(own: ctypes.Structure, layout: Layout, base: int) -> None:
-        for name, (at, kind) in layout.fields.items():
-            value = getattr(own, name)
-            if isinstance(kind, Layout):
-                write(value, kind, base + at)
-            elif kind == "P":
-                if value:
-                    image.places.append(base + at)
-                    struct.pack_into("<I", image.bytes, base + at, placed(value))
-            else:
-                struct.pack_into("<" + kind, image.bytes, base + at, value)
+    def narrow(own: ctypes.Structure, base: int) -> ctypes.Structure:
+        made: Any = structure(type(own).__name__, _ADDRESS)()
+        for name, kind, *_ in own._fields_:
+            value, at = getattr(own, name), base + getattr(type(made), name).offset
+            if isinstance(value, ctypes.Structure):
+                value = narrow(value, at)
+            elif kind is ctypes.c_void_p and value:
+                image.places.append(at)
+                value = placed(value)
+            setattr(made, name, value or 0)
+        return made
 
-    write(system, layout, room(layout.size))
+    room(ctypes.sizeof(structure(type(system).__name__, _ADDRESS)))
+    put(bytes(narrow(system, 0)), 0)
     return image
-
-
-def _up(at: int, align: int) -> int:
-    return -(-at // align) * align

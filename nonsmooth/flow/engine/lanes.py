@@ -6,13 +6,14 @@ import ctypes
 import math
 import threading
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ...model import Array, FilippovSystem
 from ..options import Options
-from ..results import Chunk, Stopped
-from .arrays import BURST, batch_of, options_of
+from ..results import Chunk
+from .arrays import BURST
 from .building.build import build
 from .building.codegen import lanes_source, supports_lanes
 from .building.compilers import lane_width
@@ -55,44 +56,23 @@ class Lanes:
     ) -> Chunk:
         """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
         # The driver takes steps that are not clear.
-        chunk = out or Chunk.empty(len(x), self.system, at is not None)
-        chunk.forget()
-        x, p = np.ascontiguousarray(x, float), np.ascontiguousarray(p, float)
-        padded = np.append(p, np.zeros((*p.shape[:-1], 1)), axis=-1)
-        c_options = options_of(self.system, options, dense=False, at=at)
-        tape = tape_for(self.system, options)
-        assert tape is not None
-        with tape.held_table() as table, tape.held_run(table) as run:
-            tree = core_library().lanes_tree(run)
-            batch = batch_of(x, padded, options.t_start, chunk, None, None)
-            _call(self.library, batch, c_options, tree, _core(run, self.random), stop)
-            used = np.flatnonzero(np.bincount(chunk.itinerary))
-            chunk.rename(tape.words(table, used.tolist()))
-        return chunk
+        return tape_for(self.system, options).run_many(
+            x, p, options, at, out, stop, None, self._calls
+        )
 
+    def _calls(self, run: int, batch: Any, options: Any) -> Callable[[], int]:
+        """Calls of the lanes, which have a run of the driver."""
+        core = core_library()
+        steps = [ctypes.cast(f, ctypes.c_void_p).value for f in (core.core_begin, core.core_step)]
+        given = structure("Core")(run, *steps, self.random)
+        memory = np.zeros(self.library.many_size() + 64, np.uint8)
+        state = memory.ctypes.data + -memory.ctypes.data % 64
+        call = (state, batch, options, core.lanes_tree(run), ctypes.byref(given), BURST)
 
-def _call(
-    library: ctypes.CDLL,
-    batch: ctypes.Structure,
-    options: ctypes.Structure,
-    tree: int,
-    core: ctypes.Structure,
-    stop: Callable[[], bool],
-) -> None:
-    memory = np.zeros(library.many_size() + 64, np.uint8)
-    state = memory.ctypes.data + -memory.ctypes.data % 64
-    call = (state, ctypes.byref(batch), ctypes.byref(options), tree, ctypes.byref(core), BURST)
-    while library.run_many(*call):
-        if stop():
-            raise Stopped
+        def more(_: Any = (memory, given)) -> int:  # which live as long as this
+            return int(self.library.run_many(*call))
 
-
-def _core(run: int, random: int) -> ctypes.Structure:
-    """The driver as C of the lanes calls it."""
-    begin, step = core_library().core_begin, core_library().core_step
-    return structure("Core")(
-        run, *[ctypes.cast(f, ctypes.c_void_p).value for f in (begin, step)], random
-    )
+        return more
 
 
 def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:

@@ -17,27 +17,31 @@ from ..trajectory import Steps
 from .arrays import Happened, address
 from .structures import structure
 
-#: Arrays in the order of C's pointers: type, and what there is one of for each entry.
-_ARRAYS = {
-    "start": (float, "step"),
-    "coefficients": (float, "step"),
-    "point_t": (float, "point"),
-    "point_x": (float, "point"),
-    "event_t": (float, "event"),
-    "event_x": (float, "event"),
-    "event_after_x": (float, "event"),
-    "event_motion": (float, "event"),
-    "step_mode": (np.int32, "step"),
-    "event_kind": (np.int32, "event"),
-    "event_before": (np.int32, "event"),
-    "event_after": (np.int32, "event"),
-    "event_guard": (np.int32, "event"),
+#: Arrays in the order of C's pointers: type, and what there is one of for each entry; those of floats first.
+_ARRAYS: dict[str, tuple[type, int]] = {
+    "start": (float, STEP := 0),
+    "coefficients": (float, STEP),
+    "point_t": (float, POINT := 1),
+    "point_x": (float, POINT),
+    "event_t": (float, EVENT := 2),
+    "event_x": (float, EVENT),
+    "event_after_x": (float, EVENT),
+    "event_motion": (float, EVENT),
+    "step_mode": (np.int32, STEP),
+    "event_kind": (np.int32, EVENT),
+    "event_before": (np.int32, EVENT),
+    "event_after": (np.int32, EVENT),
+    "event_guard": (np.int32, EVENT),
 }
 
-#: What there is several of, and room for at first; blocks of larger runs grow from there.
-_FIRST = {"step": 64, "point": 128, "event": 64}
+#: Numbers of steps, points and events.
+Rooms = tuple[int, int, int]
+#: Room for them at first; the block of a larger run grows from there.
+_FIRST: Rooms = (64, 128, 64)
+#: What C needs to be free before a step.
+_NEEDED: Rooms = (2, 4, 4)
 
-#: Largest block that is given to a run since an earlier one needed it, and largest that grows (bytes).
+#: Most bytes of polynomials that are given to a run since an earlier one needed them, largest block that grows.
 _GIVEN, _LARGEST = 1 << 26, 1 << 22
 #: How blocks grow: pages that are not written cost nothing.
 _MUCH = 16
@@ -45,104 +49,116 @@ _MUCH = 16
 #: Events and points that are read one by one.
 _FEW = 200
 
-#: Rows of all arrays that C needs to be free before a step.
-_NEEDED = {"step": 2, "point": 4, "event": 4}
 
-Rooms = Mapping[str, int]
+def written_arrays() -> dict[str, tuple[int, str]]:
+    """Bytes of a number of each array that the driver writes, and what there is one of for each entry."""
+    return {
+        name: (np.dtype(dtype).itemsize, ("step", "point", "event")[kind])
+        for name, (dtype, kind) in _ARRAYS.items()
+    }
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _layout(
-    n: int, order: int, motion: int
-) -> tuple[dict[str, tuple[int, tuple[int, ...]]], dict[str, int]]:
-    """For each array the bytes before it in its block, by room, and its shape; bytes of each kind."""
+    n: int, order: int, motion: int, rooms: Rooms
+) -> tuple[dict[str, tuple[int, type, tuple[int, ...], int]], list[int], int]:
+    """Of each array what it is of, type, shape of an entry and place in a block; the places; the block's bytes."""
     shapes: dict[str, tuple[int, ...]] = {
         "coefficients": (n, order + 1),
         **dict.fromkeys(("point_x", "event_x", "event_after_x"), (n,)),
         "event_motion": (motion,),
     }
-    used, places = dict.fromkeys(_FIRST, 0), {}
-    for name, (dtype, kind) in _ARRAYS.items():  # those of floats first
+    arrays, used = dict[str, tuple[int, type, tuple[int, ...], int]](), 0
+    for name, (dtype, kind) in _ARRAYS.items():
         shape = shapes.get(name, ())
-        places[name] = used[kind], shape
-        used[kind] += math.prod(shape) * (8 if dtype is float else 4)
-    return places, used
-
-
-def written_arrays() -> dict[str, tuple[int, str]]:
-    """Bytes of a number of each array that the driver writes, and what there is one of for each entry."""
-    return {name: (8 if dtype is float else 4, kind) for name, (dtype, kind) in _ARRAYS.items()}
+        arrays[name] = kind, dtype, shape, used
+        used += rooms[kind] * math.prod(shape) * np.dtype(dtype).itemsize
+    return arrays, [place for *_, place in arrays.values()], used
 
 
 class Output:
-    """A block of memory for each of steps, points and events, which the driver fills."""
+    """A block of memory that the driver fills with steps, points and events."""
 
     def __init__(self, n: int, order: int, rooms: Rooms = _FIRST, motion: int = 0):
-        self.motion = motion
-        self._places, self._sizes = _layout(n, order, motion)
-        self._rooms = {
-            kind: max(least, min(rooms[kind], _GIVEN // self._sizes[kind]))
-            for kind, least in _FIRST.items()
-        }
-        self._blocks = {kind: self._block(kind) for kind in _FIRST}
+        self.motion, self._sizes = motion, (n, order, motion)
+        most = _GIVEN // (8 * n * (order + 1) + 1)
+        self._allot(tuple(map(max, _FIRST, (min(own, most) for own in rooms))))
         self._point_to((0, 0, 0))
 
-    def _block(self, kind: str) -> NDArray[np.uint8]:
-        return np.empty(self._rooms[kind] * self._sizes[kind], np.uint8)
+    def _allot(self, rooms: Any) -> None:
+        self._rooms: Rooms = rooms
+        self._arrays, self._places, size = _layout(*self._sizes, rooms)
+        self._block = np.empty(size, np.uint8)
 
     def _point_to(self, counts: Sequence[int]) -> None:
-        first = {kind: address(block) or 0 for kind, block in self._blocks.items()}
-        rooms, places = self._rooms, self._places
-        at = [first[own] + rooms[own] * places[name][0] for name, (_, own) in _ARRAYS.items()]
-        self.pointer = ctypes.byref(structure("Output")(*counts, *rooms.values(), *at))
+        first = address(self._block) or 0
+        at = [first + place for place in self._places]
+        self.pointer = ctypes.byref(structure("Output")(*counts, *self._rooms, *at))
 
-    def full(self, counts: Sequence[int]) -> dict[str, bool]:
-        """Kinds without room for another step, and whether their blocks may grow."""
-        return {
-            kind: _MUCH * self._blocks[kind].nbytes < _LARGEST
-            for kind, size in zip(_FIRST, counts, strict=True)
-            if size + _NEEDED[kind] > self._rooms[kind]
-        }
-
-    def written(self, counts: Sequence[int]) -> dict[str, NDArray[Any]]:
-        """Arrays of what was written, views of the blocks."""
-        sizes = dict(zip(_FIRST, counts, strict=True))
-        return {
-            name: np.ndarray(
-                (sizes[kind], *self._places[name][1]),
-                dtype,
-                self._blocks[kind],
-                self._rooms[kind] * self._places[name][0],
-            )
-            for name, (dtype, kind) in _ARRAYS.items()
-        }
-
-    def own(self, written: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-        """Copies where nearly all of a block would be kept for nothing."""
-        found = dict(written)
-        for name, (_, kind) in _ARRAYS.items():
-            if self._rooms[kind] > _FIRST[kind] and _MUCH * len(found[name]) < self._rooms[kind]:
-                found[name] = found[name].copy()
+    def written(self, counts: Sequence[int]) -> Written:
+        """What was written; a copy where nearly all of a large block would be kept for nothing."""
+        found = Written(self._block, self._arrays, counts)
+        few = all(_MUCH * size < room for size, room in zip(counts, self._rooms, strict=True))
+        if few and self._rooms != _FIRST:
+            arrays, _, size = _layout(*self._sizes, (counts[0], counts[1], counts[2]))
+            copy = Written(np.empty(size, np.uint8), arrays, counts)
+            for name in _ARRAYS:
+                copy[name][...] = found[name]
+            return copy
         return found
 
-    def begin_with(self, rest: dict[str, NDArray[Any]], growing: Sequence[str] = ()) -> None:
-        """Go on in blocks with this content, larger ones for ``growing`` and where half is taken."""
+    def full(self, counts: Sequence[int]) -> list[bool]:
+        """Whether steps, points and events have no room for another step."""
+        return [a + b > c for a, b, c in zip(counts, _NEEDED, self._rooms, strict=True)]
+
+    @property
+    def grows(self) -> bool:
+        """Whether the block is small enough to grow."""
+        return _MUCH * self._block.nbytes < _LARGEST
+
+    def begin_with(
+        self, rest: dict[str, NDArray[Any]], growing: Sequence[bool] = (False,) * 3
+    ) -> None:
+        """Go on in a block with this content, larger for what is ``growing`` and where half is taken."""
         rest = {name: array.copy() for name, array in rest.items()}
         counts = [len(rest[name]) for name in ("start", "point_t", "event_t")]
-        for kind, count in zip(_FIRST, counts, strict=True):
-            if kind in growing or 2 * (count + _NEEDED[kind]) > self._rooms[kind]:
-                self._rooms[kind] *= _MUCH if kind in growing else 2
-                self._blocks[kind] = self._block(kind)
-        for name, array in self.written(counts).items():
-            array[...] = rest[name]
+        rooms = tuple(
+            room * (_MUCH if grows else 2 if 2 * (count + needed) > room else 1)
+            for room, count, needed, grows in zip(
+                self._rooms, counts, _NEEDED, growing, strict=True
+            )
+        )
+        if rooms != self._rooms:
+            self._allot(rooms)
+        written = Written(self._block, self._arrays, counts)
+        for name, array in rest.items():
+            written[name][...] = array
         self._point_to(counts)
 
 
+class Written:
+    """Arrays of what was written, by name: views of a block, each made when it is read."""
+
+    def __init__(
+        self,
+        block: NDArray[np.uint8],
+        arrays: Mapping[str, tuple[int, type, tuple[int, ...], int]],
+        counts: Sequence[int],
+    ):
+        self._block, self._arrays, self.counts = block, arrays, counts
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        kind, dtype, shape, place = self._arrays[name]
+        return np.ndarray((self.counts[kind], *shape), dtype, self._block, place)
+
+
+_Arrays = Written | dict[str, NDArray[Any]]
+
+
 def rooms_of(counts: Sequence[int]) -> Rooms:
-    """Room for a run of so many steps, points and events."""
-    return {
-        kind: count + needed for (kind, needed), count in zip(_NEEDED.items(), counts, strict=True)
-    }
+    """Room for a run of so many steps, points and events: powers of two, of which few are different."""
+    steps, points, events = map(max, _FIRST, (1 << (c + 4).bit_length() for c in counts))
+    return steps, points, events
 
 
 class Growing:
@@ -180,20 +196,17 @@ class Recorder:
         self._mode, self._counts = -1, np.zeros(3, np.int64)
         self._times = np.zeros(0) if read_at is None or dense else read_at
         self._samples: list[Array] = []
-        self._last = Steps()
+        self._last: Steps | None = None
 
     def make_room(self, counts: Sequence[int]) -> None:
         """Take out what was written, or give the driver larger blocks as long as they are small."""
         own, full = self.output.written(counts), self.output.full(counts)
-        if all(full.values()):
-            self.output.begin_with(own, [*full])
+        if self.output.grows:
+            self.output.begin_with({name: own[name] for name in _ARRAYS}, full)
             return
         now = own["point_t"][-1]
-        ends = {
-            "step": counts[0],
-            "point": int(np.searchsorted(own["point_t"], now, side="left")),
-            "event": int(np.searchsorted(own["event_t"], now, side="left")),
-        }
+        at_end = [own[name].searchsorted(now, side="left") for name in ("point_t", "event_t")]
+        ends = (counts[STEP], *map(int, at_end))
         taken = {name: own[name][: ends[kind]] for name, (_, kind) in _ARRAYS.items()}
         found = self._steps(taken, now)
         self._keep(found | self._happened(taken, found["x"]))
@@ -207,37 +220,34 @@ class Recorder:
 
     def finished(self, counts: Sequence[int]) -> dict[str, Any]:
         """Return the arrays of the whole run, as ``Run`` has them."""
-        own, before = self.output.written(counts), len(self._kept) > 0
+        own: _Arrays = self.output.written(counts)
         total = [one + more for one, more in zip(self._counts.tolist(), counts, strict=True)]
         self.rooms = rooms_of(total)
         now = float(own["point_t"][-1])
-        own = own if before else self.output.own(own)
         found = self._steps(own, now)
         if not self._dense:
-            steps = ("start", "step_mode")
-            own |= {name: own[name].copy() for name in steps}
-            own["coefficients"] = own["coefficients"][:0].copy()
-        if before:
+            copies = {name: own[name].copy() for name in _ARRAYS if name != "coefficients"}
+            own = copies | {"coefficients": own["coefficients"][:0].copy()}
+            found |= {"t": own["point_t"], "x": own["point_x"][:, : self._n]}
+            found |= {"starts": np.zeros(0), "implicit": np.zeros(0, bool)}
+            found["coefficients"] = own["coefficients"]
+        if not self._kept:
+            happened, few = partial(self._read, own, found["x"], now), max(total[1:]) <= _FEW
+        else:
             self._keep(found | self._happened(own, found["x"]))
             self._keep(self._end(now))
             found = {name: growing.array() for name, growing in self._kept.items()}
-            whole = self._whole(found)
-        names = ("starts", "coefficients", "implicit")
-        empty = {
-            "starts": np.zeros(0),
-            "coefficients": own["coefficients"],
-            "implicit": np.zeros(0, bool),
-        }
-        return {name: found.get(name, empty.get(name)) for name in ("t", "x", *names)} | {
+            whole, few = self._whole(found), False
+            happened = partial(lambda: whole)
+        names = ("t", "x", "starts", "coefficients", "implicit")
+        return {name: found[name] for name in names} | {
             "sample_x": np.vstack(self._samples) if self._samples else found["x"][:0],
             "event_count": total[2],
-            "make_happened": (lambda: whole)
-            if before
-            else partial(self._read, own, found["x"], now),
-            "few": None if before or max(total[1:]) > _FEW else own,
+            "make_happened": happened,
+            "few": own if few else None,
         }
 
-    def _read(self, own: dict[str, NDArray[Any]], x: Array, now: float) -> Happened:
+    def _read(self, own: _Arrays, x: Array, now: float) -> Happened:
         """Events and segments of a run that fits into the blocks."""
         found = {"x": x} | self._happened(own, x)
         end = self._end(now)
@@ -266,7 +276,7 @@ class Recorder:
         states = np.vstack([x, *self._apart]) if self._apart else x
         return Happened(states=states, keys=[*self._keys], **{name: found[name] for name in names})
 
-    def _steps(self, own: dict[str, NDArray[Any]], now: float) -> dict[str, NDArray[Any]]:
+    def _steps(self, own: _Arrays, now: float) -> dict[str, NDArray[Any]]:
         """Points and steps before ``now``; without dense output the samples there."""
         found = {"t": own["point_t"], "x": own["point_x"][:, : self._n]}
         if self._dense:
@@ -276,7 +286,7 @@ class Recorder:
         self._sample(Steps(own["start"], own["coefficients"]), now)
         return found
 
-    def _happened(self, own: dict[str, NDArray[Any]], x: Array) -> dict[str, NDArray[Any]]:
+    def _happened(self, own: _Arrays, x: Array) -> dict[str, NDArray[Any]]:
         """Events and changes of the mode, which follow on those before."""
         modes, found = own["step_mode"] & ~IMPLICIT_STEP, self._events(own, x)
         changes = np.flatnonzero(modes[1:] != modes[:-1]) + 1
@@ -291,7 +301,7 @@ class Recorder:
         self._counts += len(modes), len(x), len(own["event_t"])
         return found
 
-    def _events(self, own: dict[str, NDArray[Any]], x: Array) -> dict[str, NDArray[Any]]:
+    def _events(self, own: _Arrays, x: Array) -> dict[str, NDArray[Any]]:
         """Rows of the states of events among the points, and numbers of their labels."""
         t, before, after = (own[f"event_{name}"] for name in ("t", "x", "after_x"))
         before, after = before[:, : self._n], after[:, : self._n]
@@ -316,7 +326,7 @@ class Recorder:
             "event_codes": self._codes(own),
         }
 
-    def _codes(self, own: dict[str, NDArray[Any]]) -> NDArray[np.int32]:
+    def _codes(self, own: _Arrays) -> NDArray[np.int32]:
         """Numbers of the different kinds of events, with their modes and guards."""
         columns = [own[f"event_{name}"] for name in ("kind", "before", "after", "guard")]
         if len(columns[0]) < _FEW:
@@ -335,9 +345,9 @@ class Recorder:
         count = int(np.searchsorted(self._times, now, side="left"))
         times, self._times = self._times[:count], self._times[count:]
         begin = steps.starts[0] if len(steps) else math.inf
-        early = int(np.searchsorted(times, begin, side="left")) if len(self._last) else 0
+        early = 0 if self._last is None else int(np.searchsorted(times, begin, side="left"))
         for own, at in ((self._last, times[:early]), (steps, times[early:])):
-            if len(at):
+            if own is not None and len(at):
                 self._samples.append(own.at(at, self._n))
         if len(steps):
             self._last = Steps(steps.starts[-1:].copy(), np.array(steps.coefficients[-1:]))

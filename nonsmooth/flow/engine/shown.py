@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem
-from ...model.definition.pieces import places_of
+from ...model.definition.tables.pieces import places_of
 
 #: Reasons of which ``where`` is a function.
 _OF_FUNCTIONS = (

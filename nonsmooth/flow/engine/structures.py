@@ -10,8 +10,8 @@ from functools import cache
 from .building.core_source import driver_text
 
 #: Sources with structures that Python fills, and with functions of the driver that it calls.
-_STRUCTURES = "common.h programs.h state.c flow.c fixed.c variation.c".split()
-_CALLED = "state.c entry.c fixed.c legs.c".split()
+_STRUCTURES = "common.h programs.h state.c legs/flow.c legs/fixed.c legs/variation.c".split()
+_CALLED = "state.c entry.c legs/fixed.c legs/legs.c".split()
 
 _NUMBERS = {
     "double": ctypes.c_double,
@@ -33,22 +33,27 @@ def bodies() -> Mapping[str, str]:
     return {name: body for body, name in re.findall(r"typedef struct \{([^}]*)\} (\w+);", text)}
 
 
+def structure(name: str, address: type = ctypes.c_void_p) -> type[ctypes.Structure]:
+    """Return a structure of C with a type of addresses."""
+    return _structure(name, address)
+
+
 @cache
-def structure(name: str) -> type[ctypes.Structure]:
-    """Return a structure of C."""
-    fields = [field for line in bodies()[name].split(";") for field in _fields(line.strip())]
+def _structure(name: str, address: type) -> type[ctypes.Structure]:
+    lines = [line.strip() for line in bodies()[name].split(";")]
+    fields = [field for line in lines for field in _fields(line, address)]
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
-def _fields(declaration: str) -> Iterator[tuple[str, type]]:
+def _fields(declaration: str, address: type) -> Iterator[tuple[str, type]]:
     """Names and types of what one declaration declares."""
     if function := re.search(r"\(\*(\w+)\)\(", declaration):
-        yield function[1], ctypes.c_void_p
+        yield function[1], address
     elif declaration:
         kind, names = re.sub(r"\bconst\b", "", declaration).strip().split(None, 1)
         for name in names.split(","):
             is_pointer = "*" in name
-            own = ctypes.c_void_p if is_pointer else _NUMBERS.get(kind) or structure(kind)
+            own = address if is_pointer else _NUMBERS.get(kind) or structure(kind, address)
             yield name.replace("*", "").strip(), own
 
 

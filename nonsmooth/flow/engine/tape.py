@@ -47,6 +47,9 @@ _ENTRIES = tuple(field.name for field in fields(Tape) if field.type == "Entries"
 #: What an address of the driver's structures points to.
 Block = NDArray[Any] | ctypes.Structure | ctypes.Array[Any]
 
+#: Makes what goes on with a batch, from a run of the driver, the batch and its options: 0 where it is done.
+Calls = Callable[[int, Any, Any], Callable[[], int]]
+
 #: Steps by which a run is known to be stiff.
 _PROBED = 400
 
@@ -105,6 +108,10 @@ def values_structure(v: Values, kept: list[NDArray[Any]]) -> ctypes.Structure:
     kept += arrays
     sizes = (*map(len, (v.op, v.still, v.moving, v.free, v.outputs)), int(v.paired.any()))
     return structure("Values")(*sizes, *[a.ctypes.data for a in arrays])
+
+
+#: What a run says at its end.
+_Numbers, _Counts = ctypes.c_double * 4, ctypes.c_int64 * 15
 
 
 class _Held:
@@ -173,53 +180,58 @@ class TapeEngine:
 
     def _structure(self, coupled: Coupled, tape: Tape) -> Any:
         system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
-        made = structure("System")(
-            n=system.extended_dimension,
-            dimension=system.dimension,
-            timed=int(system.time_dependent),
-            m=m,
-            c=c,
-            parameters=len(system.parameter_names),
-            stops=len(system.stops),
-            resets=len(system.resets),
-            order=self.order,
-            slope_outputs=tape.slope_outputs,
-            series=self._series(tape.series, self.order),
-            free=self._series(tape.free, self.order),
-            affine=int(coupled.affine),
-            linear=int(coupled.linearity.everywhere),
-            linear_free=int(coupled.linearity.free),
-        )
-        for name in _VALUES:
-            setattr(made, name, values_structure(getattr(tape, name), self._kept))
-        for name in _ENTRIES:
-            setattr(made, name, self._entries(getattr(tape, name)))
         carries = np.zeros((m, c))
         for i, carried in enumerate(coupled.carriers):
             carries[i, carried] = 1
-        elements = _elements(coupled, self.shown.functions)
-        tables: dict[str, Any] = {
+        elements, linearity = _elements(coupled, self.shown.functions), coupled.linearity
+        table = (structure("Element") * (len(elements) + 1))(*elements)
+        parts: dict[str, Any] = {
+            "n": system.extended_dimension,
+            "dimension": system.dimension,
+            "timed": int(system.time_dependent),
+            "m": m,
+            "c": c,
+            "parameters": len(system.parameter_names),
+            "stops": len(system.stops),
+            "resets": len(system.resets),
+            "order": self.order,
+            "slope_outputs": tape.slope_outputs,
+            "series": self._series(tape.series, self.order),
+            "free": self._series(tape.free, self.order),
+            "affine": int(coupled.affine),
+            "linear": int(linearity.everywhere),
+            "linear_free": int(linearity.free),
             "carries": carries.ravel(),
             "component": tape.component,
             "slope_output": tape.slope_output,
             "slope_moves": tape.slope_moves,
             "slope_symmetric": tape.slope_symmetric,
             "mixed": coupled.mixed.ravel(),
-            "bent": coupled.linearity.bent_rows,
-            "bent_free": coupled.linearity.bent_free_rows,
-            "bent_guards": coupled.linearity.bent_guards,
-            "curved": coupled.linearity.curved_guards,
+            "bent": linearity.bent_rows,
+            "bent_free": linearity.bent_free_rows,
+            "bent_guards": linearity.bent_guards,
+            "curved": linearity.curved_guards,
+            "sets": len(system.sets),
+            "kept_rows": int(coupled.kept.numel()),
+            "joints": len(system.joints),
+            "combined": len(coupled.combined),
+            "impact_law": IMPACT_LAWS.index(system.definition.impact_law),
+            "element": self._at(np.frombuffer(bytes(table), np.uint8)),
+            "tables": len(self.shown.tables),
+            "cells": self._cells(),
+            "rules": self._rules(),
         }
-        made.sets, made.kept_rows = len(system.sets), int(coupled.kept.numel())
-        made.joints, made.combined = len(system.joints), len(coupled.combined)
-        made.impact_law = IMPACT_LAWS.index(system.definition.impact_law)
-        table = (structure("Element") * (len(elements) + 1))(*elements)
-        made.element = self._at(np.frombuffer(bytes(table), np.uint8))
-        made.tables, made.cells = len(self.shown.tables), self._cells()
-        for name, values in tables.items():
-            setattr(made, name, self._at(np.array([*values, 0], np.int32)))
-        made.rules = self._rules()
-        return made
+        for name in _VALUES:
+            parts[name] = values_structure(getattr(tape, name), self._kept)
+        for name in _ENTRIES:
+            parts[name] = self._entries(getattr(tape, name))
+        return self._filled("System", parts)
+
+    def _filled(self, name: str, parts: Mapping[str, Any]) -> Any:
+        """A structure of numbers, structures, and rows of integers by their addresses."""
+        rows = {k: v for k, v in parts.items() if isinstance(v, (list, np.ndarray))}
+        own = {k: self._at(np.array([*v, 0], np.int32)) for k, v in rows.items()}
+        return structure(name)(**{**parts, **own})
 
     def _cells(self) -> int:
         """Tables as C reads them, by their functions."""
@@ -262,18 +274,16 @@ class TapeEngine:
         atoms, keeps = d.guards.numel(), any(rule.at_trigger for rule in d.rules)
         width = 1 + (5 + 4 * atoms + len(conditions) + 3 * len(d.clocks)) * (atoms > 0)
         width += len(conditions) * self.system.extended_dimension * keeps
-        made: Any = structure("Rules")(
-            atoms=atoms,
-            triggers=len(conditions),
-            clocks=len(d.clocks),
-            discrete=len(d.discrete),
-            keeps=int(keeps),
-            width=width,
-        )
-        for name, table in tables.items():
-            setattr(made, name, self._at(np.array([*table, 0], np.int32)))
-        made.value = self._at(np.array([*[v for own in values for v in own], 0.0], float))
-        return made
+        numbers = {
+            "atoms": atoms,
+            "triggers": len(conditions),
+            "clocks": len(d.clocks),
+            "discrete": len(d.discrete),
+            "keeps": int(keeps),
+            "width": width,
+            "value": self._at(np.array([*chain(*values), 0.0], float)),
+        }
+        return self._filled("Rules", tables | numbers)
 
     def _at(self, array: NDArray[Any]) -> int:
         self._kept.append(array)
@@ -330,8 +340,10 @@ class TapeEngine:
         with self.held_table() as table, self.held_run(table) as state:
             c_options = ctypes.byref(options_of(self.shown.system, options, dense=True))
             given = (address(x), address(p), address(start))
-            library().run_read_at(state, address(read_at), 0 if read_at is None else len(read_at))
-            library().run_remember(state, address(known))
+            if read_at is not None:
+                library().run_read_at(state, address(read_at), len(read_at))
+            if known is not None:
+                library().run_remember(state, address(known))
             library().run_begin(
                 state, c_options, output.pointer, *given, options.t_start, address(motion)
             )
@@ -345,10 +357,11 @@ class TapeEngine:
             recorded = recorder.finished(counts[7:10])
             self._rooms = recorder.rooms if dense else self._rooms  # the next run is often similar
             modes, labels = self._modes(table), self._labels(table)
-            final = np.zeros(width)
-            library().run_motion(state, address(final))
             if width == 1 and options.t_start == 0:  # times of events are known to rounding
-                final = final[:0]
+                width = 0
+            final = np.zeros(width)
+            if width:
+                library().run_motion(state, address(final))
         return Run(
             status=counts[0],
             reason=counts[1],
@@ -416,7 +429,7 @@ class TapeEngine:
         return _Held(state, made.run_free)
 
     def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int], Array]:
-        numbers, counts = (ctypes.c_double * 4)(), (ctypes.c_int64 * 15)()
+        numbers, counts = _Numbers(), _Counts()
         width = self.system.surface_count + len(self.system.impacts)
         active, several = (ctypes.c_int32 * (width + 1))(), (ctypes.c_int32 * SEVERAL)()
         rates = np.empty((SEVERAL, self.system.extended_dimension))
@@ -500,19 +513,20 @@ class TapeEngine:
         out: Chunk | None = None,
         stop: Callable[[], bool] = lambda: False,
         times: Array | None = None,
+        calls: Calls | None = None,
     ) -> Chunk:
-        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
-        # As ``Engine.run_many``, which is faster where many trajectories share a system.
+        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,), by ``calls`` of C."""
         chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
-        x = np.ascontiguousarray(x, float)
-        p = self.shown.with_cells(p)
+        x, p = np.ascontiguousarray(x, float), self.shown.with_cells(p)
         batch = batch_of(x, p, options.t_start, chunk, times, None)
         start, done = self._letters(options.start_mode), np.zeros(1, np.int64)
         c_options = options_of(self.shown.system, options, dense=False, at=at)
+        given = (ctypes.byref(batch), ctypes.byref(c_options))
         with self.held_table() as table, self.held_run(table) as state:
-            call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
-            while status := library().run_many(*call, address(start), BURST):
+            own = lambda: library().run_many(state, address(done), *given, address(start), BURST)
+            more = own if calls is None else calls(state, *given)
+            while status := more():
                 if status == NEEDS_PROGRAM:
                     self.add_implicit()
                 if stop():

@@ -15,7 +15,7 @@ from ..constants import KINDS
 from ..engine.building.compilers import ADVICE, CompilerError, find_compiler
 from ..engine.lanes import lanes_for
 from ..engine.tape import library, tape_for
-from ..options import Options, tolerances
+from ..options import Options
 from ..results import Chunk, Collected, Ensemble
 from ..section import KINDS_OF_SECTIONS, read_sampling, sectioned
 from ..warn import warn_once
@@ -115,20 +115,7 @@ def ensemble(
     >>> many.itinerary.tolist(), [str(ns.Status(s)) for s in many.status]
     (['- s', '+', ''], ['REACHED_END', 'REACHED_END', 'NOT_FINITE'])
     """
-    rtol, atol = tolerances(tol, rtol, atol)
-    options = Options(
-        t_end=t_end,
-        t_start=t_start,
-        rtol=rtol,
-        atol=atol,
-        max_step=max_step,
-        max_steps=max_steps,
-        max_events=max_events,
-        max_jumps=max_jumps,
-        rest_below=rest_below,
-        start_mode=start_mode,
-        method=method,
-    )
+    options = Options.of(locals())
     require_system(system, sets=True, hysteresis=True, complementarity=True, joints=True)
     work = checked_work(work)
     if start_mode is not None:

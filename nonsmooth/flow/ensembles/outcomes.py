@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, require_system, whole
 from ..engine.device.kernel import Bins, Reduced
-from ..options import Options, tolerances
+from ..options import Options
 from ..results import Chunk
 from ..status import Status
 from .chunks import Job
@@ -171,8 +171,7 @@ def outcomes(
     >>> found.status, found.histogram["x"].sum()
     ({<Status.REACHED_END: 0>: 500}, np.int64(500))
     """
-    rtol, atol = tolerances(tol, rtol, atol)
-    options = Options(t_end=t_end, t_start=t_start, rtol=rtol, atol=atol)
+    options = Options.of(locals())
     require_system(system, sets=True, hysteresis=True, complementarity=True, joints=True)
     work = checked_work(work)
     if work.store is not None:

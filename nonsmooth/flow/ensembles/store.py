@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import OptionError
-from .. import files
 from ..results import Chunk
+from ..saving import files
 
 try:
     import fcntl

@@ -71,18 +71,6 @@ class Joints:
     field: Any
 
 
-def read_constraints(given: Any) -> list[Constraint]:
-    """Read ``constraints=``: one, or a sequence of them."""
-    items = [given] if isinstance(given, Constraint) else listed(given)
-    for i, item in enumerate(items):
-        if not isinstance(item, Constraint):
-            raise DefinitionError(
-                f"constraints[{i}]: expected a Constraint, received {item!r} ({type(item).__name__}). Write "
-                "constraints=[nonsmooth.Constraint(function, reaction=...)]."
-            )
-    return items
-
-
 def joints_of(items: Sequence[Constraint], reactions: Sequence[ca.SX], field: ca.SX) -> Joints:
     """Entries of constraints whose function holds no reaction; the others give their reactions at once."""
     functions = [scalar(own.function, f"function of {own.name!r}") for own in items]

@@ -10,7 +10,7 @@ import casadi as ca
 
 from ..cache import Content
 from ..errors import DefinitionError
-from .conditions import Rule, passages
+from .events.conditions import Rule, passages
 from .parse_definition import read_function
 from .system import FilippovSystem
 
@@ -20,10 +20,8 @@ SECTION = "section"
 
 def _changed(system: FilippovSystem, **changes: Any) -> FilippovSystem:
     """A system with some parts of its definition replaced."""
-    changed = FilippovSystem.__new__(FilippovSystem)
-    state = replace(system.definition if "field" in changes else system.written, **changes).state()
-    changed.__setstate__({**state, "lifted": system.lifted})
-    return changed
+    own = system.definition if "field" in changes else system.written
+    return FilippovSystem._of(replace(own, **changes), system.lifted)
 
 
 def reversed_system(system: FilippovSystem) -> FilippovSystem:

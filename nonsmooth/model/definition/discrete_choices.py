@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 
 from ..errors import DefinitionError
-from ..expressions.graph import NOT_SMOOTH, evaluate, instructions, operation
+from ..expressions.graph import NOT_SMOOTH, Expressions, evaluate, instructions, operation, shaped
 
 #: Most combinations of values by which one comparison is replaced.
 _MOST = 1000
@@ -41,23 +41,17 @@ def without_choices(expression: Any, values: Values, what: str) -> Any:
     if all(node.op not in NOT_SMOOTH for node in nodes):
         return expression
     found = evaluate(nodes, _Polynomials(inputs[0], values, what))
-    return ca.reshape(ca.vertcat(*[found[k] for k in rows[0]]), expression.shape)
+    return shaped([expression], [found[k] for k in rows[0]])[0]
 
 
-class _Polynomials:
+class _Polynomials(Expressions):
     """The algebra of expressions in which choices by discrete states are polynomials of these."""
 
     def __init__(self, symbols: ca.SX, values: Values, what: str):
-        self._symbols, self._what = symbols, what
+        super().__init__([symbols])
+        self._what = what
         self._mixed = set[int]()  # conditions of discrete states and of others
         self._values = {s.element_hash(): (s, own) for s, own in values.items()}
-
-    def constant(self, value: float) -> ca.SX:
-        return ca.SX(value)
-
-    def symbol(self, vector: int, position: int) -> ca.SX:
-        del vector
-        return self._symbols[position]
 
     def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
         if op == "if_else_zero" and self._is_discrete(args[:1]):
@@ -65,14 +59,14 @@ class _Polynomials:
         if op == "if_else_zero" and args[0].element_hash() in self._mixed:
             return args[0] * args[1]
         if op in NOT_SMOOTH and self._is_discrete(args):
-            return self._polynomial(operation(op, list(args)))
+            return self._polynomial(operation(op, args))
         if op in _LOGIC and any(
             self._is_discrete([a]) or a.element_hash() in self._mixed for a in args
         ):
             found = _LOGIC[op](*args)
             self._mixed.add(found.element_hash())
             return found
-        return operation(op, list(args))
+        return operation(op, args)
 
     def _is_discrete(self, args: Sequence[ca.SX]) -> bool:
         used = ca.symvar(ca.vertcat(*args))

@@ -41,9 +41,17 @@ import casadi as ca
 
 from ..errors import DefinitionError, NotSmoothError
 from ..expressions.cancel import NormalForms, Sum, ratio, simple_zeros
-from ..expressions.graph import NOT_SMOOTH, POWERS, evaluate, instructions, operation, power_of
-from .curves import Curve, with_curves
-from .pieces import Argument, Sides, Table, twins_of
+from ..expressions.graph import (
+    NOT_SMOOTH,
+    POWERS,
+    Expressions,
+    evaluate,
+    instructions,
+    operation,
+    power_of,
+)
+from .tables.curves import Curve, with_curves
+from .tables.pieces import Argument, Sides, Table, twins_of
 
 
 @dataclass(frozen=True)
@@ -193,22 +201,17 @@ class Switches:
         return tuple(i for i in range(self.states.numel()) if ca.depends_on(h, self.states[i]))
 
 
-class _EvenPowers:
+class _EvenPowers(Expressions):
     """The algebra of expressions in which powers of switching functions are those of their magnitude."""
 
     def __init__(self, switches: Switches):
+        super().__init__(switches.inputs)
         self._switches = switches
-
-    def constant(self, value: float) -> ca.SX:
-        return ca.SX(value)
-
-    def symbol(self, vector: int, position: int) -> ca.SX:
-        return self._switches.inputs[vector][position]
 
     def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
         power = power_of(op, args)
         if power is None or not self._switches.is_found(args[0]):
-            return operation(op, list(args))
+            return operation(op, args)
         return (args[0] * args[0]) ** (power / 2)
 
 

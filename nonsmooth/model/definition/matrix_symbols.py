@@ -118,6 +118,11 @@ def read_dae(dae: Any, parameters: Any, events: Mapping[str, Any]) -> dict[str, 
         )
     given = in_scalar_symbols({**{name: dae.get(name) for name in _OF_DAE}, **events})
     symbols = _entries(given["p"])
+    if not isinstance(parameters, Mapping | None):
+        raise DefinitionError(
+            f"parameters: expected a mapping from names to values, received {parameters!r}. "
+            f"The names are {[str(s) for s in symbols]}."
+        )
     values = {str(k): v for k, v in dict(parameters or {}).items()}
     unknown = sorted(set(values) - {str(s) for s in symbols})
     if unknown:

@@ -9,7 +9,7 @@ k = 2, with drilling friction k = 3. With k = 1 the set is a surface.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import accumulate
 from typing import Any
@@ -26,6 +26,7 @@ from ..reading import (
     Expression,
     Parameters,
     column,
+    items_of,
     listed,
     require_finite,
     require_known,
@@ -35,8 +36,7 @@ from ..reading import (
 )
 from ..values import Array, parameter_values
 from .complementarity import rate_of, require_complementarity
-from .conditions import Atoms, Rule, located, passages
-from .constraints import joints_of, read_constraints, require_constraints
+from .constraints import Constraint, joints_of, require_constraints
 from .elements import (
     Complementarity,
     functions_of,
@@ -46,13 +46,21 @@ from .elements import (
     read_entries,
 )
 from .events import Clock, Impact, Reset, Stop
-from .pieces import Table
-from .read_events import direction_of, read_maps, read_rules, read_when, require_no_endless_level
+from .events.conditions import Atoms, Rule, located, passages
+from .events.read_events import (
+    direction_of,
+    read_maps,
+    read_rules,
+    read_when,
+    require_no_endless_level,
+)
+from .tables.pieces import Table
 
 #: No expressions.
 _NONE = ca.SX(0, 1)
 
-#: Expressions of a definition, in the order in which they are written down.
+#: Symbols of a definition, and its expressions, in the order in which they are written down.
+INPUTS = ("states", "time", "parameters", "multipliers", "reactions")
 OUTPUTS = (
     *("field", "surfaces", "guards", "maps", "gaps", "restitutions"),
     *("whens", "priorities", "periods", "hysteresis"),
@@ -148,6 +156,14 @@ class Definition:
         """Rates of the gaps (c,), in states, parameters and time."""
         return rate_of(self, self.gaps) if self.gaps.numel() else ca.SX(0, 1)
 
+    def frame(self) -> dict[str, Any]:
+        """States, parameters with their defaults, and time, as arguments of a system."""
+        return {
+            "states": listed(self.states),
+            "parameters": dict(zip(listed(self.parameters), self.defaults.values(), strict=True)),
+            "time": self.time if self.time.numel() else None,
+        }
+
     @property
     def names(self) -> dict[str, list[str]]:
         """Names of the states and of the parameters."""
@@ -156,30 +172,17 @@ class Definition:
             "parameters": [s.name() for s in listed(self.parameters)],
         }
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the expressions that are written down: the last only where it has entries."""
-        return OUTPUTS if self.hysteresis.numel() else OUTPUTS[:-1]
-
     def state(self) -> dict[str, Any]:
-        """Plain values from which ``from_state`` makes an equal definition."""
-        inputs = [self.states, self.time, self.parameters, self.multipliers, self.reactions]
-        outputs = [getattr(self, name) for name in self.outputs]
-        some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed, "rules": self.rules}
-        some |= {"clocks": self.clocks, "discrete": self.discrete}
-        some |= {"layer_widths": self.layer_widths, "laws": self.laws}
-        some |= {"complementarity": self.complementarity, "constraints": self.constraints}
-        some |= {"tables": self.tables}
-        some |= {"impact_law": self.impact_law} if self.impact_law != "newton" else {}
+        """Plain values from which ``from_state`` makes an equal definition; defaults are left out."""
+        inputs = [getattr(self, name) for name in INPUTS]
+        outputs = OUTPUTS if self.hysteresis.numel() else OUTPUTS[:-1]
+        plain = {name: getattr(self, name) for name in PLAIN}
         return {
-            **{name: value for name, value in some.items() if value},
-            "definition": ca.Function("definition", inputs, outputs).serialize(),
+            **{name: v for name, v in plain.items() if v != getattr(Definition, name, None)},
+            "definition": ca.Function(
+                "definition", inputs, [getattr(self, n) for n in outputs]
+            ).serialize(),
             "names": [[str(s) for s in listed(v)] for v in inputs],
-            "defaults": self.defaults,
-            "stops": self.stops,
-            "resets": self.resets,
-            "impacts": self.impacts,
-            "hidden": self.hidden,
         }
 
     @classmethod
@@ -189,16 +192,12 @@ class Definition:
         vectors = [ca.vertcat(*map(ca.SX.sym, names)) for names in state["names"]]
         vectors = [v if v.numel() else ca.SX(0, 1) for v in vectors]
         expressions = [ca.SX(e) for e in function.call(vectors)]
-        inputs = ("states", "time", "parameters", "multipliers", "reactions")
-        rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
-        parts = dict(zip((*inputs, *OUTPUTS), (*vectors, *expressions), strict=False))
-        some = ("sizes", "renamed", "rules", "clocks", "discrete", "layer_widths", "laws")
-        tuples: dict[str, Any] = {
-            name: tuple(state.get(name, ()))
-            for name in (*some, "complementarity", "constraints", "tables")
-        }
-        law = state.get("impact_law", "newton")
-        return cls(**parts, **rest, **tuples, impact_law=law)
+        parts = dict(zip((*INPUTS, *OUTPUTS), (*vectors, *expressions), strict=False))
+        return cls(**parts, **{name: state[name] for name in PLAIN if name in state})
+
+
+#: Parts of a definition that are no expressions, and what follows from others.
+PLAIN = tuple(f.name for f in fields(Definition) if f.type not in ("ca.SX", "frozenset[int]"))
 
 
 class _Deferred:
@@ -216,15 +215,18 @@ class _Deferred:
 
 Definition.field = _Deferred()
 
-_DIRECTIONS = (-1, 0, 1)
+
+#: Classes of what a system is made of besides surfaces, their arguments, and how one is written.
+_ELEMENTS: tuple[tuple[Any, ...], ...] = (
+    *((Stop, "stops"), (Reset, "resets"), (Impact, "impacts")),
+    (Complementarity, "complementarity"),
+    (Constraint, "constraints", "function, reaction=..."),
+)
 
 
 def read_definition(
     states: Any,
     *,
-    surface: Any,
-    above: Any,
-    below: Any,
     field: Any,
     multipliers: Any,
     surfaces: Any,
@@ -234,22 +236,25 @@ def read_definition(
     resets: Any,
     impacts: Any,
     hidden: bool,
-    complementarity: Any = (),
-    constraints: Any = (),
-    clocks: Sequence[Clock] = (),
-    discrete: Sequence[tuple[float, ...] | None] = (),
+    complementarity: Any,
+    constraints: Any,
+    clocks: Sequence[Clock],
+    discrete: Sequence[tuple[float, ...] | None],
+    surface: Any = None,
+    above: Any = None,
+    below: Any = None,
     layer_widths: Any = None,
 ) -> Definition:
     """Read and check the arguments of FilippovSystem."""
-    x = _states(states)
-    t, (p, defaults) = _time(time), _parameters(parameters)
+    t = _NONE if time is None else symbols([time], "time")
+    x, (p, defaults) = symbols(states, "states"), _parameters(parameters)
+    if x.numel() == 0:
+        raise DefinitionError("states: expected at least one symbol, received none.")
     entries = read_entries(surface, surfaces)
     sizes = tuple(len(entry.functions) for entry in entries)
     lam, f = _multipliers_and_field(entries, above, below, field, multipliers, x.numel())
-    widths = _widths(layer_widths, sum(sizes))
-    given = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
-    given.append((complementarity, Complementarity, "complementarity"))
-    items = [*[_items(*one) for one in given], read_constraints(constraints)]
+    given = (stops, resets, impacts, complementarity, constraints)
+    items = [items_of(values, *own) for values, own in zip(given, _ELEMENTS, strict=True)]
     (stops, resets, impacts, conditions, joined), renamed = _distinct(items, _own_names(sizes))
     reactions, f = _reactions(impacts, "gap", x, t, f)
     _require_one_field(above, joined)
@@ -270,7 +275,7 @@ def read_definition(
         hidden=hidden or any(entry.hidden for entry in entries),
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
-        layer_widths=(*widths, *[1.0] * len(own)) if widths else (),
+        layer_widths=_widths(layer_widths, sum(sizes) - len(own), len(own)),
         constraints=joints.names,
         laws=laws_of(entries),
         hysteresis=hysteresis_of(entries),
@@ -298,10 +303,6 @@ def _multipliers_and_field(
     return lam, f
 
 
-def _time(time: Any) -> ca.SX:
-    return ca.SX(0, 1) if time is None else symbols([time], "time")
-
-
 def _require_one_field(above: Any, constraints: Sequence[Any]) -> None:
     """Refuse reactions of constraints in two fields."""
     if above is not None and any(own.reaction is not None for own in constraints):
@@ -309,13 +310,6 @@ def _require_one_field(above: Any, constraints: Sequence[Any]) -> None:
             "constraints: their reactions are in above= and below=, of which one holds at a time. Give field= with "
             "multipliers= and surfaces=, which holds them once."
         )
-
-
-def _states(states: Any) -> ca.SX:
-    x = symbols(states, "states")
-    if x.numel() == 0:
-        raise DefinitionError("states: expected at least one symbol, received none.")
-    return x
 
 
 def _contacts(impacts: Sequence[Impact]) -> dict[str, Any]:
@@ -338,6 +332,7 @@ def _events(
     p: ca.SX,
 ) -> dict[str, Any]:
     """Parts of a definition that stops, resets, clocks and discrete states make."""
+    _require_directions([*stops, *resets])
     maps, named = read_maps(resets, x)
     moving = ca.vertcat(x[: x.numel() - len(discrete)], t)
     atoms = Atoms(ca.vertcat(x, t), moving, p)
@@ -384,8 +379,8 @@ def _of_impacts(impacts: Sequence[Any], what: str) -> ca.SX:
     return ca.vertcat(*[column([getattr(i, what)], f"{what} of {i.name!r}", 1) for i in impacts])
 
 
-def _widths(values: Any, count: int) -> tuple[float, ...]:
-    """Widths of the layers of the surfaces; nothing where they are equal."""
+def _widths(values: Any, count: int, more: int) -> tuple[float, ...]:
+    """Widths of the layers of the surfaces, and of more functions that have none; nothing where they are equal."""
     if values is None:
         return ()
     widths = tuple(real(v, "layer_widths") for v in listed(values))
@@ -394,7 +389,16 @@ def _widths(values: Any, count: int) -> tuple[float, ...]:
             f"layer_widths is {values!r}, but the system has {count} switching functions. Give a "
             "positive number for each."
         )
-    return widths if len(set(widths)) > 1 else ()
+    return (*widths, *[1.0] * more) if len(set(widths)) > 1 else ()
+
+
+def _require_directions(events: Sequence[Stop | Reset]) -> None:
+    for event in events:
+        if isinstance(event.direction, bool) or event.direction not in (-1, 0, 1):
+            raise DefinitionError(
+                f"direction of {event.name!r}: expected -1 (falling), 0 (both) or 1 (rising), "
+                f"received {event.direction!r}."
+            )
 
 
 def _one_multiplier_each(lam: ca.SX, h: ca.SX) -> None:
@@ -431,26 +435,6 @@ def _parameters(
         for s, v in zip(given, values, strict=True)
     }
     return p, defaults
-
-
-def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
-    """Read stops=, resets=, impacts= or complementarity=: one, or a sequence of them."""
-    items = [values] if isinstance(values, kind) else listed(values)
-    for i, item in enumerate(items):
-        if not isinstance(item, kind):
-            raise DefinitionError(
-                f"{what}[{i}]: expected a {kind.__name__}, received {item!r} "
-                f"({type(item).__name__}). Write {what}=[nonsmooth.{kind.__name__}(function, "
-                "...)]."
-            )
-        if kind in (Impact, Complementarity):
-            continue
-        if isinstance(item.direction, bool) or item.direction not in _DIRECTIONS:
-            raise DefinitionError(
-                f"direction of {item.name!r}: expected -1 (falling), 0 (both) or 1 (rising), "
-                f"received {item.direction!r}."
-            )
-    return items
 
 
 def _own_names(sizes: Sequence[int]) -> set[str]:
@@ -503,9 +487,9 @@ def _two_fields(
 
 def _direction(name: str, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
     """Direction of a reaction that is not given: the gradient of a function's rate by the velocities."""
-    positions = _depends_on_each(gap, x)
     push = ca.densify(ca.gradient(rate, x))
-    velocities = [i for i in range(x.numel()) if not positions[i] and not push[i].is_zero()]
+    moved = [i for i in range(x.numel()) if not push[i].is_zero()]
+    velocities = [i for i in moved if not ca.depends_on(gap, x[i])]
     if velocities and not ca.is_linear(rate, ca.vertcat(*[x[i] for i in velocities])):
         raise DefinitionError(
             f"reaction of {name!r}: the rate {rate} of {gap} is not linear in the states "
@@ -513,11 +497,6 @@ def _direction(name: str, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
             "reaction=, a symbol in the field."
         )
     return ca.vertcat(*[push[i] if i in velocities else 0 for i in range(x.numel())])
-
-
-def _depends_on_each(function: ca.SX, x: ca.SX) -> list[bool]:
-    """Which of some symbols an expression depends on."""
-    return [bool(ca.depends_on(function, x[i])) for i in range(x.numel())]
 
 
 def _reactions(

@@ -134,27 +134,19 @@ def regularise(
     width = ca.SX.sym(name)
     surfaces = [system.surface_function(i) for i in range(system.surface_count)]
     multipliers = ca.vertcat(*[ca.SX(chosen.phi(h / width)) for h in surfaces])
-    p = system.parameter_symbols
-    symbols = [p[i] for i in range(p.numel())]
-    known = dict(zip(symbols, system.definition.defaults.values(), strict=True))
-    n, stops = system.dimension, system.stops
+    d, n, stops = system.definition, system.dimension, system.stops
+    frame, guards = d.frame(), ca.vertsplit(d.guards)
+    frame["parameters"][width] = eps
     resets = [
-        Reset(
-            system.definition.guards[len(stops) + j],
-            ca.vertsplit(system.definition.maps[:, j]),
-            direction,
-            label,
-        )
+        Reset(guards[len(stops) + j], ca.vertsplit(d.maps[:, j]), direction, label)
         for j, (label, direction) in enumerate(system.resets)
     ]
     if edges:
         resets += [edge for s in chosen.edges for edge in _edges(system, surfaces, s * width)]
     return FilippovSystem(
-        ca.vertsplit(system.extended_states)[:n],
+        **frame,
         field=ca.vertsplit(system.field_with(multipliers))[:n],
-        parameters={**known, width: eps},
-        time=system.extended_states[n] if system.time_dependent else None,
-        stops=[Stop(system.definition.guards[i], d, label) for i, (label, d) in enumerate(stops)],
+        stops=[Stop(guards[i], way, label) for i, (label, way) in enumerate(stops)],
         resets=resets,
     )
 

@@ -7,30 +7,32 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ..expressions.graph import POWERS, evaluate, instructions, operation, power_of, uses
+from ..expressions.graph import (
+    POWERS,
+    Expressions,
+    evaluate,
+    instructions,
+    operation,
+    power_of,
+    uses,
+)
 from ..expressions.identity import vanish_on
 
 #: Random points at which signs are compared.
 _DRAWS = 21
 
 
-class _Gated:
+class _Gated(Expressions):
     """The algebra of expressions in which roots of switching functions are there on their side only."""
 
     def __init__(self, symbols: ca.SX, surfaces: Sequence[ca.SX], x: ca.SX, gates: Sequence[ca.SX]):
-        self._symbols, self._surfaces, self._x, self._gates = symbols, surfaces, x, gates
+        super().__init__([symbols])
+        self._surfaces, self._x, self._gates = surfaces, x, gates
         #: Smallest exponent by surface.
         self.powers: dict[int, float] = {}
 
-    def constant(self, value: float) -> ca.SX:
-        return ca.SX(value)
-
-    def symbol(self, vector: int, position: int) -> ca.SX:
-        del vector
-        return self._symbols[position]
-
     def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
-        result, power = operation(op, list(args)), power_of(op, args)
+        result, power = operation(op, args), power_of(op, args)
         if power is None or not ca.depends_on(args[0], self._x):
             return result
         base, times = (args[0].dep(0), 2) if args[0].op() == ca.OP_SQ else (args[0], 1)

@@ -37,9 +37,9 @@ from .parse_definition import (
     consistent_parameters,
     read_definition,
 )
-from .pieces import by_breakpoints, by_pieces, in_cells
 from .roots import roots_of
 from .switching import Switching, class_of
+from .tables.pieces import by_breakpoints, by_pieces, in_cells
 
 T = TypeVar("T")
 
@@ -150,27 +150,8 @@ class FilippovSystem:
         hidden: bool = False,
         layer_widths: Sequence[float] | None = None,
     ):
-        given = {
-            "states": states,
-            "surface": surface,
-            "above": above,
-            "below": below,
-            "field": field,
-            "multipliers": multipliers,
-            "surfaces": surfaces,
-            "parameters": parameters,
-            "time": time,
-            "stops": stops,
-            "resets": resets,
-            "impacts": impacts,
-            "complementarity": complementarity,
-            "constraints": constraints,
-            "hidden": hidden,
-            "layer_widths": layer_widths,
-        }
-        given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
-        clocks, discrete = given.pop("clocks"), given.pop("discrete")
-        self._adopt(read_definition(**with_added_states(clocks, discrete, given)))
+        given = {name: value for name, value in locals().items() if name != "self"}
+        self._adopt(read_definition(**with_added_states(in_scalar_symbols(given))))
 
     # construction ------------------------------------------------------------------------------
 
@@ -230,13 +211,10 @@ class FilippovSystem:
         >>> system.field("+"), system.field("-")
         (SX([v, (-(x+0.4))]), SX([v, (-(x+-0.3))]))
         """
-        given = {"states": states, "rhs": rhs, "parameters": parameters, "time": time}
-        given |= {"stops": stops, "resets": resets, "impacts": impacts, "hidden": hidden}
-        given |= {"complementarity": complementarity, "constraints": constraints}
-        given = in_scalar_symbols(given | {"clocks": clocks, "discrete": discrete})
-        clocks, discrete = given.pop("clocks"), given.pop("discrete")
+        given = {name: value for name, value in locals().items() if name != "cls"}
+        given = in_scalar_symbols(given)
         column(given["rhs"], "rhs", len(listed(given["states"])))  # before clocks are added
-        given = with_added_states(clocks, discrete, given)
+        given = with_added_states(given)
         n, rhs = len(listed(given["states"])), given.pop("rhs")
         own = {name: given[name] for name in ("parameters", "time")}
         frame = cls(given["states"], field=[0] * n, **own).definition
@@ -246,9 +224,8 @@ class FilippovSystem:
         known = ca.vertcat(frame.extended_states, held)
         require_known(entries, known, "rhs", **frame.names)
         found = lift(entries, frame.states, frame.time, held, hidden=hidden)
-        given |= {"field": found.field, "multipliers": found.multipliers, "surface": None}
-        given |= {"surfaces": found.surfaces, "above": None, "below": None}
-        values = given["parameters"]
+        given |= {"field": found.field, "multipliers": found.multipliers}
+        given["surfaces"], values = found.surfaces, given["parameters"]
         if found.values and isinstance(values, Mapping):
             given["parameters"] = {**values, **dict.fromkeys(found.values)}
         elif found.values:
@@ -256,10 +233,7 @@ class FilippovSystem:
         made = read_definition(**given)
         names = {value.name() for value in found.values}
         defaults = {name: value for name, value in made.defaults.items() if name not in names}
-        system = cls.__new__(cls)
-        system._adopt(replace(made, tables=found.tables, defaults=defaults))
-        system.lifted = found.switches
-        return system
+        return cls._of(replace(made, tables=found.tables, defaults=defaults), found.switches)
 
     @classmethod
     def from_dae(
@@ -341,13 +315,17 @@ class FilippovSystem:
         """
         key = tuple(held_values(self.definition, values))
 
-        def made() -> FilippovSystem:
-            system = type(self).__new__(type(self))
-            system._adopt(with_values(self.written, list(key)))
-            system.lifted = self.lifted
-            return system
+        return self.cached(
+            ("holding", key), lambda: self._of(with_values(self.written, list(key)), self.lifted)
+        )
 
-        return self.cached(("holding", key), made)
+    @classmethod
+    def _of(cls, written: Definition, lifted: tuple[LiftedSwitch, ...] = ()) -> FilippovSystem:
+        """Return the system of a definition that was read, and of the switches that were found for it."""
+        system = cls.__new__(cls)
+        system._adopt(written)
+        system.lifted = lifted
+        return system
 
     def _adopt(self, written: Definition) -> None:
         #: The definition with tables as elements of one argument each; ``definition`` has their breakpoints.
@@ -373,8 +351,7 @@ class FilippovSystem:
         """The system that runs integrate: with tables as elements, whose cells set parameters."""
         if not self.written.tables:
             return self
-        system = type(self).__new__(type(self))
-        system._adopt(by_pieces(self.written))
+        system = self._of(by_pieces(self.written))
         counts = {table.element: table.count for table in self.written.tables}
         sizes = [counts.get(members[0], 1) for members in system.entries]
         system.numbers = tuple(accumulate(sizes, initial=0))
@@ -383,12 +360,7 @@ class FilippovSystem:
     @cached_property
     def of_breakpoints(self) -> FilippovSystem:
         """The system whose breakpoints are surfaces in runs too."""
-        if not self.written.tables:
-            return self
-        system = type(self).__new__(type(self))
-        system._adopt(self.definition)
-        system.lifted = self.lifted
-        return system
+        return self._of(self.definition, self.lifted) if self.written.tables else self
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.written.state(), "lifted": self.lifted}
@@ -967,6 +939,30 @@ class FilippovSystem:
         return np.array([*values, moment]) if self.time_dependent else values
 
 
+#: Elements that not every function supports: the system's attribute, what it has, and where they work.
+_ELEMENTS = {
+    "sets": (
+        "vector multipliers",
+        "Sets of codimension two and three work in simulate, ensemble, sensitivity, region, limit_directions, poincare, "
+        "attractors, periodic_orbit, continue_orbit and phase_response.",
+    ),
+    "remembering": (
+        "elements with hysteresis",
+        "They work in simulate, ensemble and outcomes.",
+    ),
+    "complementarity": (
+        "complementarity conditions",
+        "They work in simulate, ensemble, outcomes, sensitivity, classify, region, find_equilibrium, find_fold, "
+        "periodic_orbit and continue_orbit.",
+    ),
+    "constraints": (
+        "constraints",
+        "They work in simulate, ensemble, outcomes, sensitivity, classify, region, find_equilibrium, find_fold, "
+        "periodic_orbit and continue_orbit. Write the motion in coordinates that satisfy them.",
+    ),
+}
+
+
 def require_system(
     value: Any,
     sets: bool = False,
@@ -981,29 +977,12 @@ def require_system(
             "Make one with FilippovSystem(states, ...) or FilippovSystem.from_expression(states, "
             "rhs)."
         )
-    if value.sets and not sets:
-        raise DefinitionError(
-            f"system: {value!r} has vector multipliers, which this function does not support. Sets of "
-            "codimension two and three work in simulate, ensemble, sensitivity, region and "
-            "limit_directions."
-        )
-    if value.remembering and not hysteresis:
-        raise DefinitionError(
-            f"system: {value!r} has elements with hysteresis, which this function does not support. They "
-            "work in simulate, ensemble and outcomes."
-        )
-    if value.complementarity and not complementarity:
-        raise DefinitionError(
-            f"system: {value!r} has complementarity conditions, which this function does not support. They work "
-            "in simulate, ensemble, outcomes, sensitivity, classify, region, find_equilibrium, find_fold, periodic_orbit and "
-            "continue_orbit."
-        )
-    if value.constraints and not joints:
-        raise DefinitionError(
-            f"system: {value!r} has constraints, which this function does not support. They work in simulate, "
-            "ensemble, outcomes, sensitivity, classify, region, find_equilibrium, find_fold, periodic_orbit and "
-            "continue_orbit. Write the motion in coordinates that satisfy them."
-        )
+    allowed = (sets, hysteresis, complementarity, joints)
+    for (name, (what, where)), is_allowed in zip(_ELEMENTS.items(), allowed, strict=True):
+        if getattr(value, name) and not is_allowed:
+            raise DefinitionError(
+                f"system: {value!r} has {what}, which this function does not support. {where}"
+            )
 
 
 def parted(system: FilippovSystem, point: ArrayLike) -> tuple[Array, dict[str, float]]:

@@ -13,13 +13,13 @@ import casadi as ca
 import numpy as np
 
 from ..cache import Content
-from ..definition.conditions import decides
+from ..definition.events.conditions import decides
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
-from ..expressions.graph import evaluate, instructions, operation
+from ..expressions.graph import Expressions, evaluate, instructions, operation
 from ..expressions.identity import vanish_on
-from ..laws.coupled import combinable, coupled_of
-from ..laws.evaluators import Evaluator
+from ..laws.coupled import combinable, coupled_of, raised_of
+from ..laws.evaluators import Evaluator, evaluator
 from ..laws.motion import motion, solved
 from ..laws.switches import Guard
 from ..numbering import UNWATCHED
@@ -116,7 +116,7 @@ def event_map(
     atom: int = -1,
 ) -> EventMap:
     """The map of an event of a mode, with the function of an ``atom`` of its condition; built once."""
-    if system.sets:
+    if system.sets and kind not in ("exit", "release"):
         return instant_map(system, system.widened(mode), kind, element, letters)
 
     def build() -> EventMap:
@@ -259,8 +259,7 @@ def jumping(system: FilippovSystem, x: Array, after: Array, p: Array) -> str:
         )
     coupled, own = coupled_of(system), [i for i in system.half_lines if i not in system.algebraic]
     columns = lambda: [ca.jacobian(coupled.field, coupled.symbols_of(own))]
-    made = lambda: Evaluator(system.function(("columns of conditions",), columns))
-    b = system.cached(("columns of conditions",), made).copied(after, p)[0]
+    b = evaluator(system, "columns of conditions", columns).copied(after, p)[0]
     impulses = nnls(b, after - x)[0]
     taking = {i for i, impulse in zip(own, impulses, strict=True) if impulse > 0.0}
     return "".join("c" if i in taking else "o" for i in system.half_lines)
@@ -303,15 +302,30 @@ def surface_map(system: FilippovSystem, surface: int) -> EventMap:
     return system.cached(("surface map", surface), build)
 
 
-def kept_maps(system: FilippovSystem, surfaces: Sequence[int]) -> list[EventMap]:
-    """What is zero while surfaces slide, as maps on the extended states: with the rates of joints."""
-    x, found = system.extended_states, list[EventMap]()
-    for i in surfaces:
-        found.append(surface_map(system, i))
-        for k, rate in enumerate(coupled_of(system).lower[i] if i in system.joints else ()):
+def kept_maps(system: FilippovSystem, kept: Sequence[int]) -> list[EventMap]:
+    """What is zero while surfaces slide and, behind them, contacts are closed, as maps on the extended states."""
+    x, m, found = system.extended_states, system.surface_count, list[EventMap]()
+    for i in kept:
+        rows = [*coupled_of(system).lower[i]] if i in system.joints else []
+        if i < m:
+            found.append(surface_map(system, i))
+        else:
+            rows = [system.definition.gaps[i - m], system.definition.gap_rates[i - m]]
+        for k, rate in enumerate(rows):
             build = partial(EventMap, system, x, rate, Guard("zero", i, 0, i))
             found.append(system.cached(("rate map", i, k), build))
     return found
+
+
+def rest_maps(system: FilippovSystem, mode: str, elements: Sequence[int]) -> list[EventMap]:
+    """What is zero where surfaces, sets and contacts rest, by their positions in a mode: functions and their rates."""
+    d, lower, count, kept = system.definition, raised_of(system).lower, len(system.entries), []
+    for k in elements:
+        if k < count:
+            kept += [e for i in system.entries[k] for e in (d.open_surfaces[i], *lower[i])]
+        else:
+            kept += [d.gaps[k - count], d.gap_rates[k - count]]
+    return [function_map(system, mode, e) for e in kept]
 
 
 def atoms_at(
@@ -358,8 +372,7 @@ def choices_at(
         return np.zeros(0), np.zeros((0, len(x)))
     own = ca.vertcat(*seen)
     outputs = lambda: [own, ca.jacobian(own, system.extended_states)]
-    made = lambda: Evaluator(system.function(("choices", kind, element), outputs))
-    values, gradient = system.cached(("choices of", kind, element), made).copied(x, p)
+    values, gradient = evaluator(system, ("choices", kind, element), outputs).copied(x, p)
     return values.ravel(), gradient
 
 
@@ -385,21 +398,16 @@ def _values_at(
     x: Array,
     p: Array,
 ) -> list[float]:
-    outputs = lambda: [ca.vertcat(*build(), 0)]
-    made = lambda: Evaluator(system.function(key, outputs))
-    found: list[float] = system.cached(("values", key), made).copied(x, p)[0].ravel().tolist()
-    return found[:-1]
+    found = evaluator(system, key, lambda: [ca.vertcat(*build(), 0)]).copied(x, p)[0]
+    return found.ravel().tolist()[:-1]
 
 
-class _Differences:
+class _Differences(Expressions):
     """Expressions of a graph, and the differences by which its operations choose."""
 
     def __init__(self, vectors: list[ca.SX]):
-        self._vectors, self.seen = vectors, list[ca.SX]()
-        self.constant = ca.SX
-
-    def symbol(self, vector: int, position: int) -> ca.SX:
-        return self._vectors[vector][position]
+        super().__init__(vectors)
+        self.seen = list[ca.SX]()
 
     def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
         if op in ("lt", "le", "eq", "ne", "fmin", "fmax"):

@@ -14,18 +14,18 @@ from .variational import guarded_field
 def field_expansion(system: FilippovSystem, mode: str) -> Evaluator:
     """(x, u), p -> A, B(u, .), C(u, u, .) of a mode's field; h_x, h_xx of the sliding surface or 0."""
 
-    def build() -> Evaluator:
-        f, x, p = mode_field(system, mode), system.extended_states, system.parameter_symbols
-        u = ca.SX.sym("u", x.numel())
+    x = system.extended_states
+    u = ca.SX.sym("u", x.numel())
+
+    def build() -> list[ca.SX]:
+        f = mode_field(system, mode)
         first = ca.jtimes(f, x, u)
         third = ca.jacobian(ca.jtimes(first, x, u), x)
         h = system.surface_function(mode.index("s")) if "s" in mode else ca.SX(0.0)
         hessian, gradient = ca.hessian(h, x)
-        outputs = [ca.jacobian(f, x), ca.jacobian(first, x), third, gradient, hessian]
-        dense = [ca.densify(e) for e in outputs]
-        return Evaluator(ca.Function("forms", [ca.vertcat(x, u), p], dense, {"cse": True}))
+        return [ca.jacobian(f, x), ca.jacobian(first, x), third, gradient, hessian]
 
-    return system.cached(("field expansion", mode), build)
+    return evaluator(system, ("field expansion", mode), build, ca.vertcat(x, u))
 
 
 def contact_expansion(system: FilippovSystem, mode: str, surface: int, side: int) -> Evaluator:
@@ -49,11 +49,9 @@ def guard_rate_gradient(system: FilippovSystem, mode: str, guard: Guard) -> Eval
     """x, p -> the gradient of the rate of a guard along the field of its mode."""
     motion = guarded_field(system, mode).motion
 
-    def build() -> Evaluator:
+    def build() -> list[ca.SX]:
         k = motion.guards.index(guard)
         rate = ca.mtimes(ca.jacobian(motion.functions[k], motion.states), motion.field)
-        row = ca.densify(ca.jacobian(rate, motion.states))
-        inputs = [motion.states, system.parameter_symbols]
-        return Evaluator(ca.Function("rate", inputs, [row], {"cse": True}))
+        return [ca.jacobian(rate, motion.states)]
 
-    return system.cached(("rate of a guard", mode, guard), build)
+    return evaluator(system, ("rate of a guard", mode, guard), build, motion.states)

@@ -7,14 +7,14 @@ import casadi as ca
 from ..definition.system import FilippovSystem
 from ..errors import DefinitionError
 from ..laws.coupled import coupled_of
-from ..laws.evaluators import Evaluator
+from ..laws.evaluators import Evaluator, evaluator
 from ..laws.motion import motion
 
 
 def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
     """(x, p) -> field, its derivative, functions that are kept at zero, theirs, and guards without events."""
 
-    def build() -> Evaluator:
+    def build() -> list[ca.SX]:
         of_mode, x = motion(system, mode), system.extended_states
         if of_mode.states.numel() != x.numel():
             raise DefinitionError(
@@ -32,9 +32,6 @@ def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
             if guard.kind in ("surface", "exit", "impact", "release")
         ]
         field, h, functions = of_mode.field, every[kept], of_mode.functions[guards]
-        rows = [field, ca.jacobian(field, x), h, ca.jacobian(h, x), functions]
-        shapes = [ca.densify(e) if e.numel() else ca.SX(*e.shape) for e in rows]
-        made = ca.Function("equations", [x, system.parameter_symbols], shapes, {"cse": True})
-        return Evaluator(made)
+        return [field, ca.jacobian(field, x), h, ca.jacobian(h, x), functions]
 
-    return system.cached(("equations of a mode", mode), build)
+    return evaluator(system, ("equations of a mode", mode), build)

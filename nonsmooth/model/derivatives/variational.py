@@ -1,10 +1,11 @@
 """The variational equations of a mode: X' = Df X and P' = Df P + f_p beside the state.
 
-X and P are the derivatives by the start and by parameters; ``flow/core/flow.c`` carries their columns.
+X and P are the derivatives by the start and by parameters; ``flow/core/legs/flow.c`` carries their columns.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable, Sequence
 from functools import cached_property
 
 import casadi as ca
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
 from ..laws.coupled import coupled_of
-from ..laws.evaluators import Evaluator
+from ..laws.evaluators import Evaluator, evaluator
 from ..laws.motion import Motion, motion, solved
 from ..laws.multipliers import newton_multipliers, sliding_multipliers
 from ..printing.tape import Entries, Series, series_of, sparse_entries
@@ -95,8 +96,7 @@ class VariationalField(PlainField):
     @cached_property
     def rate(self) -> Evaluator:
         """(y, p) -> the mode's field (N + k, 1)."""
-        inputs = [self.motion.states, self.parameters]
-        return Evaluator(ca.Function("rate", inputs, [ca.densify(self.motion.field)]))
+        return self._evaluator("rate", lambda: [self.field])
 
     def rate_at(self, y: Array, p: Array) -> Array:
         """The mode's field at states of a leg (N + k,)."""
@@ -105,9 +105,8 @@ class VariationalField(PlainField):
     @cached_property
     def linear(self) -> Evaluator:
         """(y, p) -> field, its derivatives by the states and by all parameters."""
-        y, f, p = self.motion.states, self.motion.field, self.parameters
-        outputs = [ca.densify(e) for e in (f, ca.jacobian(f, y), ca.jacobian(f, p))]
-        return Evaluator(ca.Function("linear", [y, p], outputs, {"cse": True}))
+        y, f, p = self.states, self.field, self.parameters
+        return self._evaluator("linear", lambda: [f, ca.jacobian(f, y), ca.jacobian(f, p)])
 
     @cached_property
     def _multipliers(self) -> Evaluator:
@@ -115,8 +114,11 @@ class VariationalField(PlainField):
         p, residual = self.parameters, self.motion.multiplier_equations()
         x, u = self.motion.states[: self.by_start], self.motion.states[self.by_start :]
         right = ca.horzcat(ca.jacobian(residual, x), ca.jacobian(residual, p)[:, list(self.chosen)])
-        outputs = [ca.densify(-solved(ca.jacobian(residual, u), right))]
-        return Evaluator(ca.Function("multipliers", [self.motion.states, p], outputs))
+        key = ("multipliers", self.chosen)
+        return self._evaluator(key, lambda: [-solved(ca.jacobian(residual, u), right)])
+
+    def _evaluator(self, what: Hashable, build: Callable[[], Sequence[ca.SX]]) -> Evaluator:
+        return evaluator(self.motion.system, (what, self.motion.mode), build, self.states)
 
     def start(self, x: Array, p: Array, unknowns: Array | None = None) -> Array:
         """States and columns at the start of a leg, as one row; ``unknowns`` is a guess of multipliers."""
@@ -183,7 +185,8 @@ class GuardedField(PlainField):
     @cached_property
     def gradients(self) -> Evaluator:
         """(y, p) -> gradients of the guards (g, N + k)."""
-        return Evaluator(self.motion.gradient_function())
+        build = lambda: [ca.jacobian(self.motion.functions, self.states)]
+        return evaluator(self.motion.system, ("gradient", self.motion.mode), build, self.states)
 
 
 def guarded_field(system: FilippovSystem, mode: str) -> GuardedField:

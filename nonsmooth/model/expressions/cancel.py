@@ -152,11 +152,17 @@ class NormalForms:
 
     def __init__(self, inputs: Sequence[ca.SX]):
         self._inputs, self._algebra = list(inputs), _Normal(inputs)
+        self.forms = self._algebra.forms
+
+    def rows(self, outputs: Sequence[ca.SX]) -> list[list[Sum]]:
+        """The sums of coefficients times monomials of the entries of each output."""
+        nodes, rows = instructions(self._inputs, outputs)
+        values = evaluate(nodes, self._algebra)
+        return [[values[k].form for k in row] for row in rows]
 
     def of(self, expression: ca.SX) -> Sum:
-        """The sum of coefficients times monomials of a scalar."""
-        nodes, rows = instructions(self._inputs, [expression])
-        return evaluate(nodes, self._algebra)[rows[0][0]].form
+        """The same of a scalar."""
+        return self.rows([expression])[0][0]
 
 
 def ratio(first: Sum, second: Sum) -> float:
@@ -168,29 +174,13 @@ def ratio(first: Sum, second: Sum) -> float:
     return c if all(abs(r - c) <= 2 * _ROUNDING * abs(c) for r in ratios) else 0.0
 
 
-def normal_forms(
-    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
-) -> tuple[Forms, list[list[Sum]]]:
-    """Sums of coefficients times monomials for each entry of each output, and their atoms."""
-    nodes, rows = instructions(inputs, outputs)
-    algebra = _Normal(inputs)
-    values = evaluate(nodes, algebra)
-    return algebra.forms, [[values[k].form for k in row] for row in rows]
-
-
 def _combine(forms: Forms, op: str, args: list[Sum], expression: ca.SX) -> Sum:
-    if op == "add":
-        return forms.add(args[0], args[1])
-    if op == "sub":
-        return forms.add(args[0], args[1], -1.0)
+    if op in ("add", "sub", "twice"):
+        return forms.add(args[0], args[-1], -1.0 if op == "sub" else 1.0)
     if op == "neg":
         return forms.add({}, args[0], -1.0)
-    if op == "twice":
-        return forms.add(args[0], args[0])
-    if op == "mul":
-        return forms.multiply(args[0], args[1])
-    if op == "sq":
-        return forms.multiply(args[0], args[0])
+    if op in ("mul", "sq"):
+        return forms.multiply(args[0], args[-1])
     if op == "div" and args[1]:
         return forms.multiply(args[0], forms.reciprocal(args[1]))
     if op == "inv" and args[0]:
@@ -200,35 +190,31 @@ def _combine(forms: Forms, op: str, args: list[Sum], expression: ca.SX) -> Sum:
 
 def powers(expression: ca.SX, variables: ca.SX, others: ca.SX) -> list[tuple[ca.SX, int]]:
     """Visible factors of a scalar expression, with their powers."""
-    forms, rows = normal_forms([variables, others], [expression])
-    if not rows[0][0]:
-        return []
-    _, monomial = forms.factor(rows[0][0])
-    return [(forms.atoms[atom], power) for atom, power in monomial]
+    normal = NormalForms([variables, others])
+    form, forms = normal.of(expression), normal.forms
+    return [(forms.atoms[a], power) for a, power in forms.factor(form)[1]] if form else []
 
 
 def simple_zeros(expression: ca.SX, variables: ca.SX, others: ca.SX) -> ca.SX:
     """Return an expression of the same sign without its visible powers."""
-    forms, rows = normal_forms([variables, others], [expression])
-    if not rows[0][0]:
-        return expression
-    c, monomial = forms.factor(rows[0][0])
+    normal = NormalForms([variables, others])
+    form = normal.of(expression)
+    c, monomial = normal.forms.factor(form) if form else (0.0, ())
     if all(abs(power) < 2 for _, power in monomial):
         return expression
-    return forms.product(c, tuple((atom, 1) for atom, power in monomial if power % 2))
+    return normal.forms.product(c, tuple((atom, 1) for atom, power in monomial if power % 2))
 
 
 def cancel_common_factor(
     expressions: Sequence[ca.SX], variables: ca.SX, others: ca.SX
 ) -> tuple[list[ca.SX], ca.SX]:
     """Divide scalar expressions by the factors that all of them have."""
-    forms, rows = normal_forms([variables, others], expressions)
-    sums = [row[0] for row in rows]
+    normal = NormalForms([variables, others])
+    forms, sums = normal.forms, [row[0] for row in normal.rows(expressions)]
     factored = [forms.factor(s) if s else None for s in sums]
     monomials = [f[1] for f in factored if f is not None]
-    if not monomials:
-        return list(expressions), ca.SX(1)
-    common = tuple((atom, power) for atom, power in _common(monomials) if power > 0)
+    shared = _common(monomials) if monomials else ()
+    common = tuple((atom, power) for atom, power in shared if power > 0)
     if not common:
         return list(expressions), ca.SX(1)
     reduced = [

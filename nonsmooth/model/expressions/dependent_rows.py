@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from .cancel import Forms, Monomial, Sum, normal_forms
+from .cancel import Forms, Monomial, NormalForms, Sum
 from .graph import NOT_SMOOTH, instructions
 
 #: Part of a function that may be left over by rounding.
@@ -28,8 +28,8 @@ def in_span(
         return [False for _ in functions]  # other values of ``others`` have other combinations
     numbers = np.random.default_rng(1).uniform(0.3, 1.7, others.numel())
     fixed = [ca.substitute(ca.SX(e), others, ca.DM(numbers)) for e in [*rows, *functions]]
-    forms, sums = normal_forms([variables, others], fixed)
-    bent = [_nonlinear(row[0], forms) for row in sums]
+    normal = NormalForms([variables, others])
+    bent = [_nonlinear(row[0], normal.forms) for row in normal.rows(fixed)]
     monomials = sorted({m for form in bent for m in form})
     table = np.array([[form.get(m, 0.0) for m in monomials] for form in bent])
     table = table.reshape(len(bent), len(monomials))

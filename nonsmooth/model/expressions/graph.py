@@ -7,6 +7,7 @@ codes are used here only.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from itertools import accumulate, pairwise
 from typing import NamedTuple, Protocol, TypeVar, cast
 
 import casadi as ca
@@ -167,6 +168,32 @@ def evaluate(nodes: Sequence[Node], algebra: Algebra[V]) -> list[V]:
         else:
             values.append(algebra.apply(node.op, [values[k] for k in node.args]))
     return values
+
+
+class Expressions:
+    """The algebra of expressions: operations as they are, over vectors of symbols."""
+
+    def __init__(self, vectors: Sequence[ca.SX]):
+        self.vectors = vectors
+        self.constant = ca.SX
+
+    def symbol(self, vector: int, position: int) -> ca.SX:
+        """Return an entry of a vector."""
+        return self.vectors[vector][position]
+
+    def apply(self, op: str, args: Sequence[ca.SX]) -> ca.SX:
+        """Return an operation."""
+        return operation(op, args)
+
+
+def shaped(outputs: Sequence[ca.SX], entries: Sequence[ca.SX]) -> list[ca.SX]:
+    """Return expressions with the shapes of others, of entries one after the other."""
+    ends = accumulate((output.numel() for output in outputs), initial=0)
+    parts = [entries[a:b] for a, b in pairwise(ends)]
+    return [
+        ca.reshape(ca.vertcat(*own), *output.shape) if own else ca.SX.zeros(*output.shape)
+        for own, output in zip(parts, outputs, strict=True)
+    ]
 
 
 def operation(op: str, args: Sequence[ca.SX]) -> ca.SX:

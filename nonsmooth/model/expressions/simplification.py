@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from .graph import Node, depends_on, instructions, operation
+from .graph import Node, depends_on, instructions, operation, shaped
 
 Product = tuple[int, ...]  # factors, sorted; () is the constant term
 Sum = dict[Product, ca.SX]  # coefficients that do not depend on the variables
@@ -32,14 +32,7 @@ def simplified(
     """Rewrite ``outputs`` with fewer products of functions of the variables."""
     reader = _Reader(inputs, outputs, variable)
     writer = _Writer(reader, [reader.sum(j) for row in reader.rows for j in row])
-    entries = iter(writer.expressions())
-    results = []
-    for output, row in zip(outputs, reader.rows, strict=True):
-        result = ca.SX.zeros(*output.shape)
-        for k in range(len(row)):
-            result[k] = next(entries)
-        results.append(result)
-    return results
+    return shaped(outputs, writer.expressions())
 
 
 @dataclass(frozen=True)

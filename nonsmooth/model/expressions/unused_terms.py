@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
-from .graph import Node, evaluate, instructions, operation
+from .float_arithmetic import BINARY, UNARY
+from .graph import Node, evaluate, instructions, operation, shaped
 
 #: Operations that have a finite value wherever their arguments have one of moderate size.
 _SAFE = frozenset(
@@ -20,15 +21,8 @@ _SAFE = frozenset(
     "and or".split()
 )
 
-_VALUES: dict[str, Callable[..., float]] = {
-    "assign": lambda a: a,
-    "neg": lambda a: -a,
-    "twice": lambda a: a + a,
-    "sq": lambda a: a * a,
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-}
+_ALL: dict[str, Callable[..., float]] = {**UNARY, **BINARY}
+_VALUES = {op: _ALL[op] for op in "assign neg twice sq add sub mul".split()}
 
 Side = tuple[int, float]  # index of a multiplier and its value
 
@@ -59,13 +53,7 @@ def without_unused_terms(
     terms = evaluate(nodes, algebra)
     if not algebra.found:
         return list(outputs)
-    results = []
-    for output, row in zip(outputs, rows, strict=True):
-        result = ca.SX.zeros(*output.shape)
-        for k, j in enumerate(row):
-            result[k] = terms[j].e
-        results.append(result)
-    return results
+    return shaped(outputs, [terms[j].e for row in rows for j in row])
 
 
 def _is_safe(node: Node, nodes: Sequence[Node]) -> bool:

@@ -31,7 +31,7 @@ from ..expressions.linearity import linearity
 from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .degree import Degree, degree_of
-from .evaluators import Evaluator
+from .evaluators import Evaluator, evaluator
 
 #: Slopes of conditions are regular if eigenvalues are above this part of them and of those of the rates.
 _REGULAR = 1e-3
@@ -262,28 +262,22 @@ class Coupled:
 
     def heights_at(self, x: Array, p: Array) -> Array:
         """Switching functions and gaps (m,) at an extended state."""
-        build = lambda: Evaluator(self.system.function("heights", lambda: [self.heights]))
-        return self.system.cached("heights at", build).copied(x, p)[0].ravel()
+        heights = evaluator(self.system, "heights", lambda: [self.heights])
+        return heights.copied(x, p)[0].ravel()
 
     def kept_at(self, x: Array, p: Array) -> tuple[Array, Array]:
         """The functions of ``kept`` (k,) and their gradients (k, N) at an extended state."""
-
-        def build() -> Evaluator:
-            rows = ca.densify(self.kept)
-            states = self.system.extended_states
-            return Evaluator(
-                self.system.function("kept", lambda: [rows, ca.jacobian(rows, states)])
-            )
-
-        values, gradient = self.system.cached("kept at", build).copied(x, p)
+        rows = self.kept
+        build = lambda: [rows, ca.jacobian(rows, self.system.extended_states)]
+        values, gradient = evaluator(self.system, ("kept", rows.numel()), build).copied(x, p)
         return values.ravel(), gradient
 
     def sliding(self, mode: str) -> list[int]:
         """Surfaces that slide and contacts that are closed, with multipliers that are unknown."""
         signs = self.system.parse_letters(mode)
-        return [i for i, sign in enumerate(signs) if sign == 0 and not self._is_idle(i, signs)]
+        return [i for i, sign in enumerate(signs) if sign == 0 and not self.is_idle(i, signs)]
 
-    def _is_idle(self, i: int, signs: Sequence[int]) -> bool:
+    def is_idle(self, i: int, signs: Sequence[int]) -> bool:
         """Whether a multiplier makes no difference: on its surface, or at open contacts alone."""
         if i >= self._surfaces:
             return False
@@ -347,7 +341,11 @@ class Coupled:
         """Expressions with the multipliers that are known in a mode; unknowns stay symbols."""
         n = self.system.extended_dimension
         held = ca.SX([*self.held(mode), *[0.0] * sum(self.scaled)])
-        rest = self.moving[n:]
+        rest, signs = self.moving[n:], self.system.parse_letters(mode)
+        for members in self.system.sets:
+            if signs[members[0]] and not self.is_idle(members[0], signs):
+                h = self.system.definition.surfaces[list(members)]
+                held[list(members)] = h / ca.norm_2(h)
         for i in self.sliding(mode):
             own = self.unknown(i)
             for k in range(rest.numel()):

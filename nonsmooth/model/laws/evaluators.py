@@ -100,7 +100,11 @@ class Surfaces:
 
 
 def evaluator(
-    system: FilippovSystem, key: Hashable, build: Callable[[], Sequence[ca.SX]]
+    system: FilippovSystem,
+    key: Hashable,
+    build: Callable[[], Sequence[ca.SX]],
+    states: ca.SX | None = None,
 ) -> Evaluator:
-    """Return the evaluator of ``system.function(key, build)``, made once per system."""
-    return system.cached(("evaluator", key), lambda: Evaluator(system.function(key, build)))
+    """Return the evaluator of ``system.function(key, build, states)``, made once per system."""
+    made = lambda: Evaluator(system.function(key, build, states))
+    return system.cached(("evaluator", key), made)

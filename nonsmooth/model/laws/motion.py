@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 
 from ..definition.parse_definition import read_function
-from ..definition.pieces import beyond_cells
 from ..definition.system import FilippovSystem, require_system
+from ..definition.tables.pieces import beyond_cells
 from ..errors import DefinitionError
 from ..expressions.identity import decide_zero
 from .coupled import combinable, coupled_of, raised_of
@@ -119,7 +119,16 @@ class Motion:
                 continue
             of = (i, system.entry_of(i)) if i < m else (i - m, len(system.entries) + i - m)
             guard = lambda kind, side, of=of: Guard(kind, of[0], side, of[1])
-            if sign:
+            if i in system.set_of:
+                members = list(system.set_of[i])
+                if i > members[0] or coupled.is_idle(i, letters):
+                    continue
+                if sign:
+                    yield guard("surface", 1), ca.norm_2(heights[members])
+                else:  # n^2 (1 - |lambda|^2)
+                    own = self._values[[sliding.index(j) for j in members]]
+                    yield guard("exit", 0), factors[i] ** 2 - ca.sumsqr(own)
+            elif sign:
                 yield guard("surface" if i < m else "impact", sign), sign * heights[i]
             elif i >= m or i in system.half_lines:
                 yield guard("release", 0), self._values[sliding.index(i)]
@@ -140,19 +149,6 @@ class Motion:
                     yield guard("exit", side), function
         yield from zip(event_guards(system), ca.vertsplit(stops)[: stops.numel()], strict=True)
 
-    def value_function(self) -> ca.Function:
-        """Return (x, p) -> the field (N, 1) and the guard functions (m, 1)."""
-        values = [self.field, self.functions]
-        return self.system.function(("values", self.mode), lambda: values, self.states)
-
-    def gradient_function(self) -> ca.Function:
-        """Return (x, p) -> gradients of the guard functions (m, N), the error scale of rounding."""
-
-        def build() -> Sequence[ca.SX]:
-            return [ca.jacobian(self.functions, self.states)]
-
-        return self.system.function(("gradient", self.mode), build, self.states)
-
     def multiplier_equations(self) -> ca.SX:
         """Equations of the multipliers that are states."""
         (layer,) = self._coupled.held_at(self.mode, [self._coupled.layer])
@@ -161,7 +157,7 @@ class Motion:
 
 def motion(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode as a field of the states, for any system; built once."""
-    require_system(system, complementarity=True, joints=True)
+    require_system(system, sets=True, complementarity=True, joints=True)
     return system.cached(("motion", mode), lambda: Motion(system, mode))
 
 

@@ -14,7 +14,6 @@ import casadi as ca
 
 from ..definition.system import FilippovSystem
 from ..errors import DefinitionError
-from ..reading import listed
 from ..values import Array
 from .coupled import Coupled, coupled_of
 from .evaluators import Evaluator
@@ -187,9 +186,4 @@ def _with_sides(system: FilippovSystem, h: ca.SX | None, sides: Sequence[ca.SX])
     law: dict[str, Any] = {"field": fields[0]}
     if h is not None:
         law = {"surface": h, "above": fields[0], "below": fields[1]}
-    return FilippovSystem(
-        listed(d.states),
-        **law,
-        parameters=dict(zip(listed(d.parameters), d.defaults.values(), strict=True)),
-        time=d.time if d.time.numel() else None,
-    )
+    return FilippovSystem(**d.frame(), **law)

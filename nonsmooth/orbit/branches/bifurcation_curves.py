@@ -1,14 +1,12 @@
-"""Curves of bifurcations in two parameters, and the points of codimension two on them.
+"""Curves of bifurcations in two parameters, from an event of a branch or a point of codimension two.
 
-The test of the event is added to the equations of the branch, and a second parameter is free. At a fold
-the Jacobian without the parameters is singular, which a bordered system measures (Griewank & Reddien 1984;
-Kuznetsov 2004, sec. 10.2). The row of the test in the Jacobian is updated along the curve by secants
-(Broyden 1965): it only guides Newton's method, and the accuracy is that of the test.
+Points of a curve are admissible. It ends where it would become virtual, at a point of codimension two, from
+which other curves leave.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,51 +15,18 @@ import numpy as np
 from ...flow.ensembles.progress import progress_bar
 from ...model import Array, ConvergenceError, DefinitionError, OptionError, whole
 from ...model.checks import positive
-from ...solvers.continuation import Arc, Curve, Point, Secant, Zero, directions, trace
+from ...solvers.continuation import Arc, Curve, Departure, Zero, directions, trace
 from ..homoclinic.homoclinic_orbits import Connection
 from .branch import BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of
+from .codimension_two import CodimensionTwo, leaving, special_point
+from .event_curves import VIRTUAL, EventCurve
 from .homoclinic_curves import ConnectionCurve, event_of
 
-_NAMES = {
-    frozenset({"fold", "period doubling"}): "fold-flip",
-    frozenset({"fold", "Neimark-Sacker"}): "fold-Neimark-Sacker",
-    frozenset({"period doubling", "Neimark-Sacker"}): "flip-Neimark-Sacker",
-    frozenset({"fold", "Hopf"}): "fold-Hopf",
-    frozenset({"boundary equilibrium", "fold"}): "boundary saddle-node",
-    frozenset({"boundary equilibrium", "Hopf"}): "boundary Hopf",
-}
+#: Ends of arcs that are no events.
+_WHOLE = ("bound", "closed", "interrupted", "points", VIRTUAL)
 
-
-_DEGENERATE = (
-    "two-fold",
-    "a second touch",
-    "touch of higher order",
-    "fold with contact",
-    "period doubling with contact",
-    "cusp with the other sliding bifurcation",
-)
-
-
-@dataclass(frozen=True, eq=False)
-class CodimensionTwo:
-    """A point of codimension two on a curve of bifurcations.
-
-    Attributes
-    ----------
-    kind : str
-        Its name, such as ``"cusp"``, or the names of both events.
-    values : ndarray (2,)
-        Values of the two parameters.
-    solution
-        The equilibrium or orbit there.
-    """
-
-    kind: str
-    values: Array
-    solution: Any
-
-    def __str__(self) -> str:
-        return f"{self.kind} at ({self.values[0]:.10g}, {self.values[1]:.10g})"
+#: Points of codimension two closer than this, relative to their sizes, are one.
+_MERGED = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -102,7 +67,7 @@ class BifurcationCurve:
         k : int
             Number of the point: a row of ``values``.
         """
-        return self.curve.base.describe(self.points[k])
+        return self.curve.describe(self.points[k])
 
     def __len__(self) -> int:
         return len(self.values)
@@ -118,106 +83,21 @@ class BifurcationCurve:
         return f"BifurcationCurve({self.kind!r}, {len(self)} points, {len(self.special)} special)"
 
 
-class EventCurve(Curve):
-    """The equations of a branch with two free parameters, and the test of an event."""
-
-    exact = False
-    tol = 1e-15  # steps of a secant method shrink less regularly than Newton's
-
-    def __init__(self, base: BranchCurve, name: str, start: Array):
-        self.base, self.name, self.scale = base, name, base.scale
-        self.columns = len(start) - 2
-        if name == "fold":
-            left, _, right = np.linalg.svd(self._square(start))
-            self.border = left[:, -1], right[-1]
-        self.unit = abs(self.test(start + 1e-3 * base.scale * self._probe())) or 1.0
-        # tests that vanish with the event, as at its image in a symmetric orbit
-        tests = self.base.tests(Point(start, np.zeros(len(start))))
-        self.twins = {k for k, v in tests.items() if abs(v) <= 1e-8 and k != name}
-        self.secant = Secant(self._scaled_test, 1.0)
-
-    def _scaled_test(self, v: Array) -> Array:
-        return np.array([self.test(v * self.scale) / self.unit])
-
-    def _probe(self) -> Array:
-        """A generic direction."""
-        return np.cos(1.0 + np.arange(self.columns + 2))
-
-    def _square(self, u: Array) -> Array:
-        """Jacobian by the unknowns without the parameters, scaled."""
-        return self.base.scaled(u / self.scale)[1][:, : self.columns]
-
-    def test(self, u: Array) -> float:
-        """The function that vanishes on the curve."""
-        if self.name == "fold":
-            return self._bordered(u)[0]
-        return float(self.base.tests(Point(u, np.zeros(u.size)))[self.name])
-
-    def _bordered(self, u: Array) -> tuple[float, Array]:
-        """The test of a fold, zero where the square Jacobian is singular, and its null vector."""
-        b, c = self.border
-        matrix = np.block([[self._square(u), b[:, None]], [c[None, :], np.zeros((1, 1))]])
-        target = np.zeros(b.size + 1)
-        target[-1] = 1.0
-        solved = np.linalg.solve(matrix, target)
-        return float(solved[-1]), solved[:-1]
-
-    def equations(self, u: Array) -> tuple[Array, Array]:
-        values, jacobian = self.base.equations(u)
-        known = self.base.test_row(self.name, u)
-        if known is not None:
-            value, slope = known
-            return np.append(values, value), np.vstack([jacobian, slope])
-        test, row = self.secant(u / self.scale)
-        return np.append(values, test), np.vstack([jacobian, row / self.scale])
-
-    def renewed(self, point: Point) -> Point | None:
-        tangent = self.base.turned(point.u, point.tangent)
-        return None if tangent is None else self.point(point.u, tangent, tangent, point.arclength)
-
-    def ends(self, name: str) -> bool:
-        return self.base.ends_curve(name)
-
-    def tests(self, point: Point) -> Mapping[str, float]:
-        """Functions that vanish at other events and at degenerate ones."""
-        u = point.u
-        omitted = {self.name, *self.twins}
-        found = {k: v for k, v in self.base.tests(point).items() if k not in omitted}
-        if self.name == "fold":
-            found["cusp"] = self._quadratic(u)
-        else:
-            found["fold"] = float(np.linalg.det(self._square(u)))
-        further = self.base.codimension_two(self.name, u)
-        if "two-fold" in further:  # the event before is tangent there too
-            found = {k: v for k, v in found.items() if not k.startswith("transversality")}
-        return found | dict(further)
-
-    def _quadratic(self, u: Array) -> float:
-        """Quadratic coefficient of a fold, by the change of the Jacobian along its null vector."""
-        null = self._bordered(u)[1]
-        null = null / np.linalg.norm(null)
-        step = np.zeros(u.size)
-        step[: self.columns] = 1e-5 * null * self.scale[: self.columns]
-        change = (self._square(u + step) - self._square(u - step)) @ null / 2e-5
-        left = np.linalg.svd(self._square(u))[0][:, -1]
-        return float(left @ change) * np.sign(left @ self.border[0])
-
-
 def continue_bifurcation(
-    event: BranchEvent | Connection,
+    event: BranchEvent | Connection | CodimensionTwo,
     parameters: Sequence[str],
     *,
     bounds: Sequence[Sequence[float]],
     step: float = 0.02,
     max_points: int = 2000,
     progress: bool = False,
-) -> BifurcationCurve:
-    """Follow a bifurcation as two parameters vary.
+) -> BifurcationCurve | tuple[BifurcationCurve, ...]:
+    """Follow a bifurcation as two parameters vary, or the curves that leave a point of codimension two.
 
     Parameters
     ----------
-    event : BranchEvent or Connection
-        An entry of ``Branch.events``, or a homoclinic orbit.
+    event : BranchEvent, Connection or CodimensionTwo
+        An entry of ``Branch.events``, a homoclinic orbit, or an entry of ``BifurcationCurve.special``.
     parameters : two str
         Names; others keep their values at the event.
     bounds : two (low, high)
@@ -233,7 +113,9 @@ def continue_bifurcation(
     -------
     BifurcationCurve
         With the points of codimension two on it: a second event at the same time, cusps of folds,
-        changes of the class of a boundary equilibrium, neutral saddles of homoclinic orbits.
+        changes of the class of a boundary equilibrium, neutral saddles of homoclinic orbits. It ends where
+        its solutions become virtual. From a point of codimension two a tuple of the curves that leave it,
+        without the one on which it was found.
 
     Raises
     ------
@@ -265,58 +147,129 @@ def continue_bifurcation(
     names, widths, limits = _checked(event, parameters, bounds)
     positive(step, "step")
     whole(max_points, "max_points", least=2)
-    system = event.curve.system
-    free = tuple(system.parameter_names.index(name) for name in names)
-    assert event.point is not None
-    base, start = event.curve.freed(event.point.u, free, widths)
-    connected = isinstance(base, ConnectionCurve)  # its equations are of codimension one
-    curve = base if connected else EventCurve(base, event.test, start)
-    k = start.size - 2
-    start = _on_curve(curve, start, event.kind)
-    halves: list[Arc] = []
-    tangent, bar = directions(curve, start)[0], progress_bar(None, progress, " points")
-    for way in (-tangent, tangent):
-        if halves and halves[0].end in ("closed", "interrupted"):
-            break
+    bar = progress_bar(None, progress, " points")
+
+    def follow(departure: Departure) -> Arc:
+        curve = departure.curve
+        assert isinstance(curve, (EventCurve, ConnectionCurve))
+        u = departure.rows[-1]
+        curve.base.restart(curve.without(u) if isinstance(curve, EventCurve) else u)
         if isinstance(curve, EventCurve):
             curve.secant.forget()
-        ends = [(k + i, low, high) for i, (low, high) in enumerate(limits)]
-        halves.append(
-            trace(
-                curve,
-                [start],
-                way,
-                step=step,
-                most=max_points,
-                bounds=ends,
-                report=lambda _: bar.update(),
-            )
+        k = departure.rows[-1].size - 2
+        arc = trace(
+            curve,
+            departure.rows,
+            departure.tangent,
+            step=step,
+            most=max_points,
+            bounds=[(k + i, low, high) for i, (low, high) in enumerate(limits)],
+            report=lambda _: bar.update(),
         )
-    bar.close()
+        if arc.end == VIRTUAL and len(arc.points) > 1:
+            arc.points.pop()
+            last = arc.points[-1].arclength
+            arc.zeros[:] = [zero for zero in arc.zeros if zero.point.arclength <= last]
+        return arc
+
+    try:
+        if isinstance(event, CodimensionTwo):
+            assert event.meeting is not None
+            found = leaving(event.meeting, _free(event.meeting.base, names), widths)
+            return tuple(
+                _curve_of(kind, names, curve, [Arc(arc.points[:1], end="event"), arc])
+                for kind, curve, departure in found
+                for arc in [follow(departure)]
+            )
+        assert event.point is not None
+        base, start = event.curve.begun_later(event.point.u)
+        base, start = base.freed(start, _free(base, names), widths)
+        curve: EventCurve | ConnectionCurve
+        if isinstance(base, ConnectionCurve):  # its equations are of codimension one
+            curve = base
+        else:
+            curve = EventCurve(base, event.test, start)
+            start = curve.start
+        start = _on_curve(curve, start, event.kind)
+        halves, tangent = list[Arc](), directions(curve, start)[0]
+        for way in (-tangent, tangent):
+            if halves and halves[0].end in ("closed", "interrupted"):
+                break
+            halves.append(follow(Departure(curve, [start], way)))
+    finally:
+        bar.close()
+    return _curve_of(event.kind, names, curve, halves)
+
+
+def _free(curve: BranchCurve, names: Sequence[str]) -> tuple[int, ...]:
+    return tuple(curve.system.parameter_names.index(name) for name in names)
+
+
+def _curve_of(
+    kind: str,
+    names: tuple[str, str],
+    curve: EventCurve | ConnectionCurve,
+    halves: list[Arc],
+) -> BifurcationCurve:
+    """The curve of two arcs from one point, or of one that is closed."""
     points = [*reversed(halves[0].rows), *(halves[1].rows[1:] if len(halves) > 1 else ())]
     zeros = [*reversed(halves[0].zeros), *(halves[1].zeros if len(halves) > 1 else ())]
+    if isinstance(curve, EventCurve):
+        curve.limits = [half.rows[-1] for half in halves if half.end not in _WHOLE]
     for u in (points[0], points[-1]):
-        base.require_valid(u)
+        curve.base.require_valid(u if isinstance(curve, ConnectionCurve) else curve.without(u))
     return BifurcationCurve(
-        kind=event.kind,
+        kind=kind,
         parameters=names,
-        values=np.array([u[k:] for u in points]),
+        values=np.array([u[-2:] for u in points]),
         points=tuple(points),
-        special=tuple(_special(curve, zero, k, event.kind) for zero in zeros),
+        special=tuple(
+            _merged([special_point(curve, zero, kind) for zero in zeros if _occurs(curve, zero)])
+        ),
         ends=(end_of(halves[0]), end_of(halves[-1])),
         curve=curve,
     )
 
 
+def _occurs(curve: EventCurve | ConnectionCurve, zero: Zero) -> bool:
+    u = zero.point.u
+    return isinstance(curve, ConnectionCurve) or curve.base.occurs(zero.name, curve.without(u))
+
+
+def _merged(points: Sequence[CodimensionTwo]) -> list[CodimensionTwo]:
+    """Points in their order, those at one place once."""
+    found = list[CodimensionTwo]()
+    for point in points:
+        near = [one for one in found if np.abs(one.values - point.values).max() <= _MERGED]
+        if not any(_like(one, point) for one in near):
+            found.append(point)
+    return found
+
+
+def _like(one: CodimensionTwo, other: CodimensionTwo) -> bool:
+    """Whether two points at the same parameters are one: of the same equations and unknowns."""
+    a, b = one.meeting, other.meeting
+    if a is None or b is None or a.u.size != b.u.size:
+        return one.kind == other.kind
+    return bool(np.abs((a.u - b.u) / a.base.scale).max() <= _MERGED)
+
+
 def _checked(
-    event: BranchEvent, parameters: Sequence[str], bounds: Sequence[Sequence[float]]
+    event: BranchEvent | CodimensionTwo,
+    parameters: Sequence[str],
+    bounds: Sequence[Sequence[float]],
 ) -> tuple[tuple[str, str], Array, list[tuple[float, float]]]:
-    if not isinstance(event, BranchEvent) or event.curve is None or not event.test:
+    if isinstance(event, CodimensionTwo) and event.meeting is not None:
+        curve, u = event.meeting.base, event.meeting.u
+    elif isinstance(event, BranchEvent) and event.curve is not None and event.test:
+        assert event.point is not None
+        curve, u = event.curve, event.point.u
+    else:
         raise DefinitionError(
-            f"event={event!r} is no entry of Branch.events that two parameters unfold. Continue an "
-            "equilibrium or an orbit first."
+            f"event={event!r} is no entry of Branch.events that two parameters unfold, and no point from which "
+            "curves leave. Continue an equilibrium or an orbit first."
         )
-    known = event.curve.system.parameter_names
+    known = curve.system.parameter_names
     given = [parameters] if isinstance(parameters, str) else parameters
     names = [str(name) for name in given] if isinstance(given, Iterable) else []
     if len(names) != 2 or len(set(names)) != 2 or not set(names) <= set(known):
@@ -327,8 +280,7 @@ def _checked(
         raise OptionError(
             f"bounds={bounds!r} are not two pairs. Give (low, high) for each parameter."
         )
-    assert event.point is not None
-    values = event.curve.parameters_at(event.point.u)
+    values = curve.parameters_at(u)
     limits = [
         check_bounds(pair, float(values[known.index(name)]), name)
         for pair, name in zip(bounds, names, strict=True)
@@ -347,19 +299,3 @@ def _on_curve(curve: Curve, start: Array, kind: str) -> Array:
             point=start,
         )
     return found
-
-
-def _special(curve: EventCurve | ConnectionCurve, zero: Zero, k: int, event: str) -> CodimensionTwo:
-    own, other = (curve.base.named(name, zero.point.u) for name in (curve.name, zero.name))
-    kind = _NAMES.get(frozenset({own, other}), other)
-    if zero.name in _DEGENERATE:
-        kind = f"{event} with {other}"
-    elif kind == other and zero.name in curve.base.tests(zero.point):
-        kind = f"{own} with {other}"
-    if kind == "fold-Hopf" and curve.base.double_zero(zero.point.u):
-        kind = "Bogdanov-Takens"
-    try:
-        solution = curve.base.describe(zero.point.u)
-    except (ArithmeticError, ValueError):
-        solution = None
-    return CodimensionTwo(kind, zero.point.u[k:], solution)

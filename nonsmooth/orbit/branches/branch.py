@@ -25,7 +25,16 @@ from ...model import (
     real,
 )
 from ...notebook import card
-from ...solvers.continuation import Arc, Curve, Departure, Point, Zero, pieces, trace
+from ...solvers.continuation import (
+    Arc,
+    Curve,
+    Departure,
+    Point,
+    Zero,
+    directions,
+    pieces,
+    trace,
+)
 
 
 class BranchEnd(Enum):
@@ -33,8 +42,8 @@ class BranchEnd(Enum):
 
     REACHED_BOUND: the parameter reached a bound. CLOSED: the branch is a closed curve. EVENT: nothing
     continues it beyond an event. PERIOD_DIVERGES: the period grows without bound. STEP_TOO_SMALL: no
-    solution was found at the shortest step. TOO_MANY_POINTS: it has ``max_points`` points. INTERRUPTED:
-    Ctrl-C.
+    solution was found at the shortest step. TOO_MANY_POINTS: it has ``max_points`` points. FAILED: an
+    error was raised, whose words are in ``Branch.reasons``. INTERRUPTED: Ctrl-C.
     """
 
     REACHED_BOUND = "bound"
@@ -43,6 +52,7 @@ class BranchEnd(Enum):
     PERIOD_DIVERGES = "period"
     STEP_TOO_SMALL = "step too small"
     TOO_MANY_POINTS = "points"
+    FAILED = "failed"
     INTERRUPTED = "interrupted"
 
     def __str__(self) -> str:
@@ -57,10 +67,11 @@ class BranchEnd(Enum):
 _ADVICE = {
     BranchEnd.REACHED_BOUND: "The parameter reached its bound.",
     BranchEnd.CLOSED: "The branch is a closed curve.",
-    BranchEnd.EVENT: "The branch ends at an event: nothing continues it, or through=False.",
+    BranchEnd.EVENT: "Nothing continues the branch beyond its last event, or through=False.",
     BranchEnd.PERIOD_DIVERGES: "The period grows without bound: a homoclinic orbit is near.",
     BranchEnd.STEP_TOO_SMALL: "Steps became too short: the solutions end here, or the equations do.",
     BranchEnd.TOO_MANY_POINTS: "Raise max_points to go on.",
+    BranchEnd.FAILED: "An error was raised.",
     BranchEnd.INTERRUPTED: "Interrupted; the branch has the points computed so far.",
 }
 
@@ -156,6 +167,8 @@ class Branch:
         Events in their order along the branch.
     ends : tuple of two BranchEnd
         Why it ends at its first and its last point.
+    reasons : tuple of two str
+        The same in a sentence each.
     nodes : tuple of (curve, Point)
         For each solution the equations and the point of their curve.
     """
@@ -165,6 +178,7 @@ class Branch:
     solutions: tuple[Any, ...]
     events: tuple[BranchEvent, ...]
     ends: tuple[BranchEnd, BranchEnd]
+    reasons: tuple[str, str] = ("", "")
     nodes: tuple[tuple[Any, Point], ...] = ()
 
     @property
@@ -276,12 +290,20 @@ class BranchCurve(Curve):
         """The same equations with other free parameters of the scales ``widths``, and the point there."""
         raise NotImplementedError
 
+    def begun_later(self, u: Array) -> tuple[BranchCurve, Array]:
+        """The same equations and solution; a forced orbit without events begins at another phase."""
+        return self, u
+
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
         """The event at the end of a branch, if one can be named."""
         return None
 
     def restart(self, u: Array) -> None:
         """Prepare to be followed from a point of it."""
+
+    def admissible(self, u: Array) -> bool:
+        """Whether the motion has the solution at a point."""
+        return getattr(self.describe(u), "status", "") != "virtual"
 
     def turned(self, u: Array, tangent: Array) -> Array | None:
         """Change the equations at a point, if need be; the tangent of the new ones."""
@@ -291,13 +313,17 @@ class BranchCurve(Curve):
         tangent = self.turned(point.u, point.tangent)
         return None if tangent is None else self.point(point.u, tangent, tangent, point.arclength)
 
-    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+    def codimension_two(self, name: str, u: Array, touch: float | None) -> Mapping[str, float]:
         """Further functions whose zeros on a curve of events are of codimension two."""
         return {}
 
-    def ends_curve(self, name: str) -> bool:
-        """Whether a curve of events ends at a point of codimension two."""
-        return False
+    def ends_curve(self, event: str, name: str) -> bool:
+        """Whether the curve of an event ends at a zero of another test."""
+        return self.ends(name)
+
+    def faults(self, u: Array) -> list[str]:
+        """Violated guards at a point of the curve."""
+        return []
 
     def test_row(self, test: str, u: Array) -> tuple[float, Array] | None:
         """A test and its derivatives by the unknowns, where known in closed form; else None."""
@@ -306,6 +332,10 @@ class BranchCurve(Curve):
     def named(self, test: str, u: Array) -> str:
         """The bifurcation at a zero of a test."""
         return test
+
+    def occurs(self, test: str, u: Array) -> bool:
+        """Whether the bifurcation occurs at a zero of its test, which may vanish elsewhere too."""
+        return True
 
     def double_zero(self, u: Array) -> bool:
         """Whether two eigenvalues vanish together at a point."""
@@ -389,12 +419,14 @@ def follow_branch(
             bar.set_postfix_str(f"{name} = {point.u[-1]:.6g}", refresh=False)
         bar.update()
 
+    step = min(step, 1.0)  # a step is no longer than the bounds are wide
+    if away is None:
+        start = _off_events(curve, start, 0.01 * step, bounds)
     forward = np.zeros(start.size)
     forward[-1] = 1.0
-    step = min(step, 1.0)  # a step is no longer than the bounds are wide
     options: dict[str, Any] = dict(step=step, max_points=max_points, report=report, bounds=bounds)
     ways = [Departure(curve, [start], sign * forward) for sign in (-1.0, 1.0)]
-    halves = [] if away is None else [_Half()]
+    halves = [] if away is None else [_Half(reason="It begins at an event.")]
     for way in ways if away is None else [away]:
         if halves and halves[0].end in (BranchEnd.CLOSED, BranchEnd.INTERRUPTED):
             halves.append(_Half(end=halves[0].end))
@@ -408,6 +440,34 @@ def follow_branch(
     return branch
 
 
+#: Size of a test at the start, relative to that beside it, at which the start is its zero.
+_ZERO = 1e-9
+
+
+def _off_events(
+    curve: BranchCurve, start: Array, step: float, bounds: tuple[float, float]
+) -> Array:
+    """The start, or where a test vanishes there a point beside it, so that the zero is inside a step."""
+    curve.restart(start)
+    try:
+        tangent = directions(curve, start)[0]
+    except (NonsmoothError, np.linalg.LinAlgError):
+        return start
+    here = curve.point(start, tangent, tangent, 0.0)
+    small = {} if here is None else {k: abs(v) for k, v in here.tests.items() if abs(v) < 1e-6}
+    if not small:
+        return start
+    beside = list[Point]()
+    for sign in (-1.0, 1.0):
+        u = curve.correct(start + sign * step * tangent * curve.scale, tangent)
+        point = None if u is None else curve.point(u, tangent, tangent, sign * step)
+        if point is not None and bounds[0] <= curve.value(point.u) <= bounds[1]:
+            beside.append(point)
+    zero = [k for k in small for p in beside if small[k] < _ZERO * abs(p.tests.get(k, 0.0))]
+    kept = [point for point in beside if zero and curve.admissible(point.u)]
+    return kept[0].u if kept else start
+
+
 @dataclass
 class _Half:
     """One way along a branch."""
@@ -415,6 +475,18 @@ class _Half:
     nodes: list[tuple[BranchCurve, Point]] = field(default_factory=list)
     events: list[BranchEvent] = field(default_factory=list)
     end: BranchEnd = BranchEnd.EVENT
+    reason: str = ""
+
+    def name_end(self, curve: BranchCurve, u: Array) -> None:
+        """The event at the last point of a curve that could not be followed."""
+        try:
+            last = curve.ending(u, self.end)
+        except (NonsmoothError, np.linalg.LinAlgError):
+            return
+        if last is not None:
+            self.events.append(last)
+            diverges = last.kind in ("homoclinic", "infinite period at a boundary node")
+            self.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT
 
 
 def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
@@ -438,7 +510,7 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         known.update(dict.fromkeys(map(id, arc.zeros)))
         try:
             for zero in arc.zeros:
-                known[id(zero)] = curve.event(zero)
+                known[id(zero)] = _event(curve, zero)
         except KeyboardInterrupt:
             arc.end = "interrupted"
         return arc
@@ -450,7 +522,7 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         assert isinstance(departure.curve, BranchCurve)
         try:
             return departure.curve.onward(event, arc.zeros[-1])
-        except NonsmoothError:  # the itinerary beyond has no orbit
+        except (NonsmoothError, np.linalg.LinAlgError):  # the itinerary beyond has no orbit
             return None
         except KeyboardInterrupt:
             half.end = BranchEnd.INTERRUPTED
@@ -468,15 +540,50 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         if last is not None and last.point is not None and _elsewhere(last, at):
             half.nodes[-1] = (last.curve, last.point)  # regular in the other itinerary
         found = [known[id(zero)] for zero in arc.zeros]
-        half.events += [event for event in found if event is not None]
-        half.end = end_of(arc)
-        if half.end in (BranchEnd.PERIOD_DIVERGES, BranchEnd.STEP_TOO_SMALL):
-            last = at.ending(arc.points[-1].u, half.end)
-            if last is not None:
-                half.events.append(last)
-                diverges = last.kind == "homoclinic"
-                half.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT
+        half.events += _distinct(found)
+        half.end, half.reason = end_of(arc), arc.reason
+        if half.end in (BranchEnd.PERIOD_DIVERGES, BranchEnd.STEP_TOO_SMALL, BranchEnd.FAILED):
+            half.name_end(at, arc.points[-1].u)
     return half
+
+
+#: Distance of a turning point from a pitchfork, relative to the step, at which it is the pitchfork itself.
+_SAME = 1e-8
+
+
+def _distinct(events: Sequence[BranchEvent | None]) -> list[BranchEvent]:
+    """Events without the turning points of branches at the pitchforks where these begin."""
+    found = [event for event in events if event is not None]
+    forks = [event.parameter for event in found if event.kind == "pitchfork"]
+    return [
+        event
+        for event in found
+        if event.kind != "fold"
+        or all(abs(event.parameter - fork) > _SAME * (1e-3 + abs(fork)) for fork in forks)
+    ]
+
+
+def _event(curve: BranchCurve, zero: Zero) -> BranchEvent | None:
+    """The event at a zero; where it cannot be computed, with the reason."""
+    try:
+        return curve.event(zero)
+    except (NonsmoothError, np.linalg.LinAlgError) as error:
+        solution, side = curve.describe(zero.point.u), FarSide("", f"not classified: {error}")
+        value = curve.value(zero.point.u)
+        return BranchEvent(
+            "unclassified", value, solution, side, side.numbers, curve, zero.point, zero.name
+        )
+
+
+def _sentence(name: str, half: _Half) -> str:
+    """Why a branch ends."""
+    if half.end in (BranchEnd.EVENT, BranchEnd.PERIOD_DIVERGES) and half.events:
+        last = half.events[-1]
+        return (
+            f"At {name} = {last.parameter:.10g} there is an event, {last.kind} ({last.far_side})."
+        )
+    said = half.reason and f" {half.reason}"
+    return half.end.advice + said
 
 
 def _elsewhere(event: BranchEvent, curve: BranchCurve) -> bool:
@@ -522,5 +629,6 @@ def _joined(name: str, backward: _Half, forward: _Half) -> Branch:
         solutions=tuple(curve.describe(point.u) for curve, point in nodes),
         events=tuple(events),
         ends=(backward.end, forward.end),
+        reasons=(_sentence(name, backward), _sentence(name, forward)),
         nodes=tuple(nodes),
     )

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -20,18 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...flow.fixed import first_terms
-from ...model import Array, Evaluator, FilippovSystem, Guard
+from ...model import Array, Evaluator, FilippovSystem, Guard, evaluator
 from ...model.derivatives.event_maps import keeps_zero
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
-from ..periodic.multipliers import finite_return_map
+from ..periodic.multipliers import Multipliers, finite_return_map
 from ..runs.guards import CONDITIONS, LegGuards, is_met, watch
 from ..runs.legs import Leg, surface_of
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
 
-#: Entries of a return map beyond this say nothing of its multipliers.
-_NO_DIGITS = 1e10
+#: Entries of a return map beyond which its small multipliers have lost their digits.
+_NO_DIGITS = 1e6
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,14 @@ class Condition:
     leg : int
     guard : Guard or None
         Of the leg's mode.
+    t : float or None
+        Which extremum of the guard is meant, by the time since the start of the leg; the nearest to zero.
     """
 
     what: str
     leg: int
     guard: Guard | None = None
+    t: float | None = field(default=None, compare=False)
 
     @cached_property
     def name(self) -> str:
@@ -75,7 +78,8 @@ def conditions_of(
         known.setdefault(name, condition)
         if math.isfinite(value):
             found[name] = value
-    found.update((name, v) for name, v in smooth_tests(problem, at).items() if math.isfinite(v))
+    smooth = smooth_tests(problem, at, p)
+    found.update((name, v) for name, v in smooth.items() if math.isfinite(v))
     return found
 
 
@@ -99,8 +103,7 @@ def condition_row(
             rows = _starting(problem.system, i, leg, before)
             found = {test.name: float(first[k, order]) for k, order, test in rows}
             return found.get(condition.name, np.nan)
-        values = minima(problem.system, problem.legs[i], condition, x, duration, q)
-        return min(values, key=abs, default=np.nan)  # the one that touches, not the least
+        return touching(problem.system, problem.legs[i], condition, x, duration, q)[1]
 
     row, x = np.zeros(count + len(free)), starts[i]
     sizes = 1e-6 * np.maximum(np.abs(starts).max(axis=0), 1e-3)
@@ -114,17 +117,21 @@ def condition_row(
     return value(x, p), row
 
 
-def smooth_tests(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
+def smooth_tests(problem: BoundaryProblem, at: Evaluation, p: Array) -> dict[str, float]:
     """Tests by the multipliers of the legs' map."""
     # An eigenvalue -1 of the half map of a symmetric orbit breaks its symmetry: a pitchfork.
     reduced = finite_return_map(problem, at)
-    if reduced is None or not float(np.abs(reduced).max()) < _NO_DIGITS:  # an event is grazed
+    if reduced is None:  # an event is grazed
         return {}
+    values: NDArray[Any] = np.linalg.eigvals(reduced)
+    if not float(np.abs(reduced).max()) < _NO_DIGITS:
+        found = Multipliers(problem, at, p).of_map
+        values = np.append(found, np.zeros(len(reduced) - found.size, complex))
+    k, l = _pairs(values.size)
     with np.errstate(all="ignore"):
-        values = np.linalg.eigvals(reduced)
-        k, l = _pairs(values.size)
-        torus = float(np.multiply.reduce(values[k] * values[l] - 1.0).real)
-        flip = float(np.multiply.reduce(values + 1.0).real)
+        pairs = values[k] * values[l]
+        torus = float(np.multiply.reduce((pairs - 1.0) / (1.0 + np.abs(pairs))).real)
+        flip = float(np.multiply.reduce((values + 1.0) / (1.0 + np.abs(values))).real)
     name = "period doubling" if problem.symmetry is None else "pitchfork"
     return {name: flip, "Neimark-Sacker": torus}
 
@@ -229,7 +236,9 @@ def _ending(
 def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
     """(y, p) -> field and guards of a mode; built once."""
     motion = guarded_field(system, mode).motion
-    return system.cached(("guard values", mode), lambda: Evaluator(motion.value_function()))
+    return evaluator(
+        system, ("values", mode), lambda: [motion.field, motion.functions], motion.states
+    )
 
 
 def _interior(
@@ -254,19 +263,25 @@ def _signed(guard: Guard, value: float) -> float:
 
 
 def minima(
-    system: FilippovSystem, leg: Leg, condition: Condition, x: Array, duration: float, p: Array
-) -> list[float]:
-    """Values of the guard of an interior condition at all its minima inside a leg."""
-    if duration <= 0.0:
-        return []
-    seen = watch(system, leg.mode, x, duration, p).approaches
-    return [_signed(near.guard, near.value) for near in seen if near.guard == condition.guard]
+    system: FilippovSystem, leg: Leg, guard: Guard, x: Array, duration: float, p: Array
+) -> list[tuple[float, float]]:
+    """Times since its start and values at which a leg is extremal to a guard, the nearest approach first."""
+    seen = watch(system, leg, x, duration, p).approaches if duration > 0.0 else []
+    own = [(near.t, _signed(guard, near.value)) for near in seen if near.guard == guard]
+    return sorted(own, key=lambda pair: abs(pair[1]))
 
 
 def touching(
-    system: FilippovSystem, leg: Leg, guard: Guard, x: Array, duration: float, p: Array
-) -> float:
-    """Time since its start at which a leg comes nearest to a guard."""
-    seen = watch(system, leg.mode, x, duration, p).approaches
-    own = [near for near in seen if near.guard == guard]
-    return min(own, key=lambda near: abs(near.value)).t if own else 0.5 * duration
+    system: FilippovSystem,
+    leg: Leg,
+    condition: Condition,
+    x: Array,
+    duration: float,
+    p: Array,
+) -> tuple[float, float]:
+    """Time and value of the extremum of a guard that an interior condition means."""
+    assert condition.guard is not None
+    found, near = minima(system, leg, condition.guard, x, duration, p), condition.t
+    if near is not None:
+        return min(found, key=lambda pair: abs(pair[0] - near), default=(near, np.nan))
+    return found[0] if found else (0.5 * duration, np.nan)

@@ -38,6 +38,9 @@ from .normal_forms import hopf_coefficient
 #: Length of the first step from a boundary equilibrium.
 _START = 1e-4
 
+#: A switching function or weight below minus this is that of a virtual equilibrium.
+_VIRTUAL = 1e-9
+
 #: Relative error of a state.
 _ROUNDING = 1e-13
 
@@ -101,6 +104,12 @@ class Equilibria(BranchCurve):
         frequency = float(abs(values[_critical_pair(values)[0]].imag))
         value = self.lyapunov(u, frequency) if frequency else np.nan
         return {"Bautin": value} if np.isfinite(value) else {}
+
+    def occurs(self, test: str, u: Array) -> bool:
+        """Not a Hopf point at a neutral saddle, where two real eigenvalues have the sum 0."""
+        values = self.eigenvalues(u)
+        turning = values[_critical_pair(values)[0]].imag != 0.0
+        return test != "Hopf" or bool(turning) or self.double_zero(u)
 
     def double_zero(self, u: Array) -> bool:
         sizes = np.sort(np.abs(self.eigenvalues(u)))
@@ -214,10 +223,15 @@ class EquilibriumCurve(Equilibria):
             found["Hopf"] = self.hopf(point.u)
         return found
 
-    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+    def codimension_two(self, name: str, u: Array, touch: float | None) -> Mapping[str, float]:
         if name == "Hopf":
             return self.bautin(u)
         return self.boundary_numbers(u, self.k) if name == "boundary equilibrium" else {}
+
+    def faults(self, u: Array) -> list[str]:
+        mode, h = self.mode_at(u), self.local_surface(u).switches(u[: self.n])
+        signs = [1.0 if letter == "+" else -1.0 for letter in mode]
+        return [self._boundary_of(j) for j, s in enumerate(signs) if s * h[j] < -_VIRTUAL]
 
     def _boundary_of(self, surface: int) -> str:
         own = "boundary equilibrium"
@@ -271,11 +285,17 @@ class EquilibriumCurve(Equilibria):
 _ALPHA = {"alpha = 0": 0, "alpha = 1": 1}
 
 
+_PSEUDO = {"fold": "pseudo-saddle-node"}
+
+
 class _PseudoEquilibriumCurve(Equilibria):
     """h = 0 and (1 - alpha) F1 + alpha F2 = 0 in the unknowns (x, alpha, p), for continuation."""
 
     def mode_at(self, u: Array) -> str:
         return self.where.mode
+
+    def named(self, test: str, u: Array) -> str:
+        return "boundary equilibrium" if test in _ALPHA else _PSEUDO.get(test, test)
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         n, here, x, a = self.n, self.local_surface(u), u[: self.n], u[self.n]
@@ -304,10 +324,16 @@ class _PseudoEquilibriumCurve(Equilibria):
             found["Hopf"] = self.hopf(u)
         return found
 
-    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+    def codimension_two(self, name: str, u: Array, touch: float | None) -> Mapping[str, float]:
         if name == "Hopf":
             return self.bautin(u)
         return self.boundary_numbers(u, _ALPHA[name]) if name in _ALPHA else {}
+
+    def faults(self, u: Array) -> list[str]:
+        tests, mode = self.tests(Point(u, np.zeros(u.size))), self.where.mode
+        signs = {name: -1.0 if mode[j] == "-" else 1.0 for name, j in self._met.items()}
+        signs |= dict.fromkeys(_ALPHA, 1.0)
+        return [name for name, sign in signs.items() if sign * tests[name] < -_VIRTUAL]
 
     @property
     def _met(self) -> dict[str, int]:
@@ -333,7 +359,7 @@ class _PseudoEquilibriumCurve(Equilibria):
             side = FarSide("", "sliding changes between attracting and repelling")
             event = BranchEvent("two-fold", self.value(zero.point.u), numbers.x, side)
             return replace(event, curve=self, point=zero.point, test=zero.name)
-        return self.smooth_event(zero, "pseudo-saddle-node")
+        return self.smooth_event(zero, _PSEUDO["fold"])
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """Equilibria of the field whose weight is one, on that field's own side."""

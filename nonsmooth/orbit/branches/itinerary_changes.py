@@ -19,12 +19,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from ...flow.fixed import first_terms
-from ...model import Array, Guard
+from ...model import Array, Guard, NonsmoothError
 from ...model.derivatives.variational import guarded_field
+from ...solvers.continuation import Departure
 from ..periodic.boundary_value_problem import (
     TURNED,
     BoundaryProblem,
@@ -32,6 +34,7 @@ from ..periodic.boundary_value_problem import (
     mirrored,
     neighbours,
 )
+from ..periodic.find_periodic import at_two_fold
 from ..runs.itinerary import leg_between
 from ..runs.legs import Leg, integrate_leg, surface_of
 from .conditions import Condition, touching
@@ -122,6 +125,9 @@ _TANGENT = 1e-7
 
 SOFT, FORCE = "grazing of a soft switch", "grazing of a jumping force"
 
+#: Grazing of a soft switch by the orbits of a centre, at whose value of the parameter all of these exist.
+CENTRE = "focus-centre-limit cycle"
+
 
 def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array) -> str:
     """The bifurcation that the zero of a test is."""
@@ -139,6 +145,9 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     if test.what == "end":
         return "two-fold"
     if test.what == "transversality":
+        end = at.flows.end[i, : at.flows.sizes[i]]
+        if at_two_fold(problem.system, leg, end, p):
+            return "two-fold"
         return {
             "impact": "impact grazing",
             "reset": "grazing of a reset",
@@ -181,8 +190,9 @@ def _grazed(
         )
     if guard.kind == "release":
         return "release"
-    t = touching(problem.system, leg, guard, at.starts[test.leg], float(at.durations[test.leg]), p)
-    y = integrate_leg(problem.system, leg, at.starts[test.leg], t, p).end[: problem.dimension]
+    x, duration = at.starts[test.leg], float(at.durations[test.leg])
+    t = touching(problem.system, leg, test, x, duration, p)[0]
+    y = integrate_leg(problem.system, leg, x, t, p).end[: problem.dimension]
     other = (
         leg.mode[: guard.element] + ("-" if guard.side > 0 else "+") + leg.mode[guard.element + 1 :]
     )
@@ -259,7 +269,7 @@ def _longer(
         return None
     problem = before.problem
     leg, x, duration = editor.legs[i], editor.starts[i], editor.durations[i]
-    t = touching(problem.system, leg, at.guard, x, duration, p)
+    t = touching(problem.system, leg, at, x, duration, p)[0]
     y = integrate_leg(problem.system, leg, x, t, p).end[: problem.dimension]
     added = _added(problem, leg, at.guard, kind, y, p)
     if added is None:
@@ -311,7 +321,7 @@ def _added(
     if kind == "grazing-sliding":
         slide = with_letter(leg.mode, guard.element, "s")
         return [leg_between(system, leg.mode, slide), leg_between(system, slide, leg.mode)], [y, y]
-    if kind == SOFT:
+    if kind in (SOFT, FORCE, CENTRE):
         far = with_letter(leg.mode, guard.element, leg.mode[guard.element].translate(TURNED))
         return [leg_between(system, leg.mode, far), leg_between(system, far, leg.mode)], [y, y]
     if kind == "adding-sliding":
@@ -354,7 +364,7 @@ def _shorter(
         legs[i - 1] = replace(legs[i - 1], kind=became)
         editor.remove(i)
         return editor.done(test=Condition("start", i % len(legs), guard))
-    if kind in ("grazing-sliding", "adding-sliding", SOFT) and at.what == "duration":
+    if kind in ("grazing-sliding", "adding-sliding", SOFT, FORCE) and at.what == "duration":
         if len(legs) == 2:
             return _smooth(editor, p)
         if i + 1 == len(legs):
@@ -564,3 +574,38 @@ def grown(problem: BoundaryProblem, u: Array, p: Array, fresh: Sequence[int], by
             flow = integrate_leg(problem.system, legs[k], starts[k], float(durations[k]), p)
             starts[k + 1] = flow.end[: problem.dimension]
     return problem.pack(starts, durations)
+
+
+# Leaving an event ---------------------------------------------------------------------------------
+
+#: Durations of new legs, or distances along the curve, with which it leaves an event, relative to the orbit.
+_STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
+
+
+def departures(curve: Any, u: Array, fresh: Sequence[int]) -> list[Departure]:
+    """Ways to leave an event into the side where the itinerary holds, new legs growing from zero."""
+    for size in _STARTS:
+        ways: list[tuple[Array, Array]] = []
+        try:
+            tangent = np.linalg.svd(curve.scaled(u / curve.scale)[1])[2][-1]
+        except (NonsmoothError, np.linalg.LinAlgError):  # no derivatives there
+            return []
+        if fresh:
+            problem, axis = curve.problem, np.zeros(u.size)
+            axis[[problem.size - len(problem.legs) + i for i in fresh]] = len(fresh) ** -0.5
+            by = size * float(curve.scale[problem.size - 1])
+            ways.append((curve.grown(u, fresh, by), axis))
+        ways += [(u + s * size * tangent * curve.scale, tangent) for s in (1.0, -1.0)]
+        result = list[Departure]()
+        for guess, axis in ways:
+            found = curve.correct(guess, axis)
+            if found is None or np.abs((found - u) / curve.scale).max() > 0.2:
+                continue
+            if not curve.faults(found):
+                step = (found - u) / curve.scale
+                result.append(Departure(curve, [u, found], step / np.linalg.norm(step)))
+                if fresh:
+                    break
+        if result:
+            return result
+    return []

@@ -5,13 +5,6 @@ ends at a zero of one of its tests (``conditions``). Of the two itineraries that
 fewer legs is regular, so the event is located in it, and the branch goes on in the other one
 (``itinerary_changes``).
 
-On curves of bifurcations in two parameters, points of codimension two are zeros of further tests. On a curve
-of grazing-sliding the touching is of higher order (L11 = 0), or at a two-fold (L2 = 0), or a multiplier with
-contact is 1 or -1, or the orbit touches a second time; on one of crossing- or switching-sliding L11 = 0 turns
-one into the other. On a curve of Neimark-Sacker points the angle is resonant; where the pair meets at 1 or -1
-the curve ends, as the numbers beyond are a neutral saddle's. There and on curves of period doublings the cubic
-coefficient of the normal form may vanish.
-
 Source: Kowalczyk, di Bernardo, Champneys et al. 2006 (Int. J. Bifurcation Chaos 16, 601); Kuznetsov 2004,
 ch. 9.
 """
@@ -24,36 +17,37 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...flow.fixed import first_terms
-from ...local import Equilibrium, PseudoEquilibrium
-from ...local.checks import parameter_index
 from ...local.read_only import ReadOnly
-from ...model import Array, ConvergenceError, DefinitionError, NonsmoothError, whole
-from ...model.checks import positive
-from ...model.derivatives.event_maps import surface_map
-from ...model.derivatives.variational import guarded_field, variational_field
-from ...solvers.continuation import Departure, Point, Zero, other_direction
+from ...model import Array, ConvergenceError, NonsmoothError
+from ...solvers.continuation import Departure, Point, Zero
 from ...solvers.newton import converge
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, eliminated
-from ..periodic.multipliers import leg_maps, return_map
+from ..periodic.find_periodic import at_two_fold
+from ..periodic.multipliers import return_map
 from ..periodic.orbit import PeriodicOrbit, faults_of, named
-from ..periodic.symmetry import halves, mirrored, prime_period, require_symmetric
-from ..runs.legs import Leg, integrate_leg, shown_itinerary
+from ..periodic.symmetry import halves, prime_period, require_symmetric
+from ..runs.legs import integrate_leg, shown_itinerary
 from .branch import (
-    Branch,
     BranchCurve,
     BranchEnd,
     BranchEvent,
     FarSide,
-    check_bounds,
-    follow_branch,
 )
-from .conditions import Condition, condition_row, conditions_of, is_smooth, minima
-from .family_ends import extent, hopf_point, surface_end
+from .conditions import Condition, condition_row, conditions_of, is_smooth
+from .event_curves import OWN_ENDS, degenerate_tests
+from .family_ends import extent, hopf_point, node_end, surface_end
 from .homoclinic_curves import homoclinic_end
-from .itinerary_changes import ChangedItinerary, changed_itinerary, grown, kind_of
+from .itinerary_changes import (
+    CENTRE,
+    SOFT,
+    ChangedItinerary,
+    changed_itinerary,
+    departures,
+    grown,
+    kind_of,
+)
 from .normal_forms import normal_form, torus_pair
-from .unfoldings import contact_at, contact_numbers, far_side, touched
+from .unfoldings import far_side
 
 # Equations of periodic orbits with free parameters ----------------------------------------------------
 
@@ -126,9 +120,6 @@ class OrbitEquations(BranchCurve):
         return eliminated(self.problem, matrix, np.zeros(len(matrix))).determinant()
 
 
-#: Durations of new legs, or distances along the branch, with which it leaves an event, relative to the orbit.
-_STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
-
 #: Relative growth of a long period, over a change of the parameter by its bounds, at which it diverges.
 _STEEP = 30.0
 
@@ -136,11 +127,20 @@ _STEEP = 30.0
 #: the branch is lost.
 _TINY, _SMALL = 1e-4, 1e-2
 
+#: L of the other field where a slide ends, relative to its gradient and the state, at the last step to a two-fold.
+_REACHED = 1e-6
+
 #: Period relative to that of the guess below which a solution is a point.
 _COLLAPSED = 1e-6
 
 #: Share of the way to an event at which the orbit before it is checked.
 _JUST = 0.99
+
+#: Component of the parameter in a tangent below which a branch is vertical.
+_VERTICAL = 1e-6
+
+#: Share of an orbit without events by which it may begin later, where a guard is touched at its start.
+_LATER = 0.381966
 
 #: Order of the conditions that name an event at which several vanish.
 _PRIORITY = ("duration", "start", "end", "interior", "transversality")
@@ -153,9 +153,9 @@ _OBLIQUE, _LEFT = 0.9, 0.5
 class OrbitCurve(OrbitEquations):
     """Periodic orbits of one itinerary, with their tests and events."""
 
-    def with_problem(self, problem: BoundaryProblem, u: Array) -> OrbitCurve:
-        """The same parameters with another itinerary."""
-        return OrbitCurve(problem, self.p, self.free, self.widths, u, self.longest)
+    def with_problem(self, problem: BoundaryProblem, u: Array, p: Array) -> OrbitCurve:
+        """The same free parameters with another itinerary, at parameters p."""
+        return OrbitCurve(problem, p, self.free, self.widths, u, self.longest)
 
     def tests(self, point: Point) -> Mapping[str, float]:
         at, p, self._last = self.evaluation(point.u), self.parameters_at(point.u), b""
@@ -260,10 +260,18 @@ class OrbitCurve(OrbitEquations):
         shrunk = self._shrunk(u, _SMALL)
         if shrunk is not None:
             return shrunk
-        if end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u):
-            return None
-        name = self.system.parameter_names[self.free[-1]]
-        return homoclinic_end(self.describe(u), name, float(self.widths[-1]))
+        at, p = self.evaluation(u), self.parameters_at(u)
+        for i, leg in enumerate(self.problem.legs):
+            if at_two_fold(self.system, leg, at.flows.end[i, : at.flows.sizes[i]], p, _REACHED):
+                side = FarSide(
+                    "", "a slide ends at a two-fold, beyond which its future is not unique"
+                )
+                return self._event("two-fold", self, Point(u, np.zeros(u.size)), "", side)
+        name, width = self.system.parameter_names[self.free[-1]], float(self.widths[-1])
+        node = node_end(self.describe(u), name, width)
+        if node is not None or (end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u)):
+            return node
+        return homoclinic_end(self.describe(u), name, width)
 
     def _shrunk(self, u: Array, part: float) -> BranchEvent | None:
         """The point of a surface to which an orbit shrinks, if it is small relative to the first one."""
@@ -281,6 +289,9 @@ class OrbitCurve(OrbitEquations):
     def faults(self, u: Array) -> list[str]:
         """Violated guards."""
         return faults_of(self.problem, self.evaluation(u), self.parameters_at(u))
+
+    def admissible(self, u: Array) -> bool:
+        return not self.faults(u)
 
     def require_valid(self, u: Array) -> None:
         """Raise for half orbits of a system whose symmetry the parameter breaks."""
@@ -301,18 +312,25 @@ class OrbitCurve(OrbitEquations):
         p, unknowns = self.parameters_at(u), u[: self.problem.size]
         return condition_row(self.problem, unknowns, p, self.free, self.known[test])
 
-    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+    def codimension_two(self, name: str, u: Array, touch: float | None) -> Mapping[str, float]:
         at, p = self.evaluation(u), self.parameters_at(u)
-        return _degenerate(self.problem, self.known.get(name), name, at, p)
+        return degenerate_tests(self.problem, self.known.get(name), name, at, p, touch)
 
-    def ends_curve(self, name: str) -> bool:
-        return name in _ENDS
+    def ends_curve(self, event: str, name: str) -> bool:
+        return name in OWN_ENDS or (name in self.known and not is_smooth(name))
 
     def named(self, test: str, u: Array) -> str:
         if is_smooth(test) or test not in self.known:
             return test
         condition = self.known[test]
         return kind_of(self.problem, condition, self.evaluation(u), self.parameters_at(u))
+
+    def occurs(self, test: str, u: Array) -> bool:
+        """Not a Neimark-Sacker point at a neutral saddle, where two real multipliers have the product 1."""
+        if test != "Neimark-Sacker":
+            return True
+        values = np.linalg.eigvals(return_map(self.problem, self.evaluation(u)))
+        return bool(abs(values[torus_pair(values)[0]].imag) >= _REAL)
 
     def event(self, zero: Zero) -> BranchEvent | None:
         u = zero.point.u
@@ -322,6 +340,10 @@ class OrbitCurve(OrbitEquations):
         if shrunk is not None:
             return shrunk
         conditions = self._vanishing(zero)
+        if conditions[0].what == "start":
+            later = self._at_another_phase(u, conditions[0])
+            if later is not None:
+                return later
         at, p = self.evaluation(u), self.parameters_at(u)
         kind = kind_of(self.problem, conditions[0], at, p)
         beyond = self._edited(kind, conditions, u, p)
@@ -331,16 +353,37 @@ class OrbitCurve(OrbitEquations):
             side = far_side(self.problem, kind, conditions[0], at, p, itinerary, beyond)
             return self._event(kind, self, zero.point, conditions[0].name, side)
         itinerary = shown_itinerary(self.system, beyond.problem.legs)
-        curve = self.with_problem(beyond.problem, beyond.u)
+        curve = self.with_problem(beyond.problem, beyond.u, p)
         point = curve.located(np.append(beyond.u, u[-len(self.free) :]), beyond.test)
         if point is None:
             side = FarSide(itinerary, "not located on the side with fewer legs")
             return self._event(kind, self, zero.point, conditions[0].name, side)
         at, p = curve.evaluation(point.u), curve.parameters_at(point.u)
         test = curve.known[beyond.test]
+        vertical = abs(float(point.tangent[-1])) < _VERTICAL and not self.system.time_dependent
+        if kind == SOFT and vertical and curve.problem.legs[0].timed:
+            kind = CENTRE
         back = curve._edited(kind, [test], point.u, p) if kind == "corner" else None
         side = far_side(curve.problem, kind, test, at, p, itinerary, back)
         return self._event(kind, curve, point, beyond.test, side)
+
+    def begun_later(self, u: Array) -> tuple[BranchCurve, Array]:
+        if self.problem.phase is None or not self.system.time_dependent:
+            return self, u
+        k, p = self.problem.size, self.parameters_at(u)
+        (x,), (duration,) = self.problem.split(u[:k])
+        n, leg = self.problem.dimension, self.problem.legs[0]
+        begin = integrate_leg(self.system, leg, x, _LATER * float(duration), p).end[None, :n]
+        unknowns = self.problem.pack(begin, np.array([duration]))
+        curve = self.with_problem(replace(self.problem, reference=begin[0]), unknowns, p)
+        return curve, np.append(unknowns, u[k:])
+
+    def _at_another_phase(self, u: Array, at: Condition) -> BranchEvent | None:
+        """The touch of an orbit without events where it begins, located from another start."""
+        (curve, guess), name = self.begun_later(u), replace(at, what="interior").name
+        assert isinstance(curve, OrbitCurve)
+        point = None if curve is self else curve.located(guess, name)
+        return None if point is None else curve.event(Zero(name, point, 0.0, (name,)))
 
     def _vanishing(self, zero: Zero) -> list[Condition]:
         """Conditions that vanish together at a zero, of the kind that names the event."""
@@ -429,39 +472,32 @@ class OrbitCurve(OrbitEquations):
         """The branch in the other itinerary."""
         if is_smooth(zero.name) or event.point is None or not isinstance(event.curve, OrbitCurve):
             return None
+        if event.kind == CENTRE:  # any linear orbit of the centre solves the equations beyond
+            return None
         curve, u = event.curve, event.point.u
+        if curve is not self and curve.problem.legs == self.problem.legs:  # from another start
+            return curve.onward(event, Zero(event.test, event.point, 0.0, (event.test,)))
         if curve is not self:  # located on the side with fewer legs, which is ahead
             return curve.leave(u, ())
-        beyond = self._edited(event.kind, self._vanishing(zero), u, self.parameters_at(u))
-        if beyond is None:
+        return self.beyond(event.kind, self._vanishing(zero), u)
+
+    def beyond(self, kind: str, conditions: list[Condition], u: Array) -> Departure | None:
+        """Leave an event into the itinerary with more legs."""
+        p = self.parameters_at(u)
+        found = self._edited(kind, conditions, u, p)
+        if found is None:
             return None
-        start = np.append(beyond.u, u[-len(self.free) :])
-        return self.with_problem(beyond.problem, beyond.u).leave(start, beyond.fresh)
+        start = np.append(found.u, u[-len(self.free) :])
+        return self.with_problem(found.problem, found.u, p).leave(start, found.fresh)
 
     def leave(self, u: Array, fresh: Sequence[int]) -> Departure | None:
         """Leave an event into the side where the itinerary holds, new legs growing from zero."""
-        k = len(u) - len(self.free)
-        for size in _STARTS:
-            ways: list[tuple[Array, Array]] = []
-            try:
-                tangent = np.linalg.svd(self.scaled(u / self.scale)[1])[2][-1]
-            except (NonsmoothError, np.linalg.LinAlgError):  # no derivatives there
-                return None
-            if fresh:
-                axis = np.zeros(u.size)
-                axis[[k - len(self.problem.legs) + i for i in fresh]] = len(fresh) ** -0.5
-                by = size * float(self.scale[k - 1])
-                guess = grown(self.problem, u[:k], self.parameters_at(u), fresh, by)
-                ways.append((np.append(guess, u[k:]), axis))
-            ways += [(u + s * size * tangent * self.scale, tangent) for s in (1.0, -1.0)]
-            for guess, axis in ways:
-                found = self.correct(guess, axis)
-                if found is None or np.abs((found - u) / self.scale).max() > 0.2:
-                    continue
-                if not self.faults(found):
-                    step = (found - u) / self.scale
-                    return Departure(self, [u, found], step / np.linalg.norm(step))
-        return None
+        return next(iter(departures(self, u, fresh)), None)
+
+    def grown(self, u: Array, fresh: Sequence[int], by: float) -> Array:
+        """Unknowns near an orbit whose legs ``fresh`` last for ``by``."""
+        k = self.problem.size
+        return np.append(grown(self.problem, u[:k], self.parameters_at(u), fresh, by), u[k:])
 
 
 # Smooth bifurcations ------------------------------------------------------------------------------
@@ -473,6 +509,9 @@ _VERDICTS = {
     "pitchfork": "two orbits without the symmetry branch off",
     "Neimark-Sacker": "an invariant torus is born",
 }
+
+#: Imaginary part below which a multiplier is real.
+_REAL = 1e-9
 
 #: Distance of an angle from a strong resonance within which the normal form does not hold.
 _RESONANT = 1e-4
@@ -488,7 +527,7 @@ def _smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) 
     if kind == "Neimark-Sacker":
         critical = torus_pair(values)
         one = values[critical[0]]
-        if abs(one.imag) < 1e-9:
+        if abs(one.imag) < _REAL:
             return None  # a neutral saddle: two real multipliers with the product 1
         numbers["angle"] = angle = float(abs(np.angle(one)))
         if min(abs(3.0 * angle - 2.0 * np.pi), abs(4.0 * angle - 2.0 * np.pi)) < _RESONANT:
@@ -538,7 +577,7 @@ def _part(
     curve: OrbitCurve, problem: BoundaryProblem, part: Array, zero: Zero, kind: str
 ) -> Located | None:
     """The event of a part of the orbit, if its return map has the multiplier -1."""
-    made = curve.with_problem(problem, part)
+    made = curve.with_problem(problem, part, curve.parameters_at(zero.point.u))
     u = np.append(part, zero.point.u[-len(curve.free) :])
     try:
         tangent = np.linalg.svd(made.scaled(u / made.scale)[1])[2][-1]
@@ -550,319 +589,3 @@ def _part(
         return None
     side = _smooth_side(problem, at, made.parameters_at(u), kind)
     return None if side is None else (kind, made, point, kind, side)
-
-
-# Points of codimension two ------------------------------------------------------------------------
-
-#: Cosines of the angles of resonances.
-_RESONANCES = {"1:1": 1.0, "1:2": -1.0, "1:3": -0.5, "1:4": 0.0}
-
-#: Points at which a curve ends.
-_ENDS = ("1:1 resonance", "1:2 resonance")
-
-
-def _degenerate(
-    problem: BoundaryProblem, condition: Condition | None, name: str, at: Evaluation, p: Array
-) -> dict[str, float]:
-    """Functions that vanish at points of codimension two on the curve of one event."""
-    if name == "Neimark-Sacker":
-        return _resonances(problem, at) | _cubic(problem, at, p, name)
-    if name in ("period doubling", "pitchfork"):
-        return _cubic(problem, at, p, name)
-    if condition is None or condition.guard is None:
-        return {}
-    if condition.what == "interior":
-        return _touches(problem, condition, at, p)
-    return _beginnings(problem, condition, at, p) if condition.what == "start" else {}
-
-
-def _cubic(problem: BoundaryProblem, at: Evaluation, p: Array, name: str) -> dict[str, float]:
-    """The coefficient of the normal form, at whose zeros a curve of folds begins."""
-    kind = "Chenciner" if name == "Neimark-Sacker" else f"degenerate {name}"
-    try:
-        found = normal_form(problem, at, p, name)
-    except np.linalg.LinAlgError:  # another multiplier is 1
-        return {}
-    return {kind: next(iter(found.values()))} if found else {}
-
-
-def _resonances(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
-    values = np.linalg.eigvals(return_map(problem, at))
-    pair = torus_pair(values)
-    cosine = float((values[pair[0]] + values[pair[1]]).real) / 2.0
-    found = {f"{ratio} resonance": cosine - value for ratio, value in _RESONANCES.items()}
-    others = np.delete(values, pair)  # the pair itself passes 1 and -1 at the ends of the curve
-    found["fold"] = float(np.prod(1.0 - others[np.abs(others) > 1e-9]).real)
-    found["period doubling"] = float(np.prod(1.0 + others[np.abs(others) > 1e-9]).real)
-    return found
-
-
-def _touches(
-    problem: BoundaryProblem, condition: Condition, at: Evaluation, p: Array
-) -> dict[str, float]:
-    i, guard = condition.leg, condition.guard
-    assert guard is not None
-    leg, x, duration = problem.legs[i], at.starts[i], float(at.durations[i])
-    found: dict[str, float] = {}
-    values = sorted(minima(problem.system, leg, condition, x, duration, p), key=abs)
-    if len(values) > 1:
-        found["a second touch"] = min(values[1:])
-    if guard.kind != "surface":
-        return found
-    y = touched(problem, condition, at, p)
-    try:
-        _, other, second = contact_at(problem, leg, guard.element, guard.side, y, p)
-    except NonsmoothError:
-        return found  # the leg slides elsewhere
-    normal = guard.side * surface_map(problem.system, guard.element)(y, p).gradient
-    found["two-fold"] = float(normal[: other.size] @ other)
-    found["touch of higher order"] = guard.side * float(second["L11"])
-    with np.errstate(all="ignore"):  # at the two-fold itself the map has a pole
-        try:
-            numbers = contact_numbers(problem, condition, at, p)
-        except np.linalg.LinAlgError:
-            return found
-    found["fold with contact"] = numbers["det(I - A_i)"]
-    found["period doubling with contact"] = numbers["det(I + A_i)"]
-    return {key: value for key, value in found.items() if np.isfinite(value)}
-
-
-def _beginnings(
-    problem: BoundaryProblem, condition: Condition, at: Evaluation, p: Array
-) -> dict[str, float]:
-    i, guard, system = condition.leg, condition.guard, problem.system
-    field = guarded_field(system, problem.legs[i].mode)
-    k = field.motion.guards.index(guard)
-    y = variational_field(system, problem.legs[i].mode).states_at(at.starts[i], p)
-    order = 2 if problem.legs[i - 1].kind == "crossing" else 1
-    before = at.events[i - 1]
-    rate = at.by_leg[i - 1].rate[: before.gradient.size]
-    return {
-        "cusp with the other sliding bifurcation": float(first_terms(field, y, p)[1][k, order]),
-        "two-fold": float(before.gradient @ rate),
-    }
-
-
-# Branch switching ---------------------------------------------------------------------------------
-
-#: Distances from the event at which the new branch is searched, relative to the orbit.
-_AWAY = (1e-3, 1e-2, 3e-2)
-
-#: Period, relative to that of the first orbit, beyond which a branch may approach a homoclinic orbit.
-_LONG = 10.0
-
-
-def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
-    """The branch that crosses or begins at an event: its curve, and a point near the event."""
-    # At a period doubling the event comes first, as the other half of the branch repeats the same orbits.
-    if event.kind == "Hopf" and isinstance(event.solution, (Equilibrium, PseudoEquilibrium)):
-        return _around(event, free)
-    if event.kind not in ("period doubling", "pitchfork", "branch point"):
-        raise DefinitionError(
-            f"orbit={event!r} is no event at which to switch branches: a period doubling, pitchfork, branch "
-            "point or Hopf point of equilibria. Continue event.orbit, or continue_bifurcation the event."
-        )
-    base: OrbitCurve = event.curve
-    assert event.point is not None
-    curve, u = base.freed(event.point.u, free, np.ones(1))
-    assert isinstance(curve, OrbitCurve)
-    if event.kind == "branch point":
-        way = other_direction(event.point)
-    else:
-        curve, u, way = _twice(curve, u)
-    for away in _AWAY:
-        found = curve.correct(u + away * way * curve.scale, way)
-        if found is not None and np.abs((found - u) / curve.scale).max() < 10 * away:
-            return curve, [u, found] if event.kind == "period doubling" else [found]
-    raise ConvergenceError(
-        f"orbit: no orbit of the other branch was found near the {event.kind}. That branch may be vertical, "
-        "or the event degenerate: give an orbit of it."
-    )
-
-
-def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
-    """The small orbits around an equilibrium at its Hopf point."""
-    assert event.point is not None
-    system, at, n = event.curve.system, event.solution, event.curve.n
-    p, mode = event.curve.parameters_at(event.point.u), at.mode
-    slope = np.asarray(variational_field(system, mode).linear.copied(at.point, p)[1], float)
-    values, vectors = np.linalg.eig(slope)
-    turning = np.flatnonzero(values.imag > 1e-6 * np.abs(values).max())
-    if not turning.size:
-        raise DefinitionError(
-            f"orbit={event!r} is a neutral saddle, from which no orbits start. Give a Hopf point."
-        )
-    k = turning[np.argmin(np.abs(values[turning].real))]
-    across, period = vectors[:, k].real, 2 * np.pi / float(values[k].imag)
-    across = across / np.linalg.norm(across)
-    phase = slope @ across
-    problem = BoundaryProblem(
-        system, (Leg(mode),), phase=phase / np.linalg.norm(phase), reference=at.point.copy()
-    )
-    u = np.concatenate([at.point, [period], p[list(free)]])
-    curve = OrbitCurve(problem, p, free, np.ones(1), u[: n + 1], np.inf)
-    size = event.curve.scale[:n]
-    curve.scale[: n + 1] = np.append(size, period)
-    way = np.concatenate([across / np.linalg.norm(across), np.zeros(2)])
-    for away in _AWAY:
-        found = curve.correct(u + away * way * curve.scale, way)
-        first = curve.correct(u + 0.01 * away * way * curve.scale, way)
-        if found is None or first is None:
-            continue
-        if np.abs((found - u) / curve.scale).max() < 10 * away:
-            curve.longest = _LONG * period
-            return curve, [first, found]  # the tangent at the Hopf point itself is not defined
-    raise ConvergenceError(
-        f"orbit: no small orbit was found around the Hopf point {at.point.tolist()}. It may be degenerate, "
-        "with a pair of eigenvalues that does not cross the axis: give an orbit."
-    )
-
-
-def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
-    """Twice the legs, and the direction in which the doubled orbit leaves the single one."""
-    problem = curve.problem
-    starts, durations = problem.split(u)
-    p = curve.parameters_at(u)
-    changes, times = _alternating(curve, u)
-    if problem.phase is not None:  # no event ends the first turn
-        double = replace(problem, symmetry=None, periods=2 * problem.periods)
-        unknowns, way = double.pack(starts, 2.0 * durations), np.append(changes.ravel(), 0.0)
-    else:
-        shift = np.zeros(problem.dimension)
-        if problem.forcing is not None:
-            shift[-1] = problem.advance(p)[0]
-        back = np.linalg.inv(problem.wrap)
-        second = np.array([back @ (x + shift) for x in starts]).reshape(starts.shape)
-        turned = np.array([back @ -d for d in changes]).reshape(starts.shape)
-        legs = (*problem.legs, *(mirrored(problem, leg) for leg in problem.legs))
-        double = replace(problem, legs=legs, symmetry=None, periods=2 * problem.periods)
-        unknowns = double.pack(np.concatenate([starts, second]), np.concatenate([durations] * 2))
-        way = double.pack(np.concatenate([changes, turned]), np.concatenate([times, -times]))
-    new = curve.with_problem(double, unknowns)
-    way = np.append(way, np.zeros(len(curve.free))) / new.scale
-    return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
-
-
-def _alternating(curve: OrbitCurve, u: Array) -> tuple[Array, Array]:
-    """Changes of starts and durations along the eigenvector of the multiplier -1."""
-    problem, at = curve.problem, curve.evaluation(u)
-    maps = leg_maps(problem, at)
-    whole = np.eye(problem.dimension)
-    for step in maps:
-        whole = step @ whole
-    values, vectors = np.linalg.eig(whole)
-    d = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
-    changes, times = [], []
-    for step, flow, event in zip(maps, at.by_leg, at.events, strict=True):
-        changes.append(d)
-        times.append(-float(event.gradient @ flow.by_start @ d) / float(event.gradient @ flow.rate))
-        d = step @ d
-    return np.array(changes), np.array(times)
-
-
-def continue_orbit(
-    orbit: PeriodicOrbit | BranchEvent,
-    parameter: str,
-    *,
-    bounds: tuple[float, float],
-    step: float = 0.05,
-    max_points: int = 1000,
-    through: bool = True,
-    progress: bool = False,
-) -> Branch:
-    """Follow a periodic orbit as a parameter varies.
-
-    Pseudo-arclength continuation both ways to the bounds, with multipliers at each point. The itinerary
-    is kept as long as it is admissible; the event at its end is located in the itinerary with fewer
-    legs, where it is regular, and named.
-
-    Parameters
-    ----------
-    orbit : PeriodicOrbit or BranchEvent
-        Where to start; at a period doubling, pitchfork or branch point the other branch is followed
-        (from a period doubling one way only, as the other half repeats its orbits), at a Hopf point of
-        equilibria the orbits around it.
-    parameter : str
-        Name of the parameter that varies.
-    bounds : (float, float)
-        Bounds of the parameter at which the branch ends.
-    step : float, optional
-        Largest step where the branch bends, relative to the width of the bounds and to the size of
-        the orbit.
-    max_points : int, optional
-        Largest number of points of each piece.
-    through : bool, optional
-        Whether to change the itinerary and go on beyond events that end it.
-    progress : bool, optional
-        Whether to show a bar that counts points. After Ctrl-C the points computed so far are returned.
-
-    Returns
-    -------
-    Branch
-        Its ``solutions`` (or ``orbits``) are PeriodicOrbits. Events: ``"fold"``, ``"period
-        doubling"``, ``"Neimark-Sacker"``, ``"pitchfork"`` (of symmetric orbits), ``"branch
-        point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
-        ``"adding-sliding"``, ``"impact grazing"``, ``"grazing of a soft switch"``,
-        ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``; ``"Hopf"`` where orbits without events shrink to an equilibrium,
-        ``"boundary equilibrium"`` (with its class) or ``"two-fold"`` where others shrink to a point of a
-        surface.
-
-    Raises
-    ------
-    ConvergenceError
-        The orbit at the start does not solve its equations, or a branch cannot be entered.
-    DefinitionError
-        Neither an orbit nor an event from which orbits start; a parameter that the system does not have.
-    OptionError
-        Bounds in the wrong order, or without the start; ``step`` or ``max_points`` out of its range; a
-        parameter that breaks the symmetry by which half of the orbit is solved for.
-
-    Examples
-    --------
-    A forced relay, $x' = A cos t - sgn x$: crossing orbits begin to slide below
-    $A = sqrt(1 + pi^2/4)$.
-
-    >>> import casadi as ca, nonsmooth as ns
-    >>> x, t, a = (ca.SX.sym(s) for s in ("x", "t", "a"))
-    >>> relay = ns.FilippovSystem([x], surface=x, time=t, parameters={a: 2.5},
-    ...                           above=[a * ca.cos(t) - 1], below=[a * ca.cos(t) + 1])
-    >>> orbit = ns.periodic_orbit(relay, [0.5])
-    >>> branch = ns.continue_orbit(orbit, "a", bounds=(1.5, 3.0))
-    >>> [(e.kind, round(e.parameter, 12)) for e in branch.events]
-    [('crossing-sliding', 1.862095889119)]
-    """
-    positive(step, "step")
-    whole(max_points, "max_points", least=2)
-    curve, rows = _begin(orbit, parameter)
-    start = rows[-1]
-    low, high = check_bounds(bounds, float(start[-1]), parameter)
-    curve.widths = np.array([high - low])
-    curve.scale = np.append(curve.scale[:-1], high - low)
-    away = Departure(curve, rows, (start - rows[0]) / curve.scale) if len(rows) > 1 else None
-    return follow_branch(
-        curve,
-        start,
-        name=parameter,
-        bounds=(low, high),
-        step=step,
-        max_points=max_points,
-        through=through,
-        progress=progress,
-        away=away,
-    )
-
-
-def _begin(orbit: PeriodicOrbit | BranchEvent, parameter: str) -> tuple[OrbitCurve, list[Array]]:
-    """The curve and its first point; from a period doubling or Hopf point with the one before."""
-    if not isinstance(orbit, (PeriodicOrbit, BranchEvent)):
-        raise DefinitionError(
-            f"orbit={orbit!r} is no PeriodicOrbit or event of a branch. Find one with periodic_orbit."
-        )
-    system = orbit.system if isinstance(orbit, PeriodicOrbit) else orbit.curve.system
-    free = (parameter_index(system, parameter),)
-    if isinstance(orbit, BranchEvent):
-        return switched(orbit, free)
-    p, u = orbit.parameter_vector, orbit.unknowns
-    longest = _LONG * float(orbit.evaluation.durations.sum())
-    curve = OrbitCurve(orbit.problem, p, free, np.ones(1), u, longest)
-    return curve, [np.append(u, p[list(free)])]

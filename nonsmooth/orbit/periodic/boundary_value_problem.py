@@ -16,6 +16,7 @@ legs in place of collocation.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -25,11 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...flow.fixed import TOLERANCE
-from ...model import Array, FilippovSystem
+from ...model import Array, ConvergenceError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, EventMap, kept_maps
 from ...model.derivatives.forcing import Forcing
 from ..runs.leg_integration import LegFlows, LegIntegrator, leg_integrator
-from ..runs.legs import Leg, LegFlow, integrate_leg, surface_of
+from ..runs.legs import Leg, LegFlow, integrate_leg, rate_at, surface_of
 
 
 class JacobianIndices(NamedTuple):
@@ -123,16 +124,22 @@ class BoundaryProblem:
     phase: Array | None = None
     #: (N,) or None
     reference: Array | None = None
-    #: Surfaces on which every leg slides.
+    #: Surfaces on which every leg slides, and behind them contacts that are closed in every leg.
     kept: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        sliding = [
-            i
-            for i in range(self.system.surface_count)
-            if all(leg.mode[i] == "s" for leg in self.legs)
-        ]
-        object.__setattr__(self, "kept", tuple(sliding))
+        modes = [self.system.widened(leg.mode) for leg in self.legs]
+        kept = [i for i, own in enumerate(zip(*modes, strict=True)) if self._is_kept(i, set(own))]
+        object.__setattr__(self, "kept", tuple(kept))
+
+    def _is_kept(self, i: int, letters: set[str]) -> bool:
+        return letters == {"s" if i < self.system.surface_count else "c"}
+
+    @cached_property
+    def with_rates(self) -> list[int]:
+        """Joints and contacts that are kept: their rates are, too."""
+        contacts = [i for i in self.kept if i >= self.system.surface_count]
+        return [*self.system.joints, *contacts]
 
     @cached_property
     def held(self) -> list[EventMap]:
@@ -246,11 +253,9 @@ class BoundaryProblem:
         return Evaluation(residual, whole, flows, starts, durations, self._allowed(starts[0], p))
 
     def _allowed(self, start: Array, p: Array) -> Array | None:
-        if not self.system.joints:
+        if not self.with_rates:
             return None
-        rows = np.array(
-            [own(start, p).gradient for own in kept_maps(self.system, self.system.joints)]
-        )
+        rows = np.array([own(start, p).gradient for own in kept_maps(self.system, self.with_rates)])
         return np.asarray(np.eye(self.dimension) - np.linalg.pinv(rows) @ rows)
 
     def residual(self, u: Array, p: Array, extended: bool = False) -> Array | None:
@@ -321,8 +326,7 @@ class BoundaryProblem:
         if self.phase is None or self.system.time_dependent:
             return self
         start, leg = self.split(u)[0][0], self.legs[0]
-        field = leg.field(self.system)
-        rate = field.rate.copied(field.states_at(start, p), p)[0][: self.dimension, 0]
+        rate = rate_at(self.system, leg, start, p)
         speed = float(np.linalg.norm(rate))
         if not speed > 0.0:
             return self
@@ -341,11 +345,13 @@ class BoundaryProblem:
         span = float(np.abs(durations).sum()) or 1.0
         seen = starts
         if p is not None and len(self.legs) <= _FEW:
-            inside = [
-                integrate_leg(self.system, leg, x, part * float(duration), p).end[: self.dimension]
-                for leg, x, duration in zip(self.legs, starts, durations, strict=True)
-                for part in (0.2, 0.4, 0.6, 0.8)
-            ]
+            n = self.dimension
+            inside = list[Array]()
+            with suppress(ConvergenceError):  # a virtual leg may not exist
+                for leg, x, duration in zip(self.legs, starts, durations, strict=True):
+                    for part in (0.2, 0.4, 0.6, 0.8):
+                        flow = integrate_leg(self.system, leg, x, part * float(duration), p)
+                        inside.append(flow.end[:n])
             seen = np.vstack([starts, *inside])
         size, n = np.abs(seen).max(axis=0).tolist(), self.system.dimension
         largest = max(*size[:n], 1e-300)  # the time has units of its own
@@ -393,15 +399,15 @@ def mirrored(problem: BoundaryProblem, leg: Leg) -> Leg:
 
 
 def _turning(problem: BoundaryProblem) -> list[bool]:
-    """Which switching functions the symmetry maps to their negatives."""
+    """Which surfaces have functions that the symmetry maps to their negatives."""
     system = problem.system
     x = np.cos(1.0 + np.arange(system.dimension))
     back = np.linalg.inv(problem.symmetry) if problem.symmetry is not None else np.eye(x.size)
     result = []
-    for k in range(system.surface_count):
-        h = system.surface_function(k)
+    for first, *more in system.entries:
+        h = system.surface_function(first)
         a, b = (float(system.evaluate(h, v, None)[0, 0]) for v in (x, back @ x))
-        result.append(a * b < 0.0)
+        result.append(not more and a * b < 0.0)  # a set has no sides
     return result
 
 

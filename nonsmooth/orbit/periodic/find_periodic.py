@@ -24,7 +24,7 @@ from ...model import (
 )
 from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
-from ..runs.legs import leg_name, shown_itinerary
+from ..runs.legs import Leg, leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
 from .guess import Start, about_of, is_about, start_of
 from .orbit import PeriodicOrbit, faults_of, named
@@ -54,14 +54,15 @@ def periodic_orbit(
     Parameters
     ----------
     system : FilippovSystem
-        With scalar multipliers; it may slide, jump, hit, and depend periodically on time.
+        It may slide, jump, hit, rub in a plane or in space, and depend periodically on time.
     guess : Trajectory, state (n,) or PeriodicOrbit
         A run whose end is near the orbit; a state near it, from which the system is simulated; an
         orbit at other parameters, whose itinerary is kept.
     itinerary : str or sequence, optional
         Modes of the legs in order, e.g. ``"- s"``, or pairs of a mode and the name of the event that
         ends it; with a state as the guess. One mode alone means an orbit of a forced system without
-        events, over as many periods of the forcing (up to 16) as close best.
+        events, over as many periods of the forcing (up to 16) as close best. With vector multipliers
+        only that.
     period : expression in parameters or float, optional
         The period of the forcing, if the system depends on time. Found by itself where the time only
         enters sines and cosines of one frequency. The orbit may take several. Of a system without
@@ -93,7 +94,7 @@ def periodic_orbit(
     DegenerateError
         The orbit grazes, or passes a two-fold or a corner.
     DefinitionError
-        ``system`` is none, or has vector multipliers; a mode of the itinerary that it does not have.
+        ``system`` is none; a mode of the itinerary that it does not have.
     OptionError
         No period, though the system depends on time and none is found, or one that is no positive
         time; a symmetry that is none; with a run or an orbit as the guess an itinerary, a ``t_start``,
@@ -124,7 +125,7 @@ def periodic_orbit(
     >>> orbit.stability
     'asymptotically stable'
     """
-    require_system(system, complementarity=True, joints=True)
+    require_system(system, sets=True, complementarity=True, joints=True)
     max_iterations = whole(max_iterations, "max_iterations")
     if not isinstance(virtual, (bool, np.bool_)):
         raise OptionError(f"virtual: expected True or False, received {virtual!r}.")
@@ -452,23 +453,34 @@ def require_duration(problem: BoundaryProblem, at: Evaluation, about: float | No
     )
 
 
+#: L of the other field at an exit, relative to its gradient and the state, at which the exit is at a two-fold.
+_TWO_FOLD = 1e-9
+
+
+def at_two_fold(
+    system: FilippovSystem, leg: Leg, end: Array, p: Array, part: float = _TWO_FOLD
+) -> bool:
+    """Whether a slide on one surface ends where L_F1 h and L_F2 h both vanish."""
+    if leg.kind != "exit" or system.coupled:
+        return False
+    other = replace(leg, side=-leg.side).at_end(system, end, p)
+    size = float(np.linalg.norm(other.gradient) * np.linalg.norm(end)) or 1.0
+    return abs(other.value) <= part * size
+
+
 def require_simple(orbit: PeriodicOrbit) -> None:
-    """Refuse orbits through two-folds; grazing is refused by the multipliers."""
-    system, p = orbit.system, orbit.parameter_vector
+    """Refuse orbits through two-folds, and grazing."""
+    system, p, flows = orbit.system, orbit.parameter_vector, orbit.evaluation.flows
     for i, leg in enumerate(orbit.problem.legs):
-        if leg.kind != "exit" or system.coupled:
-            continue
-        flows = orbit.evaluation.flows
         end = flows.end[i, : flows.sizes[i]]
-        at = replace(leg, side=-leg.side).at_end(system, end, p)
-        size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
-        if abs(at.value) <= 1e-9 * size:
+        if at_two_fold(system, leg, end, p):
             raise DegenerateError(
                 f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
                 f"{leg_name(system, leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
                 f"{end[: system.dimension].tolist()}. The orbit is not unique there: vary a parameter."
             )
-    orbit.floquet  # noqa: B018  # DegenerateError where an event is grazed
+    if orbit.floquet.refusal:
+        raise DegenerateError(orbit.floquet.refusal)
 
 
 class VirtualOrbitError(ConvergenceError):

@@ -33,7 +33,8 @@ from ...model.derivatives.forcing import Forcing, frequencies
 from ...model.derivatives.variational import plain_field
 from ..runs.guards import march
 from ..runs.itinerary import Itinerary, lone_leg, word_legs
-from ..runs.legs import Leg, Stretch, integrate_leg, leg_name, stretches
+from ..runs.legs import Leg, Stretch, integrate_leg, leg_name, rate_at, stretches
+from ..runs.limit_leg import merged
 from .boundary_value_problem import BoundaryProblem
 from .orbit import PeriodicOrbit, named
 
@@ -123,7 +124,7 @@ def recurrence(
     about: float | None = None,
 ) -> _Recurrence | None:
     """The legs of a run that nearly close; None if there are none."""
-    parts = [part for part in stretches(run, begins=False) if part.duration > 0.0]
+    parts = [part for part in merged(stretches(run, begins=False)) if part.duration > 0.0]
     if len(parts) > 1 and parts[-1].leg.timed:
         if parts[-1].duration > _QUIET * sum(part.duration for part in parts):
             found = _without_events(run, parts[-1:], symmetry, period, first, about)
@@ -350,11 +351,10 @@ def _require_period(
     """Raise for a period after which the fields differ."""
     # They are compared in the middle of legs, as a field may jump at their ends.
     for leg, x, duration in zip(legs, starts, durations, strict=True):
-        field = leg.field(system)
-        y = flow_for(plain_field(system, leg.mode), field.states_at(x, p), p, 0.5 * float(duration))
-        later = y.copy()
+        y = integrate_leg(system, leg, x, 0.5 * float(duration), p).end[: len(x)]
+        later, middle = y.copy(), replace(leg, left=())
         later[system.dimension] += span
-        here, there = (field.rate.copied(z, p)[0][:, 0] for z in (y, later))
+        here, there = (rate_at(system, middle, z, p) for z in (y, later))
         miss = float(np.abs(here - there).max())
         if miss > _OTHER * float(np.abs(here).max()):
             raise OptionError(
@@ -511,9 +511,8 @@ def _problem(
             starts[0, -1] = 0.0
             phase[-1] = 1.0
         else:
-            field = legs[0].field(system)
-            rate = field.rate.copied(field.states_at(starts[0], p), p)[0]
-            phase = rate[: system.extended_dimension, 0] / float(np.linalg.norm(rate))
+            rate = rate_at(system, legs[0], starts[0], p)
+            phase = rate / float(np.linalg.norm(rate))
         reference = starts[0]
     problem = BoundaryProblem(system, legs, mirror, periods, forcing, phase, reference)
     return Start(problem, problem.pack(starts, durations), p)
@@ -530,6 +529,10 @@ def _from_word(
     """Integrate the legs of an itinerary to their events, or one mode over periods of the forcing."""
     if forcing is not None and mirror is None and (leg := lone_leg(system, itinerary)) is not None:
         return _from_mode(system, x, leg, forcing, p)
+    if system.sets:
+        raise OptionError(
+            "itinerary= is one mode for a system with vector multipliers. Give a run of the itinerary as the guess."
+        )
     legs = word_legs(system, itinerary, mirror is not None)
     starts, durations = _followed(system, legs, x, p)
     periods = 0.0
@@ -641,15 +644,18 @@ def _recurring(
 def _mode(system: FilippovSystem, x: Array, p: Array) -> str:
     """The mode of a state that is on no surface."""
     h = Surfaces(system).values(x, p)[0][: system.surface_count]
-    letters = ["+" if v > 0 else "-" for v in h]
+    letters = ["*" if more else "+" if h[i] > 0 else "-" for i, *more in system.entries]
     for i in system.half_lines:
-        letters[i] = "o"
+        letters[system.entry_of(i)] = "o"
     return "".join(letters) + "o" * len(system.impacts)
 
 
 def _natural_time(system: FilippovSystem, x: Array, p: Array, mode: str | None = None) -> float:
     """The time in which the state changes by its size."""
-    field = Leg(_mode(system, x, p) if mode is None else mode).field(system)
-    rate = field.rate.copied(field.states_at(x, p), p)[0][: system.dimension, 0]
+    leg = Leg(_mode(system, x, p) if mode is None else mode)
+    try:
+        rate = rate_at(system, leg, x, p)[: system.dimension]
+    except NonsmoothError:  # on a set
+        return 1.0
     size, speed = math.hypot(*x[: system.dimension]), math.hypot(*rate)
     return size / speed if size > 0.0 and speed > 0.0 and math.isfinite(speed) else 1.0

@@ -1,9 +1,9 @@
 """Floquet multipliers of a periodic orbit from the derivatives of its legs.
 
-The return map is condensed: perturbations are kept on the surfaces of the events, where the direction
-of the flow is left out, and in the subspaces that entries to sliding leave. What remains are the
-multipliers that are not structural; a multiplier 1 of the flow (or of the time) and a 0 for each
-dimension lost are exact. The full matrix gives them with rounding, which estimates the error.
+Perturbations are kept on the surfaces of the events, where the direction of the flow is left out, and in the
+subspaces that entries to sliding leave. What remains are the multipliers that are not structural; a
+multiplier 1 of the flow (or of the time) and a 0 for each dimension lost are exact. Legs on which derivatives
+grow too differently are divided. With the direction of the flow the 1 is computed too, which estimates the error.
 """
 
 from __future__ import annotations
@@ -11,86 +11,201 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array
-from ..runs.legs import leg_name
+from ...model import Array, ConvergenceError, DegenerateError
+from ..runs.legs import integrate_leg, leg_name
 from ..runs.saltation import passages, saltations
 from .boundary_value_problem import BoundaryProblem, Evaluation, jacobian_indices
-
-#: A direction of which a leg leaves no more than this part is lost.
-_LOST = 1e-12
-
+from .cyclic_qr import Factor, Product
 
 #: States below this part of the way of a leg are zero.
 _AT_ZERO = 1e-9
 
+#: Condition number of the derivatives of a leg above which it is divided.
+_STIFF = 1e4
+
+#: Most parts of a leg.
+_PARTS = 1024
+
+
+#: Sine of the angle of a multiplier below which it is real.
+_REAL = 1e-15
+
+#: Logarithm of the size of multipliers that are on the unit circle, and beyond which their error says nothing.
+_NEUTRAL, _UNSURE = 1e-9, 1e-3
+
+#: Logarithm of multipliers below which an orbit is strongly stable.
+_STRONG = -18.0
+
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Multipliers of the map of the legs, with the condensed map."""
+    """Multipliers of the map of the legs."""
 
-    #: (N - 1 or N,): The nontrivial ones and the structural zeros, largest first; of the whole
-    #: period. Discrete states have none.
-    values: NDArray[np.complex128]
-    #: Those of the legs' map alone, the half map of a symmetric orbit.
-    of_map: NDArray[np.complex128]
-    #: How many are structurally zero.
-    zeros: int
-    #: (r, r): The condensed map, whose eigenvalues are the nontrivial ones of ``of_map``.
-    reduced: Array
     problem: BoundaryProblem
     #: The orbit.
     at: Evaluation
+    p: Array
 
     @cached_property
-    def matrix(self) -> Array:
-        """The full derivative of the legs' map, (N, N)."""
-        return monodromy(self.problem, self.at)
+    def refusal(self) -> str:
+        """Why the orbit has no multipliers; empty if it has some."""
+        try:
+            passages(self.at.flows.ended, *events_of(self.problem, self.at))
+        except DegenerateError as error:
+            return str(error)
+        return ""
+
+    @cached_property
+    def logarithms(self) -> NDArray[np.complex128]:
+        """Logarithms of the nontrivial multipliers that are not zero, largest first; of the legs' map alone."""
+        return self._product.logarithms
+
+    @cached_property
+    def zeros(self) -> int:
+        """How many are structurally zero. Discrete states have none."""
+        return self._count - self.logarithms.size if not self.refusal else 0
+
+    @property
+    def of_map(self) -> NDArray[np.complex128]:
+        """Those of the legs' map alone, the half map of a symmetric orbit."""
+        return self._powers(1)
+
+    @property
+    def values(self) -> NDArray[np.complex128]:
+        """(N - 1 or N,): The nontrivial ones and the structural zeros, largest first; of the whole period."""
+        return self._powers(1 if self.problem.symmetry is None else 2)
+
+    def _powers(self, power: int) -> NDArray[np.complex128]:
+        """NaN where an event is grazed; beyond the range of numbers 0 or infinity."""
+        if self.refusal:
+            return np.full(self._count, complex(math.nan, math.nan))
+        whole = power * self.logarithms
+        whole = whole[np.lexsort((np.sin(whole.imag), -whole.real.round(13)))]
+        turned = np.exp(1j * whole.imag)
+        turned = np.where(np.abs(turned.imag) < _REAL, turned.real, turned)
+        with np.errstate(over="ignore", under="ignore"):
+            return np.concatenate([np.exp(whole.real) * turned, np.zeros(self.zeros)])
 
     @cached_property
     def error(self) -> float:
-        """Distance of the structural multipliers of ``matrix`` from 1 and 0."""
-        whole, joints = np.linalg.eigvals(self.matrix), self.problem.system.joints
-        held = sum(i not in joints for i in self.problem.kept)
-        # the sliding field keeps h whatever it is: off a surface that is never left its matrix has a 1
-        ones = np.argsort(np.abs(whole - 1.0))[: 1 + held]
-        rest = np.sort(np.abs(np.delete(whole, ones)))
-        structural = rest[: self.zeros - held].tolist()
-        return max(float(np.abs(whole[ones] - 1.0).max()), *structural, 0.0)
+        """Error of the multipliers, relative to those beyond 1: by the 1 of the flow and by transposed factors."""
+        return math.nan if self.refusal else max(self._carried[1], self._product.error)
+
+    @property
+    def stability(self) -> str:
+        """Stability in words, from the multipliers that are not the 1 of the flow."""
+        if self.refusal:
+            return f"not determined: {self.refusal}"
+        sizes, margin = self.logarithms.real, max(_NEUTRAL, 10.0 * self.error)
+        outside, on = int(np.sum(sizes > margin)), int(np.sum(np.abs(sizes) <= margin))
+        if outside:
+            return f"unstable, {outside} multiplier{'s' * (outside > 1)} outside the unit circle"
+        if on and margin > _UNSURE:
+            return f"not determined: the error of the multipliers is {self.error:.1e}"
+        if on:
+            return f"neutral to first order, {on} multiplier{'s' * (on > 1)} on the unit circle"
+        if self.zeros and not sizes.size:
+            return "superstable"
+        return f"{'strongly' if sizes.size and sizes[0] < _STRONG else 'asymptotically'} stable"
+
+    # the map of the legs --------------------------------------------------------------------------
+
+    @cached_property
+    def _count(self) -> int:
+        labels = self.problem.labels
+        return self.problem.dimension - 1 - (0 if labels is None else labels.shape[1])
+
+    @property
+    def _product(self) -> Product:
+        """The map of the legs on directions modulo that of the flow."""
+        return self._carried[0]
+
+    @cached_property
+    def _carried(self) -> tuple[Product, float]:
+        """The map, and how well the flow carries its own direction."""
+        problem, at, units = self.problem, self.at, self._units
+        n, events = problem.dimension, event_maps(problem, at)
+        fields = at.flows.before[:, :n] / units
+        across, factors, missed = _across(fields[0]), list[Factor](), 0.0
+        if problem.kept:
+            factors.append(Factor(across.T @ self._held @ across, np.eye(n - 1)))
+        for i, parts in enumerate(self._parts):
+            own, count = fields[i], len(parts)
+            for k, (part, rate) in enumerate(parts, 1):
+                x, last = part[:n] / units[:, None], k == count
+                field = fields[(i + 1) % len(fields)] if last else rate[:n] / units
+                ahead = _across(field)
+                whole = ahead.T @ (events[i] @ part / units[:, None] if last else x)
+                missed = max(missed, float(np.linalg.norm(whole @ own) / np.linalg.norm(field)))
+                factors.append(Factor(whole @ across, x @ across if last else None))
+                own, across = field, ahead
+        return Product(factors), missed
+
+    @cached_property
+    def _units(self) -> Array:
+        # sizes decide what is lost, and states and time have different units
+        return _units(self.problem, self.at)
+
+    @cached_property
+    def _held(self) -> Array:
+        """Projector on directions along the surfaces on which the orbit slides all the time."""
+        rows = [own(self.at.starts[0], self.p).gradient for own in self.problem.held]
+        kept = np.linalg.svd(np.array(rows) * self._units)[2][len(rows) :]
+        return np.asarray(kept.T @ kept)
+
+    @cached_property
+    def _parts(self) -> list[list[tuple[Array, Array]]]:
+        """Derivatives (S, N) of the parts of each leg, by starts in units of the orbit, and fields at their ends."""
+        flows = self.at.flows
+        legs = enumerate(zip(flows.by_start * self._units, flows.rate, strict=True))
+        whole = [bool(leg.repeats) for leg in self.problem.legs]
+        return [
+            [(x, rate)] if whole[i] or self._even(x) else self._cut(i, x) for i, (x, rate) in legs
+        ]
+
+    def _even(self, part: Array) -> bool:
+        """Whether derivatives (S, N) do not grow too differently."""
+        if self.problem.system.sets:  # what they take is lost, however short the leg is
+            return True
+        moved = part[: self._units.size] / self._units[:, None]
+        sizes = np.linalg.svd(moved, compute_uv=False)
+        count = self._count + 1  # discrete states do not move
+        return bool(sizes[0] <= _STIFF * sizes[count - 1])
+
+    def _cut(self, i: int, whole: Array) -> list[tuple[Array, Array]]:
+        problem, units, n = self.problem, self._units, self.problem.dimension
+        leg, duration, count = problem.legs[i], float(self.at.durations[i]), 2
+        while True:
+            parts, x = list[tuple[Array, Array]](), self.at.starts[i]
+            for _ in range(count):
+                try:
+                    flow = integrate_leg(problem.system, leg, x, duration / count, self.p)
+                except ConvergenceError:  # rounding of the parts leads it astray
+                    return [(whole, self.at.flows.rate[i])]
+                x, part = flow.end[:n], np.zeros_like(whole)
+                part[: len(flow.by_start)] = flow.by_start * units
+                parts.append((part, flow.rate))
+            if count >= _PARTS or all(self._even(part) for part, _ in parts):
+                return parts
+            count *= 2
 
 
-def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multipliers:
-    """Multipliers of a periodic orbit."""
-    n = problem.dimension
-    reduced = _condensed(problem, at, p)
-    nontrivial = np.linalg.eigvals(reduced) if len(reduced) > 1 else reduced.ravel()
-    discrete = 0 if problem.labels is None else problem.labels.shape[1]
-    zeros = n - 1 - nontrivial.size - discrete
-    of_map = values = _sorted(np.concatenate([nontrivial, np.zeros(zeros)]))
-    if problem.symmetry is not None:
-        values = _sorted(of_map**2)
-    return Multipliers(values, of_map, zeros, reduced, problem, at)
+def _across(field: Array) -> Array:
+    """Orthonormal basis (n, n - 1) of the directions across a field."""
+    return np.asarray(np.linalg.qr(field[:, None], mode="complete")[0][:, 1:])
 
 
-def _sorted(values: NDArray[Any]) -> NDArray[np.complex128]:
-    if len(values) < 2:
-        return values.astype(complex)
-    order = np.lexsort((values.imag, -np.abs(values).round(14)))
-    return np.asarray(values[order], complex)
-
-
-def leg_maps(problem: BoundaryProblem, at: Evaluation) -> Array:
-    """Derivatives (L, N, N) of the maps from the start of each leg to that of the next, across the flow."""
+def event_maps(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """Derivatives (L, N, S) of the maps from the end of each leg to the start of the next, across the flow."""
     flows = at.flows
-    row = flows.gradient[:, None, :] @ flows.by_start
     speed = (flows.gradient * flows.rate).sum(axis=1)
-    across = flows.by_start - flows.rate[:, :, None] * (row / speed[:, None, None])
-    maps = flows.after_state @ across
+    lost = (flows.after_state @ flows.rate[:, :, None]) / speed[:, None, None]
+    maps = flows.after_state - lost * flows.gradient[:, None, :]
     if problem.symmetry is not None:
         maps[-1] = problem.wrap @ maps[-1]
     if at.allowed is not None:
@@ -98,12 +213,25 @@ def leg_maps(problem: BoundaryProblem, at: Evaluation) -> Array:
     return np.asarray(maps)
 
 
+def leg_maps(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """Derivatives (L, N, N) of the maps from the start of each leg to that of the next, across the flow."""
+    return np.asarray(event_maps(problem, at) @ at.flows.by_start)
+
+
+def _multiplied(maps: Array) -> Array:
+    return reduce(lambda product, step: step @ product, maps)
+
+
 def return_map(problem: BoundaryProblem, at: Evaluation) -> Array:
     """Derivative of the legs' map across the flow, (N, N); 0 in place of the 1 of the flow."""
-    product = np.eye(problem.dimension)
-    for step in leg_maps(problem, at):
-        product = step @ product
-    return product
+    return _multiplied(leg_maps(problem, at))
+
+
+def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """Product of state-transition and saltation matrices over the legs, (N, N)."""
+    jumps = saltations(at.flows.ended, *events_of(problem, at)).matrix
+    product = problem.wrap @ _multiplied(jumps @ at.flows.by_start)
+    return product if at.allowed is None else np.asarray(at.allowed @ product, float)
 
 
 def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
@@ -111,16 +239,6 @@ def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
     with np.errstate(all="ignore"):
         found = return_map(problem, at)
     return found if np.isfinite(found).all() else None
-
-
-def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
-    """The return map on perturbations across the flow, in the smallest invariant subspace."""
-    # in units of the orbit: sizes decide what is lost, and states and time have different units
-    units = _units(problem, at)
-    passages(at.flows.ended, *events_of(problem, at))  # DegenerateError where an event is grazed
-    maps = leg_maps(problem, at) * (units / units[:, None])
-    flow = at.flows.by_start[:, : problem.dimension] * (units / units[:, None])
-    return reduced_map(maps, flow, _sliding_directions(problem, at, p, units))
 
 
 def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
@@ -132,73 +250,8 @@ def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
             initial=0.0
         )
         if np.abs(at.starts[:, :own]).max() < _AT_ZERO * ways:
-            units[:own] = np.maximum(units[:own], ways)
+            units[:own] = ways
     return units
-
-
-def reduced_map(maps: Array, flow: Array, basis: Array) -> Array:
-    """Product of maps (L, n, n) of legs on what these leave of some directions (n, r)."""
-    # Directions are lost beside those that the legs carry, ``flow`` (L, n, n).
-    count, n = len(maps), maps.shape[1]
-    bases: list[Array] = [np.eye(n)] * count
-    for i in range(2 * count):
-        k, following = i % count, (i + 1) % count
-        size = _length(flow[k] @ basis) if basis.size else 0.0
-        basis = _range(maps[k] @ basis, size)
-        if i >= count and basis.shape[1] == bases[following].shape[1]:
-            break  # nothing more is lost in the second pass
-        bases[following] = basis
-    first = min(range(count), key=lambda i: bases[i].shape[1])
-    product: Array = np.eye(bases[first].shape[1])
-    for k in range(count):
-        i = (first + k) % count
-        product = np.asarray(bases[(i + 1) % count].T @ maps[i] @ bases[i] @ product, float)
-    return product
-
-
-def _sliding_directions(problem: BoundaryProblem, at: Evaluation, p: Array, units: Array) -> Array:
-    """Directions that remain on the surfaces on which the orbit slides all the time, in given units."""
-    if not problem.kept:
-        return np.eye(problem.dimension)
-    rows = [own(at.starts[0], p).gradient for own in problem.held]
-    return np.asarray(np.linalg.svd(np.array(rows) * units)[2][len(rows) :].T)
-
-
-def _length(matrix: Array) -> float:
-    return math.sqrt(float(np.vdot(matrix, matrix)))
-
-
-def _range(matrix: Array, size: float) -> Array:
-    """Orthonormal basis of the range of a matrix, without what is lost beside ``size``."""
-    if not matrix.shape[1]:
-        return matrix
-    if matrix.shape[1] == 1:
-        length = _length(matrix)
-        return matrix / length if length > _LOST * size else matrix[:, :0]
-    u, sizes, _ = np.linalg.svd(matrix, full_matrices=False)
-    return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), size)])
-
-
-def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
-    """Product of state-transition and saltation matrices over the legs, (N, N)."""
-    jumps = saltations(at.flows.ended, *events_of(problem, at)).matrix
-    product: Array = np.eye(problem.dimension)
-    for step in jumps @ at.flows.by_start:
-        product = step @ product
-    product = problem.wrap @ product
-    return product if at.allowed is None else np.asarray(at.allowed @ product, float)
-
-
-def stability(values: NDArray[np.complex128], error: float) -> str:
-    """Stability in words, from the multipliers that are not the 1 of the flow."""
-    sizes, margin = np.abs(values), max(1e-9, 10.0 * error)
-    outside = int(np.sum(sizes > 1.0 + margin))
-    if outside:
-        return f"unstable, {outside} multiplier{'s' * (outside > 1)} outside the unit circle"
-    if np.any(sizes > 1.0 - margin):
-        on = int(np.sum(sizes > 1.0 - margin))
-        return f"neutral to first order, {on} multiplier{'s' * (on > 1)} on the unit circle"
-    return "superstable" if values.size and not np.any(sizes) else "asymptotically stable"
 
 
 def events_of(

@@ -9,17 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...flow.fixed import flow_for
-from ...flow.names import described, shown_mode
+from ...flow.names import described
 from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
 from ...model import Array, FilippovSystem, ParameterError, Surfaces
-from ...model.derivatives.variational import variational_field
 from ...notebook import card, circle
 from ..runs.guards import faults_along, watch
-from ..runs.legs import integrate_leg
+from ..runs.legs import Leg, integrate_leg, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation, mirrored
-from .multipliers import Multipliers, multipliers_of, stability
+from .multipliers import Multipliers, monodromy
 from .orbit_run import OrbitLeg, orbit_leg, orbit_run
 
 
@@ -140,7 +138,7 @@ class PeriodicOrbit:
                 start = x[:n]
                 if flip is not None:
                     start = flip @ start
-                    mode = mirrored_mode(self, leg.mode, x, float(duration))
+                    mode = mirrored_mode(self, leg, x, float(duration))
                     leg = replace(mirrored(self.problem, leg), mode=mode)
                 result.append(orbit_leg(self.system, leg, start, t, float(duration)))
                 t += float(duration)
@@ -150,10 +148,12 @@ class PeriodicOrbit:
     def itinerary(self) -> str:
         """Modes of the whole orbit in order, separated by blanks."""
         n, count = self.system.dimension, len(self.system.definition.discrete)
-        shown = [
-            shown_mode(self.system, leg.mode, leg.start[n - count :].tolist()) for leg in self.legs
+        values = [tuple(leg.start[n - count :].tolist()) for leg in self.legs]
+        legs = [
+            Leg(leg.mode, leg.kind, discrete=own)
+            for leg, own in zip(self.legs, values, strict=True)
         ]
-        return " ".join(mode or "o" for mode in shown)
+        return shown_itinerary(self.system, legs)
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -164,15 +164,16 @@ class PeriodicOrbit:
 
     @cached_property
     def floquet(self) -> Multipliers:
-        """Multipliers with their structure, and the matrices that they are of."""
-        return multipliers_of(self.problem, self.evaluation, self.parameter_vector)
+        """Multipliers with their logarithms and structure."""
+        return Multipliers(self.problem, self.evaluation, self.parameter_vector)
 
     @property
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers, (n,), the structural ones exact.
 
         Of an autonomous system with the 1 of the flow, first; then by size. Of a forced one those of
-        the stroboscopic map: the 1 of the time is left out.
+        the stroboscopic map: the 1 of the time is left out. NaN where an event is grazed, so that the
+        return map has no derivative; ``stability`` says which.
         """
         rest = self.floquet.values
         return rest if self.system.time_dependent else np.concatenate([[1.0 + 0.0j], rest])
@@ -189,7 +190,7 @@ class PeriodicOrbit:
     @property
     def monodromy(self) -> Array:
         """Derivative of the flow over one period by the start, (n, n); with the time if there is forcing."""
-        matrix = self.floquet.matrix
+        matrix = monodromy(self.problem, self.evaluation)
         return matrix @ matrix if self.symmetric else matrix
 
     @property
@@ -203,13 +204,13 @@ class PeriodicOrbit:
 
     @property
     def error_estimate(self) -> float:
-        """Distance of the structural multipliers from 1 and 0, as computed with rounding."""
+        """Error of the multipliers, estimated; relative to those outside of the unit circle."""
         return self.floquet.error
 
     @property
     def stability(self) -> str:
         """Stability in words, such as ``"asymptotically stable"``."""
-        return stability(self.floquet.values, self.error_estimate)
+        return self.floquet.stability
 
     @property
     def residual(self) -> float:
@@ -257,7 +258,7 @@ class PeriodicOrbit:
             f"{kind} of period {self.period:.13g}, itinerary {shown!r} "
             f"({len(self.legs)} leg{'s' * (len(self.legs) != 1)}{odd}), {self.stability}",
             f"  multipliers {', '.join(_number(m) for m in self.multipliers)}"
-            f" (structural ones are exact; their computed distance is {self.error_estimate:.1e})",
+            f" (structural ones are exact; the estimated error is {self.error_estimate:.1e})",
         ]
         if self.margins:
             near = self.margins[0]
@@ -286,21 +287,21 @@ def _number(m: complex) -> str:
     return f"{m.real:.12g}{m.imag:+.12g}i"
 
 
-def mirrored_mode(orbit: PeriodicOrbit, mode: str, x: Array, duration: float) -> str:
+def mirrored_mode(orbit: PeriodicOrbit, leg: Leg, x: Array, duration: float) -> str:
     """The mode of a leg's mirror image."""
     system, p = orbit.system, orbit.parameter_vector
-    field = variational_field(system, mode)
-    middle = flow_for(field, field.start(x, p), p, 0.5 * duration)[: system.extended_dimension]
+    mode, n = leg.mode, system.extended_dimension
+    middle = integrate_leg(system, leg, x, 0.5 * duration, p).end[:n]
     surfaces = Surfaces(system)
     image = orbit.problem.wrap @ middle
     if system.time_dependent:
         image[-1] += orbit.problem.advance(p)[0]
     h, gradient = surfaces.values(image, p)
     letters = ""
-    for i in range(system.surface_count):
+    for k, (i, *more) in enumerate(system.entries):
         near = abs(h[i]) <= 1e-10 * float(np.abs(gradient[i]) @ (1e-3 + np.abs(image)))
-        letters += "s" if near else "+" if h[i] > 0 else "-"
-    return letters + mode[system.surface_count :]
+        letters += mode[k] if more else "s" if near else "+" if h[i] > 0 else "-"
+    return letters + mode[len(system.entries) :]
 
 
 def faults_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
@@ -314,7 +315,7 @@ def faults_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
 def _fault_of_run(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
     """Whether the motion, with all conditions of events, has the events of the legs."""
     system, legs = problem.system, problem.legs
-    if problem.symmetry is not None or any(leg.timed for leg in legs):
+    if problem.symmetry is not None or any(leg.timed or leg.repeats for leg in legs):
         return []
     half, n = 0.5 * float(at.durations[0]), system.dimension
     start = integrate_leg(system, legs[0], at.starts[0], half, p).end
@@ -345,9 +346,9 @@ def _margins(orbit: PeriodicOrbit) -> list[Margin]:
             name = leg.name(problem.system)
             angle = float(at.events[i].gradient @ at.by_leg[i].rate) / length
             result.append(Margin(i, f"meets {name} at the angle", angle, angle, ends))
-        if duration <= 0.0:
+        if duration <= 0.0 or leg.repeats:
             continue
-        for near in watch(problem.system, leg.mode, at.starts[i], duration, p).approaches:
+        for near in watch(problem.system, leg, at.starts[i], duration, p).approaches:
             what = f"keeps {described(problem.system, near.guard)} at its nearest by"
             relative = near.distance / float(np.abs(size[: orbit.system.dimension]).max())
             result.append(Margin(i, what, near.distance, relative, begins + near.t))

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...flow.events import Event, Events, Segment, Segments
 from ...flow.follow import follow
+from ...flow.names import change
+from ...flow.simulate import simulate
 from ...flow.status import Status
 from ...flow.trajectory import Steps, Trajectory
 from ...model import Array, FilippovSystem
@@ -66,28 +69,26 @@ def orbit_run(
     for k, leg in enumerate(legs):
         if leg.duration <= 0.0:
             continue
-        run = follow(
-            system,
-            leg.start,
-            leg.t + leg.duration,
-            mode=leg.mode,
-            t_start=leg.t,
-            parameters=parameters,
-            tol=1e-12,
-        )
-        first = len(coefficients)
+        end, following, first = leg.t + leg.duration, legs[(k + 1) % len(legs)], len(coefficients)
+        given: dict[str, Any] = {"t_start": leg.t, "parameters": parameters, "tol": 1e-12}
+        endless = leg.kind == "limit"
+        if endless or system.sets:  # at an end on a set one mode has no field
+            run = simulate(system, leg.start, end, **given)
+        else:
+            run = follow(system, leg.start, end, mode=leg.mode, **given)
+        if endless:
+            events += [e for e in run.events if e.kind not in ("end", "contact", "rest")]
         times.append(run.t)
         states.append(run.x)
         starts += run.steps.starts.tolist()
         coefficients += list(run.steps.coefficients)
         implicit += run.steps.implicit.tolist()
-        end, following = leg.t + leg.duration, legs[(k + 1) % len(legs)]
         values = tuple(leg.start[held:].tolist())
         segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients), values))
         if leg.event:
             modes, of = (leg.mode, following.mode), (leg.element, leg.side)
-            after = following.start
-            events.append(Event(leg.kind, end, run.x[-1], *modes, leg.event, after, *of))
+            kind, after = change(*modes) if endless else leg.kind, following.start
+            events.append(Event(kind, end, run.x[-1], *modes, leg.event, after, *of))
     last = states[-1][-1]
     events.append(Event("end", float(times[-1][-1]), last, legs[-1].mode, legs[-1].mode))
     return Trajectory(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...flow.events import Event
 from ...model import Array, FilippovSystem, Guard
-from ...model.definition.pieces import Table
+from ...model.definition.tables.pieces import Table
 
 #: Events that no letter of a mode stands for.
 _WITHOUT_LETTER = ("stop", "reset", "zero", "end")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
 
@@ -16,13 +16,23 @@ import numpy as np
 
 from ...flow.fixed import LegsWatch, first_terms, passing
 from ...flow.names import described, guard_name
+from ...flow.variation import carry_legs, require_done
 from ...model import Array, FilippovSystem, Guard
 from ...model.derivatives.event_maps import is_due_at
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
-from .legs import Leg, leg_name
+from .legs import Leg, integrate_leg, leg_name
 
 #: Part of a leg's duration beside its ends that belongs to the ends, where guards are zero.
 _ENDS = 1e-6
+
+#: Guards that change by less than this part of their size in a step are constant.
+_CONSTANT = 1e-13
+
+#: Newton steps to an extremum between two steps of the driver.
+_REFINED = 4
+
+#: The same beside sets, where the direction of h turns ever faster.
+_NEAR_SETS = 1e-4
 
 #: Guards that are functions of conditions of events.
 CONDITIONS = ("stop", "reset", "atom")
@@ -55,16 +65,15 @@ Beside = Mapping[int, Sequence[tuple[float, Guard]]]
 
 def watch(
     system: FilippovSystem,
-    mode: str,
+    leg: Leg,
     x: Array,
     duration: float,
     p: Array,
     beside: Beside = MappingProxyType({}),
 ) -> Watch:
     """Find the extrema of all guards inside a leg, and the violations."""
-    field = guarded_field(system, mode)
-    y = variational_field(system, mode).states_at(x, p)
-    ((rows,), _, _) = LegsWatch([field])([y], p, np.array([duration]), _ENDS)
+    field = guarded_field(system, leg.mode)
+    ((rows,), _, _) = LegGuards(system, [leg])(x[None], p, np.array([duration]))
     faults = [] if beside else _violations_along(field, rows, p)
     return Watch(_approaches(field, rows, p, beside), faults)
 
@@ -102,16 +111,63 @@ class LegGuards:
     """The guards of consecutive legs, evaluated repeatedly."""
 
     def __init__(self, system: FilippovSystem, legs: Sequence[Leg]):
+        self._system, self._legs = system, tuple(legs)
         self.fields = [guarded_field(system, leg.mode) for leg in legs]
         self._plain = [variational_field(system, leg.mode) for leg in legs]
-        self._watch = LegsWatch(self.fields)
+        self._limits = [i for i, leg in enumerate(legs) if leg.repeats]
+        self._watch = None if system.sets else LegsWatch(self.fields)
 
     def __call__(
         self, starts: Array, p: Array, durations: Array
     ) -> tuple[list[Array], list[Array], list[Array]]:
-        """As of LegsWatch; legs of no positive duration have no inside."""
+        """As of LegsWatch; legs of no positive duration have no inside, nor have those of infinitely many events."""
+        if self._limits:
+            durations = durations.copy()
+            durations[self._limits] = 0.0
+        if self._watch is None:
+            given = zip(self._legs, self.fields, starts, durations.tolist(), strict=True)
+            legs = [_by_steps(self._system, leg, f, x, t, p) for leg, f, x, t in given]
+            rows, begins, values = zip(*legs, strict=True)
+            return [*rows], [*begins], [*values]
         states = [field.states_at(x, p) for field, x in zip(self._plain, starts, strict=True)]
         return self._watch(states, p, durations, _ENDS)
+
+
+def _by_steps(
+    system: FilippovSystem, leg: Leg, field: GuardedField, x: Array, duration: float, p: Array
+) -> tuple[Array, Array, Array]:
+    """As of LegsWatch for one leg, from the steps of the driver: on sets a mode has no field of the states alone."""
+    near, n = _NEAR_SETS * duration, len(x)
+    moved = lambda y, leg, t: integrate_leg(system, leg, y, t, p).end
+    terms = lambda y: np.vstack(first_terms(field, y, p))
+    begin = terms(moved(x, leg, near) if leg.left else x)
+    if not duration > 0.0:
+        return np.zeros((0, 4 + n)), begin, begin[n:, 0]
+    arcs = [leg.arc(system, x, duration)]
+    found = carry_legs(system, arcs, p, back=True)
+    require_done(system, arcs, found)
+    times, states = found.steps_of(0)
+    if system.time_dependent:  # whose times are since the start
+        states = states + np.append(np.zeros(n - 1), x[-1])
+    kept, inside = (near < times) & (times < duration - near), replace(leg, left=())
+    times = np.concatenate([[near], times[kept], [duration - near]])
+    first, *middle = [moved(x, leg, near), *states[kept]]
+    states = np.array([first, *middle, moved([first, *middle][-1], inside, times[-1] - times[-2])])
+    series, rows = np.array([terms(y)[n:] for y in states]), list[Array]()
+    for (k, j), value in np.ndenumerate(series[:, :, 0]):
+        rows.append(np.array([j, times[k], value, 0.0, *states[k]]))
+    rates, spans = series[:, :, 1], np.diff(times)
+    turns = (rates[:-1] * rates[1:] < 0.0) & (
+        np.abs(np.diff(rates, axis=0)) * spans[:, None] > _CONSTANT * np.abs(series[1:, :, 0])
+    )
+    for k, j in zip(*np.nonzero(turns), strict=True):
+        t = spans[k] * rates[k, j] / (rates[k, j] - rates[k + 1, j])
+        for _ in range(_REFINED):
+            y = moved(states[k], inside, float(t))
+            own = terms(y)[n + j]
+            t = min(max(t - own[1] / (2 * own[2]), 0.0), spans[k])
+        rows.append(np.array([j, times[k] + t, own[0], 2 * own[2], *y]))
+    return np.array(rows).reshape(-1, 4 + n), begin, terms(found.ends[0])[n:, 0]
 
 
 def _violations_along(field: GuardedField, rows: Array, p: Array) -> list[str]:
@@ -148,7 +204,8 @@ def _violations(
                 name = guard_name(system, guard)
                 return [f"{guard.kind} {name!r} reaches zero {t:.6g} after its start"]
         return []
-    low = [(t, v) for t, v, scale in ordered if v < -_NEGATIVE * scale]
+    largest = max((abs(v) for _, v, _ in ordered), default=0.0)  # where the gradient vanishes
+    low = [(t, v) for t, v, scale in ordered if v < -_NEGATIVE * max(scale, largest)]
     if not low:
         return []
     t, v = min(low, key=lambda entry: entry[1])
@@ -179,8 +236,9 @@ def _change_fault(
     system: FilippovSystem, leg: Leg, speed: float, field: GuardedField, begin: Array, p: Array
 ) -> str:
     """The same from the rate of the event's function, and from the first coefficients of the next leg."""
-    own = leg.map(system)
-    assert own is not None
+    own = None if leg.repeats else leg.map(system)
+    if own is None:
+        return _following_fault(field, begin, p)
     guard = own.guard
     if guard.kind in ("surface", "exit", "impact", "release") and speed > 0.0:
         condition, name = described(system, guard), leg.name(system)
@@ -237,7 +295,8 @@ def faults_along(
                 f"leg {i + 1} {leg_name(system, leg)} has the duration {durations[i]:.6g}"
             )
             continue
-        found, following = _violations_along(fields[i], rows[i], p), (i + 1) % count
+        found = [] if leg.repeats else _violations_along(fields[i], rows[i], p)
+        following = (i + 1) % count
         if not leg.timed and (closes or following):
             field, begin = fields[following], begins[following]
             fault = _change_fault(system, leg, float(speeds[i]), field, begin, p)

@@ -44,6 +44,9 @@ _LOCATED = 1e-7
 #: Switching functions of a set that was held are zero at this part of what they are made of.
 _ON_SET = 1e-14
 
+#: Between impacts at speeds that are lost in rounding is less than this part of the time between those before.
+_LOST = 1e-6
+
 #: Impulses and bounds that are negative by this part of the error of a location are zero.
 _ROUNDED = 1e-4
 
@@ -59,7 +62,8 @@ class Leg:
     """One mode and the event that ends it."""
 
     mode: str
-    #: Of the event: crossing, entry, exit, reset, impact, release, stop; end where a time ends it.
+    #: Of the event: crossing, entry, exit, reset, impact, release, stop; limit where infinitely many accumulate; end where
+    #: a time ends it.
     kind: str = "end"
     #: element, side: As of Event.
     element: int = -1
@@ -76,6 +80,8 @@ class Leg:
     at_start: bool = False
     #: Switching functions of the sets on which it begins, and which it leaves.
     left: tuple[int, ...] = ()
+    #: Of a leg of infinitely many events: those that repeat, behind the last of which it begins.
+    repeats: tuple[Leg, ...] = ()
 
     @property
     def timed(self) -> bool:
@@ -84,8 +90,8 @@ class Leg:
 
     def name(self, system: FilippovSystem) -> str:
         """Of its event; empty where a time ends it."""
-        if self.timed:
-            return ""
+        if self.timed or self.kind == "limit":
+            return "limit" * (not self.timed)
         return event_name(system, self.mode, self.kind, self.element, self.side)
 
     def field(self, system: FilippovSystem, chosen: tuple[int, ...] = ()) -> VariationalField:
@@ -114,6 +120,11 @@ class Leg:
             return EndOfLeg(guard="exit", number=members[0], side=self.side)
         return EndOfLeg(guard="surface", number=members[0])
 
+    def reaches_set(self, system: FilippovSystem) -> bool:
+        """Whether its event is that of reaching a set."""
+        ends = self.ends(system)
+        return ends is not None and ends.hit >= 0
+
     def _is_plain(self, system: FilippovSystem) -> bool:
         """Whether its event is one of a table or a surface without memory, whose multipliers enter linearly."""
         return system.laws[self.element] in ("surface", "table") and not any(system.nonlinear)
@@ -128,6 +139,8 @@ class Leg:
 
     def at_end(self, system: FilippovSystem, y: Array, p: Array) -> AtEvent:
         """Event function and state after the event, with derivatives; further resets included."""
+        if self.repeats:
+            return _at_limit(y, p)
         own = self.map(system)
         assert own is not None
         at = own(y, p)
@@ -145,12 +158,10 @@ class Leg:
         return at
 
     def _own_event(self, system: FilippovSystem, x: Array, p: Array) -> AtEvent:
-        at_once = self.kind in ("stop", "reset", "impact", "jump")
-        if (
-            system.sets
-            or at_once
-            or (self.kind in ("crossing", "entry") and self._is_plain(system))
-        ):
+        by_states = ["stop", "reset", "impact", "jump"]
+        if system.sets or (self.kind in ("crossing", "entry") and self._is_plain(system)):
+            by_states += ["crossing", "entry", "contact"]
+        if self.kind in by_states:
             mode = system.widened(self.mode) if self.kind == "impact" else ""
             given = mode, self.kind, self.element, self.letters, self.atom
             return instant_map(system, *given)(x, p)
@@ -170,9 +181,18 @@ class Leg:
         )
 
 
+def _at_limit(y: Array, p: Array) -> AtEvent:
+    """The end of a leg of infinitely many events: where no time is left to their limit, the last of its states."""
+    unit, none = np.eye(len(y)), np.zeros((len(y), len(p)))
+    return AtEvent(y[:-1].copy(), unit[:-1], none[:-1], float(y[-1]), unit[-1], none[-1])
+
+
 def shown_itinerary(system: FilippovSystem, legs: Sequence[Leg]) -> str:
-    """Modes of legs with the values of the discrete states, separated by blanks."""
-    return " ".join(shown_mode(system, leg.mode, leg.discrete) or "o" for leg in legs)
+    """Modes of legs with the values of the discrete states, separated by blanks; of infinitely many events with dots."""
+    shown = [shown_mode(system, leg.mode, leg.discrete) or "o" for leg in legs]
+    return " ".join(
+        mode + "..." * (leg.kind == "limit") for mode, leg in zip(shown, legs, strict=True)
+    )
 
 
 def leg_name(system: FilippovSystem, leg: Leg) -> str:
@@ -222,12 +242,32 @@ def integrate_leg(
     duration: float,
     p: Array,
     chosen: tuple[int, ...] = (),
+    to_end: bool = False,
 ) -> LegFlow:
-    """The flow of a leg's mode from ``x`` (N,) over a duration of either sign, with derivatives."""
+    """The flow of a leg's mode from ``x`` (N,) over a duration of either sign, with derivatives.
+
+    ``to_end``: to the set that ends it, if one does, where the mode has no field.
+    """
+    if leg.repeats:
+        from .limit_leg import limit_flow  # which needs this module
+
+        return limit_flow(system, leg, x, duration, p, chosen)
+    if system.sets:
+        hit = leg.ends(system) if to_end and leg.reaches_set(system) else None
+        arcs = [Arc(leg.mode, x, duration, hit, _still_left(system, leg, x, p))]
+        carried = carry_legs(system, arcs, p, chosen)
+        require_done(system, arcs, carried)
+        return flows_of(carried)[0]
     field = leg.field(system, chosen)
     whole = field.matrix(flow_for(field, field.start(x, p), p, duration))
     n, end = field.by_start, whole[:, 0]
     return LegFlow(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], field.rate_at(end, p))
+
+
+def _still_left(system: FilippovSystem, leg: Leg, x: Array, p: Array) -> tuple[int, ...]:
+    """The sets that a leg leaves, if a state (N,) is where it begins."""
+    at = [surface_map(system, i)(x, p) for i in leg.left]
+    return leg.left if all(_is_zero(h, x) for h in at) else ()
 
 
 def carry_leg(
@@ -319,7 +359,7 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
     result: list[Stretch] = []
     if len(system.joints) > 1:
         _require_independent(system, mode, x, p)
-    if system.sets:
+    if begins and system.sets:
         _require_held(system, mode, x, p)
     known: dict[tuple[object, ...], Leg] = {}
     discrete = len(system.definition.discrete)
@@ -330,7 +370,6 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
             group = [e for e in group if not cells.is_breakpoint(e)] or group[:1]
             shown, group = group[0], [cells.event(e) for e in group]
             first, last = group[0], group[-1]
-        _require_countable(group, len(system.entries))
         x_end = _extended(system, first.x, first.t)
         if len(group) == 1 and first.kind in ("crossing", "entry", "exit"):
             key = (first.mode_before, first.kind, first.element, first.side, first.mode_after)
@@ -358,6 +397,18 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
         as_shown = shown.mode_before, shown.element
         result.append(Stretch(leg, t, first.t - t, x, x_end, after, system, p, as_shown))
         t, x = last.t, after
+        if _closes(
+            result, last.mode_after
+        ):  # the last of many impacts, at a speed that is lost in rounding
+            none = Leg(leg.mode, "limit", leg.element)
+            result.append(Stretch(none, t, 0.0, x, x, x, system, p, as_shown))
+    if run.accumulation_time is not None:  # the run ends where no motion follows the limit
+        if result[-1].leg.timed:
+            t, x = result[-1].t, result.pop().start
+        mode = run.events[-1].mode_before
+        leg = Leg(cells.mode(mode) if cells else mode, "limit")
+        left = run.accumulation_time - t
+        result.append(Stretch(leg, t, left, x, x, x, system, p, (mode, -1)))
     return result
 
 
@@ -432,25 +483,27 @@ def _instants(events: Sequence[Event]) -> list[list[Event]]:
     return groups
 
 
-def _require_countable(group: Sequence[Event], contacts: int) -> None:
-    for event in group:
-        if event.kind == "rest":
-            raise DegenerateError(
-                f"event at t = {event.t:.10g}: expected finitely many events before {event.name!r} rests, "
-                "received events that accumulate. Infinitely many legs have no fixed itinerary: end the run before."
-            )
-        if event.kind == "contact" and event.element >= contacts:
-            raise DegenerateError(
-                f"event at t = {event.t:.10g}: expected finitely many impacts before a contact "
-                f"closes, received impacts on {event.name!r} that accumulate. Infinitely many legs "
-                "have no fixed itinerary: end the run before, or give a restitution of 0."
-            )
+def _is_limit(event: Event, entries: int) -> bool:
+    """Whether events accumulate at an event, without end."""
+    return event.kind == "rest" or (event.kind == "contact" and event.element >= entries)
+
+
+def _closes(parts: Sequence[Stretch], letters: str) -> bool:
+    """Whether the last impact closes a contact that impacts before it left open."""
+    if len(parts) < 2 or parts[-1].leg.kind != "impact":
+        return False
+    before, leg = parts[-2].leg, parts[-1].leg
+    same = (before.kind, before.element, before.mode) == (leg.kind, leg.element, leg.mode)
+    lost = parts[-1].duration < _LOST * max(part.duration for part in parts[-6:])
+    return same and lost and letters[leg.element] == "c" != leg.mode[leg.element]
 
 
 def leg_of(system: FilippovSystem, event: Event, p: Array) -> Leg:
     """The leg that an event of a run ends."""
     if event.kind == "end":
         return Leg(event.mode_before)
+    if _is_limit(event, len(system.entries)):
+        return Leg(event.mode_before, "limit", event.element)
     _require_one_surface(system, event, p)
     letters = _letters(system, event, p) if event.kind == "impact" else ""
     if event.kind == "jump":
@@ -652,5 +705,5 @@ def parallel(a: Array, b: Array) -> bool:
 
 def surface_of(system: FilippovSystem, leg: Leg) -> int:
     """The switching surface of a leg's event; -1 if it has none."""
-    own = leg.kind in ("crossing", "entry", "exit") and leg.element < system.surface_count
-    return leg.element if own else -1
+    own = leg.kind in ("crossing", "entry", "exit") and leg.element < len(system.entries)
+    return leg.element if own and len(system.entries[leg.element]) == 1 else -1

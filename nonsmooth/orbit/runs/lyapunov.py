@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +28,8 @@ from ...model import (
     whole,
 )
 from .legs import LegFlow, Stretch, carry_leg, stretches
-from .variation import saltation_after
+from .limits import limits_of
+from .variation import carried, passages_to, saltation_after
 
 #: Relative size of a column of R at an event below which a direction is lost, as in an entry to sliding.
 _LOST = 1e-12
@@ -222,14 +224,20 @@ class _Frame:
     def follow(self, progress: bool) -> LyapunovSpectrum:
         """Follow the run and return its exponents."""
         parts = stretches(self.run, driven=True)
+        limits = {found.points[0]: i for i, (found, _) in limits_of(parts).items()}
         bar = progress_bar(len(parts), progress, "leg")
-        complete = True
+        complete, j = True, 0
         try:
-            for j, part in enumerate(parts):
-                flow = self._leg(part)
-                following = parts[j + 1] if j + 1 < len(parts) else None
-                self._event(part, flow, following)
-                bar.update(1)
+            while j < len(parts):
+                i = limits.get(j, j)
+                if i > j:
+                    self._limit(parts, j, i)
+                else:
+                    flow = self._leg(parts[j])
+                    following = parts[j + 1] if j + 1 < len(parts) else None
+                    self._event(parts[j], flow, following)
+                bar.update(i + 1 - j)
+                j = i + 1
         except KeyboardInterrupt:
             complete = False
             if self.t <= self.bounds[1]:
@@ -268,7 +276,10 @@ class _Frame:
         event = saltation_after(self.run, part, flow, following, None)
         if event is None or part.leg.kind == "end" or not self.q.shape[1]:
             return
-        matrix = event.matrix[: self.n, : self.n]
+        self._lose(event.matrix[: self.n, : self.n], part, self.t)
+
+    def _lose(self, matrix: Array, part: Stretch, end: float) -> None:
+        """Apply the matrix (n, n) of an event, or of what happens until ``end``, at which directions may be lost."""
         if not np.abs(matrix).max() < _HUGE:
             raise self._diverging(matrix, part)
         q, r = np.linalg.qr(matrix @ self.q)
@@ -280,7 +291,19 @@ class _Frame:
         if self._block(self.t) >= 0:
             size = abs(float(np.linalg.det(matrix)))
             self.volume += math.log(size) if kept.all() and size else math.nan
-        self._count(q[:, kept], growth[kept], self.t)
+        if end == self.t:
+            self._count(q[:, kept], growth[kept], end)
+            return
+        parts_of = np.diff(np.clip(self.bounds, self.t, end)) / (end - self.t)
+        self.logs[:, : kept.sum()] += np.outer(parts_of, np.log(growth[kept]))
+        self.q, self.t = q[:, kept], end
+
+    def _limit(self, parts: Sequence[Stretch], first: int, i: int) -> None:
+        """Follow directions from leg ``first`` to the limit of events that ends leg i, where some are lost."""
+        width = len(parts[first].start)
+        found = passages_to(self.run, parts, i, first)
+        *_, (_, _, _, (matrix, _)) = carried(found[:-1], np.eye(width), np.zeros((width, 0)), ())
+        self._lose(matrix[: self.n, : self.n], parts[i], parts[i].t + parts[i].duration)
 
     def _spread(self, matrix: Array, part: Stretch) -> tuple[Array, Array]:
         """Directions and growths at a regular event, some below the rounding of QR."""

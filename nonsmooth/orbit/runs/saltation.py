@@ -89,10 +89,13 @@ class Saltation:
         return np.asarray(back - later * self.time_by_state)
 
 
-def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> Saltation:
-    """Saltation matrix of an event."""
+def saltation(
+    at: AtEvent, before: Array, after: Array, what: str = "event", slow: bool = False
+) -> Saltation:
+    """Saltation matrix of an event, which may be ``slow``."""
     rows = (before, at.after_state, at.after_parameters, at.gradient, at.by_parameters)
-    found = saltations(Ended(*[row[None] for row in rows]), after[None], lambda _: what)
+    ends, may_be = Ended(*[row[None] for row in rows]), np.array([slow])
+    found = saltations(ends, after[None], lambda _: what, slow=may_be)
     return found.of(0, at.smooth)
 
 
@@ -120,8 +123,9 @@ def passages(
     after: Array,
     named: Callable[[int], str],
     events: NDArray[np.bool_] | None = None,
+    slow: NDArray[np.bool_] | None = None,
 ) -> Passed:
-    """Passages of the events of many legs, none of which may be grazed."""
+    """Passages of the events of many legs, none of which may be grazed but those that are ``slow``, as they accumulate."""
     e, rate, g = ends.gradient, ends.rate, ends.after_state
     speed = (e * rate).sum(axis=1)
     carried = (g @ rate[:, :, None])[:, :, 0]
@@ -133,7 +137,8 @@ def passages(
     kept = of_jump <= _CONTINUOUS * np.maximum(of_after, of_carried)
     if events is not None:
         kept |= ~events
-    grazed = np.flatnonzero((angle < GRAZING) & ~kept)
+    flat = (angle < GRAZING) & ~kept
+    grazed = np.flatnonzero(flat if slow is None else flat & ~slow)
     if grazed.size:  # except by a clock: its phase has the rate 1
         ticks = ((e != 0.0).sum(axis=1) == 1) & (np.abs(speed) == np.abs(e).max(axis=1))
         grazed = grazed[~ticks[grazed]]
@@ -148,9 +153,10 @@ def saltations(
     after: Array,
     named: Callable[[int], str],
     events: NDArray[np.bool_] | None = None,
+    slow: NDArray[np.bool_] | None = None,
 ) -> Saltation:
     """Saltation matrices of the events of many legs, stacked."""
-    speed, angle, jump, kept = passages(ends, after, named, events)
+    speed, angle, jump, kept = passages(ends, after, named, events, slow)
     with np.errstate(divide="ignore", invalid="ignore"):
         time_x = -ends.gradient / speed[:, None]
         time_p = -ends.value_parameters / speed[:, None]

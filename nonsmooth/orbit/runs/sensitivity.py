@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from ...model import (
 )
 from ...model.derivatives.costs import cost_over
 from .legs import parameters_of
+from .one_sided import Side, one_sided
 from .variation import (
     Passage,
     Sensitivity,
@@ -35,7 +36,12 @@ from .variation import (
 )
 
 
-def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameters")) -> Sensitivity:
+def sensitivity(
+    run: Trajectory,
+    *,
+    wrt: str | Sequence[str] = ("x0", "parameters"),
+    side: Side | None = None,
+) -> Sensitivity:
     """Derivatives of the end of a run, and of its event times, by start and parameters.
 
     They are exact: state-transition matrices of the legs, integrated beside them to rounding, and
@@ -49,6 +55,10 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
     wrt : str or sequence of str, optional
         Names of parameters; ``"parameters"`` stands for all of them, ``"x0"`` for the start, which
         is always included.
+    side : array_like (n,) or mapping, optional
+        Direction of the start, or of ``"x0"`` and parameters by name, for one-sided derivatives: of the neighbours in that
+        direction. At a corner, a grazing or an event at the very end, others have other derivatives; without ``side``
+        they are refused. Its length, in the units of the states, is a distance over which events change little.
 
     Returns
     -------
@@ -58,8 +68,8 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
     Raises
     ------
     DegenerateError
-        An event that is grazed, two independent events at one instant, events that accumulate, a derivative that
-        is not finite at the zero of a root, a status without an end.
+        An event that is grazed, two independent events at one instant, events that accumulate but are too few to give
+        their limit, a derivative that is not finite at the zero of a root, a status without an end.
     ParameterError
         An unknown name in ``wrt``.
     OptionError
@@ -70,6 +80,11 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
     A run that starts on a sliding surface has the derivatives of the sliding field: they hold along the
     surface, not for starts off it; of a run that starts at rest, for starts that rest too. Where a reset happens exactly at the end of the run, they hold for
     neighbours that have jumped.
+
+    Where impacts, resets or crossings accumulate the derivatives are those of their limit, extrapolated from events
+    before it; they are exact to about 1e-12. A run with the status ACCUMULATION has those of the limit as its end.
+    One-sided ones are extrapolated from those of neighbours, which are simulated, to about 1e-9; those of times that are
+    not finite, as of a grazing, are NaN.
 
     Aizerman & Gantmakher 1958; Leine & Nijmeijer 2004, ch. 7.
 
@@ -89,7 +104,27 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
            [1.  ]]), array([0.5]), array([[1. , 0.5]]))
     """
     require_system(_require_run(run).system, sets=True, complementarity=True, joints=True)
-    return along(run, _names(run, wrt))
+    names = _names(run, wrt)
+    return along(run, names) if side is None else _beside(run, side, names)
+
+
+def _beside(run: Trajectory, side: Side, names: tuple[str, ...]) -> Sensitivity:
+    """One-sided derivatives."""
+    made = list[Sensitivity]()
+
+    def arrays(found: Sensitivity) -> dict[str, Array]:
+        return {name: rows for name, rows in vars(found).items() if isinstance(rows, np.ndarray)}
+
+    def values(near: Trajectory) -> Array:
+        made.append(along(near, names))
+        return np.concatenate([rows.ravel() for rows in arrays(made[-1]).values()])
+
+    n = run.system.dimension
+    limit, kept = one_sided(run, side, values, n * (n + len(names))), arrays(made[0])
+    cuts = np.cumsum([rows.size for rows in kept.values()])[:-1]
+    parts = zip(kept.items(), np.split(limit, cuts), strict=True)
+    limits: dict[str, Any] = {name: part.reshape(rows.shape) for (name, rows), part in parts}
+    return replace(made[0], **limits)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,6 +157,7 @@ def gradient(
     *,
     samples: Mapping[Any, ArrayLike] | None = None,
     wrt: str | Sequence[str] = ("x0", "parameters"),
+    side: Side | None = None,
 ) -> Gradient:
     """Gradient of a cost at the end of a run, or summed over its samples, by the exact discrete adjoint.
 
@@ -134,7 +170,7 @@ def gradient(
     samples : mapping of symbol to array_like (K,), optional
         The cost is a sum over the samples of the run (see :func:`vjp`). Symbols in it have these values there, such as
         data to be fitted; ``{}`` where it has no symbols of its own.
-    wrt : str or sequence of str, optional
+    wrt, side : optional
         As in :func:`sensitivity`.
 
     Returns
@@ -167,6 +203,15 @@ def gradient(
     """
     system = _require_run(run).system
     names, p = _names(run, wrt), parameters_of(run)
+    if side is not None:
+
+        def values(near: Trajectory) -> Array:
+            found = gradient(near, cost, samples=samples, wrt=names)
+            return np.array([found.value, *found.x0, *found.parameters.values()])
+
+        value, *rest = one_sided(run, side, values).tolist()
+        by_p = dict(zip(names, rest[system.dimension :], strict=True))
+        return Gradient(value, np.array(rest[: system.dimension]), by_p)
     chosen = places_of(run, names)
     parts = _legs(run, chosen)
     if samples is None:
@@ -187,6 +232,8 @@ def gradient(
 def _end(parts: Sequence[Passage]) -> Array:
     """The end of a run, integrated as its derivatives are; behind a jump as the run has it."""
     last = parts[-1].stretch
+    if parts[-1].limit is not None:
+        return parts[-1].limit.limit.value[1:]
     return parts[-1].flow.end if np.array_equal(last.end, last.after) else last.after
 
 
@@ -206,6 +253,7 @@ def vjp(
     *,
     samples: ArrayLike | None = None,
     wrt: str | Sequence[str] = ("x0", "parameters"),
+    side: Side | None = None,
 ) -> tuple[Array, Array]:
     """Product of rows with the derivatives of a run, by the discrete adjoint.
 
@@ -220,7 +268,7 @@ def vjp(
     samples : array_like (K, n), optional
         Its derivatives by the states ``run.sample_x`` at the times ``t_eval``, which are fixed. A sample at the time of
         an event is taken on the side of ``sample_x``: after the event where the state does not jump.
-    wrt : str or sequence of str, optional
+    wrt, side : optional
         As in :func:`sensitivity`.
 
     Returns
@@ -257,7 +305,12 @@ def vjp(
         raise PointError(
             f"cotangent {shown}, but the system has {n} states. Give one finite number for each."
         )
-    return _pulled(run, _legs(run, chosen), row, _rows_at(run, samples), chosen)
+    rows = _rows_at(run, samples)
+    if side is not None:
+        values = lambda near: np.concatenate(_pulled(near, _legs(near, chosen), row, rows, chosen))
+        found = one_sided(run, side, values)
+        return found[:n], found[n:]
+    return _pulled(run, _legs(run, chosen), row, rows, chosen)
 
 
 def _rows_at(run: Trajectory, samples: ArrayLike | None) -> Array:
@@ -326,10 +379,18 @@ def _pulled_through(
     own = every if last.back else np.zeros(len(some))  # what legs give
     pulling = last.flow.carried[0].pulling(every, rows) if last.flow.carried else nullcontext()
     row = row + rows[last.samples.stop :].sum(axis=0)
+    added = dict[int, tuple[Array, float]]()  # rows after events that accumulate
     with pulling:
-        for part in reversed(parts):
+        for i, part in reversed([*enumerate(parts)]):
             event = part.event
-            if event is not None and part is last and part.stretch.leg.kind == "stop":
+            if part.limit is not None:
+                added |= part.limit.pull(row, every)
+                row = np.zeros_like(row)
+            if i in added and event is not None:
+                row, later = row + added[i][0], added[i][1]
+                row = event.pull(row, every) + later * event.time_by_state
+                every += later * event.time_by_parameters
+            elif event is not None and part is last and part.stretch.leg.kind == "stop":
                 along_flow = float(row @ part.flow.rate)
                 every += along_flow * event.time_by_parameters
                 row = row + along_flow * event.time_by_state
@@ -337,8 +398,8 @@ def _pulled_through(
                 row = event.pull(row, every)
             row = part.backward(row, rows, own)
     if parts[0].held is not None:
-        every += row @ parts[0].held[1]
-        row = row @ parts[0].held[0]
+        every += row @ parts[0].held.by_parameters
+        row = row @ parts[0].held.by_state
     row = row.copy()
     row[discrete_places(system)] = 0.0
     by_parameters = every[some] if last.back else every[some] + own
@@ -351,7 +412,7 @@ def _require_run(run: Trajectory) -> Trajectory:
     run.require_dense("its sensitivity")
     if not len(run.steps):
         raise OptionError(f"run has no step ({run.message}) Give a start from which it moves.")
-    if run.status not in (Status.REACHED_END, Status.STOPPED):
+    if run.status not in (Status.REACHED_END, Status.STOPPED, Status.ACCUMULATION):
         raise DegenerateError(
             f"run ended with {run.status} at t = {run.t[-1]:.6g}, where its end is not a smooth function of "
             f"its start: {run.message} End it earlier."

@@ -2,8 +2,9 @@
 
 A run with a fixed itinerary is a chain of smooth maps. Each leg has its state-transition matrix X and its
 derivatives P by parameters, each event its saltation matrices (``saltation``). Derivatives of the end are
-their product. Gradients of a cost are the same product from the other end, without X and P: rows are pulled
-back through the recursion of each step's series (``flow/core/adjoint.c``). That is the exact discrete adjoint,
+their product; events that accumulate have a limit (``limits``). Gradients of a cost are the same product from the
+other end, without X and P: rows are pulled back through the recursion of each step's series
+(``flow/core/legs/adjoint.c``). That is the exact discrete adjoint,
 without backward integration, which is impossible through an entry to sliding.
 """
 
@@ -27,8 +28,7 @@ from ...model import (
     FilippovSystem,
     require_plain,
 )
-from ...model.derivatives.event_maps import AtEvent, function_map
-from ...model.laws.coupled import raised_of
+from ...model.derivatives.event_maps import AtEvent
 from ...model.laws.motion import rests_on
 from .cells import cells_of
 from .guards import watch
@@ -45,6 +45,7 @@ from .legs import (
     sets_left,
     stretches,
 )
+from .limits import AtLimit, Nearest, limits_of, rest_at
 from .saltation import Ended, Saltation, saltation, saltations
 
 # Grazings within the error of a run ---------------------------------------------------------------
@@ -67,7 +68,7 @@ def _require_certain(run: Trajectory, parts: Sequence[Passage]) -> None:
     flat = [
         k
         for k, part in enumerate(parts)
-        if part.event and not part.event.kept and part.event.angle < _STEEP
+        if part.event and not (part.event.kept or part.repeats) and part.event.angle < _STEEP
     ]
     error = np.zeros(
         run.system.extended_dimension
@@ -241,7 +242,11 @@ class Passage:
     #: Whether it was recorded so that rows can be pulled back, in place of derivatives.
     back: bool = False
     #: Derivatives of where it begins by the start of the run and by all parameters, if that is not free.
-    held: tuple[Array, Array] | None = None
+    held: Nearest | None = None
+    #: The limit of events that ends it.
+    limit: AtLimit | None = None
+    #: Whether its event is one of those that accumulate.
+    repeats: bool = False
 
     def forward(self, dx: Array, dp: Array) -> tuple[Array, Array]:
         """Carry derivatives by start (N, m) and parameters (N, q) to the end of the leg's flow."""
@@ -314,14 +319,72 @@ def passages(
         counts, spans = np.diff(cuts), np.array([(part.t, part.duration) for part in parts])
         begun, durations = np.repeat(spans, counts, axis=0).T
         since = np.clip(times[: cuts[-1]] - begun, 0.0, durations)
-    flows = _flows(run, parts, chosen, since, cuts, back)
-    events = _saltations(run, parts, flows)
-    samples = [slice(i, j) for i, j in pairwise(cuts)]
-    found = [Passage(*own, back) for own in zip(parts, flows, events, samples, strict=True)]
+    found = _passages(run, parts, chosen, since, cuts, back)
     if not system.sets:
         _require_certain(run, found)
-    at_rest = _rest_at(parts[0])
-    return [replace(found[0], held=at_rest), *found[1:]]
+    first = parts[0]
+    own = rests_on(first.system, first.leg.mode)
+    resting = list(dict.fromkeys(first.system.entry_of(i) for i in own))
+    held = rest_at(first.system, first.leg, resting, first.start, first.p)
+    return [replace(found[0], held=held), *found[1:]]
+
+
+def passages_to(
+    run: Trajectory, parts: Sequence[Stretch], i: int, first: int = 0, chosen: tuple[int, ...] = ()
+) -> list[Passage]:
+    """Legs and events of a run from leg ``first`` to the limit that ends leg i, and where the next one starts."""
+    own = list(parts[first : i + 2])
+    if i + 1 < len(parts):
+        then = own[-1]
+        own[-1] = replace(
+            then, leg=Leg(then.leg.mode), duration=0.0, end=then.start, after=then.start
+        )
+    return _passages(run, own, chosen, NONE, [0] * (len(own) + 1), False)
+
+
+def _passages(
+    run: Trajectory,
+    parts: Sequence[Stretch],
+    chosen: tuple[int, ...],
+    since: Array,
+    cuts: Sequence[int],
+    back: bool,
+) -> list[Passage]:
+    flows = _flows(run, parts, chosen, since, cuts, back)
+    limits, repeating = _limits(parts, flows)
+    events = _saltations(run, parts, flows, repeating)
+    every = zip(parts, flows, events, pairwise(cuts), strict=True)
+    return [
+        Passage(part, flow, event, slice(*own), back, limit=limits.get(i), repeats=i in repeating)
+        for i, (part, flow, event, own) in enumerate(every)
+    ]
+
+
+def carried(
+    parts: Sequence[Passage], dx: Array, dp: Array, chosen: tuple[int, ...]
+) -> Iterator[tuple[Passage, tuple[Array, Array], tuple[Array, Array] | None, tuple[Array, Array]]]:
+    """Legs with derivatives, by the start (N, m) and parameters (N, q), where they begin, of the times of their events, and
+    behind these."""
+    needed = {k for part in parts if part.limit for k in part.limit.limit.points}
+    seen, width = dict[int, tuple[Array, Array]](), dx.shape[1]
+    given = np.zeros((len(parts[0].stretch.p), width + len(chosen)))
+    given[list(chosen), width + np.arange(len(chosen))] = 1.0
+    for i, part in enumerate(parts):
+        begin, times = (dx, dp), None
+        dx, dp = part.forward(dx, dp)
+        if part.limit is not None:
+            found = part.limit.through([seen[k] for k in part.limit.limit.points], given)
+            times, (dx, dp) = ((k[..., :width], k[..., width:]) for k in found)
+        elif part.event is not None:
+            times = part.moments(dx, dp, chosen)
+            if part.stretch.leg.kind == "stop":
+                rate = part.flow.rate
+                dx, dp = (k + np.outer(rate, t) for k, t in zip((dx, dp), times, strict=True))
+            else:
+                dx, dp = part.through(dx, dp, *times, chosen)
+            if i in needed:
+                seen[i] = np.concatenate(times), np.hstack([dx, dp])
+        yield part, begin, times, (dx, dp)
 
 
 def _flows(
@@ -345,10 +408,41 @@ def _flows(
     return [_flow(run, part, since[i:j], chosen) for part, (i, j) in own]
 
 
+def _limits(
+    parts: Sequence[Stretch], flows: Sequence[LegFlow]
+) -> tuple[dict[int, AtLimit], set[int]]:
+    """Limits of events by the legs that they end, and the legs whose events accumulate."""
+    found, repeating = dict[int, AtLimit](), set[int]()
+    for i, (limit, tail) in limits_of(parts).items():
+        part = parts[i]
+        rates = np.array([_rate_at_start(parts[k + 1], flows[k + 1]) for k in limit.points])
+        rest = after = None
+        if i + 1 < len(parts):
+            then = parts[i + 1]
+            letters = enumerate(zip(part.leg.mode, then.leg.mode, strict=True))
+            resting = [k for k, (one, two) in letters if one != two and two in "sc"]
+            rest = rest_at(then.system, then.leg, resting, limit.value[1:], then.p)
+            x = limit.value[1:] if rest is None else rest.x
+            after = rate_at(then.system, then.leg, x, then.p)
+        found[i] = AtLimit(limit, rates, rest, after)
+        repeating.update(tail)
+    return found, repeating
+
+
+def _rate_at_start(part: Stretch, flow: LegFlow) -> Array:
+    rate, n = flow.before, len(part.start)
+    usual = rate is not None and not part.system.sets and bool(np.isfinite(rate).all())
+    return (
+        rate[:n]
+        if usual and rate is not None
+        else rate_at(part.system, part.leg, part.start, part.p)
+    )
+
+
 def _saltations(
-    run: Trajectory, parts: Sequence[Stretch], flows: Sequence[LegFlow]
+    run: Trajectory, parts: Sequence[Stretch], flows: Sequence[LegFlow], repeating: set[int]
 ) -> list[Saltation | None]:
-    """Events of legs; None where a time ends one."""
+    """Events of legs; None where a time or a limit ends one. Those that repeat are no grazings."""
     system, result = run.system, list[Saltation | None]([None] * len(parts))
     before = np.array(
         [np.full(len(f.end), np.nan) if f.before is None else f.before for f in flows]
@@ -356,15 +450,20 @@ def _saltations(
     usual = (np.isfinite(before).all(axis=1) & (not system.sets)).tolist()
     which, events = list[int](), list[AtEvent]()  # by one formula
     for i, (part, flow) in enumerate(zip(parts[:-1], flows, strict=False)):
+        if part.leg.kind == "limit":
+            continue
         if usual[i + 1] and not (part.leg.timed or part.leg.at_start):
             which.append(i)
             events.append(flow.at or part.leg.at_event(part.system, flow.end, part.p))
         else:
-            result[i] = saltation_after(run, part, flow, parts[i + 1], flows[i + 1])
-    result[-1] = saltation_after(run, parts[-1], flows[-1], None, None)
+            then = parts[i + 1], flows[i + 1]
+            result[i] = saltation_after(run, part, flow, *then, i in repeating)
+    if parts[-1].leg.kind != "limit":
+        result[-1] = saltation_after(run, parts[-1], flows[-1], None, None)
     if which:
         stacked, after = _stacked(events, [flows[i].rate for i in which]), before[1:][which]
-        made = saltations(stacked, after, lambda k: _at(run, parts[which[k]]))
+        slow = np.array([i in repeating for i in which]) if repeating else None
+        made = saltations(stacked, after, lambda k: _at(run, parts[which[k]]), slow=slow)
         for k, (i, at) in enumerate(zip(which, events, strict=True)):
             result[i] = made.of(k, at.smooth)
     return result
@@ -382,23 +481,6 @@ def _stacked(events: Sequence[AtEvent], rates: Sequence[Array]) -> Ended:
     return Ended(
         np.array(rates), maps, by_p, gradients, np.array([at.by_parameters for at in events])
     )
-
-
-def _rest_at(part: Stretch) -> tuple[Array, Array] | None:
-    """Derivatives, by start (N,) and parameters, of the nearest state at which a mode rests; None where none does."""
-    system, p = part.system, part.p
-    resting = rests_on(system, part.leg.mode)
-    if not resting:
-        return None
-    n, mode = system.extended_dimension, part.leg.mode
-    kept = [
-        e for i in resting for e in (system.definition.surfaces[i], *raised_of(system).lower[i])
-    ]
-    y = part.leg.field(system).states_at(part.start, p)
-    at = [function_map(system, mode, e)(y, p) for e in kept]
-    rows = np.array([row.gradient[:n] for row in at])
-    back = np.linalg.pinv(rows)
-    return np.eye(n) - back @ rows, -back @ np.array([row.by_parameters for row in at])
 
 
 def _at(run: Trajectory, part: Stretch) -> str:
@@ -427,8 +509,9 @@ def saltation_after(
     flow: LegFlow,
     following: Stretch | None,
     then: LegFlow | None,
+    slow: bool = False,
 ) -> Saltation | None:
-    """The saltation of the event that ends a leg; None where a time ends it."""
+    """The saltation of the event that ends a leg, ``slow`` as one of those that accumulate; None where a time ends it."""
     # At the end of a run the field after it is that of the mode reached.
     if part.leg.timed:
         return None
@@ -464,7 +547,7 @@ def saltation_after(
             f"{_at(run, part)}: the field after the event is not finite at {part.after.tolist()}. "
             "Start or end the run on one side of it."
         )
-    return saltation(at, flow.rate, after, _at(run, part))
+    return saltation(at, flow.rate, after, _at(run, part), slow)
 
 
 def _rate_after(part: Stretch, leg: Leg, at: AtEvent, p: Array) -> Array | None:
@@ -495,11 +578,11 @@ class Sensitivity:
     dt_dx0, dt_dp : ndarray (m, n), (m, q)
         Derivatives of the event times.
     dt_end_dx0, dt_end_dp : ndarray (n,), (q,)
-        Derivatives of the final time: zero unless a stop ended the run.
+        Derivatives of the final time: zero unless a stop, or a limit of events, ended the run.
     names : tuple of str
         Names of the parameters.
     run : Trajectory
-        The run that was differentiated.
+        The run that was differentiated; for one-sided derivatives its nearest neighbour.
     dsample_dx0, dsample_dp : ndarray (K, n, n), (K, n, q) or None
         Derivatives of ``run.sample_x``, at fixed times: None without samples, NaN where a sample is. A sample at the
         time of an event is on the side of ``sample_x``, after it where both agree.
@@ -533,7 +616,7 @@ class Sensitivity:
 
     @cached_property
     def _nearest(self) -> tuple[float, str]:
-        return (math.inf, "") if self.run.system.sets else _clearance(self.run)
+        return _clearance(self.run)
 
     def __repr__(self) -> str:
         near = f"; clearance {self.clearance:.3g} ({self.nearest})" if self.nearest else ""
@@ -551,7 +634,7 @@ def _clearance(run: Trajectory) -> tuple[float, str]:
             continue
         beside = cells.beside(part.shown.mode)
         try:
-            given = part.leg.mode, part.start, part.duration, part.p
+            given = part.leg, part.start, part.duration, part.p
             seen = watch(part.system, *given, beside).approaches
         except ConvergenceError:
             continue  # no Taylor series at an end
@@ -589,25 +672,21 @@ def along(run: Trajectory, names: Sequence[str]) -> Sensitivity:
     parts = passages(run, chosen, at)
     dx, dp = np.eye(system.extended_dimension), np.zeros((system.extended_dimension, len(chosen)))
     if (held := parts[0].held) is not None:
-        dx, dp = held[0], held[1][:, list(chosen)]
+        dx, dp = held.by_state, held.by_parameters[:, list(chosen)]
     dx[:, discrete_places(system)] = 0.0
     times, by_start, by_parameters = list[float](), list[Array](), list[Array]()
     sampled = list[tuple[Array, Array]]()
-    end_x, end_p = np.zeros(system.extended_dimension), np.zeros(len(chosen))
-    for part in parts:
-        sampled.append(part.at_samples(dx, dp))
-        dx, dp = part.forward(dx, dp)
-        if part.event is not None:
-            t_x, t_p = part.moments(dx, dp, chosen)
+    end_x, end_p, last = np.zeros(len(dx)), np.zeros(len(chosen)), (dx, dp)
+    for part, begin, moved, end in carried(parts, dx, dp, chosen):
+        sampled.append(part.at_samples(*begin))
+        if moved is not None:
             times.append(part.stretch.t + part.stretch.duration)
-            by_start.append(t_x[:n])
-            by_parameters.append(t_p)
-            if part.stretch.leg.kind == "stop":
-                end_x, end_p = t_x, t_p
-                rate = part.flow.rate
-                dx, dp = dx + np.outer(rate, t_x), dp + np.outer(rate, t_p)
-                continue
-            dx, dp = part.through(dx, dp, t_x, t_p, chosen)
+            by_start.append(moved[0][:n])
+            by_parameters.append(moved[1])
+            if part is parts[-1] and (part.limit or part.stretch.leg.kind == "stop"):
+                end_x, end_p = moved
+        last = end
+    dx, dp = last
     m, q = len(times), len(chosen)
     if not (np.isfinite(dx).all() and np.isfinite(dp).all()):
         first = next((k for k in parts if not np.isfinite(k.flow.by_start).all()), parts[-1])

@@ -16,7 +16,9 @@ import numpy as np
 
 from ...model import (
     Array,
+    ConvergenceError,
     DefinitionError,
+    DegenerateError,
     NonsmoothError,
     OptionError,
     PointError,
@@ -45,12 +47,16 @@ class Arc:
         Zeros of the tests, in their order along the arc.
     end : str
         ``"bound"``, ``"closed"``, ``"junction"``, ``"step too small"``, ``"points"`` (``most`` of
-        them), ``"interrupted"``, the name of the test that ended it, or the text that the curve gave.
+        them), ``"interrupted"``, ``"failed"`` (an error was raised), the name of the test that ended it, or
+        the text that the curve gave.
+    reason : str
+        The words of the error, also of the last one that made a step fail; else empty.
     """
 
     points: list[Point] = field(default_factory=list)
     zeros: list[Zero] = field(default_factory=list)
     end: str = ""
+    reason: str = ""
 
     @property
     def rows(self) -> list[Array]:
@@ -121,8 +127,12 @@ def trace(
                 arc.end = "points"
     except KeyboardInterrupt:
         arc.end = "interrupted"
-        if not arc.points:
-            arc.points.append(Point(np.asarray(rows[-1], float), np.asarray(tangent, float)))
+    except (ConvergenceError, DegenerateError, PointError, np.linalg.LinAlgError) as error:
+        arc.end, arc.reason = "failed", str(error)
+    if arc.end in ("lost", "step too small"):
+        arc.reason = curve.refused
+    if not arc.points:
+        arc.points.append(Point(np.asarray(rows[-1], float), np.asarray(tangent, float)))
     return arc
 
 
@@ -180,7 +190,8 @@ class _Tracing:
 
     def _shorten(self, last: Point, fault: str, bend: float, failed: bool) -> None:
         """Halve a step that failed; end the arc where what ends it can be solved for."""
-        lost = failed and (self.curve.snaps or not self.curve.exact)
+        solved = type(self.curve).snap is not Curve.snap  # what ends it
+        lost = failed and solved and (self.curve.snaps or not self.curve.exact)
         self.closing = self.closing or bool(fault) or lost
         if self.closing:
             snapped = self.curve.snap(last.u, last.tangent, 2 * self.size)

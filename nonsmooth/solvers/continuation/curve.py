@@ -81,6 +81,9 @@ class Curve:
     parameter: int | None = None
     branching: bool = False
     snaps: bool = False
+    regular: bool = False  # Newton's method converges quadratically though tangents are chords
+    #: The words of the error that made the last correction fail; else empty.
+    refused: str = ""
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         """Return the values of the equations and their Jacobian; every subclass defines it.
@@ -249,7 +252,7 @@ class Curve:
 
         def attempt() -> Array | None:
             # exact derivatives converge quadratically: near a branch point rounding is magnified
-            noise = 1e-8 if self.exact else 1e-11
+            noise = 1e-8 if self.exact or self.regular else 1e-11
             return converge(
                 bordered,
                 start,
@@ -265,8 +268,10 @@ class Curve:
             source = getattr(self, "secant", None)
             if found is None and isinstance(source, Secant) and source.forget():
                 found = attempt()
-        except NonsmoothError:
+        except NonsmoothError as error:
+            self.refused = str(error)
             return None
+        self.refused = ""
         return None if found is None else found * self.scale
 
     def point(self, u: Array, before: Array, chord: Array, arclength: float) -> Point | None:
@@ -283,19 +288,19 @@ class Curve:
         arclength : float
             From the start of the arc, in scaled unknowns.
         """
-        if not self.exact:
-            plain = Point(u, chord, arclength)
-            return Point(u, chord, arclength, tests=read_tests(self.tests(plain)))
         try:
-            jacobian = self.equations(u)[1] * self.scale
-            tangent, sign = self.along(jacobian, before)
             tests: dict[str, float] = {}
-            if self.parameter is not None:
-                tests["fold"] = float(tangent[self.parameter])
-            if self.branching:
-                tests["branch point"] = sign
+            jacobian, tangent = np.zeros((0, 0)), chord
+            if self.exact:
+                jacobian = self.equations(u)[1] * self.scale
+                tangent, sign = self.along(jacobian, before)
+                if self.parameter is not None:
+                    tests["fold"] = float(tangent[self.parameter])
+                if self.branching:
+                    tests["branch point"] = sign
             own = self.tests(Point(u, tangent, arclength, jacobian))
-        except (NonsmoothError, np.linalg.LinAlgError):
+        except (NonsmoothError, np.linalg.LinAlgError) as error:
+            self.refused = str(error)
             return None
         tests.update(read_tests(own))
         return Point(u, tangent, arclength, jacobian, tests)

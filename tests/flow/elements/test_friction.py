@@ -152,3 +152,15 @@ def test_a_system_with_friction_is_saved_and_read(tmp_path):
 def test_what_is_no_friction_is_refused(options, words):
     with pytest.raises(ns.DefinitionError, match=words):
         ns.Friction(**{"slip": v, "load": 1.0, "kinetic": 0.3, **options})
+
+
+@pytest.mark.parametrize(
+    ("force", "words"),
+    [
+        (ns.Friction(v, load=1.0, kinetic=0.3).force, "give that in surfaces="),
+        (ns.Clock(2.0).phase, "give that in clocks="),
+    ],
+)
+def test_an_element_that_is_not_given_to_the_system_is_named(force, words):
+    with pytest.raises(ns.DefinitionError, match=words):
+        ns.FilippovSystem([x, v], field=[v, force])

@@ -177,7 +177,7 @@ def test_fast_oscillations_are_resolved():
 
 
 def numbers(name):
-    text = Path("nonsmooth/flow/core/radau.h").read_text()
+    text = Path("nonsmooth/flow/core/implicit/radau.h").read_text()
     table = re.search(name + r"\[\] = \{(.*?)\}", text, re.DOTALL).group(1)
     return [mp.mpf(word) for word in re.findall(r"[-+0-9.e]+", table)]
 

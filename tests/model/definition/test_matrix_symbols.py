@@ -102,6 +102,7 @@ TABLE = ca.interpolant("table", "linear", [[0.0, 1.0, 2.0]], [0.0, 1.0, 4.0])
         (lambda: ns.FilippovSystem.from_dae({"x": X}), "'x' and 'ode'"),
         (lambda: ns.FilippovSystem.from_dae({"x": X, "ode": -X, "z": V, "alg": V - X}), "'alg'"),
         (lambda: ns.FilippovSystem.from_dae({"x": X, "ode": -X}, parameters={"k": 1}), "'k'"),
+        (lambda: ns.FilippovSystem.from_dae({"x": X, "ode": -X}, parameters=[1]), "a mapping"),
         (lambda: ns.FilippovSystem({"x": X, "ode": -X}), "from_dae"),
     ],
 )

@@ -1,7 +1,7 @@
 """Tables beside scipy's interpolation, their surfaces, and runs beside those of the formula."""
 
-import copy
 import pickle
+from dataclasses import fields, is_dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -221,21 +221,27 @@ def test_systems_with_tables_are_pickled_and_compared():
     assert other != system
 
 
-def parts_of(value, at=()):
-    yield at
-    for i, part in enumerate(value if isinstance(value, list) else []):
-        yield from parts_of(part, (*at, i))
+def damaged(value, wrong):
+    """Copies of a value with another one in place of each of its parts."""
+    if isinstance(value, tuple):
+        for i, part in enumerate(value):
+            yield from (
+                (*value[:i], own, *value[i + 1 :]) for own in [wrong, *damaged(part, wrong)]
+            )
+    elif is_dataclass(value):
+        for name in [f.name for f in fields(value)]:
+            own = [wrong, *damaged(getattr(value, name), wrong)]
+            yield from (replace(value, **{name: part}) for part in own)
 
 
-@pytest.mark.parametrize("wrong", [None, "a", [1], np.zeros(3), float("nan"), 10**9, {}])
+@pytest.mark.parametrize("wrong", [None, "a", (1,), np.zeros(3), float("nan"), 10**9, {}])
 def test_damaged_tables_in_files_are_refused(wrong):
     rhs = -ns.table(ca.fabs(x), *random_table(5), outside="error") - ca.sign(x - 1)
-    plain = written(ns.FilippovSystem.from_expression([x, v], [v, rhs]))
-    for place in [at for at in parts_of(plain["tables"]) if at]:
-        tables = copy.deepcopy(plain["tables"])
-        own = tables
-        for i in place[:-1]:
-            own = own[i]
-        own[place[-1]] = wrong
-        with pytest.raises(ns.DefinitionError):
-            read_system({**plain, "tables": tables})
+    values = written(ns.FilippovSystem.from_expression([x, v], [v, rhs]))
+    (table,) = values["plain"]["tables"]
+    for name in ("element", "curves", "sides", "twins"):
+        is_number = name == "curves" and type(wrong) is int  # as good as those of a curve
+        for part in [wrong, *([] if is_number else damaged(getattr(table, name), wrong))]:
+            plain = {**values["plain"], "tables": (replace(table, **{name: part}),)}
+            with pytest.raises(ValueError):
+                read_system({**values, "plain": plain})

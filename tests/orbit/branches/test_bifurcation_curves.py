@@ -38,7 +38,9 @@ def test_folds_and_hopf_points_meet_in_a_bogdanov_takens_point(takens):
     assert np.abs(folds.special[0].values).max() < 1e-10
     hopfs = ns.continue_bifurcation(hopf, ("a", "b"), bounds=BOX)
     assert np.abs(hopfs.values[:, 0]).max() < 1e-12
-    assert np.ptp(hopfs.values[:, 1]) > 2
+    assert (
+        np.ptp(hopfs.values[:, 1]) > 1.4 and hopfs.values[:, 1].max() < 1e-9
+    )  # then neutral saddles
     assert "Bogdanov-Takens" in str(folds) and "fold" in repr(folds)
     assert abs(folds.solution(3).point[0] + folds.values[3, 1] / 2) < 1e-10
 
@@ -192,3 +194,23 @@ def test_a_grazing_meets_a_two_fold():
     (special,) = curve.special
     assert special.kind == "grazing-sliding with two-fold"
     assert np.abs(special.values - [1, 0]).max() < 1e-11
+
+
+def test_a_grazing_of_orbits_without_events_from_their_hopf_point():
+    """Predators above y = T are harvested: T = max y of the smooth cycle, born at K = 27/13."""
+    top, capacity = ca.SX.sym("T"), ca.SX.sym("K")
+    eaten = x / (1 + x)
+    prey = x * (1 - x / capacity) - eaten * y
+    eco = ns.FilippovSystem(
+        [x, y],
+        surface=y - top,
+        above=[prey, (eaten - 0.65) * y],
+        below=[prey, (eaten - 0.35) * y],
+        parameters={top: 3.0, capacity: 2.2},
+    )
+    orbit = ns.periodic_orbit(eco, ns.simulate(eco, [1.0, 1.1], 600.0))
+    event = ns.continue_orbit(orbit, "T", bounds=(1.5, 3.1)).events[0]
+    curve = ns.continue_bifurcation(event, ("T", "K"), bounds=[(0.5, 3.0), (2.0, 2.5)], step=0.05)
+    assert curve.values[-1] == pytest.approx([2.07020393, 2.5], abs=1e-8)
+    assert curve.special[0].kind == "grazing-sliding with Hopf"
+    assert curve.special[0].values == pytest.approx([20 / 13 * (1 - 7 / 27), 27 / 13], abs=1e-3)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.orbit.branches import orbit_branches
 from tests.orbit.interrupts import interrupt
 from tests.orbit.periodic_cases import (
     CASES,
@@ -236,9 +237,15 @@ def test_bad_input(forced, change, error, words):
         ns.continue_orbit(given.pop("orbit"), given.pop("parameter"), **given)
 
 
-def test_branches_are_switched_only_where_they_cross(forced):
-    with pytest.raises(ns.DefinitionError, match="switch"):
-        ns.continue_orbit(forced.events[0], "A", bounds=(0.8, 3))
+def test_an_event_without_periodic_orbits_is_refused():
+    x, y, a = symbols("x y a")
+    folded = ns.FilippovSystem(
+        [x, y], surface=y, above=[a + x - x**3, 1 - y], below=[1, 1], parameters={a: -1.0}
+    )
+    event = ns.continue_equilibrium(folded, [-1.3, 1.0], "a", bounds=(-2, 2)).events[0]
+    assert event.kind == "fold"
+    with pytest.raises(ns.DefinitionError, match="no event from which periodic orbits start"):
+        ns.continue_orbit(event, "a", bounds=(-2, 2))
 
 
 # two harmonics: every kind of sliding bifurcation, one or two at a time ---------------------------
@@ -418,8 +425,56 @@ def test_a_graze_where_a_force_jumps_is_that_for_an_orbit_and_its_mirror_image()
     )
     orbit = ns.periodic_orbit(system, [0.5, 0.1], symmetry="odd")
     (pitchfork,) = ns.continue_orbit(orbit, "F", bounds=(1.5, 4.0)).events
-    branch = ns.continue_orbit(pitchfork, "F", bounds=(1.5, 12.0))
-    first, last = branch.events[0], branch.events[-1]
-    assert first.kind == last.kind == "grazing of a jumping force"
-    assert first.parameter == pytest.approx(last.parameter, rel=1e-11)
-    assert branch.ends == (ns.orbit.BranchEnd.EVENT,) * 2
+    branch = ns.continue_orbit(pitchfork, "F", bounds=(1.5, 11.8))
+    named = kinds(branch)
+    half = ["period doubling", "grazing of a jumping force", *["period doubling"] * 2]
+    assert named == [*half, "pitchfork", *half[::-1]]
+    first, last = (branch.events[i].parameter for i in (1, -2))
+    assert first == pytest.approx(last, rel=1e-11)
+    assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_an_event_at_the_start_is_found(forced, number):
+    event = forced.events[number]
+    low, high = event.parameter - 0.1, event.parameter + 0.1
+    branch = ns.continue_orbit(event.orbit, "A", bounds=(low, high))
+    assert kinds(branch) == [event.kind]
+    assert branch.events[0].parameter == pytest.approx(event.parameter, abs=1e-12)
+    assert branch.values.min() == low and branch.values.max() == high
+
+
+def test_a_leg_that_does_not_exist_beyond_a_bifurcation_ends_no_branch():
+    """A drill string with Stribeck friction exp(-slip), of which the slip grows on the side of sticking."""
+    phi, top, bit, speed = symbols("phi top bit speed")
+
+    def fields(s):
+        torque = s * 13950 * (0.5 + 0.3 * ca.exp(-0.9 * s * bit))
+        above = 425 * speed + 1000 * (speed - top) - 425 * top - 473 * phi - 23.2 * (top - bit)
+        below = 473 * phi + 23.2 * (top - bit) - 50 * bit - torque
+        return [top - bit, above / 2122, below / 374]
+
+    drill = ns.FilippovSystem(
+        [phi, top, bit],
+        surface=bit,
+        above=fields(1),
+        below=fields(-1),
+        parameters={speed: 14.0},
+    )
+    orbit = ns.periodic_orbit(drill, ns.simulate(drill, [0.0] * 3, 400.0))
+    branch = ns.continue_orbit(orbit, "speed", bounds=(8.0, 14.8))
+    assert kinds(branch) == ["fold", "grazing-sliding", "Hopf"]
+    assert branch.events[-1].parameter == pytest.approx(9.0091179621, abs=1e-9)
+    assert branch.reasons[0] == "The parameter reached its bound." and "Hopf" in branch.reasons[1]
+
+
+def test_what_is_raised_at_an_event_is_said_at_it(monkeypatch):
+    def raises(self, zero):
+        raise ns.DegenerateError("no such event")
+
+    system = scalar_relay()
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
+    monkeypatch.setattr(orbit_branches.OrbitCurve, "event", raises)
+    branch = ns.continue_orbit(orbit, "A", bounds=(1.7, 3.0))
+    assert kinds(branch) == ["unclassified"] and "no such event" in branch.reasons[0]
+    assert len(branch) > 10 and branch.ends[0] is ns.orbit.BranchEnd.EVENT

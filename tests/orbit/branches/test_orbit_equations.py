@@ -142,12 +142,13 @@ def test_directions_and_determinants_are_those_of_linear_algebra(orbit_and_names
 
 
 def test_tests_by_multipliers_are_products_of_them(orbit_and_names):
-    """prod (1 + m) and prod (m_i m_j - 1) over all multipliers of the legs' map, a 0 across the flow."""
+    """prod (1 + m) and prod (m_i m_j - 1), each by its size, over the legs' map and a 0 across the flow."""
     orbit, _ = orbit_and_names
     m = np.append(orbit.half_multipliers, 0.0)
-    found = conditions.smooth_tests(orbit.problem, orbit.evaluation)
-    flip = np.prod(1 + m).real
-    torus = np.prod([m[i] * m[j] - 1 for i in range(m.size) for j in range(i)]).real
+    found = conditions.smooth_tests(orbit.problem, orbit.evaluation, orbit.parameter_vector)
+    flip = np.prod((1 + m) / (1 + np.abs(m))).real
+    pairs = np.array([m[i] * m[j] for i in range(m.size) for j in range(i)])
+    torus = np.prod((pairs - 1) / (1 + np.abs(pairs))).real
     name = "pitchfork" if orbit.symmetric else "period doubling"
     assert found[name] == pytest.approx(flip, rel=1e-9, abs=1e-10)
     assert found["Neimark-Sacker"] == pytest.approx(torus, rel=1e-9, abs=1e-10)
@@ -158,6 +159,6 @@ def test_guards_at_the_ends_of_legs_are_those_of_the_states_there():
     problem, at, p = orbit.problem, orbit.evaluation, orbit.parameter_vector
     fields = [guarded_field(orbit.system, leg.mode) for leg in problem.legs]
     _, _, values = fixed.LegsWatch(fields)(list(at.starts), p, at.durations, 1e-6)
-    for field, value, flow in zip(fields, values, at.by_leg, strict=True):
-        expected = np.array(field.motion.value_function()(flow.end, p)[1])[:, 0]
+    for leg, value, flow in zip(problem.legs, values, at.by_leg, strict=True):
+        expected = conditions.guard_values(orbit.system, leg.mode).copied(flow.end, p)[1][:, 0]
         np.testing.assert_allclose(value, expected, rtol=1e-12, atol=1e-13)

@@ -1,66 +1,93 @@
-"""The condensed return map has the eigenvalues of the whole one, less what is lost on the way."""
+"""Multipliers are the eigenvalues of the map of the legs, with all their digits where the product has none."""
 
 from __future__ import annotations
+
+import json
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.orbit.periodic.multipliers import reduced_map
+from nonsmooth.orbit.periodic.cyclic_qr import Factor, Product
+
+CASES = {
+    case["id"]: case["values"]
+    for case in json.loads((Path(__file__).parents[2] / "data" / "orbits_2.json").read_text())
+}
 
 
-def random_legs(seed, count, n, s):
+def random_factors(seed, count, n):
     rng = np.random.default_rng(seed)
-    sizes = [(count, s, n), (count, s), (count, s), (count, n, s)]
-    legs = tuple(rng.normal(size=size) for size in sizes)
-    legs[1][:] = np.einsum(
-        "ikn,in->ik", legs[0], rng.normal(size=(count, n))
-    )  # what the flow carries
-    return legs, rng
+    return [rng.normal(size=(n, n)) for _ in range(count)]
 
 
-def maps_of(legs, wrap):
-    """Maps across the flow from the start of each leg to that of the next."""
-    maps = [g @ (x - np.outer(f, e @ x) / (e @ f)) for x, f, e, g in zip(*legs, strict=True)]
-    if wrap is not None:
-        maps[-1] = wrap @ maps[-1]
-    return np.array(maps)
-
-
-def reduced_of(legs, wrap, units):
-    n, by = legs[0].shape[2], units / units[:, None]
-    return reduced_map(maps_of(legs, wrap) * by, legs[0][:, :n] * by, np.eye(n))
-
-
-def whole_map(legs, wrap):
-    product = np.eye(legs[0].shape[2])
-    for step in maps_of(legs, wrap):
+def whole(matrices):
+    product = np.eye(len(matrices[0]))
+    for step in matrices:
         product = step @ product
     return product
 
 
-@pytest.mark.parametrize(("count", "n", "s"), [(1, 4, 4), (3, 3, 3), (2, 3, 5), (7, 5, 5)])
-@pytest.mark.parametrize("mirrored", [False, True])
-def test_nontrivial_multipliers_are_those_of_the_whole_map(count, n, s, mirrored):
-    legs, rng = random_legs(count, count, n, s)
-    wrap, units = (rng.normal(size=(n, n)) if mirrored else None), rng.uniform(1e-3, 1e3, n)
-    reduced = reduced_of(legs, wrap, units)
-    assert reduced.shape == (n - 1, n - 1)
-    values, found = np.linalg.eigvals(whole_map(legs, wrap)), np.linalg.eigvals(reduced)
-    size = np.abs(values).max()
-    nontrivial = values[np.argsort(-np.abs(values))][:-1]
-    apart = np.abs(found[:, None] - nontrivial)
-    assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-12 * size
+@pytest.mark.parametrize(("count", "n"), [(1, 4), (3, 3), (2, 5), (7, 4), (4, 1)])
+def test_eigenvalues_of_a_short_product_are_those_of_the_matrix(count, n):
+    matrices = random_factors(count, count, n)
+    found = np.exp(Product([Factor(m) for m in matrices]).logarithms)
+    values = np.linalg.eigvals(whole(matrices))
+    apart = np.abs(found[:, None] - values)
+    assert found.size == n
+    assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-13 * np.abs(values).max()
 
 
-def test_what_a_leg_loses_is_no_direction_of_the_reduced_map():
-    legs, _ = random_legs(5, 4, 4, 4)
-    legs[3][2] = legs[3][2] @ np.diag([1.0, 1.0, 0.0, 0.0])  # of rank two
-    reduced = reduced_of(legs, None, np.ones(4))
-    assert len(reduced) <= 2
-    values = np.sort(np.abs(np.linalg.eigvals(whole_map(legs, None))))[-len(reduced) :]
-    np.testing.assert_allclose(np.sort(np.abs(np.linalg.eigvals(reduced))), values, rtol=1e-10)
+def test_what_a_factor_loses_is_no_direction_of_the_product():
+    matrices = random_factors(5, 4, 4)
+    matrices[2] = matrices[2] @ np.diag([1.0, 1.0, 0.0, 0.0])  # of rank two
+    product = Product([Factor(m, np.eye(4)) for m in matrices])
+    values = np.linalg.eigvals(whole(matrices))
+    expected = np.sort(np.abs(values))[-2:]
+    np.testing.assert_allclose(np.sort(np.exp(product.logarithms.real)), expected, rtol=1e-12)
+    assert product.error < 1e-11
+
+
+def test_a_long_product_keeps_the_eigenvalues_that_its_matrix_has_lost():
+    """Triangular factors in other coordinates: the eigenvalues are products of the diagonals."""
+    rng = np.random.default_rng(1)
+    diagonals = rng.uniform(0.2, 0.9, (120, 3)) * [4.0, 1.0, 0.1] * rng.choice([-1, 1], (120, 3))
+    turns = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(120)]
+    upper = [np.diag(d) + np.triu(rng.normal(size=(3, 3)), 1) for d in diagonals]
+    factors = [Factor(turns[(i + 1) % 120] @ m @ turns[i].T) for i, m in enumerate(upper)]
+    product = Product(factors)
+    found, expected = product.logarithms, np.log(np.abs(diagonals)).sum(axis=0)
+    np.testing.assert_allclose(found.real, expected, atol=1e-11)
+    np.testing.assert_allclose(np.cos(found.imag), np.sign(diagonals).prod(axis=0), atol=1e-12)
+    assert expected[0] - expected[-1] > 300.0 and product.error < 1e-10
+
+
+def passengers(mixed):
+    """A relay oscillator with passengers that decay and grow, as in LM1."""
+    x, v, z, w = (ca.SX.sym(s) for s in "xvzw")
+    sides = [[v, s - x - 0.2 * v, x - 40 * z, 5 * w + v] for s in (1, -1)]
+    if not mixed:
+        return [x, v, z, w], v, sides, np.eye(4)
+    k = np.array([[1, 2, 0, 1], [0, 1, 3, 0], [1, 2, 1, 2], [2, 5, 3, 3.0]])
+    y = ca.SX.sym("y", 4)
+    own, old = ca.DM(np.linalg.inv(k)) @ y, ca.vertcat(x, v, z, w)
+    sides = [ca.vertsplit(ca.DM(k) @ ca.substitute(ca.vertcat(*f), old, own)) for f in sides]
+    return ca.vertsplit(y), own[1], sides, k
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_multipliers_of_passengers_that_decay_and_grow(mixed):
+    states, surface, (above, below), k = passengers(mixed)
+    system = ns.FilippovSystem(states, surface=surface, above=above, below=below)
+    start = k @ [float(text) for text in CASES["LM1"]["start"]]
+    orbit = ns.periodic_orbit(system, start, itinerary=["+", "-"])
+    expected = np.sort([float(text) for text in CASES["LM1"]["log_multipliers"]])[::-1]
+    found = orbit.floquet.logarithms.real
+    np.testing.assert_allclose(found, np.delete(expected, 1), atol=10 * orbit.error_estimate)
+    assert orbit.error_estimate < 1e-7 and orbit.stability.startswith("unstable, 1")
+    assert orbit.multipliers[-1] == pytest.approx(float(CASES["LM1"]["multipliers"][2]), rel=1e-9)
 
 
 def test_multipliers_of_a_half_are_roots_of_those_of_the_whole():

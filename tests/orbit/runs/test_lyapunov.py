@@ -157,3 +157,13 @@ def test_a_squaring_map_that_diverges_keeps_the_exponent_of_its_clock_finite():
         size = size**2 + 2.0
     assert found.exponents.sum() == pytest.approx(total / 6.0, rel=1e-9)
     assert np.isfinite(found.exponents).all()
+
+
+def test_a_passenger_of_a_chattering_ball_has_the_exponent_of_its_decay() -> None:
+    """A limit of impacts loses the two directions of the ball."""
+    y, v, z, t = (ca.SX.sym(s) for s in "yvzt")
+    hit = ns.Impact(y - 0.5 * ca.sin(5 * t), restitution=0.5)
+    table = ns.FilippovSystem([y, v, z], field=[v, -10, y - 0.2 * z], impacts=hit, time=t)
+    found = ns.lyapunov_spectrum(table, [0.45, 1.5, 0.1], 8.0, t_start=0.2, transient=2.5)
+    assert found.exponents.tolist() == [pytest.approx(-0.2, rel=1e-9), -math.inf, -math.inf]
+    assert found.errors[0] < 1e-9

@@ -223,16 +223,3 @@ def test_derivatives_are_differences_of_runs(system, start, t_end, itinerary):
     assert of_state == pytest.approx(expected[:n], abs=1e-10)
     assert of_times == pytest.approx(expected[n : n + m], abs=1e-8)
     assert of_end == pytest.approx(expected[-1], abs=1e-10)
-
-
-def test_accumulating_impacts_raise():
-    accumulates = ns.FilippovSystem(
-        [Y, W, V1, V2],
-        field=[W, -1.0, -0.1 * L1, -0.1 * L2],
-        surfaces=[SLIP],
-        multipliers=[PAIR],
-        impacts=ns.Impact(Y, 0.5),
-    )
-    run = ns.simulate(accumulates, [0.1, 0.0, 3.0, 4.0], 3.0)
-    with pytest.raises(ns.DegenerateError, match=r"'impact'.*accumulate"):
-        ns.sensitivity(run)

@@ -231,12 +231,6 @@ def test_a_body_that_rests_on_a_shaken_table() -> None:
     assert np.abs(s.dx_dx0).max() < 1e-12  # all starts rest, and take off together
 
 
-def test_impacts_that_accumulate_raise() -> None:
-    bouncing = ns.FilippovSystem([y, v], field=[v, -1], impacts=ns.Impact(y, restitution=0.5))
-    with pytest.raises(ns.DegenerateError, match="accumulate"):
-        ns.sensitivity(ns.simulate(bouncing, [1.0, 0.0], 9.0))
-
-
 def test_a_corner_raises() -> None:
     both = ns.FilippovSystem(
         [x, y], surfaces=[x, y], multipliers=[lam, other], field=[1 + 0.1 * lam, 1 + 0.2 * other]

@@ -1,8 +1,5 @@
 /* Sets of codimension two and more in a run ----------------------------------------------------------------- */
 
-static int choose(Run *r, const int8_t *letter, const Known *known, int known_count);
-static int change_kind(const Run *r, int before, int after);
-
 /* The law at a state with multipliers of the functions ``own`` (or 0) that are given; what slides beside them is listed
  * as r->pending. Their number. */
 static int beside(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
@@ -60,9 +57,7 @@ static int field_with(Run *r, const int8_t *letter, const double *x, const doubl
   if (!balance(r, count, b)) return 0;
   memset(acting, 0, sizeof(double) * r->width);
   for (int i = 0; i < count; i++) acting[r->pending[i]] = b[i];
-  set_inputs(r, x, r->held, acting);
-  first_values(r, 0);
-  for (int i = 0; i < r->n; i++) field[i] = row_of(r, i)[0];
+  field_of(r, x, r->held, acting, field);
   return 1;
 }
 

@@ -86,21 +86,9 @@ static int lemke(const double *m, const double *q, int n, uint32_t seed, double 
 
 /* The same with rows and columns of one size; m and q are lost. */
 static int lemke_scaled(double *m, double *q, int n, double *z, double *work, int32_t *basis) {
-  double *unit = work, largest = 0;
-  for (int i = 0; i < n; i++) {
-    double most = 0;
-    for (int j = 0; j < n; j++) most = larger(fabs(m[(int64_t)i * n + j]), most);
-    if (!(most > 0)) continue;
-    for (int j = 0; j < n; j++) m[(int64_t)i * n + j] /= most;
-    q[i] /= most;
-  }
-  for (int j = 0; j < n; j++) {
-    unit[j] = 0;
-    for (int i = 0; i < n; i++) unit[j] = larger(fabs(m[(int64_t)i * n + j]), unit[j]);
-    if (!(unit[j] > 0)) unit[j] = 1;
-    for (int i = 0; i < n; i++) m[(int64_t)i * n + j] /= unit[j];
-  }
-  for (int i = 0; i < n; i++) largest = larger(fabs(q[i]), largest);
+  double *unit = work, largest;
+  equilibrate(m, n, n, n, q, unit);
+  largest = largest_of(q, n);
   if (largest > 0) for (int i = 0; i < n; i++) q[i] /= largest;
   uint32_t seed = 1; /* of the covering vector: rounding in ties may lead to a ray */
   while (!lemke(m, q, n, seed, z, work + n, basis)) if (seed++ == COVERINGS) return 0;
@@ -530,9 +518,8 @@ static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
   for (int pass = 0; pass < (k->is_coupled ? 60 : 1) && change > VANISHES * most; pass++) {
     most = change = 0;
     invert_any(k->matrix, n, unit, inverse, inverse + (int64_t)n * n, pivot);
+    apply(inverse, k->a, n, nu);
     for (int i = 0; i < n; i++) {
-      nu[i] = 0;
-      for (int j = 0; j < n; j++) nu[i] += inverse[i * n + j] * k->a[j];
       most = larger(larger(fabs(k->b[i]), fabs(nu[i])), most);
       change = pass ? larger(fabs(nu[i] - last[i]), change) : INFINITY;
       last[i] = nu[i];
@@ -551,11 +538,6 @@ static int solve_block_of_many(const Block *k, int certificate, int8_t *position
   if (k->span) return relax(k, found, work, pivot);
   int most = certificate >= UNIQUE ? 10000 : 20 + 4 * k->size;
   int solved = pivot_block(k, position, found, most, work, pivot) || lemke_block(k, found, work, pivot);
-  if (!solved && k->is_coupled) { /* those at a bound keep it */
-    for (int i = 0; i < k->size; i++)
-      position[i] = k->state[i] == AT_TOP ? TOP : k->state[i] == AT_BOTTOM ? BOTTOM : position[i];
-    solved = pivot_block(k, position, found, most, work, pivot);
-  }
   if (solved && certificate < UNIQUE) move_inside(k, found, work, pivot);
   return solved;
 }

@@ -17,65 +17,6 @@ static int rate_row(const Run *r, int i) {
   return e->degree > 1 ? e->lower + e->degree - 2 : i;
 }
 
-/* An impact of some elements that act on one another: contacts, friction on them, and joints, whose rates stay zero. */
-typedef struct {
-  const double *x, *target; /* target: of each contact what its rate changes by */
-  int32_t *contact, *carried, contacts, carries, joints; /* carried: friction, then joints */
-  int plastic;
-} Strike;
-
-/* One possibility: the contacts ``taking`` an impulse, letters of the surfaces that they carry. What it changes is
- * added to ``after``; 0 where it contradicts itself. */
-static int impulses_fit(Run *r, const Strike *of, const int32_t *taking, int takes, const int8_t *letter, double *after) {
-  int m = r->m, w = r->width, k = 0, joints = of->joints, first;
-  int32_t *unknown = r->pending + 4 * w;
-  double *every = r->lam, *a = r->matrix, *b = a + (int64_t)w * w, *limit = b + w, *h = limit + w, *scale = h + w, *before = scale + w;
-  for (int i = of->carries; i < of->carries + joints; i++) unknown[k++] = of->carried[i];
-  for (int i = 0; i < of->carries; i++) if (letter[of->carried[i]] == 0) unknown[k++] = of->carried[i];
-  first = k;
-  for (int i = 0; i < takes; i++) unknown[k++] = m + taking[i];
-  error_scales(r, of->x, held_of(r, letter), r->none);
-  for (int i = 0; i < k; i++)
-    for (int j = 0; j < k; j++) a[i * k + j] = r->slope[unknown[i] * w + unknown[j]];
-  surface_values(r, of->x);
-  surface_scales(r, of->x);
-  for (int i = 0; i < w; i++) {
-    h[i] = r->rates[rate_row(r, i)];
-    scale[i] = r->rates[r->kept_rows + rate_row(r, i)];
-  }
-  for (int i = 0; i < k; i++) b[i] = i < first ? -h[unknown[i]] : of->target[unknown[i] - m];
-  if (joints ? !solve_any(a, b, k, TIED, r->decision->work, r->decision->pivot) : !solve(a, b, k)) return 0;
-  memset(every, 0, sizeof(double) * w);
-  for (int i = 0; i < k; i++) every[unknown[i]] = b[i];
-  /* What the impulses change, before r->slope is that of other multipliers. */
-  for (int i = 0; i < w; i++) {
-    before[i] = h[i];
-    for (int j = 0; j < k; j++) if (b[j] != 0) h[i] += r->slope[i * w + unknown[j]] * b[j];
-  }
-  for (int i = 0; i < k; i++) { /* what depends on other rows may contradict them */
-    int own = unknown[i];
-    double wanted = i < first ? 0 : before[own] + of->target[own - m];
-    if (!(fabs(h[own] - wanted) <= MERGED * (fabs(before[own]) + fabs(wanted)) + ON_SURFACE * scale[own])) return 0;
-  }
-  for (int j = 0; j < r->c; j++) r->held[m + j] = every[m + j]; /* impulses in place of reactions */
-  error_scales(r, of->x, r->held, r->none);
-  for (int i = 0; i < m; i++) limit[i] = fabs(factor_of(r, i));
-  for (int i = first; i < k; i++) if (!of->plastic && every[unknown[i]] < 0) return 0;
-  for (int i = joints; i < first; i++)
-    if (!of->plastic && fabs(every[unknown[i]]) > limit[unknown[i]] * (1 + ROOM) + SMALLEST) return 0;
-  for (int i = 0; i < of->carries; i++) {
-    int own = of->carried[i];
-    if (letter[own] && letter[own] * h[own] < -ON_SURFACE * scale[own]) return 0;
-  }
-  for (int i = 0; i < of->contacts; i++) {
-    int own = m + of->contact[i], takes_part = 0;
-    for (int q = 0; q < takes; q++) takes_part |= m + taking[q] == own;
-    if (!takes_part && h[own] < -ON_SURFACE * scale[own]) return 0;
-  }
-  add_impulses(r, of->x, letter, every, after);
-  return 1;
-}
-
 /* One of some contacts whose restitution is not from 0 to 1, or -1. */
 static int improper(Run *r, const double *x, const int32_t *involved, int count) {
   values_at(&r->s->restitution, x, r->p, r->restitution);
@@ -89,10 +30,51 @@ static int improper(Run *r, const double *x, const int32_t *involved, int count)
 /* Contacts in a group of which all subsets are tried, and choices of letters of the surfaces that they carry. */
 enum { MOST_TAKING = 12, MOST_CHOICES = 100000 };
 
-/* Impulses of a group by the law of elements, velocities in place of rates: each contact parts with at least the
- * velocity that its restitution gives it, and with no more where it takes an impulse (Moreau). Those that contacts have
- * taken ``before`` bound friction too; to ``taken`` those that they take. 0 where it has none. */
-static int strike_by_law(Run *r, const int32_t *own, int n, const Strike *of, const double *before, double *taken, double *after) {
+/* Whether a trial is one of Newton's law: contacts that take no impulse part by no more than ``slack`` below their
+ * velocity of restitution. Plastic impulses may have any size and sign. */
+static int is_of_newton(const Block *k, const int8_t *position, const double *nu, const double *slack, int plastic) {
+  for (int i = 0; i < k->size; i++) {
+    double terms, w = rate_of(k, i, nu, &terms);
+    int is_open = k->is_contact[i] && position[i] == BOTTOM, is_free = is_open || (plastic && position[i] == HELD);
+    if (is_open ? w > slack[i] + zero_of(k, i, terms) : !is_free && wanted(k, i, position[i], nu) != position[i]) return 0;
+  }
+  return 1;
+}
+
+/* Impulses by Newton's law, with most contacts that take one and with the present positions first; 0 where there are
+ * none, or too many possibilities. */
+static int take_most(const Block *k, int8_t *position, const double *slack, int plastic, double *found, double *work,
+                     int32_t *pivot) {
+  static const int8_t order[3][3] = {{HELD, TOP, BOTTOM}, {TOP, HELD, BOTTOM}, {BOTTOM, HELD, TOP}};
+  int contact[MOST_TAKING], carried[MOST_TAKING], present[MOST_TAKING], contacts = 0, carries = 0, choices = 1;
+  for (int i = 0; i < k->size; i++) {
+    if (k->state[i] == INSIDE) continue; /* a joint */
+    if (k->is_contact[i] ? contacts == MOST_TAKING : 3 * choices > MOST_CHOICES) return 0;
+    if (k->is_contact[i]) { contact[contacts++] = i; continue; }
+    present[carries] = position[i];
+    carried[carries++] = i;
+    choices *= 3;
+  }
+  for (int size = contacts; size > 0; size--)
+    for (int set = (1 << contacts) - 1; set > 0; set--)
+      for (int number = 0; number < choices && __builtin_popcount(set) == size; number++) {
+        for (int i = 0; i < contacts; i++) position[contact[i]] = set >> (contacts - 1 - i) & 1 ? HELD : BOTTOM;
+        for (int i = carries - 1, rest = number; i >= 0; i--, rest /= 3) position[carried[i]] = order[present[i]][rest % 3];
+        if (place_unknowns(k, position, found, work, pivot) && is_of_newton(k, position, found, slack, plastic)) return 1;
+      }
+  for (int i = 0; i < contacts; i++) position[contact[i]] = HELD;
+  for (int i = 0; i < carries; i++) position[carried[i]] = (int8_t)present[i];
+  return 0;
+}
+
+/* How an impact is to be: of each contact what its rate changes by; whether impulses may have any sign; whether by the
+ * law of elements; impulses that contacts have taken before, which bound friction too, or none. */
+typedef struct { const double *x, *target, *before; int plastic, by_law; } Strike;
+
+/* Impulses of a group of elements that act on one another, by their law with velocities in place of rates: each contact
+ * parts with at least the velocity that its restitution gives it, and with no more where it takes an impulse (Moreau).
+ * To ``taken`` those that contacts take; 0 where there are none. */
+static int strike_group(Run *r, const int32_t *own, int n, const Strike *of, double *taken, double *after) {
   Decision *d = r->decision;
   int w = r->width, m = r->m, solved;
   int32_t *which = d->own;
@@ -101,12 +83,13 @@ static int strike_by_law(Run *r, const int32_t *own, int n, const Strike *of, co
   double all[MOST_SOLUTIONS * MOST_ENUMERATED];
   Block b = {.size = n, .tie = TIED, .own = which, .a = d->block, .state = d->block_state, .is_contact = d->block_state + w};
   b.b = b.a + n; b.floor = b.b + n; b.matrix = b.floor + n; b.share = b.matrix + n * n;
+  double *slack = b.share + n * n;
   memcpy(letter, r->letter, w);
   for (int i = 0; i < n; i++) { which[i] = own[i]; if (own[i] < m) letter[own[i]] = 0; }
   surface_values(r, of->x);
   surface_scales(r, of->x);
   held_of(r, letter);
-  for (int j = 0; before && j < r->c; j++) r->held[m + j] = before[j];
+  for (int j = 0; of->before && j < r->c; j++) r->held[m + j] = of->before[j];
   error_scales(r, of->x, r->held, r->none);
   for (int i = 0; i < n; i++) {
     int contact = which[i] >= m, joint = has_law(r, which[i], JOINT_LAW), at = rate_row(r, which[i]);
@@ -117,6 +100,7 @@ static int strike_by_law(Run *r, const int32_t *own, int n, const Strike *of, co
     b.state[i] = joint ? INSIDE : UNDECIDED;
     position[i] = contact || joint || r->letter[which[i]] == 0 ? HELD : r->letter[which[i]] > 0 ? TOP : BOTTOM;
     b.a[i] = contact ? of->target[which[i] - m] : r->rates[at];
+    slack[i] = contact ? larger(b.a[i] + r->rates[at], 0) : 0;
     b.floor[i] = VANISHES * r->rates[r->kept_rows + at];
     b.b[i] = contact || joint ? 0 : factor_of(r, which[i]);
     d->sign[i] = contact || joint ? 1 : ns_sign(b.b[i]);
@@ -141,8 +125,9 @@ static int strike_by_law(Run *r, const int32_t *own, int n, const Strike *of, co
     for (int j = 0; j < n; j++) { b.share[i * n + j] *= -1; b.matrix[j * n + i] *= -1; }
   }
   double *found = d->large, *every = r->lam;
-  if (b.span) solved = relax(&b, found, d->work, d->pivot);
-  else solved = pivot_block(&b, position, found, 20 + 4 * n, d->work, d->pivot) || lemke_block(&b, found, d->work, d->pivot);
+  solved = !of->by_law && !b.span && take_most(&b, position, slack, of->plastic, found, d->work, d->pivot);
+  if (!solved && b.span) solved = relax(&b, found, d->work, d->pivot);
+  else if (!solved) solved = pivot_block(&b, position, found, 20 + 4 * n, d->work, d->pivot) || lemke_block(&b, found, d->work, d->pivot);
   if (!solved && !b.span && n <= MOST_ENUMERATED && enumerate(&b, all, d->work, d->pivot)) { found = all; solved = 1; }
   if (!solved) return 0;
   memset(every, 0, sizeof(double) * w);
@@ -152,78 +137,32 @@ static int strike_by_law(Run *r, const int32_t *own, int n, const Strike *of, co
   return 1;
 }
 
-/* Impulses of contacts that act on one another: with most contacts and with the present letters first. */
-static int strike_by_subsets(Run *r, const Strike *of, double *after) {
-  int count = of->contacts, choices = 1, w = r->width;
-  int32_t *taking = r->pending + w;
-  int8_t *letter = (int8_t *)(r->pending + 2 * w);
-  for (int i = 0; i < of->carries; i++) choices = choices < MOST_CHOICES ? 3 * choices : choices;
-  if (count > MOST_TAKING || choices > MOST_CHOICES) return 0;
-  for (int size = count; size > 0; size--)
-    for (int set = (1 << count) - 1; set > 0; set--) {
-      int takes = 0;
-      for (int i = 0; i < count; i++) if (set >> (count - 1 - i) & 1) taking[takes++] = of->contact[i];
-      if (takes != size) continue;
-      for (int number = 0; number < choices; number++) {
-        int rest = number;
-        memcpy(letter, r->letter, w);
-        for (int i = of->carries - 1; i >= 0; i--, rest /= 3) {
-          static const int8_t order[3][3] = {{-1, 0, 1}, {0, 1, -1}, {1, 0, -1}}; /* present, then s + - */
-          letter[of->carried[i]] = order[r->letter[of->carried[i]] + 1][rest % 3];
-        }
-        if (impulses_fit(r, of, taking, takes, letter, after)) return 1;
-      }
-    }
-  return 0;
-}
-
-/* Groups of contacts, of surfaces that they carry and of joints, that act on one another: of each its number. */
+/* Groups of contacts, of surfaces that they carry and of joints, that act on one another: of each element its number. */
 static int find_striking(Run *r, const int32_t *involved, int count, int32_t *group) {
   const Entries *slope = &r->s->slope;
-  int w = r->width, c = r->c, m = r->m, groups = 0, changed = 1;
+  int w = r->width, c = r->c, m = r->m, groups = 0;
   for (int i = 0; i < w; i++) group[i] = -1;
   for (int q = 0; q < count; q++) {
     group[m + involved[q]] = groups++;
     for (int i = 0; i < m; i++) if (r->s->carries[i * c + involved[q]] && group[i] < 0) group[i] = groups++;
   }
   for (int i = 0; i < m; i++) if (has_law(r, i, JOINT_LAW)) group[i] = groups++;
-  while (changed) {
-    changed = 0;
-    for (int e = 0; e < slope->count; e++) {
-      int i = group[slope->row[e]], j = group[slope->column[e]];
-      if (i < 0 || j < 0 || i == j || r->slope[slope->row[e] * w + slope->column[e]] == 0) continue;
-      for (int q = 0; q < w; q++) if (group[q] == (i > j ? i : j)) group[q] = i < j ? i : j;
-      changed = 1;
-    }
-    for (int i = 0; i < m; i++)
-      for (int j = 0; j < c; j++) {
-        int a = group[i], b = group[m + j];
-        if (a < 0 || b < 0 || a == b || !r->s->carries[i * c + j]) continue;
-        for (int q = 0; q < w; q++) if (group[q] == (a > b ? a : b)) group[q] = a < b ? a : b;
-        changed = 1;
-      }
-  }
+  for (int e = 0; e < slope->count; e++)
+    if (r->slope[slope->row[e] * w + slope->column[e]] != 0) join_groups(group, w, slope->row[e], slope->column[e]);
+  for (int i = 0; i < m; i++) for (int j = 0; j < c; j++) if (r->s->carries[i * c + j]) join_groups(group, w, i, m + j);
   return groups;
 }
 
-/* All groups are struck in turn, by the law of elements or by subsets of the contacts. */
-static int strike_groups(Run *r, const double *x, const int32_t *involved, int count, const double *target, int plastic,
-                         int by_law, const double *before, double *taken, double *after) {
-  int w = r->width, m = r->m, groups;
+/* All groups are struck in turn. */
+static int strike_groups(Run *r, const int32_t *involved, int count, const Strike *of, double *taken, double *after) {
+  int w = r->width;
   int32_t *group = r->decision->mark, *own = group + w;
-  error_scales(r, x, held_of(r, r->letter), r->none);
-  groups = find_striking(r, involved, count, group);
+  error_scales(r, of->x, held_of(r, r->letter), r->none);
+  int groups = find_striking(r, involved, count, group);
   for (int g = 0; g < groups; g++) {
-    Strike of = {.x = x, .target = target, .contact = r->decision->order, .carried = r->pending, .plastic = plastic};
     int n = 0;
     for (int i = 0; i < w; i++) if (group[i] == g) own[n++] = i;
-    for (int i = 0; i < n; i++) if (own[i] >= m) of.contact[of.contacts++] = own[i] - m;
-    for (int i = 0; i < n; i++) if (own[i] < m && !has_law(r, own[i], JOINT_LAW)) of.carried[of.carries++] = own[i];
-    for (int i = 0; i < n; i++) if (has_law(r, own[i], JOINT_LAW)) of.carried[of.carries + of.joints++] = own[i];
-    int in_space = 0;
-    for (int i = 0; i < n; i++) in_space |= set_of(r, own[i]) >= 0;
-    if (!of.contacts || (!by_law && !in_space && strike_by_subsets(r, &of, after))) continue;
-    if (!strike_by_law(r, own, n, &of, before, taken, after)) return 0;
+    if (n && own[n - 1] >= r->m && !strike_group(r, own, n, of, taken, after)) return 0; /* not of joints alone */
   }
   return 1;
 }
@@ -233,7 +172,8 @@ static int compress_and_expand(Run *r, const int32_t *involved, int count, doubl
   int m = r->m, c = r->c, any = 0;
   double *taken = target + c, *x = r->saved, *every = r->lam;
   memset(taken, 0, sizeof(double) * c);
-  if (!strike_groups(r, r->x, involved, count, target, 0, 1, 0, taken, after)) return 0;
+  Strike first = {.x = r->x, .target = target, .by_law = 1}, rest = {.x = x, .target = target, .before = taken, .by_law = 1};
+  if (!strike_groups(r, involved, count, &first, taken, after)) return 0;
   for (int j = 0; j < c; j++) any |= (taken[j] *= out_of(&r->s->restitution, r->restitution, j)) > 0;
   if (!any) return 1;
   memcpy(x, after, sizeof(double) * r->n);
@@ -246,7 +186,7 @@ static int compress_and_expand(Run *r, const int32_t *involved, int count, doubl
   const double *h = surface_values(r, x);
   for (int j = 0; j < c; j++) target[j] = -h[m + c + j];
   memcpy(after, x, sizeof(double) * r->n);
-  return strike_groups(r, x, involved, count, target, 0, 1, taken, 0, after);
+  return strike_groups(r, involved, count, &rest, 0, after);
 }
 
 /* State after the impulses at some closed gaps; 0 if none are consistent. */
@@ -261,5 +201,6 @@ static int strike(Run *r, const int32_t *involved, int count, int plastic, doubl
   }
   memcpy(after, r->x, sizeof(double) * r->n);
   if (!plastic && law == POISSON_IMPACTS) return compress_and_expand(r, involved, count, target, after);
-  return strike_groups(r, r->x, involved, count, target, plastic, !plastic && law == MOREAU_IMPACTS, 0, 0, after);
+  Strike of = {.x = r->x, .target = target, .plastic = plastic, .by_law = !plastic && law == MOREAU_IMPACTS};
+  return strike_groups(r, involved, count, &of, 0, after);
 }

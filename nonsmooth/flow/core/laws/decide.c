@@ -9,9 +9,6 @@
  * Source: Acary & Brogliato 2008, Numerical Methods for Nonsmooth Dynamical Systems, chapter 4.
  */
 
-/* Of a guard that ended the mode before so many coefficients vanish. */
-typedef struct { int kind, index, side, zeros; } Known;
-
 /* The law at a point --------------------------------------------------------------------------------- */
 
 /* Bounds that are negative turn the law around: the unknown changes its sign. */
@@ -102,8 +99,7 @@ static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b,
   held_of(r, d->base);
   for (int i = 0; i < k; i++) r->held[r->active[i]] = 0;
   error_scales(r, x, r->held, r->none);
-  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
-  gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
+  layer_rounding(r, x, r->small);
   for (int i = 0; i < r->n; i++) near[i] = fabs(x[i]);
   gradient_sums(r, &r->s->point, r->point, first_of_factors(r), &r->s->factor_gradient, w, near, 1, factor);
   read_joints(r, d);
@@ -227,14 +223,14 @@ static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
 /* Rounding of the states' coefficients, and of the rows of each order: what is zero at rest is not compared with
  * itself. */
 static void read_noise(Run *r, Decision *d) {
-  int k = d->count, w = r->width, all = r->kept_rows, first = 2 * w + r->s->slope.count;
-  double *ones = r->vector + r->n + w, *steep = r->small, *height = r->rates + all;
+  int k = d->count;
+  double *ones = r->vector + r->n + r->width, *steep = r->small, *height = r->rates + r->kept_rows;
   d->field = d->rate = 0;
   for (int i = 0; i < r->n; i++) ones[i] = unit_of_state(r, i);
   error_scales(r, r->x, r->held, r->none);
-  gradient_sums(r, &r->s->point, r->point, first, &r->s->layer_gradient, w, ones, 1, steep);
+  layer_sums(r, ones, steep);
   surface_values(r, r->x);
-  gradient_sums(r, &r->s->surfaces, r->heights, all, &r->s->surface_gradient, all, ones, 1, height);
+  kept_sums(r, ones, height);
   for (int i = 0; i < k; i++) {
     int own = d->own[i];
     double of = height[degree_of(r, own) > 1 ? element(r, own)->lower + degree_of(r, own) - 2 : own];
@@ -535,28 +531,16 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
 
 /* Whether all eigenvalues have positive real parts: powers of (A + c)^-1 (A - c) vanish. A is lost. */
 static int is_positive_stable(double *a, int n, double *work) {
-  double c = 0, *inverse = work, *power = inverse + (int64_t)n * n, *next = power + (int64_t)n * n;
+  double c = sqrt(dot(a, a, n * n) / n), *inverse = work, *power = inverse + (int64_t)n * n, *next = power + (int64_t)n * n;
   if (n == 1) return a[0] > 0;
-  for (int i = 0; i < n * n; i++) c += a[i] * a[i];
-  c = sqrt(c / n);
-  for (int i = 0; i < n * n; i++) next[i] = a[i];
+  memcpy(next, a, sizeof(double) * n * n);
   for (int i = 0; i < n; i++) { a[i * n + i] += c; next[i * n + i] -= c; }
   if (!(c > 0) || !invert(a, n, inverse)) return 0;
-  for (int i = 0; i < n; i++)
-    for (int j = 0; j < n; j++) {
-      power[i * n + j] = 0;
-      for (int l = 0; l < n; l++) power[i * n + j] += inverse[i * n + l] * next[l * n + j];
-    }
+  multiply(inverse, next, n, power);
   for (int again = 0; again < DEPTH; again++) {
-    double size = 0;
-    for (int i = 0; i < n * n; i++) size = larger(fabs(power[i]), size);
     if (!finite_all(power, n * n)) return 0;
-    if (size < TIED) return 1;
-    for (int i = 0; i < n; i++)
-      for (int j = 0; j < n; j++) {
-        next[i * n + j] = 0;
-        for (int l = 0; l < n; l++) next[i * n + j] += power[i * n + l] * power[l * n + j];
-      }
+    if (largest_of(power, n * n) < TIED) return 1;
+    multiply(power, power, n, next);
     double *t = power; power = next; next = t;
   }
   return 0;
@@ -591,9 +575,8 @@ static int layer_matrix(const Run *r, const Decision *d, int which, int orders, 
 
 /* Move the eigenvalues that are zero because elements depend on one another: they move nothing. */
 static void lift_null_space(double *a, int n, double *work, int32_t *pivot) {
-  double *z = work, *rest = z + (int64_t)n * n, most = 0;
+  double *z = work, *rest = z + (int64_t)n * n, most = largest_of(a, n * n);
   int count = null_space(a, n, n, z, rest, pivot);
-  for (int i = 0; i < n * n; i++) most = larger(fabs(a[i]), most);
   for (int l = 0; l < count; l++) {
     double *own = z + (int64_t)l * n;
     if (!orthonormal(own, z, l, n, 1)) continue;
@@ -763,8 +746,7 @@ static int is_determined(Run *r, const Layout *l, const int8_t *letter) {
   values_at(&r->s->columns, r->input, r->p, r->columns);
   const Entries *column = &r->s->column;
   for (int q = 0; q < count; q++) {
-    double *terms = change + r->n, most = 0;
-    for (int j = 0; j < n; j++) most = larger(fabs(z[(int64_t)q * n + j]), most);
+    double *terms = change + r->n, most = largest_of(z + (int64_t)q * n, n);
     for (int i = 0; i < 2 * r->n; i++) change[i] = 0;
     for (int e = 0; e < column->count; e++)
       for (int j = 0; j < n; j++) {
@@ -850,22 +832,25 @@ static int holds_its_own(const Run *r, int surface) {
   return 0;
 }
 
+/* The rate of h on one side of a surface, unknowns being aimed at, and rounding in it. */
+static double rate_on_side(Run *r, const int8_t *letter, int surface, int side, double *rounding) {
+  held_of(r, letter);
+  r->held[surface] = side;
+  error_scales(r, r->x, r->held, r->none);
+  layer_rounding(r, r->x, r->small);
+  *rounding = r->small[surface];
+  return layer_of(r, surface);
+}
+
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
   if (element(r, surface)->flags & CONTINUOUS || degree_of(r, surface) > 1 || !holds_its_own(r, surface)) return 0;
   if (r->s->joints) return 0;
-  double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(r->x[i]);
   for (int side = 1; side >= -1; side -= 2) {
-    held_of(r, letter);
-    r->held[surface] = side;
-    error_scales(r, r->x, r->held, r->none);
+    double rounding, rate = rate_on_side(r, letter, surface, side, &rounding);
     if (is_scaled(r, surface) && r->slope[surface * r->width + surface] != 0) return 0;
-    gradient_sums(r, &r->s->point, r->point, 2 * r->width + r->s->slope.count, &r->s->layer_gradient, r->width, near,
-                  1, r->small);
-    double scale = r->small[surface];
-    if (!(fabs(layer_of(r, surface)) <= (tolerance + TANGENT) * scale)) return 0; /* or zero everywhere */
+    if (!(fabs(rate) <= (tolerance + TANGENT) * rounding)) return 0; /* or zero everywhere */
   }
   return 1;
 }
@@ -873,19 +858,14 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
 /* One active surface whose rates of h on both sides decide, without series: crossing, entry, and exit where the
  * multiplier is known to pass its bound. The choice to r->chosen; 0 where it is not clear. */
 static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count) {
-  int own = r->active[0], w = r->width, exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
-  double rate[2], *near = r->vector + r->n + w; /* not where inputs are put together */
+  int own = r->active[0], exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
+  double rate[2], rounding;
   if (!has_law(r, own, SURFACE_LAW) || !r->s->affine || r->s->joints || is_scaled(r, own) || is_idle(r, letter, own)) return 0;
   if (known_count && !(exits && r->falls)) return 0;
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(r->x[i]);
   for (int q = 0; q < 2; q++) {
-    held_of(r, letter);
-    r->held[own] = q ? 1 : -1;
-    error_scales(r, r->x, r->held, r->none);
-    gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
-    rate[q] = layer_of(r, own);
-    if (!(fabs(rate[q]) > (VANISHES + TANGENT) * r->small[own] && fabs(rate[q]) < INFINITY)) rate[q] = 0;
+    rate[q] = rate_on_side(r, letter, own, q ? 1 : -1, &rounding);
+    if (!(fabs(rate[q]) > (VANISHES + TANGENT) * rounding && fabs(rate[q]) < INFINITY)) rate[q] = 0;
   }
   if (exits) { /* the other side still leads onto the surface; the rate of this one is zero */
     chosen = known[0].side;
@@ -893,7 +873,7 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
   } else if (rate[0] * rate[1] > 0) chosen = rate[0] > 0 ? 1 : -1;
   else if (!(rate[0] > 0 && rate[1] < 0)) return 0;
   Layout *l = &r->trial.l;
-  memcpy(r->chosen.letter, letter, w);
+  memcpy(r->chosen.letter, letter, r->width);
   r->chosen.letter[own] = (int8_t)chosen;
   keep_carried(r, r->chosen.letter, r->chosen.unknowns);
   lay_out(r, r->chosen.letter, l);
@@ -916,11 +896,6 @@ static int no_motion(Run *r, const int8_t *letter) {
   else finish(r, NON_UNIQUE, DEGENERATE, 0);
   return 0;
 }
-
-static int is_mixed(const Run *r, const int32_t *own, int count);
-static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count);
-static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count);
-static int follow_step(Run *r, const int8_t *letter, const Known *known, int known_count);
 
 /* The law at the point of the active elements; 0 where it is no number. */
 static int begin_law(Run *r, const int8_t *letter, const Known *known, int known_count) {

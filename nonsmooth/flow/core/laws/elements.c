@@ -14,8 +14,8 @@ static const double *surface_values(Run *r, const double *x) {
 /* Rounding in each of them, times epsilon, after surface_values. */
 static const double *surface_scales(Run *r, const double *x) {
   double *near = r->vector, *scale = r->rates + r->kept_rows;
-  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
-  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, near, 1, scale);
+  weigh_state(r, x, near);
+  kept_sums(r, near, scale);
   return scale;
 }
 
@@ -173,10 +173,6 @@ static const double *gaps(Run *r, const double *x) {
   return r->rates + r->m;
 }
 
-/* Surfaces through the present state, to rounding, and contacts at rest; those that slide in a mode and the
- * ``certain`` one (or -1). The run ends where a gap is negative. */
-static int is_met(Run *r, const int8_t *letter, int set, const double *h, const double *scales_of);
-
 /* Of the active surfaces, those stay that Newton's steps from the others lead onto within rounding of the states: one
  * that is nearly parallel is passed by itself, its nearer root first. */
 static void leave_parallel(Run *r, int certain, const int8_t *letter) {
@@ -241,6 +237,8 @@ static void idle_sets(const Run *r, int8_t *letter, const double *scale) {
   EACH_SET(r, s) if (is_unloaded(r, letter, s, scale)) memset(letter + s, IDLE, size_of(r, s));
 }
 
+/* Surfaces through the present state, to rounding, and contacts at rest; those that slide in a mode and the
+ * ``certain`` one (or -1). The run ends where a gap is negative. */
 static void active_surfaces(Run *r, int certain, const int8_t *letter) {
   r->active_count = 0;
   if (!r->width) return;
@@ -269,18 +267,6 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
 
 /* Laws -------------------------------------------------------------------------------------------------- */
 
-static void serve_surface(Run *r, int row);
-static void serve_contact(Run *r, int row);
-static void serve_set(Run *r, int row);
-static void serve_complementarity(Run *r, int row);
-static int settle_in(Run *r);
-static int change_kind(const Run *r, int before, int after);
-static void event(Run *r, int kind, int before, int guard, const double *x);
-static void enter_segment(Run *r, int mode);
-static void renote(Run *r);
-static void strike_due(Run *r);
-static void prepare(Run *r);
-
 /* The sign of a bound's first coefficient that is not zero; one that rounding has left before it passes zero is. */
 static double turn_of(const Run *r, int i, const double *factor, int count) {
   const Entries *g = &r->s->factor_gradient;
@@ -303,14 +289,10 @@ static void lay_out_surface(const Run *r, Layout *l, int i) {
   else { add_row(l, EXIT_GUARD, i, 1); add_row(l, EXIT_GUARD, i, -1); }
 }
 
-static void lay_out_complementarity(const Run *r, Layout *l, int i) {
-  (void)r;
-  add_row(l, l->letter[i] ? SURFACE_GUARD : RELEASE_GUARD, i, l->letter[i]);
-}
-
-static void lay_out_contact(const Run *r, Layout *l, int i) {
-  (void)r;
-  add_row(l, l->letter[i] ? IMPACT_GUARD : RELEASE_GUARD, i, l->letter[i]);
+/* Of contacts and complementarity. */
+static void lay_out_half_line(const Run *r, Layout *l, int i) {
+  int open = has_law(r, i, CONTACT_LAW) ? IMPACT_GUARD : SURFACE_GUARD;
+  add_row(l, l->letter[i] ? open : RELEASE_GUARD, i, l->letter[i]);
 }
 
 /* A function on its side, also a gap. */
@@ -350,7 +332,7 @@ static int8_t side_of_surface(const Run *r, int i, double h) {
   return h > 0 ? 1 : -1; /* what is on it counts as below until it is decided */
 }
 
-static int8_t side_of_half_line(const Run *r, int i, double h) {
+static int8_t side_of_one(const Run *r, int i, double h) {
   (void)r, (void)i, (void)h;
   return 1;
 }
@@ -380,8 +362,6 @@ static void serve_relay(Run *r, int row) {
 }
 
 /* A joint holds its function at zero with a reaction of any size and sign: nothing ends that. */
-static void lay_out_joint(const Run *r, Layout *l, int i) { (void)r, (void)l, (void)i; }
-
 static int8_t side_of_joint(const Run *r, int i, double h) {
   (void)r, (void)i, (void)h;
   return 0;
@@ -517,11 +497,6 @@ static void guard_of_table(Run *r, const Layout *l, int row, const double *serie
   g[0] = is_at ? 0 : g[0] - side * cells_of(r, i)->level[k];
 }
 
-static int8_t side_of_table(const Run *r, int i, double h) {
-  (void)r, (void)i, (void)h;
-  return 1;
-}
-
 static void serve_table(Run *r, int row) {
   int before = r->mode, i = r->now.index[row], count = kept_by(r, r->letter, r->involved);
   memset(r->levels, 0, sizeof(double) * count);
@@ -543,13 +518,12 @@ static int shown_index(const Run *r) {
 
 static const Law LAWS[] = {
   [SURFACE_LAW] = {lay_out_surface, guard_of_surface, rounding_of_element, side_of_surface, serve_surface},
-  [CONTACT_LAW] = {lay_out_contact, guard_of_half_line, rounding_of_element, side_of_half_line, serve_contact},
-  [COMPLEMENTARITY_LAW] = {lay_out_complementarity, guard_of_half_line, rounding_of_element, side_of_half_line,
-                           serve_complementarity},
+  [CONTACT_LAW] = {lay_out_half_line, guard_of_half_line, rounding_of_element, side_of_one, serve_half_line},
+  [COMPLEMENTARITY_LAW] = {lay_out_half_line, guard_of_half_line, rounding_of_element, side_of_one, serve_half_line},
   [SET_LAW] = {lay_out_set, guard_of_set, rounding_of_set, side_of_set, serve_set},
   [RELAY_LAW] = {lay_out_surface, guard_of_relay, rounding_of_element, side_of_relay, serve_relay},
-  [JOINT_LAW] = {.lay_out = lay_out_joint, .side = side_of_joint},
-  [TABLE_LAW] = {lay_out_table, guard_of_table, rounding_of_element, side_of_table, serve_table},
+  [JOINT_LAW] = {.side = side_of_joint},
+  [TABLE_LAW] = {lay_out_table, guard_of_table, rounding_of_element, side_of_one, serve_table},
 };
 
 static const Law *law_of(const Run *r, int i) { return LAWS + element(r, i)->law; }

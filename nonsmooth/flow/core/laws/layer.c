@@ -2,7 +2,6 @@
  * products, sets of codimension two and more). A mode can continue if each of its guards that vanishes here becomes
  * positive at once: its first coefficient that is not zero is positive. */
 
-
 static int bits(int a) { return (a & 1) + (a >> 1 & 1) + (a >> 2 & 1); }
 
 /* Number of the modes that are possible, or 0 where they are more than are tried. */
@@ -97,8 +96,8 @@ static int rests(const Run *r, const int8_t *letter) {
   return 0;
 }
 
-/* Modes that can continue, so far. */
-typedef struct { int strict, found, resting; } Tally;
+/* Modes that can continue, so far; the rank of the chosen one: 2 if no guard of it stays zero, 1 if something rests. */
+typedef struct { int strict, found, rank; } Tally;
 
 /* Whether a mode that continues, that of r->trial, has the motion of the first one: loads that are not determined may be
  * anywhere. It is kept if it is the first. */
@@ -110,21 +109,23 @@ static int is_found(Run *r, const Tally *t) {
   return t->strict && is_same_motion(r, first, own);
 }
 
-/* Count r->found, of r->trial. */
+/* Count r->found, of r->trial; the first of the highest rank is r->chosen. */
 static void count_found(Run *r, Tally *t) {
-  if (r->s->combined && r->found.strict && is_found(r, t)) return;
-  if (r->found.strict && t->strict++ == 0) copy_continuation(r, &r->one, &r->found);
-  if (r->found.strict && r->several_count < SEVERAL) r->several[r->several_count++] = r->trial.l.mode;
-  if (t->found++ == 0) copy_continuation(r, &r->first, &r->found);
-  if (rests(r, r->found.letter) && t->resting++ == 0) copy_continuation(r, &r->rest, &r->found);
+  int strict = r->found.strict, rank = strict ? 2 : rests(r, r->found.letter);
+  if (r->s->combined && strict && is_found(r, t)) return;
+  if (strict && r->several_count < SEVERAL) r->several[r->several_count++] = r->trial.l.mode;
+  if (!t->found || rank > t->rank) {
+    t->rank = rank;
+    copy_continuation(r, &r->chosen, &r->found);
+  }
+  t->strict += strict;
+  t->found++;
 }
 
-/* The one that continues to r->chosen; 0 where there is none, or more than one and the run ends. */
-static int choose_of(Run *r, const Tally *t) {
-  if (t->strict > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
-  if (!t->found || (!t->strict && t->found > 1 && !t->resting)) return 0;
-  copy_continuation(r, &r->chosen, t->strict ? &r->one : t->found == 1 ? &r->first : &r->rest);
-  return 1;
+/* Whether r->chosen continues; 0 where none does, or more than one and the run ends. */
+static int is_chosen(Run *r, const Tally *t) {
+  if (t->strict > 1) finish(r, NON_UNIQUE, AMBIGUOUS, 0);
+  return t->strict < 2 && t->found && (t->rank || t->found == 1);
 }
 
 /* Letters of the active elements by the number of a choice of those that are possible. */
@@ -247,51 +248,14 @@ static void keep_solution(Run *r, const Layout *l, double *unknowns, int steps, 
   memcpy(found->each + found->count++ * w, unknowns, sizeof(double) * w);
 }
 
-/* Products: functions that are linear in each of k variables in [0, 1], by their values at the corners. */
-
-/* Values and derivatives at a point. */
-static void at_point(const double *corner, int k, const double *u, double *value, double *slope) {
-  for (int f = 0; f < k; f++) value[f] = 0;
-  for (int i = 0; i < k * k; i++) slope[i] = 0;
-  for (int c = 0; c < 1 << k; c++)
-    for (int f = 0; f < k; f++) {
-      double whole = corner[c * k + f];
-      for (int i = 0; i < k; i++) whole *= c >> i & 1 ? u[i] : 1 - u[i];
-      value[f] += whole;
-      for (int j = 0; j < k; j++) {
-        double part = corner[c * k + f] * (c >> j & 1 ? 1 : -1);
-        for (int i = 0; i < k; i++) if (i != j) part *= c >> i & 1 ? u[i] : 1 - u[i];
-        slope[f * k + j] += part;
-      }
-    }
-}
-
-/* The box of a product's variables. */
-typedef struct { const Layout *l; const double *corner, *low, *width; double *unknowns; int k; } Cube;
-
-/* Newton's method from a point of the cube. */
-static void from_point(Run *r, const Cube *c, const double *start, Solutions *found) {
-  double u[FACTORS], value[FACTORS], slope[FACTORS * FACTORS];
-  memcpy(u, start, sizeof u);
-  for (int again = 0; again < LAYER_NEWTON; again++) {
-    double most = 0;
-    at_point(c->corner, c->k, u, value, slope);
-    if (!solve(slope, value, c->k)) return;
-    for (int i = 0; i < c->k; i++) { u[i] -= value[i]; most = larger(fabs(value[i]), most); }
-    if (most <= EPSILON) break;
-  }
-  for (int i = 0; i < c->k; i++) {
-    if (!(u[i] >= -LAYER_APART && u[i] <= 1 + LAYER_APART)) return;
-    c->unknowns[c->l->sliding[i]] = c->low[i] + u[i] * c->width[i];
-  }
-  keep_solution(r, c->l, c->unknowns, 3, found);
-}
+/* The box of a product's variables, of which its functions are linear in each. */
+typedef struct { const Layout *l; const double *low, *width; double *unknowns; int k; } Cube;
 
 /* Solutions in a box by halving: a function that is linear in each variable is between its values at the corners. */
 static void search_cube(Run *r, const Cube *c, const double *corner, const double *at, double size, int depth,
                         Solutions *found) {
   int k = c->k, axis = depth % k, step = 1 << axis;
-  double half[CORNERS * FACTORS], next[FACTORS], start[FACTORS];
+  double half[CORNERS * FACTORS], next[FACTORS];
   for (int f = 0; f < k; f++) {
     double low = INFINITY, high = -INFINITY;
     for (int i = 0; i < 1 << k; i++) { low = smaller(corner[i * k + f], low); high = larger(corner[i * k + f], high); }
@@ -299,8 +263,9 @@ static void search_cube(Run *r, const Cube *c, const double *corner, const doubl
   }
   if (depth == LAYER_HALVINGS * k) {
     for (int i = 0; i <= 1 << k; i++) { /* two solutions may be close to a fold: from the corners and the centre */
-      for (int j = 0; j < k; j++) start[j] = at[j] + size * (i == 1 << k ? 0.5 : i >> j & 1);
-      from_point(r, c, start, found);
+      for (int j = 0; j < k; j++)
+        c->unknowns[c->l->sliding[j]] = c->low[j] + c->width[j] * (at[j] + size * (i == 1 << k ? 0.5 : i >> j & 1));
+      keep_solution(r, c->l, c->unknowns, LAYER_NEWTON, found);
     }
     return;
   }
@@ -330,7 +295,7 @@ static void solve_products(Run *r, const Layout *l, double *unknowns, Solutions 
     for (int f = 0; f < k; f++) corner[c * k + f] = layer_of(r, l->sliding[f]);
   }
   if (!finite_all(corner, k << k)) return;
-  search_cube(r, &(Cube){l, corner, low, width, unknowns, k}, corner, start, 1, 0, found);
+  search_cube(r, &(Cube){l, low, width, unknowns, k}, corner, start, 1, 0, found);
 }
 
 /* The same for other laws, and with reactions: Newton's method from a grid. */
@@ -410,6 +375,15 @@ static void keep_stable(Run *r, const Layout *l, Solutions *found) {
     if (is_stable(r, l)) memmove(found->each + kept++ * w, own, sizeof(double) * w);
   }
   found->count = kept;
+}
+
+/* Unknowns of a mode to r->unknowns; how many sets of them it has, of which one is wanted. */
+static int find_unknowns(Run *r, const Layout *l) {
+  Solutions all = {0};
+  mode_solutions(r, l, &all);
+  if (all.count > 1) keep_stable(r, l, &all);
+  if (all.count == 1) memcpy(r->unknowns, all.each, sizeof(double) * r->width);
+  return all.count;
 }
 
 /* Where the multiplier of the one active surface comes from, and which way it moves; 0 where that is not known. */
@@ -505,7 +479,7 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
       if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
     }
   }
-  return r->status == RUNNING && (choose_of(r, &tally) || no_motion(r, letter));
+  return r->status == RUNNING && (is_chosen(r, &tally) || no_motion(r, letter));
 }
 
 /* The same where unknowns of the active elements enter nonlinearly. */
@@ -528,8 +502,6 @@ static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int
 /* Folds of sliding: where the slope of what slides vanishes the multipliers go with a root of the time. With one of
  * them as the independent variable states, time and the others are regular there. */
 
-static int advance(Run *r, const Expansion *e, double dt);
-
 /* Whether sliding may end in a fold within some steps of length h. */
 static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
   if (!is_mixed(r, e->l.sliding, e->l.slides)) return 0;
@@ -546,25 +518,15 @@ static int is_before_fold(const Run *r, const Expansion *e, int row, double dt) 
   return dt > FOLD_NEAR * time_scale(r);
 }
 
-/* Rules of order k of all that a mode needs, with the multipliers' own coefficients. */
-static void rules_of(Run *r, const Expansion *f, int k) {
-  const Series *t = &r->s->series;
-  double *x = r->vector, *lam = x + r->n;
-  for (int i = 0; i < r->n; i++) x[i] = f->states[(int64_t)i * r->stride + k];
-  for (int i = 0; i < r->width; i++) lam[i] = f->series[(int64_t)i * r->stride + k];
-  set_inputs(r, x, k ? r->none : r->held, lam);
-  series_at(t, k ? &t->later : &t->moving, k, r->stride, r->input, r->series);
-}
-
 /* Series in the multiplier of sliding[lead], which moves in a direction, of states, of the others and of the rate
  * of the time; 0 where there is none. */
 static int series_in_multiplier(Run *r, Expansion *f, int lead, double way, double *rate) {
   int slides = f->l.slides, w = r->width, n = r->n, order = r->order, stride = r->stride;
   double *drift = r->lam, *a = r->work, *b = a + slides * slides;
   held_of(r, f->l.letter);
-  rules_of(r, f, 0);
+  open_order(r, f, 0);
   for (int i = 0; i < n; i++) f->states[(int64_t)i * stride + 1] = row_of(r, i)[0];
-  rules_of(r, f, 1);
+  open_order(r, f, 1);
   for (int i = 0; i < slides; i++) drift[i] = row_of(r, n + f->l.sliding[i])[1];
   for (int k = 1; k <= order; k++) {
     for (int i = 0; i < n; i++) {
@@ -573,7 +535,7 @@ static int series_in_multiplier(Run *r, Expansion *f, int lead, double way, doub
       for (int j = 0; j < k - 1; j++) x[k] += rate[j] * row_of(r, i)[k - 1 - j] / k;
     }
     f->series[(int64_t)f->l.sliding[lead] * stride + k] = k == 1 ? way : 0;
-    rules_of(r, f, k);
+    open_order(r, f, k);
     for (int i = 0; i < slides; i++) {
       b[i] = -row_of(r, n + f->l.sliding[i])[k];
       for (int j = 0; j < slides; j++)
@@ -583,7 +545,7 @@ static int series_in_multiplier(Run *r, Expansion *f, int lead, double way, doub
     rate[k - 1] = b[lead];
     for (int i = 0; i < slides; i++) if (i != lead) f->series[(int64_t)f->l.sliding[i] * stride + k] = b[i];
     for (int i = 0; i < n; i++) f->states[(int64_t)i * stride + k] += row_of(r, i)[0] * b[lead] / k;
-    rules_of(r, f, k);
+    open_order(r, f, k);
   }
   rate[order] = 0;
   return 1;
@@ -651,9 +613,7 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   note_sides(r, f, s);
   for (int i = 0; i < r->width; i++) end[i] = value_at(f->series + (int64_t)i * stride, order, s);
   for (int i = 0; i < r->n; i++) r->before[i] = value_at(f->states + (int64_t)i * stride, order, s);
-  set_inputs(r, r->before, held_of(r, f->l.letter), end);
-  first_values(r, 0);
-  for (int i = 0; i < r->n; i++) field[i] = row_of(r, i)[0];
+  field_of(r, r->before, held_of(r, f->l.letter), end, field);
   if (!in_time(r, f, rate, s, dt, field)) return -1;
   memcpy(r->tried, end, sizeof(double) * r->width);
   memset(f->series, 0, sizeof(double) * r->width * stride);

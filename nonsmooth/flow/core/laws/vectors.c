@@ -4,12 +4,6 @@
  * are two or three.
  */
 
-static double largest_of(const double *m, int count) {
-  double most = 0;
-  for (int i = 0; i < count; i++) most = larger(fabs(m[i]), most);
-  return most;
-}
-
 static int is_vector_symmetric(const double *m, int k, double part) {
   double most = largest_of(m, k * k);
   for (int i = 0; i < k; i++) for (int j = 0; j < i; j++) if (fabs(m[i * k + j] - m[j * k + i]) > part * most) return 0;
@@ -34,14 +28,11 @@ static int solve_vector(const double *m, int k, double shift, const double *b, d
 /* The direction u with (M + s) u = a, |u| = 1 and the largest s, which is not negative: Newton's method from the
  * left, where it is monotone (1/|(M + s)^-1 a| is concave). M is symmetric and positive definite. */
 static int leaving_direction(const double *a, const double *m, int k, double *u) {
-  double d[3], w[3], s = 0;
-  for (int i = 0; i < k * k; i++) s += m[i] * m[i];
-  s = larger(0, length_of(a, k) - sqrt(s));
+  double d[3], w[3], s = larger(0, length_of(a, k) - sqrt(dot(m, m, k * k)));
   for (int again = 0; again < 100; again++) {
     if (!solve_vector(m, k, s, a, d) || !solve_vector(m, k, s, d, w)) return 0;
-    double n = length_of(d, k), slope = 0;
-    for (int i = 0; i < k; i++) slope += d[i] * w[i];
-    s += (n - 1) * n * n / slope;
+    double n = length_of(d, k);
+    s += (n - 1) * n * n / dot(d, w, k);
     if (!(fabs(n - 1) > SOLVED)) break;
   }
   if (!solve_vector(m, k, s, a, d)) return 0;
@@ -57,9 +48,8 @@ static void secular(const double *a, const double *m, int k, double *polynomial)
   for (int j = 1; j <= k; j++) { /* of highest powers first */
     double trace = 0;
     for (int i = 0; i < k; i++) {
-      numerator[j - 1][i] = 0;
+      numerator[j - 1][i] = dot(adjugate + i * k, a, k);
       for (int l = 0; l < k; l++) {
-        numerator[j - 1][i] += adjugate[i * k + l] * a[l];
         next[i * k + l] = 0;
         for (int q = 0; q < k; q++) next[i * k + l] -= m[i * k + q] * adjugate[q * k + l];
       }
@@ -80,10 +70,8 @@ static int direction_at(const double *a, const double *m, int k, double s, doubl
   double d[3], w[3], start = s, n = 0;
   for (int again = 0; again < LAYER_NEWTON; again++) {
     if (!solve_vector(m, k, s, a, d) || !solve_vector(m, k, s, d, w)) return 0;
-    double slope = 0;
-    for (int i = 0; i < k; i++) slope += d[i] * w[i];
     n = length_of(d, k);
-    double step = (n * n - 1) / (-2 * slope);
+    double step = (n * n - 1) / (-2 * dot(d, w, k));
     if (!(fabs(step) < INFINITY)) return 0;
     s -= step;
     if (fabs(step) <= EPSILON * fabs(s)) break;

@@ -21,7 +21,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ... import files
+from ...saving import files
 from ...warn import warn_once
 from .compilers import (
     ADVICE,

@@ -21,14 +21,17 @@ MOST_ORDER = 48
 
 #: The driver in C, in the order in which it is read: one text.
 _FILES = """
-    programs.h pairs.h linear.h banded.h radau.h state.c modes.c laws/hidden.c jets.c laws/stability.c laws/sets.c
+    programs.h pairs.h linear.h implicit/banded.h implicit/radau.h state.c modes.c laws/hidden.c jets.c laws/stability.c laws/sets.c
     stepper.c near_zeros.c laws/elements.c record.c laws/spiral.c laws/vectors.c laws/blocks.c laws/decide.c laws/layer.c laws/contacts.c
-    laws/complementarity.c laws/approach.c events.c collocation.c implicit.c stiffness.c driver.c accumulation.c laws/roots.c
-    entry.c sample.c
+    laws/complementarity.c laws/approach.c events.c implicit/collocation.c implicit/implicit.c implicit/stiffness.c
+    driver.c accumulation.c laws/roots.c entry.c sample.c
 """.split()
 
 #: Legs of known durations with derivatives.
-_LEGS = "variation.c adjoint.c implicit_legs.c legs.c".split()
+_LEGS = "legs/variation.c legs/adjoint.c implicit/implicit_legs.c legs/legs.c".split()
+
+#: Flows of smooth fields.
+_FLOWS = "legs/flow.c implicit/implicit_flow.c legs/fixed.c".split()
 
 
 #: The folder of those of the C files.
@@ -55,17 +58,26 @@ def run_source() -> str:
     head += f"#define OPERATIONS_OF(x, y) {' '.join(cases)}\n"
     sizes = f"#define UNFUSED\n#define P {MOST_ORDER}\n"
     driver = [driver_text(f"core/{name}") for name in _FILES]
-    return "".join([facts_header(), sizes, head, driver_text("core/common.h"), *driver])
+    at = _FILES.index("state.c") + 1
+    texts = [*driver[:at], _declarations(driver[at:]), *driver[at:]]
+    return "".join([facts_header(), sizes, head, driver_text("core/common.h"), *texts])
+
+
+def _declarations(texts: Sequence[str]) -> str:
+    """Declare the functions of some files, so that each may call all others, but those that take types of these files."""
+    text = "".join(texts)
+    own = re.findall(r"^(?:\} |typedef struct (?:\w+ |\{[^}]*\} ))(\w+);", text, re.MULTILINE)
+    heads = re.findall(r"^static [\w *]+\([^;{}]*\)(?= \{)", text, re.MULTILINE)
+    foreign = re.compile(rf"\b(?:{'|'.join(own)})\b")
+    return "".join(f"{head};\n" for head in heads if not foreign.search(head))
 
 
 @lru_cache(maxsize=1)
 def core_source() -> str:
     """C of the driver."""
     legs = [driver_text(f"core/{name}") for name in _LEGS]
-    flow, *others = (
-        driver_text(f"core/{name}") for name in ("flow.c", "implicit_flow.c", "fixed.c")
-    )
-    extended = _extended("programs.h", "flow.c")
+    flow, *others = (driver_text(f"core/{name}") for name in _FLOWS)
+    extended = _extended("programs.h", "legs/flow.c")
     return "".join([run_source(), *legs, flow, extended, *others])
 
 

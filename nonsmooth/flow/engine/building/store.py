@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from ... import files
+from ...saving import files
 from ...warn import warn_once
 from .compilers import CompilerError
 

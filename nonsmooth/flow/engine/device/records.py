@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....model import Array, FilippovSystem
-from ...constants import HAND_OVER, SIMPLE_KINDS
+from ...constants import HAND_OVER, NEEDS_PROGRAM, SIMPLE_KINDS
 from ...options import Options
 from ...results import Chunk, Stopped
 from ..arrays import BURST, address, batch_of, options_of
@@ -114,15 +114,17 @@ def _continue(
     stop: Callable[[], bool],
 ) -> None:
     x, done = np.ascontiguousarray(records["x"]), np.zeros(1, np.int64)
-    padded = np.append(p, np.zeros((*p.shape[:-1], 1)), axis=-1)
+    own, p = records.ctypes.data, engine.shown.with_cells(p)
     c_options = options_of(engine.system, options, dense=False, at=at)
-    batch = batch_of(x, padded, options.t_start, out, None, None)
-    width = records.dtype.itemsize // 8
+    batch = batch_of(x, p, options.t_start, out, None, None)
+    rest = (own, records.dtype.itemsize // 8, int(to_end), BURST)
     out.itinerary[:] = 0
     with engine.held_table() as table, engine.held_run(table) as run:
         library().lanes_tree(run)  # modes have the numbers that they have in codes
         call = (run, address(done), ctypes.byref(batch), ctypes.byref(c_options))
-        while library().run_left(*call, records.ctypes.data, width, int(to_end), BURST):
+        while status := library().run_left(*call, *rest):
+            if status == NEEDS_PROGRAM:
+                engine.add_implicit()
             if stop():
                 raise Stopped
         used = np.flatnonzero(np.bincount(out.itinerary)).tolist()

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from nonsmooth.flow import files
 from nonsmooth.flow.engine.building import store
 from nonsmooth.flow.engine.building.build import (
     build,
@@ -17,6 +16,7 @@ from nonsmooth.flow.engine.building.build import (
     find_compiler,
     library_key,
 )
+from nonsmooth.flow.saving import files
 from nonsmooth.flow.warn import CompilerWarning, warn_once
 
 pytestmark = [

@@ -9,12 +9,11 @@ from typing import Any
 
 import casadi as ca
 
-from ..errors import DefinitionError
-from ..reading import listed
-from .conditions import ABOVE, AND, BELOW, ZERO
-from .discrete_states import held_values
-from .events import Stop
-from .system import FilippovSystem
+from ...errors import DefinitionError
+from ..discrete_states import held_values
+from ..system import FilippovSystem
+from .conditions import ABOVE, BELOW, ZERO, folded
+from .declarations import Stop
 
 #: A condition that always holds, or never.
 _ALWAYS = float("inf")
@@ -101,14 +100,7 @@ def held_events(system: FilippovSystem, values: Mapping[Any, float]) -> tuple[He
 
 def _function(tree: Sequence[int], atoms: Sequence[ca.SX]) -> ca.SX | float:
     """A function that is not negative where a condition holds; plus or minus inf where it always or never does."""
-    stack: list[ca.SX | float] = []
-    for code in tree:
-        if code >= 0:
-            stack.append(_relation(atoms[code // 8], code % 8))
-            continue
-        two, one = stack.pop(), stack.pop()
-        stack.append(_joined(one, two, code == AND))
-    return stack[-1]
+    return folded(tree, lambda atom, mask: _relation(atoms[atom], mask), _joined)
 
 
 def _joined(one: ca.SX | float, two: ca.SX | float, both: bool) -> ca.SX | float:
@@ -133,9 +125,6 @@ def held_relay(system: FilippovSystem, on: bool) -> tuple[FilippovSystem, tuple[
     d = system.definition
     h = d.surfaces[0]
     field = ca.vertsplit(system.field("+" if on else "-")[: system.dimension])
-    values = dict(zip(listed(d.parameters), d.defaults.values(), strict=True))
-    smooth = FilippovSystem(
-        listed(d.states), field=field, parameters=values, time=d.time if d.time.numel() else None
-    )
+    smooth = FilippovSystem(**d.frame(), field=field)
     due = -h if on else h - d.hysteresis[0]
     return smooth, (HeldEvent("off" if on else "on", due, None, True, 1),)

@@ -12,8 +12,8 @@ from typing import Any, cast
 import casadi as ca
 import numpy as np
 
-from ..errors import DefinitionError
-from ..expressions.graph import NOT_SMOOTH, Node, operation, reached
+from ...errors import DefinitionError
+from ...expressions.graph import NOT_SMOOTH, Node, operation, reached
 
 #: Part of the largest value that values may be off by.
 _LOST = 1e-9

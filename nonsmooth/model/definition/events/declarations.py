@@ -8,10 +8,10 @@ from typing import Any
 
 import casadi as ca
 
-from ..checks import real
-from ..errors import DefinitionError
-from ..reading import Expression, column, listed, scalar
-from .discrete_choices import without_choices
+from ...checks import real
+from ...errors import DefinitionError
+from ...reading import Expression, column, items_of, listed, scalar
+from ..discrete_choices import without_choices
 
 
 @dataclass(frozen=True)
@@ -240,16 +240,10 @@ class Clock:
         return f"Clock(period={self.period}, name={self.name!r})"
 
 
-def with_added_states(clocks: Any, discrete: Any, given: dict[str, Any]) -> dict[str, Any]:
+def with_added_states(given: dict[str, Any]) -> dict[str, Any]:
     """Put clocks and discrete states into the arguments of a definition: as states, with ticks as resets."""
-    clocks = [clocks] if isinstance(clocks, Clock) else listed(clocks)
+    clocks, discrete = items_of(given["clocks"], Clock, "clocks", "period"), given["discrete"]
     values = dict(discrete) if isinstance(discrete, Mapping) else dict.fromkeys(listed(discrete))
-    for i, clock in enumerate(clocks):
-        if not isinstance(clock, Clock):
-            raise DefinitionError(
-                f"clocks[{i}]: expected a Clock, received {clock!r} ({type(clock).__name__}). "
-                "Write clocks=[nonsmooth.Clock(period)]."
-            )
     states, phases = listed(given["states"]), [c.phase for c in clocks]
     n, still = len(states), list(values)
     result = {**given, "states": [*states, *phases, *still], "clocks": clocks}

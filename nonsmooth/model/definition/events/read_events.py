@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import casadi as ca
 
-from ..errors import DefinitionError
-from ..numbering import MOST_CODES
-from ..reading import column, scalar
+from ...errors import DefinitionError
+from ...numbering import MOST_CODES
+from ...reading import column, scalar
 from .conditions import Atoms, Rule, Tree, is_boolean, is_piecewise, passages
-from .events import Reset, Stop
+from .declarations import Reset, Stop
 
 
 def direction_of(event: Stop | Reset) -> int:

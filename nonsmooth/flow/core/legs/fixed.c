@@ -106,11 +106,7 @@ static void roots_in(const double *c, int n, double *b, double lo, double hi, in
     return;
   }
   double left[P + 1], mid = 0.5 * (lo + hi);
-  left[0] = b[0];
-  for (int level = n; level > 0; level--) {
-    for (int i = 0; i < level; i++) b[i] = 0.5 * (b[i] + b[i + 1]);
-    left[n - level + 1] = b[0];
-  }
+  halve(b, n, left);
   roots_in(c, n, left, lo, mid, depth + 1, found);
   roots_in(c, n, b, mid, hi, depth + 1, found);
 }

@@ -6,8 +6,7 @@ The types are the annotations of the fields. The shapes are texts such as ``"m n
   states and time, in the whole result; a number is itself, ``*`` any length, ``...`` any number of leading axes;
 - ``|`` separates alternatives; what stands before ``;`` is the length of a sequence of arrays, or the first axis
   of one array in its place;
-- ``nan`` allows numbers that are not finite, ``<points`` requires positions in the field ``points``, ``status``
-  values of ``Status``.
+- ``nan`` allows numbers that are not finite, ``<points`` requires positions in the field ``points``.
 """
 
 from __future__ import annotations
@@ -16,51 +15,68 @@ import dataclasses
 import math
 import types
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import FilippovSystem
-from .status import Status
+C = TypeVar("C", bound=type[Any])
 
 #: Lengths that are the same in a whole result.
 _SHARED = ("n", "N")
 
+#: Classes whose objects may be in a file, by name; shapes of their fields, and a check of what shapes cannot say.
+CLASSES: dict[str, type[Any]] = {}
+_HINTS: dict[type[Any], dict[str, Any]] = {}
+_SCHEMAS: dict[type[Any], tuple[Mapping[str, str], Callable[[Any], None] | None]] = {}
 
-@dataclasses.dataclass(frozen=True)
-class Schema:
-    """The shapes of a class's fields, and a check of what shapes cannot say."""
 
-    shapes: Mapping[str, str]
-    check: Callable[[Any], None] | None
+def type_hints(cls: type[Any]) -> dict[str, Any]:
+    """Return the types of a class's fields."""
+    if cls not in _HINTS:
+        _HINTS[cls] = get_type_hints(cls)
+    return _HINTS[cls]
+
+
+def savable(*, check: Callable[[Any], None] | None = None, **shapes: str) -> Callable[[C], C]:
+    """Register a dataclass whose instances may be part of a saved result, with the shapes of its fields."""
+
+    def register(cls: C) -> C:
+        CLASSES[cls.__name__], _SCHEMAS[cls] = cls, (shapes, check)
+        return cls
+
+    return register
 
 
 class Validator:
     """Checks the objects of one result; ValueError where one does not fit."""
 
-    def __init__(self, schemas: Mapping[type[Any], Schema]):
-        self.schemas = schemas
+    def __init__(self) -> None:
         self.shared: dict[str, Any] = {}
-        self.hints: dict[type[Any], dict[str, Any]] = {}
 
     def require(self, value: Any) -> None:
         """Check a result and all objects in it."""
         cls = type(value)
-        schema = self.schemas[cls]
-        if cls not in self.hints:
-            self.hints[cls] = get_type_hints(cls)
-        hints = self.hints[cls]
+        shapes, check = _SCHEMAS[cls]
+        parts = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+        self.require_parts(cls.__name__, parts, type_hints(cls), shapes)
+        if check is not None:
+            check(value)
+
+    def require_parts(
+        self,
+        owner: str,
+        parts: Mapping[str, Any],
+        hints: Mapping[str, Any],
+        shapes: Mapping[str, str],
+    ) -> None:
+        """Check the parts of an object by their types and shapes."""
         lengths = dict[str, Any]()
-        for field in dataclasses.fields(value):
-            where = f"{cls.__name__}.{field.name}"
+        for name, value in parts.items():
             try:
-                spec = _Spec(self, schema.shapes.get(field.name, ""), lengths, value)
-                spec.require(getattr(value, field.name), hints[field.name])
+                _Spec(self, shapes.get(name, ""), lengths, parts).require(value, hints[name])
             except ValueError as error:
-                raise ValueError(f"{where}: {error}") from error
-        if schema.check is not None:
-            schema.check(value)
+                raise ValueError(f"{owner}.{name}: {error}") from error
 
 
 class _Spec:
@@ -87,7 +103,11 @@ class _Spec:
         elif kind in (list, tuple, Sequence):
             types_of = (list, tuple) if kind is Sequence else (kind,)
             _demand(type(value) in types_of, f"it is no {kind.__name__}")
-            _demand(kind is not tuple or args[1:] == (...,), "tuples of one type are known")
+            if kind is tuple and args[-1] is not ...:
+                _demand(len(value) == len(args), f"it has {len(value)} parts")
+                for part, own in zip(value, args, strict=True):
+                    self.require(part, own)
+                return
             if self.count:
                 self._length(self.count, len(value))
             for part in value:
@@ -112,14 +132,13 @@ class _Spec:
         elif hint is float:
             _demand(_is_number(value), "it is no number")
             _demand("nan" in self.words or math.isfinite(value), "it is not finite")
-        elif hint is FilippovSystem:
-            _demand(type(value) is hint, "it is no system")
-            self._length("n", value.dimension)
-            self._length("N", value.extended_dimension)
         else:
             _demand(type(value) is hint, f"it is no {getattr(hint, '__name__', hint)}")
-            if hint in self.validator.schemas:
+            if hint in _SCHEMAS:
                 self.validator.require(value)
+            elif hasattr(value, "extended_dimension"):  # a system
+                self._length("n", value.dimension)
+                self._length("N", value.extended_dimension)
 
     def _array(self, value: Any, scalar: Any, inside: bool) -> None:
         _demand(isinstance(value, np.ndarray), "it is no array")
@@ -128,7 +147,7 @@ class _Spec:
         for word in self.words:
             if word == "|":
                 shapes.append([])
-            elif word in ("nan", "status") or word[0] == "<":
+            elif word == "nan" or word[0] == "<":
                 flags.append(word)
             else:
                 shapes[-1].append(word)
@@ -165,10 +184,8 @@ class _Spec:
         if value.dtype.kind in "fc" and "nan" not in flags:
             _demand(bool(np.isfinite(value).all()), "not all of its numbers are finite")
         for flag in flags:
-            if flag == "status":
-                _demand(bool(np.isin(value, [int(s) for s in Status]).all()), "it has no status")
-            elif flag[0] == "<":
-                most = len(getattr(self.owner, flag[1:]))
+            if flag[0] == "<":
+                most = len(self.owner[flag[1:]])
                 within = bool(np.all((value >= 0) & (value < most)))
                 _demand(within, f"it has numbers that are not of {flag[1:]}")
 

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from ..reading import listed
-from ..values import Array
+from ...reading import listed
+from ...values import Array
+from ..elements import Element, Entry
 from .curves import Curve, polynomial
-from .elements import Element, Entry
 
 if TYPE_CHECKING:
-    from .parse_definition import Definition
+    from ..parse_definition import Definition
 
 
 #: Zeros that are this close, relatively, are one.

@@ -10,10 +10,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import DefinitionError
-from ..expressions.graph import evaluate, instructions
-from ..reading import Expression, scalar
-from ..values import Array
+from ...errors import DefinitionError
+from ...expressions.graph import evaluate, instructions
+from ...reading import Expression, scalar
+from ...values import Array
 from .curves import Curve
 
 #: Jumps of a derivative below this part of it are rounding.

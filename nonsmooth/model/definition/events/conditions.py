@@ -6,15 +6,16 @@ before them. A mask has the signs of the atom for which the relation holds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import casadi as ca
 import numpy as np
 
-from ..errors import DefinitionError
-from ..expressions.graph import IN_A_GUARD, require_smooth
-from ..numbering import UNWATCHED
+from ...errors import DefinitionError
+from ...expressions.graph import IN_A_GUARD, require_smooth
+from ...numbering import UNWATCHED
 
 #: Signs of an atom in the mask of a relation.
 BELOW, ZERO, ABOVE = 1, 2, 4
@@ -24,6 +25,7 @@ AND, OR = -1, -2
 FALLING, EITHER, RISING = -1, 0, 1
 
 Tree = tuple[int, ...]
+V = TypeVar("V")
 
 
 @dataclass(frozen=True)
@@ -77,16 +79,24 @@ def passages(atom: int, direction: int) -> tuple[Tree, ...]:
     return tuple((8 * atom + mask,) for mask in _PASSED[direction])
 
 
-def holds(tree: Sequence[int], sides: Sequence[int]) -> bool:
-    """Whether a condition is true for given signs of the atoms."""
-    stack: list[bool] = []
+def folded(
+    tree: Sequence[int], relation: Callable[[int, int], V], joined: Callable[[V, V, bool], V]
+) -> V:
+    """A condition in the values of relations, by their atoms and masks, and of what joins two: and, or or."""
+    stack: list[V] = []
     for code in tree:
         if code >= 0:
-            stack.append(bool(code % 8 >> (sides[code // 8] + 1) & 1))
+            stack.append(relation(*divmod(code, 8)))
         else:
             two, one = stack.pop(), stack.pop()
-            stack.append(one and two if code == AND else one or two)
+            stack.append(joined(one, two, code == AND))
     return stack[-1]
+
+
+def holds(tree: Sequence[int], sides: Sequence[int]) -> bool:
+    """Whether a condition is true for given signs of the atoms."""
+    relation = lambda atom, mask: bool(mask >> (sides[atom] + 1) & 1)
+    return folded(tree, relation, lambda one, two, both: one and two if both else one or two)
 
 
 def decides(rule: Rule, atom: int, sides: Sequence[int]) -> bool:

@@ -2,7 +2,6 @@
 
 /* The mode of a leg at its start: sets off which it is carry h. 0 where its unknowns are not unique. */
 static int begin_leg(Run *r, const Leg *l) {
-  Solutions all = {0};
   memcpy(r->x, l->x, sizeof(double) * r->n);
   set_time_state(r);
   memcpy(r->letter, l->letter, r->width);
@@ -18,22 +17,18 @@ static int begin_leg(Run *r, const Leg *l) {
     }
   }
   lay_out(r, r->letter, &r->now);
-  mode_solutions(r, &r->now, &all);
-  if (all.count > 1) keep_stable(r, &r->now, &all);
-  if (all.count != 1) return 0;
-  memcpy(r->unknowns, all.each, sizeof(double) * r->width);
-  return 1;
+  return find_unknowns(r, &r->now) == 1;
 }
 
 /* Move state, unknowns and columns by a step. */
-static void move_columns(Run *r, const Leg *l, const Columns *c, double dt) {
+static void move_columns(Run *r, const Leg *l, const Variation *v, double dt) {
   const Expansion *e = &r->e;
   int n = r->n, w = r->width, m = r->m, order = r->order, stride = r->stride;
   at_time(r, e, dt, r->x, r->unknowns);
   for (int64_t k = 0; k < l->columns; k++) {
-    for (int i = 0; i < n; i++) l->y[k * n + i] = value_at(c->states + (k * n + i) * stride, order, dt);
+    for (int i = 0; i < n; i++) l->y[k * n + i] = value_at(v->of_states + (k * n + i) * stride, order, dt);
     for (int i = 0; i < m; i++)
-      if (set_of(r, i) >= 0 && r->letter[i]) c->h[k * m + i] = value_at(c->series + (k * w + i) * stride, order, dt);
+      if (set_of(r, i) >= 0 && r->letter[i]) v->h[k * m + i] = value_at(v->of_series + (k * w + i) * stride, order, dt);
   }
   for (int i = 0; i < m; i++) if (r->letter[i] == LEAVING) r->letter[i] = LEFT_BEHIND;
   lay_out(r, r->letter, &r->now);
@@ -61,52 +56,56 @@ static double near_step(const Run *r, int f, double h) {
 }
 
 /* What is read of columns at times within a step, or at the end of the leg: those from ``sample`` on. */
-static void read_columns(const Run *r, const Leg *l, const Columns *c, double begun, double dt, int64_t *sample) {
+static void read_columns(const Run *r, const Leg *l, const Variation *v, double begun, double dt, int64_t *sample) {
   double sign = way_of_leg(l), end = begun + dt + 4 * EPSILON * length_of_leg(l);
   for (; *sample < l->samples && sign * l->sample_t[*sample] <= end; ++*sample) {
     double *to = l->at_samples + *sample * l->columns * r->n, time = l->sample_t[*sample] - sign * begun;
     for (int64_t i = 0; i < (int64_t)l->columns * r->n; i++)
-      to[i] = c ? value_at(c->states + i * r->stride, r->order, time) : l->y[i];
+      to[i] = v ? value_at(v->of_states + i * r->stride, r->order, time) : l->y[i];
   }
 }
 
 /* Step of columns and state from an expansion; 0 where it is too short. */
-static double taylor_step(Run *r, Leg *l, Slopes *g, Columns *c) {
-  Expansion *e = &r->e;
+static double taylor_step(Run *r, Leg *l, Slopes *g) {
+  const Expansion *e = &r->e;
+  const Variation *v = g->v;
+  int64_t states = (int64_t)r->n * r->stride, series = (int64_t)r->width * r->stride;
   if (!e->finite) return 0;
   measure_slopes(r, e, g, 0);
   for (int k = 0; k < l->columns; k++) {
-    Expansion d = column_of(r, c, k, l->y + k * r->n);
-    column_series(r, e, &d, l, k, g, c, r->order);
+    begin_column(r, l, g, k);
+    column_series(r, e, g, r->order);
+    memcpy(v->of_states + k * states, v->states, sizeof(double) * states);
+    memcpy(v->of_series + k * series, v->series, sizeof(double) * series);
   }
   double h = state_step(r, e);
-  h = smaller(h, column_step(r, l, c, 0, l->starts)); /* those by the start, those by parameters */
-  h = smaller(h, column_step(r, l, c, l->starts, l->columns - l->starts));
+  h = smaller(h, column_step(r, l, v, 0, l->starts)); /* those by the start, those by parameters */
+  h = smaller(h, column_step(r, l, v, l->starts, l->columns - l->starts));
   if (!(h > (l->hit < 0 ? FIXED_SHORTEST * length_of_leg(l) : 0))) return 0;
   if (l->hit >= 0) return near_step(r, l->hit, smaller(h, length_of_leg(l)));
   return h >= l->left ? l->left : l->left < 1.5 * h ? smaller(h, 0.5 * l->left) : h;
 }
 
 /* A Taylor step and what it leaves; its length, or 0. */
-static double make_taylor_step(Run *r, Leg *l, Slopes *g, Columns *c, double begun, int64_t *sample) {
-  double h = taylor_step(r, l, g, c);
+static double make_taylor_step(Run *r, Leg *l, Slopes *g, double begun, int64_t *sample) {
+  double h = taylor_step(r, l, g);
   if (!(h > 0)) return 0;
   record(r, l, way_of_leg(l) * h, begun, 0, r->x, r->unknowns);
-  read_columns(r, l, c, begun, h, sample);
-  move_columns(r, l, c, way_of_leg(l) * h);
+  read_columns(r, l, g->v, begun, h, sample);
+  move_columns(r, l, g->v, way_of_leg(l) * h);
   return h;
 }
 
 /* The same of an implicit step, which ends at the next sample. */
-static double make_implicit_step(Run *r, Leg *l, Slopes *g, Columns *c, double begun, int64_t *sample) {
+static double make_implicit_step(Run *r, Leg *l, Slopes *g, double begun, int64_t *sample) {
   double most = *sample < l->samples ? smaller(l->left, l->sample_t[*sample] - begun) : l->left;
   double h = solve_step(r, l, most);
-  if (!(h > 0) || !move_implicit(r, l, g, c, h, begun)) return 0;
+  if (!(h > 0) || !move_implicit(r, l, g, h, begun)) return 0;
   read_columns(r, l, 0, begun, h, sample);
   return h;
 }
 
-static int carry(Run *r, Leg *l, Slopes *g, Columns *c) {
+static int carry(Run *r, Leg *l, Slopes *g) {
   double most = 0, size = 0;
   int64_t sample = 0;
   int order = r->order, is_implicit = 0;
@@ -123,13 +122,14 @@ static int carry(Run *r, Leg *l, Slopes *g, Columns *c) {
     r->order = at_end || (is_implicit && l->left > 0) ? 1 : order;
     expand(r, r->letter, r->x, r->unknowns, e);
     r->order = order;
+    if (step == 0 && land_state(r, g)) expand(r, r->letter, r->x, r->unknowns, e);
     for (int i = 0; i < r->s->dimension; i++)
       size = larger(fabs(e->states[(int64_t)i * r->stride + 1]) * length_of_leg(l), size);
     for (int i = 0; i < r->n; i++) l->end_rate[i] = e->states[(int64_t)i * r->stride + 1];
     if (!finite_all(l->end_rate, r->n)) return LEG_STUCK;
     if (step == 0) {
       memcpy(l->start_rate, l->end_rate, sizeof(double) * r->n);
-      land(r, l, g, c);
+      land(r, l, g);
     }
     if (l->hit < 0 ? l->left <= 0 : has_arrived(r, l->hit, &most)) {
       memcpy(l->end, r->x, sizeof(double) * r->n);
@@ -139,29 +139,16 @@ static int carry(Run *r, Leg *l, Slopes *g, Columns *c) {
     }
     double begun = length_of_leg(l) - l->left, h;
     if (is_implicit) {
-      h = make_implicit_step(r, l, g, c, begun, &sample);
+      h = make_implicit_step(r, l, g, begun, &sample);
       is_implicit = h > 0;
     } else {
-      h = make_taylor_step(r, l, g, c, begun, &sample);
+      h = make_taylor_step(r, l, g, begun, &sample);
       if (!(h > 0)) return LEG_STUCK;
       is_implicit = step % LOOK_AGAIN == LOOK_AGAIN - 1 && is_step_held(r, l, h);
     }
     l->left = h == l->left ? 0 : l->left - h;
   }
   return LEG_STUCK;
-}
-
-static size_t place_columns(const Run *r, const Leg *l, Columns *c, char *base, size_t used) {
-  size_t count = l->columns, n = r->n, w = r->width, stride = r->stride, inputs = moving_size(r);
-  c->h = DOUBLES(count * r->m);
-  c->states = DOUBLES(count * n * stride);
-  c->series = DOUBLES(count * w * stride);
-  c->sum = DOUBLES(n + 3 * w);
-  c->push = DOUBLES((n + 3 * w) * stride);
-  c->of = place(base, &used, sizeof(double *), inputs);
-  c->terms = INTEGERS(inputs);
-  c->late = LETTERS(inputs);
-  return used;
 }
 
 /* Begin at the start of a leg; parameters that are those of the last one are known. */
@@ -174,34 +161,26 @@ static void begin_at(Run *r, const Leg *l) {
   r->prepared = 1;
 }
 
-/* Room for columns, rows and slopes. */
-static size_t place_leg(const Run *r, const Leg *l, Slopes *g, Columns *c, Rows *b, char *base) {
-  size_t used = place_slopes(r, g, base, 0);
-  if (c) used = place_columns(r, l, c, base, used);
-  return b ? place_rows(r, b, base, used) : used;
-}
-
 /* Carry states and columns of legs with as many columns to their ends, where gradients of events are taken. Their steps
  * go one after the other into the room of the first. The number of the leg that is not done, or -1. */
 int64_t carry_legs(Run *r, Leg *l, int64_t count) {
   int64_t room = l->step_room, used = 0, failed = -1;
   double *begin = l->steps;
   Slopes g;
-  Columns c;
-  Rows rows;
-  char *memory = calloc(place_leg(r, l, &g, &c, &rows, 0), 1);
+  Variation v;
+  char *memory = calloc(place_variation(r, l->columns, &g, &v, 0), 1);
   if (!memory) { l->status = LEG_STUCK; return 0; }
-  place_leg(r, l, &g, &c, &rows, memory);
+  place_variation(r, l->columns, &g, &v, memory);
   for (int64_t i = 0; i < count && failed < 0; i++) {
     int64_t taken = used < room ? used : room;
     l[i].steps = room ? begin + taken * row_width(r) : 0;
     l[i].step_room = room - taken;
-    memset(c.h, 0, sizeof(double) * l->columns * r->m);
+    memset(v.h, 0, sizeof(double) * l->columns * r->m);
     begin_at(r, l + i);
     if (i == 0) begin_slopes(r, &g);
-    l[i].status = carry(r, l + i, &g, &c);
+    l[i].status = carry(r, l + i, &g);
     if (l[i].status != LEG_DONE) failed = i;
-    else if (l[i].gradient) event_gradient(r, l + i, &g, &rows);
+    else if (l[i].gradient) event_gradient(r, l + i, &g);
     used += l[i].step_count;
   }
   free(memory);
@@ -213,11 +192,11 @@ int64_t carry_legs(Run *r, Leg *l, int64_t count) {
 int32_t pull_row(Run *r, Leg *l) {
   int64_t sample = l->samples;
   Slopes g;
-  Rows c;
-  char *memory = calloc(place_leg(r, l, &g, 0, &c, 0), 1);
+  Variation v;
+  char *memory = calloc(place_variation(r, 0, &g, &v, 0), 1);
   if (!memory) return LEG_STUCK;
-  place_leg(r, l, &g, 0, &c, memory);
-  c.p = l->by_parameters;
+  place_variation(r, 0, &g, &v, memory);
+  v.p = l->by_parameters;
   begin_at(r, l);
   begin_slopes(r, &g);
   int status = begin_leg(r, l) ? LEG_DONE : LEG_NOT_UNIQUE;
@@ -225,7 +204,7 @@ int32_t pull_row(Run *r, Leg *l) {
     const double *row = l->steps + s * row_width(r);
     if (row[2] < 0) continue; /* a stage */
     if (row[2] > 0) {
-      if (!pull_implicit(r, l, &g, &c, row, &sample)) status = LEG_STUCK;
+      if (!pull_implicit(r, l, &g, row, &sample)) status = LEG_STUCK;
       continue;
     }
     if (s == 0) begin_leg(r, l);
@@ -234,8 +213,8 @@ int32_t pull_row(Run *r, Leg *l) {
     memcpy(r->unknowns, row + 3 + r->n, sizeof(double) * r->width);
     lay_out(r, r->letter, &r->now);
     expand(r, r->letter, r->x, r->unknowns, &r->e);
-    pull_step(r, l, &g, &c, row[0], row[1], &sample);
-    if (s == 0) pull_land(r, l, &g, &c);
+    pull_step(r, l, &g, row[0], row[1], &sample);
+    if (s == 0) pull_land(r, l, &g);
   }
   for (; sample > 0; sample--)
     for (int i = 0; i < r->n; i++) l->row[i] += l->at_samples[(sample - 1) * r->n + i];

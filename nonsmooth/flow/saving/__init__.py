@@ -11,36 +11,22 @@ import dataclasses
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import FilippovSystem, LiftedSwitch, NonsmoothError, OptionError, instruction_form
+from ...model import FilippovSystem, NonsmoothError, OptionError, instruction_form
+from ...model.schema import CLASSES, Validator, savable
+from ..status import Status
 from . import archive, files
-from .schema import Schema, Validator
-from .status import Status
 
-_FORMAT = 3
-_FIELDS: dict[str, type[Any]] = {}
-_SCHEMAS: dict[type[Any], Schema] = {}
-C = TypeVar("C", bound=type[Any])
+_FORMAT = 4
 
 #: Longest axis of an array; one beside an axis of length zero costs nothing else.
 _LONGEST = 1 << 48
-
-
-def savable(*, check: Callable[[Any], None] | None = None, **shapes: str) -> Callable[[C], C]:
-    """Register a dataclass whose instances may be part of a saved result, with the shapes of its fields."""
-    # How shapes are written is in ``schema.py``; ``check`` raises ValueError for what they cannot say.
-
-    def register(cls: C) -> C:
-        _FIELDS[cls.__name__], _SCHEMAS[cls] = cls, Schema(shapes, check)
-        return cls
-
-    return register
 
 
 class Savable:
@@ -165,7 +151,7 @@ class _Writer:
         if isinstance(value, Mapping):
             return {"mapping": [[self.tree(k), self.tree(v)] for k, v in value.items()]}
         name = type(value).__name__
-        if name in _FIELDS and dataclasses.is_dataclass(value):
+        if name in CLASSES and dataclasses.is_dataclass(value):
             fields = dataclasses.fields(value)
             return {
                 "of": name,
@@ -218,13 +204,10 @@ def _read(path: str | bytes | os.PathLike[Any]) -> Any:
     reader = _Reader(rows)
     systems = [instruction_form.read_system(reader.value(s)) for s in head["systems"]]
     reader.systems = systems
-    validator = Validator(_SCHEMAS)
-    for switch in (switch for system in systems for switch in system.lifted):
-        validator.require(switch)
     result = reader.value(head["result"])
     if not isinstance(result, Savable):
         raise ValueError(f"a {type(result).__name__} is no result")
-    validator.require(result)
+    Validator().require(result)
     return result
 
 
@@ -255,7 +238,7 @@ class _Reader:
             case {"system": int(number), **rest} if not rest and number >= 0:
                 return self.systems[number]
             case {"of": str(name), "fields": dict(fields), **rest} if not rest:
-                return self._object(_FIELDS[name], fields)
+                return self._object(CLASSES[name], fields)
         raise ValueError(f"{', '.join(map(repr, tree))} in the tree")
 
     def _array(self, kind: str, start: int, shape: list[Any]) -> NDArray[Any]:
@@ -275,6 +258,3 @@ class _Reader:
         if {*fields} != {field.name for field in dataclasses.fields(cls)}:
             raise ValueError(f"a {cls.__name__} with other fields")
         return cls(**{name: self.value(part) for name, part in fields.items()})
-
-
-savable()(LiftedSwitch)

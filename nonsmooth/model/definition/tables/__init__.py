@@ -1,0 +1,1 @@
+"""Tables: piecewise polynomials in expressions, and the systems that follow from them."""

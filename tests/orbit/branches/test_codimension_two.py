@@ -1,0 +1,192 @@
+"""Curves of bifurcations end at points of codimension two known in closed form, from which others leave.
+
+CT1, CT5 and CT7 of ``tests/cases/orbits_2.json``; the other rows are of closed form too.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.orbit import BifurcationCurve, BranchEnd
+from tests.orbit.periodic_cases import symbols
+
+_FILE = Path(__file__).parents[2] / "cases" / "orbits_2.json"
+CASES = {case["id"]: case["values"] for case in json.loads(_FILE.read_text())}
+x, y, t, s, a, b = symbols("x y t s a b")
+
+#: Values and residual of a curve: the parameters are its columns.
+Known = dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]]
+
+
+def forced(m: float, amplitude: float) -> ns.FilippovSystem:
+    """CT1 and CT4, with the parameters m and A as a and b."""
+    drive = a + b * ca.cos(t) - x / 2
+    given: dict[Any, float] = {a: m, b: amplitude}
+    above, below = [drive - 1], [drive + 1]
+    return ns.FilippovSystem([x], surface=x, above=above, below=below, time=t, parameters=given)
+
+
+def repeated(rate: ca.SX, start: Any, **values: float) -> ns.FilippovSystem:
+    """One flight from s = -1 to 1 with its landings, made periodic by a reset."""
+    reset = ns.Reset(s - 1, [start, -1.0], direction=1)
+    given = {a: values["a"], b: values["b"]}
+    return ns.FilippovSystem(
+        [x, s], surface=x, above=[rate, 1], below=[5, 1], parameters=given, resets=[reset]
+    )
+
+
+def circle(mu: float, radius: float) -> ns.FilippovSystem:
+    """CT7, with the parameters mu and a as a and b."""
+    w = a - (ca.sqrt(x**2 + y**2) - b) ** 2
+    above = [x * w - y, y * w + x]
+    given = {a: mu, b: radius}
+    return ns.FilippovSystem([x, y], surface=1 - x, above=above, below=[-3, 0], parameters=given)
+
+
+CUBIC, RISING = b - 3 * s**2, a + b * s + s**3
+GRAZING: Known = {"grazing-sliding": lambda p, q: p - 2 * (np.maximum(q, 0) / 3) ** 1.5}
+ADDING: Known = {"adding-sliding": lambda p, q: p + 2 * (np.maximum(-q, 0) / 3) ** 1.5}
+LINE: Known = {"adding-sliding": lambda p, q: np.abs(p) - np.abs(q - 1)}
+LANDING = "landing at a degenerate tangency of"
+ONE = float(CASES["CT1"]["A"])
+
+#: System, guess, free parameter, event, the curve, bounds, the point, its kind, the curves that leave it.
+ROWS = {
+    "CT1": (
+        forced(0.3, 2.0), [0.0], "a", LINE, [(-3, 3), (0.5, 4)], (1 - ONE, ONE),
+        f"{LANDING} the other field", {"switching-sliding": 1, "crossing-sliding": 1},
+    ),
+    "CT4": (
+        forced(0.05, 0.9), [0.0], "a", LINE, [(-3, 3), (0.05, 4)], (0.0, 1.0),
+        "adding-sliding with adding-sliding", {"adding-sliding": 3},
+    ),
+    "CT5": (
+        repeated(CUBIC, 1 + a - b, a=0.05, b=0.12), [1.0, -1.0], "a", GRAZING,
+        [(-0.3, 0.3), (-0.5, 0.5)], (0.0, 0.0), f"{LANDING} its own field", {"adding-sliding": 1},
+    ),
+    "CT5 from the other curve": (
+        repeated(CUBIC, 1 + a - b, a=-0.1, b=-0.03), [1.0, -1.0], "b",
+        {"adding-sliding": lambda p, q: q}, [(-0.3, 0.3), (-0.5, 0.5)], (0.0, 0.0),
+        f"{LANDING} its own field", {"grazing-sliding": 1},
+    ),
+    "CT7": (
+        circle(0.005, 0.9), [-0.97, 0.0], "a", {"grazing-sliding": lambda p, q: p - (1 - q) ** 2},
+        [(-0.05, 0.1), (0.7, 1.3)], (0.0, 1.0), "grazing-sliding with fold", {"fold": 1},
+    ),
+    "CT7 from the fold": (
+        circle(0.005, 0.9), [-0.97, 0.0], "a", {"fold": lambda p, q: p},
+        [(-0.05, 0.1), (0.7, 1.3)], (0.0, 1.0), "fold with grazing-sliding", {"grazing-sliding": 2},
+    ),
+    "CT8": (
+        repeated(RISING, 0.05, a=-0.1, b=-0.27), [0.05, -1.0], "a", ADDING,
+        [(-0.5, 0.5), (-0.6, 0.3)], (0.0, 0.0), "exit at a degenerate tangency",
+        {"grazing-sliding": 1},
+    ),
+    "CT8 from the other curve": (
+        repeated(RISING, 0.05, a=-0.1, b=-0.27), [0.05, -1.0], "a",
+        {"grazing-sliding": lambda p, q: p}, [(-0.5, 0.5), (-0.5, 0.3)], (0.0, 0.0),
+        "exit at a degenerate tangency", {"adding-sliding": 1},
+    ),
+}  # fmt: skip
+
+
+def assert_real(curve: BifurcationCurve) -> None:
+    """No point of a curve violates a guard."""
+    virtual = [k for k in range(len(curve)) if curve.solution(k).is_virtual]
+    assert not virtual, (curve, virtual)
+
+
+_FAST = ("CT1", "CT4", "CT5", "CT7")
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in _FAST else pytest.param(name, marks=pytest.mark.slow) for name in ROWS]
+)
+def test_curves_end_where_others_leave(name: str) -> None:
+    system, guess, free, known, bounds, values, kind, leaving = ROWS[name]
+    orbit = ns.periodic_orbit(system, ns.simulate(system, guess, 60.0))
+    branch = ns.continue_orbit(orbit, free, bounds=bounds["ab".index(free)])
+    ((event_kind, residual),) = known.items()
+    event = next(e for e in branch.events if e.kind == event_kind)
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=bounds, step=0.05)
+    assert_real(curve)
+    assert np.abs(residual(*curve.values.T)).max() < 1e-10
+    point = next(p for p in curve.special if p.kind == kind)
+    assert np.abs(np.abs(point.values) - np.abs(values)).max() < 1e-9
+    if not name.startswith("CT7"):
+        assert BranchEnd.EVENT in curve.ends
+    found = ns.continue_bifurcation(point, ("a", "b"), bounds=bounds, step=0.05)
+    kinds = [one.kind for one in found]
+    assert {one: kinds.count(one) for one in kinds} == leaving
+    every = LINE | GRAZING | ADDING if name.startswith("CT") else known
+    for one in found:
+        assert_real(one)
+        assert len(one) > 5 and np.abs(one.values[0] - point.values).max() < 1e-15
+        closed = known if one.kind == event_kind else _CLOSED.get(name, every)
+        if one.kind in closed:
+            assert np.abs(closed[one.kind](*one.values.T)).max() < 1e-10, one
+
+
+#: Curves that leave and are of another kind than the one followed first.
+_CLOSED: dict[str, Known] = {
+    "CT1": {},
+    "CT5": {"adding-sliding": lambda p, q: q},
+    "CT7": {"fold": lambda p, q: p},
+    "CT7 from the fold": {"grazing-sliding": lambda p, q: p - (1 - q) ** 2},
+    "CT8": {"grazing-sliding": lambda p, q: p},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "key", "k"),
+    [("crossing-sliding", "crossing-sliding (landing at t = pi + s, s < 0), s = -0.3, -0.1: (A, m)", k) for k in (0, 1)]
+    + [("switching-sliding", "switching-sliding (s > 0), s = 0.1, 0.3: (A, m)", k) for k in (0, 1)],
+)  # fmt: skip
+def test_curves_beside_a_degenerate_landing(kind: str, key: str, k: int) -> None:
+    """A curve that is cut off at a value of A ends at the m of the case."""
+    amplitude, m = (float(v) for v in CASES["CT1"][key][k])
+    bounds = [(m, 3.0), (1.2, 4.0)] if kind == "crossing-sliding" else [(-3, 3), (1.2, amplitude)]
+    system = forced(0.3, 2.0)
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0], 60.0))
+    event = next(
+        e for e in ns.continue_orbit(orbit, "a", bounds=(-2.5, 2.5)).events if e.parameter > 0.5
+    )
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=[(-3, 3), (1.2, 4.0)])
+    point = next(p for p in curve.special if p.kind.startswith(LANDING))
+    found = ns.continue_bifurcation(point, ("a", "b"), bounds=bounds)
+    (one,) = (one for one in found if one.kind == kind)
+    assert np.abs(one.values[-1] - [m, amplitude]).max() < 1e-11
+
+
+def test_boundary_equilibria_meet_the_fold() -> None:
+    """CT6: x = +-sqrt(mu) of x' = mu - x^2 on x = a: boundary where mu = a^2, fold mu = 0 for a < 0 only."""
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=x - b,
+        above=[a - x**2, -2 * y],
+        below=[1, -y],
+        parameters={a: 0.25, b: -0.3},
+    )
+    box = [(-0.5, 0.5), (-0.9, 0.9)]
+    branch = ns.continue_equilibrium(system, [0.5, 0], "a", bounds=(-0.5, 0.5))
+    boundary, fold = sorted(branch.events, key=lambda e: e.kind)
+    for event, other, count in ((boundary, "fold", 1), (fold, "boundary equilibrium", 2)):
+        curve = ns.continue_bifurcation(event, ("a", "b"), bounds=box)
+        point = next(p for p in curve.special if p.kind == "boundary saddle-node")
+        assert np.abs(point.values).max() < 1e-12
+        assert [p.kind for p in curve.special] == ["boundary saddle-node"]  # no neutral saddle
+        found = ns.continue_bifurcation(point, ("a", "b"), bounds=box)
+        assert [one.kind for one in found] == [other] * count
+        for one in (curve, *found):
+            m, edge = one.values.T
+            assert np.abs(m if one.kind == "fold" else m - edge**2).max() < 1e-12
+            assert one.kind != "fold" or edge.max() < 1e-9

@@ -16,7 +16,7 @@ from functools import cached_property, reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, DegenerateError
+from ...model import Array, ConvergenceError, DegenerateError
 from ..runs.legs import integrate_leg, leg_name
 from ..runs.saltation import passages, saltations
 from .boundary_value_problem import BoundaryProblem, Evaluation, jacobian_indices
@@ -95,6 +95,13 @@ class Multipliers:
     def error(self) -> float:
         """Error of the multipliers, relative to those beyond 1: by the 1 of the flow and by transposed factors."""
         return math.nan if self.refusal else max(self._carried[1], self._product.error)
+
+    @property
+    def repeats(self) -> bool:
+        """Whether an autonomous orbit has the multiplier 1 twice, as in a family of orbits."""
+        if self.refusal or self.problem.system.time_dependent:
+            return False
+        return bool((np.abs(self.logarithms) <= max(_NEUTRAL, 10.0 * self.error)).any())
 
     @property
     def stability(self) -> str:
@@ -183,7 +190,10 @@ class Multipliers:
         while True:
             parts, x = list[tuple[Array, Array]](), self.at.starts[i]
             for _ in range(count):
-                flow = integrate_leg(problem.system, leg, x, duration / count, self.p)
+                try:
+                    flow = integrate_leg(problem.system, leg, x, duration / count, self.p)
+                except ConvergenceError:  # rounding of the parts leads it astray
+                    return [(whole, self.at.flows.rate[i])]
                 x, part = flow.end[:n], np.zeros_like(whole)
                 part[: len(flow.by_start)] = flow.by_start * units
                 parts.append((part, flow.rate))

@@ -172,7 +172,7 @@ static int vanishing(Run *r, const double *near, int32_t *which) {
   int count = 0;
   surface_values(r, r->x);
   for (int i = 0; i < r->n; i++) own[i] = 4 * near[i] + ON_SURFACE * (size_of_state(r, i) + fabs(r->x[i])); /* rates may jump */
-  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, own, 1, change);
+  kept_sums(r, own, change);
   for (int i = 0; i < r->m; i++) {
     int small = has_law(r, i, SURFACE_LAW) && fabs(r->rates[i]) <= change[i], first = element(r, i)->lower;
     for (int k = first; k < first + degree_of(r, i) - 1; k++) small &= fabs(r->rates[k]) <= change[k];

@@ -6,6 +6,7 @@
  */
 #ifndef ON_DEVICE
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -176,6 +177,15 @@ static void bernstein(double *b, int n) {
     for (int i = n; i >= level; i--) b[i] += b[i - 1];
 }
 
+/* Bernstein coefficients on the left half, and in place of b those on the right one. */
+static inline void halve(double *b, int n, double *left) {
+  left[0] = b[0];
+  for (int level = n; level > 0; level--) {
+    for (int i = 0; i < level; i++) b[i] = 0.5 * (b[i] + b[i + 1]);
+    left[n - level + 1] = b[0];
+  }
+}
+
 /* First root on (lo, hi] given Bernstein coefficients there; -1 if none. */
 static double first_in(const double *c, int n, double *b, double lo, double hi, int depth) {
   if (b[0] <= 0) return polish_late(c, n, lo, hi);
@@ -192,11 +202,7 @@ static double first_in(const double *c, int n, double *b, double lo, double hi, 
   }
   if (depth == DEPTH) return b[n] <= 0 ? hi : -1;
   double left[P + 1], mid = 0.5 * (lo + hi);
-  left[0] = b[0];
-  for (int level = n; level > 0; level--) {
-    for (int i = 0; i < level; i++) b[i] = 0.5 * (b[i] + b[i + 1]);
-    left[n - level + 1] = b[0];
-  }
+  halve(b, n, left);
   double x = first_in(c, n, left, lo, mid, depth + 1);
   return x >= 0 ? x : first_in(c, n, b, mid, hi, depth + 1);
 }

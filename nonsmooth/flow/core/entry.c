@@ -63,8 +63,8 @@ static size_t place_run(Run *to, char *base) {
   used = place_layout(&to->now, base, used, to->width, to->guards);
   used = place_expansion(&to->e, base, used, to);
   used = place_expansion(&to->trial, base, used, to);
-  Continuation *each[] = {&to->chosen, &to->one, &to->first, &to->rest, &to->found};
-  for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, to->width, to->guards);
+  used = place_continuation(&to->chosen, base, used, to->width, to->guards);
+  used = place_continuation(&to->found, base, used, to->width, to->guards);
   used = place_decision(to, base, used);
   used = place_instant(&to->instant, base, used, s);
   used = place_equations(to, base, used);
@@ -165,29 +165,17 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->instant.tied = -1;
   memset(r->instant.passing, 0, s->rules.atoms);
   memset(r->instant.unmet, 0, s->rules.triggers);
-  memset(r->kinds, 0, sizeof r->kinds);
-  r->step_count = r->implicit_count = r->event_count = r->segment_steps = r->history = r->hits = r->kept = 0;
-  r->itinerary = r->active_count = r->several_count = 0;
-  r->length = r->shortened = 0;
-  r->held_steps = r->wants_program = 0;
-  r->held_length = 0;
-  r->over = 0;
+  memset(&r->since, 0, offsetof(Run, past) - offsetof(Run, since));
   end_implicit(r);
   r->hold = INFINITY;
   r->begun = t;
   r->t = t.high;
   r->t_low = t.low;
-  r->since = 0;
   for (int i = 0; i < r->m; i++) { r->speed[i] = INFINITY; r->has_roots |= element(r, i)->power > 0; }
   r->limit = r->at_t = NAN;
   for (int i = 0; i < r->n; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
-  r->met = (Met){0};
-  r->repelling = 0;
   r->reason = NO_REASON;
-  r->where = 0;
-  r->facts = 0;
-  r->t_error = 0;
   r->dependent = r->turned_mode = -1;
   r->segment_mode = r->due_impact = r->length_mode = -1;
 }
@@ -270,24 +258,6 @@ static void keep(Run *r, const Batch *b, int64_t i) {
   if (b->at_x) { memcpy(b->at_x + i * nd, r->at_x, nd * sizeof(double)); b->at_t[i] = r->at_t; }
   b->totals[0] += r->step_count;
   b->totals[1] += r->event_count;
-}
-
-/* Run a batch, ``budget`` steps of it at most; 0, or why something is left for another call. ``next`` is zero
- * before the first, twice the number of runs done after it, and one more within a run. */
-int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8_t *start_mode, int64_t budget) {
-  static const Output none;
-  for (; *next / 2 < b->count; *next += 1) {
-    int64_t k = *next / 2, i = b->which ? b->which[k] : k;
-    if (*next % 2 == 0) {
-      sample_into(r, b, i);
-      run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, start_mode, b->t0, 0);
-    }
-    *next |= 1;
-    int status = go_on(r, &budget);
-    if (status == RUNNING || status == NEEDS_PROGRAM) return status;
-    keep(r, b, i);
-  }
-  return 0;
 }
 
 /* Steps of runs that are lanes' between them ------------------------------------------------------- */
@@ -478,31 +448,43 @@ static void step_left(Run *r, const Batch *b, const Options *o, int64_t i, Left 
   b->status[i] = HAND_OVER;
 }
 
-/* Continue the runs of a batch whose starts are records of ``width`` words that a card left: for a step, so that
- * those with the status HAND_OVER go on from their records, or to their ends, ``budget`` steps at most. ``next`` and
- * the result as in run_many. */
-int run_left(Run *r, int64_t *next, const Batch *b, const Options *o, int64_t *records, int64_t width, int to_end,
-             int64_t budget) {
+/* Run a batch, ``budget`` steps of it at most, from records of ``width`` words that a card left, where they have begun, or
+ * none; 0, or why something is left for another call. ``next`` is zero before the first, twice the number of runs done
+ * after it, and one more within a run. */
+static int run_all(Run *r, int64_t *next, const Batch *b, const Options *o, const int8_t *start_mode, int64_t *records,
+                   int64_t width, int64_t budget) {
   static const Output none;
   for (; *next / 2 < b->count; *next += 1) {
-    int64_t i = *next / 2;
-    Left *left = (Left *)(records + i * width);
-    if (!to_end) {
-      if (--budget < 0) return 1;
-      step_left(r, b, o, i, left);
-      *next |= 1;
-      continue;
-    }
-    if (*next % 2 == 0 && left->begun) {
+    int64_t k = *next / 2, i = b->which ? b->which[k] : k;
+    Left *left = records ? (Left *)(records + i * width) : 0;
+    if (*next % 2 == 0 && !records) sample_into(r, b, i);
+    if (*next % 2 == 0 && left && left->begun) {
       Recent past[HISTORY];
       int8_t letter, side[r->s->stops + 1];
       Suspended m = suspended_of(r, left, past, &letter, side);
       take(r, b, o, i, &m);
       read_kept(r, b, i);
-    } else if (*next % 2 == 0) run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, 0, b->t0, 0);
+    } else if (*next % 2 == 0) run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, start_mode, b->t0, 0);
     *next |= 1;
-    if (go_on(r, &budget) == RUNNING) return 1;
+    int status = go_on(r, &budget);
+    if (status == RUNNING || status == NEEDS_PROGRAM) return status;
     keep(r, b, i);
+  }
+  return 0;
+}
+
+int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8_t *start_mode, int64_t budget) {
+  return run_all(r, next, b, o, start_mode, 0, 0, budget);
+}
+
+/* Continue the runs that a card left: for a step, so that those with the status HAND_OVER go on from their records, or to
+ * their ends. */
+int run_left(Run *r, int64_t *next, const Batch *b, const Options *o, int64_t *records, int64_t width, int to_end,
+             int64_t budget) {
+  if (to_end) return run_all(r, next, b, o, 0, records, width, budget);
+  for (; *next / 2 < b->count; *next += 2) {
+    if (--budget < 0) return RUNNING;
+    step_left(r, b, o, *next / 2, (Left *)(records + *next / 2 * width));
   }
   return 0;
 }

@@ -35,7 +35,7 @@ static void look(Run *r, const double *x) {
   Instant *i = &r->instant;
   double *weight = r->vector;
   values_at(&s->atoms, x, r->p, r->atom_work);
-  for (int k = 0; k < r->n; k++) weight[k] = size_of_state(r, k) + fabs(x[k]);
+  weigh_state(r, x, weight);
   gradient_sums(r, &s->atoms, r->atom_work, s->rules.atoms, &s->atom_gradient, s->rules.atoms, weight, 1, i->noise);
   for (int a = 0; a < s->rules.atoms; a++) {
     i->value[a] = out_of(&s->atoms, r->atom_work, a);

@@ -33,6 +33,12 @@ static int is_idle(const Run *r, const int8_t *letter, int i) {
   return carried;
 }
 
+/* Make one group of those of two elements, unless one has none; it has the lower number. */
+static void join_groups(int32_t *group, int count, int i, int j) {
+  int a = group[i], b = group[j];
+  for (int q = 0; q < count && a >= 0 && b >= 0 && a != b; q++) if (group[q] == (a > b ? a : b)) group[q] = a < b ? a : b;
+}
+
 static int add_row(Layout *l, int kind, int index, int side) {
   int k = l->rows++;
   l->kind[k] = kind; l->index[k] = index; l->side[k] = side;
@@ -159,6 +165,25 @@ static void gradient_sums(const Run *r, const Values *t, const double *w, int fi
     double slope = fabs(out_of(t, w, first + k));
     if (slope < INFINITY || (!finite_only && slope == slope)) sum[g->row[k]] += slope * vector[g->column[k]];
   }
+}
+
+/* Sums over the states for rows of the layer at the point, and for functions that are kept, after surface_values. */
+static void layer_sums(const Run *r, const double *vector, double *sum) {
+  int first = 2 * r->width + r->s->slope.count;
+  gradient_sums(r, &r->s->point, r->point, first, &r->s->layer_gradient, r->width, vector, 1, sum);
+}
+static void kept_sums(const Run *r, const double *vector, double *sum) {
+  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, vector, 1, sum);
+}
+
+/* What rounding in a state is weighed with; times epsilon, rounding in the rows of the layer at it. */
+static void weigh_state(const Run *r, const double *x, double *near) {
+  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
+}
+static void layer_rounding(Run *r, const double *x, double *sum) {
+  double *near = r->vector + r->n + r->width; /* not where inputs are put together */
+  weigh_state(r, x, near);
+  layer_sums(r, near, sum);
 }
 
 static int first_of_factors(const Run *r) {

@@ -182,30 +182,33 @@ typedef struct {
   int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
   /* The time is t + t_low: that of an event is no number of its own where times are large. */
   Pair begun;
-  double t, t_low, since, limit, at_t;
+  double t, t_low, limit, at_t;
   const int8_t *remembered; /* letters from which elements with hysteresis go on, or none */
   Layout now; /* of the present mode */
-  Met met;
   Instant instant;
-  int32_t mode, status, reason, where, due_impact, falls, repelling, folded, passed; /* passed: the breakpoint */
-  int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history;
-  int32_t itinerary, segment_mode, prepared; /* prepared: whether the parameters are known, in lanes */
+  int32_t mode, status, reason, due_impact, falls, folded, passed; /* passed: the breakpoint */
+  int32_t segment_mode, length_mode, prepared; /* prepared: whether the parameters are known, in lanes */
+  /* Zero where a run begins, up to ``past``: held_steps are those in a row that a decay rate held; facts are about the
+   * decisions; t_error is the largest of what is ``hidden`` of events that move a state by more than the tolerance. */
+  double since, length, shortened, held_length, t_error;
+  int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history, hits, kept;
+  int32_t where, repelling, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
+  Met met;
   Happened past[HISTORY];
-  double size, time_size, length, shortened, held_length, hold; /* hold: the step's end before zeros of a guard that are not told apart */
-  int32_t over, length_mode, active_count, several_count, several[SEVERAL];
+  int32_t several[SEVERAL];
+  double size, time_size, hold; /* hold: the step's end before zeros of a guard that are not told apart */
   Expansion e, trial;
-  Continuation chosen, one, first, rest, found;
+  Continuation chosen, found;
   Decision *decision;
-  int32_t facts, dependent; /* about the decisions of a run; the last mode whose unknowns are not unique */
+  int32_t dependent; /* the last mode whose unknowns are not unique */
   int32_t turned_mode; /* the mode of start_mode, whose guards of stability begin with the signs ``turned`` */
   Output out;
-  int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
+  int64_t stamp, room; /* of the section, and samples kept: in the row of the results */
   const double *times, *read_at; /* times of samples in the row; times at which any run is read */
   int64_t read_count;
   double *sample_t, *sample_x;
   Equations equations;
-  double t_error; /* the largest of what is ``hidden`` of events that move a state by more than the tolerance */
-  int32_t shown, has_roots, held_steps, wants_program; /* held_steps: steps in a row that a decay rate held */
+  int32_t shown, has_roots;
   Implicit *implicit;
   const Expansion *expansion;
   void *arena;

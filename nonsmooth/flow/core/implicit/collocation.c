@@ -282,24 +282,88 @@ static void go_on_from(Collocation *m, int is_known) {
   m->end_jacobian = kept;
 }
 
+/* The equations of all stages, (A/h - J) dz = b, or their transpose: add those of a stage; 0 where they have no value. */
+static int add_stage(Collocation *m, int stage, const double *x, double h, int transposed, double *matrix) {
+  const Radau *t = m->method;
+  int n = m->n, size = t->s * n;
+  if (!m->jacobian_at(m->of, stage + 1, x, m->jacobian)) return 0;
+  for (int k = 0; k < n; k++) {
+    int64_t own = stage * n + k, row = transposed ? 1 : size, column = transposed ? size : 1;
+    for (int j = 0; j < t->s; j++) matrix[own * row + (j * n + k) * column] += t->slopes[stage * t->s + j] / h;
+    for (int l = 0; l < n; l++) matrix[own * row + (stage * n + l) * column] -= m->jacobian[k * n + l];
+  }
+  return 1;
+}
+
+/* Move columns of derivatives by the step whose stages are known: the exact derivatives of the discrete step, each stage
+ * with its own J. ``push`` gives the rates of all columns at a stage, ``apart`` numbers after one another. 0 where that
+ * is not possible. */
+static int move_through_stages(Collocation *m, double h, int64_t columns, double *y, void *with,
+                               void (*push)(void *with, int stage, const double *x, double *rates, int64_t apart)) {
+  int n = m->n, s = m->method->s, size = s * n, is_solved = 1;
+  double *matrix = calloc((int64_t)size * size + columns * size + n + size, sizeof(double));
+  if (!matrix) return 0;
+  double *change = matrix + (int64_t)size * size, *x = change + columns * size;
+  int32_t *pivot = (int32_t *)(x + n);
+  for (int i = 0; i < s && is_solved; i++) {
+    for (int k = 0; k < n; k++) x[k] = m->x[k] + m->z[i * n + k];
+    is_solved = add_stage(m, i, x, h, 0, matrix);
+    push(with, i, x, change + i * n, size);
+  }
+  is_solved = is_solved && factor_real(matrix, size, size - 1, pivot);
+  for (int64_t k = 0; k < columns && is_solved; k++) {
+    double *own = change + k * size;
+    solve_real(matrix, size, size - 1, pivot, own);
+    for (int i = 0; i < n; i++) y[k * n + i] += own[(s - 1) * n + i];
+  }
+  free(matrix);
+  return is_solved;
+}
+
 /* The fastest rate, renewed by products with the field's derivative. */
 static double fastest(Collocation *m, const double *jacobian, int pairs) {
   int n = m->n;
   double *v = m->fast, *next = m->work, rho = 0;
   for (int pass = 0; pass < pairs; pass++) {
-    double size = 0, grown = 0;
-    for (int i = 0; i < n; i++) size = larger(fabs(v[i]), size);
+    double size = largest_of(v, n);
     if (!(size > 0 && size < INFINITY)) for (int i = 0; i < n; i++) v[i] = 1 + 0.1 * i / n;
     else for (int i = 0; i < n; i++) v[i] /= size;
     for (int product = 0; product < 2; product++) {
-      for (int i = 0; i < n; i++) {
-        next[i] = 0;
-        for (int j = 0; j < n; j++) next[i] += jacobian[(int64_t)i * n + j] * v[j];
-      }
+      apply(jacobian, v, n, next);
       memcpy(v, next, sizeof(double) * n);
     }
-    for (int i = 0; i < n; i++) grown = larger(fabs(v[i]), grown);
-    rho = sqrt(grown);
+    rho = sqrt(largest_of(v, n));
   }
   return rho;
+}
+
+/* The part of the longest Taylor step that a decay rate allows, in units of its inverse. */
+static double longest_decay(double tol) { return 3 - 0.5 * log10(tol); }
+
+/* Steps anew, of about eight times the length of a Taylor step that a decay rate may hold; whether it does. */
+static int begin_lengths(Collocation *m, double h, double tol) {
+  m->h = EIGHTFOLD * h;
+  m->length = 0;
+  m->is_fresh = 0;
+  m->error = 1;
+  return tol > 0 && h * fastest(m, m->jacobian, 8) > HELD_PART * longest_decay(tol);
+}
+
+/* Write s coefficients after the first of series, for powers of the time. */
+static void write_powers(const Radau *t, const double *powers, int n, double h, int stride, double *series) {
+  double part = 1;
+  for (int k = 0; k < t->s; k++) {
+    part /= h;
+    for (int i = 0; i < n; i++) series[(int64_t)i * stride + k + 1] = powers[k * n + i] * part;
+  }
+  for (int i = 0; i < n; i++)
+    memset(series + (int64_t)i * stride + t->s + 1, 0, sizeof(double) * (stride - t->s - 1));
+}
+
+/* Coefficients after the first of series of n functions, by powers of the time, from their values at the stages less those
+ * at the start; room for as many powers is behind these. */
+static void interpolate(const Radau *t, double *values, int n, double h, int stride, double *series) {
+  double *powers = values + (int64_t)t->s * n;
+  powers_of(t, values, n, powers);
+  write_powers(t, powers, n, h, stride, series);
 }

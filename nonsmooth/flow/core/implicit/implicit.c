@@ -17,11 +17,14 @@ struct Implicit {
   void *arena;
 };
 
+/* Coefficients of a row of that program. */
+static int stride_of_implicit(const Run *r) { return r->s->implicit == &r->s->series ? r->stride : 1; }
+
 static size_t place_implicit(Implicit *m, const Run *r, char *base) {
   size_t n = r->n, w = r->width, s = m->c.method->s, used = place_collocation(&m->c, base, 0);
   m->unknowns = DOUBLES((s + 1) * w);
   m->guards = DOUBLES(2 * s * (w > (size_t)r->guards ? w : (size_t)r->guards));
-  m->program = DOUBLES(r->s->implicit ? series_room(r->s->implicit, 1) : 0);
+  m->program = DOUBLES(r->s->implicit ? series_room(r->s->implicit, stride_of_implicit(r)) : 0);
   m->layer = DOUBLES(w * n);
   m->by_unknown = DOUBLES(w * n);
   m->slope = DOUBLES(w * w);
@@ -41,6 +44,21 @@ static int rate_at_stage(void *of, int stage, const double *x, double *rate) {
   return finite_all(rate, r->n);
 }
 
+/* The field's derivative by differences, where no program has it: it only steers Newton's method. */
+static int differences(Run *r, int stage, const double *x, double *jacobian) {
+  int n = r->n;
+  double *rate = r->implicit->c.work, *moved = rate + n, *there = moved + n, most = largest_of(x, n);
+  if (!rate_at_stage(r, stage, x, rate)) return 0;
+  memcpy(there, x, sizeof(double) * n);
+  for (int k = 0; k < n; k++) {
+    there[k] = x[k] + sqrt(EPSILON) * larger(fabs(x[k]), ROOT_SHARE * most > 0 ? ROOT_SHARE * most : 1);
+    if (!rate_at_stage(r, stage, there, moved)) return 0;
+    for (int i = 0; i < n; i++) jacobian[i * n + k] = (moved[i] - rate[i]) / (there[k] - x[k]);
+    there[k] = x[k];
+  }
+  return finite_all(jacobian, n * n);
+}
+
 /* The field's derivative by the states, multipliers of what slides following them. */
 static int jacobian_at_stage(void *of, int stage, const double *x, double *jacobian) {
   Run *r = of;
@@ -51,11 +69,12 @@ static int jacobian_at_stage(void *of, int stage, const double *x, double *jacob
   const Entries *g = &r->s->derivatives;
   int n = r->n, w = r->width, slides = l->slides, size = moving_size(r), *where = r->pending;
   int first = n + 3 * w + r->s->rules.atoms + r->s->slope_outputs;
+  if (!g->count) return differences(r, stage, x, jacobian);
   for (int i = 0; i < w; i++) where[i] = -1;
   for (int i = 0; i < slides; i++) where[l->sliding[i]] = i;
   aim(r, l->letter, x, unknowns);
   set_inputs(r, x, held_of(r, l->letter), unknowns);
-  series_at(t, &t->values, 0, 1, r->input, m->program);
+  series_at(t, &t->values, 0, stride_of_implicit(r), r->input, m->program);
   memset(jacobian, 0, sizeof(double) * n * n);
   memset(m->layer, 0, sizeof(double) * slides * n);
   memset(m->by_unknown, 0, sizeof(double) * slides * n);
@@ -89,7 +108,7 @@ static int jacobian_at_stage(void *of, int stage, const double *x, double *jacob
 static void prepare_implicit(Run *r) {
   if (!r->implicit || !r->s->implicit) return;
   series_prepare(r->s->implicit, r->p, r->implicit->program);
-  pairs_begin(r->s->implicit->size, 1, r->begun, r->implicit->program);
+  pairs_begin(r->s->implicit->size, stride_of_implicit(r), r->begun, r->implicit->program);
 }
 
 /* Memory for implicit steps; 0 where there is none. */
@@ -125,23 +144,12 @@ static void end_implicit(Run *r) {
 
 /* Polynomials ------------------------------------------------------------------------------------------------ */
 
-/* Write s coefficients after the first of series, for powers of the time. */
-static void write_powers(const Radau *t, const double *powers, int n, double h, int stride, double *series) {
-  double part = 1;
-  for (int k = 0; k < t->s; k++) {
-    part /= h;
-    for (int i = 0; i < n; i++) series[(int64_t)i * stride + k + 1] = powers[k * n + i] * part;
-  }
-  for (int i = 0; i < n; i++)
-    memset(series + (int64_t)i * stride + t->s + 1, 0, sizeof(double) * (stride - t->s - 1));
-}
-
 /* The guards' series, through their values at the stages. */
 static void interpolate_guards(Run *r, Expansion *e, double h) {
   Implicit *m = r->implicit;
   const Radau *t = m->c.method;
   int n = r->n, s = t->s, w = r->width, rows = e->l.rows;
-  double *values = m->guards, *powers = values + (int64_t)s * rows, *x = m->c.work;
+  double *values = m->guards, *x = m->c.work;
   for (int i = 0; i < s; i++) {
     double *unknowns = m->unknowns + (i + 1) * w;
     for (int k = 0; k < n; k++) x[k] = e->states[(int64_t)k * r->stride] + m->c.z[i * n + k];
@@ -150,8 +158,7 @@ static void interpolate_guards(Run *r, Expansion *e, double h) {
     for (int row = 0; row < rows; row++)
       values[i * rows + row] = g[(int64_t)row * r->stride] - e->guards[(int64_t)row * r->stride];
   }
-  powers_of(t, values, rows, powers);
-  write_powers(t, powers, rows, h, r->stride, e->guards);
+  interpolate(t, values, rows, h, r->stride, e->guards);
 }
 
 /* Series of states, of unknowns and of guards. */
@@ -159,13 +166,12 @@ static void write_step(Run *r, Expansion *e, double h) {
   Implicit *m = r->implicit;
   const Radau *t = m->c.method;
   int n = r->n, s = t->s, w = r->width;
-  double *values = m->guards, *powers = values + (int64_t)s * w;
+  double *values = m->guards;
   write_powers(t, m->c.powers, n, h, r->stride, e->states);
   for (int i = 0; i < w; i++) e->series[(int64_t)i * r->stride] = r->unknowns[i];
   for (int i = 0; i < s; i++)
     for (int k = 0; k < w; k++) values[i * w + k] = m->unknowns[(i + 1) * w + k] - r->unknowns[k];
-  powers_of(t, values, w, powers);
-  write_powers(t, powers, w, h, r->stride, e->series);
+  interpolate(t, values, w, h, r->stride, e->series);
   interpolate_guards(r, e, h);
   e->end = m->c.end;
 }
@@ -196,18 +202,28 @@ static int guards_agree(Run *r, Expansion *e, double h) {
 
 /* A step ------------------------------------------------------------------------------------------------------ */
 
+/* Values and first coefficients of a mode. */
+static void expand_first(Run *r, const double *x, const double *unknowns, Expansion *e) {
+  int order = r->order;
+  r->order = 1;
+  expand(r, r->letter, x, unknowns, e);
+  r->order = order;
+}
+
+/* A step from the present state, of which an expansion is known. */
+static void begin_stages(Run *r, const Expansion *e) {
+  Implicit *m = r->implicit;
+  memcpy(m->c.x, r->x, sizeof(double) * r->n);
+  for (int k = 0; k <= m->c.method->s; k++) memcpy(m->unknowns + k * r->width, r->unknowns, sizeof(double) * r->width);
+  for (int i = 0; i < r->n; i++) m->c.start_rate[i] = e->states[(int64_t)i * r->stride + 1];
+}
+
 /* What a step begins with: first coefficients of guards, what is allowed, the field. */
 static int begin_step(Run *r, Expansion *e) {
   Collocation *m = &r->implicit->c;
-  int order = r->order;
-  r->order = 1;
-  expand(r, r->letter, r->x, r->unknowns, e);
-  r->order = order;
+  expand_first(r, r->x, r->unknowns, e);
   if (!e->finite) return 0;
-  memcpy(m->x, r->x, sizeof(double) * r->n);
-  for (int k = 0; k <= m->method->s; k++)
-    memcpy(r->implicit->unknowns + k * r->width, r->unknowns, sizeof(double) * r->width);
-  for (int i = 0; i < r->n; i++) m->start_rate[i] = e->states[(int64_t)i * r->stride + 1];
+  begin_stages(r, e);
   for (int i = 0; i < r->s->dimension; i++) m->weight[i] = r->o.atol + r->o.rtol * fabs(r->x[i]);
   return 1;
 }

@@ -1,8 +1,5 @@
 /* When steps are implicit: where a decay rate holds Taylor steps, and an implicit step costs less. */
 
-/* The part of the longest Taylor step that a decay rate allows, in units of its inverse. */
-static double longest_decay(const Run *r) { return 3 - 0.5 * log10(r->o.rtol); }
-
 static int can_collocate(const Run *r) {
   return r->o.method != METHOD_TAYLOR && !r->s->sets && !r->has_roots && !r->repelling && r->n <= MOST_STATES;
 }
@@ -28,10 +25,7 @@ static int is_implicit(Run *r) {
   if (!m || !(r->o.method == METHOD_STIFF || (r->mode < m->modes && m->known[r->mode]))) return 0;
   if (m->leg != r->event_count) {
     m->leg = r->event_count;
-    m->c.h = EIGHTFOLD * r->length;
-    m->c.length = 0;
-    m->c.is_fresh = 0;
-    m->c.error = 1;
+    begin_lengths(&m->c, r->length, 0);
     m->idle = 0;
   }
   return 1;
@@ -51,7 +45,7 @@ static void watch_decay(Run *r, const Expansion *e, double h) {
   Implicit *m = r->implicit;
   double last = 0, before = 0, limit;
   if (r->step_count % EVERY_STEP) return;
-  limit = HELD_PART * longest_decay(r);
+  limit = HELD_PART * longest_decay(r->o.rtol);
   for (int i = 0; i < r->s->dimension; i++) {
     const double *c = e->states + (int64_t)i * r->stride;
     last = larger(fabs(c[r->order]) / e->allowed[i], last);
@@ -78,7 +72,7 @@ static void watch_cost(Run *r, double h) {
   Implicit *m = r->implicit;
   if (h > 0 && r->o.method == METHOD_AUTO) {
     m->c.rho = fastest(&m->c, m->c.jacobian, 1);
-    m->idle = h * m->c.rho * cost_ratio(r) < longest_decay(r) ? m->idle + 1 : 0;
+    m->idle = h * m->c.rho * cost_ratio(r) < longest_decay(r->o.rtol) ? m->idle + 1 : 0;
   }
   m->steps++;
   if (h > 0 && m->idle < IDLE_STEPS) return;

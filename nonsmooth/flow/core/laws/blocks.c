@@ -538,11 +538,6 @@ static int solve_block_of_many(const Block *k, int certificate, int8_t *position
   if (k->span) return relax(k, found, work, pivot);
   int most = certificate >= UNIQUE ? 10000 : 20 + 4 * k->size;
   int solved = pivot_block(k, position, found, most, work, pivot) || lemke_block(k, found, work, pivot);
-  if (!solved && k->is_coupled) { /* those at a bound keep it */
-    for (int i = 0; i < k->size; i++)
-      position[i] = k->state[i] == AT_TOP ? TOP : k->state[i] == AT_BOTTOM ? BOTTOM : position[i];
-    solved = pivot_block(k, position, found, most, work, pivot);
-  }
   if (solved && certificate < UNIQUE) move_inside(k, found, work, pivot);
   return solved;
 }

@@ -137,32 +137,19 @@ static int strike_group(Run *r, const int32_t *own, int n, const Strike *of, dou
   return 1;
 }
 
-/* Make one group of those of two elements; whether they were two. */
-static int join_groups(int32_t *group, int count, int a, int b) {
-  if (a < 0 || b < 0 || a == b) return 0;
-  for (int q = 0; q < count; q++) if (group[q] == (a > b ? a : b)) group[q] = a < b ? a : b;
-  return 1;
-}
-
-/* Groups of contacts, of surfaces that they carry and of joints, that act on one another: of each its number. */
+/* Groups of contacts, of surfaces that they carry and of joints, that act on one another: of each element its number. */
 static int find_striking(Run *r, const int32_t *involved, int count, int32_t *group) {
   const Entries *slope = &r->s->slope;
-  int w = r->width, c = r->c, m = r->m, groups = 0, changed = 1;
+  int w = r->width, c = r->c, m = r->m, groups = 0;
   for (int i = 0; i < w; i++) group[i] = -1;
   for (int q = 0; q < count; q++) {
     group[m + involved[q]] = groups++;
     for (int i = 0; i < m; i++) if (r->s->carries[i * c + involved[q]] && group[i] < 0) group[i] = groups++;
   }
   for (int i = 0; i < m; i++) if (has_law(r, i, JOINT_LAW)) group[i] = groups++;
-  while (changed) {
-    changed = 0;
-    for (int e = 0; e < slope->count; e++) {
-      int i = slope->row[e], j = slope->column[e];
-      changed |= r->slope[i * w + j] != 0 && join_groups(group, w, group[i], group[j]);
-    }
-    for (int i = 0; i < m; i++)
-      for (int j = 0; j < c; j++) changed |= r->s->carries[i * c + j] && join_groups(group, w, group[i], group[m + j]);
-  }
+  for (int e = 0; e < slope->count; e++)
+    if (r->slope[slope->row[e] * w + slope->column[e]] != 0) join_groups(group, w, slope->row[e], slope->column[e]);
+  for (int i = 0; i < m; i++) for (int j = 0; j < c; j++) if (r->s->carries[i * c + j]) join_groups(group, w, i, m + j);
   return groups;
 }
 

@@ -99,8 +99,7 @@ static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b,
   held_of(r, d->base);
   for (int i = 0; i < k; i++) r->held[r->active[i]] = 0;
   error_scales(r, x, r->held, r->none);
-  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
-  gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
+  layer_rounding(r, x, r->small);
   for (int i = 0; i < r->n; i++) near[i] = fabs(x[i]);
   gradient_sums(r, &r->s->point, r->point, first_of_factors(r), &r->s->factor_gradient, w, near, 1, factor);
   read_joints(r, d);
@@ -224,14 +223,14 @@ static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
 /* Rounding of the states' coefficients, and of the rows of each order: what is zero at rest is not compared with
  * itself. */
 static void read_noise(Run *r, Decision *d) {
-  int k = d->count, w = r->width, all = r->kept_rows, first = 2 * w + r->s->slope.count;
-  double *ones = r->vector + r->n + w, *steep = r->small, *height = r->rates + all;
+  int k = d->count;
+  double *ones = r->vector + r->n + r->width, *steep = r->small, *height = r->rates + r->kept_rows;
   d->field = d->rate = 0;
   for (int i = 0; i < r->n; i++) ones[i] = unit_of_state(r, i);
   error_scales(r, r->x, r->held, r->none);
-  gradient_sums(r, &r->s->point, r->point, first, &r->s->layer_gradient, w, ones, 1, steep);
+  layer_sums(r, ones, steep);
   surface_values(r, r->x);
-  gradient_sums(r, &r->s->surfaces, r->heights, all, &r->s->surface_gradient, all, ones, 1, height);
+  kept_sums(r, ones, height);
   for (int i = 0; i < k; i++) {
     int own = d->own[i];
     double of = height[degree_of(r, own) > 1 ? element(r, own)->lower + degree_of(r, own) - 2 : own];
@@ -833,22 +832,25 @@ static int holds_its_own(const Run *r, int surface) {
   return 0;
 }
 
+/* The rate of h on one side of a surface, unknowns being aimed at, and rounding in it. */
+static double rate_on_side(Run *r, const int8_t *letter, int surface, int side, double *rounding) {
+  held_of(r, letter);
+  r->held[surface] = side;
+  error_scales(r, r->x, r->held, r->none);
+  layer_rounding(r, r->x, r->small);
+  *rounding = r->small[surface];
+  return layer_of(r, surface);
+}
+
 /* Both fields tangent to a surface at the present point, and the sliding field 0/0. */
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
   if (element(r, surface)->flags & CONTINUOUS || degree_of(r, surface) > 1 || !holds_its_own(r, surface)) return 0;
   if (r->s->joints) return 0;
-  double *near = r->vector + r->n + r->width; /* not where inputs are put together */
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(r->x[i]);
   for (int side = 1; side >= -1; side -= 2) {
-    held_of(r, letter);
-    r->held[surface] = side;
-    error_scales(r, r->x, r->held, r->none);
+    double rounding, rate = rate_on_side(r, letter, surface, side, &rounding);
     if (is_scaled(r, surface) && r->slope[surface * r->width + surface] != 0) return 0;
-    gradient_sums(r, &r->s->point, r->point, 2 * r->width + r->s->slope.count, &r->s->layer_gradient, r->width, near,
-                  1, r->small);
-    double scale = r->small[surface];
-    if (!(fabs(layer_of(r, surface)) <= (tolerance + TANGENT) * scale)) return 0; /* or zero everywhere */
+    if (!(fabs(rate) <= (tolerance + TANGENT) * rounding)) return 0; /* or zero everywhere */
   }
   return 1;
 }
@@ -856,19 +858,14 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
 /* One active surface whose rates of h on both sides decide, without series: crossing, entry, and exit where the
  * multiplier is known to pass its bound. The choice to r->chosen; 0 where it is not clear. */
 static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count) {
-  int own = r->active[0], w = r->width, exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
-  double rate[2], *near = r->vector + r->n + w; /* not where inputs are put together */
+  int own = r->active[0], exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
+  double rate[2], rounding;
   if (!has_law(r, own, SURFACE_LAW) || !r->s->affine || r->s->joints || is_scaled(r, own) || is_idle(r, letter, own)) return 0;
   if (known_count && !(exits && r->falls)) return 0;
   aim(r, letter, r->x, r->unknowns);
-  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(r->x[i]);
   for (int q = 0; q < 2; q++) {
-    held_of(r, letter);
-    r->held[own] = q ? 1 : -1;
-    error_scales(r, r->x, r->held, r->none);
-    gradient_sums(r, &r->s->point, r->point, 2 * w + r->s->slope.count, &r->s->layer_gradient, w, near, 1, r->small);
-    rate[q] = layer_of(r, own);
-    if (!(fabs(rate[q]) > (VANISHES + TANGENT) * r->small[own] && fabs(rate[q]) < INFINITY)) rate[q] = 0;
+    rate[q] = rate_on_side(r, letter, own, q ? 1 : -1, &rounding);
+    if (!(fabs(rate[q]) > (VANISHES + TANGENT) * rounding && fabs(rate[q]) < INFINITY)) rate[q] = 0;
   }
   if (exits) { /* the other side still leads onto the surface; the rate of this one is zero */
     chosen = known[0].side;
@@ -876,7 +873,7 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
   } else if (rate[0] * rate[1] > 0) chosen = rate[0] > 0 ? 1 : -1;
   else if (!(rate[0] > 0 && rate[1] < 0)) return 0;
   Layout *l = &r->trial.l;
-  memcpy(r->chosen.letter, letter, w);
+  memcpy(r->chosen.letter, letter, r->width);
   r->chosen.letter[own] = (int8_t)chosen;
   keep_carried(r, r->chosen.letter, r->chosen.unknowns);
   lay_out(r, r->chosen.letter, l);

@@ -14,8 +14,8 @@ static const double *surface_values(Run *r, const double *x) {
 /* Rounding in each of them, times epsilon, after surface_values. */
 static const double *surface_scales(Run *r, const double *x) {
   double *near = r->vector, *scale = r->rates + r->kept_rows;
-  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
-  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, near, 1, scale);
+  weigh_state(r, x, near);
+  kept_sums(r, near, scale);
   return scale;
 }
 

@@ -42,13 +42,12 @@ static void plain_rows(Run *r, int kind) {
 /* Slopes that make no difference but below rounding: those of resistances that are as good as none. */
 static void drop_small_slopes(Run *r, const double *x) {
   Equations *h = &r->equations;
-  int q = r->s->combined, w = r->width, first = 2 * w + r->s->slope.count;
-  double *near = r->vector + r->n + w, *of_y = r->small, *of_rates = of_y + w; /* not where inputs are put together */
-  for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
-  gradient_sums(r, &r->s->point, r->point, first, &r->s->layer_gradient, w, near, 1, of_y);
+  int q = r->s->combined, w = r->width;
+  double *of_y = r->small, *of_rates = of_y + w;
+  layer_rounding(r, x, of_y);
   plain_rows(r, RATE_ROWS);
   error_scales(r, x, r->none, r->none);
-  gradient_sums(r, &r->s->point, r->point, first, &r->s->layer_gradient, w, near, 1, of_rates);
+  layer_rounding(r, x, of_rates);
   for (int i = 0; i < q; i++)
     for (int j = 0; j < w; j++) {
       int row = h->own[i];

@@ -96,8 +96,8 @@ static int rests(const Run *r, const int8_t *letter) {
   return 0;
 }
 
-/* Modes that can continue, so far. */
-typedef struct { int strict, found, resting; } Tally;
+/* Modes that can continue, so far; the rank of the chosen one: 2 if no guard of it stays zero, 1 if something rests. */
+typedef struct { int strict, found, rank; } Tally;
 
 /* Whether a mode that continues, that of r->trial, has the motion of the first one: loads that are not determined may be
  * anywhere. It is kept if it is the first. */
@@ -109,21 +109,23 @@ static int is_found(Run *r, const Tally *t) {
   return t->strict && is_same_motion(r, first, own);
 }
 
-/* Count r->found, of r->trial. */
+/* Count r->found, of r->trial; the first of the highest rank is r->chosen. */
 static void count_found(Run *r, Tally *t) {
-  if (r->s->combined && r->found.strict && is_found(r, t)) return;
-  if (r->found.strict && t->strict++ == 0) copy_continuation(r, &r->one, &r->found);
-  if (r->found.strict && r->several_count < SEVERAL) r->several[r->several_count++] = r->trial.l.mode;
-  if (t->found++ == 0) copy_continuation(r, &r->first, &r->found);
-  if (rests(r, r->found.letter) && t->resting++ == 0) copy_continuation(r, &r->rest, &r->found);
+  int strict = r->found.strict, rank = strict ? 2 : rests(r, r->found.letter);
+  if (r->s->combined && strict && is_found(r, t)) return;
+  if (strict && r->several_count < SEVERAL) r->several[r->several_count++] = r->trial.l.mode;
+  if (!t->found || rank > t->rank) {
+    t->rank = rank;
+    copy_continuation(r, &r->chosen, &r->found);
+  }
+  t->strict += strict;
+  t->found++;
 }
 
-/* The one that continues to r->chosen; 0 where there is none, or more than one and the run ends. */
-static int choose_of(Run *r, const Tally *t) {
-  if (t->strict > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
-  if (!t->found || (!t->strict && t->found > 1 && !t->resting)) return 0;
-  copy_continuation(r, &r->chosen, t->strict ? &r->one : t->found == 1 ? &r->first : &r->rest);
-  return 1;
+/* Whether r->chosen continues; 0 where none does, or more than one and the run ends. */
+static int is_chosen(Run *r, const Tally *t) {
+  if (t->strict > 1) finish(r, NON_UNIQUE, AMBIGUOUS, 0);
+  return t->strict < 2 && t->found && (t->rank || t->found == 1);
 }
 
 /* Letters of the active elements by the number of a choice of those that are possible. */
@@ -477,7 +479,7 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
       if (continues(r, trial, known, known_count, &r->found)) count_found(r, &tally);
     }
   }
-  return r->status == RUNNING && (choose_of(r, &tally) || no_motion(r, letter));
+  return r->status == RUNNING && (is_chosen(r, &tally) || no_motion(r, letter));
 }
 
 /* The same where unknowns of the active elements enter nonlinearly. */

@@ -24,7 +24,7 @@ static double field_at_root(Run *r, int i, const double *x, int with_root, doubl
 static double near_root(Run *r, int i) {
   double *allowed = r->vector;
   for (int k = 0; k < r->n; k++) allowed[k] = k < r->s->dimension ? SAFETY * (r->o.atol + r->o.rtol * fabs(r->x[k])) : 0;
-  gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, allowed, 1, r->small);
+  kept_sums(r, allowed, r->small);
   return r->small[i];
 }
 
@@ -59,6 +59,12 @@ static double change_of_rate(Run *r, int i, double bare, const double *field) {
   return (field_at_root(r, i, x, 0, other) - bare) / time;
 }
 
+/* Put the state where the function of a surface has a value. */
+static void put_at(Run *r, int i, double height) {
+  int32_t which = i;
+  project_to(r, &which, 1, &height);
+}
+
 /* Whether a line would lead to the other side of another surface with a root: the field is not the same beyond it. */
 static int leads_beyond(Run *r, int i, const double *field, double dt) {
   double *x = r->at_root + r->n;
@@ -78,18 +84,16 @@ static int pass_balance(Run *r, int i, double bare, const double *field, double 
 
 /* Leave a surface whose h is hardly driven away yet, to where h has the size ``level``; 0 where it is not driven away. */
 static int grow_off_root(Run *r, int i, double rate, const double *bare, double level, double left) {
-  double change = change_of_rate(r, i, rate, bare), *with = r->at_root + 2 * r->n, own, dt;
-  int32_t which = i;
-  double height = r->letter[i] * level;
+  double change = change_of_rate(r, i, rate, bare), *with = r->at_root + 2 * r->n, own, dt, height = r->letter[i] * level;
   if (!(change * r->letter[i] > 0) || (rate * r->letter[i] < 0 && rate * rate > level * fabs(change))) return 0;
   memcpy(r->saved, r->x, sizeof(double) * r->n);
-  project_to(r, &which, 1, &height);
+  put_at(r, i, height);
   own = fabs(field_at_root(r, i, r->x, 1, with) - rate); /* what the root is there */
   memcpy(r->x, r->saved, sizeof(double) * r->n);
   dt = larger((own - fabs(rate)) / fabs(change), sqrt(2 * level / fabs(change)));
   if (leads_beyond(r, i, bare, dt)) return 0;
   if (!move_by(r, bare, smaller(dt, left))) return 1;
-  project_to(r, &which, 1, &height);
+  put_at(r, i, height);
   renote(r);
   return 1;
 }
@@ -127,9 +131,7 @@ static int approach_root(Run *r, int i, double h, double level, double left) {
   if (bare * side > 0 && degree_of(r, i) == 1 && fabs(h) <= level) {
     if (pass_balance(r, i, bare, with, left)) return 1;
     if (h * side <= 0 && r->t < r->o.t_end) { /* rounding has put it beyond */
-      int32_t which = i;
-      double height = side * level;
-      project_to(r, &which, 1, &height);
+      put_at(r, i, side * level);
       renote(r);
     }
     return 0;
@@ -189,7 +191,6 @@ static int rest_near_root(Run *r, int i) {
 static int is_driven_away(Run *r, int i, int side) {
   double *field = r->before, *with = r->at_root, terms = 0, level, bare, own;
   const Entries *g = &r->s->surface_gradient;
-  int32_t which = i;
   r->letter[i] = (int8_t)side;
   bare = field_at_root(r, i, r->x, 0, field);
   for (int k = 0; k < g->count; k++)
@@ -197,7 +198,7 @@ static int is_driven_away(Run *r, int i, int side) {
   level = side * near_root(r, i);
   if (fabs(bare) > VANISHES * terms || level == 0) return 0;
   memcpy(r->saved, r->x, sizeof(double) * r->n);
-  project_to(r, &which, 1, &level);
+  put_at(r, i, level);
   own = field_at_root(r, i, r->x, 1, with) - field_at_root(r, i, r->x, 0, field);
   memcpy(r->x, r->saved, sizeof(double) * r->n);
   return own * side > 0;

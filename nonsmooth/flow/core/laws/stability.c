@@ -11,28 +11,16 @@
 /* What a guard of stability is: the slope of one unknown, or determinants of a group. */
 enum { OF_ONE, OF_GROUP, OF_SUMS };
 
-/* Number of the group of each unknown that slides: those that act on one another, directly or not. */
+/* The group of each unknown that slides, of numbers below how many these are: those that act on one another, directly or
+ * not. */
 static int find_groups(const Run *r, Layout *l) {
-  int n = l->slides, w = r->width, count = 0;
-  int32_t *stack = r->pending;
-  for (int i = 0; i < n; i++) l->group[i] = -1;
-  for (int i = 0; i < n; i++) {
-    int top = 0;
-    if (l->group[i] >= 0) continue;
-    l->group[i] = count;
-    stack[top++] = i;
-    while (top) {
-      int at = stack[--top], own = l->sliding[at];
-      for (int j = 0; j < n; j++) {
-        int other = l->sliding[j];
-        if (l->group[j] >= 0 || (r->s->slope_output[own * w + other] < 0 && r->s->slope_output[other * w + own] < 0)) continue;
-        l->group[j] = count;
-        stack[top++] = j;
-      }
-    }
-    count++;
-  }
-  return count;
+  const int32_t *output = r->s->slope_output, *own = l->sliding;
+  int w = r->width;
+  for (int i = 0; i < l->slides; i++) l->group[i] = i;
+  for (int i = 0; i < l->slides; i++)
+    for (int j = 0; j < i; j++)
+      if (output[own[i] * w + own[j]] >= 0 || output[own[j] * w + own[i]] >= 0) join_groups(l->group, l->slides, i, j);
+  return l->slides;
 }
 
 /* Rows of the guards of stability: of groups whose matrix moves. */

@@ -15,6 +15,7 @@ typedef struct {
  * columns and of the field's derivatives: terms up to the last that is not zero. */
 typedef struct {
   const Field *field;
+  const double *p;
   double *rules, *states, *watched, *input, *columns;
   int32_t *terms, *bend;
   double whole, left, sign, tol;
@@ -23,7 +24,7 @@ typedef struct {
 
 static Flow flow_of(const Field *f, const double *p, double duration, double tol, double *work) {
   int64_t stride = f->order + 1;
-  Flow w = {.field = f, .rules = work, .whole = fabs(duration), .left = fabs(duration)};
+  Flow w = {.field = f, .p = p, .rules = work, .whole = fabs(duration), .left = fabs(duration)};
   w.sign = duration < 0 ? -1 : 1;
   w.tol = tol;
   w.states = work + series_room(&f->series, stride);

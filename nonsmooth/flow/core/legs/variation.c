@@ -28,7 +28,7 @@ typedef struct {
 
 /* One term of the recursion: to coefficient k of ``to`` the sum of products of coefficients of ``by``, from ``first`` to
  * below ``terms``, with those of ``from`` up to k + ahead, times a factor. */
-typedef struct { double *to, *from; const double *by; int32_t first, terms, ahead, factor; } Link;
+typedef struct { double *to, *from; const double *by; int32_t first, terms, ahead, factor, known; } Link; /* known: coefficients of ``from`` up to the last that is not zero */
 enum { PLUS, MINUS, TIMES_ORDER, OVER_ORDER }; /* the last two: k + 1 and its inverse */
 
 /* Links in the order in which they are used: distances of sets at the start; of an order directions of sets, sums,
@@ -119,7 +119,7 @@ static void begin_slopes(const Run *r, Slopes *g) {
 }
 
 static void add_link(Slopes *g, double *to, double *from, const double *by, int first, int terms, int ahead, int factor) {
-  g->link[g->begin[GROUPS]++] = (Link){to, from, by, first, terms, ahead, factor};
+  g->link[g->begin[GROUPS]++] = (Link){to, from, by, first, terms, ahead, factor, 0};
 }
 
 /* A link of coefficients of one order. */
@@ -242,11 +242,22 @@ static void measure_slopes(Run *r, const Expansion *e, Slopes *g, int at_point) 
 
 /* What links of a group add at an order. */
 static void follow_links(const Slopes *g, int group, int k) {
-  for (const Link *l = g->link + g->begin[group], *end = g->link + g->begin[group + 1]; l < end; l++) {
-    int at = k + l->ahead, first = at < l->terms ? 0 : at + 1 - l->terms, last = terms_of(l->from, at + 1 - l->first) - 1;
-    if (first > last) continue;
-    double sum = first < last ? convolve(l->from, l->by, at, first, last) : l->from[first] * l->by[at - first];
-    l->to[k] += l->factor == PLUS ? sum : l->factor == MINUS ? -sum : l->factor == TIMES_ORDER ? (k + 1) * sum : sum * PART[k + 1];
+  for (Link *l = g->link + g->begin[group], *end = g->link + g->begin[group + 1]; l < end; l++) {
+    double sum;
+    if (l->terms == 1) sum = l->from[k] * *l->by;
+    else {
+      int at = k + l->ahead, newest = at - l->first, first = at < l->terms ? 0 : at + 1 - l->terms;
+      if (k == 0) l->known = terms_of(l->from, newest + 1);
+      else if (l->from[newest] != 0) l->known = newest + 1;
+      if (first >= l->known) continue;
+      sum = first + 1 < l->known ? convolve(l->from, l->by, at, first, l->known - 1) : l->from[first] * l->by[at - first];
+    }
+    switch (l->factor) {
+      case PLUS: l->to[k] += sum; break;
+      case MINUS: l->to[k] -= sum; break;
+      case TIMES_ORDER: l->to[k] += (k + 1) * sum; break;
+      default: l->to[k] = sum * PART[k + 1];
+    }
   }
 }
 
@@ -291,28 +302,50 @@ static void begin_column(Run *r, const Leg *l, const Slopes *g, int column) {
     }
 }
 
+/* Move a state or a column from where sets have values h by what their multipliers do at once. */
+static void move_onto(const Run *r, const Slopes *g, const double *h, double *y) {
+  const Expansion *e = &r->e;
+  const Variation *v = g->v;
+  int64_t n = r->n, slides = e->l.slides, stride = r->stride;
+  for (int i = 0; i < slides; i++)
+    for (int j = 0; j < slides; j++)
+      if (set_of(r, e->l.sliding[j]) >= 0)
+        v->series[e->l.sliding[i] * stride] -= e->inverse[i * slides + j] * h[e->l.sliding[j]];
+  memset(v->sum, 0, sizeof(double) * n * stride);
+  follow_links(g, LATE, 0);
+  for (int i = 0; i < n; i++) y[i] += v->sum[i * stride];
+}
+
 /* Derivatives of h of the sets at the start, and columns from which what leads off sets is taken. */
 static void land(Run *r, const Leg *l, Slopes *g) {
   const Expansion *e = &r->e;
   const Variation *v = g->v;
-  int64_t n = r->n, slides = e->l.slides, stride = r->stride;
+  int64_t n = r->n, stride = r->stride;
   if (!r->s->sets) return;
   measure_slopes(r, e, g, 1);
   for (int k = 0; k < l->columns; k++) {
-    double *y = l->y + k * n, *h = v->h + k * r->m;
+    double *h = v->h + k * r->m;
     memset(h, 0, sizeof(double) * r->m);
     begin_column(r, l, g, k);
     follow_links(g, SUMS, 0);
     for (int i = 0; i < r->m; i++) if (set_of(r, i) >= 0) h[i] = v->sum[(n + r->width + i) * stride];
-    for (int i = 0; i < slides; i++)
-      for (int j = 0; j < slides; j++)
-        if (set_of(r, e->l.sliding[j]) >= 0)
-          v->series[e->l.sliding[i] * stride] -= e->inverse[i * slides + j] * h[e->l.sliding[j]];
-    memset(v->sum, 0, sizeof(double) * n * stride);
-    follow_links(g, LATE, 0);
-    for (int i = 0; i < n; i++) y[i] += v->sum[i * stride];
+    move_onto(r, g, h, l->y + k * n);
     for (int i = 0; i < r->m; i++) if (e->l.letter[i] == 0) h[i] = 0;
   }
+}
+
+/* The same of a state; whether it was off sets on which it is held. */
+static int land_state(Run *r, Slopes *g) {
+  const Expansion *e = &r->e;
+  int is_off = 0;
+  if (!r->s->sets) return 0;
+  const double *h = surface_values(r, r->x);
+  for (int i = 0; i < e->l.slides; i++) is_off |= set_of(r, e->l.sliding[i]) >= 0 && h[e->l.sliding[i]] != 0;
+  if (!is_off) return 0;
+  measure_slopes(r, e, g, 1);
+  clear_variation(g->v);
+  move_onto(r, g, h, r->x);
+  return 1;
 }
 
 /* The longest step for which the last two terms of columns stay below the tolerance: a part of them, or of what they

@@ -264,7 +264,7 @@ REASONS = (
         branch_point state pressed two_sided multiple_zero sampled behind no_impulse restitution
         no_reaction no_stable_motion possibly_several stability_lost undetermined_rates
         start_solutions impossible_start several_directions indefinite undetermined high_degree
-        discrete_value no_jump off_constraint dead_point decay out_of_table
+        spiral_out discrete_value no_jump off_constraint dead_point decay out_of_table
     """.split(),
 )
 

@@ -116,10 +116,26 @@ static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b,
   return 1;
 }
 
+/* Bounds of friction by one of the reactions, of which they are affine functions; bounds that are negative turned. */
+static void read_shares(Run *r, Decision *d, const double *x) {
+  int k = d->count;
+  memset(d->share, 0, sizeof(double) * k * k);
+  for (int j = 0; j < k; j++) {
+    int carries = 0;
+    for (int i = 0; i < r->m && d->is_contact[j] && d->own[j] >= r->m; i++) carries |= r->s->carries[i * r->c + d->own[j] - r->m];
+    if (!carries) continue;
+    r->held[d->own[j]] += 1;
+    error_scales(r, x, r->held, r->none);
+    r->held[d->own[j]] -= 1;
+    for (int i = 0; i < k; i++)
+      if (!d->is_contact[i] && !d->is_idle[i]) d->share[i * k + j] = factor_of(r, d->own[i]) - d->b[i];
+  }
+  for (int i = 0; i < k; i++) { d->sign[i] = 1; turn_bound(d, i, d->b + i); }
+}
+
 /* Rows, matrix and bounds at the present point; 0 where they are no numbers. */
 static int read_law(Run *r, Decision *d) {
-  int k = d->count, w = r->width, carried = 0;
-  memset(d->share, 0, sizeof(double) * k * k);
+  int k = d->count, w = r->width;
   memcpy(d->base, d->letter, w);
   for (int i = 0; i < k; i++) {
     int own = d->own[i] = r->active[i], set = set_of(r, own);
@@ -129,21 +145,12 @@ static int read_law(Run *r, Decision *d) {
     d->is_contact[i] = (int8_t)is_half_line(r, own);
     d->turn[i] = d->is_contact[i] ? -1 : 1;
     d->is_idle[i] = element(r, own)->flags & CONTINUOUS;
-    for (int j = 0; j < r->c && own < r->m; j++) carried |= r->s->carries[own * r->c + j];
   }
   if (!read_rows(r, d, r->x, d->a, d->b, d->floor, d->work)) return 0;
   for (int i = 0; i < k; i++)
     for (int j = 0; j < k; j++)
       d->matrix[i * k + j] = d->is_idle[j] ? 0 : -d->turn[i] * beside_joints(r, d, i, r->slope + d->own[j], w);
-  for (int j = 0; carried && j < k; j++) { /* bounds are affine in the reactions */
-    if (!d->is_contact[j]) continue;
-    r->held[d->own[j]] = 1;
-    error_scales(r, r->x, r->held, r->none);
-    r->held[d->own[j]] = 0;
-    for (int i = 0; i < k; i++)
-      if (!d->is_contact[i] && !d->is_idle[i]) d->share[i * k + j] = factor_of(r, d->own[i]) - d->b[i];
-  }
-  for (int i = 0; i < k; i++) { d->sign[i] = 1; turn_bound(d, i, d->b + i); }
+  read_shares(r, d, r->x);
   return finite_all(d->matrix, k * k);
 }
 

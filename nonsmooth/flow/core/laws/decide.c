@@ -433,45 +433,12 @@ static void add_rounding(Decision *d, Block *b) {
   b->room = room;
 }
 
-/* The first row of the element of a row. */
-static int first_row(const int8_t *span, int i) {
-  while (span[i] < 0) i--;
-  return i;
-}
-
-/* What is proved of a block with vectors, in units of its unknowns in which it is symmetric. */
-static int certificate_of_vectors(const Block *b, double *work, int32_t *pending) {
-  int n = b->size, count = 0;
-  const double *m = b->matrix;
-  double *unit = work, *size = unit + n, *a = size + n, *rest = a + n * n;
-  memset(unit, 0, sizeof(double) * n);
-  for (int root = 0; root < n; root++) {
-    if (unit[root] == 0) { unit[root] = 1; pending[count++] = root; }
-    while (count) {
-      int i = pending[--count];
-      for (int j = 0; j < n; j++) {
-        int is_one = first_row(b->span, i) == first_row(b->span, j);
-        if (unit[j] != 0 || !(is_one || m[i * n + j] * m[j * n + i] > 0)) continue;
-        unit[j] = unit[i] * (is_one ? 1 : m[j * n + i] / m[i * n + j]);
-        pending[count++] = j;
-      }
-    }
-  }
-  for (int i = 0; i < n; i++) size[i] = m[i * n + i] > 0 ? sqrt(m[i * n + i] * unit[i]) : 1;
-  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) a[i * n + j] = m[i * n + j] * unit[j] / (size[i] * size[j]);
-  for (int i = 0; i < n; i++) for (int j = 0; j < i; j++) if (!(fabs(a[i * n + j] - a[j * n + i]) <= SYMMETRIC)) return NOTHING;
-  memcpy(rest, a, sizeof(double) * n * n);
-  if (is_definite(rest, n, VANISHES * n)) return UNIQUE_AND_STABLE;
-  return is_definite(a, n, -SINGULAR * n) ? SEMIDEFINITE : NOTHING;
-}
-
 /* What is proved of each block, once, or after its vectors have been turned. */
 static int certificate_of(Decision *d, const Block *b, int which) {
   int has_vectors = 0;
   for (int i = 0; i < b->size; i++) has_vectors |= d->span[b->own[i]];
   if (d->proved[which] < 0 || has_vectors)
-    d->proved[which] = b->is_coupled ? NOTHING : b->span ? certificate_of_vectors(b, d->work, d->pivot)
-                                                         : certificate(b->matrix, b->size, d->work, d->pivot);
+    d->proved[which] = b->is_coupled ? NOTHING : certificate(b->matrix, b->size, b->span, d->work, d->pivot);
   return d->proved[which];
 }
 
@@ -599,7 +566,7 @@ static int is_stable_block(Run *r, Decision *d, int which, int orders) {
   int n = layer_matrix(r, d, which, orders, a, weight), stable, falling = 0;
   if (n == 0) return 1;
   if (n == 1) return a[0] > 0;
-  int proved = certificate(a, n, d->work, d->pivot), moves = 0, turns = 1; /* orbits that only turn: no trace */
+  int proved = certificate(a, n, 0, d->work, d->pivot), moves = 0, turns = 1; /* orbits that only turn: no trace */
   for (int i = 0; i < n * n; i++) moves |= a[i] != 0;
   for (int i = 0; i < n; i++) turns &= moves && a[i * n + i] == 0;
   if (proved == UNIQUE_AND_STABLE || (proved == SEMIDEFINITE && !turns)) return 1;

@@ -19,18 +19,29 @@ static int set_of(const Run *r, int i) { return element(r, i)->law == SET_LAW ? 
 #define EACH_SET(run, set) \
   for (int set = 0; set < ((run)->s->sets ? (run)->m : 0); set++) if (set_of(run, set) == set)
 
-/* Whether a multiplier makes no difference: on its surface, or where all contacts are open that carry it. */
-static int is_idle(const Run *r, const int8_t *letter, int i) {
-  const System *s = r->s;
+/* Whether friction has no load: all contacts that carry it are open, here also those that may close. After
+ * surface_values, with ``scale``; without it by the letters alone. */
+static int is_unloaded(const Run *r, const int8_t *letter, int i, const double *scale) {
   int carried = 0;
-  if (i >= r->m) return 0;
-  if (element(r, i)->flags & CONTINUOUS) return 1;
   for (int j = 0; j < r->c; j++) {
-    if (!s->carries[i * r->c + j]) continue;
-    if (!letter[r->m + j]) return 0;
+    int gap = r->m + j, rate = gap + r->c;
+    if (!r->s->carries[i * r->c + j]) continue;
+    if (!letter[gap]) return 0;
+    if (scale && fabs(r->rates[gap]) <= ON_SURFACE * scale[gap] && fabs(r->rates[rate]) <= ON_SURFACE * scale[rate]) return 0;
     carried = 1;
   }
   return carried;
+}
+
+/* Whether a multiplier makes no difference: on its surface, or where all contacts are open that carry it. */
+static int is_idle(const Run *r, const int8_t *letter, int i) {
+  return i < r->m && (element(r, i)->flags & CONTINUOUS || is_unloaded(r, letter, i, 0));
+}
+
+/* Whether an element is one of those that the state is on. */
+static int is_active(const Run *r, int i) {
+  for (int j = 0; j < r->active_count; j++) if (r->active[j] == i) return 1;
+  return 0;
 }
 
 /* Make one group of those of two elements, unless one has none; it has the lower number. */

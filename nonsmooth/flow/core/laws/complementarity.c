@@ -178,7 +178,7 @@ static int follow_step(Run *r, const int8_t *letter, const Known *known, int kno
     if (all.count != 1) continue;
     memcpy(r->found.unknowns, all.each, sizeof(double) * r->width);
     if (!continues(r, trial, known, known_count, &r->found)) continue;
-    copy_continuation(r, &r->chosen, &r->found);
+    choose_found(r);
     return 1;
   }
   return 0;

@@ -255,6 +255,13 @@ static int is_plain(Run *r) {
   return 1;
 }
 
+/* What a run is between two steps, here and as lanes have it. */
+#define GOES_ON(OF) \
+  OF(t, t) OF(since, since) OF(shortened, shortened) OF(step_count, steps) OF(event_count, events) \
+  OF(segment_steps, segment_steps) OF(itinerary, itinerary) OF(history, history)
+#define TAKEN(here, there) r->here = m->there;
+#define GIVEN(here, there) m->there = r->here;
+
 /* The number of a mode's letters in the driver's table is that of lanes. */
 static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Suspended *m) {
   static const Output none;
@@ -269,7 +276,7 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   memcpy(r->x, b->x0 + i * r->n, sizeof(double) * r->n);
   measure_time(r);
   memcpy(r->x, m->x, sizeof(double) * r->n);
-  r->t = m->t;
+  GOES_ON(TAKEN)
   set_time_state(r);
   memcpy(r->letter, m->letter, r->width);
   if (r->s->sets) memcpy(r->unknowns, m->unknowns, sizeof(double) * r->width);
@@ -283,15 +290,8 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   memset(r->instant.residual, 0, sizeof(double) * r->s->stops);
   memset(r->instant.pending, 0, r->s->rules.triggers);
   memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
-  r->since = m->since;
   r->length = m->length;
-  r->shortened = m->shortened;
   if (m->length > 0) r->length_mode = r->mode;
-  r->step_count = m->steps;
-  r->event_count = m->events;
-  r->segment_steps = m->segment_steps;
-  r->itinerary = m->itinerary;
-  r->history = m->history;
   for (int k = 0; k < HISTORY && k < m->history; k++) {
     int64_t pattern = m->past[k].pattern;
     Met met = {(int)(pattern >> 32 & 255), (int)(int32_t)pattern, 0};
@@ -314,17 +314,10 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
   m->drop = r->drop[0];
   memcpy(m->side, r->instant.side, r->s->stops);
   memcpy(m->kinds, r->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
-  m->t = r->t;
-  m->since = r->since;
   m->length = r->length_mode == r->mode ? r->length : 0;
-  m->shortened = r->shortened;
-  m->steps = r->step_count;
-  m->events = r->event_count;
-  m->segment_steps = r->segment_steps;
-  m->itinerary = r->itinerary;
   for (int64_t k = first; k < r->history; k++)
     m->past[k % HISTORY] = (Recent){r->past[k % HISTORY].interval, r->past[k % HISTORY].pattern};
-  m->history = r->history;
+  GOES_ON(GIVEN)
 }
 
 static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Suspended *m) {

@@ -111,7 +111,8 @@ static void keep_rates(Run *r, Expansion *e) {
 
 /* Coefficients of all that a mode with sets needs; ``start`` are places in the inverse. */
 static void set_series(Run *r, Expansion *e, const int32_t *start) {
-  int leaving = begin_directions(r, e);
+  int leaving = 0;
+  EACH_LEAVING(r, e, f) leaving = 1;
   for (int k = 0; k <= r->order; k++) {
     open_order(r, e, k);
     if (leaving) leave_sets(r, e, k);

@@ -217,12 +217,8 @@ static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
   held_of(r, letter);
   for (int i = 0; i < d->count; i++) r->held[d->own[i]] = 0;
   if (!r->s->sets) return;
-  memset(e->lambda, 0, sizeof(double) * w * stride);
-  for (int i = 0; i < r->m; i++) {
-    e->lambda[(int64_t)i * stride] = r->direction[i];
-    if (letter[i] == LEFT_BEHIND) e->series[(int64_t)i * stride] = r->unknowns[i];
-  }
   memcpy(e->l.letter, letter, w);
+  begin_sets(r, e, r->unknowns);
   e->l.mode = -1;
   e->l.is_free = 0;
 }

@@ -184,28 +184,17 @@ static void close_sets(Run *r, Expansion *e, int k) {
   }
 }
 
-/* Multipliers of sets at the start of the series; whether sets are left. */
-static int begin_directions(Run *r, Expansion *e) {
-  int leaving = 0;
-  if (!r->s->sets) return 0;
-  memset(e->lambda, 0, sizeof(double) * r->width * r->stride); /* the first guess of each order is zero */
-  for (int i = 0; i < r->m; i++) {
-    e->lambda[(int64_t)i * r->stride] = r->direction[i];
-    leaving |= e->l.letter[i] == LEAVING;
-  }
-  return leaving;
-}
-
-/* What the expansion of a mode begins with, besides the states: h that is carried, derivatives of the rates by
- * the multipliers. */
+/* What the expansion of a mode begins with, besides the states: multipliers of sets, h that is carried, derivatives of the
+ * rates by the multipliers. */
 static void begin_sets(Run *r, Expansion *e, const double *unknowns) {
   int w = r->width, leaving = 0;
+  memset(e->lambda, 0, sizeof(double) * w * r->stride); /* the first guess of each order is zero */
   for (int i = 0; i < r->m; i++) {
+    e->lambda[(int64_t)i * r->stride] = r->direction[i];
     if (e->l.letter[i] == LEFT_BEHIND) e->series[(int64_t)i * r->stride] = unknowns[i];
     leaving |= e->l.letter[i] == LEAVING;
   }
-  if (!leaving) return;
-  for (int i = 0; i < w; i++)
+  for (int i = 0; i < w && leaving; i++)
     for (int j = 0; j < w; j++)
       e->slopes[i * w + j] = r->slope[i * w + j] * (j < r->m && e->l.letter[j] == LEAVING ? factor_of(r, j) : 1);
 }

@@ -287,6 +287,7 @@ REASONS = (
     "indefinite",
     "undetermined",
     "high_degree",
+    "spiral_out",
     "discrete_value",
     "no_jump",
     "off_constraint",

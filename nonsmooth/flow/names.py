@@ -41,10 +41,13 @@ def described(system: FilippovSystem, guard: Guard) -> str:
     k, name = guard.element, guard_name(system, guard)
     if _is_condition(system, k) and guard.kind in ("surface", "release"):
         return f"{'y' if guard.kind == 'surface' else 'the multiplier'} of {name!r} >= 0"
+    number = system.numbers[k] if k < len(system.entries) else 0
+    if k < len(system.entries) and len(system.entries[k]) > 1:
+        return f"|h{number}| > 0" if guard.kind == "surface" else f"|lambda{number}| <= 1"
     if guard.kind == "surface":
-        return f"h{system.numbers[k]} {'>' if guard.side > 0 else '<'} 0"
+        return f"h{number} {'>' if guard.side > 0 else '<'} 0"
     if guard.kind == "exit":
-        return f"lambda{system.numbers[k]} {'<= 1' if guard.side > 0 else '>= -1'}"
+        return f"lambda{number} {'<= 1' if guard.side > 0 else '>= -1'}"
     of = {"impact": "gap", "release": "reaction"}.get(guard.kind)
     return f"the {of} of {name!r} >= 0" if of else name
 

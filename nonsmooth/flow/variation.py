@@ -79,4 +79,4 @@ def require_done(system: FilippovSystem, legs: Sequence[Arc], found: CarriedLegs
             f"mode {system.spelled(leg.mode)!r} at {leg.start.tolist()}: expected one set of multipliers that "
             "keeps the sliding, received none or several. Start elsewhere."
         )
-    raise stuck(leg.duration, found.left, leg.start)
+    raise stuck(leg.duration, float(found.left[found.failed]), leg.start)

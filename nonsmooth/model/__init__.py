@@ -18,7 +18,7 @@ from .definition.system import (
     require_system,
 )
 from .derivatives.forcing import clock_periods, is_function, periods, read_period
-from .derivatives.start_maps import StartMap
+from .derivatives.given_functions import StartMap
 from .errors import (
     ConvergenceError,
     DefinitionError,

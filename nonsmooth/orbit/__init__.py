@@ -5,8 +5,8 @@ from ..solvers import continuation
 from .basins import Attractor, Basins, attractors, basins
 from .branches.bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifurcation
 from .branches.branch import Branch, BranchEnd, BranchEvent, FarSide
+from .branches.continue_orbit import continue_orbit
 from .branches.equilibrium_branches import continue_equilibrium
-from .branches.orbit_branches import continue_orbit
 from .branches.two_fold_curves import TraceError, trace_two_folds
 from .homoclinic.homoclinic_orbits import Connection, find_homoclinic
 from .manifolds.canards import Path, Slider, paths_from

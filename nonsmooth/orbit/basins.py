@@ -763,7 +763,7 @@ def basins(
     Raises
     ------
     DefinitionError
-        ``system`` is not a FilippovSystem, or has vector multipliers.
+        ``system`` is not a FilippovSystem.
     OptionError
         A time, a number of samples or rounds or a section out of its range; no period, though the
         system depends on time.
@@ -791,7 +791,7 @@ def basins(
     >>> ns.basins(swing, {"x": np.linspace(-3, 3, 4), "v": 1.0}, t_end=100.0, section=x).attractors
     [Attractor(cycle of period 6.663286859, 2 points about (0, 0))]
     """
-    require_system(system, complementarity=True)
+    require_system(system, sets=True, complementarity=True)
     starts, axes = _starts(system, grid)
     _require_finite(starts)
     search = Search(

@@ -46,12 +46,32 @@ static int rests_unstably(const Run *r, const int8_t *letter) {
   return -1;
 }
 
+/* A surface that would come to rest beside one whose multiplier drives its rate away, and enters its second derivative
+ * in the same way: motions leave such a point in turns of growing size, infinitely many. -1 if there is none. */
+static int spirals_out(Run *r, const int8_t *letter) {
+  int w = r->width, is_read = 0;
+  for (int i = 0; i < r->m; i++)
+    for (int j = 0; j < r->m; j++) {
+      if (letter[i] || letter[j] || degree_of(r, i) != 2 || degree_of(r, j) != 1) continue;
+      if (!has_law(r, i, SURFACE_LAW) || !has_law(r, j, SURFACE_LAW) || !(r->letter[i] || r->letter[j])) continue;
+      if (!is_read++) {
+        aim(r, letter, r->x, r->chosen.unknowns);
+        error_scales(r, r->x, held_of(r, letter), r->chosen.unknowns);
+      }
+      double own = r->slope[i * w + i] * r->slope[j * w + j], crossed = r->slope[i * w + j] * r->slope[j * w + i];
+      if (r->slope[j * w + j] > 0 && own != 0 && fabs(own - crossed) <= TIED * fabs(own)) return i;
+    }
+  return -1;
+}
+
 /* Adopt the mode that continues; 0 where there is none or more than one. */
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count) {
   if (r->active_count) {
     if (!decide(r, letter, known, known_count)) return 0;
     int unstable = rests_unstably(r, r->chosen.letter);
     if (unstable >= 0) { finish(r, NON_UNIQUE, HIGH_DEGREE, unstable); return 0; }
+    unstable = spirals_out(r, r->chosen.letter);
+    if (unstable >= 0) { finish(r, NON_UNIQUE, SPIRAL_OUT, unstable); return 0; }
     if (leaves_by_root(r)) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
   } else {
     memcpy(r->chosen.letter, letter, r->width);

@@ -179,7 +179,7 @@ static void field_of(Run *r, const double *x, const double *held, const double *
 static void weigh_rounding(Run *r, int is_free, double size) {
   const Series *t = is_free ? &r->s->free : &r->s->series;
   series_at(t, &t->moving, 0, r->stride, r->input, r->series);
-  series_rounding(t, size, r->s->timed ? r->n - 1 : -1, r->time_size, r->series, r->rounding);
+  series_rounding(t, size, r->s->timed ? r->n - 1 : -1, r->time_size, r->begun.high, r->series, r->rounding);
 }
 
 static void jets(Run *r, Expansion *e) {

@@ -67,7 +67,7 @@ class CarriedLegs:
     """Ends of legs (L, n) with fields at starts and ends, gradients of their events by states and parameters (L, n + np),
     derivatives of the ends (L, n, columns) and at samples (K, n, columns).
 
-    ``failed`` is the number of a leg that did not reach its end, with its status and the time that was left, or -1.
+    ``failed`` is the number of a leg that did not reach its end, with its status, or -1.
     """
 
     def __init__(self, engine: ColumnsEngine, given: GivenLegs, count: int, starts: int):
@@ -82,7 +82,7 @@ class CarriedLegs:
             np.append(given.p, np.zeros((*given.p.shape[:-1], 1)), -1),
             np.ascontiguousarray(given.times, float),
         ]
-        self.failed, self.status, self.left = -1, DONE, 0.0
+        self.failed, self.status = -1, DONE
         self.row = np.zeros(n)
         self._c = self._structures(count, starts)
 
@@ -124,8 +124,20 @@ class CarriedLegs:
             self.failed = int(library().carry_legs(state, self._c.ctypes.data, len(self._c)))
         if self.failed >= 0:
             self.status = int(self._c["status"][self.failed])
-            self.left = float(self._c["left"][self.failed])
         return int(self._c["step_count"].sum())
+
+    @property
+    def left(self) -> Array:
+        """What is left of durations (L,) where legs end: at a set that is reached before, or where they are stuck."""
+        return np.asarray(self._c["left"])
+
+    def steps_of(self, leg: int) -> tuple[Array, Array]:
+        """Times since the start of a recorded leg at which its steps begin (k,), and the states there (k, n)."""
+        counts, n = self._c["step_count"].tolist(), self.ends.shape[1]
+        first = sum(counts[:leg])
+        rows = self._steps[first : first + counts[leg]]
+        rows = rows[rows[:, 2] >= 0.0]  # without stages
+        return rows[:, 1], rows[:, 3 : 3 + n]
 
     def set_columns(self, first: Array) -> None:
         """Let the first column (n,) of all legs be one, and others zero."""

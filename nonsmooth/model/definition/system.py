@@ -943,7 +943,8 @@ class FilippovSystem:
 _ELEMENTS = {
     "sets": (
         "vector multipliers",
-        "Sets of codimension two and three work in simulate, ensemble, sensitivity, region and limit_directions.",
+        "Sets of codimension two and three work in simulate, ensemble, sensitivity, region, limit_directions, poincare, "
+        "attractors, periodic_orbit, continue_orbit and phase_response.",
     ),
     "remembering": (
         "elements with hysteresis",

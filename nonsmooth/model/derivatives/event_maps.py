@@ -116,7 +116,7 @@ def event_map(
     atom: int = -1,
 ) -> EventMap:
     """The map of an event of a mode, with the function of an ``atom`` of its condition; built once."""
-    if system.sets:
+    if system.sets and kind not in ("exit", "release"):
         return instant_map(system, system.widened(mode), kind, element, letters)
 
     def build() -> EventMap:
@@ -302,12 +302,16 @@ def surface_map(system: FilippovSystem, surface: int) -> EventMap:
     return system.cached(("surface map", surface), build)
 
 
-def kept_maps(system: FilippovSystem, surfaces: Sequence[int]) -> list[EventMap]:
-    """What is zero while surfaces slide, as maps on the extended states: with the rates of joints."""
-    x, found = system.extended_states, list[EventMap]()
-    for i in surfaces:
-        found.append(surface_map(system, i))
-        for k, rate in enumerate(coupled_of(system).lower[i] if i in system.joints else ()):
+def kept_maps(system: FilippovSystem, kept: Sequence[int]) -> list[EventMap]:
+    """What is zero while surfaces slide and, behind them, contacts are closed, as maps on the extended states."""
+    x, m, found = system.extended_states, system.surface_count, list[EventMap]()
+    for i in kept:
+        rows = [*coupled_of(system).lower[i]] if i in system.joints else []
+        if i < m:
+            found.append(surface_map(system, i))
+        else:
+            rows = [system.definition.gaps[i - m], system.definition.gap_rates[i - m]]
+        for k, rate in enumerate(rows):
             build = partial(EventMap, system, x, rate, Guard("zero", i, 0, i))
             found.append(system.cached(("rate map", i, k), build))
     return found

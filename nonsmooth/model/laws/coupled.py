@@ -275,9 +275,9 @@ class Coupled:
     def sliding(self, mode: str) -> list[int]:
         """Surfaces that slide and contacts that are closed, with multipliers that are unknown."""
         signs = self.system.parse_letters(mode)
-        return [i for i, sign in enumerate(signs) if sign == 0 and not self._is_idle(i, signs)]
+        return [i for i, sign in enumerate(signs) if sign == 0 and not self.is_idle(i, signs)]
 
-    def _is_idle(self, i: int, signs: Sequence[int]) -> bool:
+    def is_idle(self, i: int, signs: Sequence[int]) -> bool:
         """Whether a multiplier makes no difference: on its surface, or at open contacts alone."""
         if i >= self._surfaces:
             return False
@@ -341,7 +341,11 @@ class Coupled:
         """Expressions with the multipliers that are known in a mode; unknowns stay symbols."""
         n = self.system.extended_dimension
         held = ca.SX([*self.held(mode), *[0.0] * sum(self.scaled)])
-        rest = self.moving[n:]
+        rest, signs = self.moving[n:], self.system.parse_letters(mode)
+        for members in self.system.sets:
+            if signs[members[0]] and not self.is_idle(members[0], signs):
+                h = self.system.definition.surfaces[list(members)]
+                held[list(members)] = h / ca.norm_2(h)
         for i in self.sliding(mode):
             own = self.unknown(i)
             for k in range(rest.numel()):

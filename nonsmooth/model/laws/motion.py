@@ -119,7 +119,16 @@ class Motion:
                 continue
             of = (i, system.entry_of(i)) if i < m else (i - m, len(system.entries) + i - m)
             guard = lambda kind, side, of=of: Guard(kind, of[0], side, of[1])
-            if sign:
+            if i in system.set_of:
+                members = list(system.set_of[i])
+                if i > members[0] or coupled.is_idle(i, letters):
+                    continue
+                if sign:
+                    yield guard("surface", 1), ca.norm_2(heights[members])
+                else:  # n^2 (1 - |lambda|^2)
+                    own = self._values[[sliding.index(j) for j in members]]
+                    yield guard("exit", 0), factors[i] ** 2 - ca.sumsqr(own)
+            elif sign:
                 yield guard("surface" if i < m else "impact", sign), sign * heights[i]
             elif i >= m or i in system.half_lines:
                 yield guard("release", 0), self._values[sliding.index(i)]
@@ -148,7 +157,7 @@ class Motion:
 
 def motion(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode as a field of the states, for any system; built once."""
-    require_system(system, complementarity=True, joints=True)
+    require_system(system, sets=True, complementarity=True, joints=True)
     return system.cached(("motion", mode), lambda: Motion(system, mode))
 
 

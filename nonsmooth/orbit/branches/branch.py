@@ -477,6 +477,17 @@ class _Half:
     end: BranchEnd = BranchEnd.EVENT
     reason: str = ""
 
+    def name_end(self, curve: BranchCurve, u: Array) -> None:
+        """The event at the last point of a curve that could not be followed."""
+        try:
+            last = curve.ending(u, self.end)
+        except (NonsmoothError, np.linalg.LinAlgError):
+            return
+        if last is not None:
+            self.events.append(last)
+            diverges = last.kind in ("homoclinic", "infinite period at a boundary node")
+            self.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT
+
 
 def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
     half, (low, high) = _Half(), options["bounds"]
@@ -529,18 +540,27 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         if last is not None and last.point is not None and _elsewhere(last, at):
             half.nodes[-1] = (last.curve, last.point)  # regular in the other itinerary
         found = [known[id(zero)] for zero in arc.zeros]
-        half.events += [event for event in found if event is not None]
+        half.events += _distinct(found)
         half.end, half.reason = end_of(arc), arc.reason
         if half.end in (BranchEnd.PERIOD_DIVERGES, BranchEnd.STEP_TOO_SMALL, BranchEnd.FAILED):
-            try:
-                last = at.ending(arc.points[-1].u, half.end)
-            except (NonsmoothError, np.linalg.LinAlgError):
-                last = None
-            if last is not None:
-                half.events.append(last)
-                diverges = last.kind == "homoclinic"
-                half.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT
+            half.name_end(at, arc.points[-1].u)
     return half
+
+
+#: Distance of a turning point from a pitchfork, relative to the step, at which it is the pitchfork itself.
+_SAME = 1e-8
+
+
+def _distinct(events: Sequence[BranchEvent | None]) -> list[BranchEvent]:
+    """Events without the turning points of branches at the pitchforks where these begin."""
+    found = [event for event in events if event is not None]
+    forks = [event.parameter for event in found if event.kind == "pitchfork"]
+    return [
+        event
+        for event in found
+        if event.kind != "fold"
+        or all(abs(event.parameter - fork) > _SAME * (1e-3 + abs(fork)) for fork in forks)
+    ]
 
 
 def _event(curve: BranchCurve, zero: Zero) -> BranchEvent | None:
@@ -557,7 +577,7 @@ def _event(curve: BranchCurve, zero: Zero) -> BranchEvent | None:
 
 def _sentence(name: str, half: _Half) -> str:
     """Why a branch ends."""
-    if half.end is BranchEnd.EVENT and half.events:
+    if half.end in (BranchEnd.EVENT, BranchEnd.PERIOD_DIVERGES) and half.events:
         last = half.events[-1]
         return (
             f"At {name} = {last.parameter:.10g} there is an event, {last.kind} ({last.far_side})."

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...local.point.surface_point import SIDES, LocalSurface, Side, surface_at
+from ...local.point.surface_point import SIDES, Numbers, Side, surface_at
 from ...local.searches.boundary_equilibria import find_boundary_equilibrium
 from ...model import Array, FilippovSystem, NonsmoothError
 from ...model.derivatives.variational import variational_field
@@ -97,10 +97,9 @@ def surface_end(
             found = _equilibrium(orbit, x, parameter, (surface, mode), side, reach)
             if found is not None:
                 return found
-        if system.dimension == 2:
-            found = _two_fold(orbit, x, parameter, (surface, mode), reach)
-            if found is not None:
-                return found
+        found = _two_fold(orbit, x, parameter, (surface, mode), reach)
+        if found is not None:
+            return found
     return None
 
 
@@ -124,54 +123,96 @@ def _equilibrium(
     side: Side,
     reach: float,
 ) -> BranchEvent | None:
-    system, (surface, mode) = orbit.system, at
+    found = _boundary(orbit, x, parameter, at, side)
+    if found is None or not found[0] < reach:
+        return None
+    _, event, k = found
+    label, verdict = event.solution.label, event.far_side.verdict
+    verdict = f"the orbit shrinks to a boundary equilibrium of F{k + 1} ({label}; {verdict})"
+    side_of = FarSide("", verdict, event.far_side.numbers)
+    return replace(event, solution=orbit, far_side=side_of, coefficients=side_of.numbers)
+
+
+def _boundary(
+    orbit: PeriodicOrbit, x: Array, parameter: str, at: tuple[int, str | None], side: Side
+) -> tuple[float, BranchEvent, int] | None:
+    """The boundary equilibrium near a state: its distance, the event, and of which field it is."""
+    system, (surface, mode), given = orbit.system, at, orbit.parameters
     try:
         found = find_boundary_equilibrium(
-            system,
-            x,
-            vary=parameter,
-            side=side,
-            parameters=orbit.parameters,
-            surface=surface,
-            mode=mode,
+            system, x, vary=parameter, side=side, parameters=given, surface=surface, mode=mode
         )
-        if not found.distance < reach:
-            return None
         values = dict(found.parameters)
         where, point = surface_at(system, found.point, values, 0.0, surface, mode)
         free, scale = (system.parameter_names.index(parameter),), np.ones(system.dimension + 1)
         curve, u = EquilibriumCurve(where, free, scale, side), np.append(point, found.value)
         zero = Zero("boundary equilibrium", Point(u, np.zeros(u.size)), 0.0)
-        event = curve.boundary(zero, curve.k)
+        return found.distance, curve.boundary(zero, curve.k), curve.k
     except (NonsmoothError, np.linalg.LinAlgError):
         return None
-    label, verdict = event.solution.label, event.far_side.verdict
-    verdict = f"the orbit shrinks to a boundary equilibrium of F{curve.k + 1} ({label}; {verdict})"
-    side_of = FarSide("", verdict, event.far_side.numbers)
-    return replace(event, solution=orbit, far_side=side_of, coefficients=side_of.numbers)
 
 
 def _two_fold(
     orbit: PeriodicOrbit, x: Array, parameter: str, at: tuple[int, str | None], reach: float
 ) -> BranchEvent | None:
-    """The two-fold of a planar system at an isolated value of the parameter."""
+    """The two-fold at which F1 and F2 are antiparallel, at an isolated value of the parameter."""
     system, (surface, mode) = orbit.system, at
     index = system.parameter_names.index(parameter)
 
-    def local_surface(value: float) -> LocalSurface:
-        values = {**orbit.parameters, parameter: value}
-        return surface_at(system, x, values, 0.0, surface, mode)[0]
+    def numbers_at(u: Array) -> Numbers:
+        values = {**orbit.parameters, parameter: float(u[-1])}
+        return surface_at(system, x, values, 0.0, surface, mode)[0].at(u[:-2])
 
     def equations(u: Array) -> Array:
-        numbers = local_surface(float(u[-1])).at(u[:-1])
-        return np.array([numbers.h, *numbers.lie])
+        numbers = numbers_at(u)
+        first, second = numbers.fields
+        return np.append(
+            (1 - u[-2]) * first + u[-2] * second, [numbers.h, numbers.lie[0] - numbers.lie[1]]
+        )
 
-    start = np.append(x, orbit.parameter_vector[index])
+    start = np.concatenate([x, [0.5, orbit.parameter_vector[index]]])
+    first, second = numbers_at(start).fields
+    apart = first - second
+    start[-2] = np.clip(float(first @ apart) / (float(apart @ apart) or 1.0), 0.01, 0.99)
     try:
         root = converge(Secant(equations, 1.0), start)
     except (NonsmoothError, np.linalg.LinAlgError):
         return None
-    if root is None or not np.abs(root[:-1] - x).max() < reach:
+    if root is None or not np.abs(root[:-2] - x).max() < reach or not 0.0 < root[-2] < 1.0:
         return None
     verdict = "the orbit shrinks to a two-fold, at which sliding changes its stability"
-    return BranchEvent("two-fold", float(root[-1]), orbit, FarSide("", verdict))
+    kind = "two-fold" if system.dimension == 2 else "cycle from a two-fold"
+    if system.dimension > 2:
+        verdict = "the orbit shrinks to a two-fold, through which a pseudo-equilibrium passes"
+    return BranchEvent(kind, float(root[-1]), orbit, FarSide("", verdict))
+
+
+#: Speed at the slowest start of a leg, relative to the fastest, of an orbit that is close to a boundary equilibrium.
+_SLOW = 1e-3
+
+#: Distance of the parameter from that of the node, relative to the bounds.
+_CLOSE = 1e-3
+
+
+def node_end(orbit: PeriodicOrbit, parameter: str, width: float) -> BranchEvent | None:
+    """The node on a surface beside which a long periodic orbit crosses that surface; None if there is none."""
+    # The period grows with the logarithm of the distance, so that it is not long where the steps end.
+    n, system = orbit.system.dimension, orbit.system
+    if system.time_dependent:
+        return None
+    speeds = np.linalg.norm(orbit.evaluation.flows.before[:, :n], axis=1)
+    slowest = int(np.argmin(speeds))
+    if not speeds[slowest] < _SLOW * speeds.max():
+        return None
+    x, value = orbit.evaluation.starts[slowest, :n], orbit.parameters[parameter]
+    for at in _surfaces(orbit.problem):
+        for side in SIDES:
+            found = _boundary(orbit, x, parameter, at, side)
+            if found is None or not abs(found[1].parameter - value) < _CLOSE * width:
+                continue
+            values = found[1].solution.eigenvalues
+            if not np.iscomplex(values).any() and np.all(values.real * values.real[0] > 0):
+                verdict = "the period diverges like the logarithm of the distance"
+                kind = "infinite period at a boundary node"
+                return BranchEvent(kind, found[1].parameter, orbit, FarSide("", verdict))
+    return None

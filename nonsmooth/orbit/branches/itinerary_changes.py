@@ -34,6 +34,7 @@ from ..periodic.boundary_value_problem import (
     mirrored,
     neighbours,
 )
+from ..periodic.find_periodic import at_two_fold
 from ..runs.itinerary import leg_between
 from ..runs.legs import Leg, integrate_leg, surface_of
 from .conditions import Condition, touching
@@ -124,6 +125,9 @@ _TANGENT = 1e-7
 
 SOFT, FORCE = "grazing of a soft switch", "grazing of a jumping force"
 
+#: Grazing of a soft switch by the orbits of a centre, at whose value of the parameter all of these exist.
+CENTRE = "focus-centre-limit cycle"
+
 
 def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array) -> str:
     """The bifurcation that the zero of a test is."""
@@ -141,6 +145,9 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     if test.what == "end":
         return "two-fold"
     if test.what == "transversality":
+        end = at.flows.end[i, : at.flows.sizes[i]]
+        if at_two_fold(problem.system, leg, end, p):
+            return "two-fold"
         return {
             "impact": "impact grazing",
             "reset": "grazing of a reset",
@@ -314,7 +321,7 @@ def _added(
     if kind == "grazing-sliding":
         slide = with_letter(leg.mode, guard.element, "s")
         return [leg_between(system, leg.mode, slide), leg_between(system, slide, leg.mode)], [y, y]
-    if kind == SOFT:
+    if kind in (SOFT, FORCE, CENTRE):
         far = with_letter(leg.mode, guard.element, leg.mode[guard.element].translate(TURNED))
         return [leg_between(system, leg.mode, far), leg_between(system, far, leg.mode)], [y, y]
     if kind == "adding-sliding":
@@ -357,7 +364,7 @@ def _shorter(
         legs[i - 1] = replace(legs[i - 1], kind=became)
         editor.remove(i)
         return editor.done(test=Condition("start", i % len(legs), guard))
-    if kind in ("grazing-sliding", "adding-sliding", SOFT) and at.what == "duration":
+    if kind in ("grazing-sliding", "adding-sliding", SOFT, FORCE) and at.what == "duration":
         if len(legs) == 2:
             return _smooth(editor, p)
         if i + 1 == len(legs):

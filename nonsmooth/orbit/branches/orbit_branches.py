@@ -17,33 +17,35 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...local import Equilibrium, PseudoEquilibrium
-from ...local.checks import parameter_index
 from ...local.read_only import ReadOnly
-from ...model import Array, ConvergenceError, DefinitionError, NonsmoothError, whole
-from ...model.checks import positive
-from ...model.derivatives.variational import variational_field
-from ...solvers.continuation import Departure, Point, Zero, other_direction
+from ...model import Array, ConvergenceError, NonsmoothError
+from ...solvers.continuation import Departure, Point, Zero
 from ...solvers.newton import converge
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, eliminated
-from ..periodic.multipliers import leg_maps, return_map
+from ..periodic.find_periodic import at_two_fold
+from ..periodic.multipliers import return_map
 from ..periodic.orbit import PeriodicOrbit, faults_of, named
-from ..periodic.symmetry import halves, mirrored, prime_period, require_symmetric
-from ..runs.legs import Leg, integrate_leg, shown_itinerary
+from ..periodic.symmetry import halves, prime_period, require_symmetric
+from ..runs.legs import integrate_leg, shown_itinerary
 from .branch import (
-    Branch,
     BranchCurve,
     BranchEnd,
     BranchEvent,
     FarSide,
-    check_bounds,
-    follow_branch,
 )
 from .conditions import Condition, condition_row, conditions_of, is_smooth
 from .event_curves import OWN_ENDS, degenerate_tests
-from .family_ends import extent, hopf_point, surface_end
+from .family_ends import extent, hopf_point, node_end, surface_end
 from .homoclinic_curves import homoclinic_end
-from .itinerary_changes import ChangedItinerary, changed_itinerary, departures, grown, kind_of
+from .itinerary_changes import (
+    CENTRE,
+    SOFT,
+    ChangedItinerary,
+    changed_itinerary,
+    departures,
+    grown,
+    kind_of,
+)
 from .normal_forms import normal_form, torus_pair
 from .unfoldings import far_side
 
@@ -125,11 +127,17 @@ _STEEP = 30.0
 #: the branch is lost.
 _TINY, _SMALL = 1e-4, 1e-2
 
+#: L of the other field where a slide ends, relative to its gradient and the state, at the last step to a two-fold.
+_REACHED = 1e-6
+
 #: Period relative to that of the guess below which a solution is a point.
 _COLLAPSED = 1e-6
 
 #: Share of the way to an event at which the orbit before it is checked.
 _JUST = 0.99
+
+#: Component of the parameter in a tangent below which a branch is vertical.
+_VERTICAL = 1e-6
 
 #: Share of an orbit without events by which it may begin later, where a guard is touched at its start.
 _LATER = 0.381966
@@ -252,10 +260,18 @@ class OrbitCurve(OrbitEquations):
         shrunk = self._shrunk(u, _SMALL)
         if shrunk is not None:
             return shrunk
-        if end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u):
-            return None
-        name = self.system.parameter_names[self.free[-1]]
-        return homoclinic_end(self.describe(u), name, float(self.widths[-1]))
+        at, p = self.evaluation(u), self.parameters_at(u)
+        for i, leg in enumerate(self.problem.legs):
+            if at_two_fold(self.system, leg, at.flows.end[i, : at.flows.sizes[i]], p, _REACHED):
+                side = FarSide(
+                    "", "a slide ends at a two-fold, beyond which its future is not unique"
+                )
+                return self._event("two-fold", self, Point(u, np.zeros(u.size)), "", side)
+        name, width = self.system.parameter_names[self.free[-1]], float(self.widths[-1])
+        node = node_end(self.describe(u), name, width)
+        if node is not None or (end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u)):
+            return node
+        return homoclinic_end(self.describe(u), name, width)
 
     def _shrunk(self, u: Array, part: float) -> BranchEvent | None:
         """The point of a surface to which an orbit shrinks, if it is small relative to the first one."""
@@ -344,6 +360,9 @@ class OrbitCurve(OrbitEquations):
             return self._event(kind, self, zero.point, conditions[0].name, side)
         at, p = curve.evaluation(point.u), curve.parameters_at(point.u)
         test = curve.known[beyond.test]
+        vertical = abs(float(point.tangent[-1])) < _VERTICAL and not self.system.time_dependent
+        if kind == SOFT and vertical and curve.problem.legs[0].timed:
+            kind = CENTRE
         back = curve._edited(kind, [test], point.u, p) if kind == "corner" else None
         side = far_side(curve.problem, kind, test, at, p, itinerary, back)
         return self._event(kind, curve, point, beyond.test, side)
@@ -453,17 +472,23 @@ class OrbitCurve(OrbitEquations):
         """The branch in the other itinerary."""
         if is_smooth(zero.name) or event.point is None or not isinstance(event.curve, OrbitCurve):
             return None
+        if event.kind == CENTRE:  # any linear orbit of the centre solves the equations beyond
+            return None
         curve, u = event.curve, event.point.u
         if curve is not self and curve.problem.legs == self.problem.legs:  # from another start
             return curve.onward(event, Zero(event.test, event.point, 0.0, (event.test,)))
         if curve is not self:  # located on the side with fewer legs, which is ahead
             return curve.leave(u, ())
+        return self.beyond(event.kind, self._vanishing(zero), u)
+
+    def beyond(self, kind: str, conditions: list[Condition], u: Array) -> Departure | None:
+        """Leave an event into the itinerary with more legs."""
         p = self.parameters_at(u)
-        beyond = self._edited(event.kind, self._vanishing(zero), u, p)
-        if beyond is None:
+        found = self._edited(kind, conditions, u, p)
+        if found is None:
             return None
-        start = np.append(beyond.u, u[-len(self.free) :])
-        return self.with_problem(beyond.problem, beyond.u, p).leave(start, beyond.fresh)
+        start = np.append(found.u, u[-len(self.free) :])
+        return self.with_problem(found.problem, found.u, p).leave(start, found.fresh)
 
     def leave(self, u: Array, fresh: Sequence[int]) -> Departure | None:
         """Leave an event into the side where the itinerary holds, new legs growing from zero."""
@@ -564,228 +589,3 @@ def _part(
         return None
     side = _smooth_side(problem, at, made.parameters_at(u), kind)
     return None if side is None else (kind, made, point, kind, side)
-
-
-# Branch switching ---------------------------------------------------------------------------------
-
-#: Distances from the event at which the new branch is searched, relative to the orbit.
-_AWAY = (1e-3, 1e-2, 3e-2)
-
-#: Period, relative to that of the first orbit, beyond which a branch may approach a homoclinic orbit.
-_LONG = 10.0
-
-
-def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
-    """The branch that crosses or begins at an event: its curve, and a point near the event."""
-    # At a period doubling the event comes first, as the other half of the branch repeats the same orbits.
-    if event.kind == "Hopf" and isinstance(event.solution, (Equilibrium, PseudoEquilibrium)):
-        return _around(event, free)
-    if event.kind not in ("period doubling", "pitchfork", "branch point"):
-        raise DefinitionError(
-            f"orbit={event!r} is no event at which to switch branches: a period doubling, pitchfork, branch "
-            "point or Hopf point of equilibria. Continue event.orbit, or continue_bifurcation the event."
-        )
-    base: OrbitCurve = event.curve
-    assert event.point is not None
-    curve, u = base.freed(event.point.u, free, np.ones(1))
-    assert isinstance(curve, OrbitCurve)
-    if event.kind == "branch point":
-        way = other_direction(event.point)
-    else:
-        curve, u, way = _twice(curve, u)
-    for away in _AWAY:
-        found = curve.correct(u + away * way * curve.scale, way)
-        if found is not None and np.abs((found - u) / curve.scale).max() < 10 * away:
-            return curve, [u, found] if event.kind == "period doubling" else [found]
-    raise ConvergenceError(
-        f"orbit: no orbit of the other branch was found near the {event.kind}. That branch may be vertical, "
-        "or the event degenerate: give an orbit of it."
-    )
-
-
-def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
-    """The small orbits around an equilibrium at its Hopf point."""
-    assert event.point is not None
-    system, at, n = event.curve.system, event.solution, event.curve.n
-    p, mode = event.curve.parameters_at(event.point.u), at.mode
-    slope = np.asarray(variational_field(system, mode).linear.copied(at.point, p)[1], float)
-    values, vectors = np.linalg.eig(slope)
-    turning = np.flatnonzero(values.imag > 1e-6 * np.abs(values).max())
-    if not turning.size:
-        raise DefinitionError(
-            f"orbit={event!r} is a neutral saddle, from which no orbits start. Give a Hopf point."
-        )
-    k = turning[np.argmin(np.abs(values[turning].real))]
-    across, period = vectors[:, k].real, 2 * np.pi / float(values[k].imag)
-    across = across / np.linalg.norm(across)
-    phase = slope @ across
-    problem = BoundaryProblem(
-        system, (Leg(mode),), phase=phase / np.linalg.norm(phase), reference=at.point.copy()
-    )
-    u = np.concatenate([at.point, [period], p[list(free)]])
-    curve = OrbitCurve(problem, p, free, np.ones(1), u[: n + 1], np.inf)
-    size = event.curve.scale[:n]
-    curve.scale[: n + 1] = np.append(size, period)
-    way = np.concatenate([across / np.linalg.norm(across), np.zeros(2)])
-    for away in _AWAY:
-        found = curve.correct(u + away * way * curve.scale, way)
-        first = curve.correct(u + 0.01 * away * way * curve.scale, way)
-        if found is None or first is None:
-            continue
-        if np.abs((found - u) / curve.scale).max() < 10 * away:
-            curve.longest = _LONG * period
-            return curve, [first, found]  # the tangent at the Hopf point itself is not defined
-    raise ConvergenceError(
-        f"orbit: no small orbit was found around the Hopf point {at.point.tolist()}. It may be degenerate, "
-        "with a pair of eigenvalues that does not cross the axis: give an orbit."
-    )
-
-
-def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
-    """Twice the legs, and the direction in which the doubled orbit leaves the single one."""
-    problem = curve.problem
-    starts, durations = problem.split(u)
-    p = curve.parameters_at(u)
-    changes, times = _alternating(curve, u)
-    if problem.phase is not None:  # no event ends the first turn
-        double = replace(problem, symmetry=None, periods=2 * problem.periods)
-        unknowns, way = double.pack(starts, 2.0 * durations), np.append(changes.ravel(), 0.0)
-    else:
-        shift = np.zeros(problem.dimension)
-        if problem.forcing is not None:
-            shift[-1] = problem.advance(p)[0]
-        back = np.linalg.inv(problem.wrap)
-        second = np.array([back @ (x + shift) for x in starts]).reshape(starts.shape)
-        turned = np.array([back @ -d for d in changes]).reshape(starts.shape)
-        legs = (*problem.legs, *(mirrored(problem, leg) for leg in problem.legs))
-        double = replace(problem, legs=legs, symmetry=None, periods=2 * problem.periods)
-        unknowns = double.pack(np.concatenate([starts, second]), np.concatenate([durations] * 2))
-        way = double.pack(np.concatenate([changes, turned]), np.concatenate([times, -times]))
-    new = curve.with_problem(double, unknowns, p)
-    way = np.append(way, np.zeros(len(curve.free))) / new.scale
-    return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
-
-
-def _alternating(curve: OrbitCurve, u: Array) -> tuple[Array, Array]:
-    """Changes of starts and durations along the eigenvector of the multiplier -1."""
-    problem, at = curve.problem, curve.evaluation(u)
-    maps = leg_maps(problem, at)
-    whole = np.eye(problem.dimension)
-    for step in maps:
-        whole = step @ whole
-    values, vectors = np.linalg.eig(whole)
-    d = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
-    changes, times = [], []
-    for step, flow, event in zip(maps, at.by_leg, at.events, strict=True):
-        changes.append(d)
-        times.append(-float(event.gradient @ flow.by_start @ d) / float(event.gradient @ flow.rate))
-        d = step @ d
-    return np.array(changes), np.array(times)
-
-
-def continue_orbit(
-    orbit: PeriodicOrbit | BranchEvent,
-    parameter: str,
-    *,
-    bounds: tuple[float, float],
-    step: float = 0.05,
-    max_points: int = 1000,
-    through: bool = True,
-    progress: bool = False,
-) -> Branch:
-    """Follow a periodic orbit as a parameter varies.
-
-    Pseudo-arclength continuation both ways to the bounds, with multipliers at each point. The itinerary
-    is kept as long as it is admissible; the event at its end is located in the itinerary with fewer
-    legs, where it is regular, and named.
-
-    Parameters
-    ----------
-    orbit : PeriodicOrbit or BranchEvent
-        Where to start; at a period doubling, pitchfork or branch point the other branch is followed
-        (from a period doubling one way only, as the other half repeats its orbits), at a Hopf point of
-        equilibria the orbits around it.
-    parameter : str
-        Name of the parameter that varies.
-    bounds : (float, float)
-        Bounds of the parameter at which the branch ends.
-    step : float, optional
-        Largest step where the branch bends, relative to the width of the bounds and to the size of
-        the orbit.
-    max_points : int, optional
-        Largest number of points of each piece.
-    through : bool, optional
-        Whether to change the itinerary and go on beyond events that end it.
-    progress : bool, optional
-        Whether to show a bar that counts points. After Ctrl-C the points computed so far are returned.
-
-    Returns
-    -------
-    Branch
-        Its ``solutions`` (or ``orbits``) are PeriodicOrbits. Events: ``"fold"``, ``"period
-        doubling"``, ``"Neimark-Sacker"``, ``"pitchfork"`` (of symmetric orbits), ``"branch
-        point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
-        ``"adding-sliding"``, ``"impact grazing"``, ``"grazing of a soft switch"``,
-        ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``; ``"Hopf"`` where orbits without events shrink to an equilibrium,
-        ``"boundary equilibrium"`` (with its class) or ``"two-fold"`` where others shrink to a point of a
-        surface.
-
-    Raises
-    ------
-    ConvergenceError
-        The orbit at the start does not solve its equations, or a branch cannot be entered.
-    DefinitionError
-        Neither an orbit nor an event from which orbits start; a parameter that the system does not have.
-    OptionError
-        Bounds in the wrong order, or without the start; ``step`` or ``max_points`` out of its range; a
-        parameter that breaks the symmetry by which half of the orbit is solved for.
-
-    Examples
-    --------
-    A forced relay, $x' = A cos t - sgn x$: crossing orbits begin to slide below
-    $A = sqrt(1 + pi^2/4)$.
-
-    >>> import casadi as ca, nonsmooth as ns
-    >>> x, t, a = (ca.SX.sym(s) for s in ("x", "t", "a"))
-    >>> relay = ns.FilippovSystem([x], surface=x, time=t, parameters={a: 2.5},
-    ...                           above=[a * ca.cos(t) - 1], below=[a * ca.cos(t) + 1])
-    >>> orbit = ns.periodic_orbit(relay, [0.5])
-    >>> branch = ns.continue_orbit(orbit, "a", bounds=(1.5, 3.0))
-    >>> [(e.kind, round(e.parameter, 12)) for e in branch.events]
-    [('crossing-sliding', 1.862095889119)]
-    """
-    positive(step, "step")
-    whole(max_points, "max_points", least=2)
-    curve, rows = _begin(orbit, parameter)
-    start = rows[-1]
-    low, high = check_bounds(bounds, float(start[-1]), parameter)
-    curve.widths = np.array([high - low])
-    curve.scale = np.append(curve.scale[:-1], high - low)
-    away = Departure(curve, rows, (start - rows[0]) / curve.scale) if len(rows) > 1 else None
-    return follow_branch(
-        curve,
-        start,
-        name=parameter,
-        bounds=(low, high),
-        step=step,
-        max_points=max_points,
-        through=through,
-        progress=progress,
-        away=away,
-    )
-
-
-def _begin(orbit: PeriodicOrbit | BranchEvent, parameter: str) -> tuple[OrbitCurve, list[Array]]:
-    """The curve and its first point; from a period doubling or Hopf point with the one before."""
-    if not isinstance(orbit, (PeriodicOrbit, BranchEvent)):
-        raise DefinitionError(
-            f"orbit={orbit!r} is no PeriodicOrbit or event of a branch. Find one with periodic_orbit."
-        )
-    system = orbit.system if isinstance(orbit, PeriodicOrbit) else orbit.curve.system
-    free = (parameter_index(system, parameter),)
-    if isinstance(orbit, BranchEvent):
-        return switched(orbit, free)
-    p, u = orbit.parameter_vector, orbit.unknowns
-    longest = _LONG * float(orbit.evaluation.durations.sum())
-    curve = OrbitCurve(orbit.problem, p, free, np.ones(1), u, longest)
-    return curve, [np.append(u, p[list(free)])]

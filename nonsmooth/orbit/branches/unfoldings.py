@@ -10,21 +10,22 @@ bifurcations keep the derivative continuous.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from ...flow.names import guard_name
 from ...local.read_only import ReadOnly
-from ...model import Array, DegenerateError, NonsmoothError
+from ...model import Array, DegenerateError, Guard, NonsmoothError
 from ...model.derivatives.event_maps import surface_map
-from ...model.derivatives.higher_derivatives import contact_expansion, guard_rate_gradient
+from ...model.derivatives.mode_derivatives import contact_expansion, guard_rate_gradient
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import leg_maps, return_map
 from ..runs.legs import Leg, integrate_leg
 from .branch import FarSide
 from .conditions import Condition, touching
-from .itinerary_changes import ChangedItinerary
+from .itinerary_changes import FORCE, ChangedItinerary
 
 #: Sine of the angle between orbit and surface below which an event is a grazing.
 _TANGENT = 1e-6
@@ -38,12 +39,17 @@ _VERDICTS = {
     "grazing of a reset": "the reset happens on one side only, and the return map changes at once",
     "grazing of a stop": "the orbit ends at the stop",
     "grazing of a soft switch": _SMOOTH,
+    "focus-centre-limit cycle": "the cycle is born from the largest orbit of a centre",
     "grazing of a jumping force": "the return map has a square root: stability is lost at once",
     "grazing, escaping": "the orbit leaves along the other field: nothing continues it",
     "two-fold": "the orbit passes a two-fold, where its future may not be unique",
     "corner": "two events at one time, {one} and {other}; the itinerary beyond is not known here: "
     "simulate there and continue what is found",
 }
+
+
+#: Events at which the return map may have a square root.
+_ROOTS = ("impact grazing", "grazing of a reset", FORCE)
 
 
 def far_side(
@@ -62,12 +68,8 @@ def far_side(
             return FarSide(
                 itinerary, _verdict(numbers, "with and without sliding"), ReadOnly(numbers)
             )
-        of_reset = test.guard is not None and test.guard.kind in ("impact", "reset")
-        if (
-            kind in ("impact grazing", "grazing of a reset")
-            and test.what == "interior"
-            and of_reset
-        ):
+        jumps = test.guard is not None and test.guard.kind in ("impact", "reset", "surface")
+        if kind in _ROOTS and test.what == "interior" and jumps:
             return _root(problem, kind, test, at, p, itinerary)
         if kind == "corner" and beyond is not None:
             numbers = _orders(problem, at, beyond, p)
@@ -91,7 +93,8 @@ def _root(
     if "n.A.w" not in numbers:
         return FarSide(itinerary, _VERDICTS[kind], ReadOnly(numbers))
     if numbers["n.(I - A)^-1.A.w"] > 0.0:
-        verdict = "nonsmooth fold: the orbits with and without the impact meet and vanish"
+        what = "the visit" if kind == FORCE else "the impact"
+        verdict = f"nonsmooth fold: the orbits with and without {what} meet and vanish"
     else:
         verdict = "persistence of an orbit that becomes unstable"
     verdict += "; the return map has a square root: stability is lost at once"
@@ -149,23 +152,44 @@ def impact_numbers(
     numbers = {"leading multiplier": abs(leading), "its angle": float(np.angle(leading))}
     y = touched(problem, test, at, p)
     own = leg.field(system).rate.copied(leg.field(system).states_at(y, p), p)[0][:n, 0]
-    event = Leg(leg.mode, guard.kind, guard.element, guard.side).at_end(system, y, p)
-    if y.size != event.gradient.size or np.abs(event.after - y).max() > 1e-6 * (
-        1 + np.abs(y).max()
-    ):
-        return numbers
-    sign = -guard.side if guard.kind == "reset" else 1
-    normal = (sign or 1) * event.gradient
-    found = guard_rate_gradient(system, leg.mode, guard).copied(y, p)[0]
-    rate = found.ravel() * (sign or 1)
-    bend = float(rate @ own)
-    jump = (event.after_state @ own - own) / bend
-    push = jump - own * float(rate @ jump) / bend
+    if guard.kind == "surface":
+        normal, rate, push = _visit(problem, leg, guard, y, p)
+    else:
+        event = Leg(leg.mode, guard.kind, guard.element, guard.side).at_end(system, y, p)
+        size = 1 + np.abs(y).max()
+        if y.size != event.gradient.size or np.abs(event.after - y).max() > 1e-6 * size:
+            return numbers
+        sign = -guard.side if guard.kind == "reset" else 1
+        normal = (sign or 1) * event.gradient
+        found = guard_rate_gradient(system, leg.mode, guard).copied(y, p)[0]
+        rate = found.ravel() * (sign or 1)
+        bend = float(rate @ own)
+        jump = (event.after_state @ own - own) / bend
+        push = jump - own * float(rate @ jump) / bend
     outside = _around(problem, test, at, p, own, rate)
     after = outside @ push
     numbers["n.A.w"] = float(normal @ after)
     numbers["n.(I - A)^-1.A.w"] = float(normal @ np.linalg.solve(np.eye(n) - outside, after))
+    if guard.kind == "surface":
+        size = math.sqrt(2.0 * float(rate @ own))
+        numbers["psi"] = -size * numbers["n.(I - A)^-1.A.w"]
+        numbers["n.A.e"] = -size * numbers["n.A.w"]
     return numbers
+
+
+def _visit(
+    problem: BoundaryProblem, leg: Leg, guard: Guard, y: Array, p: Array
+) -> tuple[Array, Array, Array]:
+    """Gradients of |h| and of its rate at a touch, and w of a visit beyond a surface where a force jumps."""
+    # The visit takes 2 s/a2 while the flow without it would take 2 s/a1 to come back.
+    own, other, second = contact_at(problem, leg, guard.element, guard.side, y, p)
+    gradient, sign = second["gradient of L1"], guard.side
+    normal = surface_map(problem.system, guard.element)(y, p).gradient[: own.size]
+    return (
+        sign * normal,
+        sign * gradient,
+        2.0 * (own / second["L11"] - other / second["L21"]) * sign,
+    )
 
 
 def _require_one_touch(at: Evaluation) -> None:

@@ -101,7 +101,7 @@ class Loop(ABC):
             if duration <= 0.0:
                 continue
             least: dict[str, float] = {}
-            for near in watch(self.system, leg.mode, x, duration, p).approaches:
+            for near in watch(self.system, leg, x, duration, p).approaches:
                 name = f"leg {i + 1} grazes {guard_name(self.system, near.guard)}"
                 least[name] = min(near.value, least.get(name, np.inf))
             found.update(least)
@@ -180,7 +180,7 @@ class Loop(ABC):
             if duration <= 0.0:
                 faults.append(f"{name} has the duration {duration:.3g}")
             else:
-                seen = watch(self.system, leg.mode, x, duration, p).faults
+                seen = watch(self.system, leg, x, duration, p).faults
                 faults += [f"{name}: {fault}" for fault in seen]
         return tuple(legs), tuple(faults)
 

@@ -29,8 +29,9 @@ from ...flow.fixed import TOLERANCE
 from ...model import Array, ConvergenceError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, EventMap, kept_maps
 from ...model.derivatives.forcing import Forcing
-from ..runs.leg_integration import LegFlows, LegIntegrator, leg_integrator
-from ..runs.legs import Leg, LegFlow, integrate_leg, surface_of
+from ..runs.cell_legs import CellLegs
+from ..runs.leg_integration import LegFlows, LegIntegrator
+from ..runs.legs import Leg, LegFlow, integrate_leg, rate_at, surface_of
 
 
 class JacobianIndices(NamedTuple):
@@ -49,14 +50,14 @@ class JacobianIndices(NamedTuple):
 def jacobian_indices(count: int, n: int, q: int = 0) -> JacobianIndices:
     """Indices for ``count`` legs of n states, with q parameters."""
     size = count * (n + 1)
-    indices = np.arange(size * (size + q)).reshape(size, size + q)
     rows = np.arange(count * n).reshape(count, n)
     times = np.arange(count * n, size)[:, None]
     more = np.broadcast_to(np.arange(size, size + q), (count, q))
     own, columns = np.hstack([rows, times]), np.hstack([rows, times, more])
     next_leg = np.roll(np.arange(count), -1)
+    width = size + q
     return JacobianIndices(
-        indices[own[:, :, None], columns[:, None, :]], indices[rows, rows[next_leg]], next_leg
+        own[:, :, None] * width + columns[:, None, :], rows * width + rows[next_leg], next_leg
     )
 
 
@@ -124,16 +125,22 @@ class BoundaryProblem:
     phase: Array | None = None
     #: (N,) or None
     reference: Array | None = None
-    #: Surfaces on which every leg slides.
+    #: Surfaces on which every leg slides, and behind them contacts that are closed in every leg.
     kept: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        sliding = [
-            i
-            for i in range(self.system.surface_count)
-            if all(leg.mode[i] == "s" for leg in self.legs)
-        ]
-        object.__setattr__(self, "kept", tuple(sliding))
+        modes = [self.system.widened(leg.mode) for leg in self.legs]
+        kept = [i for i, own in enumerate(zip(*modes, strict=True)) if self._is_kept(i, set(own))]
+        object.__setattr__(self, "kept", tuple(kept))
+
+    def _is_kept(self, i: int, letters: set[str]) -> bool:
+        return letters == {"s" if i < self.system.surface_count else "c"}
+
+    @cached_property
+    def with_rates(self) -> list[int]:
+        """Joints and contacts that are kept: their rates are, too."""
+        contacts = [i for i in self.kept if i >= self.system.surface_count]
+        return [*self.system.joints, *contacts]
 
     @cached_property
     def held(self) -> list[EventMap]:
@@ -247,11 +254,9 @@ class BoundaryProblem:
         return Evaluation(residual, whole, flows, starts, durations, self._allowed(starts[0], p))
 
     def _allowed(self, start: Array, p: Array) -> Array | None:
-        if not self.system.joints:
+        if not self.with_rates:
             return None
-        rows = np.array(
-            [own(start, p).gradient for own in kept_maps(self.system, self.system.joints)]
-        )
+        rows = np.array([own(start, p).gradient for own in kept_maps(self.system, self.with_rates)])
         return np.asarray(np.eye(self.dimension) - np.linalg.pinv(rows) @ rows)
 
     def residual(self, u: Array, p: Array, extended: bool = False) -> Array | None:
@@ -273,12 +278,14 @@ class BoundaryProblem:
                 gap += rest
         return np.concatenate([gap.ravel(), value])
 
-    def integrator(self, chosen: tuple[int, ...] = ()) -> LegIntegrator:
+    def integrator(self, chosen: tuple[int, ...] = ()) -> LegIntegrator | CellLegs:
         """The legs, ready to be integrated with derivatives by chosen parameters."""
         made = _INTEGRATORS.setdefault(self, {})
         found = made.get(chosen)
         if found is None:
-            found = made[chosen] = leg_integrator(self.system, self.legs, chosen)
+            of_legs = CellLegs if self.system.written.tables else LegIntegrator
+            build = lambda: of_legs(self.system, self.legs, chosen)
+            found = made[chosen] = self.system.cached(("integrator", self.legs, chosen), build)
         return found
 
     def _phased(
@@ -322,8 +329,7 @@ class BoundaryProblem:
         if self.phase is None or self.system.time_dependent:
             return self
         start, leg = self.split(u)[0][0], self.legs[0]
-        field = leg.field(self.system)
-        rate = field.rate.copied(field.states_at(start, p), p)[0][: self.dimension, 0]
+        rate = rate_at(self.system, leg, start, p)
         speed = float(np.linalg.norm(rate))
         if not speed > 0.0:
             return self
@@ -360,9 +366,9 @@ class BoundaryProblem:
 
 
 #: Legs of a problem ready to be integrated, by the chosen parameters.
-_INTEGRATORS: WeakKeyDictionary[BoundaryProblem, dict[tuple[int, ...], LegIntegrator]] = (
-    WeakKeyDictionary()
-)
+_INTEGRATORS: WeakKeyDictionary[
+    BoundaryProblem, dict[tuple[int, ...], LegIntegrator | CellLegs]
+] = WeakKeyDictionary()
 
 
 # Symmetry action on legs.
@@ -396,15 +402,15 @@ def mirrored(problem: BoundaryProblem, leg: Leg) -> Leg:
 
 
 def _turning(problem: BoundaryProblem) -> list[bool]:
-    """Which switching functions the symmetry maps to their negatives."""
+    """Which surfaces have functions that the symmetry maps to their negatives."""
     system = problem.system
     x = np.cos(1.0 + np.arange(system.dimension))
     back = np.linalg.inv(problem.symmetry) if problem.symmetry is not None else np.eye(x.size)
     result = []
-    for k in range(system.surface_count):
-        h = system.surface_function(k)
+    for first, *more in system.entries:
+        h = system.surface_function(first)
         a, b = (float(system.evaluate(h, v, None)[0, 0]) for v in (x, back @ x))
-        result.append(a * b < 0.0)
+        result.append(not more and a * b < 0.0)  # a set has no sides
     return result
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from time import monotonic
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...flow.ensembles.progress import progress_bar
 from ...flow.fixed import TOLERANCE
 from ...flow.trajectory import Trajectory
 from ...model import (
@@ -22,11 +24,12 @@ from ...model import (
     require_system,
     whole,
 )
+from ...model.checks import positive
 from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
-from ..runs.legs import leg_name, shown_itinerary
+from ..runs.legs import Leg, leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
-from .guess import Start, about_of, is_about, start_of
+from .guess import Start, about_of, is_about, starts_of
 from .orbit import PeriodicOrbit, faults_of, named
 from .symmetry import prime_period, require_symmetric, symmetry_matrix
 
@@ -40,11 +43,14 @@ def periodic_orbit(
     *,
     itinerary: Itinerary | None = None,
     period: Any = None,
+    multiplicity: int | None = None,
     symmetry: ArrayLike | str | None = None,
     parameters: Parameters | None = None,
     t_start: float = 0.0,
     virtual: bool = False,
     max_iterations: int = 20,
+    max_time: float | None = None,
+    progress: bool = False,
 ) -> PeriodicOrbit:
     """Find a periodic orbit, stable or not, with all digits, its multipliers and its margins.
 
@@ -54,19 +60,24 @@ def periodic_orbit(
     Parameters
     ----------
     system : FilippovSystem
-        With scalar multipliers; it may slide, jump, hit, and depend periodically on time.
+        It may slide, jump, hit, rub in a plane or in space, and depend periodically on time.
     guess : Trajectory, state (n,) or PeriodicOrbit
         A run whose end is near the orbit; a state near it, from which the system is simulated; an
         orbit at other parameters, whose itinerary is kept.
     itinerary : str or sequence, optional
         Modes of the legs in order, e.g. ``"- s"``, or pairs of a mode and the name of the event that
         ends it; with a state as the guess. One mode alone means an orbit of a forced system without
-        events, over as many periods of the forcing (up to 16) as close best.
+        events; without ``multiplicity`` it lasts for as many periods of the forcing (up to 16) as close best.
+        With vector multipliers only that.
     period : expression in parameters or float, optional
         The period of the forcing, if the system depends on time. Found by itself where the time only
-        enters sines and cosines of one frequency. The orbit may take several. Of a system without
+        enters sines and cosines whose frequencies have rational ratios. Of a system without
         time about how long the whole orbit takes: shorter and longer ones, by more than a factor of
         1.5, are skipped in the guess and refused as the result.
+    multiplicity : int, optional
+        Number of periods of the forcing that the orbit of a forced system takes. By default, for a state as the
+        guess, the least of an orbit beside it (up to 8), and else 1; a run, an itinerary or an orbit has
+        its own.
     symmetry : "odd" or array_like (n, n), optional
         R, if R x solves the equations when x does (half a forcing period later, if there is one): the
         orbit is solved for as a half, which R maps to the other half. ``"odd"`` is $R = -1$.
@@ -77,7 +88,11 @@ def periodic_orbit(
     virtual : bool, optional
         Accept an orbit that violates guards.
     max_iterations : int, optional
-        Maximum number of Newton steps.
+        Maximum number of full Newton steps; where they fail, up to twice as many with damping follow.
+    max_time : float, optional
+        Seconds after which Newton's method gives up (ConvergenceError).
+    progress : bool, optional
+        Whether to show a bar that counts evaluations of the equations.
 
     Returns
     -------
@@ -93,7 +108,7 @@ def periodic_orbit(
     DegenerateError
         The orbit grazes, or passes a two-fold or a corner.
     DefinitionError
-        ``system`` is none, or has vector multipliers; a mode of the itinerary that it does not have.
+        ``system`` is none; a mode of the itinerary that it does not have.
     OptionError
         No period, though the system depends on time and none is found, or one that is no positive
         time; a symmetry that is none; with a run or an orbit as the guess an itinerary, a ``t_start``,
@@ -124,30 +139,127 @@ def periodic_orbit(
     >>> orbit.stability
     'asymptotically stable'
     """
-    require_system(system, complementarity=True, joints=True)
+    require_system(system, sets=True, complementarity=True, joints=True)
     max_iterations = whole(max_iterations, "max_iterations")
     if not isinstance(virtual, (bool, np.bool_)):
         raise OptionError(f"virtual: expected True or False, received {virtual!r}.")
     matrix = symmetry_matrix(system, symmetry)
-    start = start_of(system, guess, itinerary, period, matrix, parameters, t_start)
-    begun, guessed = start.problem, start.unknowns
+    if multiplicity is not None:
+        multiplicity = _multiplicity(system, multiplicity, matrix)
+    budget = _Budget(max_time, progress)
+    given = itinerary, period, multiplicity, matrix, parameters, t_start
+    try:
+        for start in starts_of(system, guess, *given):
+            if start.near:
+                beside = _beside(start, multiplicity, max_iterations, budget)
+                if beside is not None:
+                    return beside
+                continue
+            orbit = _solved(start, period, multiplicity, max_iterations, budget)
+            if orbit.faults and not virtual:
+                raise _virtual(orbit)
+            return orbit
+        raise AssertionError("the last start is beside none")
+    except _OutOfTime:
+        raise ConvergenceError(
+            f"periodic orbit: no orbit was found in max_time = {max_time:g} s, after {budget.spent} evaluations of "
+            "the equations. Start closer to the orbit, or allow more time."
+        ) from None
+    finally:
+        budget.bar.close()
+
+
+def _multiplicity(system: FilippovSystem, given: Any, symmetry: Array | None) -> int:
+    """Check the number of periods of the forcing."""
+    count = whole(given, "multiplicity")
+    if not system.time_dependent:
+        raise OptionError(
+            f"multiplicity={count} is a number of periods of a forcing, but the system does not depend on time. "
+            "Give period=, about how long the orbit takes."
+        )
+    if symmetry is not None and count % 2 == 0:
+        raise OptionError(
+            f"multiplicity={count} is even, but an orbit whose half a symmetry maps to the other half takes an odd "
+            "number of periods of the forcing. Drop symmetry=."
+        )
+    return count
+
+
+class _OutOfTime(Exception):
+    """The time for a search is spent."""
+
+
+class _Budget:
+    """The time that a search may take, and a bar that counts evaluations of its equations."""
+
+    def __init__(self, seconds: float | None, shown: bool):
+        self.end = math.inf if seconds is None else monotonic() + positive(seconds, "max_time")
+        self.bar, self.spent = progress_bar(None, shown, " evaluations"), 0
+
+    def spend(self) -> None:
+        if monotonic() > self.end:
+            raise _OutOfTime
+        self.spent += 1
+        self.bar.update()
+
+
+def _solved(
+    start: Start,
+    period: Any,
+    multiplicity: int | None,
+    most: int,
+    budget: _Budget,
+    damped: bool = True,
+) -> PeriodicOrbit:
+    """The orbit that Newton's method finds from a start."""
+    begun, guessed, system = start.problem, start.unknowns, start.problem.system
     if not begun.legs[-1].timed:
         begun, guessed = prime_period(begun, guessed, start.p)
-    solver = _Solver(begun, start.p)
-    u, at = solver.solve(guessed, max_iterations)
+    solver = _Solver(begun, start.p, budget)
+    u, at = solver.solve(guessed, most, damped)
     problem, once = prime_period(begun, u, start.p)
     if problem is not begun:
-        u, at = _Solver(problem, start.p).solve(once, max_iterations)
+        u, at = _Solver(problem, start.p, budget).solve(once, most)
     require_motion(problem, at, start)
     require_duration(problem, at, about_of(system, period, start.p))
+    _require_multiplicity(problem, multiplicity)
     faults = tuple(faults_of(problem, at, start.p))
     orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, solver.iterations, faults)
     require_simple(orbit)
     require_symmetric(orbit)
-    if faults and not virtual:
-        raise _virtual(orbit)
     return orbit
 
+
+def _require_multiplicity(problem: BoundaryProblem, wanted: int | None) -> None:
+    """Refuse an orbit that takes another number of periods of the forcing."""
+    found = problem.periods * (1 if problem.symmetry is None else 2)
+    if wanted is not None and abs(found - wanted) > 0.25:
+        raise ConvergenceError(
+            f"periodic orbit: multiplicity = {wanted} was requested, but the orbit closes after {found:g} of the "
+            "forcing's periods. Start closer to the orbit, or leave multiplicity= out."
+        )
+
+
+def _beside(
+    start: Start, multiplicity: int | None, most: int, budget: _Budget
+) -> PeriodicOrbit | None:
+    """The orbit that full Newton steps reach beside a state; None if it is not near."""
+    try:
+        orbit = _solved(start, None, multiplicity, min(most, _QUICK), budget, damped=False)
+    except (ConvergenceError, DegenerateError):
+        return None
+    begun, guessed = prime_period(start.problem, start.unknowns, start.p)
+    if orbit.faults or orbit.problem.size != begun.size:
+        return None
+    away = np.abs(orbit.unknowns - guessed) / orbit.problem.scales(orbit.unknowns, start.p)
+    return orbit if away.max() <= _BESIDE else None
+
+
+#: Full Newton steps that suffice beside an orbit.
+_QUICK = 8
+
+#: Largest distance of an orbit from a state beside it, in scaled unknowns.
+_BESIDE = 0.05
 
 #: Steps below this, relative to the orbit, that do not shrink are rounding of the equations.
 _CLOSE = 1e-10
@@ -177,12 +289,12 @@ _LARGE, _CLOSED = 1000, 1e-9
 class _Solver:
     """Newton's method on the equations of an orbit, with diagnostics on failure."""
 
-    def __init__(self, problem: BoundaryProblem, p: Array):
-        self.problem, self.p, self.iterations = problem, p, 0
+    def __init__(self, problem: BoundaryProblem, p: Array, budget: _Budget):
+        self.problem, self.p, self.iterations, self.budget = problem, p, 0, budget
         self.last: tuple[Array, Evaluation | None] = (np.zeros(0), None)
 
-    def solve(self, u: Array, max_iterations: int) -> tuple[Array, Evaluation]:
-        """The orbit, to rounding."""
+    def solve(self, u: Array, max_iterations: int, damped: bool = True) -> tuple[Array, Evaluation]:
+        """The orbit, to rounding; with damped steps where full ones fail."""
         longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
         scales = self.problem.scales(u)
         last: list[Array] = []
@@ -201,6 +313,7 @@ class _Solver:
                     f"Leg {i + 1} {leg_name(self.problem.system, self.problem.legs[i])} grew to the duration "
                     f"{durations[i]:.3g}."
                 )
+            self.budget.spend()
             size = float(np.abs(v - last[-1]).max()) if last else 0.0
             # after a step of this size the next one is its square, and what it leaves its fourth power
             tol = min(max(1e-3 * size**4, TOLERANCE), _COARSE)
@@ -234,7 +347,7 @@ class _Solver:
         last[:] = before
         if nearest is not root and nearest is not None:
             return self._polished(nearest * scales, _POLISH)
-        if root is None and u.size <= _LARGE:
+        if root is None and damped and u.size <= _LARGE:
             root = self._damped(equations, u / scales, 2 * max_iterations)
         if root is None:
             raise self._failure(reason)
@@ -370,7 +483,7 @@ class _Solver:
         modes += f" ... ({len(legs)} legs)" * (len(legs) > 40)
         return ConvergenceError(
             f"periodic orbit: Newton's method did not converge with the itinerary {modes!r} in "
-            f"{self.iterations} steps, residual {size:.2g}.{why}{where} Simulate "
+            f"{self.iterations} evaluations of the equations, residual {size:.2g}.{why}{where} Simulate "
             "longer, start closer to the orbit, or try the itinerary of a run from there.",
             residual=size,
             point=u,
@@ -452,17 +565,27 @@ def require_duration(problem: BoundaryProblem, at: Evaluation, about: float | No
     )
 
 
+#: L of the other field at an exit, relative to its gradient and the state, at which the exit is at a two-fold.
+_TWO_FOLD = 1e-9
+
+
+def at_two_fold(
+    system: FilippovSystem, leg: Leg, end: Array, p: Array, part: float = _TWO_FOLD
+) -> bool:
+    """Whether a slide on one surface ends where L_F1 h and L_F2 h both vanish."""
+    if leg.kind != "exit" or system.coupled:
+        return False
+    other = replace(leg, side=-leg.side).at_end(system, end, p)
+    size = float(np.linalg.norm(other.gradient) * np.linalg.norm(end)) or 1.0
+    return abs(other.value) <= part * size
+
+
 def require_simple(orbit: PeriodicOrbit) -> None:
-    """Refuse orbits through two-folds; grazing is refused by the multipliers."""
-    system, p = orbit.system, orbit.parameter_vector
+    """Refuse orbits through two-folds, and grazing."""
+    system, p, flows = orbit.system, orbit.parameter_vector, orbit.evaluation.flows
     for i, leg in enumerate(orbit.problem.legs):
-        if leg.kind != "exit" or system.coupled:
-            continue
-        flows = orbit.evaluation.flows
         end = flows.end[i, : flows.sizes[i]]
-        at = replace(leg, side=-leg.side).at_end(system, end, p)
-        size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
-        if abs(at.value) <= 1e-9 * size:
+        if at_two_fold(system, leg, end, p):
             raise DegenerateError(
                 f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
                 f"{leg_name(system, leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "

@@ -16,7 +16,7 @@ from functools import cached_property, reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, DegenerateError
+from ...model import Array, ConvergenceError, DegenerateError
 from ..runs.legs import integrate_leg, leg_name
 from ..runs.saltation import passages, saltations
 from .boundary_value_problem import BoundaryProblem, Evaluation, jacobian_indices
@@ -97,6 +97,13 @@ class Multipliers:
         return math.nan if self.refusal else max(self._carried[1], self._product.error)
 
     @property
+    def repeats(self) -> bool:
+        """Whether an autonomous orbit has the multiplier 1 twice, as in a family of orbits."""
+        if self.refusal or self.problem.system.time_dependent:
+            return False
+        return bool((np.abs(self.logarithms) <= max(_NEUTRAL, 10.0 * self.error)).any())
+
+    @property
     def stability(self) -> str:
         """Stability in words, from the multipliers that are not the 1 of the flow."""
         if self.refusal:
@@ -170,6 +177,8 @@ class Multipliers:
 
     def _even(self, part: Array) -> bool:
         """Whether derivatives (S, N) do not grow too differently."""
+        if self.problem.system.sets:  # what they take is lost, however short the leg is
+            return True
         moved = part[: self._units.size] / self._units[:, None]
         sizes = np.linalg.svd(moved, compute_uv=False)
         count = self._count + 1  # discrete states do not move
@@ -181,7 +190,10 @@ class Multipliers:
         while True:
             parts, x = list[tuple[Array, Array]](), self.at.starts[i]
             for _ in range(count):
-                flow = integrate_leg(problem.system, leg, x, duration / count, self.p)
+                try:
+                    flow = integrate_leg(problem.system, leg, x, duration / count, self.p)
+                except ConvergenceError:  # rounding of the parts leads it astray
+                    return [(whole, self.at.flows.rate[i])]
                 x, part = flow.end[:n], np.zeros_like(whole)
                 part[: len(flow.by_start)] = flow.by_start * units
                 parts.append((part, flow.rate))

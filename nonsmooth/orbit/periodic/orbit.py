@@ -9,12 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...flow.fixed import flow_for
 from ...flow.names import described
 from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
 from ...model import Array, FilippovSystem, ParameterError, Surfaces
-from ...model.derivatives.variational import variational_field
 from ...notebook import card, circle
 from ..runs.guards import faults_along, watch
 from ..runs.legs import Leg, integrate_leg, shown_itinerary
@@ -140,7 +138,7 @@ class PeriodicOrbit:
                 start = x[:n]
                 if flip is not None:
                     start = flip @ start
-                    mode = mirrored_mode(self, leg.mode, x, float(duration))
+                    mode = mirrored_mode(self, leg, x, float(duration))
                     leg = replace(mirrored(self.problem, leg), mode=mode)
                 result.append(orbit_leg(self.system, leg, start, t, float(duration)))
                 t += float(duration)
@@ -262,6 +260,8 @@ class PeriodicOrbit:
             f"  multipliers {', '.join(_number(m) for m in self.multipliers)}"
             f" (structural ones are exact; the estimated error is {self.error_estimate:.1e})",
         ]
+        if self.floquet.repeats:
+            lines.append("  the multiplier 1 twice: one of a family of orbits, or at a fold")
         if self.margins:
             near = self.margins[0]
             lines.append(f"  nearest change: leg {near.leg + 1} {near.what} {near.value:.6g}")
@@ -289,21 +289,21 @@ def _number(m: complex) -> str:
     return f"{m.real:.12g}{m.imag:+.12g}i"
 
 
-def mirrored_mode(orbit: PeriodicOrbit, mode: str, x: Array, duration: float) -> str:
+def mirrored_mode(orbit: PeriodicOrbit, leg: Leg, x: Array, duration: float) -> str:
     """The mode of a leg's mirror image."""
     system, p = orbit.system, orbit.parameter_vector
-    field = variational_field(system, mode)
-    middle = flow_for(field, field.start(x, p), p, 0.5 * duration)[: system.extended_dimension]
+    mode, n = leg.mode, system.extended_dimension
+    middle = integrate_leg(system, leg, x, 0.5 * duration, p).end[:n]
     surfaces = Surfaces(system)
     image = orbit.problem.wrap @ middle
     if system.time_dependent:
         image[-1] += orbit.problem.advance(p)[0]
     h, gradient = surfaces.values(image, p)
     letters = ""
-    for i in range(system.surface_count):
+    for k, (i, *more) in enumerate(system.entries):
         near = abs(h[i]) <= 1e-10 * float(np.abs(gradient[i]) @ (1e-3 + np.abs(image)))
-        letters += "s" if near else "+" if h[i] > 0 else "-"
-    return letters + mode[system.surface_count :]
+        letters += mode[k] if more else "s" if near else "+" if h[i] > 0 else "-"
+    return letters + mode[len(system.entries) :]
 
 
 def faults_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
@@ -350,7 +350,7 @@ def _margins(orbit: PeriodicOrbit) -> list[Margin]:
             result.append(Margin(i, f"meets {name} at the angle", angle, angle, ends))
         if duration <= 0.0 or leg.repeats:
             continue
-        for near in watch(problem.system, leg.mode, at.starts[i], duration, p).approaches:
+        for near in watch(problem.system, leg, at.starts[i], duration, p).approaches:
             what = f"keeps {described(problem.system, near.guard)} at its nearest by"
             relative = near.distance / float(np.abs(size[: orbit.system.dimension]).max())
             result.append(Margin(i, what, near.distance, relative, begins + near.t))

@@ -72,12 +72,12 @@ def orbit_run(
         end, following, first = leg.t + leg.duration, legs[(k + 1) % len(legs)], len(coefficients)
         given: dict[str, Any] = {"t_start": leg.t, "parameters": parameters, "tol": 1e-12}
         endless = leg.kind == "limit"
-        if endless:
+        if endless or system.sets:  # at an end on a set one mode has no field
             run = simulate(system, leg.start, end, **given)
-            inside = [e for e in run.events if e.kind not in ("end", "contact", "rest")]
-            events += inside
         else:
             run = follow(system, leg.start, end, mode=leg.mode, **given)
+        if endless:
+            events += [e for e in run.events if e.kind not in ("end", "contact", "rest")]
         times.append(run.t)
         states.append(run.x)
         starts += run.steps.starts.tolist()

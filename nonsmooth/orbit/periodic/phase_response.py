@@ -120,8 +120,12 @@ class PhaseResponse:
         number = int(self.leg[after - 1])
         leg, p = replace(problem.legs[number], left=()), orbit.parameter_vector
         gone, rest = t - float(self.t[after - 1]), float(self.t[after]) - t
+        at_end = after + 1 == len(self.t) or self.leg[after + 1] != number
         x = integrate_leg(orbit.system, leg, self.x[after - 1], gone, p).end[: self.x.shape[1]]
-        z = integrate_leg(orbit.system, leg, x, rest, p).by_start[: len(x)].T @ self.z[after]
+        z = (
+            integrate_leg(orbit.system, leg, x, rest, p, to_end=at_end).by_start[: len(x)].T
+            @ self.z[after]
+        )
         if mirrored:
             x, z = problem.wrap @ x, np.linalg.solve(problem.wrap.T, z)
             number += len(problem.legs)
@@ -220,7 +224,7 @@ def _eigenvector(orbit: PeriodicOrbit) -> Array:
     units[units == 0.0] = 1.0
     speed = float(np.linalg.norm(field / units))
     rows = np.vstack([(matrix * units / units[:, None] - np.eye(n)).T, field / units / speed])
-    free = n - len(orbit.problem.kept)
+    free = n - len(orbit.problem.held)
     sizes = np.linalg.svd(rows, compute_uv=False)
     if sizes[free - 1] < _FAMILY * sizes[0]:
         raise DegenerateError(
@@ -263,8 +267,8 @@ def _parts(
     n, x = system.dimension, orbit.evaluation.starts[k]
     states, maps, speeds = [x], list[Array](), list[Array]()
     for i in range(count):
-        part = integrate_leg(system, leg if i == 0 else replace(leg, left=()), x, step, p)
-        last = i == count - 1
+        last, own = i == count - 1, leg if i == 0 else replace(leg, left=())
+        part = integrate_leg(system, own, x, step, p, to_end=last)
         maps.append(part.by_start if last else part.by_start[:n])
         x = part.end[:n]
         states.append(x)

@@ -159,6 +159,7 @@ def require_symmetric(orbit: PeriodicOrbit) -> None:
         return
     try:
         closed = any("c" in leg.mode for leg in orbit.legs)  # a run decides which contact
+        closed |= bool(orbit.system.sets)
         miss, where = (0.0, "") if closed else _miss_of_legs(orbit)
         jumps = closed or any(leg.kind in ("reset", "impact") for leg in orbit.legs)
         if miss <= _MISS and jumps and not orbit.is_virtual:
@@ -183,7 +184,7 @@ def require_symmetric(orbit: PeriodicOrbit) -> None:
 
 def _surface_missed(orbit: PeriodicOrbit) -> str:
     """Name of a surface on which events of the other half should be and are not; empty for none."""
-    system, p, m = orbit.system, orbit.parameter_vector, orbit.system.surface_count
+    system, p, entries = orbit.system, orbit.parameter_vector, orbit.system.entries
     surfaces = system.cached("surfaces of symmetric orbits", lambda: Surfaces(system))
     here, there = (np.sort(np.abs(surfaces.values(x, p)[0])) for x in _beside(orbit, 0))
     if (np.abs(here - there) <= 1e-10 * here).all():
@@ -191,7 +192,10 @@ def _surface_missed(orbit: PeriodicOrbit) -> str:
     legs, count = orbit.legs, len(orbit.problem.legs)
     units = orbit.problem.scales(orbit.unknowns)[: system.dimension]
     for leg, after in pairwise([*legs[count - 1 :], legs[0]]):
-        on = [k for k in range(m) if leg.mode[k] != after.mode[k] or after.mode[k] == "s"]
+        changed = [
+            leg.mode[k] != after.mode[k] or after.mode[k] == "s" for k in range(len(entries))
+        ]
+        on = [i for own, members in zip(changed, entries, strict=True) if own for i in members]
         if not on or leg.kind in ("reset", "impact"):
             continue
         h, gradient = surfaces.values(system.extended_point(after.start, after.t), p)

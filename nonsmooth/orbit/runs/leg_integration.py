@@ -6,18 +6,21 @@ The results of :func:`~nonsmooth.orbit.runs.legs.integrate_leg` and
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
 
 import numpy as np
 
+from ...flow.engine.columns import CarriedLegs
 from ...flow.engine.smooth import LegsProgram
 from ...flow.fixed import MOST_STEPS, TOLERANCE, legs_program, stuck
+from ...flow.variation import Arc, carry_legs, require_done
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
-from ...model.derivatives.event_maps import AtEvent
-from ...model.derivatives.variational import plain_field
+from ...model.derivatives.event_maps import AtEvent, surface_map
+from ...model.derivatives.variational import VariationalField, plain_field
 from .legs import Leg, LegFlow, integrate_leg, leg_name
 from .limit_leg import limit_flow
 from .saltation import Ended
@@ -87,28 +90,49 @@ def _event_offsets(n: int, most: int, q: int) -> tuple[int, ...]:
 class LegIntegrator:
     """Legs that are integrated repeatedly, with derivatives by the ``chosen`` parameters."""
 
-    def __init__(self, system: FilippovSystem, legs: Sequence[Leg], chosen: tuple[int, ...] = ()):
+    def __init__(
+        self,
+        system: FilippovSystem,
+        legs: Sequence[Leg],
+        chosen: tuple[int, ...] = (),
+        by_leg: bool = False,
+    ):
         self.system, self.legs, self.chosen = system, tuple(legs), chosen
-        distinct = {leg: leg.field(system, chosen) for leg in set(self.legs)}
-        self.fields = [distinct[leg] for leg in self.legs]
+        #: Whether parameters are given leg by leg, (L, np).
+        self._by_leg = by_leg
         self._limits = any(leg.repeats for leg in self.legs)
-        both = zip(self.fields, self.legs, strict=True)
-        self.sizes = tuple(field.entries + bool(leg.repeats) for field, leg in both)
-        self._most = max(self.sizes)
         # events at one instant follow from each other: composed in Python
         self._composed = [i for i, leg in enumerate(self.legs) if leg.further and not leg.timed]
         self._plain = [i for i, leg in enumerate(self.legs) if leg.timed]
 
     @cached_property
+    def fields(self) -> list[VariationalField]:
+        """The field of each leg."""
+        distinct = {leg: leg.field(self.system, self.chosen) for leg in set(self.legs)}
+        return [distinct[leg] for leg in self.legs]
+
+    @cached_property
+    def sizes(self) -> tuple[int, ...]:
+        """States of each leg, with multipliers that are."""
+        if self.system.sets:
+            return tuple(self.system.extended_dimension + bool(leg.repeats) for leg in self.legs)
+        both = zip(self.fields, self.legs, strict=True)
+        return tuple(field.entries + bool(leg.repeats) for field, leg in both)
+
+    @property
+    def _most(self) -> int:
+        return max(self.sizes)
+
+    @cached_property
     def _program(self) -> LegsProgram:
         maps = {leg: None if leg.further else leg.map(self.system) for leg in set(self.legs)}
         events = [maps[leg] for leg in self.legs]
-        return legs_program(self.fields, events, len(self.system.parameter_names))
+        return legs_program(self.fields, events, len(self.system.parameter_names), self._by_leg)
 
     @cached_property
     def _plain_program(self) -> LegsProgram | None:
         """Legs without derivatives, where each is a flow of the states to one event."""
-        if self._plain or self._composed or self._limits:
+        if self._plain or self._composed or self._limits or self.system.sets:
             return None
         maps = {leg: leg.map(self.system) for leg in set(self.legs)}
         if any(field.entries > field.by_start for field in self.fields):
@@ -116,7 +140,7 @@ class LegIntegrator:
         fields = {leg.mode: plain_field(self.system, leg.mode) for leg in set(self.legs)}
         events = [at.plain for leg in self.legs if (at := maps[leg]) is not None]
         of_legs = [fields[leg.mode] for leg in self.legs]
-        return legs_program(of_legs, events, len(self.system.parameter_names))
+        return legs_program(of_legs, events, len(self.system.parameter_names), self._by_leg)
 
     def ends(
         self, starts: Array, durations: Array, p: Array, extended: bool
@@ -143,6 +167,8 @@ class LegIntegrator:
         self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE
     ) -> LegFlows:
         """Integrate all legs."""
+        if self.system.sets:
+            return self._by_modes(starts, durations, p)
         if len(set(self.sizes)) > 1 or self._limits:
             return self._one_by_one(starts, durations, p)
         n, most = starts.shape[1], self._most
@@ -151,7 +177,8 @@ class LegIntegrator:
             z = np.tile(np.eye(columns, n, -1), (len(starts), 1, 1))
             z[:, 0], z[:, 1 + n :] = starts, 0.0
         else:
-            z = np.array([f.initial(x, p).T for f, x in zip(self.fields, starts, strict=True)])
+            own = zip(self.fields, starts, self._each(p), strict=True)
+            z = np.array([f.initial(x, q).T for f, x, q in own])
         flow = self._program(z, p, durations, tol, MOST_STEPS)
         if flow.failed >= 0:
             i = flow.failed
@@ -166,9 +193,13 @@ class LegIntegrator:
             flow.after[:, :most],
             x,
             by_p,
-            *self._events(flow.results, n, p.size),
+            *self._events(flow.results, n, p.shape[-1]),
         )
         return self._completed(result, p)
+
+    def _each(self, p: Array) -> Array:
+        """Parameters of each leg (L, np)."""
+        return p if self._by_leg else np.broadcast_to(p, (len(self.legs), p.size))
 
     def _events(self, results: Array, n: int, q: int) -> tuple[Array, ...]:
         """Outputs of the events' programs: g, g_x, g_p, e, e_x, e_p."""
@@ -192,7 +223,12 @@ class LegIntegrator:
             return flows
         for i in self._composed:
             k = self.sizes[i]
-            self._fill(flows, i, self.legs[i].at_end(self.system, flows.end[i, :k], p))
+            self._fill(
+                flows, i, self.legs[i].at_end(self.system, flows.end[i, :k], self._each(p)[i])
+            )
+        return self._without_events(flows)
+
+    def _without_events(self, flows: LegFlows) -> LegFlows:
         n = flows.after.shape[1]
         for i in self._plain:
             flows.after[i] = flows.end[i, :n]
@@ -208,44 +244,103 @@ class LegIntegrator:
         flows.after_parameters[i], flows.value[i] = at.after_parameters, at.value
         flows.gradient[i, :k], flows.value_parameters[i] = at.gradient, at.by_parameters
 
-    def _one_by_one(self, starts: Array, durations: Array, p: Array) -> LegFlows:
-        count, n, most, q = len(self.legs), starts.shape[1], self._most, len(self.chosen)
-        flows = LegFlows(
-            self.sizes,
-            np.zeros((count, most)),
-            np.zeros((count, most)),
-            np.zeros((count, most)),
-            np.zeros((count, most, n)),
-            np.zeros((count, most, q)),
-            *self._events(np.zeros((count, 0)), n, p.size),
+    def _by_modes(self, starts: Array, durations: Array, p: Array) -> LegFlows:
+        """Integrate all legs by the law of their modes."""
+        system, (count, n), q = self.system, starts.shape, len(self.chosen)
+        arcs, onto, own = list[Arc](), dict[int, list[Array]](), self._each(p)
+        for i, (leg, x, t) in enumerate(zip(self.legs, starts, durations.tolist(), strict=True)):
+            if leg.left:
+                x, *onto[i] = _onto_set(system, leg, x, own[i])
+            arcs.append(leg.arc(system, x, 0.0 if leg.repeats else t))
+        found = carry_legs(system, arcs, p, self.chosen)
+        with self._naming(found.failed):
+            require_done(system, arcs, found)
+        by = found.derivatives
+        for i, (by_start, by_p) in onto.items():
+            by[i, :, n:] += by[i, :, :n] @ by_p[:, list(self.chosen)]
+            by[i, :, :n] = by[i, :, :n] @ by_start
+        flows, most = self._empty(count, n, q, p.shape[-1]), slice(n)
+        flows.end[:, most], flows.before[:, most], flows.rate[:, most] = (
+            found.ends,
+            found.before,
+            found.rates,
         )
-        for i, field in enumerate(self.fields):
-            at = field.states_at(starts[i], p)
-            flows.before[i, : field.entries] = field.rate.copied(at, p)[0][:, 0]
+        flows.by_start[:, most], flows.by_parameters[:, most] = by[:, :, :n], by[:, :, n:]
         for i, leg in enumerate(self.legs):
-            k, own = self.sizes[i], (self.system, leg, starts[i], float(durations[i]), p)
-            try:
-                if leg.repeats:
-                    part = limit_flow(*own, self.chosen, flows.before[(i + 1) % count, :n])
-                else:
-                    part = integrate_leg(*own, self.chosen)
-            except ConvergenceError as error:
-                message = f"{self._named(i)}: {error}"
-                raise ConvergenceError(message, point=error.point) from None
-            except DegenerateError as error:
-                raise DegenerateError(f"{self._named(i)}: {error}") from None
+            if leg.repeats:
+                self._to_limit(flows, i, starts[i], float(durations[i]), own[i])
+            elif leg.reaches_set(system):
+                self._fill(flows, i, self._reached(flows, found, i, own[i]))
+            elif not leg.timed:
+                self._fill(flows, i, leg.at_event(system, flows.end[i, :n], own[i]))
+        return self._without_events(flows)
+
+    def _empty(self, count: int, n: int, q: int, parameters: int) -> LegFlows:
+        """Flows of ``count`` legs of zeros."""
+        most = self._most
+        end, before, rate = (np.zeros((count, most)) for _ in range(3))
+        x, by_p = np.zeros((count, most, n)), np.zeros((count, most, q))
+        events = self._events(np.zeros((count, 0)), n, parameters)
+        return LegFlows(self.sizes, end, before, rate, x, by_p, *events)
+
+    def _to_limit(self, flows: LegFlows, i: int, x: Array, duration: float, p: Array) -> None:
+        """Fill in a leg of infinitely many events."""
+        leg, following = self.legs[i], (i + 1) % len(self.legs)
+        with self._naming(i):
+            then = flows.before[following, : len(x)]
+            part = limit_flow(self.system, leg, x, duration, p, self.chosen, then)
+        flows.end[i], flows.rate[i] = part.end, part.rate
+        flows.by_start[i], flows.by_parameters[i] = part.by_start, part.by_parameters
+        self._fill(flows, i, leg.at_end(self.system, part.end, p))
+
+    def _reached(self, flows: LegFlows, found: CarriedLegs, i: int, p: Array) -> AtEvent:
+        """The end of a leg at a set: the motion goes on over the whole duration as it reaches the set."""
+        n, members = flows.after.shape[1], self.system.entries[self.legs[i].element]
+        end, rate = flows.end[i, :n], flows.rate[i, :n]
+        h = [surface_map(self.system, k)(end, p).value for k in members]
+        left, gradient = float(found.left[i]), found.gradients[i]
+        end += left * rate
+        value = float(np.linalg.norm(h)) + left * float(gradient[:n] @ rate)
+        return AtEvent.smooth_at(end, value, gradient[:n], gradient[n:])
+
+    def _one_by_one(self, starts: Array, durations: Array, p: Array) -> LegFlows:
+        n, every = starts.shape[1], self._each(p)
+        flows = self._empty(len(self.legs), n, len(self.chosen), p.shape[-1])
+        for i, field in enumerate(self.fields):
+            at = field.states_at(starts[i], every[i])
+            flows.before[i, : field.entries] = field.rate.copied(at, every[i])[0][:, 0]
+        for i, leg in enumerate(self.legs):
+            if leg.repeats:
+                self._to_limit(flows, i, starts[i], float(durations[i]), every[i])
+                continue
+            k, own = self.sizes[i], (self.system, leg, starts[i], float(durations[i]), every[i])
+            with self._naming(i):
+                part = integrate_leg(*own, self.chosen)
             flows.end[i, :k], flows.rate[i, :k] = part.end, part.rate
             flows.by_start[i, :k], flows.by_parameters[i, :k] = part.by_start, part.by_parameters
             if not leg.timed:
-                self._fill(flows, i, leg.at_end(self.system, part.end, p))
+                self._fill(flows, i, leg.at_end(self.system, part.end, every[i]))
         return self._completed(flows, p)
+
+    @contextmanager
+    def _naming(self, i: int) -> Iterator[None]:
+        """Say in errors of a leg which it is."""
+        try:
+            yield
+        except ConvergenceError as error:
+            raise ConvergenceError(f"{self._named(i)}: {error}", point=error.point) from None
+        except DegenerateError as error:
+            raise DegenerateError(f"{self._named(i)}: {error}") from None
 
     def _named(self, i: int) -> str:
         return f"leg {i + 1} {leg_name(self.system, self.legs[i])}"
 
 
-def leg_integrator(
-    system: FilippovSystem, legs: tuple[Leg, ...], chosen: tuple[int, ...] = ()
-) -> LegIntegrator:
-    """Return the integrator of some legs, made once per system."""
-    return system.cached(("integrator", legs, chosen), lambda: LegIntegrator(system, legs, chosen))
+def _onto_set(system: FilippovSystem, leg: Leg, x: Array, p: Array) -> tuple[Array, Array, Array]:
+    """The state to first order on the sets that a leg leaves, with derivatives by state and parameters."""
+    at = [surface_map(system, i)(x, p) for i in leg.left]
+    rows = np.array([own.gradient for own in at])
+    back = np.zeros(rows.T.shape)
+    back[: system.dimension] = np.linalg.pinv(rows[:, : system.dimension])  # at the same time
+    by_p = -back @ np.array([own.by_parameters for own in at])
+    return x - back @ [own.value for own in at], np.eye(len(x)) - back @ rows, by_p

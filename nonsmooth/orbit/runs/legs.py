@@ -120,6 +120,11 @@ class Leg:
             return EndOfLeg(guard="exit", number=members[0], side=self.side)
         return EndOfLeg(guard="surface", number=members[0])
 
+    def reaches_set(self, system: FilippovSystem) -> bool:
+        """Whether its event is that of reaching a set."""
+        ends = self.ends(system)
+        return ends is not None and ends.hit >= 0
+
     def _is_plain(self, system: FilippovSystem) -> bool:
         """Whether its event is one of a table or a surface without memory, whose multipliers enter linearly."""
         return system.laws[self.element] in ("surface", "table") and not any(system.nonlinear)
@@ -153,12 +158,10 @@ class Leg:
         return at
 
     def _own_event(self, system: FilippovSystem, x: Array, p: Array) -> AtEvent:
-        at_once = self.kind in ("stop", "reset", "impact", "jump")
-        if (
-            system.sets
-            or at_once
-            or (self.kind in ("crossing", "entry") and self._is_plain(system))
-        ):
+        by_states = ["stop", "reset", "impact", "jump"]
+        if system.sets or (self.kind in ("crossing", "entry") and self._is_plain(system)):
+            by_states += ["crossing", "entry", "contact"]
+        if self.kind in by_states:
             mode = system.widened(self.mode) if self.kind == "impact" else ""
             given = mode, self.kind, self.element, self.letters, self.atom
             return instant_map(system, *given)(x, p)
@@ -239,16 +242,32 @@ def integrate_leg(
     duration: float,
     p: Array,
     chosen: tuple[int, ...] = (),
+    to_end: bool = False,
 ) -> LegFlow:
-    """The flow of a leg's mode from ``x`` (N,) over a duration of either sign, with derivatives."""
+    """The flow of a leg's mode from ``x`` (N,) over a duration of either sign, with derivatives.
+
+    ``to_end``: to the set that ends it, if one does, where the mode has no field.
+    """
     if leg.repeats:
         from .limit_leg import limit_flow  # which needs this module
 
         return limit_flow(system, leg, x, duration, p, chosen)
+    if system.sets:
+        hit = leg.ends(system) if to_end and leg.reaches_set(system) else None
+        arcs = [Arc(leg.mode, x, duration, hit, _still_left(system, leg, x, p))]
+        carried = carry_legs(system, arcs, p, chosen)
+        require_done(system, arcs, carried)
+        return flows_of(carried)[0]
     field = leg.field(system, chosen)
     whole = field.matrix(flow_for(field, field.start(x, p), p, duration))
     n, end = field.by_start, whole[:, 0]
     return LegFlow(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], field.rate_at(end, p))
+
+
+def _still_left(system: FilippovSystem, leg: Leg, x: Array, p: Array) -> tuple[int, ...]:
+    """The sets that a leg leaves, if a state (N,) is where it begins."""
+    at = [surface_map(system, i)(x, p) for i in leg.left]
+    return leg.left if all(_is_zero(h, x) for h in at) else ()
 
 
 def carry_leg(
@@ -340,7 +359,7 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
     result: list[Stretch] = []
     if len(system.joints) > 1:
         _require_independent(system, mode, x, p)
-    if system.sets:
+    if begins and system.sets:
         _require_held(system, mode, x, p)
     known: dict[tuple[object, ...], Leg] = {}
     discrete = len(system.definition.discrete)
@@ -686,5 +705,5 @@ def parallel(a: Array, b: Array) -> bool:
 
 def surface_of(system: FilippovSystem, leg: Leg) -> int:
     """The switching surface of a leg's event; -1 if it has none."""
-    own = leg.kind in ("crossing", "entry", "exit") and leg.element < system.surface_count
-    return leg.element if own else -1
+    own = leg.kind in ("crossing", "entry", "exit") and leg.element < len(system.entries)
+    return leg.element if own and len(system.entries[leg.element]) == 1 else -1

@@ -161,7 +161,7 @@ def poincare(
     Parameters
     ----------
     system : FilippovSystem
-        With scalar multipliers.
+        The system to follow.
     section : expression, str, number or Section
         A function of states, parameters and time; a name of a surface, reset or impact, or a kind of
         event; a period. See :class:`Section`.
@@ -184,7 +184,7 @@ def poincare(
     Raises
     ------
     DefinitionError
-        ``system`` is not a FilippovSystem, or has vector multipliers.
+        ``system`` is not a FilippovSystem.
     PointError
         A start of a wrong shape or not finite.
     ParameterError
@@ -207,7 +207,7 @@ def poincare(
     >>> returns.jacobian(2)[0, 0].round(9), returns.points[2, 0] / returns.points[1, 0].round(9)
     (np.float64(0.533488091), np.float64(0.53348809...))
     """
-    require_system(system, complementarity=True, joints=True)
+    require_system(system, sets=True, complementarity=True, joints=True)
     count, t_start = whole(count, "count"), real(t_start, "t_start")
     if isinstance(section, Section):
         wanted = replace(section, count=count, skip=section.skip + whole(skip, "skip", least=0))

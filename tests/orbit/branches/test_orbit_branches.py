@@ -237,9 +237,15 @@ def test_bad_input(forced, change, error, words):
         ns.continue_orbit(given.pop("orbit"), given.pop("parameter"), **given)
 
 
-def test_branches_are_switched_only_where_they_cross(forced):
-    with pytest.raises(ns.DefinitionError, match="switch"):
-        ns.continue_orbit(forced.events[0], "A", bounds=(0.8, 3))
+def test_an_event_without_periodic_orbits_is_refused():
+    x, y, a = symbols("x y a")
+    folded = ns.FilippovSystem(
+        [x, y], surface=y, above=[a + x - x**3, 1 - y], below=[1, 1], parameters={a: -1.0}
+    )
+    event = ns.continue_equilibrium(folded, [-1.3, 1.0], "a", bounds=(-2, 2)).events[0]
+    assert event.kind == "fold"
+    with pytest.raises(ns.DefinitionError, match="no event from which periodic orbits start"):
+        ns.continue_orbit(event, "a", bounds=(-2, 2))
 
 
 # two harmonics: every kind of sliding bifurcation, one or two at a time ---------------------------
@@ -419,11 +425,13 @@ def test_a_graze_where_a_force_jumps_is_that_for_an_orbit_and_its_mirror_image()
     )
     orbit = ns.periodic_orbit(system, [0.5, 0.1], symmetry="odd")
     (pitchfork,) = ns.continue_orbit(orbit, "F", bounds=(1.5, 4.0)).events
-    branch = ns.continue_orbit(pitchfork, "F", bounds=(1.5, 12.0))
-    first, last = branch.events[0], branch.events[-1]
-    assert first.kind == last.kind == "grazing of a jumping force"
-    assert first.parameter == pytest.approx(last.parameter, rel=1e-11)
-    assert branch.ends == (ns.orbit.BranchEnd.EVENT,) * 2
+    branch = ns.continue_orbit(pitchfork, "F", bounds=(1.5, 11.8))
+    named = kinds(branch)
+    half = ["period doubling", "grazing of a jumping force", *["period doubling"] * 2]
+    assert named == [*half, "pitchfork", *half[::-1]]
+    first, last = (branch.events[i].parameter for i in (1, -2))
+    assert first == pytest.approx(last, rel=1e-11)
+    assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
 
 
 @pytest.mark.parametrize("number", [0, 1])

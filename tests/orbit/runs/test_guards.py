@@ -67,7 +67,7 @@ def test_legs_are_judged_together_as_one_by_one():
         if durations[i] <= 0.0:
             expected.append(f"leg {i + 1} {leg_name(system, leg)} has the duration 0")
             continue
-        found = watch(system, leg.mode, starts[i], durations[i], p).faults
+        found = watch(system, leg, starts[i], durations[i], p).faults
         j = (i + 1) % len(legs)
         fault = change_fault(system, leg, legs[j].mode, ends[i].end, starts[j], p)
         found += [fault] if fault else []
@@ -96,9 +96,9 @@ def test_what_is_passed_inside_a_step_is_seen(kind, duration):
         [x, y], surface=y + 99, above=[1, 1 + 0.1 * turn], below=[1, 1 + 0 * y], **given
     )
     p = np.zeros(0)
-    (fault,) = watch(system, "+", np.array([0.0, 0.0]), duration, p).faults
+    (fault,) = watch(system, Leg("+"), np.array([0.0, 0.0]), duration, p).faults
     assert fault.startswith(f"{kind} 'out' reaches zero ")
-    assert watch(system, "+", np.array([0.91, 0.0]), duration, p).faults == []
+    assert watch(system, Leg("+"), np.array([0.91, 0.0]), duration, p).faults == []
     late = np.array([0.9 - duration, 0.0])  # met at the very end, as by what ends the leg
-    assert watch(system, "+", late, duration, p).faults == []
-    assert watch(system, "+", np.array([0.9, 0.0]), duration, p).faults == []
+    assert watch(system, Leg("+"), late, duration, p).faults == []
+    assert watch(system, Leg("+"), np.array([0.9, 0.0]), duration, p).faults == []

@@ -99,7 +99,7 @@ def test_residuals_have_more_digits_than_doubles():
 def test_extrema_of_a_guard_are_those_of_its_closed_form():
     """h = sin(3 t) + 1.1 along x = t: minima at t = pi/2, 7 pi/6, ... with h = 0.1."""
     system = ns.FilippovSystem([x, y], surface=ca.sin(3 * x) + 1.1, above=[1, 0], below=[1, 0])
-    seen = watch(system, "+", np.array([0.0, 0.0]), 5.0, np.zeros(0))
+    seen = watch(system, Leg("+"), np.array([0.0, 0.0]), 5.0, np.zeros(0))
     times = [near.t for near in seen.approaches]
     np.testing.assert_allclose(times, np.pi / 2 + 2 * np.pi / 3 * np.arange(2), rtol=1e-13)
     np.testing.assert_allclose([near.value for near in seen.approaches], 0.1, rtol=1e-13)

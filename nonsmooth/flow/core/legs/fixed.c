@@ -139,12 +139,12 @@ static void watched_at(Flow *w, const double *z, double *values) {
  * ``counts``, first coefficients, and behind those of a leg values at its end. Those whose duration is not positive
  * have coefficients alone. The number of a flow
  * that fails, with what is left of it, or -1; -2 where there was not enough room. */
-int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, const double *p, double *z,
+int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, const double *p, int64_t parameters, double *z,
                    const double *durations, double tol, int64_t most_steps, double ends, double *found, int64_t room,
                    int64_t *counts, double *begins, int64_t begin_width, double *left, double *work) {
   for (int64_t i = 0; i < legs; i++) {
     const Field *f = fields[i];
-    Flow w = flow_of(f, p, durations[i], tol, work);
+    Flow w = flow_of(f, p + i * parameters, durations[i], tol, work);
     counts[i] = 0;
     if (durations[i] > 0 && f->watched) {
       counts[i] = watch_flow(&w, z + i * width, most_steps, ends * w.whole, found, room, begins + i * begin_width);

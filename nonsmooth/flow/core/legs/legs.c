@@ -122,6 +122,7 @@ static int carry(Run *r, Leg *l, Slopes *g) {
     r->order = at_end || (is_implicit && l->left > 0) ? 1 : order;
     expand(r, r->letter, r->x, r->unknowns, e);
     r->order = order;
+    if (step == 0 && land_state(r, g)) expand(r, r->letter, r->x, r->unknowns, e);
     for (int i = 0; i < r->s->dimension; i++)
       size = larger(fabs(e->states[(int64_t)i * r->stride + 1]) * length_of_leg(l), size);
     for (int i = 0; i < r->n; i++) l->end_rate[i] = e->states[(int64_t)i * r->stride + 1];

@@ -300,28 +300,50 @@ static void begin_column(Run *r, const Leg *l, const Slopes *g, int column) {
     }
 }
 
+/* Move a state or a column from where sets have values h by what their multipliers do at once. */
+static void move_onto(const Run *r, const Slopes *g, const double *h, double *y) {
+  const Expansion *e = &r->e;
+  const Variation *v = g->v;
+  int64_t n = r->n, slides = e->l.slides, stride = r->stride;
+  for (int i = 0; i < slides; i++)
+    for (int j = 0; j < slides; j++)
+      if (set_of(r, e->l.sliding[j]) >= 0)
+        v->series[e->l.sliding[i] * stride] -= e->inverse[i * slides + j] * h[e->l.sliding[j]];
+  memset(v->sum, 0, sizeof(double) * n * stride);
+  follow_links(g, LATE, 0);
+  for (int i = 0; i < n; i++) y[i] += v->sum[i * stride];
+}
+
 /* Derivatives of h of the sets at the start, and columns from which what leads off sets is taken. */
 static void land(Run *r, const Leg *l, Slopes *g) {
   const Expansion *e = &r->e;
   const Variation *v = g->v;
-  int64_t n = r->n, slides = e->l.slides, stride = r->stride;
+  int64_t n = r->n, stride = r->stride;
   if (!r->s->sets) return;
   measure_slopes(r, e, g, 1);
   for (int k = 0; k < l->columns; k++) {
-    double *y = l->y + k * n, *h = v->h + k * r->m;
+    double *h = v->h + k * r->m;
     memset(h, 0, sizeof(double) * r->m);
     begin_column(r, l, g, k);
     follow_links(g, SUMS, 0);
     for (int i = 0; i < r->m; i++) if (set_of(r, i) >= 0) h[i] = v->sum[(n + r->width + i) * stride];
-    for (int i = 0; i < slides; i++)
-      for (int j = 0; j < slides; j++)
-        if (set_of(r, e->l.sliding[j]) >= 0)
-          v->series[e->l.sliding[i] * stride] -= e->inverse[i * slides + j] * h[e->l.sliding[j]];
-    memset(v->sum, 0, sizeof(double) * n * stride);
-    follow_links(g, LATE, 0);
-    for (int i = 0; i < n; i++) y[i] += v->sum[i * stride];
+    move_onto(r, g, h, l->y + k * n);
     for (int i = 0; i < r->m; i++) if (e->l.letter[i] == 0) h[i] = 0;
   }
+}
+
+/* The same of a state; whether it was off sets on which it is held. */
+static int land_state(Run *r, Slopes *g) {
+  const Expansion *e = &r->e;
+  int is_off = 0;
+  if (!r->s->sets) return 0;
+  const double *h = surface_values(r, r->x);
+  for (int i = 0; i < e->l.slides; i++) is_off |= set_of(r, e->l.sliding[i]) >= 0 && h[e->l.sliding[i]] != 0;
+  if (!is_off) return 0;
+  measure_slopes(r, e, g, 1);
+  clear_variation(g->v);
+  move_onto(r, g, h, r->x);
+  return 1;
 }
 
 /* The longest step for which the last two terms of columns stay below the tolerance: a part of them, or of what they

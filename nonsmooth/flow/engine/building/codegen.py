@@ -44,7 +44,7 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
     """C source of the engine for ``width`` trajectories in step."""
     head, program = _lanes_head(system, order)
     groups = 8 if system.sets and len(program) > _LONG_TEXT else 2
-    before = ("core/common.h", "kernel/vector.h", "kernel/sines.h", "kernel/polynomials.h")
+    before = ("core/common.h", "kernel/vector.h", "kernel/functions.h", "kernel/polynomials.h")
     sizes = f"#define W {width}\n#define GROUPS {groups}\n"
     parts = [sizes, head, *map(driver_text, before), program, driver_text("kernel/records.h")]
     after = ("kernel/exchange.c", "kernel/batch.c")
@@ -55,7 +55,7 @@ def device_source(system: FilippovSystem, order: int, threads: int, resident: in
     """C++ source of the same engine with a trajectory for each thread, for CUDA or any compiler."""
     head, program = _lanes_head(system, order)
     sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n#define RANDOM 0\n"
-    before = ("core/common.h", "kernel/lane.h", "kernel/sines.h", "kernel/polynomials.h")
+    before = ("core/common.h", "kernel/lane.h", "kernel/functions.h", "kernel/polynomials.h")
     parts = [driver_text("kernel/cuda.h"), sizes, head, *map(driver_text, before), program]
     return "".join([*parts, *_step_texts(system), driver_text("kernel/cuda.c")])
 

@@ -78,12 +78,12 @@ def continued(
     engine, stop = tape_for(system, options), threading.Event()
     assert engine is not None
 
-    def part(first: int) -> tuple[int, Chunk]:
+    def part(first: int) -> tuple[slice, Chunk]:
         rows = slice(first, min(first + size, count))
         own = p[rows] if p.ndim > 1 else p
         chunk = out.part(rows.start, rows.stop)
         _continue(engine, records[rows], own, options, at, chunk, to_end, stop.is_set)
-        return first, chunk
+        return rows, chunk
 
     with ThreadPoolExecutor(max(workers, 1)) as pool:
         try:
@@ -91,12 +91,7 @@ def continued(
         except BaseException:
             stop.set()
             raise
-    words: list[str] = []
-    for first, chunk in parts:
-        out.itinerary[first : first + len(chunk.t)] += len(words)
-        words += chunk.words
-        out.totals += chunk.totals
-    out.rename(dict(enumerate(words)))
+    out.take(parts)
     rows = np.flatnonzero(out.status == HAND_OVER)
     going = records[rows]
     going["index"], going["shortest"], going["shrinking"] = rows, 1e-3, 0

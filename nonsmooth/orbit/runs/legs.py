@@ -214,7 +214,7 @@ def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class LegFlow:
     """Flow of a leg from its start over its duration."""
 
@@ -317,7 +317,7 @@ def flows_of(found: CarriedLegs) -> list[LegFlow]:
     return result
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)  # made for each event: frozen ones take thrice the time
 class Stretch:
     """A leg of a run: where it starts and ends."""
 

@@ -26,6 +26,7 @@ from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
 from ..runs.legs import Leg, leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
+from .divided_legs import divided, to_divide
 from .guess import Start, about_of, is_about, start_of
 from .orbit import PeriodicOrbit, faults_of, named
 from .symmetry import prime_period, require_symmetric, symmetry_matrix
@@ -134,20 +135,44 @@ def periodic_orbit(
     begun, guessed = start.problem, start.unknowns
     if not begun.legs[-1].timed:
         begun, guessed = prime_period(begun, guessed, start.p)
-    solver = _Solver(begun, start.p)
-    u, at = solver.solve(guessed, max_iterations)
-    problem, once = prime_period(begun, u, start.p)
-    if problem is not begun:
-        u, at = _Solver(problem, start.p).solve(once, max_iterations)
+    problem, u, at, iterations = _solved(begun, guessed, start.p, max_iterations)
+    part, once = prime_period(begun, problem.undivided(u), start.p)
+    if part is not begun:
+        problem, u, at, _ = _solved(part, once, start.p, max_iterations)
     require_motion(problem, at, start)
     require_duration(problem, at, about_of(system, period, start.p))
     faults = tuple(faults_of(problem, at, start.p))
-    orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, solver.iterations, faults)
+    orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, iterations, faults)
     require_simple(orbit)
     require_symmetric(orbit)
     if faults and not virtual:
         raise _virtual(orbit)
     return orbit
+
+
+def _solved(
+    problem: BoundaryProblem, guess: Array, p: Array, max_iterations: int
+) -> tuple[BoundaryProblem, Array, Evaluation, int]:
+    """The orbit near a guess, with legs divided where derivatives grow along them; how many steps it took."""
+    solver, found = _Solver(problem, p), None
+    try:
+        found = solver.solve(guess, max_iterations)
+        if not to_divide(problem, found[1]):
+            return problem, *found, solver.iterations
+        parts, start = divided(problem, guess, p)
+    except ConvergenceError:
+        parts, start = divided(problem, guess, p)
+        if parts is problem:
+            raise
+    if parts is not problem:
+        try:
+            finer = _Solver(parts, p)
+            return parts, *finer.solve(start, max_iterations), solver.iterations + finer.iterations
+        except ConvergenceError:
+            if found is None:
+                raise
+    assert found is not None
+    return problem, *found, solver.iterations
 
 
 #: Steps below this, relative to the orbit, that do not shrink are rounding of the equations.
@@ -170,6 +195,9 @@ _FAR = 10.0
 
 #: Directions that equations say less of than the others, by these factors.
 _WEAK = (1e-15, 1e-8, 1e-6, 1e-4, 1e-2)
+
+#: Residual, relative to the orbit, with which it does not close.
+_CLOSES = 1e-7
 
 #: Equations of which singular values would take minutes, and residuals that cannot be smaller.
 _LARGE, _CLOSED = 1000, 1e-9
@@ -234,12 +262,20 @@ class _Solver:
         nearest = self._of_family(equations, u / scales, root, max_iterations)
         last[:] = before
         if nearest is not root and nearest is not None:
-            return self._polished(nearest * scales, _POLISH)
+            return self._closed(*self._polished(nearest * scales, _POLISH))
         if root is None and u.size <= _LARGE:
             root = self._damped(equations, u / scales, 2 * max_iterations)
         if root is None:
             raise self._failure(reason)
-        return self._polished(root * scales)
+        return self._closed(*self._polished(root * scales))
+
+    def _closed(self, u: Array, at: Evaluation) -> tuple[Array, Evaluation]:
+        """Refuse what no step brings nearer to an orbit."""
+        sizes = self._sizes(at.jacobian * self.problem.scales(u))
+        if not float(np.abs(at.residual / sizes).max()) <= _CLOSES:
+            self.last = u, at
+            raise self._failure("")
+        return u, at
 
     def _of_family(
         self, equations: Equations, v: Array, root: Array | None, most: int

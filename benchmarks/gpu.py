@@ -25,7 +25,7 @@ from nonsmooth.flow.constants import HAND_OVER
 from nonsmooth.flow.engine import find_compiler
 from nonsmooth.flow.engine.device import card as cards
 from nonsmooth.flow.engine.device.card import Card, card
-from nonsmooth.flow.engine.device.kernel import Kernel, Source
+from nonsmooth.flow.engine.device.kernel import Given, Kernel, Source
 from nonsmooth.flow.ensembles.on_device import device_order
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
@@ -71,7 +71,7 @@ def ends(name: str, x: Array, machine: Card) -> Chunk:
     """What a machine makes of starts (m, n), without the driver."""
     kernel = kernel_of(name, machine)
     chunk, p = Chunk.empty(len(x), kernel.system, False), kernel.system.parameter_vector()
-    kernel.run(Source.rows(x), 0, len(x), p, options_of(name), None, chunk)
+    kernel.run(Given(Source.rows(x), 0, len(x), p, options_of(name)), None, chunk)
     return chunk
 
 
@@ -178,7 +178,7 @@ def rates(quick: bool) -> dict[str, Any]:
         steps, left = np.empty(part, np.int32), [0]
 
         def alone(kernel=kernel, name=name, part=part, box=box, p=p, left=left) -> Any:  # type: ignore[no-untyped-def]
-            memory, left[0] = kernel.start(box, 0, part, p, options_of(name), None)
+            memory, left[0] = kernel.start(Given(box, 0, part, p, options_of(name)), None)
             return memory
 
         card().read(alone()["steps"], steps)

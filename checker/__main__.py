@@ -15,6 +15,7 @@ from typing import Any
 from complete_lists import check_cover, check_list
 from intervals import CheckError
 from orbit_proofs import check_orbit
+from periodic_orbits import check_periodic
 from records import read
 from special_points import check
 
@@ -59,7 +60,7 @@ def claimed(text: dict[str, Any]) -> list[tuple[Callable[[Any], str], Any]]:
 def _point(record: dict[str, Any]) -> str:
     if not record:
         raise CheckError("there is no proof")
-    return check(record)
+    return check_periodic(record) if record.get("kind") == "periodic orbit" else check(record)
 
 
 if __name__ == "__main__":

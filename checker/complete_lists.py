@@ -33,8 +33,9 @@ def check_cover(ranges: list[list[str]], records: list[dict[str, Any]]) -> str:
 
 def _ranges(record: dict[str, Any]) -> list[list[str]]:
     """Parameters, then the states that are no unknowns."""
-    free = {i for vector, i in record["unknowns"] if vector == 0}
-    return [*record["parameters"], *(v for i, v in enumerate(record["held"]) if i not in free)]
+    free = {i for vector, i in record.get("unknowns", []) if vector == 0}
+    held = [v for i, v in enumerate(record.get("held", [])) if i not in free]
+    return [*record["parameters"], *held]
 
 
 def _volume(box: list[tuple[Fraction, Fraction]], wide: list[int]) -> Fraction:

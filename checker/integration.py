@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from intervals import CheckError, Iv, number, whole
-from mean_value_forms import States, span
+from mean_value_forms import States, covers, span, tube
 from modes import Modes
 from polynomials import is_factored
 from series import Coefficients, Dual, constant, evaluate, minus, motion, negative, over, times
@@ -34,9 +34,16 @@ class Orbit:
 
     def __init__(self, record: dict[str, Any], box: Box):
         self.record, self.graph, self.n = record, record["graph"], len(record["start"])
+        self.plane: tuple[int, Iv, int] | None = (
+            None  # x_k = c, where it ends, and the side it comes from
+        )
+        self.smooth = False  # whether the derivatives of the motion are enclosed
         start, given = box[: self.n], box[self.n :]
         self.given = [Iv.of(*pair) for pair in given]
         self.moving = [k for k, (a, b) in enumerate(given) if a < b]
+        nodes, jumps = self.graph["nodes"], max(map(len, self.graph["maps"]), default=0)
+        clocks = [i for i, k in enumerate(self.graph["field"]) if nodes[k] == ["const", "1"]]
+        self.time = next((i for i in clocks if i >= jumps), None)  # a state that is the time
         values = [Iv.of(*pair) for pair in start] + [whole(0)]
         values += [self.given[k] for k in self.moving]
         self.states = States(values, any(a < b for a, b in box))
@@ -140,6 +147,10 @@ class Orbit:
             turned = self.signs.get(k, 1)
             c_k = values[node].v if turned > 0 else negative(values[node].v)
             found.append(Guard(kind, k, direction, c_k))
+        if self.plane is not None:
+            k, value, direction = self.plane
+            left = minus(constant(value), c[k])
+            found.append(Guard("end", 0, 0, left if direction > 0 else negative(left)))
         return found
 
     def _initial_signs(self, jumped: int | None = None, own: int | None = None) -> None:
@@ -147,7 +158,7 @@ class Orbit:
         before, self.signs = self.signs if own is not None else {}, {}
         c = motion(self.rates, self.states.values, 4)
         for g in self.guards(c):
-            if g.kind in ("surface", "exit"):
+            if g.kind in ("surface", "exit", "end"):
                 continue
             order = next((k for k, v in enumerate(g.c[k] for k in range(4)) if not v.zero), 0)
             order = 1 if g.index == jumped else order
@@ -185,7 +196,7 @@ class Orbit:
             except UnsureError as unsure:
                 if unsure.since < natural // 50:
                     raise
-                h = unsure.since
+                h = unsure.since * 7 // 8  # so that the guard is positive there
                 continue
             except CheckError:
                 h >>= 1
@@ -240,21 +251,24 @@ class Orbit:
         return not passes or g.direction * -self.signs[g.index] >= 0
 
     def _tube(self, h: int) -> list[Iv]:
-        """A box in which every orbit stays for a time h."""
-        t, x = Iv(0, h), [span(v) for v in self.states.values]
-        box = x
+        """A box in which every orbit stays for a time h; with derivatives by the set, if they are enclosed."""
+        t, values = Iv(0, h), self.states.values
+        x = values if self.smooth else [span(v) for v in values]
+        box = [tube(v) for v in x]
         for _ in range(12):
             rates = self.rates([[v] for v in box])
             new = [v + t * f[0] for v, f in zip(x, rates, strict=True)]
-            if all(b.a <= v.a and v.b <= b.b for b, v in zip(box, new, strict=True)):
+            if all(covers(b, v) for b, v in zip(box, new, strict=True)):
                 return box
-            box = [Iv(v.a - (v.b - v.a) // 8 - 1, v.b + (v.b - v.a) // 8 + 1) for v in new]
+            box = [tube(v, 8) for v in new]
         raise CheckError("no enclosure of the motion")
 
     # events --------------------------------------------------------------------------------------
 
     def apply(self, g: Guard) -> tuple[str, str] | None:
         """Apply a guard's zero; return kind and name of the event, None if it is not one."""
+        if g.kind == "end":
+            return "end", "end"
         if g.kind in ("stop", "reset", "impact"):
             counts = self._is_event(g)
             self.signs[g.index] = -self.signs[g.index]

@@ -104,6 +104,23 @@ def middle(v: Any) -> Iv:
     return v if type(v) is Iv else v.m
 
 
+def tube(v: Iv, share: int = 0) -> Iv:
+    """A function that may be anywhere in a range, with its derivatives; both wider by one of so many parts."""
+    own = _wider(span(v), share)
+    return own if type(v) is Iv else Form(own, [_wider(s, share) for s in v.g], v.r, own)
+
+
+def _wider(v: Iv, share: int) -> Iv:
+    more = (v.b - v.a) // share + 1 if share else 0
+    return v if v is ZERO else Iv(v.a - more, v.b + more)
+
+
+def covers(b: Iv, v: Iv) -> bool:
+    """Whether a range with its derivatives holds another."""
+    pairs = [(b, v), *(zip(b.g, v.g, strict=True) if type(b) is Form else ())]
+    return all(p.a <= q.a and q.b <= p.b for p, q in pairs)
+
+
 # Sets --------------------------------------------------------------------------------------------
 
 
@@ -114,6 +131,7 @@ class States:
         n = len(box)
         self.values: list[Iv] = box
         self.wide = wide
+        self.along = [[whole(int(i == j)) for j in range(n)] for i in range(n)]
         if wide:
             c = [v.mid() for v in box]
             frame = [[whole(1) if i == j else ZERO for j in range(n)] for i in range(n)]
@@ -144,10 +162,16 @@ class States:
                 continue
             parts = zip(applied(product(back, g), r), applied(back, miss), strict=True)
             new = [a + b for a, b in parts]
-            found.append((_size(frame, new), not skew, frame, new))
+            found.append((_size(frame, new), not skew, frame, new, back))
         if not found:
             raise CheckError("no frame for a set")
-        self._set(c, *min(found, key=lambda f: f[:2])[2:], [span(v) for v in image])
+        _, _, frame, new, back = min(found, key=lambda f: f[:2])
+        self._frame, self.along = frame, product(product(back, g), self.along)
+        self._set(c, frame, new, [span(v) for v in image])
+
+    def derivatives(self) -> Matrix:
+        """Derivatives of the states by those at the start, where forms have those of the motion."""
+        return product(self._frame, self.along)
 
 
 def _size(frame: Matrix, r: list[Iv]) -> int:

@@ -137,6 +137,22 @@ def require_orbit(record: dict[str, Any]) -> None:
         )
 
 
+def require_periodic(record: dict[str, Any]) -> None:
+    """Refuse a record of a periodic orbit whose parts do not belong together."""
+    require_orbit(record | {"start": record["graph"]["field"]})
+    n, sections = len(record["graph"]["field"]), record["sections"]
+    require_index(len(sections) - 1, _STATES, "the number of planes less one")
+    sizes = [len(record[key]) for key in ("box", "point", "matrix")]
+    sizes += [len(row) for row in record["matrix"]]
+    events = record["claims"]["events"]
+    if {len(sections) * (n - 1)} != set(sizes) or len(events) != len(sections):
+        raise CheckError("its boxes and events are not as many as its planes")
+    for section in sections:
+        require_index(section["position"], n, "the state of a plane")
+        if section["direction"] not in (1, -1):
+            raise CheckError("a direction is neither 1 nor -1")
+
+
 def require_point(record: dict[str, Any]) -> None:
     """Refuse a record of a special point whose parts do not belong together."""
     if record["kind"] not in _KINDS or record["side"] not in (None, "+", "-"):

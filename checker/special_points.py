@@ -136,7 +136,7 @@ class Local:
 # Krawczyk ----------------------------------------------------------------------------------------
 
 
-def krawczyk(equations: Equations, box: list[Iv], matrix: Matrix) -> list[Iv]:
+def krawczyk(equations: Any, box: list[Iv], matrix: Matrix) -> list[Iv]:
     """m - C f(m) + (1 - C J(X)) (X - m)."""
     n, m = len(box), [b.mid() for b in box]
     f, _ = equations.system(m)
@@ -179,7 +179,7 @@ def check(record: dict[str, Any]) -> str:
     image = krawczyk(equations, box, matrix)
     if not all(k.inside(b) for k, b in zip(image, box, strict=True)):
         raise CheckError("Krawczyk's operator does not map the box into its interior")
-    point, exactly = _point(equations, record, box)
+    point, exactly = zero_near(equations, record, box)
     summary = f"exactly one {record['kind']} in the box, at the claimed point"
     summary += " exactly" if exactly else ""
     label = record["claims"].get("label", "")
@@ -215,7 +215,7 @@ def _kind(equations: Equations, record: dict[str, Any], point: list[Iv]) -> None
         raise CheckError(f"it is claimed to be a {label}, and found to be a {found}")
 
 
-def _point(equations: Equations, record: dict[str, Any], box: list[Iv]) -> tuple[list[Iv], bool]:
+def zero_near(equations: Any, record: dict[str, Any], box: list[Iv]) -> tuple[list[Iv], bool]:
     """An enclosure of the zero near the claimed one, proven again in a small box around it."""
     claimed = [Iv.of(*pair) for pair in record["point"]]
     if all(number(a) == number(b) for a, b in record["point"]):
@@ -226,7 +226,7 @@ def _point(equations: Equations, record: dict[str, Any], box: list[Iv]) -> tuple
     tiny = whole(1).a >> max(40, int(record["bits"]) - 20)
     small = [Iv(c.a - 4 * (c.b - c.a) - tiny, c.b + 4 * (c.b - c.a) + tiny) for c in claimed]
     small = [Iv(max(s.a, b.a), min(s.b, b.b)) for s, b in zip(small, box, strict=True)]
-    _, J = equations.system([s.mid() for s in small])
+    _, J = equations.system(small)
     image = krawczyk(equations, small, inverse(J))
     if not all(k.inside(s) for k, s in zip(image, small, strict=True)):
         raise CheckError("the zero is not proven to be at the claimed point")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -109,15 +109,17 @@ class Chunk:
         )
         return {name: a for name in names if (a := getattr(self, name)) is not None}
 
-    def replace(self, rows: NDArray[np.intp], chunk: Chunk) -> None:
-        """Replace some rows by the results of another chunk, and add its steps and events."""
-        for name, array in chunk.arrays().items():
-            self.arrays()[name][rows] = array
-        self.itinerary[rows] += len(self.words)
-        words = [*self.words, *chunk.words]
+    def take(self, parts: Iterable[tuple[NDArray[np.intp] | slice, Chunk]]) -> None:
+        """Replace some rows by the results of other chunks, and add their steps and events."""
+        own, words = self.arrays(), [*self.words]
+        for rows, chunk in parts:
+            for name, array in chunk.arrays().items():
+                own[name][rows] = array
+            self.itinerary[rows] += len(words)
+            words += chunk.words
+            self.totals[:2] += chunk.totals[:2]
         used = np.flatnonzero(np.bincount(self.itinerary)).tolist()
         self.rename({code: words[code] for code in used})
-        self.totals[:2] += chunk.totals[:2]
 
     def rename(self, words: Mapping[int, str]) -> None:
         """Number the itineraries that are in use in sorted order."""

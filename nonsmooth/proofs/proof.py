@@ -1,4 +1,4 @@
-"""Proofs about special points: statement, enclosures in decimals, and a record for a checker."""
+"""Proofs about special points and periodic orbits: statement, enclosures in decimals, and a record for a checker."""
 
 from __future__ import annotations
 
@@ -23,29 +23,52 @@ class DigitsError(UnprovenError):
     """No proof was found, and more digits would not help."""
 
 
+#: How constants are read.
+READ = {
+    "stored": "Constants are the doubles stored in the expressions.",
+    "written": "Constants are the decimals that the stored doubles are written as.",
+}
+
+
+@dataclass(frozen=True)
+class Classification:
+    """The class of a proven zero."""
+
+    label: str
+    title: str
+    why: str = ""
+    lines: list[str] = field(default_factory=list)
+    values: dict[str, Any] = field(default_factory=dict)
+    claims: dict[str, Any] = field(default_factory=dict)
+    applies: bool = True
+    final: bool = False  # whether more digits would change nothing
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Proof:
-    """A theorem about one special point, or what is left open of it.
+    """A theorem about one special point or periodic orbit, or what is left open of it.
 
     Attributes
     ----------
     kind : str
-        ``"two-fold"``, ``"fold"``, ``"equilibrium"`` or ``"pseudo-equilibrium"``.
+        ``"two-fold"``, ``"fold"``, ``"equilibrium"``, ``"pseudo-equilibrium"`` or
+        ``"periodic orbit"``.
     proven : bool
         Whether existence, uniqueness and class are proven, for all parameters that were given.
     exists : bool
         Whether existence and uniqueness are proven, also where the class is not decided.
     label : str
-        The class or kind; a boundary of classes where it is exactly on one; ``""`` if undecided.
+        The class, kind or stability; a boundary of classes where it is exactly on one; ``""`` if undecided.
     statement : str
         The theorem in words.
     point : mapping of str to Enclosure
-        The unknowns, over all parameters.
+        The unknowns, over all parameters; of a periodic orbit the states at a plane for each leg.
     box : mapping of str to Enclosure
         Where there is no other; of a proof in pieces that of each piece.
     values : mapping of str to Enclosure
         For two-folds ``nu1``, ``nu2``, ``Delta``, ``T`` and the eigenvalues; the second
-        derivatives ``L11`` ... ; for equilibria the eigenvalues and h.
+        derivatives ``L11`` ... ; for equilibria the eigenvalues and h; for periodic orbits the
+        ``period`` and ``multiplier1``, which is 1, ``multiplier2`` ... by their size.
     parameters : mapping of str to Enclosure
         Values or ranges for which it holds.
     pieces : tuple of Proof

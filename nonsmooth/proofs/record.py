@@ -11,6 +11,7 @@ from .arithmetic.algebra import Difference
 from .arithmetic.flint import arb
 from .arithmetic.instructions import Program
 from .arithmetic.intervals import Numbers, ends, exact, fraction
+from .arithmetic.krawczyk import Zero
 from .surface_functions import SystemGraph
 
 FORMAT = "nonsmooth proof 1"
@@ -124,18 +125,22 @@ def problem_record(instance: Any, coincident: bool = False) -> dict[str, Any]:
     }
 
 
-def record_of(
-    instance: Any, equations: Any, zero: Any, classification: Any, bits: int
-) -> dict[str, Any]:
-    """Everything that a checker needs about one zero."""
-    n = equations.n
+def zero_record(zero: Zero, classification: Any, bits: int) -> dict[str, Any]:
+    """Boxes and matrix of a proven zero, and what is claimed of it."""
     return {
-        **problem_record(instance, bool(classification.claims.get("coincident"))),
         "bits": bits,
         "box": [interval(b) for b in zero.box],
-        "matrix": [[text(fraction(zero.matrix[i, j])) for j in range(n)] for i in range(n)],
+        "matrix": [[text(fraction(v)) for v in row] for row in zero.matrix.tolist()],
         "point": [interval(p) for p in zero.point],
         "claims": dict(classification.claims),
+    }
+
+
+def record_of(instance: Any, zero: Zero, classification: Any, bits: int) -> dict[str, Any]:
+    """Everything that a checker needs about one zero."""
+    return {
+        **problem_record(instance, bool(classification.claims.get("coincident"))),
+        **zero_record(zero, classification, bits),
         "values": {
             k: interval(v)
             for k, v in classification.values.items()

@@ -18,17 +18,19 @@ Range = Any
 class SystemGraph:
     """The stored expressions of a system as a graph."""
 
-    def __init__(self, system: FilippovSystem, moving: Sequence[int] = ()):
+    # With a clock, a system that does not depend on time has it as one more state all the same.
+
+    def __init__(self, system: FilippovSystem, moving: Sequence[int] = (), clock: bool = False):
         self.system = system
         self.graph = graph = ExpressionGraph()
         d = system.definition
         n = d.states.numel()
-        count = system.extended_dimension
-        self.x = [graph.symbol(0, i) for i in range(count + len(moving))]
+        self.clock = n + 1 if clock else system.extended_dimension
+        self.x = [graph.symbol(0, i) for i in range(self.clock + len(moving))]
         self.p = [graph.symbol(1, i) for i in range(d.parameters.numel())]
         for k, i in enumerate(moving):
-            self.p[i] = self.x[count + k]
-        self._inputs = [self.x[:n], self.x[n:count], self.p]
+            self.p[i] = self.x[self.clock + k]
+        self._inputs = [self.x[:n], self.x[n : system.extended_dimension], self.p]
         self._symbols = [d.states, d.time, d.parameters]
 
     def insert(self, expressions: Sequence[Any]) -> list[list[int]]:
@@ -52,8 +54,9 @@ class SystemGraph:
         (rows,) = graph.insert(
             [d.field], [*self._symbols, d.multipliers, d.reactions], [*self._inputs, *values]
         )
-        more = len(self.x) - self.system.extended_dimension
-        return [*rows, *[graph.constant(1)] * d.time.numel(), *[graph.constant(0)] * more]
+        times = self.clock - self.system.dimension
+        more = [graph.constant(0)] * (len(self.x) - self.clock)
+        return [*rows, *[graph.constant(1)] * times, *more]
 
     def gradient(self, k: int) -> list[int]:
         """Derivatives with respect to the extended states."""

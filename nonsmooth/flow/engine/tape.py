@@ -330,8 +330,7 @@ class TapeEngine:
         """Run one trajectory from an extended start, to be read at ``read_at`` times."""
         # ``motion`` and ``mode`` are those of a run or event that is continued.
         width = self._c.rules.width
-        if motion is not None:
-            motion = self._checked(motion)
+        motion = None if motion is None else self._checked(motion)
         rooms = {"rooms": self._rooms} if dense else {}
         output = Output(self.system.extended_dimension, self.order, motion=width, **rooms)
         recorder = Recorder(output, self.system.dimension, dense, read_at)
@@ -339,14 +338,12 @@ class TapeEngine:
         start, known = self._letters(options.start_mode), self._letters(mode)
         with self.held_table() as table, self.held_run(table) as state:
             c_options = ctypes.byref(options_of(self.shown.system, options, dense=True))
-            given = (address(x), address(p), address(start))
+            given = (address(x), address(p), address(start), options.t_start, address(motion))
             if read_at is not None:
                 library().run_read_at(state, address(read_at), len(read_at))
             if known is not None:
                 library().run_remember(state, address(known))
-            library().run_begin(
-                state, c_options, output.pointer, *given, options.t_start, address(motion)
-            )
+            library().run_begin(state, c_options, output.pointer, *given)
             while True:
                 status = self._continued(state)
                 numbers, counts, active, several, rates = self._read(state)
@@ -357,10 +354,9 @@ class TapeEngine:
             recorded = recorder.finished(counts[7:10])
             self._rooms = recorder.rooms if dense else self._rooms  # the next run is often similar
             modes, labels = self._modes(table), self._labels(table)
-            if width == 1 and options.t_start == 0:  # times of events are known to rounding
-                width = 0
-            final = np.zeros(width)
-            if width:
+            at_zero = width == 1 and options.t_start == 0  # times of events are known to rounding
+            final = np.zeros(0 if at_zero else width)
+            if len(final):
                 library().run_motion(state, address(final))
         return Run(
             status=counts[0],
@@ -468,16 +464,9 @@ class TapeEngine:
         """Letters of a mode, of which all bytes are given."""
         width = self.system.surface_count + len(self.system.impacts)
         letters = self._spelled(np.frombuffer(row[:width], np.int8).tolist())
-        return self.shown.widened(letters, np.frombuffer(row[width:])[self._discrete :])
-
-    @property
-    def _discrete(self) -> int:
-        return len(self.system.definition.discrete)
-
-    def _values(self, table: int) -> Array:
-        """Values of the discrete states and cells of tables in the modes that were met."""
-        width = self.system.surface_count + len(self.system.impacts)
-        return np.ascontiguousarray(self._met(table)[:, width:]).view(np.float64)
+        return self.shown.widened(
+            letters, np.frombuffer(row[width:])[len(self.system.definition.discrete) :]
+        )
 
     def _met(self, table: int) -> NDArray[np.int8]:
         """Modes that were met, as bytes."""
@@ -487,12 +476,13 @@ class TapeEngine:
         return met[:-1].reshape(count, width)
 
     def _labels(self, table: int) -> list[tuple[float, ...]]:
-        """Values of the discrete states in the modes that were met."""
-        return (
-            [*map(tuple, self._values(table)[:, : self._discrete].tolist())]
-            if self._discrete
-            else []
-        )
+        """Values of the discrete states in the modes that were met; empty without any."""
+        count = len(self.system.definition.discrete)
+        if not count:
+            return []
+        width = self.system.surface_count + len(self.system.impacts)
+        values = np.ascontiguousarray(self._met(table)[:, width:]).view(np.float64)
+        return [*map(tuple, values[:, :count].tolist())]
 
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``core/state.c`` for those of sets."""
@@ -519,7 +509,7 @@ class TapeEngine:
         chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
         x, p = np.ascontiguousarray(x, float), self.shown.with_cells(p)
-        batch = batch_of(x, p, options.t_start, chunk, times, None)
+        batch = batch_of(x, p, options.t_start, chunk, times)
         start, done = self._letters(options.start_mode), np.zeros(1, np.int64)
         c_options = options_of(self.shown.system, options, dense=False, at=at)
         given = (ctypes.byref(batch), ctypes.byref(c_options))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ...model import Array, FilippovSystem, OptionError
 from ..constants import SAFETY
 from ..engine.building.codegen import supports_lanes
 from ..engine.device.card import machine_for
-from ..engine.device.kernel import Bins, Kernel, Reduced, Reduction, Source
+from ..engine.device.kernel import Bins, Given, Kernel, Reduced, Reduction, Source
 from ..engine.device.records import Records, continued, record_type
 from ..options import Options
 from ..results import Chunk
@@ -92,16 +93,16 @@ def run_on_device(
 ) -> Chunk:
     """Run the trajectories of the rows of ``out``; the driver makes the steps that are not clear."""
     kernel, count = _kernel(job, device), len(out.t)
-    source, start, p, x = _given(starts, first, count)
-    left = kernel.run(source, start, count, p, job.options, job.at, out)
+    given, x = _given(starts, first, count, job.options)
+    left = kernel.run(given, job.at, out)
     if x is not None:
-        refused = np.isnan(source.values).any(axis=-1)
+        refused = np.isnan(given.source.values).any(axis=-1)
         out.x[refused] = x[refused]
     if left.size:
         rows, chunk = _carry_on(
-            job, kernel, left, _of(p, left["index"]), _events(out, left), workers
+            job, kernel, left, _of(given.p, left["index"]), _events(out, left), workers
         )
-        out.replace(rows, chunk)
+        out.take([(rows, chunk)])
     return out
 
 
@@ -113,8 +114,8 @@ def reduce_on_device(
     reduction, waiting = Reduction(kernel, bins), list[tuple[Records, Array]]()
     for first in range(0, starts.count, size):
         count = min(size, starts.count - first)
-        source, start, p, _ = _given(starts, first, count)
-        left, others = reduction.add(source, start, count, p, job.options)
+        given, _ = _given(starts, first, count, job.options)
+        (left, others), p = reduction.add(given), given.p
         waiting.append((left, _of(p, left["index"])))
         if others is not None:
             yield others
@@ -160,7 +161,7 @@ def _carry_on(
         if not left.size:
             break
         chunk = Chunk.empty(len(left), system, at is not None)
-        still = kernel.run(Source.records(left), 0, len(left), p, options, at, chunk)
+        still = kernel.run(Given(Source.records(left), 0, len(left), p, options), at, chunk)
         left, rows, p, events = _split(_with_events(chunk, events), still, rows, p, ends)
         if not left.size:
             break
@@ -196,33 +197,21 @@ def _joined(
     ends: list[tuple[NDArray[np.int64], Chunk]], system: FilippovSystem, at: bool
 ) -> tuple[NDArray[np.int64], Chunk]:
     rows = np.concatenate([own for own, _ in ends])
-    made, first, words = Chunk.empty(len(rows), system, at), 0, list[str]()
-    for own, chunk in ends:
-        for name, array in made.arrays().items():
-            array[first : first + len(own)] = chunk.arrays()[name]
-        made.itinerary[first : first + len(own)] += len(words)
-        words += chunk.words
-        made.totals[:2] += chunk.totals[:2]
-        first += len(own)
-    made.rename(dict(enumerate(words)))
+    made = Chunk.empty(len(rows), system, at)
+    bounds = pairwise(accumulate((len(own) for own, _ in ends), initial=0))
+    made.take((slice(a, b), chunk) for (a, b), (_, chunk) in zip(bounds, ends, strict=True))
     return rows, made
 
 
-def _given(starts: Starts, first: int, count: int) -> tuple[Source, int, Array, Array | None]:
-    """Where starts come from, the number of the first, parameters, and states if they are sent."""
-    source = _source(starts)
+def _given(starts: Starts, first: int, count: int, options: Options) -> tuple[Given, Array | None]:
+    """Trajectories of a call, and their states as given if they are sent: as NaN where a parameter is no number."""
+    source, n = _source(starts), starts.system.dimension
     if source is not None:
-        return source, first, starts.p, None
-    own, p, x = _rows(starts, first, count)
-    return own, 0, p, x
-
-
-def _rows(starts: Starts, first: int, count: int) -> tuple[Source, Array, Array]:
-    """Starts with NaN where a parameter is no number, their parameters, and their states as given."""
-    n = starts.system.dimension
+        return Given(source, first, count, starts.p, options), None
     x, p = starts.part(first, first + count)
     bad = ~np.all(np.isfinite(p), axis=-1) if p.ndim > 1 else np.zeros(count, bool)
-    return Source.rows(np.where(bad[:, None], np.nan, x[:, :n])), p, x[:, :n]
+    sent = Source.rows(np.where(bad[:, None], np.nan, x[:, :n]))
+    return Given(sent, 0, count, p, options), x[:, :n]
 
 
 def _source(starts: Starts) -> Source | None:

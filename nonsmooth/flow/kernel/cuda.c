@@ -83,22 +83,17 @@ static inline void shorten_codes(Lanes *s, Work *) {
   if (!(s->code.v & FROZEN)) s->code = (s->code >> 2) | FROZEN;
 }
 
+/* What a record has as numbers and as counts; lanes have them by the same names. */
+#define RECORDED(F, G) F(t) F(since) F(length) F(shortest) G(steps) G(events) G(entered) G(shrinking) G(code) G(drop)
+
 static inline void write_record(const Lanes *s, int begun, int64_t *record) {
   Left *to = (Left *)record;
   double *x = (double *)(to + 1);
   int64_t *above = (int64_t *)(x + N);
+#define WRITE(name) to->name = s->name.v;
+  RECORDED(WRITE, WRITE)
   to->index = s->index.v;
-  to->t = s->t.v;
-  to->since = s->since.v;
-  to->length = s->length.v;
-  to->shortest = s->shortest.v;
-  to->steps = s->steps.v;
-  to->events = s->events.v;
-  to->entered = s->entered.v;
-  to->shrinking = s->shrinking.v;
-  to->code = s->code.v;
   to->letter = s->slides.v ? 0 : s->above.v ? 1 : -1;
-  to->drop = s->drop.v;
   to->begun = begun;
   UNROLL for (int k = 0; k < LAST_KIND; k++) to->kinds[k] = s->kinds[k].v;
   UNROLL for (int k = 0; k < N; k++) x[k] = s->x[k].v;
@@ -111,18 +106,11 @@ static inline void read_record(Lanes *s, const Work *w, const int64_t *record, i
   const int64_t *above = (const int64_t *)(x + N);
   s->index = I(index);
   s->q = (const T *)(w->given.q + index * w->given.q_stride);
-  s->t = BC(from->t);
-  s->since = BC(from->since);
-  s->length = BC(from->length);
-  s->shortest = BC(from->shortest);
-  s->steps = I(from->steps);
-  s->events = I(from->events);
-  s->entered = I(from->entered);
-  s->shrinking = I(from->shrinking);
-  s->code = I(from->code);
+#define READ_T(name) s->name = BC(from->name);
+#define READ_I(name) s->name = I(from->name);
+  RECORDED(READ_T, READ_I)
   s->slides = I(-(int64_t)(M > 0 && from->letter == 0));
   s->above = I(-(int64_t)(from->letter > 0));
-  s->drop = I(from->drop);
   UNROLL for (int k = 0; k < LAST_KIND; k++) s->kinds[k] = I(from->kinds[k]);
   UNROLL for (int k = 0; k < N; k++) s->x[k] = BC(x[k]);
   UNROLL for (int k = 0; k < STOPS; k++) s->above_stop[k] = I(above[k]);

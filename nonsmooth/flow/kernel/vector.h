@@ -29,12 +29,6 @@ static inline T SQRT_(T a) { return (T)__builtin_ia32_sqrtpd512_mask(a, a, -1, 4
 #else
 LANEWISE(SQRT_, sqrt)
 #endif
-LANEWISE(EXP_, exp) LANEWISE(LOG_, log) LANEWISE(TAN_, tan) LANEWISE(ASIN_, asin) LANEWISE(ACOS_, acos)
-LANEWISE(ATAN_, atan) LANEWISE(SINH_, sinh) LANEWISE(COSH_, cosh) LANEWISE(TANH_, tanh)
-LANEWISE(ASINH_, asinh) LANEWISE(ACOSH_, acosh) LANEWISE(ATANH_, atanh) LANEWISE(ERF_, erf)
-LANEWISE(ERFINV_, ns_erfinv) LANEWISE(EXPM1_, expm1) LANEWISE(LOG1P_, log1p)
-LANEWISE2(POW_, pow) LANEWISE2(ATAN2_, atan2) LANEWISE2(HYPOT_, hypot)
-
 INLINE T ABS(T a) { return (T)((I)a & 0x7fffffffffffffffLL); }
 #if defined(__AVX512F__) && W == 8 && !defined(__clang__)
 /* The same as below; GCC does not find the instruction by itself. */
@@ -61,21 +55,10 @@ INLINE int any(I m) { return bits(m) != 0; }
 /* Loop over the lanes of a mask. */
 #define EACH(l, mask) (unsigned left_ = bits(mask), l; left_ && (l = (unsigned)__builtin_ctz(left_), 1); left_ &= left_ - 1)
 
-/* Binary logarithm and exponential to 1e-4, reciprocal to 1e-3: enough for a step size, a hundredth
- * of libm's cost. */
-INLINE T LOG2(T a) {
-  I b = (I)a;
-  T e = __builtin_convertvector((b >> 52) - 1023, T);
-  T m = (T)((b & 0xfffffffffffffLL) | 0x3ff0000000000000LL) - 1.5, z = m * m;
-  T high = (0.1424883991 * m - 0.3205988980) + z * ((0.0379969064 * m - 0.0712441996) - 0.0211093925 * z);
-  return (e + (0.5849625007 + 0.9617966939 * m)) + z * high;
-}
-INLINE T EXP2(T a) {
-  T k = (a + 6755399441055744.0) - 6755399441055744.0, f = (a - k) * 0.6931471805599453;
-  T z = f * f, y = (1.0 + f) + z * ((0.5 + 0.16666666666 * f) + z * (0.0416666666 + 0.0083333333 * f));
-  return y * (T)((__builtin_convertvector(k, I) + 1023) << 52);
-}
+INLINE T NUMBERS(I a) { return __builtin_convertvector(a, T); }
+INLINE I WHOLE(T a) { return __builtin_convertvector(a, I); }
 #if defined(__AVX512F__) && W == 8 && !defined(__clang__)
+#define INVERSES_HERE
 INLINE T ROUGH_INVERSE(T a) { return (T)__builtin_ia32_rcp14pd512_mask(a, BC(0), -1); }
 /* To some 1e-8, NaN at the ends of the range: for iterations that correct themselves. */
 INLINE T QUICK_INVERSE(T a) {
@@ -91,13 +74,4 @@ INLINE T QUICK_ROOT(T a) {
   T y = (T)__builtin_ia32_rsqrt14pd512_mask(a, BC(0), -1), root = a * y;
   return root * (1.5 - 0.5 * (root * y));
 }
-#else
-INLINE T ROUGH_INVERSE(T a) {
-  T y = (T)(0x7fde6238da3c2118LL - (I)a);
-  y = y * (2.0 - a * y);
-  return y * (2.0 - a * y);
-}
-INLINE T QUICK_INVERSE(T a) { return 1.0 / a; }
-INLINE T INVERSE(T a) { return 1.0 / a; }
-INLINE T QUICK_ROOT(T a) { return SQRT_(a); }
 #endif

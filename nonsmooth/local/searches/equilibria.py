@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, Parameters, call
-from ...model.derivatives.mode_equations import mode_equations
+from ...model.derivatives.mode_derivatives import mode_equations
 from ..checks import require_autonomous
 from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import (

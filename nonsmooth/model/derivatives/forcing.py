@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from fractions import Fraction
 from typing import Any
 
 import casadi as ca
@@ -102,6 +104,30 @@ def frequencies(system: FilippovSystem) -> list[ca.SX]:
                     found.append(rate)
         stack += [node.dep(k) for k in range(node.n_dep())]
     return found
+
+
+#: Largest ratio of two frequencies, and largest denominator of it, that have a common period.
+_LARGEST = 64
+
+
+def common_frequency(found: list[ca.SX]) -> ca.SX | None:
+    """The frequency of which some others are whole multiples, whatever the parameters; None if there is none."""
+    if not found:
+        return None
+    parts = list[Fraction]()
+    for rate in found:
+        ratio = ca.simplify(rate / found[0])
+        value = float(ca.DM(ratio)) if ratio.is_constant() else math.nan
+        near = Fraction(value).limit_denominator(_LARGEST) if math.isfinite(value) else Fraction(0)
+        if not near or abs(near) > _LARGEST or abs(float(near) - value) > _EXACT * abs(value):
+            return None
+        parts.append(abs(near))
+    denominator = math.lcm(*(part.denominator for part in parts))
+    return found[0] * math.gcd(*(int(part * denominator) for part in parts)) / denominator
+
+
+#: Relative difference of a ratio of frequencies from a rational number that is rounding.
+_EXACT = 1e-13
 
 
 def clock_periods(system: FilippovSystem, clock: int, p: Array) -> Array:

@@ -61,19 +61,15 @@ class Surfaces:
     def __init__(self, system: FilippovSystem):
         self.system = system
 
-        def build() -> Sequence[ca.SX]:
-            d = system.definition
-            h = ca.densify(ca.vertcat(d.open_surfaces, d.gaps, d.gap_rates))
-            return [h, ca.jacobian(h, system.extended_states)]
-
-        self.evaluator = Evaluator(system.function("surfaces", build))
-
     def values(self, x: Array, p: Array) -> tuple[Array, Array]:
         """Return h (m,) and its gradient with respect to the extended state (m, N)."""
         if not self.system.surface_count and not self.system.impacts:
             return np.zeros(0), np.zeros((0, x.size))
-        h, gradient = self.evaluator(x, p)
-        return np.array(h).ravel(), np.array(gradient)
+        d, states = self.system.definition, self.system.extended_states
+        every = lambda: ca.vertcat(d.open_surfaces, d.gaps, d.gap_rates)
+        build = lambda: [every(), ca.jacobian(every(), states)]
+        h, gradient = evaluator(self.system, "surfaces", build).copied(x, p)
+        return h.ravel(), gradient
 
     def project(
         self,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..definition.system import FilippovSystem, require_system
 from ..values import Array
-from .evaluators import Evaluator
+from .evaluators import evaluator
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,28 +36,21 @@ class Layer:
 
     def __init__(self, system: FilippovSystem):
         require_system(system)
-        self._m = system.surface_count
-        x, lam = system.extended_states, ca.SX.sym("lambda", self._m)
-        field = system.field_with(lam)
-        h = ca.vertcat(system.definition.surfaces)
+        x, lam = system.extended_states, ca.SX.sym("lambda", system.surface_count)
+        field, h = system.field_with(lam), ca.vertcat(system.definition.surfaces)
         gradient = ca.jacobian(h, x)
-        rates = ca.mtimes(gradient, field)
         outputs = [h, gradient]
-        for e in (field, rates):
+        for e in (field, ca.mtimes(gradient, field)):
             outputs += [e, ca.jacobian(e, x), ca.jacobian(e, lam)]
-        inputs = [ca.vertcat(x, lam), system.parameter_symbols]
         #: Whether the multipliers enter linearly together, without products.
         self.affine = bool(ca.is_linear(field, lam))
-        dense = [ca.densify(e) for e in outputs]
-        self._evaluate = Evaluator(ca.Function("layer", inputs, dense, {"cse": True}))
+        self._evaluate = evaluator(system, "layer at", lambda: outputs, ca.vertcat(x, lam))
 
     def at(self, x: Array, multipliers: Array, p: Array) -> LayerNumbers:
         """Evaluate at an extended state (N,) and multipliers (m,)."""
-        found = self._evaluate.copied(np.concatenate([x, multipliers]), p)
-        h, h_x, field, field_x, field_l, rates, rates_x, rates_l = found
-        return LayerNumbers(
-            h.ravel(), h_x, field.ravel(), field_x, field_l, rates.ravel(), rates_x, rates_l
-        )
+        given = np.append(x, multipliers)
+        h, h_x, f, f_x, f_l, w, w_x, w_l = self._evaluate.copied(given, p)
+        return LayerNumbers(h.ravel(), h_x, f.ravel(), f_x, f_l, w.ravel(), w_x, w_l)
 
 
 def layer_of(system: FilippovSystem) -> Layer:

@@ -18,6 +18,9 @@ from ..expressions.taylor_rules import Rule, entered
 if TYPE_CHECKING:
     from .terms import Graph
 
+#: Gives a coefficient from its order.
+_Later = Callable[[int], Any]
+
 
 class Expansion:
     """All series of a list of rules, expanded together."""
@@ -65,10 +68,6 @@ class Expansion:
     def _quotient_of(self, a: Any, b: Any) -> Any:
         return None if a is None else self._on.divide(a, b)
 
-    def _convolve(self, u: list[Any], v: list[Any], k: int, first: int, last: int) -> Any:
-        """Sum of u_i v_(k-i) for i from first to last."""
-        return self._on.inner(u[first : last + 1], v[k - last : k - first + 1][::-1])
-
     def _weigh(self, u: list[Any], v: list[Any], k: int, first: int, last: int) -> Any:
         """Sum of i u_i v_(k-i) for i from first to last."""
         total = None
@@ -78,73 +77,69 @@ class Expansion:
 
     # one recurrence for each rule ---------------------------------------------------------------
 
-    def _recurrence(self, j: int, rule: Rule) -> Callable[[int], Any]:
-        build = getattr(self, "_" + rule.rule)
-        recurrence: Callable[[int], Any] = build(rule, self.series[j], *self._arguments(rule))
-        return recurrence
+    def _recurrence(self, j: int, rule: Rule) -> _Later:
+        build: Callable[..., _Later] = getattr(self, "_" + rule.rule)
+        return build(rule, self.series[j], *[self.series[a] for a in rule.args])
 
-    def _arguments(self, rule: Rule) -> list[list[Any]]:
-        return [self.series[a] for a in rule.args]
-
-    def _constant(self, rule: Rule, _: list[Any]) -> Callable[[int], Any]:
+    def _constant(self, rule: Rule, _: list[Any]) -> _Later:
         value = self._on.number(rule.numbers[0])
         return lambda k: None if k else value
 
-    def _input(self, rule: Rule, _: list[Any]) -> Callable[[int], Any]:
+    def _input(self, rule: Rule, _: list[Any]) -> _Later:
         vector, position = rule.source
         if vector == 0:
             return lambda k: self._moving[position]
         return lambda k: None if k else self._still[position]
 
-    def _apply(self, rule: Rule, _: list[Any], *args: list[Any]) -> Callable[[int], Any]:
+    def _apply(self, rule: Rule, _: list[Any], *args: list[Any]) -> _Later:
         value = lambda: self._on.clean(self._on.apply(rule.operation, [a[0] for a in args]))
         return lambda k: None if k else value()
 
-    def _add(self, _: Rule, __: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+    def _add(self, _: Rule, __: list[Any], u: list[Any], v: list[Any]) -> _Later:
         return lambda k: self._on.total(u[k], v[k])
 
-    def _sub(self, _: Rule, __: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+    def _sub(self, _: Rule, __: list[Any], u: list[Any], v: list[Any]) -> _Later:
         return lambda k: self._on.difference(u[k], v[k])
 
-    def _neg(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:
+    def _neg(self, _: Rule, __: list[Any], u: list[Any]) -> _Later:
         return lambda k: self._on.difference(None, u[k])
 
-    def _twice(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:
+    def _twice(self, _: Rule, __: list[Any], u: list[Any]) -> _Later:
         return lambda k: self._on.total(u[k], u[k])
 
-    def _mul(self, rule: Rule, _: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+    def _mul(self, rule: Rule, _: list[Any], u: list[Any], v: list[Any]) -> _Later:
         moves, other = (self._moves[a] for a in rule.args)
         if not moves:
             return lambda k: self._product(u[0], v[k])
         if not other:
             return lambda k: self._product(u[k], v[0])
-        return lambda k: self._convolve(u, v, k, 0, k)
+        return lambda k: self._on.convolved(u, v, k, 0, k)
 
-    def _sq(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:
+    def _sq(self, _: Rule, __: list[Any], u: list[Any]) -> _Later:
         def square(k: int) -> Any:
-            half = self._scaled(self._convolve(u, u, k, 0, (k + 1) // 2 - 1), 2.0)
+            half = self._scaled(self._on.convolved(u, u, k, 0, (k + 1) // 2 - 1), 2.0)
             return half if k % 2 else self._on.total(half, self._product(u[k // 2], u[k // 2]))
 
         return square
 
-    def _div(self, _: Rule, w: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+    def _div(self, _: Rule, w: list[Any], u: list[Any], v: list[Any]) -> _Later:
         return lambda k: self._quotient_of(
-            self._on.difference(u[k], self._convolve(w, v, k, 0, k - 1)), v[0]
+            self._on.difference(u[k], self._on.convolved(w, v, k, 0, k - 1)), v[0]
         )
 
-    def _sqrt(self, _: Rule, w: list[Any], u: list[Any]) -> Callable[[int], Any]:
+    def _after(self, op: str, args: Sequence[list[Any]], later: _Later) -> _Later:
+        """An operation of the values, and what gives the coefficients after them."""
+        return lambda k: later(k) if k else self._on.apply(op, [a[0] for a in args])
+
+    def _sqrt(self, _: Rule, w: list[Any], u: list[Any]) -> _Later:
         def root(k: int) -> Any:
-            if k == 0:
-                return self._on.apply("sqrt", [u[0]])
-            known = self._convolve(w, w, k, 1, k - 1)
+            known = self._on.convolved(w, w, k, 1, k - 1)
             return self._quotient_of(self._scaled(self._on.difference(u[k], known), 0.5), w[0])
 
-        return root
+        return self._after("sqrt", [u], root)
 
-    def _power(self, _: Rule, w: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+    def _power(self, _: Rule, w: list[Any], u: list[Any], v: list[Any]) -> _Later:
         def power(k: int) -> Any:
-            if k == 0:
-                return self._on.apply("pow", [u[0], v[0]])
             total = None
             for j in range(k):
                 factor = self._on.difference(self._scaled(v[0], float(k - j)), self._on.number(j))
@@ -152,50 +147,37 @@ class Expansion:
                 total = self._on.total(total, term)
             return self._scaled(self._quotient_of(total, u[0]), 1.0 / k)
 
-        return power
+        return self._after("pow", [u, v], power)
 
-    def _affine(self, rule: Rule, _: list[Any], u: list[Any]) -> Callable[[int], Any]:
+    def _affine(self, rule: Rule, _: list[Any], u: list[Any]) -> _Later:
         offset, factor = rule.numbers
         constant = self._on.number(offset)
         return lambda k: self._on.total(None if k else constant, self._scaled(u[k], factor))
 
-    def _integral(
-        self, rule: Rule, _: list[Any], u: list[Any], g: list[Any]
-    ) -> Callable[[int], Any]:
+    def _integral(self, rule: Rule, _: list[Any], u: list[Any], g: list[Any]) -> _Later:
         (sign,) = rule.numbers
+        later = lambda k: self._scaled(self._weigh(u, g, k, 1, k), sign / k)
+        return self._after(rule.operation, [u], later)
 
-        def integral(k: int) -> Any:
-            if k == 0:
-                return self._on.apply(rule.operation, [u[0]])
-            return self._scaled(self._weigh(u, g, k, 1, k), sign / k)
-
-        return integral
-
-    def _quotient(
-        self, rule: Rule, w: list[Any], u: list[Any], g: list[Any]
-    ) -> Callable[[int], Any]:
+    def _quotient(self, rule: Rule, w: list[Any], u: list[Any], g: list[Any]) -> _Later:
         (sign,) = rule.numbers
 
         def quotient(k: int) -> Any:
-            if k == 0:
-                return self._on.apply(rule.operation, [u[0]])
             known = self._weigh(w, g, k, 1, k - 1)
             top = self._on.difference(self._scaled(u[k], sign * k), known)
             return self._scaled(self._quotient_of(top, g[0]), 1.0 / k)
 
-        return quotient
+        return self._after(rule.operation, [u], quotient)
 
     def _atan2(
         self, _: Rule, w: list[Any], y: list[Any], x: list[Any], radius: list[Any]
-    ) -> Callable[[int], Any]:
+    ) -> _Later:
         def angle(k: int) -> Any:
-            if k == 0:
-                return self._on.apply("atan2", [y[0], x[0]])
             turn = self._on.difference(self._weigh(y, x, k, 1, k), self._weigh(x, y, k, 1, k))
             top = self._on.difference(turn, self._weigh(w, radius, k, 1, k - 1))
             return self._scaled(self._quotient_of(top, radius[0]), 1.0 / k)
 
-        return angle
+        return self._after("atan2", [y, x], angle)
 
-    def _chosen(self, _: Rule, __: list[Any], c: list[Any], u: list[Any]) -> Callable[[int], Any]:
+    def _chosen(self, _: Rule, __: list[Any], c: list[Any], u: list[Any]) -> _Later:
         return lambda k: self._on.chosen(c[: k + 1], u[k])

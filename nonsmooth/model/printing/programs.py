@@ -14,7 +14,7 @@ from functools import cached_property
 import casadi as ca
 
 from ..definition.system import FilippovSystem
-from ..expressions.dependent_rows import in_span
+from ..expressions.cancel import in_span
 from ..expressions.linearity import bent
 from ..expressions.simplification import simplified
 from ..laws.coupled import Coupled, coupled_of
@@ -61,7 +61,7 @@ class _Writer(OfTape):
 
     def expanded(self, order: int) -> tuple[list[list[Term | None]], list[list[Term | None]]]:
         """Coefficients of states and of guards, in rows."""
-        jet: list[list[Term | None]] = [[x] for x in self.x]
+        jet = self.begun()
         guards: list[Terms] = []
         every = self.expansion(range(5))
         sides = [self.expansion((1,)) for _ in range(2)]
@@ -79,9 +79,7 @@ class _Writer(OfTape):
                 leaves = None if above is None else -above
                 stops = [self.graph.select(self.slides, leaves, height), below, *stops]
             guards.append(stops)
-            if k < order:
-                for row, value in zip(jet, field, strict=True):
-                    row.append(None if value is None else (1.0 / (k + 1)) * value)
+            self.extend(jet, field, k, order)
         return jet, [list(row) for row in zip(*guards, strict=True)]
 
     @cached_property

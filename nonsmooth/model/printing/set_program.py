@@ -124,7 +124,7 @@ class _Writer(OfTape):
     def _off(self) -> dict[str, Rows]:
         """Off the set: coefficients of states, of |h| over its first, of stops; the last ones of h."""
         expansion = self.expansion((0, 2, 3, 4))
-        jet = self._begin()
+        jet = self.begun()
         direction = _Direction(self.graph, self.k, self.scaled)
         stops, fields = Rows(), Rows()
         for k in range(self.order + 1):
@@ -143,7 +143,7 @@ class _Writer(OfTape):
 
     def _on(self) -> dict[str, Rows]:
         """On the set: coefficients of states, of stops, of the unknowns and of their limit."""
-        graph, expansion, jet = self.graph, self.expansion((0, 1, 3, 4)), self._begin()
+        graph, expansion, jet = self.graph, self.expansion((0, 1, 3, 4)), self.begun()
         series: Rows = [[] for _ in range(self.k)]
         limit: list[Term | None] = []
         stops = Rows()
@@ -156,7 +156,7 @@ class _Writer(OfTape):
                 row.append(value)
             limit.append(known[2][0])
             stops.append(known[3])
-            self._next(jet, known[0], k)
+            self.extend(jet, known[0], k, self.order)
         room = []
         for k in range(self.order + 1):
             square: Term | None = None
@@ -167,7 +167,7 @@ class _Writer(OfTape):
 
     def _leave(self) -> dict[str, Rows]:
         """Leaving the set at no rate yet."""
-        graph, expansion, jet = self.graph, self.expansion((0, 1, 4)), self._begin()
+        graph, expansion, jet = self.graph, self.expansion((0, 1, 4)), self.begun()
         inverse = _inverse(graph, self.pull)
         turned = self._times(inverse, self.lam)
         per = graph.constant(1.0) / graph.whole(graph.inner(self.lam, turned))
@@ -181,7 +181,7 @@ class _Writer(OfTape):
             if k:
                 right: list[Term | None] = []
                 for row, rate in zip(u, known[1], strict=True):
-                    more = _products(graph, row, radius, 1, k - 1, k + 1)
+                    more = graph.convolved(row, radius, k + 1, 1, k - 1)
                     own = None if more is None else float(k + 1) * more
                     right.append(graph.difference(own, rate))
                 short: Term | None = None  # half of the squares
@@ -197,7 +197,7 @@ class _Writer(OfTape):
                     k, [*now, *self._acting(None, [row[k] for row in u])], self.late
                 )
             stops.append(known[2])
-            self._next(jet, known[0], k)
+            self.extend(jet, known[0], k, self.order)
         distance = [*radius[2:], *[None] * (self.order + 3 - len(radius))]
         return dict(c=jet, g=[distance, self._none, *map(list, zip(*stops, strict=True)), *u])
 
@@ -209,14 +209,6 @@ class _Writer(OfTape):
             self.graph.inner(weights[: len(row)], row)
             for row in zip(*reversed(fields[-3:]), strict=True)
         ]
-
-    def _begin(self) -> Rows:
-        return [[x] for x in self.x]
-
-    def _next(self, jet: Rows, field: Terms, k: int) -> None:
-        if k < self.order:
-            for row, value in zip(jet, field, strict=True):
-                row.append(None if value is None else (1.0 / (k + 1)) * value)
 
 
 class _Direction:
@@ -249,25 +241,19 @@ class _Direction:
             )
         if self._scaled:
             # (n/|h|) h has a product less than n (h/|h|).
-            known = _products(graph, self._part, self.root, 0, k - 1, k)
+            known = graph.convolved(self._part, self.root, k, 0, k - 1)
             self._part.append(graph.difference(factor, known))
-            return [_products(graph, self._part, row, 0, k, k) for row in self.own]
+            return [graph.convolved(self._part, row, k, 0, k) for row in self.own]
         for row, own in zip(self.u, self.own, strict=True):
-            row.append(graph.difference(own[k], _products(graph, row, self.root, 0, k - 1, k)))
+            row.append(graph.difference(own[k], graph.convolved(row, self.root, k, 0, k - 1)))
         return [row[k] for row in self.u]
-
-
-def _products(graph: Graph, u: Terms, v: Terms, first: int, last: int, k: int) -> Term | None:
-    """Sum of u_i v_(k-i) for i from first to last."""
-    places = range(first, last + 1)
-    return graph.inner([u[i] for i in places], [v[k - i] for i in places])
 
 
 def _inner(graph: Graph, row: Terms, k: int) -> Term | None:
     """Half of coefficient k of a square, without its first and last products."""
     middle = row[k // 2] if k % 2 == 0 and k else None
     half = None if middle is None else 0.5 * (middle * middle)
-    return graph.total(_products(graph, row, row, 1, (k - 1) // 2, k), half)
+    return graph.total(graph.convolved(row, row, k, 1, (k - 1) // 2), half)
 
 
 def _square(graph: Graph, row: Terms, k: int) -> Term | None:

@@ -170,6 +170,10 @@ class Graph:
                 total = a * b if total is None else total + a * b
         return None if total is None else self.clean(total)
 
+    def convolved(self, u: Terms, v: Terms, k: int, first: int, last: int) -> Term | None:
+        """Return the sum of u_i v_(k-i) for i from first to last."""
+        return self.inner(u[first : last + 1], v[k - last : k - first + 1][::-1])
+
     def divide(self, a: Term, b: Term | None) -> Term:
         """Return a quotient."""
         return a / self.whole(b)
@@ -273,6 +277,15 @@ class OfTape:
         self.p = self.graph.inputs(1, len(system.parameter_names))
         #: Rules that multipliers enter.
         self.late = touched(self.tape.series.rules, self.n)
+
+    def begun(self) -> list[list[Term | None]]:
+        """Rows of coefficients of the states, with their values."""
+        return [[x] for x in self.x]
+
+    def extend(self, jet: list[list[Term | None]], field: Terms, k: int, order: int) -> None:
+        """Add coefficients k + 1 of the states, up to an order, from those of the field."""
+        for row, value in zip(jet, field if k < order else (), strict=k < order):
+            row.append(None if value is None else (1.0 / (k + 1)) * value)
 
     def expansion(self, outputs: Sequence[int]) -> Expansion:
         """The series of some of field, layer, heights, factors, stops."""

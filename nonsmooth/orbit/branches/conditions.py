@@ -22,9 +22,10 @@ from numpy.typing import NDArray
 from ...flow.fixed import first_terms
 from ...model import Array, Evaluator, FilippovSystem, Guard, evaluator
 from ...model.derivatives.event_maps import keeps_zero
-from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
+from ...model.derivatives.variational import guarded_field, variational_field
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import Multipliers, finite_return_map
+from ..runs.cell_field import Guarded, field_of
 from ..runs.guards import CONDITIONS, LegGuards, is_met, watch
 from ..runs.legs import Leg, surface_of
 
@@ -177,7 +178,7 @@ def _starting(
     system: FilippovSystem, i: int, leg: Leg, before: Leg
 ) -> list[tuple[int, int, Condition]]:
     """Guards that are not zero by construction at the start of a leg, of those to order 3."""
-    guards = guarded_field(system, leg.mode).motion.guards
+    guards = field_of(system, leg.mode).motion.guards
     orders = [(k, guard, _order(system, guard, before, leg)) for k, guard in enumerate(guards)]
     return [(k, order, Condition("start", i, g)) for k, g, order in orders if order is not None]
 
@@ -243,7 +244,7 @@ def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
 
 
 def _interior(
-    guards: Sequence[tuple[Condition, Guard]], field: GuardedField, rows: Array, p: Array
+    guards: Sequence[tuple[Condition, Guard]], field: Guarded, rows: Array, p: Array
 ) -> list[tuple[Condition, float]]:
     """Smallest minimum of each guard inside a leg, where something happens at its zero."""
     least: dict[int, float] = {}

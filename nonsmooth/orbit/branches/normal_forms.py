@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem, NonsmoothError
-from ...model.derivatives.higher_derivatives import field_expansion
+from ...model.derivatives.mode_derivatives import field_expansion
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import return_map
 

@@ -19,7 +19,7 @@ from ...flow.names import guard_name
 from ...local.read_only import ReadOnly
 from ...model import Array, DegenerateError, Guard, NonsmoothError
 from ...model.derivatives.event_maps import surface_map
-from ...model.derivatives.higher_derivatives import contact_expansion, guard_rate_gradient
+from ...model.derivatives.mode_derivatives import contact_expansion, guard_rate_gradient
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import leg_maps, return_map
 from ..runs.legs import Leg, integrate_leg

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from time import monotonic
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...flow.ensembles.progress import progress_bar
 from ...flow.fixed import TOLERANCE
 from ...flow.trajectory import Trajectory
 from ...model import (
@@ -22,12 +24,13 @@ from ...model import (
     require_system,
     whole,
 )
+from ...model.checks import positive
 from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
 from ..runs.legs import Leg, leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
 from .divided_legs import divided, to_divide
-from .guess import Start, about_of, is_about, start_of
+from .guess import Start, about_of, is_about, starts_of
 from .orbit import PeriodicOrbit, faults_of, named
 from .symmetry import prime_period, require_symmetric, symmetry_matrix
 
@@ -41,11 +44,14 @@ def periodic_orbit(
     *,
     itinerary: Itinerary | None = None,
     period: Any = None,
+    multiplicity: int | None = None,
     symmetry: ArrayLike | str | None = None,
     parameters: Parameters | None = None,
     t_start: float = 0.0,
     virtual: bool = False,
     max_iterations: int = 20,
+    max_time: float | None = None,
+    progress: bool = False,
 ) -> PeriodicOrbit:
     """Find a periodic orbit, stable or not, with all digits, its multipliers and its margins.
 
@@ -62,13 +68,17 @@ def periodic_orbit(
     itinerary : str or sequence, optional
         Modes of the legs in order, e.g. ``"- s"``, or pairs of a mode and the name of the event that
         ends it; with a state as the guess. One mode alone means an orbit of a forced system without
-        events, over as many periods of the forcing (up to 16) as close best. With vector multipliers
-        only that.
+        events; without ``multiplicity`` it lasts for as many periods of the forcing (up to 16) as close best.
+        With vector multipliers only that.
     period : expression in parameters or float, optional
         The period of the forcing, if the system depends on time. Found by itself where the time only
-        enters sines and cosines of one frequency. The orbit may take several. Of a system without
+        enters sines and cosines whose frequencies have rational ratios. Of a system without
         time about how long the whole orbit takes: shorter and longer ones, by more than a factor of
         1.5, are skipped in the guess and refused as the result.
+    multiplicity : int, optional
+        Number of periods of the forcing that the orbit of a forced system takes. By default, for a state as the
+        guess, the least of an orbit beside it (up to 8), and else 1; a run, an itinerary or an orbit has
+        its own.
     symmetry : "odd" or array_like (n, n), optional
         R, if R x solves the equations when x does (half a forcing period later, if there is one): the
         orbit is solved for as a half, which R maps to the other half. ``"odd"`` is $R = -1$.
@@ -79,7 +89,11 @@ def periodic_orbit(
     virtual : bool, optional
         Accept an orbit that violates guards.
     max_iterations : int, optional
-        Maximum number of Newton steps.
+        Maximum number of full Newton steps; where they fail, up to twice as many with damping follow.
+    max_time : float, optional
+        Seconds after which Newton's method gives up (ConvergenceError).
+    progress : bool, optional
+        Whether to show a bar that counts evaluations of the equations.
 
     Returns
     -------
@@ -131,49 +145,153 @@ def periodic_orbit(
     if not isinstance(virtual, (bool, np.bool_)):
         raise OptionError(f"virtual: expected True or False, received {virtual!r}.")
     matrix = symmetry_matrix(system, symmetry)
-    start = start_of(system, guess, itinerary, period, matrix, parameters, t_start)
-    begun, guessed = start.problem, start.unknowns
+    if multiplicity is not None:
+        multiplicity = _multiplicity(system, multiplicity, matrix)
+    budget = _Budget(max_time, progress)
+    given = itinerary, period, multiplicity, matrix, parameters, t_start
+    try:
+        for start in starts_of(system, guess, *given):
+            if start.near:
+                beside = _beside(start, multiplicity, max_iterations, budget)
+                if beside is not None:
+                    return beside
+                continue
+            orbit = _solved(start, period, multiplicity, max_iterations, budget)
+            if orbit.faults and not virtual:
+                raise _virtual(orbit)
+            return orbit
+        raise AssertionError("the last start is beside none")
+    except _OutOfTime:
+        raise ConvergenceError(
+            f"periodic orbit: no orbit was found in max_time = {max_time:g} s, after {budget.spent} evaluations of "
+            "the equations. Start closer to the orbit, or allow more time."
+        ) from None
+    finally:
+        budget.bar.close()
+
+
+def _multiplicity(system: FilippovSystem, given: Any, symmetry: Array | None) -> int:
+    """Check the number of periods of the forcing."""
+    count = whole(given, "multiplicity")
+    if not system.time_dependent:
+        raise OptionError(
+            f"multiplicity={count} is a number of periods of a forcing, but the system does not depend on time. "
+            "Give period=, about how long the orbit takes."
+        )
+    if symmetry is not None and count % 2 == 0:
+        raise OptionError(
+            f"multiplicity={count} is even, but an orbit whose half a symmetry maps to the other half takes an odd "
+            "number of periods of the forcing. Drop symmetry=."
+        )
+    return count
+
+
+class _OutOfTime(Exception):
+    """The time for a search is spent."""
+
+
+class _Budget:
+    """The time that a search may take, and a bar that counts evaluations of its equations."""
+
+    def __init__(self, seconds: float | None, shown: bool):
+        self.end = math.inf if seconds is None else monotonic() + positive(seconds, "max_time")
+        self.bar, self.spent = progress_bar(None, shown, " evaluations"), 0
+
+    def spend(self) -> None:
+        if monotonic() > self.end:
+            raise _OutOfTime
+        self.spent += 1
+        self.bar.update()
+
+
+def _solved(
+    start: Start,
+    period: Any,
+    multiplicity: int | None,
+    most: int,
+    budget: _Budget,
+    damped: bool = True,
+) -> PeriodicOrbit:
+    """The orbit that Newton's method finds from a start."""
+    begun, guessed, system = start.problem, start.unknowns, start.problem.system
     if not begun.legs[-1].timed:
         begun, guessed = prime_period(begun, guessed, start.p)
-    problem, u, at, iterations = _solved(begun, guessed, start.p, max_iterations)
+    problem, u, at, iterations = _closed_orbit(begun, guessed, start.p, most, budget, damped)
     part, once = prime_period(begun, problem.undivided(u), start.p)
     if part is not begun:
-        problem, u, at, _ = _solved(part, once, start.p, max_iterations)
+        problem, u, at, _ = _closed_orbit(part, once, start.p, most, budget)
     require_motion(problem, at, start)
     require_duration(problem, at, about_of(system, period, start.p))
+    _require_multiplicity(problem, multiplicity)
     faults = tuple(faults_of(problem, at, start.p))
     orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, iterations, faults)
     require_simple(orbit)
     require_symmetric(orbit)
-    if faults and not virtual:
-        raise _virtual(orbit)
     return orbit
 
 
-def _solved(
-    problem: BoundaryProblem, guess: Array, p: Array, max_iterations: int
+def _closed_orbit(
+    problem: BoundaryProblem,
+    guess: Array,
+    p: Array,
+    most: int,
+    budget: _Budget,
+    damped: bool = True,
 ) -> tuple[BoundaryProblem, Array, Evaluation, int]:
     """The orbit near a guess, with legs divided where derivatives grow along them; how many steps it took."""
-    solver, found = _Solver(problem, p), None
+    solver, found = _Solver(problem, p, budget), None
     try:
-        found = solver.solve(guess, max_iterations)
+        found = solver.solve(guess, most, damped)
         if not to_divide(problem, found[1]):
             return problem, *found, solver.iterations
         parts, start = divided(problem, guess, p)
     except ConvergenceError:
-        parts, start = divided(problem, guess, p)
+        parts, start = divided(problem, guess, p) if damped else (problem, guess)
         if parts is problem:
             raise
     if parts is not problem:
         try:
-            finer = _Solver(parts, p)
-            return parts, *finer.solve(start, max_iterations), solver.iterations + finer.iterations
+            finer = _Solver(parts, p, budget)
+            orbit = finer.solve(start, most, damped)
+            return parts, *orbit, solver.iterations + finer.iterations
         except ConvergenceError:
             if found is None:
                 raise
     assert found is not None
     return problem, *found, solver.iterations
 
+
+def _require_multiplicity(problem: BoundaryProblem, wanted: int | None) -> None:
+    """Refuse an orbit that takes another number of periods of the forcing."""
+    found = problem.periods * (1 if problem.symmetry is None else 2)
+    if wanted is not None and abs(found - wanted) > 0.25:
+        raise ConvergenceError(
+            f"periodic orbit: multiplicity = {wanted} was requested, but the orbit closes after {found:g} of the "
+            "forcing's periods. Start closer to the orbit, or leave multiplicity= out."
+        )
+
+
+def _beside(
+    start: Start, multiplicity: int | None, most: int, budget: _Budget
+) -> PeriodicOrbit | None:
+    """The orbit that full Newton steps reach beside a state; None if it is not near."""
+    try:
+        orbit = _solved(start, None, multiplicity, min(most, _QUICK), budget, damped=False)
+    except (ConvergenceError, DegenerateError):
+        return None
+    begun, guessed = prime_period(start.problem, start.unknowns, start.p)
+    own, u = orbit.problem.whole, orbit.problem.undivided(orbit.unknowns)
+    if orbit.faults or own.size != begun.size:
+        return None
+    away = np.abs(u - guessed) / own.scales(u, start.p)
+    return orbit if away.max() <= _BESIDE else None
+
+
+#: Full Newton steps that suffice beside an orbit.
+_QUICK = 8
+
+#: Largest distance of an orbit from a state beside it, in scaled unknowns.
+_BESIDE = 0.05
 
 #: Steps below this, relative to the orbit, that do not shrink are rounding of the equations.
 _CLOSE = 1e-10
@@ -206,12 +324,12 @@ _LARGE, _CLOSED = 1000, 1e-9
 class _Solver:
     """Newton's method on the equations of an orbit, with diagnostics on failure."""
 
-    def __init__(self, problem: BoundaryProblem, p: Array):
-        self.problem, self.p, self.iterations = problem, p, 0
+    def __init__(self, problem: BoundaryProblem, p: Array, budget: _Budget):
+        self.problem, self.p, self.iterations, self.budget = problem, p, 0, budget
         self.last: tuple[Array, Evaluation | None] = (np.zeros(0), None)
 
-    def solve(self, u: Array, max_iterations: int) -> tuple[Array, Evaluation]:
-        """The orbit, to rounding."""
+    def solve(self, u: Array, max_iterations: int, damped: bool = True) -> tuple[Array, Evaluation]:
+        """The orbit, to rounding; with damped steps where full ones fail."""
         longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
         scales = self.problem.scales(u)
         last: list[Array] = []
@@ -230,6 +348,7 @@ class _Solver:
                     f"Leg {i + 1} {leg_name(self.problem.system, self.problem.legs[i])} grew to the duration "
                     f"{durations[i]:.3g}."
                 )
+            self.budget.spend()
             size = float(np.abs(v - last[-1]).max()) if last else 0.0
             # after a step of this size the next one is its square, and what it leaves its fourth power
             tol = min(max(1e-3 * size**4, TOLERANCE), _COARSE)
@@ -263,7 +382,7 @@ class _Solver:
         last[:] = before
         if nearest is not root and nearest is not None:
             return self._closed(*self._polished(nearest * scales, _POLISH))
-        if root is None and u.size <= _LARGE:
+        if root is None and damped and u.size <= _LARGE:
             root = self._damped(equations, u / scales, 2 * max_iterations)
         if root is None:
             raise self._failure(reason)
@@ -407,7 +526,7 @@ class _Solver:
         modes += f" ... ({len(legs)} legs)" * (len(legs) > 40)
         return ConvergenceError(
             f"periodic orbit: Newton's method did not converge with the itinerary {modes!r} in "
-            f"{self.iterations} steps, residual {size:.2g}.{why}{where} Simulate "
+            f"{self.iterations} evaluations of the equations, residual {size:.2g}.{why}{where} Simulate "
             "longer, start closer to the orbit, or try the itinerary of a run from there.",
             residual=size,
             point=u,

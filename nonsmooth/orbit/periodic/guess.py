@@ -8,7 +8,7 @@ time between the events must be a whole number of periods, or half a number with
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,7 +29,7 @@ from ...model import (
     Surfaces,
     real_array,
 )
-from ...model.derivatives.forcing import Forcing, frequencies
+from ...model.derivatives.forcing import Forcing, common_frequency, frequencies
 from ...model.derivatives.variational import plain_field
 from ..runs.guards import march
 from ..runs.itinerary import Itinerary, lone_leg, word_legs
@@ -47,12 +47,13 @@ def _forcing_of(system: FilippovSystem, period: Any) -> Forcing | None:
         return None
     if period is None:
         found = system.cached("frequencies", lambda: frequencies(system))
-        if len(found) != 1:
+        common = system.cached("common frequency", lambda: common_frequency(found))
+        if common is None:
             raise OptionError(
                 f"period is missing, and the system has {len(found)} frequencies {found} in sines and "
-                "cosines. Give the period of the forcing, such as period=2*pi/w."
+                "cosines without a common period. Give the period of the forcing, such as period=2*pi/w."
             )
-        return system.cached("forcing", lambda: Forcing(system, 2.0 * math.pi / found[0], True))
+        return system.cached("forcing", lambda: Forcing(system, 2.0 * math.pi / common, True))
     return Forcing(system, period)
 
 
@@ -91,6 +92,9 @@ _FALLING = 0.7
 #: Relative range of the states of a part of a run below which it rests.
 _REST = 1e-6
 
+#: Share of the time of a run at its end in which it rests, if it does.
+_AT_END = 0.1
+
 #: Share of the time of a run after its last event from which it may have reached an orbit without events.
 _QUIET = 0.75
 
@@ -122,19 +126,21 @@ def recurrence(
     period: float | None,
     first: bool,
     about: float | None = None,
+    multiplicity: int | None = None,
 ) -> _Recurrence | None:
-    """The legs of a run that nearly close; None if there are none."""
+    """The legs of a run that nearly close, over a number of periods of the forcing; None if there are none."""
+    whole = None if multiplicity is None else multiplicity / (1 if symmetry is None else 2)
     parts = [part for part in merged(stretches(run, begins=False)) if part.duration > 0.0]
     if len(parts) > 1 and parts[-1].leg.timed:
         if parts[-1].duration > _QUIET * sum(part.duration for part in parts):
-            found = _without_events(run, parts[-1:], symmetry, period, first, about)
+            found = _without_events(run, parts[-1:], symmetry, period, first, about, whole)
             if found is not None and found.distance <= _CLOSE and _moves(run, found.parts[0]):
                 return found
     closed = [k for k, part in enumerate(parts) if part.leg.kind not in ("end", "stop")]
     # legs between two events: start k is after the event that ends part k - 1
     starts = [k + 1 for k in closed if k + 1 < len(parts)]
     if len(starts) < 2:
-        return _without_events(run, parts, symmetry, period, first, about)
+        return _without_events(run, parts, symmetry, period, first, about, whole)
     scale = _scales(run)
     anchor = starts[0] if first else starts[-1]
     others = [k for k in starts if (k > anchor if first else k < anchor)]
@@ -145,6 +151,8 @@ def recurrence(
     if not others:
         return None
     distances, periods = _distances(run, parts, anchor, others, scale, symmetry, period)
+    if period is not None and whole is not None:
+        distances = [d if n == whole else math.inf for d, n in zip(distances, periods, strict=True)]
     best = min(distances)  # of those that close about as well as the best the shortest
     good = [i for i, apart in enumerate(distances) if apart <= max(3.0 * best, 1e-9)]
     i = min(good, key=lambda i: abs(others[i] - anchor))
@@ -202,6 +210,7 @@ def _without_events(
     period: float | None,
     first: bool,
     about: float | None,
+    whole: float | None,
 ) -> _Recurrence | None:
     """A recurrence within one leg: after whole periods, or on a plane across the flow."""
     if not parts:
@@ -214,6 +223,8 @@ def _without_events(
     for t in _returns(run, start, end, anchor, symmetry, period):
         low, high = sorted((anchor, t))
         if about is not None and not is_about(high - low, about):
+            continue
+        if period is not None and whole is not None and abs((high - low) / period - whole) > 0.25:
             continue
         there = run(high) if symmetry is None else symmetry @ run(high)
         distance = float(np.abs((there - run(low)) / scale).max())
@@ -281,17 +292,40 @@ def _require_steady(run: Trajectory) -> None:
     )
 
 
-def refused(run: Trajectory, found: _Recurrence | None) -> ConvergenceError:
-    """The error for a run without a recurrence."""
+def refused(
+    run: Trajectory,
+    found: _Recurrence | None,
+    multiplicity: int | None = None,
+    other: _Recurrence | None = None,
+) -> ConvergenceError:
+    """The error for a run without a recurrence, or with an ``other`` one over more periods."""
+    if _rests(run):
+        return ConvergenceError(
+            f"guess: the run rests at {run.x[-1].tolist()} at its end, t = {run.t[-1]:.6g}. Start it where it "
+            "keeps moving, or vary a parameter.",
+            point=run.x[-1],
+        )
+    over = "" if multiplicity is None else f" over {multiplicity} of the forcing's periods"
     best = (
-        "has no two events of one kind"
+        f"has no two events of one kind{over}"
         if found is None
-        else f"closes only to {found.distance:.2g} of its size, after {len(found.parts)} legs"
+        else f"closes only to {found.distance:.2g} of its size{over}, after {len(found.parts)} legs"
     )
+    advice = "Simulate longer, closer to the orbit, or give itinerary= or a symmetry."
+    if other is not None and other.distance < _GOOD and other.parts:
+        advice = f"It closes over {other.periods:g} of the forcing's periods: give that as multiplicity=."
     return ConvergenceError(
-        f"guess: the itinerary does not close: the run to t = {run.t[-1]:.6g} ({run.status}) {best}. "
-        "Simulate longer, closer to the orbit, or give itinerary= or a symmetry."
+        f"guess: the itinerary does not close: the run to t = {run.t[-1]:.6g} ({run.status}) {best}. {advice}"
     )
+
+
+def _rests(run: Trajectory) -> bool:
+    """Whether a run moves no more at its end."""
+    if run.status is not Status.REACHED_END:
+        return False
+    last = run(run.t[-1] - _AT_END * (run.t[-1] - run.t[0]) * np.linspace(0.0, 1.0, 33))
+    size = float(np.abs(run.x).max())
+    return bool(np.ptp(last, axis=0).max() <= _REST * size) if np.isfinite(size) else False
 
 
 # Checks of a guess --------------------------------------------------------------------------------
@@ -374,6 +408,9 @@ _LONGEST = 200.0
 #: Most periods of the forcing over which one mode alone is integrated.
 _MOST_PERIODS = 16
 
+#: Most periods of the forcing of an orbit beside a state, and events of the run from there.
+_BESIDE, _SEVERAL = 8, 200
+
 #: Relative distance of a recurrence at which a run is not simulated further.
 _GOOD = 0.02
 
@@ -388,44 +425,69 @@ class Start:
     problem: BoundaryProblem
     unknowns: Array
     p: Array
+    near: bool = False  # an orbit is accepted only beside it
 
 
-def start_of(
+def starts_of(
     system: FilippovSystem,
     guess: Any,
     itinerary: Itinerary | None,
     period: Any,
+    multiplicity: int | None,
     mirror: Array | None,
     parameters: Parameters | None,
     t_start: float,
-) -> Start:
+) -> Iterator[Start]:
+    """Starts of Newton's method in the order in which they are tried."""
     if isinstance(guess, (PeriodicOrbit, Trajectory)):
         _require_of(system, guess.system)
+        _require_alone(guess, itinerary=itinerary, t_start=t_start or None)
     if isinstance(guess, PeriodicOrbit):
-        _require_alone(guess, itinerary=itinerary, t_start=t_start or None)
-        return _from_orbit(system, guess, period, mirror, parameters)
+        yield _from_orbit(system, guess, period, mirror, parameters)
+        return
+    own = guess.parameters if isinstance(guess, Trajectory) else {}
+    p = system.parameter_vector({**own, **_by_name(parameters)})
+    forcing, about = _forcing_of(system, period), _half(about_of(system, period, p), mirror)
+    span = _span_of(forcing, p)
     if isinstance(guess, Trajectory):
-        _require_alone(guess, itinerary=itinerary, t_start=t_start or None)
-        given = {**guess.parameters, **_by_name(parameters)}
-        p = system.parameter_vector(given)
-        forcing, about = _forcing_of(system, period), _half(about_of(system, period, p), mirror)
         found = recurrence(
-            guess, symmetry=mirror, period=_span_of(forcing, p), first=False, about=about
+            guess, symmetry=mirror, period=span, first=False, about=about, multiplicity=multiplicity
         )
         _require_steady(guess)
         if found is None or found.distance > _CLOSE:
-            raise refused(guess, found)
-        return _from_recurrence(system, found, forcing, mirror, p)
-    p = system.parameter_vector(parameters)
-    forcing = _forcing_of(system, period)
-    span = _span_of(forcing, p)
+            raise refused(guess, found, multiplicity)
+        yield _from_recurrence(system, found, forcing, mirror, p)
+        return
     x = system.extended_point(real_array(guess, "guess"), t_start)
     if itinerary is not None:
-        return _from_word(system, x, itinerary, forcing, mirror, p)
-    about = _half(about_of(system, period, p), mirror)
-    found = _simulated(system, x, mirror, about or span, forcing is not None, p)
+        yield _from_word(system, x, itinerary, forcing, multiplicity, mirror, p)
+        return
+    once = 1 if multiplicity is None else multiplicity
+    if forcing is not None and span is not None and not forcing.found:
+        here = Leg(_mode(system, x, p))
+        _require_period(system, (here,), x[None], np.zeros(1), span, p)
+    for near in () if span is None else _beside(system, x, mirror, span, multiplicity, p):
+        yield replace(_from_recurrence(system, near, forcing, mirror, p), near=True)
+    found = _simulated(system, x, mirror, about or span, once if forcing is not None else None, p)
     start = _from_recurrence(system, found, forcing, mirror, p)
-    return start if forcing is None or mirror is not None else _nearest(start, x, forcing(p)[0])
+    yield start if forcing is None or mirror is not None else _nearest(start, x, forcing(p)[0])
+
+
+def _beside(
+    system: FilippovSystem, x: Array, mirror: Array | None, span: float, given: int | None, p: Array
+) -> Iterator[_Recurrence]:
+    """The legs from a state that returns to its neighbourhood, as beside an unstable orbit."""
+    n, t, values = system.dimension, float(x[-1]), named(system, p)
+    for once in range(1, _BESIDE + 1) if given is None else (given,):
+        end = t + (once + 1.05) * span
+        run = simulate(
+            system, x[:n], end, t_start=t, parameters=values, tol=1e-12, max_events=_SEVERAL
+        )
+        near = recurrence(run, symmetry=mirror, period=span, first=True, multiplicity=once)
+        if near is not None and near.distance <= _CLOSE:
+            yield near
+        if run.status is not Status.REACHED_END:
+            return
 
 
 def _half(about: float | None, mirror: Array | None) -> float | None:
@@ -523,12 +585,13 @@ def _from_word(
     x: Array,
     itinerary: Itinerary,
     forcing: Forcing | None,
+    multiplicity: int | None,
     mirror: Array | None,
     p: Array,
 ) -> Start:
     """Integrate the legs of an itinerary to their events, or one mode over periods of the forcing."""
     if forcing is not None and mirror is None and (leg := lone_leg(system, itinerary)) is not None:
-        return _from_mode(system, x, leg, forcing, p)
+        return _from_mode(system, x, leg, forcing, multiplicity, p)
     if system.sets:
         raise OptionError(
             "itinerary= is one mode for a system with vector multipliers. Give a run of the itinerary as the guess."
@@ -539,16 +602,20 @@ def _from_word(
     if forcing is not None:
         count = float(durations.sum()) / forcing(p)[0]
         periods = max(1.0, round(count)) if mirror is None else round(count - 0.5) + 0.5
+        if multiplicity is not None:
+            periods = multiplicity / (1.0 if mirror is None else 2.0)
     return _problem(system, legs, starts[: len(legs)], durations, periods, forcing, mirror, p)
 
 
-def _from_mode(system: FilippovSystem, x: Array, leg: Leg, forcing: Forcing, p: Array) -> Start:
-    """Integrate one mode over the number of periods of the forcing after which it closes best."""
+def _from_mode(
+    system: FilippovSystem, x: Array, leg: Leg, forcing: Forcing, multiplicity: int | None, p: Array
+) -> Start:
+    """Integrate one mode over a number of periods of the forcing, or that after which it closes best."""
     span, n, y, apart = _span_of(forcing, p) or 1.0, system.dimension, x, list[float]()
     for _ in range(_MOST_PERIODS):
         y = integrate_leg(system, leg, y, span, p).end[: x.size]
         apart.append(float(np.abs(y[:n] - x[:n]).max()))
-    count = 1 + int(np.argmin(apart))
+    count = 1 + int(np.argmin(apart)) if multiplicity is None else multiplicity
     durations = np.array([count * span])
     return _problem(system, (leg,), x[None].copy(), durations, count, forcing, None, p)
 
@@ -580,7 +647,7 @@ def _simulated(
     x: Array,
     mirror: Array | None,
     hint: float | None,
-    forced: bool,
+    multiplicity: int | None,
     p: Array,
 ) -> _Recurrence:
     """Simulate from a state, longer and longer, until the run recurs."""
@@ -597,7 +664,7 @@ def _simulated(
     best: _Recurrence | None = None
     run: Trajectory | None = None
     for start in starts:
-        run, found = _recurring(system, start, mirror, hint or natural, hint, forced, p)
+        run, found = _recurring(system, start, mirror, hint or natural, hint, multiplicity, p)
         if found is not None and (best is None or found.distance < best.distance):
             best = found
         if best is not None and best.distance < _GOOD:
@@ -605,7 +672,8 @@ def _simulated(
     assert run is not None
     _require_steady(run)
     if best is None or best.distance > _CLOSE:
-        raise refused(run, best)
+        other = recurrence(run, symmetry=mirror, period=hint, first=False) if multiplicity else None
+        raise refused(run, best, multiplicity, other)
     return best
 
 
@@ -615,13 +683,15 @@ def _recurring(
     mirror: Array | None,
     unit: float,
     hint: float | None,
-    forced: bool,
+    multiplicity: int | None,
     p: Array,
 ) -> tuple[Trajectory, _Recurrence | None]:
     n, values = system.dimension, named(system, p)
     t = float(x[-1]) if system.time_dependent else 0.0
     best: _Recurrence | None = None
-    given = {"period": hint, "about": None} if forced else {"period": None, "about": hint}
+    given: dict[str, Any] = {"period": None, "about": hint}
+    if multiplicity is not None:  # the system is forced
+        given = {"period": hint, "multiplicity": multiplicity}
     for span in [k + 0.6 for k in (1, 2, 4, 8, 16)] if hint else [4.0 * 2**k for k in range(11)]:
         run = simulate(
             system,

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, ConvergenceError, DegenerateError, OptionError
-from ...model.derivatives.coupling import Coupling
+from ...model.derivatives.given_functions import Coupling
 from ..runs.legs import integrate_leg
 from ..runs.saltation import saltations
 from .multipliers import events_of

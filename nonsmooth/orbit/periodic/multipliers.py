@@ -97,6 +97,13 @@ class Multipliers:
         return math.nan if self.refusal else max(self._carried[1], self._product.error)
 
     @property
+    def repeats(self) -> bool:
+        """Whether an autonomous orbit has the multiplier 1 twice, as in a family of orbits."""
+        if self.refusal or self.problem.system.time_dependent:
+            return False
+        return bool((np.abs(self.logarithms) <= max(_NEUTRAL, 10.0 * self.error)).any())
+
+    @property
     def stability(self) -> str:
         """Stability in words, from the multipliers that are not the 1 of the flow."""
         if self.refusal:

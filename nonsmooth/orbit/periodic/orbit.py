@@ -260,6 +260,8 @@ class PeriodicOrbit:
             f"  multipliers {', '.join(_number(m) for m in self.multipliers)}"
             f" (structural ones are exact; the estimated error is {self.error_estimate:.1e})",
         ]
+        if self.floquet.repeats:
+            lines.append("  the multiplier 1 twice: one of a family of orbits, or at a fold")
         if self.margins:
             near = self.margins[0]
             lines.append(f"  nearest change: leg {near.leg + 1} {near.what} {near.value:.6g}")

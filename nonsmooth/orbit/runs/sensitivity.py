@@ -22,7 +22,7 @@ from ...model import (
     real_array,
     require_system,
 )
-from ...model.derivatives.costs import cost_over
+from ...model.derivatives.given_functions import cost_over
 from .legs import parameters_of
 from .one_sided import Side, one_sided
 from .variation import (

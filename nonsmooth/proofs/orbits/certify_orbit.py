@@ -9,13 +9,12 @@ from typing import Any, NamedTuple
 
 from ...model import FilippovSystem, OptionError, PointError, require_plain, require_system, whole
 from ..arithmetic.decimals import enclosure, given
-from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.flint import arb, ctx
 from ..arithmetic.intervals import Numbers, exact, exact_range, precision
 from ..proof import DigitsError, UnprovenError
 from ..surface_functions import enclosed, parameter_ranges
 from .itinerary import EnclosedEvent, OrbitEnclosure
-from .modes import Modes
+from .modes import EventFunction, Modes
 from .orbit_proof import OrbitProof, ProvenEvent
 
 
@@ -106,16 +105,15 @@ def certify_orbit(
     whole(max_bits, "max_bits", least=32)
     whole(max_steps, "max_steps")
     start = _read_start(system, x0, numbers)
-    if system.time_dependent:
-        t = exact(t0, numbers, "t0")
-        start.append((t, t))
+    start.append((exact(t0, numbers, "t0") if system.time_dependent else Fraction(0),) * 2)
     ranges = parameter_ranges(system, parameters, numbers)
     moving = [i for i, (a, b) in enumerate(ranges) if a < b]
     modes = Modes(system, numbers, moving)
+    constant = modes.graph.constant
+    end = modes.end_at("end", modes.clock, constant(start[modes.clock][0] + duration))
     points = all(a == b for a, b in (*start, *ranges))
     while True:
         with precision(bits):
-            end = enclosed([(duration, duration)])[0]
             result, digits = _run(modes, InitialSet(start, ranges, duration), end, max_steps)
         if result.proven or not (points and digits) or 2 * bits > max_bits:
             return result
@@ -138,24 +136,25 @@ def _read_start(system: FilippovSystem, x0: Sequence[Any], numbers: Numbers) -> 
     ]
 
 
-def _run(modes: Modes, initial: InitialSet, t_end: arb, max_steps: int) -> tuple[OrbitProof, bool]:
+def _run(
+    modes: Modes, initial: InitialSet, end: EventFunction, max_steps: int
+) -> tuple[OrbitProof, bool]:
     """Integrate to the end, a stop or something undecided; whether more digits may decide it."""
     flow, why, status, digits = None, "", "", False
     moving = [r for r in initial.ranges if r[0] < r[1]]
     x = enclosed([*initial.start, *moving])
     try:
         order = max(12, int(ctx.prec * 0.3))
-        exactly = [*initial.start, *moving], initial.ranges
-        flow = OrbitEnclosure(modes, x, enclosed(initial.ranges), order, exactly)
-        flow.smallest = min(1e-3, float(t_end.mid()) / (50 * max_steps))
+        on = modes.surfaces_at([*initial.start, *moving], initial.ranges)
+        flow = OrbitEnclosure(modes, x, enclosed(initial.ranges), order, on)
+        flow.smallest = min(1e-3, float(initial.duration) / (50 * max_steps))
+        flow.end = end
         while not status:
             if flow.steps >= max_steps:
                 raise DigitsError(f"more than {max_steps} steps")
-            event = flow.step_through(t_end)
-            if event is not None and event.kind == "stop":
+            event = flow.step_through()
+            if event is not None and event.kind in ("stop", "end"):
                 status = event.function.name
-            elif event is None and not (t_end - flow.t) > 0:
-                status = "end"
     except UnprovenError as error:
         why, digits = str(error), not isinstance(error, DigitsError)
     except KeyboardInterrupt:
@@ -185,9 +184,11 @@ def _result(
         why=why,
         itinerary=" ".join(mode or "o" for mode, _ in groupby(visited)),
         events=tuple(_event(e, named) for e in events),
-        start=dict(zip(names, (given(*pair) for pair in initial.start), strict=True)),
+        start=dict(zip(names, (given(*pair) for pair in initial.start), strict=False)),
         parameters=dict(zip(system.parameter_names, ranges, strict=True)),
-        t=enclosure(flow.t) if flow else Enclosure("0", "0"),
+        t=given(*[initial.duration] * 2)
+        if status == "end"
+        else enclosure(flow.t if flow else arb(0)),
         end=named(flow.hull() if flow else x),
         steps=flow.steps if flow else 0,
         bits=int(ctx.prec),

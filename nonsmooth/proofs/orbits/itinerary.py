@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..arithmetic.flint import arb
 from ..arithmetic.intervals import sign
 from ..proof import UnprovenError
-from .modes import EventFunction, Modes, Range, mode_after
+from .modes import EventFunction, Modes, mode_after
 from .validated_flow import ValidatedFlow
 
 
@@ -33,24 +33,21 @@ class OrbitEnclosure(ValidatedFlow):
         x: Sequence[arb],
         p: Sequence[arb],
         order: int,
-        exact: tuple[Sequence[Range], Sequence[Range]],
+        on: Sequence[int] = (),
     ):
         super().__init__(modes, x, p, order)
         self.events: list[EnclosedEvent] = []
-        start = [
-            j
-            for j, h in enumerate(modes.heights(x, p))
-            if not sign(h) and modes.on_surface(j, *exact)
-        ]
-        self._enter(list(x), start, "start")
+        self._enter(list(x), on, "start")
         self._initial_signs()
 
-    def step_through(self, t_end: arb) -> EnclosedEvent | None:
-        """Take one step, and change the mode at an event; return the event or None."""
-        k = self.step(t_end)
+    def step_through(self) -> EnclosedEvent | None:
+        """Take one step, and change the mode at an event; return the event, or the end, or None."""
+        k = self.step()
         if k is None:
             return None
         function = self.now.event_functions[k]
+        if function.kind == "end":
+            return EnclosedEvent(function, "end", self.t, self.hull(), self.mode, self.mode)
         return self._passed(function, k) if function.signed else self._switched(function)
 
     # modes and signs -----------------------------------------------------------------------------

@@ -216,7 +216,8 @@ class Modes:
                 "linear multipliers only."
             )
         self.system, self.numbers = system, numbers
-        self.system_graph = SystemGraph(system, moving)
+        self.system_graph = SystemGraph(system, moving, clock=True)
+        self.clock = system.dimension
         self.graph = self.system_graph.graph
         surfaces = system.definition.surfaces
         (self.h,) = self.system_graph.insert([surfaces]) if system.surface_count else ([],)
@@ -281,10 +282,20 @@ class Modes:
         mode = self.replaced(mode, surface, "s")
         return self._values(mode, lambda: [list(self.functions(surface, mode).lie)], x, p)[0]
 
-    def on_surface(self, surface: int, x: Sequence[Range], p: Sequence[Range]) -> bool:
-        """Whether h is zero at exact starts; inputs with a width are unknown."""
+    def surfaces_at(self, x: Sequence[Range], p: Sequence[Range]) -> list[int]:
+        """The surfaces on which exact starts lie; inputs with a width are unknown."""
         inputs = [[a if a == b else None for a, b in vector] for vector in (x, p)]
-        return is_zero(Program(self.graph, [[self.h[surface]]]), inputs, self.numbers)
+        zero = lambda h: is_zero(Program(self.graph, [[h]]), inputs, self.numbers)
+        return [j for j, h in enumerate(self.h) if zero(h)]
+
+    def end_at(
+        self, name: str, position: int, value: int, direction: int = 1, index: int = -1
+    ) -> EventFunction:
+        """Add an end of orbits, where a state has a value (a node); of a time the index is -1."""
+        left = self.graph.apply("sub", [value, self.system_graph.x[position]])
+        node = left if direction > 0 else self.graph.apply("neg", [left])
+        self.ends.append(EventFunction("end", name, node, index=index))
+        return self.ends[-1]
 
     def across(self, surface: int, mode: str, x: Sequence[arb], p: Sequence[arb]) -> str:
         """The side to which a surface is crossed while another slides."""

@@ -3,7 +3,8 @@
 A step has an a-priori enclosure B (Picard), the Taylor polynomial with the coefficient K + 1 over B as
 remainder, and the set of states as middle + frame r with an orthogonal frame (Lohner 1987). Guards
 are proven positive, or to have one simple zero; there the time is eliminated by the derivative of the
-return map, (1 - f grad g/(grad g . f)) D. ``itinerary`` decides what follows an event.
+return map, (1 - f grad g/(grad g . f)) D. The end of the integration is such a zero too, of the time
+that is left or of another function. ``itinerary`` decides what follows an event.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arithmetic.equations import column, entries
 from ..arithmetic.flint import arb, arb_mat, ctx
 from ..arithmetic.intervals import hull, radius
+from ..arithmetic.krawczyk import identity
 from ..arithmetic.series import horner
-from ..points.equations import column, entries
-from ..points.krawczyk import identity
 from ..proof import DigitsError, UnprovenError
 from .first_zero import Polynomial, UnsureError, first_zero, narrowed
-from .modes import Mode, Modes
+from .modes import EventFunction, Mode, Modes
 
 
 @dataclass
@@ -48,9 +49,11 @@ def growth(bound: float, h: float) -> float:
     return float(((arb(bound) * arb(h)).expm1()).upper()) * (1 + 1e-12)
 
 
-def orthogonal(matrix: arb_mat) -> arb_mat:
-    """An orthogonal factor of the midpoints as exact doubles, longest column first."""
+def orthogonal(matrix: arb_mat, sides: arb_mat) -> arb_mat:
+    """An orthogonal frame of the edges of a set as exact doubles, longest edge first."""
     a = np.array([[float(v.mid()) for v in row] for row in matrix.tolist()])
+    widest = max(map(radius, entries(sides)))
+    a *= [radius(v) / widest for v in entries(sides)]
     order = np.argsort(-np.linalg.norm(a, axis=0))
     q = np.linalg.qr(a[:, order])[0]
     return arb_mat([[arb(float(v)) for v in row] for row in q.tolist()])
@@ -65,8 +68,11 @@ class ValidatedFlow:
 
     def __init__(self, modes: Modes, x: Sequence[arb], p: Sequence[arb], order: int):
         self.modes, self.p, self.order, self.n = modes, list(p), order, len(x)
+        self.along = identity(self.n)  # derivatives of r by the start
         self.adopt(list(x))
-        self.t, self.steps, self.smallest, self.mode = arb(0), 0, 0.0, ""
+        self.origin = x[modes.clock]
+        self.steps, self.smallest, self.mode = 0, 0.0, ""
+        self.end: EventFunction | None = None
         self.zeros: dict[int, int] = {}
         self.signs: dict[int, int] = {}
 
@@ -81,17 +87,28 @@ class ValidatedFlow:
         move = entries(self.frame * self.r)
         return [m + v for m, v in zip(self.middle, move, strict=True)]
 
+    @property
+    def t(self) -> arb:
+        """Time since the start."""
+        return self.hull()[self.modes.clock] - self.origin
+
+    @property
+    def derivative(self) -> arb_mat:
+        """Derivatives of the states by those at the start, for all states of the set."""
+        return self.frame * self.along
+
     def moved(self, image: list[arb], derivative: arb_mat) -> None:
         """The set becomes image + derivative (x - middle), in a new orthogonal frame."""
         product = derivative * self.frame
         if not all(v.is_finite() for v in (*image, *entries(product))):
             raise UnprovenError(f"the flow has no enclosure at t = {float(self.t.mid()):.9g}")
         wide = any(radius(v) > 0 for v in entries(self.r))
-        frame = orthogonal(product) if wide else identity(self.n)
+        frame = orthogonal(product, self.r) if wide else identity(self.n)
         inverse = frame.inv()
         self.middle = [v.mid() for v in image]
         miss = column([v - m for v, m in zip(image, self.middle, strict=True)])
         self.r = inverse * miss + (inverse * product) * self.r
+        self.along = (inverse * product) * self.along
         self.frame = frame
 
     @property
@@ -101,12 +118,15 @@ class ValidatedFlow:
 
     # steps ---------------------------------------------------------------------------------------
 
-    def step(self, t_end: arb) -> int | None:
-        """Take one step, at most to the first event; return the index of its function or None."""
-        left = math.nextafter(float((t_end - self.t).upper()), math.inf)
-        limit = left
+    def step(self) -> int | None:
+        """Take one step, at most to the first event or the end; return the index of its function or None."""
+        left = limit = math.inf
+        if self.end is not None and self.end.index < 0:  # a time: a little longer than what is left
+            (k,) = (k for k, w in enumerate(self.now.event_functions) if w is self.end)
+            left = float(self.now.event_values(self.hull(), self.p)[k].upper())
+            limit = (1 + 2.0**-10) * left
         for _ in range(40):
-            step = self._prepare(limit, t_end)
+            step = self._prepare(limit)
             try:
                 event = self._first_event(step)
             except UnsureError as unsure:
@@ -117,10 +137,10 @@ class ValidatedFlow:
                     ) from None
                 limit = unsure.since
                 continue
-            return self._advance(step, event, t_end)
+            return self._advance(step, event)
         raise UnprovenError(f"no step at t = {float(self.t.mid()):.9g}")
 
-    def _prepare(self, limit: float, t_end: arb) -> Step:
+    def _prepare(self, limit: float) -> Step:
         """A step size with an a-priori enclosure and a small remainder."""
         mode, x, count = self.now, self.hull(), self.order + 2
         c = mode.series(x, self.p, count)
@@ -177,7 +197,9 @@ class ValidatedFlow:
     def _first_event(self, step: Step) -> tuple[int, arb] | None:
         """The guard with the first zero, proven, and its time."""
         events, unsure = [], float("inf")
-        for k in range(len(self.now.event_functions)):
+        for k, function in enumerate(self.now.event_functions):
+            if function.kind == "end" and function is not self.end:
+                continue
             f = self._polynomial(step, k)
             try:
                 t = first_zero(f, step.h)
@@ -203,7 +225,7 @@ class ValidatedFlow:
         passed = [event for event in together if not self.is_event(event[1])]
         if any(not self._stays_past(step, event, together) for event in passed):
             counting = []  # it may come back in its own direction
-        if len(counting) == 1 and self.now.event_functions[counting[0][1]].kind == "stop":
+        if len(counting) == 1 and self.now.event_functions[counting[0][1]].kind in ("stop", "end"):
             return counting[0][1], counting[0][0]
         for t, j in counting:
             others = [event for event in together if event[1] != j]
@@ -254,23 +276,14 @@ class ValidatedFlow:
             c, top = [-v for v in c], -top
         return Polynomial(c, top, self.zeros.get(k, 0))
 
-    def _advance(self, step: Step, event: tuple[int, arb] | None, t_end: arb) -> int | None:
-        mode = self.now
-        time = arb(step.h) if event is None else event[1]
-        if event is not None and not self.t + time <= t_end:
-            name = mode.event_functions[event[0]].name
-            raise UnprovenError(
-                f"whether {name} is reached before the end is undecided: at t in {(self.t + time).str(8)}"
-            )
-        if event is None and (t_end - self.t) <= step.h:
-            time = t_end - self.t  # the end itself, also where it is no double
+    def _advance(self, step: Step, event: tuple[int, arb] | None) -> int | None:
         if event is None:
-            c = mode.series(self.middle, self.p, self.order + 2)
+            c, time = self.now.series(self.middle, self.p, self.order + 2), arb(step.h)
             image, derivative = at(c, step.top, time), self._derivative(step, time)
         else:
             image, derivative = self._at_event(step, event)
         self.moved(image, derivative)
-        self.t, self.steps, self.zeros = self.t + time, self.steps + 1, {}
+        self.steps, self.zeros = self.steps + 1, {}
         return None if event is None else event[0]
 
     def _at_event(self, step: Step, event: tuple[int, arb]) -> tuple[list[arb], arb_mat]:

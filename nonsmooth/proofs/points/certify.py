@@ -1,4 +1,4 @@
-"""Proofs of existence, uniqueness and class of one special point, also over boxes of parameters."""
+"""Proofs of existence, uniqueness and class of a special point or periodic orbit, also for ranges of parameters."""
 
 from __future__ import annotations
 
@@ -10,21 +10,17 @@ from typing import Any
 
 from ...local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
 from ...model import FilippovSystem, OptionError, real, whole
+from ...orbit import PeriodicOrbit
 from ..arithmetic.decimals import enclosure, given, inner
 from ..arithmetic.flint import arb
 from ..arithmetic.intervals import Numbers, between, precision, radius
-from ..proof import Proof, hulls, intervals, listed, paragraph
-from ..record import record_of
-from .equations import Equations
-from .krawczyk import Zero, prove_zero
+from ..arithmetic.krawczyk import Zero, prove_zero
+from ..orbits.periodic import OrbitInstance, orbit_instance
+from ..proof import READ, Classification, Proof, hulls, intervals, paragraph
 from .problem_instance import ProblemInstance, instance_of
-from .special_points import Classification
 
-#: How constants are read.
-READ = {
-    "stored": "Constants are the doubles stored in the expressions.",
-    "written": "Constants are the decimals that the stored doubles are written as.",
-}
+#: A special point or a periodic orbit that is to be proven.
+Instance = ProblemInstance | OrbitInstance
 
 
 def check_numbers(numbers: Any) -> None:
@@ -34,7 +30,7 @@ def check_numbers(numbers: Any) -> None:
 
 
 def certify(
-    found: TwoFold | Fold | Equilibrium | PseudoEquilibrium,
+    found: TwoFold | Fold | Equilibrium | PseudoEquilibrium | PeriodicOrbit,
     *,
     system: FilippovSystem | None = None,
     width: float = 1e-12,
@@ -44,18 +40,19 @@ def certify(
     max_bits: int = 2048,
     max_pieces: int = 64,
 ) -> Proof:
-    """Prove that a special point exists, is the only one in a named box, and what it is.
+    """Prove that a special point or periodic orbit exists, is the only one in a named box, and what it is.
 
     Krawczyk's operator in interval arithmetic of any precision; derivatives are those of the
     expressions as they are stored. Nothing rests on rounding.
 
     Parameters
     ----------
-    found : TwoFold, Fold, Equilibrium or PseudoEquilibrium
-        As a search returns it. In systems with more states than equations the theorem is about the
+    found : TwoFold, Fold, Equilibrium, PseudoEquilibrium or PeriodicOrbit
+        As a search returns it. Periodic orbits may cross surfaces and jump, but not slide; their
+        period, multipliers and stability are proven. In systems with more states than equations the theorem is about the
         point on the plane through it, across the set of such points (or of held states).
     system : FilippovSystem, optional
-        Needed for all points but two-folds, which carry their system.
+        Needed for folds and points of rest; two-folds and orbits carry their system.
     width : float, optional
         Largest radius of the enclosures, where the parameters are points.
     parameters : mapping, optional
@@ -66,7 +63,7 @@ def certify(
     numbers : {"stored", "written"}
         Whether the constant 0.1 is the double nearest to one tenth, or one tenth.
     max_bits : int, optional
-        Where to give up raising the precision.
+        Where to give up raising the precision; for orbits at 256 or what ``width`` needs.
     max_pieces : int, optional
         How many pieces the intervals of parameters and held states may be divided into.
 
@@ -91,7 +88,8 @@ def certify(
     Notes
     -----
     Krawczyk 1969; Neumaier, Interval Methods for Systems of Equations, 1990, ch. 5; the classes are
-    those of ``nonsmooth.two_folds``. Arithmetic: Arb (Johansson 2017).
+    those of ``nonsmooth.two_folds``. Arithmetic: Arb (Johansson 2017). Orbits: multiple shooting with
+    validated flows, as in Kapela et al. 2021.
 
     Examples
     --------
@@ -102,21 +100,25 @@ def certify(
     >>> proof.proven, proof.label, str(proof.point["y"]), str(proof.values["eigenvalue_low"])
     (True, 'II-C', '0', '-2.618033988749894848204586834365... +- ...')
     """
-    instance = instance_of(found, system, hold, numbers, parameters)
+    instance: Instance
+    if isinstance(found, PeriodicOrbit):
+        instance = orbit_instance(found, hold, numbers, parameters)
+    else:
+        instance = instance_of(found, system, hold, numbers, parameters)
     limit = real(width, "width", low=5e-324, expected="a positive number")
     whole(max_bits, "max_bits", least=64)
     whole(max_pieces, "max_pieces")
     check_numbers(numbers)
-    pieces = _divided(instance, limit, max_bits, max_pieces)
+    refusal = getattr(instance, "refusal", "")
+    pieces = [_proof(instance, None, 64, refusal)] if refusal else []
+    pieces = pieces or _divided(instance, limit, max_bits, max_pieces)
     return pieces[0] if len(pieces) == 1 else _together(instance, pieces)
 
 
 # Pieces of the parameters --------------------------------------------------------------------------
 
 
-def _divided(
-    instance: ProblemInstance, width: float, max_bits: int, max_pieces: int
-) -> list[Proof]:
+def _divided(instance: Instance, width: float, max_bits: int, max_pieces: int) -> list[Proof]:
     """Proofs over pieces of the parameters' intervals, which are halved where a proof fails."""
     todo, done, failed = deque([instance]), list[Proof](), 0
     while todo:
@@ -135,31 +137,33 @@ def _divided(
     return done
 
 
-def _one(instance: ProblemInstance, width: float, max_bits: int) -> tuple[Proof, list[float]]:
+def _one(instance: Instance, width: float, max_bits: int) -> tuple[Proof, list[float]]:
     """A proof for one piece, with as many bits as its width and class need."""
     bits = 64
     while 2.0 ** (16 - bits) > width and bits < max_bits:
         bits *= 2
+    max_bits = min(max_bits, max(bits, instance.most_bits))
     start: list[arb] = [arb(v) for v in instance.start]
-    best: tuple[Zero, Classification, Equations] | None = None
-    last = float("inf")
+    best: tuple[Zero, Classification] | None = None
+    last, why = float("inf"), ""
     while True:
         with precision(bits):
             equations = instance.equations()
             zero = prove_zero(equations, start)
+            why = "" if zero else instance.failure(equations)
             if zero is not None:
-                classification = instance.problem.classification(equations.inputs(zero.point))
-                best, start = (zero, classification, equations), [v.mid() for v in zero.point]
+                classification = instance.classification(equations, zero)
+                best, start = (zero, classification), [v.mid() for v in zero.point]
                 size = max(map(radius, zero.point))
                 stuck = size > 0 and size > 0.5 * last  # wide parameters: more digits do not help
                 last = size
-                if (classification.label and size <= width) or stuck:
+                if (classification.label and size <= width) or stuck or classification.final:
                     break
             if 2 * bits > max_bits or (zero is None and _wide(instance) and bits > 64):
                 break
         bits *= 2
     with precision(bits):
-        proof = _proof(instance, best, bits)
+        proof = _proof(instance, best, bits, why)
     return proof, [float(v) for v in start]
 
 
@@ -185,42 +189,31 @@ def _all_in(point: Sequence[arb], box: Sequence[arb]) -> bool:
     return all(b.contains(v) for b, v in zip(box, point, strict=True))
 
 
-def _wide(instance: ProblemInstance) -> bool:
-    return any(a < b for a, b in (*instance.parameters, *instance.values))
+def _wide(instance: Instance) -> bool:
+    return any(a < b for a, b in instance.ranges)
 
 
 def _proof(
-    instance: ProblemInstance, best: tuple[Zero, Classification, Equations] | None, bits: int
+    instance: Instance, best: tuple[Zero, Classification] | None, bits: int, why: str
 ) -> Proof:
-    kind, names = instance.problem.kind, instance.parameter_names
+    kind, names = instance.kind, instance.parameter_names
     ranges = [given(*pair) for pair in instance.parameters]
     parameters = dict(zip(names, ranges, strict=True)) | instance.wide_held
     condition = f"For {intervals(parameters)}: " if parameters else ""
     if best is None or not best[1].applies:
-        why = (
-            "Krawczyk's operator mapped no box into itself: the zero is not simple (dependent "
-            "gradients, a double zero, a curve of zeros), a field is not defined there, or the "
-            "parameters are too wide."
-            if best is None
-            else f"The fields were those of other sides: {best[1].why}."
-        )
-        statement = paragraph(
-            f"{condition}No proof of a {kind} near "
-            + ", ".join(
-                f"{k} = {v:.8g}" for k, v in zip(instance.names, instance.start, strict=True)
-            )
-            + f" with up to {bits} bits.",
-            why,
-        )
+        why = f"{best[1].why}." if best else why
+        near = [f"{k} = {v:.8g}" for k, v in zip(instance.names, instance.start, strict=True)]
+        place = f" near {', '.join(near)} with up to {bits} bits" if near else ""
+        statement = paragraph(f"{condition}No proof of a {kind}{place}.", why)
         return Proof(kind, False, False, "", statement, {}, {}, {}, parameters, bits)
-    zero, classification, equations = best
+    zero, classification = best
     point = dict(zip(instance.names, map(enclosure, zero.point), strict=True))
     box = {
         name: inner(b, k) for name, b, k in zip(instance.names, zero.box, zero.image, strict=True)
     }
     values = {k: enclosure(v) for k, v in classification.values.items() if v.is_finite()}
-    statement = _statement(instance, classification, condition, point, box, values)
-    record = record_of(instance, equations, zero, classification, bits)
+    statement = instance.statement(classification, condition, point, box, values)
+    record = instance.record(zero, classification, bits)
     return Proof(
         kind,
         bool(classification.label),
@@ -236,62 +229,9 @@ def _proof(
     )
 
 
-def _statement(
-    instance: ProblemInstance,
-    classification: Classification,
-    condition: str,
-    point: Mapping[str, Any],
-    box: Mapping[str, Any],
-    values: Mapping[str, Any],
-) -> str:
-    kind = instance.problem.kind
-    conditions = where(instance)
-    article = "an" if classification.title[0] in "aeiou" else "a"
-    shown = {k: v for k, v in values.items() if not (k[0] == "L" and k[1:].isdigit())}
-    classed = (
-        f", class {classification.label}" if kind == "two-fold" and classification.label else ""
-    )
-    if classification.label.startswith("boundary Delta") or classification.label.startswith(
-        "boundary disc"
-    ):
-        classed = f", exactly on the {classification.label}"
-    head = "Theorem" if classification.label else "Theorem on existence, with the class undecided"
-    return paragraph(
-        f"{head}. {condition}The box {intervals(box)} contains exactly one {kind}{conditions}.",
-        f"It is {article} {classification.title}{classed}, at {listed(point)}.",
-        f"{listed(shown)}." if shown else "",
-        *classification.lines,
-        f"Not decided: {classification.why}."
-        if classification.why and not classification.label
-        else "",
-        READ[instance.numbers],
-    )
-
-
-def where(instance: ProblemInstance) -> str:
-    """Held states, the plane and the sides of other surfaces, in words."""
-    functions = instance.problem.functions
-    free = {i for vector, i in instance.unknowns if vector == 0}
-    names = [*functions.system.state_names, "t"]
-    held = [
-        intervals({names[i]: given(*v)})
-        for i, v in enumerate(instance.values)
-        if i not in free and v[0] == v[1]
-    ]
-    text = f" with {', '.join(held)}" if held else ""
-    if functions.system.surface_count > 1:
-        text += f" in mode {functions.mode!r}"
-    if instance.normals:
-        text += (
-            f" on the plane through the given point across the set of such points (of codimension "
-            f"{len(instance.normals)})"
-        )
-    return text
-
-
-def _together(instance: ProblemInstance, pieces: list[Proof]) -> Proof:
+def _together(instance: Instance, pieces: list[Proof]) -> Proof:
     """One statement of all pieces."""
-    kind, names = instance.problem.kind, instance.parameter_names
+    kind, names = instance.kind, instance.parameter_names
     whole_range = [given(*pair) for pair in instance.parameters]
     parameters = dict(zip(names, whole_range, strict=True)) | instance.wide_held
     proven = all(p.proven for p in pieces)

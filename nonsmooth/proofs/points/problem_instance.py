@@ -12,13 +12,15 @@ import numpy as np
 from ...local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
 from ...local.searches.search import unknowns
 from ...model import FilippovSystem, OptionError
-from ..arithmetic.decimals import given as given_range
+from ..arithmetic.decimals import given
 from ..arithmetic.enclosure import Enclosure
+from ..arithmetic.equations import Equations, plane
 from ..arithmetic.flint import arb
 from ..arithmetic.intervals import Numbers, exact, exact_range, radius
+from ..arithmetic.krawczyk import Zero, inverse
+from ..proof import READ, Classification, intervals, listed, paragraph
+from ..record import record_of
 from ..surface_functions import SurfaceFunctions, enclosed, parameter_ranges
-from .equations import Equations, plane
-from .krawczyk import inverse
 from .special_points import PROBLEMS, PointProblem
 
 
@@ -36,6 +38,12 @@ class ProblemInstance:
     parameters: list[tuple[Fraction, Fraction]]
     numbers: Numbers
 
+    most_bits = 2**16  # that may help to decide the class
+
+    @property
+    def kind(self) -> str:
+        return self.problem.kind
+
     @property
     def parameter_names(self) -> tuple[str, ...]:
         return self.problem.functions.system.parameter_names
@@ -51,7 +59,7 @@ class ProblemInstance:
         """Ranges of held states that are not single values."""
         names = [*self.problem.functions.system.state_names, "t"]
         return {
-            names[i]: given_range(*self.values[i])
+            names[i]: given(*self.values[i])
             for i in self.held
             if self.values[i][0] < self.values[i][1]
         }
@@ -113,6 +121,76 @@ class ProblemInstance:
         held.append([arb(0)] * len(self.problem.further))
         return Equations(graph, nodes, self.unknowns, self.names, held, self.numbers)
 
+    def failure(self, equations: Any) -> str:
+        """Why no zero was proven."""
+        return (
+            "Krawczyk's operator mapped no box into itself: the zero is not simple (dependent "
+            "gradients, a double zero, a curve of zeros), a field is not defined there, or the "
+            "parameters are too wide."
+        )
+
+    def classification(self, equations: Any, zero: Zero) -> Classification:
+        """The class of a proven zero."""
+        return self.problem.classification(equations.inputs(zero.point))
+
+    def record(self, zero: Zero, classification: Classification, bits: int) -> dict[str, Any]:
+        """Everything that a checker needs about a proven zero."""
+        return record_of(self, zero, classification, bits)
+
+    def statement(
+        self,
+        classification: Classification,
+        condition: str,
+        point: Mapping[str, Any],
+        box: Mapping[str, Any],
+        values: Mapping[str, Any],
+    ) -> str:
+        """The theorem in words."""
+        kind = self.kind
+        article = "an" if classification.title[0] in "aeiou" else "a"
+        shown = {k: v for k, v in values.items() if not (k[0] == "L" and k[1:].isdigit())}
+        classed = (
+            f", class {classification.label}" if kind == "two-fold" and classification.label else ""
+        )
+        if classification.label.startswith("boundary Delta") or classification.label.startswith(
+            "boundary disc"
+        ):
+            classed = f", exactly on the {classification.label}"
+        head = (
+            "Theorem" if classification.label else "Theorem on existence, with the class undecided"
+        )
+        return paragraph(
+            f"{head}. {condition}The box {intervals(box)} contains exactly one {kind}{self.where}.",
+            f"It is {article} {classification.title}{classed}, at {listed(point)}.",
+            f"{listed(shown)}." if shown else "",
+            *classification.lines,
+            f"Not decided: {classification.why}."
+            if classification.why and not classification.label
+            else "",
+            READ[self.numbers],
+        )
+
+    @property
+    def where(self) -> str:
+        """Held states, the plane and the sides of other surfaces, in words."""
+        functions = self.problem.functions
+        free = {i for vector, i in self.unknowns if vector == 0}
+        names = [*functions.system.state_names, "t"]
+        held = [
+            intervals({names[i]: given(*v)})
+            for i, v in enumerate(self.values)
+            if i not in free and v[0] == v[1]
+        ]
+        text = f" with {', '.join(held)}" if held else ""
+        if functions.system.surface_count > 1:
+            text += f" in mode {functions.mode!r}"
+        if self.normals:
+            text += (
+                f" on the plane through the given point across the set of such points (of codimension "
+                f"{len(self.normals)})"
+            )
+        return text
+
 
 def radius_of(values: Sequence[arb]) -> float:
     """Sum of radii."""
@@ -133,13 +211,13 @@ def instance_of(
             f"certify cannot prove {found!r} ({type(found).__name__}): it is not a TwoFold, Fold, Equilibrium or "
             "PseudoEquilibrium. Find one first, for example with find_two_fold(system, near=...)."
         )
-    surface, mode, given = 0, None, dict(parameters or {})
+    surface, mode, values = 0, None, dict(parameters or {})
     if isinstance(found, TwoFold):
         system, surface = found.system, found.surface
         where = found.chart.where
         mode = where.mode if system.surface_count > 1 else None
-        names = {k if isinstance(k, str) else str(k) for k in given}
-        given |= {k: v for k, v in found.parameters.items() if k not in names}
+        names = {k if isinstance(k, str) else str(k) for k in values}
+        values |= {k: v for k, v in found.parameters.items() if k not in names}
     if system is None:
         raise OptionError(
             "system is missing: only two-folds carry theirs. Write certify(found, system=system)."
@@ -153,7 +231,7 @@ def instance_of(
     for i, (low, high) in held.items():
         point[i] = float((low + high) / 2)
     extra = [1 - 2 * found.alpha] if isinstance(found, PseudoEquilibrium) else []
-    normals = _across(problem, point, free, parameter_ranges(system, given, numbers), numbers)
+    normals = _across(problem, point, free, parameter_ranges(system, values, numbers), numbers)
     return ProblemInstance(
         problem,
         [point[i] for i in free] + extra,
@@ -162,7 +240,7 @@ def instance_of(
         [held.get(i, (exact(v, numbers),) * 2) for i, v in enumerate(point)],
         normals,
         [exact(point[i], numbers) for i in free],
-        parameter_ranges(system, given, numbers),
+        parameter_ranges(system, values, numbers),
         numbers,
     )
 

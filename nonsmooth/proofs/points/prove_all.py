@@ -15,14 +15,14 @@ from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.flint import arb
 from ..arithmetic.interval_arrays import Floats, of_fractions
 from ..arithmetic.intervals import Numbers, enclose, exact, precision
-from ..proof import Proof, intervals, paragraph
+from ..arithmetic.krawczyk import Zero
+from ..proof import READ, Classification, Proof, intervals, paragraph
 from ..record import problem_record, record_of
 from ..surface_functions import SurfaceFunctions, parameter_ranges
 from .census import Census, Undecided
-from .certify import READ, check_numbers, prove_instance, where
-from .krawczyk import Zero
+from .certify import check_numbers, prove_instance
 from .problem_instance import ProblemInstance
-from .special_points import PROBLEMS, Classification, PointProblem
+from .special_points import PROBLEMS, PointProblem
 from .subdivide import Search, clusters
 
 Kind = Literal["two-fold", "fold", "equilibrium", "pseudo-equilibrium"]
@@ -224,7 +224,7 @@ def _census(
 def _of_another(instance: ProblemInstance, search: Search, found: Zero) -> dict[str, Any]:
     """The record of a zero outside the box, or with fields that do not apply there."""
     nothing = Classification("", instance.problem.kind, claims={"label": "", "coincident": False})
-    return record_of(instance, search.equations, found, nothing, 128)
+    return record_of(instance, found, nothing, 128)
 
 
 def _position(point: Sequence[arb], bounds: Sequence[tuple[Fraction, Fraction]]) -> str:
@@ -283,7 +283,7 @@ def _words(
     lines += [f"Undecided: {u}." for u in left[:10]]
     head = "Theorem" if complete else "Theorem in part"
     return paragraph(
-        f"{head}. {f'For {condition}: the' if condition else 'The'} box {ranges}{where(instance)} "
+        f"{head}. {f'For {condition}: the' if condition else 'The'} box {ranges}{instance.where} "
         f"holds {count}.",
         *lines,
         f"Pieces of the box that were examined: {search.boxes}. {READ[instance.numbers]}",

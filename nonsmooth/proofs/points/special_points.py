@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -12,25 +11,13 @@ from ...local.point.surface_point import FIELDS, Side, side_index
 from ...local.two_folds.classification import TABLE
 from ...model import DefinitionError
 from ..arithmetic.algebra import Difference
+from ..arithmetic.eigenvalues import eigenvalue_kind
 from ..arithmetic.flint import arb
 from ..arithmetic.instructions import Program
 from ..arithmetic.intervals import Enclosures, Numbers, sign
+from ..proof import Classification
 from ..surface_functions import SurfaceFunctions
-from .eigenvalues import eigenvalue_kind
 from .two_fold_class import FOLDS, proven_class
-
-
-@dataclass(frozen=True)
-class Classification:
-    """The class of a proven zero."""
-
-    label: str
-    title: str
-    why: str = ""
-    lines: list[str] = field(default_factory=list)
-    values: dict[str, arb] = field(default_factory=dict)
-    claims: dict[str, Any] = field(default_factory=dict)
-    applies: bool = True
 
 
 class PointProblem:
@@ -58,6 +45,7 @@ class PointProblem:
     def classification(self, inputs: Sequence[Sequence[arb]]) -> Classification:
         """Classify the zero enclosed in the inputs."""
         _, why = self._in_mode(inputs)
+        why = why and f"The fields were those of other sides: {why}"
         return Classification("", self.kind, why, applies=False) if why else self.classified(inputs)
 
     def qualifies(self, inputs: Sequence[Sequence[arb]]) -> bool | None:

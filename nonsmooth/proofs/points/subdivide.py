@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arithmetic.equations import Equations
 from ..arithmetic.flint import arb
 from ..arithmetic.instructions import Program
 from ..arithmetic.interval_arrays import Floats, Intervals, evaluate_many, of_enclosure, points
-from .equations import Equations
-from .krawczyk import Zero, prove_zero
+from ..arithmetic.krawczyk import Zero, prove_zero
 
 _MANY = 4096  # pieces at once
 

@@ -6,7 +6,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.flow.engine import find_compiler
-from nonsmooth.model.expressions.dependent_rows import in_span
+from nonsmooth.model.expressions.cancel import in_span
 
 x, y, z, p = (ca.SX.sym(name) for name in "xyzp")
 STATES = ca.vertcat(x, y, z)

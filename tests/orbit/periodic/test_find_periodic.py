@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.periodic_cases import stick_slip, symbols
 
 
 def walker():
@@ -66,3 +67,96 @@ def test_an_orbit_at_other_parameters_leads_to_the_one_there_and_too_few_iterati
     assert np.abs(back.unknowns - orbit.unknowns).max() < 1e-14
     with pytest.raises(ns.ConvergenceError, match="Newton's method"):
         ns.periodic_orbit(system, orbit, parameters={"f": 0.7}, max_iterations=1)
+
+
+# forced systems ------------------------------------------------------------------------------------
+
+x, v, t = symbols("x v t")
+
+
+def walls() -> ns.FilippovSystem:
+    """A free mass between walls at -1 and 1 under the force 2 cos t, restitution 0.7."""
+    resets = [ns.Reset(x - s, [s, -0.7 * v], direction=s, name=f"wall {s}") for s in (-1, 1)]
+    return ns.FilippovSystem([x, v], field=[v, 2 * ca.cos(t)], time=t, resets=resets)
+
+
+@pytest.mark.parametrize("symmetry", [None, "odd"])
+@pytest.mark.parametrize("off", [0.0, 0.01, 0.02, -0.02])
+def test_a_state_beside_an_unstable_orbit_gives_that_orbit(symmetry, off) -> None:
+    """Impacts half a period apart, at -1 at the time s: 2 = -2 sin(s) pi (1 + r)/(1 - r) + 4 cos s."""
+    r, turns = 0.7, np.pi * 1.7 / 0.3
+    s = -np.arccos(2 / np.hypot(4, 2 * turns)) - np.arctan2(2 * turns, 4)
+    assert abs(-2 * np.sin(s) * turns + 4 * np.cos(s) - 2) < 1e-13
+    speed = -2 * r * 2 * np.sin(s) / (1 - r)
+    later = s + 0.3
+    state = [
+        -1 + (speed - 2 * np.sin(s)) * 0.3 + 2 * (np.cos(s) - np.cos(later)),
+        speed + 2 * (np.sin(later) - np.sin(s)),
+    ]
+    guess = np.array(state) * (1 + off)
+    orbit = ns.periodic_orbit(walls(), guess, t_start=later, symmetry=symmetry)
+    assert orbit.period == pytest.approx(2 * np.pi, rel=1e-13) and len(orbit.legs) == 2
+    assert np.abs([leg.start[1] for leg in orbit.legs]) == pytest.approx(speed, rel=1e-12)
+
+
+def driven(drive: ca.SX) -> ns.FilippovSystem:
+    return ns.FilippovSystem([x], surface=x, above=[drive - 1], below=[drive + 1], time=t)
+
+
+@pytest.mark.parametrize(
+    ("drive", "periods"),
+    [
+        (2.5 * ca.cos(t) + 0.3 * ca.cos(2 * t + 0.5), 1.0),
+        (2.5 * ca.cos(3 * t) + 0.3 * ca.cos(2 * t + 0.5), 1.0),
+        (2.5 * ca.cos(t) + 0.3 * ca.cos(1.5 * t), 2.0),
+        (2.5 * ca.cos(t) + 0.3 * ca.cos(np.sqrt(2) * t), None),
+    ],
+)
+def test_the_common_period_of_several_frequencies_is_found(drive, periods) -> None:
+    if periods is None:
+        with pytest.raises(ns.OptionError, match="common period"):
+            ns.periodic_orbit(driven(drive), [0.5])
+    else:
+        orbit = ns.periodic_orbit(driven(drive), [0.5])
+        assert orbit.period == pytest.approx(2 * np.pi * periods, rel=1e-14)
+
+
+def pendulum(drive: float) -> ns.FilippovSystem:
+    above, below = ([v, -x - s + drive * ca.cos(t)] for s in (1, -1))
+    return ns.FilippovSystem([x, v], surface=v, above=above, below=below, time=t)
+
+
+@pytest.mark.parametrize(
+    ("system", "guess", "options", "error", "words"),
+    [
+        (driven(2.5 * ca.cos(t)), [0.5], {"multiplicity": 2}, ns.ConvergenceError, "after 1 of"),
+        (driven(2.5 * ca.cos(t)), [0.5], {"multiplicity": 0}, ns.OptionError, "multiplicity"),
+        (driven(2.5 * ca.cos(t)), [0.5], {"multiplicity": 2, "symmetry": "odd"}, ns.OptionError, "even"),
+        (driven(2.5 * ca.cos(t)), [0.5], {"max_time": 1e-9}, ns.ConvergenceError, "max_time = 1e-09"),
+        (driven(2.5 * ca.cos(t)), [0.5], {"max_time": 0}, ns.OptionError, "max_time"),
+        (stick_slip(), [0.5, 0.1], {"multiplicity": 1}, ns.OptionError, "does not depend on time"),
+        (pendulum(0.5), [3.3, 0.0], {}, ns.ConvergenceError, "the run rests at"),
+    ],
+)  # fmt: skip
+def test_what_is_refused_in_words(system, guess, options, error, words) -> None:
+    with pytest.raises(error, match=words):
+        ns.periodic_orbit(system, guess, **options)
+
+
+def test_an_orbit_of_a_family_is_named() -> None:
+    """Two springs: every start has the period 3 pi/2."""
+    springs = ns.FilippovSystem([x, v], surface=x, above=[v, -4 * x], below=[v, -x])
+    orbit = ns.periodic_orbit(springs, [1.0, 0.0], progress=True)
+    assert orbit.period == pytest.approx(1.5 * np.pi, rel=1e-13)
+    assert "one of a family" in str(orbit) and not orbit.is_virtual
+
+
+def test_multiplicity_of_a_run_and_of_one_mode() -> None:
+    """x' = -x + cos t/2 has the period 4 pi over one, and over two periods of 2 pi."""
+    system = ns.FilippovSystem([x], field=[-x + ca.cos(t / 2)], time=t)
+    for given in ({"period": 4 * np.pi}, {"period": 4 * np.pi, "multiplicity": 1}):
+        assert ns.periodic_orbit(system, [0.1], **given).period == pytest.approx(4 * np.pi)
+    orbit = ns.periodic_orbit(system, [0.1], itinerary="", multiplicity=1)
+    assert orbit.period == pytest.approx(4 * np.pi)
+    run = ns.simulate(system, [0.1], 80.0)
+    assert ns.periodic_orbit(system, run, multiplicity=1).period == pytest.approx(4 * np.pi)

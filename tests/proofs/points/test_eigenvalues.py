@@ -5,7 +5,7 @@ import math
 import pytest
 from flint import arb
 
-from nonsmooth.proofs.points.eigenvalues import eigenvalue_kind
+from nonsmooth.proofs.arithmetic.eigenvalues import eigenvalue_kind
 
 
 def matrix(*rows):

@@ -6,7 +6,7 @@ import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,16 @@ class Source:
     def records(cls, left: Records) -> Source:
         """Runs that go on where a step was not clear."""
         return cls(_RECORDS, 0, np.ascontiguousarray(left).view(np.float64), np.zeros(1, np.int64))
+
+
+class Given(NamedTuple):
+    """Trajectories of one call: ``size`` of them, the first of which has the number ``first`` in its source."""
+
+    source: Source
+    first: int
+    size: int
+    p: Array
+    options: Options
 
 
 @dataclass(frozen=True)
@@ -117,23 +127,14 @@ class Kernel:
             kept[name] = size, self.machine.empty(size)
         return kept[name][1]
 
-    def run(
-        self,
-        source: Source,
-        first: int,
-        count: int,
-        p: Array,
-        options: Options,
-        at: tuple[int, int] | None,
-        out: Chunk,
-    ) -> Records:
-        """Run ``count`` trajectories, the first of which has the number ``first`` in its source.
+    def run(self, given: Given, at: tuple[int, int] | None, out: Chunk) -> Records:
+        """Run trajectories, with an event at which they are kept.
 
         Those that need a step of the driver have the status HAND_OVER; their records are returned.
         """
         with self.lock:
-            machine, (kernels, _) = self.machine, self.compiled
-            memory, left = self.start(source, first, count, p, options, at)
+            machine, (kernels, _), count = self.machine, self.compiled, given.size
+            memory, left = self.start(given, at)
             keys, totals = np.zeros(PLACES, np.int64), np.zeros(2, np.int64)
             there = [machine.write(keys), self.memory("place", 4 * count), machine.write(totals)]
             arrays = [memory[name] for name in ("status", "kinds", "steps", "code")]
@@ -154,22 +155,14 @@ class Kernel:
             out.totals[2] += left
             return self._records(memory["left"], left)
 
-    def start(
-        self,
-        source: Source,
-        first: int,
-        count: int,
-        p: Array,
-        options: Options,
-        at: tuple[int, int] | None,
-    ) -> tuple[dict[str, Any], int]:
+    def start(self, given: Given, at: tuple[int, int] | None) -> tuple[dict[str, Any], int]:
         """Run them, as :meth:`run` does: the memory where their results are, and the number of records."""
-        machine, n = self.machine, self.system.dimension
+        machine, n, (source, first, count, p, options) = self.machine, self.system.dimension, given
         kernels, width = self.compiled
         rows = np.atleast_2d(np.ascontiguousarray(p, float))
         q = self.memory("q", 8 * width * len(rows))
-        given = [len(rows), rows.shape[1], machine.write(rows), q]
-        machine.launch(kernels, "parameters", given)
+        own_rows = [len(rows), rows.shape[1], machine.write(rows), q]
+        machine.launch(kernels, "parameters", own_rows)
         sizes = _sizes(count, n, at is not None) | {"left": self.record.itemsize * count}
         memory = {name: self.memory(name, size) for name, size in sizes.items()}
         own = self.memory("own", (self.record.itemsize + 16) * machine.blocks * machine.threads)
@@ -229,14 +222,12 @@ class Reduction:
         self._there = {name: machine.write(array) for name, array in self._arrays.items()}
         self._ranges = [bins.count, machine.write(bins.low), machine.write(bins.high)]
 
-    def add(
-        self, source: Source, first: int, count: int, p: Array, options: Options
-    ) -> tuple[Records, Chunk | None]:
+    def add(self, given: Given) -> tuple[Records, Chunk | None]:
         """Run trajectories and add what becomes of them, except that of the records and of the chunk."""
         # The chunk has the runs whose itineraries have no room in the table.
-        kernel, machine, there = self.kernel, self.kernel.machine, self._there
+        kernel, machine, there, count = self.kernel, self.kernel.machine, self._there, given.size
         with kernel.lock:
-            memory, left = kernel.start(source, first, count, p, options, None)
+            memory, left = kernel.start(given, None)
             number = np.zeros(1, np.int64)
             rest = [machine.write(number), kernel.memory("rest", 8 * count)]
             results = [memory[name] for name in ("x", "t", "status", "code")]

@@ -78,12 +78,12 @@ def continued(
     engine, stop = tape_for(system, options), threading.Event()
     assert engine is not None
 
-    def part(first: int) -> tuple[int, Chunk]:
+    def part(first: int) -> tuple[slice, Chunk]:
         rows = slice(first, min(first + size, count))
         own = p[rows] if p.ndim > 1 else p
         chunk = out.part(rows.start, rows.stop)
         _continue(engine, records[rows], own, options, at, chunk, to_end, stop.is_set)
-        return first, chunk
+        return rows, chunk
 
     with ThreadPoolExecutor(max(workers, 1)) as pool:
         try:
@@ -91,12 +91,7 @@ def continued(
         except BaseException:
             stop.set()
             raise
-    words: list[str] = []
-    for first, chunk in parts:
-        out.itinerary[first : first + len(chunk.t)] += len(words)
-        words += chunk.words
-        out.totals += chunk.totals
-    out.rename(dict(enumerate(words)))
+    out.take(parts)
     rows = np.flatnonzero(out.status == HAND_OVER)
     going = records[rows]
     going["index"], going["shortest"], going["shrinking"] = rows, 1e-3, 0
@@ -116,7 +111,7 @@ def _continue(
     x, done = np.ascontiguousarray(records["x"]), np.zeros(1, np.int64)
     own, p = records.ctypes.data, engine.shown.with_cells(p)
     c_options = options_of(engine.system, options, dense=False, at=at)
-    batch = batch_of(x, p, options.t_start, out, None, None)
+    batch = batch_of(x, p, options.t_start, out, None)
     rest = (own, records.dtype.itemsize // 8, int(to_end), BURST)
     out.itinerary[:] = 0
     with engine.held_table() as table, engine.held_run(table) as run:

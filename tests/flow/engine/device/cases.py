@@ -5,7 +5,7 @@ import casadi as ca
 import nonsmooth as ns
 import nonsmooth.textbook as textbook
 from nonsmooth.flow.engine.building.codegen import supports_lanes
-from nonsmooth.flow.engine.device.kernel import Kernel, Source
+from nonsmooth.flow.engine.device.kernel import Given, Kernel, Source
 from nonsmooth.flow.results import Chunk
 
 #: Textbook problems for a card.
@@ -34,5 +34,5 @@ def ends(machine, system, x, options, p=None, at=None):
     chunk = Chunk.empty(len(x), system, at is not None)
     p = system.parameter_vector() if p is None else p
     kernel = Kernel(system, options.order, machine)
-    kernel.run(Source.rows(x[:, : system.dimension]), 0, len(x), p, options, at, chunk)
+    kernel.run(Given(Source.rows(x[:, : system.dimension]), 0, len(x), p, options), at, chunk)
     return chunk

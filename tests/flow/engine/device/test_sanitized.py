@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[4]
 #: Bounces of starts of all sources, with shared and with own parameters; an event is kept.
 PROGRAM = """
 import numpy as np
-from nonsmooth.flow.engine.device.kernel import Bins, Kernel, Reduction, Source
+from nonsmooth.flow.engine.device.kernel import Bins, Given, Kernel, Reduction, Source
 from tests.flow.engine.device.shim import Shim
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
@@ -34,14 +34,14 @@ for name in ("linear", "nonlinear"):
             for limits in (options, wide):
                 chunk = Chunk.empty(400, system, True)
                 kernel.steps = 5
-                left = kernel.run(source, 0, 400, own, limits, (1, 1), chunk)
+                left = kernel.run(Given(source, 0, 400, own, limits), (1, 1), chunk)
                 assert chunk.totals[0] + left["steps"].sum() > 400
             reduction = Reduction(kernel, bins)
-            left, rest = reduction.add(source, 0, 400, own, options)
+            left, rest = reduction.add(Given(source, 0, 400, own, options))
             assert rest is None
             assert sum(reduction.read().status.values()) + len(left) == 400
             back = left[left["begun"] != 0]
-            kernel.run(Source.records(back), 0, len(back), p, options, (1, 1), Chunk.empty(len(back), system, True))
+            kernel.run(Given(Source.records(back), 0, len(back), p, options), (1, 1), Chunk.empty(len(back), system, True))
 print("done")
 """
 

@@ -11,7 +11,7 @@ from nonsmooth.flow.constants import HAND_OVER
 from nonsmooth.flow.engine import find_compiler
 from nonsmooth.flow.engine import lanes as engine
 from nonsmooth.flow.engine.device import kernel as kernel_module
-from nonsmooth.flow.engine.device.kernel import Kernel, Source
+from nonsmooth.flow.engine.device.kernel import Given, Kernel, Source
 from nonsmooth.flow.engine.device.records import FROZEN, word_of
 from nonsmooth.flow.ensembles import on_device
 from nonsmooth.flow.options import Options
@@ -193,7 +193,7 @@ def test_launches_are_bounded(system, monkeypatch):
         kernel.steps = steps
         monkeypatch.setattr(kernel_module, "_SECONDS", 0.0)  # the number of steps does not grow
         chunk = Chunk.empty(len(STARTS), system, True)
-        left = kernel.run(Source.rows(STARTS), 0, len(STARTS), p, LOOSE, (2, 1), chunk)
+        left = kernel.run(Given(Source.rows(STARTS), 0, len(STARTS), p, LOOSE), (2, 1), chunk)
         found.append((chunk, left))
         assert (launched.count("trajectories") > 20) == (steps < 4)
     for chunk, left in found[1:]:

@@ -1,3 +1,34 @@
+/* Functions of W numbers at once: those of libm lane by lane, rough ones for a step size, sine and cosine. */
+LANEWISE(EXP_, exp) LANEWISE(LOG_, log) LANEWISE(TAN_, tan) LANEWISE(ASIN_, asin) LANEWISE(ACOS_, acos)
+LANEWISE(ATAN_, atan) LANEWISE(SINH_, sinh) LANEWISE(COSH_, cosh) LANEWISE(TANH_, tanh)
+LANEWISE(ASINH_, asinh) LANEWISE(ACOSH_, acosh) LANEWISE(ATANH_, atanh) LANEWISE(ERF_, erf)
+LANEWISE(ERFINV_, ns_erfinv) LANEWISE(EXPM1_, expm1) LANEWISE(LOG1P_, log1p)
+LANEWISE2(POW_, pow) LANEWISE2(ATAN2_, atan2) LANEWISE2(HYPOT_, hypot)
+
+/* Binary logarithm and exponential to 1e-4, reciprocal to 1e-3: enough for a step size, a hundredth
+ * of libm's cost. */
+INLINE T LOG2(T a) {
+  I b = (I)a;
+  T m = (T)((b & 0xfffffffffffffLL) | 0x3ff0000000000000LL) - 1.5, z = m * m;
+  T high = (0.1424883991 * m - 0.3205988980) + z * ((0.0379969064 * m - 0.0712441996) - 0.0211093925 * z);
+  return (NUMBERS((b >> 52) - 1023) + (0.5849625007 + 0.9617966939 * m)) + z * high;
+}
+INLINE T EXP2(T a) {
+  T k = (a + 6755399441055744.0) - 6755399441055744.0, f = (a - k) * 0.6931471805599453;
+  T z = f * f, y = (1.0 + f) + z * ((0.5 + 0.16666666666 * f) + z * (0.0416666666 + 0.0083333333 * f));
+  return y * (T)((WHOLE(k) + 1023) << 52);
+}
+#ifndef INVERSES_HERE /* by instructions of the processor */
+INLINE T ROUGH_INVERSE(T a) {
+  T y = (T)(0x7fde6238da3c2118LL - (I)a);
+  y = y * (2.0 - a * y);
+  return y * (2.0 - a * y);
+}
+INLINE T QUICK_INVERSE(T a) { return 1.0 / a; }
+INLINE T INVERSE(T a) { return 1.0 / a; }
+INLINE T QUICK_ROOT(T a) { return SQRT_(a); }
+#endif
+
 /* Sine and cosine of W numbers at once, to less than 1 ulp: the reduction and the polynomials of fdlibm (Sun
  * Microsystems 1993), for all lanes alike. */
 #define LARGEST_ANGLE 1e6 /* below, a multiple of half of pi has few enough digits that its products are exact */

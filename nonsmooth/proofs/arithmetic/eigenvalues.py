@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..arithmetic.flint import arb, arb_mat
-from ..arithmetic.intervals import sign
+from .flint import arb, arb_mat
+from .intervals import sign
 
 
 def eigenvalue_kind(jacobian: Sequence[Sequence[arb]]) -> tuple[str, str, dict[str, arb]]:
@@ -16,7 +16,7 @@ def eigenvalue_kind(jacobian: Sequence[Sequence[arb]]) -> tuple[str, str, dict[s
     matrix = arb_mat([list(row) for row in jacobian])
     if not all(v.is_finite() for v in matrix.entries()):
         return "", "the Jacobian is not finite", {}
-    found = _small(matrix) if matrix.nrows() <= 2 else _eigenvalues(matrix)
+    found = eigenvalues(matrix)
     if found is None:
         return "", "the eigenvalues are not proven to be apart", {}
     real = [sign(re) for re, _ in found]
@@ -31,6 +31,11 @@ def eigenvalue_kind(jacobian: Sequence[Sequence[arb]]) -> tuple[str, str, dict[s
         return "saddle", "", values
     shape = "focus" if any(not im.contains(0) for _, im in found) else "node"
     return f"{'stable' if real[0] < 0 else 'unstable'} {shape}", "", values
+
+
+def eigenvalues(matrix: arb_mat) -> list[tuple[arb, arb]] | None:
+    """Eigenvalues as (real part, imaginary part); None where they are not proven to be apart."""
+    return _small(matrix) if matrix.nrows() <= 2 else _isolated(matrix)
 
 
 def _small(matrix: arb_mat) -> list[tuple[arb, arb]] | None:
@@ -55,7 +60,7 @@ def _small(matrix: arb_mat) -> list[tuple[arb, arb]] | None:
     return None
 
 
-def _eigenvalues(matrix: arb_mat) -> list[tuple[arb, arb]] | None:
+def _isolated(matrix: arb_mat) -> list[tuple[arb, arb]] | None:
     """Isolated eigenvalues of a real matrix as (real part, imaginary part)."""
     try:
         values: list[Any] = matrix.eig()

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..arithmetic.flint import arb, arb_mat, ctx
-from ..arithmetic.intervals import inside, precision, radius
 from .equations import Equations, column, entries
+from .flint import arb, arb_mat, ctx
+from .intervals import inside, precision, radius
 
 
 @dataclass(frozen=True)

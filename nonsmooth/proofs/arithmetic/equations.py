@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-from ..arithmetic.flint import arb, arb_mat
-from ..arithmetic.instructions import ExpressionGraph, Program
-from ..arithmetic.intervals import Enclosures, Numbers
+from .flint import arb, arb_mat
+from .instructions import ExpressionGraph, Program
+from .intervals import Enclosures, Numbers
 
 
 class Equations:

@@ -31,6 +31,9 @@ from ..runs.legs import Leg, surface_of
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
 
+#: Tests that a user gives: the prefix of the names of events, and the extremum of a cost.
+USER, COST = "event: ", "extremum of the cost"
+
 #: Entries of a return map beyond which its small multipliers have lost their digits.
 _NO_DIGITS = 1e6
 
@@ -64,7 +67,7 @@ class Condition:
 
 def is_smooth(name: str) -> bool:
     """Whether a test is that of a smooth bifurcation, which does not end an itinerary."""
-    return name in _SMOOTH
+    return name in _SMOOTH or name == COST or name.startswith(USER)
 
 
 def conditions_of(

@@ -18,13 +18,14 @@ from dataclasses import replace
 import numpy as np
 
 from ...local.read_only import ReadOnly
-from ...model import Array, ConvergenceError, NonsmoothError
+from ...model import Array, ConvergenceError, DefinitionError, NonsmoothError
 from ...solvers.continuation import Departure, Point, Zero
 from ...solvers.newton import converge
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, eliminated
 from ..periodic.find_periodic import at_two_fold
 from ..periodic.multipliers import return_map
 from ..periodic.orbit import PeriodicOrbit, faults_of, named
+from ..periodic.orbit_functions import UserRows
 from ..periodic.symmetry import halves, prime_period, require_symmetric
 from ..runs.legs import integrate_leg, shown_itinerary
 from .branch import (
@@ -33,7 +34,7 @@ from .branch import (
     BranchEvent,
     FarSide,
 )
-from .conditions import Condition, condition_row, conditions_of, is_smooth
+from .conditions import COST, USER, Condition, condition_row, conditions_of, is_smooth
 from .event_curves import OWN_ENDS, degenerate_tests
 from .family_ends import extent, hopf_point, node_end, surface_end
 from .homoclinic_curves import homoclinic_end
@@ -69,6 +70,7 @@ class OrbitEquations(BranchCurve):
         self.system, self.widths = problem.system, widths
         self.scale = np.append(problem.scales(u, p), widths)
         self.known: dict[str, Condition] = {}
+        self.rows = UserRows()
         self._found, self._last = dict[bytes, Evaluation](), b""  # of points, and the last untested
 
     # equations ----------------------------------------------------------------------------------
@@ -80,6 +82,11 @@ class OrbitEquations(BranchCurve):
 
     def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
         p, unknowns = self.parameters_at(u), u[: self.problem.size]
+        if self.rows.constraints:
+            raise DefinitionError(
+                "a branch with constraints= has no curves in two parameters and no other branches. Continue an orbit "
+                "without constraints."
+            )
         curve = type(self)(self.problem, p, free, widths, unknowns, self.longest)
         curve.known = self.known
         return curve, np.append(unknowns, p[list(free)])
@@ -96,9 +103,16 @@ class OrbitEquations(BranchCurve):
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         at = self.evaluation(u)
-        return at.residual, at.whole
+        if not self.rows.constraints:
+            return at.residual, at.whole
+        p = self.parameters_at(u)
+        more = [c.rule(self.problem, at, p, self.free) for c in self.rows.constraints]
+        values = [value for value, _ in more]
+        return np.append(at.residual, values), np.vstack([at.whole, *(row for _, row in more)])
 
     def values(self, u: Array) -> Array | None:
+        if self.rows.constraints:
+            return None
         return self.problem.residual(u[: self.problem.size], self.parameters_at(u))
 
     def solve(self, matrix: Array, right: Array) -> Array:
@@ -155,11 +169,18 @@ class OrbitCurve(OrbitEquations):
 
     def with_problem(self, problem: BoundaryProblem, u: Array, p: Array) -> OrbitCurve:
         """The same free parameters with another itinerary, at parameters p."""
-        return OrbitCurve(problem, p, self.free, self.widths, u, self.longest)
+        curve = OrbitCurve(problem, p, self.free, self.widths, u, self.longest)
+        curve.rows = self.rows
+        return curve
 
     def tests(self, point: Point) -> Mapping[str, float]:
         at, p, self._last = self.evaluation(point.u), self.parameters_at(point.u), b""
         found = conditions_of(self.problem, at, p, self.known)
+        for name, function in self.rows.events.items():
+            found[USER + name] = function.rule(self.problem, at, p, ())[0]
+        if self.rows.cost is not None:
+            row = self.rows.cost.rule(self.problem, at, p, self.free)[1]
+            found[COST] = float(row @ (point.tangent * self.scale))
         if self._on_plane:  # the flow across the plane on which the orbit starts
             assert self.problem.phase is not None
             found["Hopf"] = float(self.problem.phase @ at.by_leg[0].rate[: self.problem.dimension])
@@ -413,6 +434,14 @@ class OrbitCurve(OrbitEquations):
         if zero.name == "Hopf":
             return self._hopf(zero)
         at, p = self.evaluation(zero.point.u), self.parameters_at(zero.point.u)
+        if zero.name.startswith(USER):
+            function = self.rows.events[zero.name.removeprefix(USER)]
+            of_user = FarSide("", f"{function.name} = 0")
+            return self._event(zero.name.removeprefix(USER), self, zero.point, "", of_user)
+        if zero.name == COST and self.rows.cost is not None:
+            cost = self.rows.cost.rule(self.problem, at, p, ())[0]
+            of_user = FarSide("", f"{self.rows.cost.name} is extremal", ReadOnly({"cost": cost}))
+            return self._event(COST, self, zero.point, "", of_user)
         if zero.name == "branch point":
             shorter = _as_doubling(self, zero) or _as_pitchfork(self, zero)
             if shorter is not None:

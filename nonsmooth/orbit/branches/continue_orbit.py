@@ -120,8 +120,8 @@ def continue_orbit(
         doubling"``, ``"Neimark-Sacker"``, ``"pitchfork"`` (of symmetric orbits), ``"branch
         point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
         ``"adding-sliding"``, ``"impact grazing"``, ``"grazing of a soft switch"``,
-        ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``;
-        ``"Hopf"`` where orbits without events shrink to an equilibrium, ``"boundary equilibrium"`` (with its
+        ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``,
+        ``"end of complete chatter"``; ``"Hopf"`` where orbits without events shrink to an equilibrium, ``"boundary equilibrium"`` (with its
         class) or ``"two-fold"`` where others shrink to a point of a surface, ``"focus-centre-limit cycle"``,
         ``"homoclinic"`` and ``"infinite period at a boundary node"``.
 

@@ -36,12 +36,14 @@ from .branch import (
     BranchEvent,
     FarSide,
 )
+from .chatter_end import chatter_end
 from .conditions import COST, USER, Condition, condition_row, conditions_of, is_smooth
 from .event_curves import OWN_ENDS, degenerate_tests
 from .family_ends import extent, hopf_point, node_end, surface_end
 from .homoclinic_curves import homoclinic_end
 from .itinerary_changes import (
     CENTRE,
+    CHATTER_END,
     SOFT,
     ChangedItinerary,
     changed_itinerary,
@@ -50,7 +52,7 @@ from .itinerary_changes import (
     kind_of,
 )
 from .normal_forms import normal_form, torus_pair
-from .unfoldings import far_side
+from .unfoldings import VERDICTS, far_side
 
 # Equations of periodic orbits with free parameters ----------------------------------------------------
 
@@ -305,10 +307,15 @@ class OrbitCurve(OrbitEquations):
         return bool(growth > _STEEP * float(u[durations].sum()) * abs(float(tangent[-1])))
 
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
-        """The point to which the orbit shrinks, or the homoclinic orbit at which its period diverges."""
+        """The point to which the orbit shrinks, the end of its chatter, or the homoclinic orbit at which its period diverges."""
         shrunk = self._shrunk(u, _SMALL)
         if shrunk is not None:
             return shrunk
+        chatter = chatter_end(self.problem, u, self.scale, self.equations)
+        if chatter is not None:
+            value, near = chatter
+            side = FarSide("", VERDICTS[CHATTER_END])
+            return BranchEvent(CHATTER_END, value, self.describe(near), side, curve=self)
         at, p = self.evaluation(u), self.parameters_at(u)
         for i, leg in enumerate(self.problem.legs):
             if at_two_fold(self.system, leg, at.flows.end[i, : at.flows.sizes[i]], p, _REACHED):

@@ -40,6 +40,8 @@ SENTENCES = {
     "high_degree": "Rest on h{entry} = 0 is one of many motions: the multiplier enters the third derivative of "
     "h{entry} or a later one, and motions leave such a point by infinitely many switchings. "
     "start_mode='s' chooses rest.",
+    "spiral_out": "Rest on h{entry} = 0 is one of many motions: a multiplier drives the rate of h{entry} away from zero, "
+    "and motions leave such a point in turns of growing size, infinitely many. start_mode= chooses rest.",
     "wrong_start": "start_mode {start_mode!r} is not admissible at the start, where the mode is {actual!r}.",
     "impossible_start": "start_mode {start_mode!r} cannot continue from the start: its field points elsewhere.",
     "start_solutions": "start_mode {start_mode!r} has {where} sliding solutions here.",

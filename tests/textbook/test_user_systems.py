@@ -801,6 +801,22 @@ def test_20_a_rod_on_its_tip_topples_at_the_rate_of_a_pendulum():
     assert ends == pytest.approx([-math.sqrt(1.5), math.sqrt(1.5)], rel=1e-10)
 
 
+@pytest.mark.parametrize(
+    ("angle", "slip", "mu", "itinerary", "time", "speed"),
+    [
+        (1.11, -0.5, 1.3331673, "-c sc", 3.8475787852e-05, -0.3008446978682633),
+        (1.1084, -1.5, 1.3330999, "-c -o", 5.6458252654e-04, -1.0554995195170),
+    ],
+)
+def test_20_a_rod_close_to_the_paradox_sticks_or_rises(angle, slip, mu, itinerary, time, speed):
+    """Reactions are some thousand times the weight. Time and speed of the rod by scipy's DOP853."""
+    start = [0, math.sin(angle) / 2, angle, slip, 0, 0]
+    run = ns.simulate(textbook.painleve_rod().system, start, 0.01, parameters={"mu": mu})
+    assert run.status is ns.Status.REACHED_END and run.itinerary == itinerary
+    assert run.events[0].t == pytest.approx(time, rel=1e-8)
+    assert run.events[0].x[3] == pytest.approx(speed, rel=1e-8)
+
+
 def test_21_a_block_that_rocks_stands_stably():
     here = ns.classify(textbook.rocking_block().system, [0.0, 0.0])
     assert (here.kind, here.label) == ("rest", "stable, invisible on both sides")

@@ -46,12 +46,32 @@ static int rests_unstably(const Run *r, const int8_t *letter) {
   return -1;
 }
 
+/* A surface that would come to rest beside one whose multiplier drives its rate away, and enters its second derivative
+ * in the same way: motions leave such a point in turns of growing size, infinitely many. -1 if there is none. */
+static int spirals_out(Run *r, const int8_t *letter) {
+  int w = r->width, is_read = 0;
+  for (int i = 0; i < r->m; i++)
+    for (int j = 0; j < r->m; j++) {
+      if (letter[i] || letter[j] || degree_of(r, i) != 2 || degree_of(r, j) != 1) continue;
+      if (!has_law(r, i, SURFACE_LAW) || !has_law(r, j, SURFACE_LAW) || !(r->letter[i] || r->letter[j])) continue;
+      if (!is_read++) {
+        aim(r, letter, r->x, r->chosen.unknowns);
+        error_scales(r, r->x, held_of(r, letter), r->chosen.unknowns);
+      }
+      double own = r->slope[i * w + i] * r->slope[j * w + j], crossed = r->slope[i * w + j] * r->slope[j * w + i];
+      if (r->slope[j * w + j] * factor_of(r, j) > 0 && own != 0 && fabs(own - crossed) <= TIED * fabs(own)) return i;
+    }
+  return -1;
+}
+
 /* Adopt the mode that continues; 0 where there is none or more than one. */
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count) {
   if (r->active_count) {
     if (!decide(r, letter, known, known_count)) return 0;
     int unstable = rests_unstably(r, r->chosen.letter);
     if (unstable >= 0) { finish(r, NON_UNIQUE, HIGH_DEGREE, unstable); return 0; }
+    unstable = spirals_out(r, r->chosen.letter);
+    if (unstable >= 0) { finish(r, NON_UNIQUE, SPIRAL_OUT, unstable); return 0; }
     if (leaves_by_root(r)) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
   } else {
     memcpy(r->chosen.letter, letter, r->width);
@@ -113,13 +133,12 @@ static int can_start(Run *r) {
   expand(r, r->letter, r->x, r->unknowns, e);
   r->turned_mode = r->mode;
   for (int row = 0; row < e->l.rows; row++) {
-    int kind = e->l.kind[row], index = e->l.index[row], active = 0;
+    int kind = e->l.kind[row], index = e->l.index[row];
     r->turned[row] = e->guards[(int64_t)row * r->stride] < 0 ? -1 : 1;
     int is_of_law = kind == SURFACE_GUARD || kind == EXIT_GUARD || kind == SLIP_GUARD || kind == NEAR_GUARD;
     if (!is_of_law && !(kind == RELEASE_GUARD && has_law(r, index, COMPLEMENTARITY_LAW))) continue;
     if (kind == NEAR_GUARD && r->letter[index] == 0) continue; /* ends steps only */
-    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == index;
-    if (!active) continue;
+    if (!is_active(r, index)) continue;
     double value;
     r->drop[row] = leading(r, e, row, kind == SURFACE_GUARD || kind == NEAR_GUARD, &value);
     if (kind != EXIT_GUARD) { holds &= value >= 0; continue; }
@@ -134,8 +153,7 @@ static int can_start(Run *r) {
 static void start_in(Run *r, const int8_t *asked) {
   int8_t *letter = r->start;
   for (int i = 0; i < r->width; i++) {
-    int active = 0;
-    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == i;
+    int active = is_active(r, i);
     letter[i] = asked[i];
     if (set_of(r, i) >= 0 && asked[i] == OFF) letter[i] = active ? LEAVING : r->letter[i] == IDLE ? IDLE : OFF;
     if (!active && letter[i] != r->letter[i]) { finish(r, NON_UNIQUE, WRONG_START, r->mode); return; }

@@ -29,7 +29,7 @@ static double sure_root(Run *r, const Expansion *e, int row, const double *c, in
   if (!(c[0] > 0)) return 0;
   if (is_far(c, n, h)) return -1;
   const double *g = e->guards + (int64_t)row * r->stride;
-  double b[P + 1], within = h, exact = LOCATED * larger(time_scale(r), h), slope, floor = 0;
+  double b[P + 1], within = h, exact = LOCATED * larger(time_scale(r), h), slope, noise = 0, floor = 0;
   int changes = isolate(c, n, &within, b);
   if (!changes) return -1;
   double root = first_in(c, n, b, 0, within, 0), end = root < 0 ? h : root;
@@ -39,10 +39,11 @@ static double sure_root(Run *r, const Expansion *e, int row, const double *c, in
   }
   double low = first_low(c, n, end, LOW, 0);
   if (low > 0) {
-    floor = guard_noise(r, e, row, from + low);
+    noise = guard_noise(r, e, row, from + low);
     if (from > 0) /* of the shift by ``from``, and of what was known to be zero before it */
-      floor += ROUNDING * (fabs(g[0]) + rest_of(g, r->order, from + low)) + left_out(g + known, known, from + low);
-    floor = (floor / pow(from + low, known) + left_out(c, drop, low)) / pow(low, drop);
+      noise += ROUNDING * (fabs(g[0]) + rest_of(g, r->order, from + low)) + left_out(g + known, known, from + low);
+    noise = noise / pow(from + low, known) + left_out(c, drop, low);
+    floor = noise / pow(low, drop);
     if (floor > 0) low = first_low(c, n, end, LOW, floor);
   }
   if (low < 0 || passes_once(c, n, end, low, floor, exact)) return root;
@@ -53,9 +54,10 @@ static double sure_root(Run *r, const Expansion *e, int row, const double *c, in
     return -1;
   }
   if (floor > 0) { /* a touch that reaches zero by rounding is no root */
-    memcpy(b, c, sizeof(double) * (n + 1));
-    b[0] += LOW * floor;
-    root = first_root(b, n, h);
+    memset(b, 0, sizeof(double) * drop);
+    memcpy(b + drop, c, sizeof(double) * (n + 1));
+    b[0] += LOW * noise;
+    root = first_root(b, n + drop, h);
     if (root > 0) root = polish_late(c, n, root, h);
   }
   r->hidden[row] = larger(root - hidden, 0);

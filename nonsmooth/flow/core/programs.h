@@ -269,21 +269,31 @@ static void series_inputs(const Series *t, int k, const double *x, double *s) {
   for (int32_t l = 0; l < t->inputs; l++) s[t->input[l] + k] = x[t->place[l]];
 }
 
+/* Functions of an argument of two numbers (pairs.h). */
+static int has_pair_rule(int op) { return op == OP_sin || op == OP_cos || op == OP_tan; }
+
 /* Rounding of the values of all rules that move, in units of EPSILON, from that of their inputs, of the ``size`` that
  * these have at least, or of that of the input ``time``: 0 for none. Each stands where the coefficient of order zero of
- * its row would. */
-static void series_rounding(const Series *t, double size, int32_t time, double time_size, const double *s, double *error) {
-  for (int32_t l = 0; l < t->inputs; l++)
-    error[t->input[l]] = size > 0 ? (t->place[l] == time ? time_size : size) + fabs(s[t->input[l]]) : 0;
+ * its row would. In a run that begins at ``start`` arithmetic with the time has two numbers (pairs.h), and no rounding. */
+static void series_rounding(const Series *t, double size, int32_t time, double time_size, double start, const double *s,
+                            double *error) {
+  for (int32_t l = 0; l < t->inputs; l++) {
+    int is_time = t->place[l] == time;
+    double value = s[t->input[l]] - (is_time ? start : 0);
+    error[t->input[l]] = size > 0 ? (is_time ? time_size : size) + fabs(value) : 0;
+  }
   for (int32_t l = 0; l < t->moving.count; l++) {
     const Rule *q = t->rule + t->moving.rule[l];
     double u = s[q->a], v = s[q->b], w = s[q->w], of_u = error[q->a], of_v = error[q->b], sum = 0, partial = 0;
+    int is_pair = start != 0 && q->paired;
+    if (is_pair && q->rule != RULE_div && !has_pair_rule(q->op)) of_u += fabs(u);
     switch (q->rule) {
       case RULE_sum:
         for (int32_t i = q->begin; i < q->end; i++) {
           const Term *e = t->term + i;
           double y = s[e->a], z = s[e->b], term = e->factor * z * y;
           sum += fabs(e->factor) * (fabs(y) * error[e->b] + fabs(z) * error[e->a]);
+          if (is_pair) continue;
           if (e->b || !(e->factor == 1 || e->factor == -1)) sum += fabs(term); /* row 0 is one */
           partial += term;
           if (i > q->begin) sum += fabs(partial);
@@ -298,7 +308,7 @@ static void series_rounding(const Series *t, double size, int32_t time, double t
       case RULE_atan2: sum = over(fabs(u) * of_v + fabs(v) * of_u, s[q->c]); break;
       case RULE_chosen: error[q->w] = of_v; continue;
     }
-    error[q->w] = sum + fabs(w);
+    error[q->w] = sum + (is_pair && q->rule == RULE_div ? 0 : fabs(w));
   }
 }
 

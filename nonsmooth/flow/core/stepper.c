@@ -30,9 +30,9 @@ static void set_time_state(Run *r) {
 
 /* Move the time on, in two numbers; it is kept to the rounding of the steps, not of their sum. */
 static void pass_time(Run *r, double dt) {
-  double sum = r->t + dt, moved = sum - r->t, lost = (r->t - (sum - moved)) + (dt - moved) + r->t_low;
-  r->t = sum + lost;
-  r->t_low = lost - (r->t - sum);
+  Pair t = pair_sum((Pair){r->t, r->t_low}, (Pair){dt, 0});
+  r->t = t.high;
+  r->t_low = t.low;
   set_time_state(r);
 }
 
@@ -248,8 +248,10 @@ static int agrees(Run *r, const Expansion *e, double time, double dt) {
       horner(e->states + (int64_t)i * stride, order, time, &slope);
       near = fabs(found[i] - slope) * dt <= WRONG * e->allowed[i] + dt * (VANISHES * fabs(slope) + noisy);
     }
-    for (int i = n; near && i < n + slides; i++)
-      near = found[i] <= WRONG * SAFETY * r->o.rtol + VANISHES + (again ? noise[i] : 0);
+    for (int i = n; near && i < n + slides; i++) { /* reactions may be large */
+      double size = larger(1, fabs(lam[e->l.sliding[i - n]]));
+      near = found[i] <= size * (WRONG * SAFETY * r->o.rtol + VANISHES) + (again ? noise[i] : 0);
+    }
     for (int q = 0; near && q < guards; q++) {
       int j = e->l.bent[q];
       const double *c = e->guards + (int64_t)j * stride;

@@ -13,7 +13,7 @@ from ...model.definition.tables.pieces import places_of
 #: Reasons of which ``where`` is a function.
 _OF_FUNCTIONS = (
     *("two_fold", "slid_to_two_fold", "multiple_zero", "indefinite", "no_jump"),
-    *("stability_lost", "high_degree"),
+    *("stability_lost", "high_degree", "spiral_out"),
 )
 
 

@@ -155,6 +155,25 @@ def _puck(**more):
     )
 
 
+@pytest.mark.parametrize("rate", [1.0, 7.0])
+@pytest.mark.parametrize("ratio", [2.0, 4.0])
+def test_a_set_is_reached_beside_a_contact_with_a_moving_floor(rate, ratio):
+    v, w, q, s, t, r = plane.columns("v", "w", "q", "s", "t", "r")
+    lam, floor = ca.vertcat(*plane.columns("l1", "l2")), 0.2 * ca.sin(rate * t)
+    system = ns.FilippovSystem(
+        [v, w, q, s],
+        field=[-lam[0], -ratio * lam[1], s, r - 20],
+        surfaces=[ca.vertcat(v, w)],
+        multipliers=[lam],
+        impacts=ns.Impact(q - floor, reaction=r),
+        time=t,
+    )
+    run = ns.simulate(system, [0.5, 0.3, 0.0, 0.2 * rate], 1.0)
+    assert (run.status, run.itinerary) == (ns.Status.REACHED_END, "*c sc")
+    moves = [0.2 * np.sin(rate), 0.2 * rate * np.cos(rate)]
+    np.testing.assert_allclose(run.x[-1], [0, 0, *moves], atol=1e-9)
+
+
 def test_no_friction_is_allowed():
     run = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"mu": 0.0, "pull": 1.0})
     assert run.status == ns.Status.REACHED_END and run.itinerary == "*"

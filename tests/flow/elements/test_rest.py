@@ -57,6 +57,18 @@ def test_relay_that_repels_has_several_motions():
     assert ns.simulate(_relay(lam), [0, 0], 1.0).status is ns.Status.NON_UNIQUE
 
 
+@pytest.mark.parametrize(("two", "push"), [(-1, 0.0), (-1, 1.5), (-1, 2.5), (-2.9, 0.0)])
+def test_twisting_that_spirals_out_has_several_motions(two, push):
+    """Half a turn multiplies the speed by sqrt((3 - push - two) / (3 - push + two)) > 1, or a side is left for good."""
+    run = ns.simulate(_twisting(3, two, push), [0, 0], 1.0)
+    assert (run.status, run.t[-1]) == (ns.Status.NON_UNIQUE, 0)
+    many = ns.ensemble(_twisting(3, two, push), [[0, 0]], 1.0)
+    assert many.status[0] == ns.Status.NON_UNIQUE
+    if push < 2:
+        rests = ns.simulate(_twisting(3, two, push), [0, 0], 1.0, start_mode="ss")
+        assert rests.status is ns.Status.REACHED_END and rests.x[-1].tolist() == [0, 0]
+
+
 @pytest.mark.parametrize("push", [0.0, 0.5])
 def test_third_degree_is_not_unique(push):
     system = ns.FilippovSystem([x, v, a], field=[v, a, push - lam], surfaces=[x], multipliers=[lam])

@@ -333,6 +333,22 @@ def test_an_orbit_through_many_breakpoints(count):
     np.testing.assert_allclose(*map(np.sort_complex, (orbit.multipliers, by_run)), atol=1e-8)
 
 
+@pytest.mark.parametrize("direction", [1, -1, 0])
+def test_a_table_is_the_guard_of_a_reset_whatever_it_is_beyond_its_ends(direction):
+    """It is 0.7 at x = 0.7 and x = 1.6."""
+    events = []
+    for outside in ("constant", "linear"):
+        guard = ns.table(x, [0, 1, 2], [0, 1, 0.5], outside=outside) - 0.7
+        count = ns.Reset(guard, {v: 0.9 * v}, direction=direction)
+        system = ns.FilippovSystem.from_expression([x, v], [v, -x], resets=count)
+        run = ns.simulate(system, [-0.5, 2.2], 6.0, tol=1e-12)
+        events.append([(e.t, e.x[0]) for e in run.events if e.kind == "reset"])
+    assert np.array(events[0]) == pytest.approx(np.array(events[1]), abs=1e-9)
+    rising = [x for _, x in events[0]]
+    own = {1: [0.7, 1.6], -1: [1.6, 0.7], 0: [0.7, 1.6, 1.6, 0.7]}[direction]
+    assert rising == pytest.approx(own, abs=1e-10)
+
+
 def test_modes_of_tables_watch_the_breakpoints_beside_their_cell():
     system = SYSTEMS["two arguments"]
     run = ns.simulate(system, [0.8, 0.4], 3.0)

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass, field
+import re
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
@@ -22,6 +23,7 @@ from scipy.optimize import brentq
 
 _TOLERANCE = 1e-13
 _CLOSE = 1e-7  # rates, multipliers and guards closer than this to a limit decide nothing
+_REACHED = 1e-10  # a set is reached at this distance
 _NAMES = ("sin", "cos", "exp", "tanh", "sqrt")
 
 
@@ -36,6 +38,8 @@ class Jump:
     level: bool = False
     when: str = ""  # holds where it is not negative
     priority: float = 0.0
+    other: str = ""  # the condition is this one too, or either: not negative
+    either: bool = False
 
 
 @dataclass(frozen=True)
@@ -44,12 +48,21 @@ class Contact:
 
     gap: str
     rate: str
-    restitution: float = 0.0
+    restitution: str = "0.0"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A curve of straight lines, that go on beyond its ends."""
+
+    argument: str
+    xs: list[float]
+    ys: list[float]
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A system, a start and an end; multiplier i is ``li`` in the field."""
+    """A system, a start and an end; multiplier i is ``li`` in the field, and ``numbers`` are parameters."""
 
     states: list[str]
     field: list[str]
@@ -60,6 +73,12 @@ class Problem:
     jumps: list[Jump] = field(default_factory=list)
     stops: list[tuple[str, int]] = field(default_factory=list)
     hidden: bool = False
+    numbers: dict[str, float] = field(default_factory=dict)
+    discrete: list[str] = field(default_factory=list)  # the last states
+    tables: list[Table] = field(default_factory=list)  # table j is ``tabj`` in the field
+    sets: list[tuple[str, str]] = field(
+        default_factory=list
+    )  # one at most; its multiplier is (u0, u1)
 
 
 @dataclass
@@ -77,33 +96,53 @@ class Undecided(Exception):
     """Two things too close to tell apart in doubles."""
 
 
-def _compiled(expressions: list[str], arguments: list[str], names: Any) -> Any:
+def _compiled(p: Problem, expressions: list[str], arguments: list[str], names: Any) -> Any:
     """One function of all expressions."""
-    space = {name: getattr(names, name) for name in _NAMES}
+    space = {name: getattr(names, name) for name in _NAMES} | p.numbers
     return eval(f"lambda {', '.join(arguments)}: [{', '.join(expressions)}]", space)
+
+
+def by_kinks(p: Problem) -> Problem:
+    """A problem whose breakpoints of tables are surfaces, after the others."""
+    surfaces, texts = list(p.surfaces), {}
+    for j, table in enumerate(p.tables):
+        slopes = np.diff(table.ys) / np.diff(table.xs)
+        text = f"({table.ys[0]}+({slopes[0]})*({table.argument}-({table.xs[0]}))"
+        for x, turn in zip(table.xs[1:-1], np.diff(slopes), strict=True):
+            text += f"+({turn / 2})*(1+l{len(surfaces)})*({table.argument}-({x}))"
+            surfaces.append(f"{table.argument}-({x})")
+        texts[f"tab{j}"] = text + ")"
+    fields = [re.sub(r"\btab\d\b", lambda found: texts[found[0]], f) for f in p.field]
+    return replace(p, field=fields, surfaces=surfaces, tables=[])
 
 
 class Model:
     """Numbers of a problem: field, outputs that multipliers act on, and guards."""
 
-    def __init__(self, problem: Problem):
-        p = self.problem = problem
+    def __init__(self, given: Problem):
+        p = self.problem = by_kinks(given)
         self.n, self.m, self.c = len(p.states), len(p.surfaces), len(p.contacts)
+        self.own, self.vectors = len(given.surfaces), len(p.sets)
         unknowns = [f"l{i}" for i in range(self.m)] + [f"r{k}" for k in range(self.c)]
+        unknowns += ["u0", "u1"] * self.vectors
         products = any(
             f"l{i}*l{j}" in f for f in p.field for i in range(self.m) for j in range(self.m)
         )
         self.affine = not (p.hidden or products)
-        self._field = _compiled(p.field, [*p.states, "t", *unknowns], math)
+        self._field = _compiled(p, p.field, [*p.states, "t", *unknowns], math)
         outputs = [*p.surfaces, *[contact.rate for contact in p.contacts]]
-        self._complex = _compiled(outputs, [*p.states, "t"], cmath)
+        outputs += [h for one in p.sets for h in one]
+        self._vector = _compiled(p, [h for one in p.sets for h in one], [*p.states, "t"], math)
+        self._complex = _compiled(p, outputs, [*p.states, "t"], cmath)
         self.atoms = [*[g for g, _ in p.stops], *[j.guard for j in p.jumps]]
-        self.atoms += [j.when for j in p.jumps if j.when]
+        self.atoms += [j.when for j in p.jumps if j.when] + [j.other for j in p.jumps if j.other]
         gaps = [contact.gap for contact in p.contacts]
-        self._guards = _compiled([*p.surfaces, *gaps, *self.atoms], [*p.states, "t"], math)
-        self._atoms = _compiled(self.atoms, [*p.states, "t"], cmath)
+        self._guards = _compiled(p, [*p.surfaces, *gaps, *self.atoms], [*p.states, "t"], math)
+        kept = [contact.restitution for contact in p.contacts]
+        self.restitutions = _compiled(p, kept, [], math)()
+        self._atoms = _compiled(p, self.atoms, [*p.states, "t"], cmath)
         self.maps = [
-            _compiled([j.target.get(s, s) for s in p.states], [*p.states, "t"], math)
+            _compiled(p, [j.target.get(s, s) for s in p.states], [*p.states, "t"], math)
             for j in p.jumps
         ]
 
@@ -118,7 +157,7 @@ class Model:
             moved = list(given)
             moved[j] += step
             columns.append([complex(value).imag / 1e-30 for value in self._complex(*moved)])
-        matrix = np.array(columns).T.reshape(self.m + self.c, self.n + 1)
+        matrix = np.array(columns).T.reshape(-1, self.n + 1)
         return matrix[:, :-1], matrix[:, -1]
 
     def rates(self, x: np.ndarray, t: float, unknown: np.ndarray) -> np.ndarray:
@@ -143,9 +182,15 @@ class Model:
         self, x: np.ndarray, t: float, mode: tuple[int, ...], guess: np.ndarray
     ) -> np.ndarray:
         """Multipliers and reactions of a mode, by Newton's method from a guess."""
-        held = [i for i, letter in enumerate(mode) if letter == 0]
-        unknown = np.array(mode, float)
-        unknown[self.m :] = 0.0
+        size = self.m + self.c
+        held = [i for i, letter in enumerate(mode[:size]) if letter == 0]
+        unknown = np.zeros(size + 2 * self.vectors)
+        unknown[: self.m] = mode[: self.m]
+        if mode[size:] == (0,):
+            held += [size, size + 1]
+        elif mode[size:]:
+            h = self.vector(x, t)
+            unknown[size:] = h / np.linalg.norm(h)
         if not held:
             return unknown
         unknown[held] = guess[held]
@@ -160,6 +205,10 @@ class Model:
             if np.abs(change).max() < 1e-14 * (1 + np.abs(unknown).max()):
                 return unknown
         raise Undecided("multipliers do not converge")
+
+    def vector(self, x: np.ndarray, t: float) -> np.ndarray:
+        """The function of the set."""
+        return np.array(self._vector(*x.tolist(), t))
 
     def guards(self, x: np.ndarray, t: float) -> np.ndarray:
         """Surfaces, gaps and atoms."""
@@ -181,9 +230,16 @@ class Run:
         if np.abs(values).min(initial=1.0) < _CLOSE:
             raise Undecided("a start on a zero")
         signs = np.sign(values).astype(int)
-        self.mode = tuple(signs[: model.m]) + (1,) * model.c
+        self.mode = tuple(signs[: model.m]) + (1,) * (model.c + model.vectors)
         self.side = signs[model.m + model.c :]
-        self.unknown = self._guess = np.array(self.mode, float)
+        self.unknown = self._guess = np.zeros(model.m + model.c + 2 * model.vectors)
+        count = len(problem.stops) + len(problem.jumps)
+        filtered = [j for j, jump in enumerate(problem.jumps) if jump.when]
+        joined = [j for j, jump in enumerate(problem.jumps) if jump.other]
+        self._conditions = [
+            {j: at + first for at, j in enumerate(own)}
+            for own, first in ((filtered, count), (joined, count + len(filtered)))
+        ]
         self.events: list[tuple[float, str, str]] = []
         self.fresh: set[int] = set()  # rows of ``_room`` that start at zero
         self.status = ""
@@ -191,9 +247,10 @@ class Run:
 
     def word(self, mode: tuple[int, ...] | None = None) -> str:
         mode = self.mode if mode is None else mode
-        letters = {1: "+", -1: "-", 0: "s"}
-        contacts = ["co"[letter] for letter in mode[self.model.m :]]
-        return "".join([letters[letter] for letter in mode[: self.model.m]] + contacts)
+        letters, m, size = {1: "+", -1: "-", 0: "s"}, self.model.m, self.model.m + self.model.c
+        sets = ["s*"[letter] for letter in mode[size:]]
+        contacts = ["co"[letter] for letter in mode[m:size]]
+        return "".join([letters[letter] for letter in mode[: self.model.own]] + sets + contacts)
 
     def run(self) -> Outcome:
         trouble = ""
@@ -234,16 +291,19 @@ class Run:
         """Positive in the mode: surfaces and gaps, both bounds of multipliers, atoms, stability."""
         m, c = self.model.m, self.model.c
         values, growth = self.model.guards(x, t), -1.0
-        room = list(values[: m + c] * self.mode) + [1.0] * (m + c)
+        room = list(values[: m + c] * self.mode[: m + c]) + [1.0] * (m + c)
+        size = np.linalg.norm(self.model.vector(x, t)) - _REACHED
         if 0 in self.mode:
             unknown = self.model.unknowns(x, t, self.mode, self._guess)
             growth = self._growth(x, t, self.mode, unknown)
-            for i, letter in enumerate(self.mode):
+            if self.mode[m + c :] == (0,):
+                size = 1 - np.linalg.norm(unknown[m + c :])
+            for i, letter in enumerate(self.mode[: m + c]):
                 if letter == 0:
                     room[i] = 1 - unknown[i] if i < m else unknown[i]
                     room[m + c + i] = 1 + unknown[i] if i < m else 1.0
         room += list(values[m + c :] * np.where(self.side == 0, 1, self.side))
-        return np.array([*room, -growth])
+        return np.array([*room, *[size] * self.model.vectors, -growth])
 
     def _between(
         self, h: float, part: float, begin: np.ndarray, y: np.ndarray, end: np.ndarray
@@ -260,7 +320,7 @@ class Run:
     def _growth(self, x: np.ndarray, t: float, mode: tuple[int, ...], unknown: np.ndarray) -> float:
         """Growth across the layers of the sliding surfaces; negative if they attract."""
         m = self.model.m
-        held = [i for i, letter in enumerate(mode) if letter == 0]
+        held = [i for i, letter in enumerate(mode[: m + self.model.c]) if letter == 0]
         slides = sum(i < m for i in held)
         if not slides:
             return -1.0
@@ -354,8 +414,10 @@ class Run:
 
     def _event(self, row: int) -> None:
         m, c = self.model.m, self.model.c
-        if row == 2 * (m + c) + len(self.side):
+        if row == 2 * (m + c) + len(self.side) + self.model.vectors:
             self.status = "INTERSECTION"
+        elif row == 2 * (m + c) + len(self.side):
+            self._meet_set()
         elif row >= 2 * (m + c):
             self._instant(row - 2 * (m + c))
         elif row < m + c and self.mode[row] != 0 and row >= m:
@@ -367,7 +429,7 @@ class Run:
 
     def _impact(self, k: int) -> float | None:
         """Apply Newton's law to one contact; return when it closes, where its speed is small."""
-        if any(letter == 0 for letter in self.mode[self.model.m :]):
+        if 0 in self.mode[self.model.m : self.model.m + self.model.c]:
             raise Undecided("an impact beside a closed contact")
         gradient, _ = self.model.gradients(self.x, self.t)
         unknown = np.array(self.unknown)
@@ -378,11 +440,11 @@ class Run:
         rate = self._rate(k)
         if rate > -1e-9:
             raise Undecided("an impact without speed")
-        kept = self.problem.contacts[k - self.model.m].restitution if rate < -1e-6 else 0.0
+        restitution = self.model.restitutions[k - self.model.m]
+        kept = restitution if rate < -1e-6 else 0.0
         self.x = self.x - (1 + kept) * rate / (gradient[k] @ along) * along
         if kept:
             return None
-        restitution = self.problem.contacts[k - self.model.m].restitution
         falls = -self.model.rates(self.x, self.t, unknown)[k]
         left = -2 * rate * restitution / (1 - restitution) / falls if restitution else 0.0
         return float(self.t + left)
@@ -390,7 +452,7 @@ class Run:
     def _rate(self, k: int) -> float:
         """Rate of a gap."""
         p = self.problem
-        rate = _compiled([p.contacts[k - self.model.m].rate], [*p.states, "t"], math)
+        rate = _compiled(p, [p.contacts[k - self.model.m].rate], [*p.states, "t"], math)
         return rate(*self.x.tolist(), self.t)[0]
 
     def _instant(self, passing: int | None, impact: int | None = None) -> None:
@@ -400,10 +462,7 @@ class Run:
         turned = set() if passing is None else {passing}
         for a in turned:
             view[a] = -view[a]
-        whens, count = {}, stops + len(p.jumps)
-        for j, jump in enumerate(p.jumps):
-            if jump.when:
-                whens[j], count = count, count + 1
+        whens, others = self._conditions
         order = [("stop", k) for k in range(stops)]
         order += [
             ("jump", j) for j in sorted(range(len(p.jumps)), key=lambda j: -p.jumps[j].priority)
@@ -412,24 +471,30 @@ class Run:
         def parts(kind: str, k: int) -> tuple[int, int]:
             return (k, p.stops[k][1]) if kind == "stop" else (stops + k, p.jumps[k].direction)
 
-        def holds(kind: str, k: int, sides: np.ndarray) -> bool:
+        def holds(kind: str, k: int, sides: np.ndarray, d: int = 0) -> bool:
             a, direction = parts(kind, k)
-            return bool(sides[a] == direction)
+            own = bool(sides[a] == (d or direction))
+            if kind == "stop" or k not in others:
+                return own
+            too = bool(sides[others[k]] == 1)
+            return own or too if p.jumps[k].either else own and too
 
         def due(before: np.ndarray, before2: np.ndarray, but: tuple[str, int] | None) -> set:
             found = set()
             for kind, k in order:
                 if (kind, k) == but or (kind == "jump" and p.jumps[k].level):
                     continue
-                a, direction = parts(kind, k)
+                _, direction = parts(kind, k)
                 for d in [direction] if direction else [1, -1]:
-                    if view[a] == d and before[a] != d and before2[a] != d:
+                    if holds(kind, k, view, d) and not any(
+                        holds(kind, k, sides, d) for sides in (before, before2)
+                    ):
                         found.add((kind, k, d))
             return found
 
         pending, first, jumps, zeros, closing = due(side, side, None), True, 0, set(), []
         while True:
-            pending = {e for e in pending if view[parts(*e[:2])[0]] == e[2]}
+            pending = {e for e in pending if holds(e[0], e[1], view, e[2])}
             served = None
             for kind, k in order:
                 level = kind == "jump" and p.jumps[k].level
@@ -438,7 +503,11 @@ class Run:
                     continue
                 if any(e[:2] == (kind, k) for e in pending):
                     served = (kind, k)
-                elif level and holds(kind, k, view) and (first or not ({a, whens.get(k)} & zeros)):
+                elif (
+                    level
+                    and holds(kind, k, view)
+                    and (first or not ({a, whens.get(k), others.get(k)} & zeros))
+                ):
                     served = (kind, k)
                 if served:
                     break
@@ -506,7 +575,7 @@ class Run:
     def _settle(self, active: list[int], bound: dict[int, int], moved: bool = False) -> None:
         """Choose the mode after an event at which ``active`` elements are zero, or after a jump."""
         m, values = self.model.m, self.model.guards(self.x, self.t)
-        before, mode, active = self.mode, list(self.mode), list(active)
+        mode, active = list(self.mode), list(active)
         if moved:
             for i in range(m):
                 if abs(values[i]) < 1e-10:
@@ -515,42 +584,58 @@ class Run:
                     raise Undecided("a jump leads near a surface")
                 else:
                     mode[i] = int(np.sign(values[i]))
-            for k in range(m, len(mode)):
+            for k in range(m + self.model.c, len(mode)):
+                mode[k] = 1
+                if np.linalg.norm(self.model.vector(self.x, self.t)) < _CLOSE:
+                    raise Undecided("a jump leads near a set")
+            for k in range(m, m + self.model.c):
                 if mode[k] == 0 and (abs(values[k]) > 1e-9 or abs(self._rate(k)) > 1e-9):
                     raise Undecided("a jump out of a closed contact")
                 if mode[k] == 1 and values[k] < _CLOSE and k not in active:
                     if self._rate(k) < 0 or values[k] < -_CLOSE:
                         raise Undecided("a jump into a contact")
-        active = sorted({*active, *[i for i, letter in enumerate(mode) if letter == 0]})
+        size = m + self.model.c
+        active = sorted({*active, *[i for i in range(size) if mode[i] == 0]})
         if self.problem.hidden and active:
             found = [self._layer(tuple(mode), active, bound)]
         else:
             found = self._continuations(tuple(mode), active, bound)
+        if not found and self.mode[size:] == (0,):
+            raise Undecided("a set may be left with another event")
         if len(found) != 1:
             self.status = "NON_UNIQUE" if found else "INTERSECTION"
             return
-        self.mode = found[0]
+        self._take(found[0], event=not moved)
+
+    def _take(self, mode: tuple[int, ...], event: bool) -> None:
+        """Go on in a mode."""
+        before, self.mode, size = self.word(), mode, self.model.m + self.model.c
         self.unknown = self.model.unknowns(self.x, self.t, self.mode, self.unknown)
-        size = m + self.model.c
         room = self._room(self.x, self.t)[: 2 * size]
         self.fresh |= {r for r in range(2 * size) if abs(room[r]) < _CLOSE}
-        if self.mode != before and not moved:
+        if event and self.word() != before:
             self.events.append((self.t, "mode", self.word()))
 
     def _continuations(
         self, mode: tuple[int, ...], active: list[int], bound: dict[int, int]
     ) -> list[tuple[int, ...]]:
         """Modes of the active elements whose rates and unknowns agree with them."""
-        found, m = [], self.model.m
+        found, m, size = [], self.model.m, self.model.m + self.model.c
         letters = [
-            (0, bound[i]) if i in bound and i < m else (1, -1, 0) if i < m else (0, 1)
+            (0, bound[i])
+            if i in bound and i < m
+            else (1, -1, 0)[: 3 - (self.model.own <= i)]
+            if i < m
+            else (0, 1)
             for i in active
         ]
         for chosen in product(*letters):
             candidate = list(mode)
             for i, letter in zip(active, chosen, strict=True):
                 candidate[i] = letter
-            unknown = self.model.unknowns(self.x, self.t, tuple(candidate), np.zeros(len(mode)))
+            unknown = self.model.unknowns(
+                self.x, self.t, tuple(candidate), np.zeros(len(self.unknown))
+            )
             rates = self.model.rates(self.x, self.t, unknown)
             room = []
             for i, letter in zip(active, chosen, strict=True):
@@ -562,12 +647,55 @@ class Run:
                     room.append(1 - abs(unknown[i]) if i < m else unknown[i])
                 else:
                     room.append(letter * rates[i])
+            if mode[size:] == (0,):
+                room.append(1 - float(np.linalg.norm(unknown[size:])))
             growth = self._growth(self.x, self.t, tuple(candidate), unknown)
             if min(room, default=1.0) > -_CLOSE and growth < _CLOSE:
                 if min(room, default=1.0) < _CLOSE or growth > -_CLOSE:
                     raise Undecided("a rate is nearly zero")
                 found.append(tuple(candidate))
         return found
+
+    def _meet_set(self) -> None:
+        """The set is reached or left: rest on it, or the one direction in which it is left."""
+        model, size = self.model, self.model.m + self.model.c
+        row, off, on = 2 * size + len(self.side), self.mode, (*self.mode[:-1], 0)
+        guess = self.unknown.copy()
+        if self.mode[-1]:  # what is left of the way to the set
+            self.x = self.x - np.linalg.pinv(self._set_slope()) @ model.vector(self.x, self.t)
+            unknown = model.unknowns(self.x, self.t, on, guess)
+            room = 1 - np.linalg.norm(unknown[size:])
+            if abs(room) < _CLOSE:
+                raise Undecided("friction of a set is nearly at its bound")
+            if room > 0:
+                self._take(on, event=True)
+                return
+        off = (*self.mode[:-1], 1)
+        gradient = self._set_slope()
+
+        def rate(angle: float) -> tuple[float, float]:
+            """Rates of the set's function across and along a direction."""
+            e = np.array([math.cos(angle), math.sin(angle)])
+            x = self.x + np.linalg.pinv(gradient) @ (_REACHED * e)
+            h = model.rates(x, self.t, model.unknowns(x, self.t, off, guess))[size:]
+            return float(e[0] * h[1] - e[1] * h[0]), float(e @ h)
+
+        grid = np.linspace(0, 2 * math.pi, 181)
+        across, found = [rate(a)[0] for a in grid], []
+        for k in range(180):
+            if across[k] * across[k + 1] < 0:
+                angle = brentq(lambda a: rate(a)[0], grid[k], grid[k + 1], xtol=1e-14)
+                if rate(angle)[1] > -_CLOSE:
+                    found.append(angle)
+        if len(found) != 1 or rate(found[0])[1] < _CLOSE:
+            raise Undecided("directions from a set")
+        e = np.array([math.cos(found[0]), math.sin(found[0])])
+        self.x = self.x + np.linalg.pinv(gradient) @ (_REACHED * e)
+        self.fresh.add(row)
+        self._take(off, event=True)
+
+    def _set_slope(self) -> np.ndarray:
+        return self.model.gradients(self.x, self.t)[0][self.model.m + self.model.c :]
 
     def _layer(
         self, mode: tuple[int, ...], active: list[int], bound: dict[int, int]
@@ -612,20 +740,28 @@ def package_system(problem: Problem, sets: bool = False) -> Any:
     space: dict[str, Any] = {name: getattr(ca, name) for name in _NAMES}
     m, c = len(problem.surfaces), len(problem.contacts)
     names = [*problem.states, "t", *[f"l{i}" for i in range(m)], *[f"r{k}" for k in range(c)]]
+    names += [*problem.numbers, "u0", "u1"]
     space |= {name: ca.SX.sym(name) for name in names}
 
     def read(expression: str) -> Any:
         return ca.SX(eval(expression, space))
 
     options: dict[str, Any] = {}
-    if m:
-        options["surfaces"] = [read(h) for h in problem.surfaces]
-        options["multipliers"] = [space[f"l{i}"] for i in range(m)]
-        if sets:
-            options = {name: [[entry] for entry in entries] for name, entries in options.items()}
+    if problem.numbers:
+        options["parameters"] = {space[name]: value for name, value in problem.numbers.items()}
+    if problem.tables:  # found by from_expression, as are surfaces beside them
+        space |= {f"l{i}": ca.sign(read(h)) for i, h in enumerate(problem.surfaces)}
+        for j, table in enumerate(problem.tables):
+            space[f"tab{j}"] = ns.table(read(table.argument), table.xs, table.ys, outside="linear")
+    elif m:
+        options["surfaces"] = [[read(h)] if sets else read(h) for h in problem.surfaces]
+        options["multipliers"] = [[space[f"l{i}"]] if sets else space[f"l{i}"] for i in range(m)]
+    for first, second in problem.sets:
+        options.setdefault("surfaces", []).append([read(first), read(second)])
+        options.setdefault("multipliers", []).append([space["u0"], space["u1"]])
     if c:
         options["impacts"] = [
-            ns.Impact(read(one.gap), restitution=one.restitution, reaction=space[f"r{k}"], name=f"impact {k}")
+            ns.Impact(read(one.gap), restitution=read(one.restitution), reaction=space[f"r{k}"], name=f"impact {k}")
             for k, one in enumerate(problem.contacts)
         ]  # fmt: skip
     if problem.stops:
@@ -634,27 +770,35 @@ def package_system(problem: Problem, sets: bool = False) -> Any:
             for k, (g, d) in enumerate(problem.stops)
         ]
     if problem.jumps:
-        options["resets"] = [
-            ns.Reset(
-                read(one.guard),
-                [read(one.target.get(s, s)) for s in problem.states],
-                direction=one.direction,
-                name=one.name,
-                **({"level": True} if one.level else {}),
-                **({"when": read(one.when) >= 0} if one.when else {}),
-                **({"priority": one.priority} if one.priority else {}),
-            )
-            for one in problem.jumps
-        ]
-    used = " ".join([*problem.field, *problem.surfaces, *[x.gap for x in problem.contacts]])
-    used += " ".join(
-        [*[j.guard + j.when + str(j.target) for j in problem.jumps], *[g for g, _ in problem.stops]]
-    )
-    import re
-
-    if re.search(r"\bt\b", used):
+        options["resets"] = [_reset(one, space, read) for one in problem.jumps]
+    if re.search(r"\bt\b", repr(problem)):
         options["time"] = space["t"]
     if problem.hidden:
         options["hidden"] = True
-    states = [space[s] for s in problem.states]
-    return ns.FilippovSystem(states, field=[read(f) for f in problem.field], **options)
+    if problem.discrete:
+        options["discrete"] = {space[name]: (0, 1) for name in problem.discrete}
+    count = len(problem.states) - len(problem.discrete)
+    states, f = [space[s] for s in problem.states[:count]], [read(f) for f in problem.field[:count]]
+    if problem.tables:
+        return ns.FilippovSystem.from_expression(states, f, **options)
+    return ns.FilippovSystem(states, field=f, **options)
+
+
+def _reset(one: Jump, space: dict[str, Any], read: Any) -> Any:
+    import casadi as ca
+
+    import nonsmooth as ns
+
+    condition, options = read(one.guard), {"direction": one.direction}
+    if one.other:
+        own = condition * one.direction >= 0
+        join = ca.logic_or if one.either else ca.logic_and
+        condition, options = join(own, read(one.other) >= 0), {}
+    if one.level:
+        options["level"] = True
+    if one.when:
+        options["when"] = read(one.when) >= 0
+    if one.priority:
+        options["priority"] = one.priority
+    target = {space[s]: read(e) for s, e in one.target.items()}
+    return ns.Reset(condition, target, name=one.name, **options)

@@ -173,7 +173,11 @@ static void near_set(Run *r, int row, int fell) {
     }
     if (bend <= radius) jump(r, field, smaller(dt, r->o.t_end - r->t - r->t_low));
   }
-  if (r->s->sets > 1) project(r, own, k); /* others may be zero there too */
+  if (r->s->sets > 1 || r->c) { /* others may be zero there too; what is closed stays so along a line */
+    int held = kept_by(r, r->letter, r->involved);
+    for (int i = 0; i < k; i++) r->involved[held++] = own[i];
+    project(r, r->involved, held);
+  }
   active_surfaces(r, f, r->letter);
   if (r->status != RUNNING) return;
   int kept = 0;

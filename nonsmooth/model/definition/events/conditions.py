@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import casadi as ca
+import numpy as np
 
 from ...errors import DefinitionError
 from ...expressions.graph import IN_A_GUARD, require_smooth
@@ -217,12 +218,30 @@ class Atoms:
             raise DefinitionError(
                 f"{what}: == and != compare a discrete state with a number, not fmin or fmax."
             )
+        found = self._joined(e, mask, what)
+        if isinstance(found, bool):
+            raise DefinitionError(
+                f"{what}: expected a condition that becomes true, received one that is "
+                f"{'always' if found else 'never'} true: constants among the arguments of fmin and fmax, or the values "
+                "of a table beyond its ends, decide it."
+            )
+        return found
+
+    def _joined(self, e: ca.SX | _Choice, mask: int, what: str) -> Tree | bool:
+        """The same; what constants decide is true or false."""
+        if not isinstance(e, _Choice):
+            if e.is_constant():
+                return bool(mask >> (1 + int(np.sign(float(e)))) & 1)
+            return self._signs(e, mask, what)
         # The least of several is above where all are; the largest is below where all are.
-        joined = AND if e.least == bool(mask & ABOVE) else OR
-        first, *rest = [self._signs(p, mask, what) for p in e.pieces]
-        for other in rest:
-            first = (*first, *other, joined)
-        return first
+        joined, tree = AND if e.least == bool(mask & ABOVE) else OR, Tree()
+        for part in (self._joined(p, mask, what) for p in e.pieces):
+            if isinstance(part, bool):
+                if part == (joined == OR):
+                    return part
+            else:
+                tree = (*tree, *part, joined) if tree else part
+        return tree or joined == AND
 
     def add(self, function: ca.SX, mask: int, what: str) -> int:
         """Number of an atom, a new one unless it is there."""

@@ -65,13 +65,18 @@ def made_program(field: PlainField, order: int) -> SmoothProgram:
 
 
 def legs_program(
-    fields: Sequence[PlainField], events: Sequence[EventMap | PlainMap | None], parameters: int
+    fields: Sequence[PlainField],
+    events: Sequence[EventMap | PlainMap | None],
+    parameters: int,
+    by_leg: bool = False,
 ) -> LegsProgram:
-    """Program that integrates legs and evaluates expressions at their ends, in one call."""
+    """Program that integrates legs and evaluates expressions at their ends, in one call, with as many parameters of all
+    or of each."""
     return LegsProgram(
         [program_of(field) for field in fields],
         [None if event is None else values_program(event) for event in events],
         parameters,
+        by_leg,
     )
 
 

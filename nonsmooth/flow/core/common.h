@@ -298,12 +298,6 @@ static int passes_once(const double *c, int n, double root, double low, double f
   return spread <= 0.25 * fabs(d[1]) && width <= exact && fabs(low - root) <= 2 * width;
 }
 
-/* Whether a polynomial's errors hide which root on (0, h] is its first, as ``root`` or, with -1, none is. */
-static inline int hides_roots(const double *c, int n, double h, double root) {
-  double end = root < 0 ? h : root, low = first_low(c, n, end, LOW, 0);
-  return low > 0 && !passes_once(c, n, end, low, 0, LOCATED);
-}
-
 /* First t in (0, h] at which a polynomial passes zero falling (-1), rising (1) or either way (0).
  * Leading zeros are a start on the zero and are skipped. */
 static double first_crossing(const double *given, int n, double h, int direction) {

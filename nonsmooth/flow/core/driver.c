@@ -59,7 +59,7 @@ static int spirals_out(Run *r, const int8_t *letter) {
         error_scales(r, r->x, held_of(r, letter), r->chosen.unknowns);
       }
       double own = r->slope[i * w + i] * r->slope[j * w + j], crossed = r->slope[i * w + j] * r->slope[j * w + i];
-      if (r->slope[j * w + j] > 0 && own != 0 && fabs(own - crossed) <= TIED * fabs(own)) return i;
+      if (r->slope[j * w + j] * factor_of(r, j) > 0 && own != 0 && fabs(own - crossed) <= TIED * fabs(own)) return i;
     }
   return -1;
 }
@@ -133,13 +133,12 @@ static int can_start(Run *r) {
   expand(r, r->letter, r->x, r->unknowns, e);
   r->turned_mode = r->mode;
   for (int row = 0; row < e->l.rows; row++) {
-    int kind = e->l.kind[row], index = e->l.index[row], active = 0;
+    int kind = e->l.kind[row], index = e->l.index[row];
     r->turned[row] = e->guards[(int64_t)row * r->stride] < 0 ? -1 : 1;
     int is_of_law = kind == SURFACE_GUARD || kind == EXIT_GUARD || kind == SLIP_GUARD || kind == NEAR_GUARD;
     if (!is_of_law && !(kind == RELEASE_GUARD && has_law(r, index, COMPLEMENTARITY_LAW))) continue;
     if (kind == NEAR_GUARD && r->letter[index] == 0) continue; /* ends steps only */
-    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == index;
-    if (!active) continue;
+    if (!is_active(r, index)) continue;
     double value;
     r->drop[row] = leading(r, e, row, kind == SURFACE_GUARD || kind == NEAR_GUARD, &value);
     if (kind != EXIT_GUARD) { holds &= value >= 0; continue; }
@@ -154,8 +153,7 @@ static int can_start(Run *r) {
 static void start_in(Run *r, const int8_t *asked) {
   int8_t *letter = r->start;
   for (int i = 0; i < r->width; i++) {
-    int active = 0;
-    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == i;
+    int active = is_active(r, i);
     letter[i] = asked[i];
     if (set_of(r, i) >= 0 && asked[i] == OFF) letter[i] = active ? LEAVING : r->letter[i] == IDLE ? IDLE : OFF;
     if (!active && letter[i] != r->letter[i]) { finish(r, NON_UNIQUE, WRONG_START, r->mode); return; }

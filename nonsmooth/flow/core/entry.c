@@ -15,19 +15,6 @@ static size_t place_expansion(Expansion *to, char *base, size_t used, const Run 
   return used;
 }
 
-static size_t place_continuation(Continuation *c, char *base, size_t used, int width, int guards) {
-  c->letter = LETTERS(width);
-  c->drop = INTEGERS(guards);
-  c->unknowns = DOUBLES(width);
-  return used;
-}
-
-static size_t place_instant(Instant *to, char *base, size_t used, const System *s) {
-  size_t atoms = s->rules.atoms, triggers = s->rules.triggers, clocks = s->rules.clocks;
-  INSTANT_ARRAYS(PLACED)
-  return used;
-}
-
 static size_t place_decision(Run *r, char *base, size_t used) {
   size_t w = r->width, orders = (ORDERS + 1) * w;
   Decision none = {0}, *to = r->decision = place(base, &used, sizeof(Decision), 1);
@@ -41,33 +28,21 @@ static size_t place_decision(Run *r, char *base, size_t used) {
   return used;
 }
 
-static size_t place_equations(Run *to, char *base, size_t used) {
-  size_t w = to->width, q = to->s->combined;
-  Equations *h = &to->equations;
-  h->letter = LETTERS(w);
-  h->row = INTEGERS(q);
-  h->own = INTEGERS(q);
-  h->mark = INTEGERS(3 * q + w);
-  h->slope = DOUBLES(q * w);
-  h->gradient = DOUBLES(q * to->n);
-  h->work = DOUBLES(q ? 2 * q * q + 2 * q * w + w + q : 0);
-  return used;
-}
-
 static size_t place_run(Run *to, char *base) {
   const System *s = to->s;
   size_t n = to->n, m = to->m, w = to->width, c = to->c, all = to->kept_rows, rows = to->guards, stride = to->stride;
   size_t used = 0, jumping = 0, q = s->combined, tried = m < MOST_ENUMERATED ? m : MOST_ENUMERATED, sums = tried * (tried - (tried > 0)) / 2;
   size_t most = s->point.size > s->columns.size ? s->point.size : s->columns.size;
+  size_t atoms = s->rules.atoms, triggers = s->rules.triggers, clocks = s->rules.clocks;
+  Run *r = to;
   for (size_t i = 0; i < m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;
   used = place_layout(&to->now, base, used, to->width, to->guards);
   used = place_expansion(&to->e, base, used, to);
   used = place_expansion(&to->trial, base, used, to);
-  used = place_continuation(&to->chosen, base, used, to->width, to->guards);
-  used = place_continuation(&to->found, base, used, to->width, to->guards);
+  for (int i = 0; i < 2; i++) { Continuation *to = i ? &r->found : &r->chosen; CONTINUATION_ARRAYS(PLACED) }
   used = place_decision(to, base, used);
-  used = place_instant(&to->instant, base, used, s);
-  used = place_equations(to, base, used);
+  { Instant *to = &r->instant; INSTANT_ARRAYS(PLACED) }
+  { Equations *to = &r->equations; EQUATION_ARRAYS(PLACED) }
   RUN_ARRAYS(PLACED)
   return used;
 }
@@ -82,7 +57,7 @@ double polynomial_crossing(const double *c, int32_t n, double h, int32_t directi
 /* What is proved of -dw/dnu of surfaces, of n rows. */
 int32_t law_certificate(const double *m, int32_t n) {
   double *work = malloc(sizeof(double) * (4 * (size_t)n * n + 4 * n) + sizeof(int32_t) * n);
-  int32_t found = work ? certificate(m, n, work, (int32_t *)(work + 4 * (int64_t)n * n + 4 * n)) : NOTHING;
+  int32_t found = work ? certificate(m, n, 0, work, (int32_t *)(work + 4 * (int64_t)n * n + 4 * n)) : NOTHING;
   free(work);
   return found;
 }
@@ -280,6 +255,13 @@ static int is_plain(Run *r) {
   return 1;
 }
 
+/* What a run is between two steps, here and as lanes have it. */
+#define GOES_ON(OF) \
+  OF(t, t) OF(since, since) OF(shortened, shortened) OF(step_count, steps) OF(event_count, events) \
+  OF(segment_steps, segment_steps) OF(itinerary, itinerary) OF(history, history)
+#define TAKEN(here, there) r->here = m->there;
+#define GIVEN(here, there) m->there = r->here;
+
 /* The number of a mode's letters in the driver's table is that of lanes. */
 static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Suspended *m) {
   static const Output none;
@@ -294,7 +276,7 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   memcpy(r->x, b->x0 + i * r->n, sizeof(double) * r->n);
   measure_time(r);
   memcpy(r->x, m->x, sizeof(double) * r->n);
-  r->t = m->t;
+  GOES_ON(TAKEN)
   set_time_state(r);
   memcpy(r->letter, m->letter, r->width);
   if (r->s->sets) memcpy(r->unknowns, m->unknowns, sizeof(double) * r->width);
@@ -308,15 +290,8 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   memset(r->instant.residual, 0, sizeof(double) * r->s->stops);
   memset(r->instant.pending, 0, r->s->rules.triggers);
   memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
-  r->since = m->since;
   r->length = m->length;
-  r->shortened = m->shortened;
   if (m->length > 0) r->length_mode = r->mode;
-  r->step_count = m->steps;
-  r->event_count = m->events;
-  r->segment_steps = m->segment_steps;
-  r->itinerary = m->itinerary;
-  r->history = m->history;
   for (int k = 0; k < HISTORY && k < m->history; k++) {
     int64_t pattern = m->past[k].pattern;
     Met met = {(int)(pattern >> 32 & 255), (int)(int32_t)pattern, 0};
@@ -339,17 +314,10 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
   m->drop = r->drop[0];
   memcpy(m->side, r->instant.side, r->s->stops);
   memcpy(m->kinds, r->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
-  m->t = r->t;
-  m->since = r->since;
   m->length = r->length_mode == r->mode ? r->length : 0;
-  m->shortened = r->shortened;
-  m->steps = r->step_count;
-  m->events = r->event_count;
-  m->segment_steps = r->segment_steps;
-  m->itinerary = r->itinerary;
   for (int64_t k = first; k < r->history; k++)
     m->past[k % HISTORY] = (Recent){r->past[k % HISTORY].interval, r->past[k % HISTORY].pattern};
-  m->history = r->history;
+  GOES_ON(GIVEN)
 }
 
 static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Suspended *m) {

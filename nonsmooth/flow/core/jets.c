@@ -111,7 +111,8 @@ static void keep_rates(Run *r, Expansion *e) {
 
 /* Coefficients of all that a mode with sets needs; ``start`` are places in the inverse. */
 static void set_series(Run *r, Expansion *e, const int32_t *start) {
-  int leaving = begin_directions(r, e);
+  int leaving = 0;
+  EACH_LEAVING(r, e, f) leaving = 1;
   for (int k = 0; k <= r->order; k++) {
     open_order(r, e, k);
     if (leaving) leave_sets(r, e, k);
@@ -257,11 +258,9 @@ static int invert_layer(Run *r, const Layout *l, const double *unknowns, double 
 /* Close to a surface a root makes of an error in h one that is larger by far: h has a relative tolerance there. */
 static void allow_for_roots(Run *r, Expansion *e) {
   const Entries *g = &r->s->surface_gradient;
-  const double *x = r->vector, *h = r->rates;
   double *state = r->vector;
   for (int k = 0; k < r->n; k++) state[k] = e->states[(int64_t)k * r->stride];
-  values_at(&r->s->surfaces, x, r->p, r->heights);
-  for (int i = 0; i < r->m; i++) r->rates[i] = out_of(&r->s->surfaces, r->heights, i);
+  const double *h = surface_values(r, state);
   for (int q = 0; q < g->count; q++) {
     int i = g->row[q], k = g->column[q];
     if (i >= r->m || element(r, i)->power == 0 || e->l.letter[i] == 0 || k >= r->s->dimension) continue;

@@ -239,8 +239,14 @@ static int is_definite(double *a, int n, double margin) {
   return 1;
 }
 
-/* A matrix of unit diagonal as D^-1 A D, symmetric, if a positive diagonal D makes it so. */
-static int symmetrised(const double *a, int n, double *d, double *result, int *pending) {
+/* The first of the rows of a vector, where ``span`` has their number there and -1 at the others. */
+static int first_row(const int8_t *span, int i) {
+  while (span[i] < 0) i--;
+  return i;
+}
+
+/* A matrix of unit diagonal as D^-1 A D, symmetric, if a positive diagonal D, one number for each vector, makes it so. */
+static int symmetrised(const double *a, int n, const int8_t *span, double *d, double *result, int *pending) {
   double largest = 0;
   for (int i = 0; i < n; i++) d[i] = 0;
   for (int root = 0; root < n; root++) {
@@ -251,8 +257,9 @@ static int symmetrised(const double *a, int n, double *d, double *result, int *p
     while (count) {
       int i = pending[--count];
       for (int j = 0; j < n; j++) {
-        if (d[j] || !(a[i * n + j] * a[j * n + i] > 0)) continue;
-        d[j] = d[i] * sqrt(a[j * n + i] / a[i * n + j]);
+        int is_one = span && first_row(span, i) == first_row(span, j);
+        if (d[j] || !(is_one || a[i * n + j] * a[j * n + i] > 0)) continue;
+        d[j] = d[i] * (is_one ? 1 : sqrt(a[j * n + i] / a[i * n + j]));
         pending[count++] = j;
       }
     }
@@ -298,8 +305,8 @@ static int has_positive_minors(const double *a, int n) {
   return 1;
 }
 
-/* ``work`` has room for 3 n^2 + 3 n, ``pending`` for n. */
-static int certificate(const double *m, int n, double *work, int32_t *pending) {
+/* Of a matrix, with vectors if there is a ``span``. ``work`` has room for 3 n^2 + 3 n, ``pending`` for n. */
+static int certificate(const double *m, int n, const int8_t *span, double *work, int32_t *pending) {
   double *a = work, *b = work + n * n, *d = b + n * n, *scale = d + n, *rest = scale + n;
   int is_positive = 1, is_symmetric;
   if (!finite_all(m, n * n)) return NOTHING;
@@ -309,13 +316,14 @@ static int certificate(const double *m, int n, double *work, int32_t *pending) {
   }
   for (int i = 0; i < n; i++) scale[i] = m[i * n + i] > 0 ? sqrt(m[i * n + i]) : 1;
   for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) a[i * n + j] = m[i * n + j] / (scale[i] * scale[j]);
-  if (is_positive && is_dominant(a, n, rest)) return UNIQUE_AND_STABLE;
-  is_symmetric = symmetrised(a, n, d, b, pending);
+  if (!span && is_positive && is_dominant(a, n, rest)) return UNIQUE_AND_STABLE;
+  is_symmetric = symmetrised(a, n, span, d, b, pending);
   if (is_symmetric && is_definite(b, n, VANISHES * n)) return UNIQUE_AND_STABLE;
+  if (span && !is_symmetric) return NOTHING;
   for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) b[i * n + j] = (a[i * n + j] + a[j * n + i]) / 2;
-  if (is_definite(b, n, VANISHES * n)) return UNIQUE_AND_STABLE;
-  if (is_positive && n <= MOST_MINORS && has_positive_minors(a, n)) return UNIQUE;
-  if (is_symmetric) symmetrised(a, n, d, b, pending);
+  if (!span && is_definite(b, n, VANISHES * n)) return UNIQUE_AND_STABLE;
+  if (!span && is_positive && n <= MOST_MINORS && has_positive_minors(a, n)) return UNIQUE;
+  if (is_symmetric) symmetrised(a, n, span, d, b, pending);
   else for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) b[i * n + j] = (a[i * n + j] + a[j * n + i]) / 2;
   return is_definite(b, n, -SINGULAR * n) ? SEMIDEFINITE : NOTHING;
 }

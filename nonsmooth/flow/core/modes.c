@@ -18,19 +18,31 @@ static int is_bounded(const Run *r, int i) { return !is_half_line(r, i) && !has_
 static int set_of(const Run *r, int i) { return element(r, i)->law == SET_LAW ? element(r, i)->first : -1; }
 #define EACH_SET(run, set) \
   for (int set = 0; set < ((run)->s->sets ? (run)->m : 0); set++) if (set_of(run, set) == set)
+#define EACH_LEAVING(run, e, set) EACH_SET(run, set) if ((e)->l.letter[set] == LEAVING)
 
-/* Whether a multiplier makes no difference: on its surface, or where all contacts are open that carry it. */
-static int is_idle(const Run *r, const int8_t *letter, int i) {
-  const System *s = r->s;
+/* Whether friction has no load: all contacts that carry it are open, here also those that may close. After
+ * surface_values, with ``scale``; without it by the letters alone. */
+static int is_unloaded(const Run *r, const int8_t *letter, int i, const double *scale) {
   int carried = 0;
-  if (i >= r->m) return 0;
-  if (element(r, i)->flags & CONTINUOUS) return 1;
   for (int j = 0; j < r->c; j++) {
-    if (!s->carries[i * r->c + j]) continue;
-    if (!letter[r->m + j]) return 0;
+    int gap = r->m + j, rate = gap + r->c;
+    if (!r->s->carries[i * r->c + j]) continue;
+    if (!letter[gap]) return 0;
+    if (scale && fabs(r->rates[gap]) <= ON_SURFACE * scale[gap] && fabs(r->rates[rate]) <= ON_SURFACE * scale[rate]) return 0;
     carried = 1;
   }
   return carried;
+}
+
+/* Whether a multiplier makes no difference: on its surface, or where all contacts are open that carry it. */
+static int is_idle(const Run *r, const int8_t *letter, int i) {
+  return i < r->m && (element(r, i)->flags & CONTINUOUS || is_unloaded(r, letter, i, 0));
+}
+
+/* Whether an element is one of those that the state is on. */
+static int is_active(const Run *r, int i) {
+  for (int j = 0; j < r->active_count; j++) if (r->active[j] == i) return 1;
+  return 0;
 }
 
 /* Make one group of those of two elements, unless one has none; it has the lower number. */
@@ -268,22 +280,17 @@ static double speed_of(const Run *r, const Expansion *e, int k) {
   return speed;
 }
 
-/* Rounding in the guards is these times epsilon. */
-static const double *scales(Run *r, Expansion *e) {
-  if (e->scaled) return e->scale;
+/* Sums for the guards with what rounding in the states is weighed with, or with units of states, once. */
+static const double *sums_once(Run *r, Expansion *e, int by_units, int *is_known, double *sums) {
+  if (*is_known) return sums;
   weigh_again(r, e);
-  for (int i = 0; i < r->n; i++) r->vector[i] = size_of_state(r, i) + fabs(e->states[(int64_t)i * r->stride]);
-  guard_sums(r, e, r->vector, 1, e->scale);
-  e->scaled = 1;
-  return e->scale;
+  for (int i = 0; i < r->n; i++)
+    r->vector[i] = by_units ? unit_of_state(r, i) : size_of_state(r, i) + fabs(e->states[(int64_t)i * r->stride]);
+  guard_sums(r, e, r->vector, !by_units, sums);
+  *is_known = 1;
+  return sums;
 }
 
-/* Sums of the magnitudes of the guards' slopes, all by units of states. */
-static const double *steepness(Run *r, Expansion *e) {
-  if (e->steepened) return e->steep;
-  weigh_again(r, e);
-  for (int i = 0; i < r->n; i++) r->vector[i] = unit_of_state(r, i);
-  guard_sums(r, e, r->vector, 0, e->steep);
-  e->steepened = 1;
-  return e->steep;
-}
+/* Rounding in the guards is these times epsilon; sums of the magnitudes of their slopes, all by units of states. */
+static const double *scales(Run *r, Expansion *e) { return sums_once(r, e, 0, &e->scaled, e->scale); }
+static const double *steepness(Run *r, Expansion *e) { return sums_once(r, e, 1, &e->steepened, e->steep); }

@@ -118,7 +118,11 @@ typedef struct {
 } Expansion;
 
 /* A mode that can continue, and the zeros of its guards. */
-typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Continuation;
+typedef struct {
+  int32_t strict;
+#define CONTINUATION_ARRAYS(OF) OF(int8_t, letter, w) OF(int32_t, drop, rows) OF(double, unknowns, w)
+  CONTINUATION_ARRAYS(DECLARED)
+} Continuation;
 
 /* A motion that can continue from a point: states of the active elements, the orders at which they were decided, the
  * states before, the unknowns; first terms of the states' series. */
@@ -152,10 +156,17 @@ typedef struct {
 /* Equations of the states alone that closed conditions leave (hidden.c): letters of the mode for which rows are
  * combined, and what for; how many of those that are closed depend on others; numbers of the rows that are combined;
  * slopes of all conditions by the unknowns, gradients of their functions, the part by which dropped slopes are off. */
-typedef struct { int8_t *letter; int32_t kind, is_raw, is_known, dependent, count, *row, *own, *mark; double *slope, *gradient, *work, off; } Equations;
+typedef struct {
+  int32_t kind, is_raw, is_known, dependent, count;
+  double off;
+#define EQUATION_ARRAYS(OF) \
+  OF(int8_t, letter, w) OF(int32_t, row, q) OF(int32_t, own, q) OF(int32_t, mark, 3 * q + w) OF(double, slope, q * w) \
+  OF(double, gradient, q * n) OF(double, work, q ? 2 * q * q + 2 * q * w + w + q : 0)
+  EQUATION_ARRAYS(DECLARED)
+} Equations;
 
 /* Modes met, by number: their letters. */
-typedef struct { Tree tree; int32_t width, count, room; int8_t *letter; int32_t *bucket, buckets; } Table;
+typedef struct { Tree tree, leaves; int32_t width, count, room; int8_t *letter; } Table;
 
 /* What a run writes, when dense: steps, points and events, into arrays that the caller makes larger when full. */
 typedef struct {
@@ -278,44 +289,31 @@ static void *place(char *base, size_t *used, size_t size, size_t count) {
 
 /* Modes by number ------------------------------------------------------------------------------ */
 
-static uint32_t hash_of(const int8_t *letter, int width) {
-  uint32_t h = 2166136261u;
-  for (int i = 0; i < width; i++) h = (h ^ (uint8_t)letter[i]) * 16777619u;
-  return h;
-}
-
+/* Letters lead from the root of a tree to a leaf, whose child is one more than the number of the mode. */
 static int32_t mode_number(Table *t, const int8_t *letter) {
-  uint32_t at = hash_of(letter, t->width) % (uint32_t)t->buckets;
-  for (; t->bucket[at] >= 0; at = (at + 1) % (uint32_t)t->buckets)
-    if (!memcmp(t->letter + (int64_t)t->bucket[at] * t->width, letter, t->width)) return t->bucket[at];
+  int32_t at = 0;
+  for (int i = 0; i < t->width; i++) at = tree_child(&t->leaves, at, letter[i]);
+  int32_t *number = &t->leaves.node[at].child;
+  if (*number) return *number - 1;
   if (t->count == t->room) {
-    int32_t room = 2 * t->room, buckets = 4 * room;
-    int8_t *more = realloc(t->letter, (size_t)room * (t->width + 1));
-    int32_t *bucket = malloc(sizeof(int32_t) * buckets);
-    if (!more || !bucket) return 0;
-    memset(bucket, -1, sizeof(int32_t) * buckets);
-    for (int32_t k = 0; k < t->count; k++) {
-      uint32_t place = hash_of(more + (int64_t)k * t->width, t->width) % (uint32_t)buckets;
-      while (bucket[place] >= 0) place = (place + 1) % (uint32_t)buckets;
-      bucket[place] = k;
-    }
-    free(t->bucket);
-    t->letter = more; t->bucket = bucket; t->room = room; t->buckets = buckets;
-    return mode_number(t, letter);
+    int8_t *more = realloc(t->letter, 2 * (size_t)t->room * (t->width + 1));
+    if (!more) return 0;
+    t->letter = more;
+    t->room *= 2;
   }
   memcpy(t->letter + (int64_t)t->count * t->width, letter, t->width);
-  t->bucket[at] = t->count;
-  return t->count++;
+  *number = ++t->count;
+  return t->count - 1;
 }
 
 Table *table_new(int32_t width) {
   Table *t = calloc(1, sizeof(Table));
   t->tree = (Tree){malloc(64 * sizeof(Node)), 1, 64};
-  t->tree.node[0] = (Node){.parent = -1, .mode = -1};
-  t->width = width; t->room = 64; t->buckets = 256;
+  t->leaves = (Tree){malloc(64 * sizeof(Node)), 1, 64};
+  t->tree.node[0] = t->leaves.node[0] = (Node){.parent = -1, .mode = -1};
+  t->width = width;
+  t->room = 64;
   t->letter = malloc((size_t)t->room * (width + 1));
-  t->bucket = malloc(sizeof(int32_t) * t->buckets);
-  memset(t->bucket, -1, sizeof(int32_t) * t->buckets);
   return t;
 }
 int32_t table_modes(const Table *t) { return t->count; }
@@ -327,4 +325,4 @@ void table_read(const Table *t, int32_t *parent, int32_t *mode, int8_t *letter) 
   }
   if (letter) memcpy(letter, t->letter, (size_t)t->count * t->width);
 }
-void table_free(Table *t) { free(t->tree.node); free(t->letter); free(t->bucket); free(t); }
+void table_free(Table *t) { free(t->tree.node); free(t->leaves.node); free(t->letter); free(t); }

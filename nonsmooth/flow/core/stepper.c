@@ -30,9 +30,9 @@ static void set_time_state(Run *r) {
 
 /* Move the time on, in two numbers; it is kept to the rounding of the steps, not of their sum. */
 static void pass_time(Run *r, double dt) {
-  double sum = r->t + dt, moved = sum - r->t, lost = (r->t - (sum - moved)) + (dt - moved) + r->t_low;
-  r->t = sum + lost;
-  r->t_low = lost - (r->t - sum);
+  Pair t = pair_sum((Pair){r->t, r->t_low}, (Pair){dt, 0});
+  r->t = t.high;
+  r->t_low = t.low;
   set_time_state(r);
 }
 

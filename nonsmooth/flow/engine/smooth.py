@@ -117,6 +117,7 @@ class LegsProgram:
         fields: Sequence[SmoothProgram],
         events: Sequence[ValuesProgram | None],
         parameters: int,
+        by_leg: bool = False,
     ):
         self._kept = [*fields, *events]
         count, own = len(fields), [e for e in events if e is not None]
@@ -124,12 +125,15 @@ class LegsProgram:
         results = max([e.results for e in own], default=0)
         self._pointers = (ctypes.c_void_p * count)(*[f.pointer for f in fields])
         self._events = (ctypes.c_void_p * count)(*[e.pointer if e else None for e in events])
-        sizes = [parameters + 1, count * self.width, count, count * self.width, count * self.width]
+        every = count * parameters if by_leg else parameters
+        sizes = [every + 1, count * self.width, count, count * self.width, count * self.width]
         sizes += [count * results, max([*(f.work for f in fields), *(e.work for e in own)])]
         places = np.cumsum([0, *sizes]).tolist()
-        self._places, self._count, self._parameters = places, count, parameters
+        self._places, self._count, self._parameters = places, count, every
         pointers = (ctypes.addressof(self._pointers), ctypes.addressof(self._events))
-        self._c = structure("Legs")(count, self.width, results, *places[1:7], *pointers)
+        self._c = structure("Legs")(
+            count, self.width, results, parameters if by_leg else 0, *places[1:7], *pointers
+        )
         self._pointer, self._size = ctypes.addressof(self._c), int(places[-1])
 
     def __call__(
@@ -151,7 +155,7 @@ class LegsProgram:
     def _given(self, z: Array, p: Array, durations: Array) -> tuple[Array, list[Array]]:
         memory, at = np.empty(self._size), self._places
         parts = [memory[at[k] : at[k + 1]] for k in range(6)]
-        parts[0][: self._parameters] = p
+        parts[0][: self._parameters] = p.ravel()
         parts[1][:] = z.ravel()
         parts[2][:] = durations
         return memory, parts
@@ -205,10 +209,11 @@ class WatchProgram:
         most_steps: int,
         ends: float,
     ) -> WatchedLegs:
-        """Watch them; those of no positive duration have their starts alone."""
+        """Watch them, with parameters (np,) or (L, np); those of no positive duration have their starts alone."""
+        parameters = p.shape[1] if p.ndim > 1 else 0
         legs, width, begin, room = self._count, self._width, self._begin, _ROOM + 16 * self._count
         counts, left = np.empty(legs, np.int64), ctypes.c_double()
-        durations, p = np.ascontiguousarray(durations, float), np.append(p, 0.0)
+        durations, p = np.ascontiguousarray(durations, float), np.append(p.ravel(), 0.0)
         pointers = ctypes.addressof(self._pointers)
         while True:
             states = np.empty((legs, width))
@@ -217,7 +222,7 @@ class WatchProgram:
             memory, found = np.empty(legs * begin + self._work), np.empty(room * (4 + width))
             at = memory.ctypes.data
             failed = library().watch_legs(
-                *(pointers, legs, width, p.ctypes.data, states.ctypes.data),
+                *(pointers, legs, width, p.ctypes.data, parameters, states.ctypes.data),
                 *(durations.ctypes.data, tol, most_steps, ends, found.ctypes.data, room),
                 *(counts.ctypes.data, at, begin, ctypes.addressof(left), at + 8 * legs * begin),
             )

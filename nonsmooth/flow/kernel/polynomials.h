@@ -195,6 +195,12 @@ static __attribute__((noinline)) void resolve_step(const T *g, I active, T *h) {
   }
 }
 
+/* Whether a polynomial's errors hide which root on (0, h] is its first, as ``root`` or, with -1, none is. */
+static inline int hides_roots(const double *c, int n, double h, double root) {
+  double end = root < 0 ? h : root, low = first_low(c, n, end, LOW, 0);
+  return low > 0 && !passes_once(c, n, end, low, 0, LOCATED);
+}
+
 /* The root of one lane of any polynomial, and the slope there: of a stop that is passed in its direction, or of another
  * guard (a negative number). NAN where errors hide which root is the first, or a stop has an earlier one. */
 static __attribute__((noinline)) double hard_root(const T *a, int l, int stop, int flipped, int hides, double *slope) {

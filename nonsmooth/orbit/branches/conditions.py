@@ -22,13 +22,17 @@ from numpy.typing import NDArray
 from ...flow.fixed import first_terms
 from ...model import Array, Evaluator, FilippovSystem, Guard, evaluator
 from ...model.derivatives.event_maps import keeps_zero
-from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
+from ...model.derivatives.variational import guarded_field, variational_field
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import Multipliers, finite_return_map
+from ..runs.cell_field import Guarded, field_of
 from ..runs.guards import CONDITIONS, LegGuards, is_met, watch
 from ..runs.legs import Leg, surface_of
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
+
+#: Tests that a user gives: the prefix of the names of events, and the extremum of a cost.
+USER, COST = "event: ", "extremum of the cost"
 
 #: Entries of a return map beyond which its small multipliers have lost their digits.
 _NO_DIGITS = 1e6
@@ -63,7 +67,7 @@ class Condition:
 
 def is_smooth(name: str) -> bool:
     """Whether a test is that of a smooth bifurcation, which does not end an itinerary."""
-    return name in _SMOOTH
+    return name in _SMOOTH or name == COST or name.startswith(USER)
 
 
 def conditions_of(
@@ -94,6 +98,7 @@ def condition_row(
     i, n = condition.leg, problem.dimension
     starts, durations = problem.split(u)
     duration, count = float(durations[i]), problem.size
+    own = count - len(durations) * (n + 1) + i * n
 
     def value(x: Array, q: Array) -> float:
         if condition.what == "start":
@@ -109,7 +114,7 @@ def condition_row(
     sizes = 1e-6 * np.maximum(np.abs(starts).max(axis=0), 1e-3)
     for k in range(n):
         step = sizes[k] * np.eye(n)[k]
-        row[i * n + k] = (value(x + step, p) - value(x - step, p)) / (2 * sizes[k])
+        row[own + k] = (value(x + step, p) - value(x - step, p)) / (2 * sizes[k])
     for j, k in enumerate(free):
         size = 1e-6 * max(abs(float(p[k])), 1e-3)
         step = size * np.eye(p.size)[k]
@@ -176,7 +181,7 @@ def _starting(
     system: FilippovSystem, i: int, leg: Leg, before: Leg
 ) -> list[tuple[int, int, Condition]]:
     """Guards that are not zero by construction at the start of a leg, of those to order 3."""
-    guards = guarded_field(system, leg.mode).motion.guards
+    guards = field_of(system, leg.mode).motion.guards
     orders = [(k, guard, _order(system, guard, before, leg)) for k, guard in enumerate(guards)]
     return [(k, order, Condition("start", i, g)) for k, g, order in orders if order is not None]
 
@@ -242,7 +247,7 @@ def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
 
 
 def _interior(
-    guards: Sequence[tuple[Condition, Guard]], field: GuardedField, rows: Array, p: Array
+    guards: Sequence[tuple[Condition, Guard]], field: Guarded, rows: Array, p: Array
 ) -> list[tuple[Condition, float]]:
     """Smallest minimum of each guard inside a leg, where something happens at its zero."""
     least: dict[int, float] = {}

@@ -29,7 +29,8 @@ from ...flow.fixed import TOLERANCE
 from ...model import Array, ConvergenceError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, EventMap, kept_maps
 from ...model.derivatives.forcing import Forcing
-from ..runs.leg_integration import LegFlows, LegIntegrator, leg_integrator
+from ..runs.cell_legs import CellLegs
+from ..runs.leg_integration import LegFlows, LegIntegrator
 from ..runs.legs import Leg, LegFlow, integrate_leg, rate_at, surface_of
 
 
@@ -49,14 +50,14 @@ class JacobianIndices(NamedTuple):
 def jacobian_indices(count: int, n: int, q: int = 0) -> JacobianIndices:
     """Indices for ``count`` legs of n states, with q parameters."""
     size = count * (n + 1)
-    indices = np.arange(size * (size + q)).reshape(size, size + q)
     rows = np.arange(count * n).reshape(count, n)
     times = np.arange(count * n, size)[:, None]
     more = np.broadcast_to(np.arange(size, size + q), (count, q))
     own, columns = np.hstack([rows, times]), np.hstack([rows, times, more])
     next_leg = np.roll(np.arange(count), -1)
+    width = size + q
     return JacobianIndices(
-        indices[own[:, :, None], columns[:, None, :]], indices[rows, rows[next_leg]], next_leg
+        own[:, :, None] * width + columns[:, None, :], rows * width + rows[next_leg], next_leg
     )
 
 
@@ -84,6 +85,8 @@ class Evaluation:
     durations: Array
     #: (n, n) or None: The projector at the first start onto what constraints allow.
     allowed: Array | None = None
+    #: The same of the parts of divided legs, as legs; None where no leg is divided.
+    parts: Evaluation | None = None
 
     @property
     def jacobian(self) -> Array:
@@ -180,14 +183,28 @@ class BoundaryProblem:
         """Number of unknowns."""
         return len(self.legs) * (self.dimension + 1)
 
+    @property
+    def whole(self) -> BoundaryProblem:
+        """The problem with undivided legs."""
+        return self
+
+    def parts_of(self, i: int) -> range:
+        """The parts of a leg among those of all legs."""
+        return range(i, i + 1)
+
+    def undivided(self, u: Array) -> Array:
+        """The unknowns of undivided legs, without free parameters."""
+        return u[: self.size]
+
     def pack(self, starts: Array, durations: Array) -> Array:
         """Unknowns from starts (N, n) and durations (N,)."""
         return np.concatenate([np.ravel(starts), np.ravel(durations)])
 
     def split(self, u: Array) -> tuple[Array, Array]:
         """Starts (N, n) and durations (N,) of unknowns."""
-        count = len(self.legs) * self.dimension
-        return u[:count].reshape(len(self.legs), self.dimension), u[count : self.size]
+        count = len(self.legs)
+        at = count * self.dimension
+        return u[:at].reshape(count, self.dimension), u[at : at + count]
 
     @cached_property
     def wrap(self) -> Array:
@@ -277,12 +294,14 @@ class BoundaryProblem:
                 gap += rest
         return np.concatenate([gap.ravel(), value])
 
-    def integrator(self, chosen: tuple[int, ...] = ()) -> LegIntegrator:
+    def integrator(self, chosen: tuple[int, ...] = ()) -> LegIntegrator | CellLegs:
         """The legs, ready to be integrated with derivatives by chosen parameters."""
         made = _INTEGRATORS.setdefault(self, {})
         found = made.get(chosen)
         if found is None:
-            found = made[chosen] = leg_integrator(self.system, self.legs, chosen)
+            of_legs = CellLegs if self.system.written.tables else LegIntegrator
+            build = lambda: of_legs(self.system, self.legs, chosen)
+            found = made[chosen] = self.system.cached(("integrator", self.legs, chosen), build)
         return found
 
     def _phased(
@@ -363,9 +382,9 @@ class BoundaryProblem:
 
 
 #: Legs of a problem ready to be integrated, by the chosen parameters.
-_INTEGRATORS: WeakKeyDictionary[BoundaryProblem, dict[tuple[int, ...], LegIntegrator]] = (
-    WeakKeyDictionary()
-)
+_INTEGRATORS: WeakKeyDictionary[
+    BoundaryProblem, dict[tuple[int, ...], LegIntegrator | CellLegs]
+] = WeakKeyDictionary()
 
 
 # Symmetry action on legs.

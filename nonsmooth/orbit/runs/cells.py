@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...flow.events import Event
 from ...model import Array, FilippovSystem, Guard
 from ...model.definition.tables.pieces import Table
+
+if TYPE_CHECKING:
+    from .legs import Leg
 
 #: Events that no letter of a mode stands for.
 _WITHOUT_LETTER = ("stop", "reset", "zero", "end")
@@ -59,6 +64,30 @@ class Cells:
         kept = event.name, event.x_after, own, event.side, event.motion
         return Event(event.kind, event.t, event.x, before, after, *kept)
 
+    def leg(self, leg: Leg) -> Leg:
+        """A leg with its mode and element."""
+        own = leg.element
+        own = own if leg.kind in _WITHOUT_LETTER or own < 0 else self.element(own)
+        further = tuple(self.leg(then) for then in leg.further)
+        return replace(leg, mode=self.mode(leg.mode), element=own, further=further)
+
+    def guard(self, guard: Guard) -> Guard:
+        """A guard of no table as one of a mode that is shown."""
+        if guard.kind in (*_WITHOUT_LETTER, "atom"):
+            return guard
+        entries, element = self._shown.entries, self._first[guard.element]
+        index = entries[element][0] if element < len(entries) else guard.index
+        return replace(guard, element=element, index=index)
+
+    def breakpoint(self, mode: str, element: int) -> tuple[float, float]:
+        """On which side of a breakpoint a mode is, and where that is, by its letter; (1, 0) for others."""
+        own = -1 if element < 0 else self.element(element)
+        for i, entry in self._entries.items():
+            if own == entry:
+                level = self.tables[i].levels[self._places[i][element - self._first[entry]]]
+                return (1.0 if mode[element] == "+" else -1.0), level
+        return 1.0, 0.0
+
     def _above(self, table: Table, mode: str) -> int:
         """How many surfaces of a table are below its cell."""
         first = self._first[self._entries[table.element]]
@@ -79,7 +108,11 @@ class Cells:
         for i, t in self.tables.items():
             above, places, first = self._above(t, mode), self._places[i], self._entries[i]
             own = [(above - 1, 1)] * (above > 0) + [(above, -1)] * (above < t.count)
-            guards = [Guard("surface", i, side, self._first[first] + k) for k, side in own]
+            guards = [
+                Guard("surface", self._shown.entries[j][0], side, j)
+                for k, side in own
+                for j in (self._first[first] + k,)
+            ]
             found[i] = [(t.levels[places[k]], g) for (k, _), g in zip(own, guards, strict=True)]
         return found
 

@@ -7,10 +7,9 @@ without samples.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from types import MappingProxyType
 
 import numpy as np
 
@@ -20,6 +19,8 @@ from ...flow.variation import carry_legs, require_done
 from ...model import Array, FilippovSystem, Guard
 from ...model.derivatives.event_maps import is_due_at
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
+from .cell_field import CellField, Guarded, field_of
+from .cells import cells_of
 from .legs import Leg, integrate_leg, leg_name
 
 #: Part of a leg's duration beside its ends that belongs to the ends, where guards are zero.
@@ -59,26 +60,14 @@ class Watch:
     faults: list[str]
 
 
-#: What is watched of tables, by function: each breakpoint beside the cell with its guard as results show it.
-Beside = Mapping[int, Sequence[tuple[float, Guard]]]
-
-
-def watch(
-    system: FilippovSystem,
-    leg: Leg,
-    x: Array,
-    duration: float,
-    p: Array,
-    beside: Beside = MappingProxyType({}),
-) -> Watch:
+def watch(system: FilippovSystem, leg: Leg, x: Array, duration: float, p: Array) -> Watch:
     """Find the extrema of all guards inside a leg, and the violations."""
-    field = guarded_field(system, leg.mode)
-    ((rows,), _, _) = LegGuards(system, [leg])(x[None], p, np.array([duration]))
-    faults = [] if beside else _violations_along(field, rows, p)
-    return Watch(_approaches(field, rows, p, beside), faults)
+    guards = LegGuards(system, [leg])
+    ((rows,), _, _), (field,) = guards(x[None], p, np.array([duration])), guards.fields
+    return Watch(_approaches(field, rows, p), _violations_along(field, rows, p))
 
 
-def is_met(field: GuardedField, row: Array, p: Array) -> bool:
+def is_met(field: Guarded, row: Array, p: Array) -> bool:
     """Whether something happens where the guard of a row of ``LegsWatch`` passes zero."""
     guard, system = field.motion.guards[int(row[0])], field.motion.system
     if guard.kind not in CONDITIONS:
@@ -86,19 +75,11 @@ def is_met(field: GuardedField, row: Array, p: Array) -> bool:
     return is_due_at(system, guard, row[4 : 4 + system.extended_dimension], p)
 
 
-def _approaches(field: GuardedField, rows: Array, p: Array, beside: Beside) -> list[Approach]:
+def _approaches(field: Guarded, rows: Array, p: Array) -> list[Approach]:
     """Extrema at which guards come near to zero."""
     guards, found = field.motion.guards, list[Approach]()
     for row in rows:
         guard, (t, value, bend) = guards[int(row[0])], row[1:4].tolist()
-        near = beside.get(guard.index, ()) if guard.kind == "surface" else ()
-        for level, own in near if bend else ():
-            size = float(np.linalg.norm(field.gradients.copied(row[4:], p)[0][int(row[0])]))
-            if bend * own.side > 0.0 and size > 0.0:
-                distance = own.side * (value - level)
-                found.append(Approach(own, t, distance, distance / size))
-        if near or (guard.kind == "surface" and guard.index in beside):
-            continue
         if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_met(field, row, p):
             slope = field.gradients.copied(row[4:], p)[0][int(row[0])]
             size = math.sqrt(float(slope @ slope))
@@ -111,11 +92,13 @@ class LegGuards:
     """The guards of consecutive legs, evaluated repeatedly."""
 
     def __init__(self, system: FilippovSystem, legs: Sequence[Leg]):
-        self._system, self._legs = system, tuple(legs)
-        self.fields = [guarded_field(system, leg.mode) for leg in legs]
-        self._plain = [variational_field(system, leg.mode) for leg in legs]
+        self.fields = [field_of(system, leg.mode) for leg in legs]
+        self._cells, cells = [f for f in self.fields if isinstance(f, CellField)], cells_of(system)
+        self._system, self._legs = cells.system, [cells.leg(leg) for leg in legs]
+        self._driven = [guarded_field(cells.system, leg.mode) for leg in self._legs]
+        self._plain = [variational_field(cells.system, leg.mode) for leg in self._legs]
         self._limits = [i for i, leg in enumerate(legs) if leg.repeats]
-        self._watch = None if system.sets else LegsWatch(self.fields)
+        self._watch = None if system.sets else LegsWatch(self._driven)
 
     def __call__(
         self, starts: Array, p: Array, durations: Array
@@ -124,12 +107,27 @@ class LegGuards:
         if self._limits:
             durations = durations.copy()
             durations[self._limits] = 0.0
+        if not self._cells:
+            return self._watched(starts, np.broadcast_to(p, (len(starts), p.size)), durations)
+        own = np.array([field.parameters(p) for field in self._cells])
+        rows, begins, values = self._watched(starts, own, durations)
+        return (
+            [field.extrema(of) for field, of in zip(self._cells, rows, strict=True)],
+            [field.series(of) for field, of in zip(self._cells, begins, strict=True)],
+            [field.values(of) for field, of in zip(self._cells, values, strict=True)],
+        )
+
+    def _watched(
+        self, starts: Array, p: Array, durations: Array
+    ) -> tuple[list[Array], list[Array], list[Array]]:
+        """The same of modes without breakpoints, with parameters (L, np)."""
         if self._watch is None:
-            given = zip(self._legs, self.fields, starts, durations.tolist(), strict=True)
-            legs = [_by_steps(self._system, leg, f, x, t, p) for leg, f, x, t in given]
+            given = zip(self._legs, self._driven, starts, durations.tolist(), p, strict=True)
+            legs = [_by_steps(self._system, leg, f, x, t, own) for leg, f, x, t, own in given]
             rows, begins, values = zip(*legs, strict=True)
             return [*rows], [*begins], [*values]
-        states = [field.states_at(x, p) for field, x in zip(self._plain, starts, strict=True)]
+        given_states = zip(self._plain, starts, p, strict=True)
+        states = [field.states_at(x, own) for field, x, own in given_states]
         return self._watch(states, p, durations, _ENDS)
 
 
@@ -170,7 +168,7 @@ def _by_steps(
     return np.array(rows).reshape(-1, 4 + n), begin, terms(found.ends[0])[n:, 0]
 
 
-def _violations_along(field: GuardedField, rows: Array, p: Array) -> list[str]:
+def _violations_along(field: Guarded, rows: Array, p: Array) -> list[str]:
     """Violations, from extrema of guards and values at the ends of steps."""
     if not len(rows) or float(rows[:, 2].min()) >= 0.0:
         return []
@@ -222,7 +220,9 @@ def change_fault(
     y = variational_field(system, following).states_at(after, p)
     field = guarded_field(system, following)
     begin = np.vstack(first_terms(field, y, p))
-    return _change_fault(system, leg, float(own.gradient @ rate), field, begin, p)
+    return _change_fault(
+        leg, guarded_field(system, leg.mode), float(own.gradient @ rate), field, begin, p
+    )
 
 
 def begin_fault(system: FilippovSystem, leg: Leg, end: Array, p: Array) -> str:
@@ -233,13 +233,14 @@ def begin_fault(system: FilippovSystem, leg: Leg, end: Array, p: Array) -> str:
 
 
 def _change_fault(
-    system: FilippovSystem, leg: Leg, speed: float, field: GuardedField, begin: Array, p: Array
+    leg: Leg, own: Guarded, speed: float, field: Guarded, begin: Array, p: Array
 ) -> str:
     """The same from the rate of the event's function, and from the first coefficients of the next leg."""
-    own = None if leg.repeats else leg.map(system)
-    if own is None:
+    system = own.motion.system
+    found = (g for g in own.motion.guards if g.ends(leg.kind, leg.element, leg.side))
+    guard = next(found, None) if not leg.repeats else None
+    if guard is None:
         return _following_fault(field, begin, p)
-    guard = own.guard
     if guard.kind in ("surface", "exit", "impact", "release") and speed > 0.0:
         condition, name = described(system, guard), leg.name(system)
         return f"at its end {condition} starts to hold instead of failing ({name})"
@@ -248,13 +249,13 @@ def _change_fault(
     return _following_fault(field, begin, p)
 
 
-def _following_fault(field: GuardedField, begin: Array, p: Array) -> str:
+def _following_fault(field: Guarded, begin: Array, p: Array) -> str:
     """A guard of the next mode that is negative, or zero and falling, where the mode begins."""
     fault = _negative(field, begin, p)
     return fault and f"where mode {field.motion.mode!r} begins after it, {fault}"
 
 
-def _negative(field: GuardedField, begin: Array, p: Array) -> str:
+def _negative(field: Guarded, begin: Array, p: Array) -> str:
     """Describe the first guard whose first nonzero coefficient is negative."""
     guards = field.motion.guards
     states, rows = begin[: len(begin) - len(guards)], begin[len(begin) - len(guards) :]
@@ -299,7 +300,7 @@ def faults_along(
         following = (i + 1) % count
         if not leg.timed and (closes or following):
             field, begin = fields[following], begins[following]
-            fault = _change_fault(system, leg, float(speeds[i]), field, begin, p)
+            fault = _change_fault(leg, fields[i], float(speeds[i]), field, begin, p)
             found += [fault] if fault else []
         result += [f"leg {i + 1} {leg_name(system, leg)}: {fault}" for fault in found]
     return result

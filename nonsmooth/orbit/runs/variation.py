@@ -628,20 +628,17 @@ class Sensitivity:
 
 def _clearance(run: Trajectory) -> tuple[float, str]:
     """Smallest distance from a guard that a run passed without reaching it, with its name and time."""
-    cells, best = cells_of(run.system), (math.inf, "")
+    p, best = parameters_of(run), (math.inf, "")
     for part in stretches(run, driven=True):
         if part.duration <= 0.0:
             continue
-        beside = cells.beside(part.shown.mode)
         try:
-            given = part.leg, part.start, part.duration, part.p
-            seen = watch(part.system, *given, beside).approaches
+            seen = watch(run.system, part.shown, part.start, part.duration, p).approaches
         except ConvergenceError:
             continue  # no Taylor series at an end
         for near in seen:
             if abs(near.distance) < best[0]:
-                is_shown = near.guard.kind == "surface" and near.guard.index in beside
-                guard = described(run.system if is_shown else part.system, near.guard)
+                guard = described(run.system, near.guard)
                 best = (abs(near.distance), f"{guard} at t = {part.t + near.t:.6g}")
     return best
 

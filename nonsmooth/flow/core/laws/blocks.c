@@ -305,27 +305,21 @@ static int maximise(const double *g, const double *s, const double *c, double ca
   return 1;
 }
 
-/* Distances of nu from the bounds that are open to it (rows), where w is zero. */
-static int distances(const Block *k, const double *nu, const int8_t *is_moving, double *s) {
+/* Distances of nu from the bounds that are open to it (rows), where w is zero, and whose they are. */
+static int distances(const Block *k, const double *nu, const int8_t *is_moving, double *s, int32_t *of) {
   int rows = 0;
   for (int i = 0; i < k->size; i++) {
     double bound = k->is_contact[i] ? 0 : bound_of(k, i, nu);
     if (!is_moving[i] || k->state[i] == INSIDE) continue;
-    if (!k->is_contact[i] && k->state[i] != AT_BOTTOM) s[rows++] = bound - nu[i];
-    if (k->state[i] != AT_TOP) s[rows++] = nu[i] + bound;
+    if (!k->is_contact[i] && k->state[i] != AT_BOTTOM) { of[rows] = i; s[rows++] = bound - nu[i]; }
+    if (k->state[i] != AT_TOP) { of[rows] = i; s[rows++] = nu[i] + bound; }
   }
   return rows;
 }
 
-/* How large the unknown of a distance can be where it has no bound: it takes what others bring. */
-static double reach_of(const Block *k, const double *nu, const int8_t *is_moving, int row) {
+/* How large an unknown can be where it has no bound: it takes what others bring. */
+static double reach_of(const Block *k, const double *nu, int i) {
   double reach = 0, own = 0;
-  int i = 0;
-  for (int rows = 0; i < k->size; i++) {
-    if (!is_moving[i] || k->state[i] == INSIDE) continue;
-    rows += (!k->is_contact[i] && k->state[i] != AT_BOTTOM) + (k->state[i] != AT_TOP);
-    if (rows > row) break;
-  }
   if (!k->is_contact[i]) return 0;
   for (int l = 0; l < k->size; l++) own = larger(fabs(k->matrix[l * k->size + i]), own);
   for (int j = 0; j < k->size && own > 0; j++)
@@ -338,6 +332,7 @@ static double reach_of(const Block *k, const double *nu, const int8_t *is_moving
 static int move_inside(const Block *k, double *nu, double *work, int32_t *pivot) {
   int n = k->size, rows = 0, found = 1;
   int8_t *is_moving = (int8_t *)work;
+  int32_t of[2 * n];
   double *e = work + n, *z = e + 2 * (int64_t)n * n, *g = z + (int64_t)n * n, *s = g + 2 * (int64_t)n * n, *mean = s + 2 * n;
   double *y = mean + n, *trial = y + n, *shifted = trial + n, *rest = shifted + 2 * n;
   for (int i = 0; i < n; i++) {
@@ -355,19 +350,19 @@ static int move_inside(const Block *k, double *nu, double *work, int32_t *pivot)
   int d = null_space(e, rows, n, z, rest, pivot);
   if (!d) return 0;
   memcpy(mean, nu, sizeof(double) * n);
-  rows = distances(k, nu, is_moving, s);
+  rows = distances(k, nu, is_moving, s, of);
   for (int l = 0; l < d; l++) { /* distances are affine */
     for (int i = 0; i < n; i++) trial[i] = nu[i] + z[(int64_t)l * n + i];
-    distances(k, trial, is_moving, shifted);
+    distances(k, trial, is_moving, shifted, of);
     for (int q = 0; q < rows; q++) g[(int64_t)q * d + l] = shifted[q] - s[q];
   }
   for (int q = 0; q < rows; q++) s[q] = larger(s[q], 0);
   double cap = 0;
   for (int i = 0; i < n; i++) cap = larger(cap, fabs(nu[i]) + (k->is_contact[i] ? 0 : fabs(bound_of(k, i, nu))));
   for (int q = 0; q < rows; q++) {
-    distances(k, mean, is_moving, shifted);
+    distances(k, mean, is_moving, shifted, of);
     if (shifted[q] > TIED * cap || !(cap > 0)) continue;
-    if (!maximise(g, s, g + (int64_t)q * d, larger(cap, reach_of(k, nu, is_moving, q)), rows, d, y, rest, pivot)) continue;
+    if (!maximise(g, s, g + (int64_t)q * d, larger(cap, reach_of(k, nu, of[q])), rows, d, y, rest, pivot)) continue;
     found++;
     for (int i = 0; i < n; i++) {
       trial[i] = nu[i];

@@ -167,7 +167,7 @@ static int find_hidden_jump(Run *r, const int32_t *own, int n, const double *fro
 static int follow_step(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int32_t *own = r->decision->own;
   int8_t *trial = r->tried_letter;
-  int due, n = find_jumping(r, 1, own, &due);
+  int due, n;
   Solutions all = {0};
   for (double share = IMPULSIVE; share < WEAK; share *= IMPULSIVE_STEP) {
     memcpy(trial, letter, r->width);
@@ -178,7 +178,7 @@ static int follow_step(Run *r, const int8_t *letter, const Known *known, int kno
     if (all.count != 1) continue;
     memcpy(r->found.unknowns, all.each, sizeof(double) * r->width);
     if (!continues(r, trial, known, known_count, &r->found)) continue;
-    copy_continuation(r, &r->chosen, &r->found);
+    choose_found(r);
     return 1;
   }
   return 0;

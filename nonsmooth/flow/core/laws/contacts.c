@@ -77,62 +77,42 @@ typedef struct { const double *x, *target, *before; int plastic, by_law; } Strik
 static int strike_group(Run *r, const int32_t *own, int n, const Strike *of, double *taken, double *after) {
   Decision *d = r->decision;
   int w = r->width, m = r->m, solved;
-  int32_t *which = d->own;
-  int8_t *letter = (int8_t *)(r->pending + 2 * w), *position = d->block_state + 2 * w;
-  int8_t *span = d->block_state + 3 * w;
-  double all[MOST_SOLUTIONS * MOST_ENUMERATED];
-  Block b = {.size = n, .tie = TIED, .own = which, .a = d->block, .state = d->block_state, .is_contact = d->block_state + w};
-  b.b = b.a + n; b.floor = b.b + n; b.matrix = b.floor + n; b.share = b.matrix + n * n;
-  double *slack = b.share + n * n;
+  int8_t *letter = (int8_t *)(r->pending + 2 * w), *position = d->large_class;
+  double all[MOST_SOLUTIONS * MOST_ENUMERATED], *slack = d->old, *found = d->large, *every = r->lam;
+  Block b = {.size = n, .tie = TIED, .own = d->own, .a = d->a, .b = d->b, .matrix = d->matrix, .share = d->share,
+             .floor = d->floor, .state = d->state, .is_contact = d->is_contact};
+  d->count = n;
   memcpy(letter, r->letter, w);
-  for (int i = 0; i < n; i++) { which[i] = own[i]; if (own[i] < m) letter[own[i]] = 0; }
+  for (int i = 0; i < n; i++) { d->own[i] = own[i]; if (own[i] < m) letter[own[i]] = 0; }
   surface_values(r, of->x);
   surface_scales(r, of->x);
   held_of(r, letter);
   for (int j = 0; of->before && j < r->c; j++) r->held[m + j] = of->before[j];
   error_scales(r, of->x, r->held, r->none);
   for (int i = 0; i < n; i++) {
-    int contact = which[i] >= m, joint = has_law(r, which[i], JOINT_LAW), at = rate_row(r, which[i]);
-    int set = set_of(r, which[i]);
-    span[i] = (int8_t)(set < 0 ? 0 : which[i] == set ? size_of(r, set) : -1);
-    if (set >= 0) b.span = span;
-    b.is_contact[i] = (int8_t)contact;
-    b.state[i] = joint ? INSIDE : UNDECIDED;
-    position[i] = contact || joint || r->letter[which[i]] == 0 ? HELD : r->letter[which[i]] > 0 ? TOP : BOTTOM;
-    b.a[i] = contact ? of->target[which[i] - m] : r->rates[at];
-    slack[i] = contact ? larger(b.a[i] + r->rates[at], 0) : 0;
-    b.floor[i] = VANISHES * r->rates[r->kept_rows + at];
-    b.b[i] = contact || joint ? 0 : factor_of(r, which[i]);
-    d->sign[i] = contact || joint ? 1 : ns_sign(b.b[i]);
-    for (int j = 0; j < n; j++) b.matrix[i * n + j] = (contact ? 1 : -1) * r->slope[which[i] * w + which[j]];
+    int contact = own[i] >= m, joint = has_law(r, own[i], JOINT_LAW), at = rate_row(r, own[i]), set = set_of(r, own[i]);
+    d->span[i] = (int8_t)(set < 0 ? 0 : own[i] == set ? size_of(r, set) : -1);
+    if (set >= 0) b.span = d->span;
+    d->is_contact[i] = (int8_t)contact;
+    d->is_idle[i] = (int8_t)joint;
+    d->state[i] = joint ? INSIDE : UNDECIDED;
+    position[i] = contact || joint || r->letter[own[i]] == 0 ? HELD : r->letter[own[i]] > 0 ? TOP : BOTTOM;
+    d->a[i] = contact ? of->target[own[i] - m] : r->rates[at];
+    slack[i] = contact ? larger(d->a[i] + r->rates[at], 0) : 0;
+    d->floor[i] = VANISHES * r->rates[r->kept_rows + at];
+    d->b[i] = contact || joint ? 0 : factor_of(r, own[i]);
+    for (int j = 0; j < n; j++) d->matrix[i * n + j] = (contact ? 1 : -1) * r->slope[own[i] * w + own[j]];
   }
-  memset(b.share, 0, sizeof(double) * n * n);
-  for (int j = 0; j < n; j++) { /* limits of friction by the impulses */
-    if (!b.is_contact[j]) continue;
-    r->held[which[j]] += 1;
-    error_scales(r, of->x, r->held, r->none);
-    r->held[which[j]] -= 1;
-    for (int i = 0; i < n; i++) {
-      if (b.is_contact[i] || b.state[i] == INSIDE) continue;
-      b.share[i * n + j] = factor_of(r, which[i]) - b.b[i];
-      if (!d->sign[i]) d->sign[i] = ns_sign(b.share[i * n + j]);
-      b.is_coupled |= b.share[i * n + j] != 0;
-    }
-  }
-  for (int i = 0; i < n; i++) { /* a bound that is negative turns its unknown */
-    if (!(d->sign[i] < 0)) continue;
-    b.b[i] *= -1;
-    for (int j = 0; j < n; j++) { b.share[i * n + j] *= -1; b.matrix[j * n + i] *= -1; }
-  }
-  double *found = d->large, *every = r->lam;
+  read_shares(r, d, of->x);
+  for (int i = 0; i < n * n; i++) b.is_coupled |= d->share[i] != 0;
   solved = !of->by_law && !b.span && take_most(&b, position, slack, of->plastic, found, d->work, d->pivot);
   if (!solved && b.span) solved = relax(&b, found, d->work, d->pivot);
   else if (!solved) solved = pivot_block(&b, position, found, 20 + 4 * n, d->work, d->pivot) || lemke_block(&b, found, d->work, d->pivot);
   if (!solved && !b.span && n <= MOST_ENUMERATED && enumerate(&b, all, d->work, d->pivot)) { found = all; solved = 1; }
   if (!solved) return 0;
   memset(every, 0, sizeof(double) * w);
-  for (int i = 0; i < n; i++) every[which[i]] = d->sign[i] < 0 ? -found[i] : found[i];
-  for (int i = 0; taken && i < n; i++) if (which[i] >= m) taken[which[i] - m] = found[i];
+  for (int i = 0; i < n; i++) every[own[i]] = d->sign[i] * found[i];
+  for (int i = 0; taken && i < n; i++) if (own[i] >= m) taken[own[i] - m] = found[i];
   add_impulses(r, of->x, letter, every, after);
   return 1;
 }

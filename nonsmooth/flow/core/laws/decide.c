@@ -116,10 +116,26 @@ static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b,
   return 1;
 }
 
+/* Bounds of friction by one of the reactions, of which they are affine functions; bounds that are negative turned. */
+static void read_shares(Run *r, Decision *d, const double *x) {
+  int k = d->count;
+  memset(d->share, 0, sizeof(double) * k * k);
+  for (int j = 0; j < k; j++) {
+    int carries = 0;
+    for (int i = 0; i < r->m && d->is_contact[j] && d->own[j] >= r->m; i++) carries |= r->s->carries[i * r->c + d->own[j] - r->m];
+    if (!carries) continue;
+    r->held[d->own[j]] += 1;
+    error_scales(r, x, r->held, r->none);
+    r->held[d->own[j]] -= 1;
+    for (int i = 0; i < k; i++)
+      if (!d->is_contact[i] && !d->is_idle[i]) d->share[i * k + j] = factor_of(r, d->own[i]) - d->b[i];
+  }
+  for (int i = 0; i < k; i++) { d->sign[i] = 1; turn_bound(d, i, d->b + i); }
+}
+
 /* Rows, matrix and bounds at the present point; 0 where they are no numbers. */
 static int read_law(Run *r, Decision *d) {
-  int k = d->count, w = r->width, carried = 0;
-  memset(d->share, 0, sizeof(double) * k * k);
+  int k = d->count, w = r->width;
   memcpy(d->base, d->letter, w);
   for (int i = 0; i < k; i++) {
     int own = d->own[i] = r->active[i], set = set_of(r, own);
@@ -129,21 +145,12 @@ static int read_law(Run *r, Decision *d) {
     d->is_contact[i] = (int8_t)is_half_line(r, own);
     d->turn[i] = d->is_contact[i] ? -1 : 1;
     d->is_idle[i] = element(r, own)->flags & CONTINUOUS;
-    for (int j = 0; j < r->c && own < r->m; j++) carried |= r->s->carries[own * r->c + j];
   }
   if (!read_rows(r, d, r->x, d->a, d->b, d->floor, d->work)) return 0;
   for (int i = 0; i < k; i++)
     for (int j = 0; j < k; j++)
       d->matrix[i * k + j] = d->is_idle[j] ? 0 : -d->turn[i] * beside_joints(r, d, i, r->slope + d->own[j], w);
-  for (int j = 0; carried && j < k; j++) { /* bounds are affine in the reactions */
-    if (!d->is_contact[j]) continue;
-    r->held[d->own[j]] = 1;
-    error_scales(r, r->x, r->held, r->none);
-    r->held[d->own[j]] = 0;
-    for (int i = 0; i < k; i++)
-      if (!d->is_contact[i] && !d->is_idle[i]) d->share[i * k + j] = factor_of(r, d->own[i]) - d->b[i];
-  }
-  for (int i = 0; i < k; i++) { d->sign[i] = 1; turn_bound(d, i, d->b + i); }
+  read_shares(r, d, r->x);
   return finite_all(d->matrix, k * k);
 }
 
@@ -210,12 +217,8 @@ static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
   held_of(r, letter);
   for (int i = 0; i < d->count; i++) r->held[d->own[i]] = 0;
   if (!r->s->sets) return;
-  memset(e->lambda, 0, sizeof(double) * w * stride);
-  for (int i = 0; i < r->m; i++) {
-    e->lambda[(int64_t)i * stride] = r->direction[i];
-    if (letter[i] == LEFT_BEHIND) e->series[(int64_t)i * stride] = r->unknowns[i];
-  }
   memcpy(e->l.letter, letter, w);
+  begin_sets(r, e, r->unknowns);
   e->l.mode = -1;
   e->l.is_free = 0;
 }
@@ -426,45 +429,12 @@ static void add_rounding(Decision *d, Block *b) {
   b->room = room;
 }
 
-/* The first row of the element of a row. */
-static int first_row(const int8_t *span, int i) {
-  while (span[i] < 0) i--;
-  return i;
-}
-
-/* What is proved of a block with vectors, in units of its unknowns in which it is symmetric. */
-static int certificate_of_vectors(const Block *b, double *work, int32_t *pending) {
-  int n = b->size, count = 0;
-  const double *m = b->matrix;
-  double *unit = work, *size = unit + n, *a = size + n, *rest = a + n * n;
-  memset(unit, 0, sizeof(double) * n);
-  for (int root = 0; root < n; root++) {
-    if (unit[root] == 0) { unit[root] = 1; pending[count++] = root; }
-    while (count) {
-      int i = pending[--count];
-      for (int j = 0; j < n; j++) {
-        int is_one = first_row(b->span, i) == first_row(b->span, j);
-        if (unit[j] != 0 || !(is_one || m[i * n + j] * m[j * n + i] > 0)) continue;
-        unit[j] = unit[i] * (is_one ? 1 : m[j * n + i] / m[i * n + j]);
-        pending[count++] = j;
-      }
-    }
-  }
-  for (int i = 0; i < n; i++) size[i] = m[i * n + i] > 0 ? sqrt(m[i * n + i] * unit[i]) : 1;
-  for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) a[i * n + j] = m[i * n + j] * unit[j] / (size[i] * size[j]);
-  for (int i = 0; i < n; i++) for (int j = 0; j < i; j++) if (!(fabs(a[i * n + j] - a[j * n + i]) <= SYMMETRIC)) return NOTHING;
-  memcpy(rest, a, sizeof(double) * n * n);
-  if (is_definite(rest, n, VANISHES * n)) return UNIQUE_AND_STABLE;
-  return is_definite(a, n, -SINGULAR * n) ? SEMIDEFINITE : NOTHING;
-}
-
 /* What is proved of each block, once, or after its vectors have been turned. */
 static int certificate_of(Decision *d, const Block *b, int which) {
   int has_vectors = 0;
   for (int i = 0; i < b->size; i++) has_vectors |= d->span[b->own[i]];
   if (d->proved[which] < 0 || has_vectors)
-    d->proved[which] = b->is_coupled ? NOTHING : b->span ? certificate_of_vectors(b, d->work, d->pivot)
-                                                         : certificate(b->matrix, b->size, d->work, d->pivot);
+    d->proved[which] = b->is_coupled ? NOTHING : certificate(b->matrix, b->size, b->span, d->work, d->pivot);
   return d->proved[which];
 }
 
@@ -592,7 +562,7 @@ static int is_stable_block(Run *r, Decision *d, int which, int orders) {
   int n = layer_matrix(r, d, which, orders, a, weight), stable, falling = 0;
   if (n == 0) return 1;
   if (n == 1) return a[0] > 0;
-  int proved = certificate(a, n, d->work, d->pivot), moves = 0, turns = 1; /* orbits that only turn: no trace */
+  int proved = certificate(a, n, 0, d->work, d->pivot), moves = 0, turns = 1; /* orbits that only turn: no trace */
   for (int i = 0; i < n * n; i++) moves |= a[i] != 0;
   for (int i = 0; i < n; i++) turns &= moves && a[i * n + i] == 0;
   if (proved == UNIQUE_AND_STABLE || (proved == SEMIDEFINITE && !turns)) return 1;

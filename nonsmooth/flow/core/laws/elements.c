@@ -218,20 +218,6 @@ static void require_joints(Run *r, const double *scale) {
   }
 }
 
-/* Whether friction on a set has no load: all contacts that carry it are open, here also those that may close. After
- * surface_values, with ``scale``; without it by the letters alone. */
-static int is_unloaded(const Run *r, const int8_t *letter, int set, const double *scale) {
-  int carried = 0;
-  for (int j = 0; j < r->c; j++) {
-    int gap = r->m + j, rate = gap + r->c;
-    if (!r->s->carries[set * r->c + j]) continue;
-    if (!letter[gap]) return 0;
-    if (scale && fabs(r->rates[gap]) <= ON_SURFACE * scale[gap] && fabs(r->rates[rate]) <= ON_SURFACE * scale[rate]) return 0;
-    carried = 1;
-  }
-  return carried;
-}
-
 /* Sets without load are idle. */
 static void idle_sets(const Run *r, int8_t *letter, const double *scale) {
   EACH_SET(r, s) if (is_unloaded(r, letter, s, scale)) memset(letter + s, IDLE, size_of(r, s));

@@ -63,11 +63,10 @@ static int continues(Run *r, const int8_t *letter, const Known *known, int known
   result->strict = 1;
   memset(result->drop, 0, sizeof(int32_t) * r->guards);
   for (int row = 0; row < e->l.rows; row++) {
-    int kind = e->l.kind[row], index = e->l.index[row], active = 0, zeros = 0;
+    int kind = e->l.kind[row], index = e->l.index[row], zeros = 0;
     if (is_atom(kind)) continue;
     if (kind == NEAR_GUARD && letter[index] == 0) continue; /* ends steps only */
-    for (int i = 0; i < r->active_count; i++) active |= r->active[i] == index;
-    if (!active) continue;
+    if (!is_active(r, index)) continue;
     for (int i = 0; i < known_count; i++)
       if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row] && others_stay(r, letter, index)
           && (!r->s->combined || is_zero_to(r, e, row, KNOWN_TO * r->o.rtol))) /* unknowns that keep equations may jump */
@@ -84,12 +83,7 @@ static int continues(Run *r, const int8_t *letter, const Known *known, int known
   return 1;
 }
 
-static void copy_continuation(const Run *r, Continuation *to, const Continuation *from) {
-  memcpy(to->letter, from->letter, r->width);
-  memcpy(to->drop, from->drop, sizeof(int32_t) * r->guards);
-  memcpy(to->unknowns, from->unknowns, sizeof(double) * r->width);
-  to->strict = from->strict;
-}
+static void choose_found(Run *r) { Continuation found = r->found; r->found = r->chosen; r->chosen = found; }
 
 static int rests(const Run *r, const int8_t *letter) {
   for (int i = 0; i < r->width; i++) if (letter[i] == 0) return 1;
@@ -114,10 +108,7 @@ static void count_found(Run *r, Tally *t) {
   int strict = r->found.strict, rank = strict ? 2 : rests(r, r->found.letter);
   if (r->s->combined && strict && is_found(r, t)) return;
   if (strict && r->several_count < SEVERAL) r->several[r->several_count++] = r->trial.l.mode;
-  if (!t->found || rank > t->rank) {
-    t->rank = rank;
-    copy_continuation(r, &r->chosen, &r->found);
-  }
+  if (!t->found || rank > t->rank) { t->rank = rank; choose_found(r); }
   t->strict += strict;
   t->found++;
 }
@@ -442,7 +433,7 @@ static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int
     keep_others(r, trial, own, r->found.unknowns);
     if (k < count) r->found.unknowns[own] = root[k];
     if (!continues(r, trial, known, known_count, &r->found) || !r->found.strict) continue;
-    copy_continuation(r, &r->chosen, &r->found);
+    choose_found(r);
     return 1;
   }
   return 0;

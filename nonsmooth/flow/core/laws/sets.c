@@ -94,9 +94,8 @@ static void follow_sets(Run *r, Expansion *e, int k) {
 /* Rates at which sets are left, in the directions in which they are. */
 static void leave_at_rates(Run *r, Expansion *e) {
   int w = r->width, stride = r->stride;
-  EACH_SET(r, f) {
+  EACH_LEAVING(r, e, f) {
     int size = size_of(r, f);
-    if (e->l.letter[f] != LEAVING) continue;
     double *radius = e->rates + (int64_t)f * (stride + 1), rate = 0, terms = 0;
     for (int i = 0; i < size; i++) {
       double u = e->lambda[(int64_t)(f + i) * stride], g = row_of(r, r->n + f + i)[0], sum = fabs(g);
@@ -116,8 +115,7 @@ static int leaving_matrix(Run *r, const Expansion *e, int k, int *count) {
   int slides = e->l.slides, n = 0, sets = 0, stride = r->stride, w = r->width, at = slides;
   int32_t *which = r->pending;
   for (int i = 0; i < slides; i++) which[n++] = e->l.sliding[i];
-  EACH_SET(r, f) {
-    if (e->l.letter[f] != LEAVING) continue;
+  EACH_LEAVING(r, e, f) {
     for (int i = f; i < f + size_of(r, f); i++) which[n++] = i;
     sets++;
   }
@@ -126,9 +124,8 @@ static int leaving_matrix(Run *r, const Expansion *e, int k, int *count) {
   memset(a, 0, sizeof(double) * all * all);
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) a[i * all + j] = e->slopes[which[i] * w + which[j]];
-  EACH_SET(r, f) {
+  EACH_LEAVING(r, e, f) {
     int size = size_of(r, f);
-    if (e->l.letter[f] != LEAVING) continue;
     for (int i = f; i < f + size; i++, at++) {
       double u = e->lambda[(int64_t)i * stride];
       a[at * all + at] -= (k + 1) * e->rates[(int64_t)f * (stride + 1) + 1];
@@ -148,9 +145,8 @@ static void leave_sets(Run *r, Expansion *e, int k) {
   const int32_t *which = r->pending;
   double *a = r->work, *b = a + (int64_t)all * all;
   for (int i = 0; i < n; i++) b[i] = -row_of(r, r->n + which[i])[k];
-  EACH_SET(r, f) {
+  EACH_LEAVING(r, e, f) {
     int size = size_of(r, f);
-    if (e->l.letter[f] != LEAVING) continue;
     const double *radius = e->rates + (int64_t)f * (stride + 1);
     b[column] = 0;
     for (int i = f; i < f + size; i++, at++) {
@@ -167,8 +163,7 @@ static void leave_sets(Run *r, Expansion *e, int k) {
   for (int i = 0; i < slides; i++) e->series[(int64_t)which[i] * stride + k] = b[i];
   for (int i = slides; i < n; i++) e->lambda[(int64_t)which[i] * stride + k] = b[i];
   at = n;
-  EACH_SET(r, s)
-    if (e->l.letter[s] == LEAVING) e->rates[(int64_t)s * (stride + 1) + k + 1] = b[at++];
+  EACH_LEAVING(r, e, s) e->rates[(int64_t)s * (stride + 1) + k + 1] = b[at++];
 }
 
 /* Coefficients k + 1 of h that is carried along. */
@@ -189,28 +184,17 @@ static void close_sets(Run *r, Expansion *e, int k) {
   }
 }
 
-/* Multipliers of sets at the start of the series; whether sets are left. */
-static int begin_directions(Run *r, Expansion *e) {
-  int leaving = 0;
-  if (!r->s->sets) return 0;
-  memset(e->lambda, 0, sizeof(double) * r->width * r->stride); /* the first guess of each order is zero */
-  for (int i = 0; i < r->m; i++) {
-    e->lambda[(int64_t)i * r->stride] = r->direction[i];
-    leaving |= e->l.letter[i] == LEAVING;
-  }
-  return leaving;
-}
-
-/* What the expansion of a mode begins with, besides the states: h that is carried, derivatives of the rates by
- * the multipliers. */
+/* What the expansion of a mode begins with, besides the states: multipliers of sets, h that is carried, derivatives of the
+ * rates by the multipliers. */
 static void begin_sets(Run *r, Expansion *e, const double *unknowns) {
   int w = r->width, leaving = 0;
+  memset(e->lambda, 0, sizeof(double) * w * r->stride); /* the first guess of each order is zero */
   for (int i = 0; i < r->m; i++) {
+    e->lambda[(int64_t)i * r->stride] = r->direction[i];
     if (e->l.letter[i] == LEFT_BEHIND) e->series[(int64_t)i * r->stride] = unknowns[i];
     leaving |= e->l.letter[i] == LEAVING;
   }
-  if (!leaving) return;
-  for (int i = 0; i < w; i++)
+  for (int i = 0; i < w && leaving; i++)
     for (int j = 0; j < w; j++)
       e->slopes[i * w + j] = r->slope[i * w + j] * (j < r->m && e->l.letter[j] == LEAVING ? factor_of(r, j) : 1);
 }

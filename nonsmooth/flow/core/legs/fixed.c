@@ -25,34 +25,9 @@ void fixed_terms(const Field *f, const double *p, const double *z, double *terms
 
 /* Legs ----------------------------------------------------------------------------------------------------- */
 
-/* Legs and what happens at their ends. One array has, from the places given: parameters, and in rows for each leg
- * its state (width), duration, field at its start and at its end (width each), what the event's program gives of
- * the state at its end (results); then room for work. A leg without a program ends at a time. */
-typedef struct {
-  int64_t count, width, results, states, durations, before, after, events, work;
-  const Field *const *field;
-  const Values *const *event;
-} Legs;
-
 /* Move all states to the ends of their legs. The number of a leg that fails and what is left of it, or -1. */
 int64_t fly_legs(const Legs *l, double *a, double tol, int64_t most_steps, double *left) {
-  for (int64_t i = 0; i < l->count; i++) {
-    const Field *f = l->field[i];
-    const Values *e = l->event[i];
-    double *z = a + l->states + i * l->width, *found = a + l->events + i * l->results, *work = a + l->work;
-    Flow w = flow_of(f, a, a[l->durations + i], tol, work);
-    field_at(&w, z, a + l->before + i * l->width);
-    run_whole_flow(&w, z, most_steps);
-    *left = w.left;
-    if (w.left > 0 || w.left != w.left) return i;
-    field_at(&w, z, a + l->after + i * l->width);
-    if (!e) continue;
-    memset(work, 0, sizeof(double) * e->size);
-    values_prepare(e, a, work);
-    values_run(e, z, a, work);
-    for (int k = 0; k < e->output_count; k++) found[k] = work[e->output[k]];
-  }
-  return -1;
+  return integrate_legs(l, a, tol, most_steps, left, run_whole_flow);
 }
 
 /* The same in extended precision (as ``long double`` has it), for residuals of equations whose solution is known to
@@ -60,33 +35,19 @@ int64_t fly_legs(const Legs *l, double *a, double tol, int64_t most_steps, doubl
 int64_t fly_legs_extended(const Legs *l, double *a, double tol, int64_t most_steps, double *left, double *rest) {
   int64_t room = 0;
   for (int64_t i = 0; i < l->count; i++) {
-    int64_t own = field_work(l->field[i]) + l->field[i]->n;
-    if (l->event[i] && l->event[i]->size > own) own = l->event[i]->size;
-    if (own > room) room = own;
+    room = room < field_work(l->field[i]) ? field_work(l->field[i]) : room;
+    if (l->event[i] && l->event[i]->size > room) room = l->event[i]->size;
   }
-  long double *memory = calloc(room + l->width + l->states, sizeof(long double)), *work = memory + l->width + l->states;
-  long double *z = memory, *p = memory + l->width;
-  if (!memory) return 0;
-  int64_t failed = -1;
-  for (int64_t k = 0; k < l->states; k++) p[k] = a[k];
-  for (int64_t i = 0; i < l->count && failed < 0; i++) {
-    const Values *e = l->event[i];
-    for (int k = 0; k < l->field[i]->n; k++) z[k] = a[l->states + i * l->width + k];
-    Flow_extended w = flow_of_extended(l->field[i], p, a[l->durations + i], tol, work);
-    run_flow_extended(&w, z, most_steps);
-    *left = w.left;
-    if (w.left > 0 || w.left != w.left) failed = i;
-    if (failed >= 0) continue;
-    memset(work, 0, sizeof(long double) * e->size);
-    values_prepare_extended(e, p, work);
-    values_run_extended(e, z, p, work);
-    for (int k = 0; k < e->output_count; k++) {
-      long double value = work[e->output[k]];
-      a[l->events + i * l->results + k] = value;
-      rest[i * l->results + k] = value - (long double)(double)value;
-    }
+  long double *all = calloc(l->work + room, sizeof(long double)), *found = all + l->events, over = 0;
+  if (!all) return 0;
+  for (int64_t k = 0; k < l->before; k++) all[k] = a[k];
+  int64_t failed = integrate_legs_extended(l, all, tol, most_steps, &over, run_flow_extended);
+  for (int64_t k = 0; k < l->count * l->results; k++) {
+    a[l->events + k] = found[k];
+    rest[k] = found[k] - (long double)(double)found[k];
   }
-  free(memory);
+  *left = over;
+  free(all);
   return failed;
 }
 
@@ -178,12 +139,12 @@ static void watched_at(Flow *w, const double *z, double *values) {
  * ``counts``, first coefficients, and behind those of a leg values at its end. Those whose duration is not positive
  * have coefficients alone. The number of a flow
  * that fails, with what is left of it, or -1; -2 where there was not enough room. */
-int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, const double *p, double *z,
+int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, const double *p, int64_t parameters, double *z,
                    const double *durations, double tol, int64_t most_steps, double ends, double *found, int64_t room,
                    int64_t *counts, double *begins, int64_t begin_width, double *left, double *work) {
   for (int64_t i = 0; i < legs; i++) {
     const Field *f = fields[i];
-    Flow w = flow_of(f, p, durations[i], tol, work);
+    Flow w = flow_of(f, p + i * parameters, durations[i], tol, work);
     counts[i] = 0;
     if (durations[i] > 0 && f->watched) {
       counts[i] = watch_flow(&w, z + i * width, most_steps, ends * w.whole, found, room, begins + i * begin_width);

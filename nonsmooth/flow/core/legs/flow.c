@@ -181,3 +181,33 @@ static void run_flow(Flow *w, double *z, int64_t most_steps) {
     advance_flow(w, h, z);
   }
 }
+
+/* Legs and what happens at their ends. One array has, from the places given: parameters, of each leg so many or, with 0,
+ * of all, and in rows for each leg its state (width), duration, field at its start and at its end (width each), what the event's program gives of
+ * the state at its end (results); then room for work. A leg without a program ends at a time. */
+typedef struct {
+  int64_t count, width, results, parameters, states, durations, before, after, events, work;
+  const Field *const *field;
+  const Values *const *event;
+} Legs;
+
+static int64_t integrate_legs(const Legs *l, double *a, double tol, int64_t most_steps, double *left,
+                              void (*run)(Flow *w, double *z, int64_t most_steps)) {
+  for (int64_t i = 0; i < l->count; i++) {
+    const Values *e = l->event[i];
+    double *z = a + l->states + i * l->width, *found = a + l->events + i * l->results, *work = a + l->work;
+    const double *p = a + i * l->parameters;
+    Flow w = flow_of(l->field[i], p, a[l->durations + i], tol, work);
+    field_at(&w, z, a + l->before + i * l->width);
+    run(&w, z, most_steps);
+    *left = w.left;
+    if (w.left > 0 || w.left != w.left) return i;
+    field_at(&w, z, a + l->after + i * l->width);
+    if (!e) continue;
+    memset(work, 0, sizeof(double) * e->size);
+    values_prepare(e, p, work);
+    values_run(e, z, p, work);
+    for (int k = 0; k < e->output_count; k++) found[k] = work[e->output[k]];
+  }
+  return -1;
+}

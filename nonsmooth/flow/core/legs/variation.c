@@ -166,8 +166,7 @@ static void link_right_sides(Run *r, const Expansion *e, Slopes *g) {
   int n, all = leaving_matrix(r, e, 1, &n), at = e->l.slides, column = n;
   (void)all;
   for (int i = 0; i < n; i++) add_single(g, v->right + i * stride, v->sum + (r->n + r->pending[i]) * stride, 0, MINUS);
-  EACH_SET(r, f) {
-    if (e->l.letter[f] != LEAVING) continue;
+  EACH_LEAVING(r, e, f) {
     double *change = v->rates + f * (stride + 1);
     for (int64_t i = f * stride; i < (f + size_of(r, f)) * stride; i += stride, at++) {
       add_link(g, v->right + at * stride, v->lambda + i, e->rates + f * (stride + 1), 2, r->stride + 1, 1, TIMES_ORDER);
@@ -267,8 +266,7 @@ static void solve_leaving(Run *r, const Expansion *e, const Variation *v, int k,
   int slides = e->l.slides, n, all = leaving_matrix(r, e, k, &n), row = n;
   double *a = r->work, *b = a + (int64_t)all * all, *unknown[all];
   for (int i = 0; i < n; i++) unknown[i] = (i < slides ? v->series : v->lambda) + r->pending[i] * stride + k;
-  EACH_SET(r, f)
-    if (e->l.letter[f] == LEAVING) unknown[row++] = v->rates + f * (stride + 1) + k + 1;
+  EACH_LEAVING(r, e, f) unknown[row++] = v->rates + f * (stride + 1) + k + 1;
   for (int i = 0; i < all; i++) b[i] = is_back ? *unknown[i] : v->right[i * stride + k];
   for (int i = 0; i < all && is_back; i++)
     for (int j = 0; j < i; j++) swap(a + i * all + j, a + j * all + i, 1);

@@ -84,7 +84,7 @@ def core_source() -> str:
 def _extended(*files: str) -> str:
     """Functions of some files once more, under other names, on long doubles."""
     text = "".join(driver_text(f"core/{name}") for name in files)
-    text = re.sub(r"typedef struct \{[^}]*\} (Values|Rule|Term|List|Series|Field);", "", text)
+    text = re.sub(r"typedef struct \{[^}]*\} (Values|Rule|Term|List|Series|Field|Legs);", "", text)
     text = re.sub(r"enum \{[^}]*\};", "", text)
     text = re.sub(r"\bdouble\b", "long double", text)
     names = {

@@ -36,7 +36,7 @@ from .laws.followed import Followed, followed
 from .laws.layer import Layer, LayerNumbers, layer_of
 from .laws.motion import Motion, mode_field, motion, watched_functions
 from .laws.multipliers import sliding_multipliers
-from .laws.one_surface import OneSurface, has_elements, one_surface
+from .laws.one_surface import OneSurface, condition_as_surface, has_elements, one_surface
 from .laws.switches import Guard
 from .reading import Parameters
 from .values import Array

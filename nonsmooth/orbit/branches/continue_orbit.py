@@ -120,8 +120,8 @@ def continue_orbit(
         doubling"``, ``"Neimark-Sacker"``, ``"pitchfork"`` (of symmetric orbits), ``"branch
         point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
         ``"adding-sliding"``, ``"impact grazing"``, ``"grazing of a soft switch"``,
-        ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``;
-        ``"Hopf"`` where orbits without events shrink to an equilibrium, ``"boundary equilibrium"`` (with its
+        ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``,
+        ``"end of complete chatter"``; ``"Hopf"`` where orbits without events shrink to an equilibrium, ``"boundary equilibrium"`` (with its
         class) or ``"two-fold"`` where others shrink to a point of a surface, ``"focus-centre-limit cycle"``,
         ``"homoclinic"`` and ``"infinite period at a boundary node"``.
 
@@ -177,7 +177,7 @@ def continue_orbit(
         *of_user.events.values(),
         *of_user.constraints,
     ):  # raises where one is not defined
-        function.rule(curve.problem, curve.evaluation(start), curve.p, ())
+        function.rule(curve.problem.whole, curve.evaluation(start), curve.p, ())
     if more:
         start = _constrained(curve, start)
     away = Departure(curve, rows, (start - rows[0]) / curve.scale) if len(rows) > 1 else None
@@ -199,7 +199,7 @@ def _constrained(curve: OrbitCurve, start: Array) -> Array:
     found = curve.unknowns_at(start, float(start[-1]))
     if found is None:
         values = [
-            c.rule(curve.problem, curve.evaluation(start), curve.p, ())[0]
+            c.rule(curve.problem.whole, curve.evaluation(start), curve.p, ())[0]
             for c in curve.rows.constraints
         ]
         raise ConvergenceError(

@@ -251,7 +251,7 @@ def integrate_leg(
     if leg.repeats:
         from .limit_leg import limit_flow  # which needs this module
 
-        return limit_flow(system, leg, x, duration, p, chosen)
+        return limit_flow(system, leg, x, duration, p, chosen)[0]
     if system.sets:
         hit = leg.ends(system) if to_end and leg.reaches_set(system) else None
         arcs = [Arc(leg.mode, x, duration, hit, _still_left(system, leg, x, p))]
@@ -371,7 +371,9 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
             shown, group = group[0], [cells.event(e) for e in group]
             first, last = group[0], group[-1]
         x_end = _extended(system, first.x, first.t)
-        if len(group) == 1 and first.kind in ("crossing", "entry", "exit"):
+        if len(group) == 1 and (
+            first.kind in ("crossing", "entry", "exit") or _strikes_alone(system, first)
+        ):
             key = (first.mode_before, first.kind, first.element, first.side, first.mode_after)
             leg = known.get(key) or known.setdefault(key, leg_of(system, first, p))
         else:
@@ -615,6 +617,15 @@ def corner(t: float, one: str, other: str) -> str:
         f"and {other!r} at the same instant (a corner). Its derivative depends on which of them comes "
         "first: move the start or a parameter."
     )
+
+
+def _strikes_alone(system: FilippovSystem, event: Event) -> bool:
+    """Whether an event is an impact in which nothing else may take part."""
+    if event.kind != "impact" or len(system.impacts) > 1:
+        return False
+    mode = event.mode_before
+    by = lambda: not struck_by(system, system.widened(mode), 0).carried
+    return bool(system.cached(("strikes alone", mode), by))
 
 
 def _letters(system: FilippovSystem, event: Event, p: Array) -> str:

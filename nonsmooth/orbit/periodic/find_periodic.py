@@ -122,6 +122,7 @@ def periodic_orbit(
     Notes
     -----
     Unknowns are starts and durations of the legs (multiple shooting by Taylor series; no mesh).
+    Impacts or switches that accumulate are one leg, which the itinerary shows with dots, as in ``"c o o..."``.
     Multipliers: products of variational and saltation matrices, Leine & Nijmeijer 2004, ch. 7.
 
     Examples

@@ -326,7 +326,10 @@ def leaving(
         if _is_known(meeting, curve):
             continue
         for way in ways:
-            kind = curve.base.named(curve.name, curve.without(way.rows[-1]))
+            inner = curve.without(way.rows[-1])
+            if not curve.base.occurs(curve.name, inner):  # a neutral saddle
+                continue
+            kind = curve.base.named(curve.name, inner)
             curve.settle(way.rows[-1])
             yield kind, curve, way
 

@@ -85,7 +85,8 @@ TASKS = {
         "in two parameters. [Branches and bifurcations](../branches.md) shows them at work.",
         "nonsmooth",
         "continue_orbit continue_equilibrium orbit.Branch orbit.BranchEvent orbit.FarSide orbit.BranchEnd "
-        "continue_bifurcation orbit.BifurcationCurve orbit.CodimensionTwo find_homoclinic orbit.Connection",
+        "continue_bifurcation orbit.BifurcationCurve orbit.CodimensionTwo orbit_functions orbit.OrbitFunctions "
+        "orbit.OrbitFunction find_homoclinic orbit.Connection",
     ),
     "futures": _task(
         "Follow sets of orbits",

@@ -259,41 +259,13 @@ PRIORITY = {
 #: Why a run ended, besides its status, by number in C.
 REASONS = (
     "",
-    "two_fold",
-    "slid_to_two_fold",
-    "ambiguous",
-    "degenerate",
-    "wrong_start",
-    "field",
-    "surface",
-    "reset_map",
-    "branch_point",
-    "state",
-    "pressed",
-    "two_sided",
-    "multiple_zero",
-    "sampled",
-    "behind",
-    "no_impulse",
-    "restitution",
-    "no_reaction",
-    "no_stable_motion",
-    "possibly_several",
-    "stability_lost",
-    "undetermined_rates",
-    "start_solutions",
-    "impossible_start",
-    "several_directions",
-    "indefinite",
-    "undetermined",
-    "high_degree",
-    "spiral_out",
-    "discrete_value",
-    "no_jump",
-    "off_constraint",
-    "dead_point",
-    "decay",
-    "out_of_table",
+    *"""
+        two_fold slid_to_two_fold ambiguous degenerate wrong_start field surface reset_map
+        branch_point state pressed two_sided multiple_zero sampled behind no_impulse restitution
+        no_reaction no_stable_motion possibly_several stability_lost undetermined_rates
+        start_solutions impossible_start several_directions indefinite undetermined high_degree
+        spiral_out discrete_value no_jump off_constraint dead_point decay out_of_table
+    """.split(),
 )
 
 #: Flag of the mode of an implicit step, as it is recorded.

@@ -128,7 +128,8 @@ def follow(
     unknowns = sliding_multipliers(coupled_of(system), mode, x, p, stable_only=False)
     if made.unknowns and len(unknowns) != 1:
         said = _said("start_solutions", start_mode=mode, where=len(unknowns))
-        return _stuck(system, mode, x, p, t_start, said)
+        t, x = np.array([t_start]), x[None, : system.dimension]
+        return _finished(system, mode, p, t, x, [], Status.NON_UNIQUE, said, Steps())
     start = x[: system.dimension]
     if made.unknowns:
         start = np.concatenate([start, unknowns[0][list(made.unknowns)]])
@@ -145,20 +146,31 @@ def _said(reason: str, **fields: Any) -> str:
     return messages.SENTENCES[reason].format(**fields)
 
 
-def _stuck(
-    system: FilippovSystem, mode: str, x: Array, p: Array, t: float, message: str
+def _finished(
+    system: FilippovSystem,
+    mode: str,
+    p: Array,
+    t: Array,
+    x: Array,
+    events: list[Event],
+    status: Status,
+    message: str,
+    steps: Steps,
 ) -> Trajectory:
-    """A run that ends at its start, where the multipliers are not unique."""
-    status, x = Status.NON_UNIQUE, x[: system.dimension]
+    """A run in one mode, with its events; its end is one of them unless a stop is the last."""
+    end = float(t[-1])
+    if status is not Status.STOPPED:
+        events = [*events, Event("end", end, x[-1].copy(), mode, mode, str(status))]
     return Trajectory(
         system=system,
         parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),
-        t=np.array([t]),
-        x=x[None, :],
-        events=Events.of([Event("end", t, x, mode, mode, str(status))]),
-        segments=Segments.of([Segment(mode, t, t, 0, 0)]),
+        t=t,
+        x=x,
+        events=Events.of(events),
+        segments=Segments.of([Segment(mode, float(t[0]), end, 0, len(steps))]),
         status=status,
         message=f"{message} {ADVICE[status]}",
+        steps=steps,
     )
 
 
@@ -187,25 +199,14 @@ def _trajectory(
         kind, x = "stop" if last else "zero", state[:n].copy()
         of = (guard.element, guard.side)
         events.append(Event(kind, sign * time, x, mode, mode, names[at], x, *of))
-    end, x_end = float(t[-1]), run.x[-1, :n].copy()
+    end = float(t[-1])
     if status is Status.REACHED_END:
         message = _said("REACHED_END", t_end=end)
     elif status is Status.STOPPED:
         message = _said("STOPPED", stop=events[-1].name, t=end)
     elif status is Status.NOT_FINITE:
-        message = _said("field", mode=mode, state=messages.listed(x_end.tolist()))
+        message = _said("field", mode=mode, state=messages.listed(run.x[-1, :n].tolist()))
     else:
         message = message_of(made.system, options, replace(run, t=t))
-    if status is not Status.STOPPED:
-        events.append(Event("end", end, x_end, mode, mode, str(status)))
-    return Trajectory(
-        system=system,
-        parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),
-        t=t,
-        x=run.x[:, :n].copy(),
-        events=Events.of(events),
-        segments=Segments.of([Segment(mode, float(t[0]), end, 0, len(run.starts))]),
-        status=status,
-        message=f"{message} {ADVICE[status]}",
-        steps=Steps(sign * run.starts, coefficients, run.implicit),
-    )
+    steps = Steps(sign * run.starts, coefficients, run.implicit)
+    return _finished(system, mode, p, t, run.x[:, :n].copy(), events, status, message, steps)

@@ -92,7 +92,7 @@ class _Spec:
         """Check a value, or one ``inside`` of a sequence whose length has a name."""
         kind, args = get_origin(hint), get_args(hint)
         if kind in (Union, types.UnionType):
-            self._any(value, args)
+            _any(lambda one: self.require(value, one), args)
         elif kind is np.ndarray:
             self._array(value, get_args(args[1])[0], inside)
         elif kind is dict:
@@ -114,16 +114,6 @@ class _Spec:
                 self.require(part, args[0], True)
         else:
             self._one(value, hint)
-
-    def _any(self, value: Any, hints: Sequence[Any]) -> None:
-        """Check that a value fits one of several types."""
-        errors = []
-        for hint in hints:
-            try:
-                return self.require(value, hint)
-            except ValueError as error:
-                errors.append(error)
-        raise errors[0]
 
     def _one(self, value: Any, hint: Any) -> None:
         """Check a number, a text, a system or an object of a registered class."""
@@ -151,17 +141,8 @@ class _Spec:
                 flags.append(word)
             else:
                 shapes[-1].append(word)
-        errors = []
-        for shape in shapes:
-            try:
-                self._shape(
-                    value.shape, shape if inside or not self.count else [self.count, *shape]
-                )
-                break
-            except ValueError as error:
-                errors.append(error)
-        else:
-            raise errors[0]
+        before = [] if inside or not self.count else [self.count]
+        _any(lambda shape: self._shape(value.shape, [*before, *shape]), shapes)
         self._values(value, flags)
 
     def _shape(self, found: tuple[int, ...], words: Sequence[str]) -> None:
@@ -197,3 +178,14 @@ def _is_number(value: Any) -> bool:
 def _demand(holds: bool, otherwise: str) -> None:
     if not holds:
         raise ValueError(otherwise)
+
+
+def _any(check: Callable[[Any], None], choices: Sequence[Any]) -> None:
+    """Check that something fits one of several types or shapes."""
+    errors = []
+    for one in choices:
+        try:
+            return check(one)
+        except ValueError as error:
+            errors.append(error)
+    raise errors[0]

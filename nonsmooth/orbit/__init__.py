@@ -25,6 +25,7 @@ from .manifolds.invariant_manifolds import Manifold, manifold
 from .periodic.find_periodic import VirtualOrbitError, periodic_orbit
 from .periodic.master_stability import MasterStability, master_stability
 from .periodic.orbit import PeriodicOrbit
+from .periodic.orbit_functions import OrbitFunction, OrbitFunctions, orbit_functions
 from .periodic.phase_response import PhaseResponse, phase_response
 from .runs.itinerary import Arrival, FixedItinerary
 from .runs.lyapunov import LyapunovSpectrum, lyapunov_spectrum
@@ -56,6 +57,8 @@ __all__ = [
     "LyapunovSpectrum",
     "Manifold",
     "MasterStability",
+    "OrbitFunction",
+    "OrbitFunctions",
     "Passage",
     "Path",
     "PeriodicOrbit",
@@ -79,6 +82,7 @@ __all__ = [
     "lyapunov_spectrum",
     "manifold",
     "master_stability",
+    "orbit_functions",
     "paths_from",
     "periodic_orbit",
     "phase_response",

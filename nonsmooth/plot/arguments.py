@@ -94,12 +94,12 @@ def _relays(system: FilippovSystem, holding: Mapping[Any, float] | None, one: st
 def require_one_surface(
     system: FilippovSystem, caller: str, dimension: int, others: str, smooth: bool = False
 ) -> None:
-    """Raise DefinitionError unless a system has so many states, one surface and no explicit time.
+    """Raise DefinitionError unless a system has so many states, one surface or condition and no explicit time.
 
-    ``smooth`` allows one without surfaces, and a complementarity condition in place of the surface.
+    ``smooth`` allows one without surfaces.
     """
     runs = "Draw runs with trajectory."
-    require_system(system, sets=True, hysteresis=True, complementarity=smooth, joints=True)
+    require_system(system, sets=True, hysteresis=True, complementarity=True, joints=True)
     conditions, count = len(system.complementarity), system.surface_count
     if system.constraints:
         received = f"constraints: {', '.join(system.constraints)}"

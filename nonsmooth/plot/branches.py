@@ -38,6 +38,7 @@ MARKERS = {
     "grazing of a soft switch": ("v", "white"),
     "grazing of a jumping force": ("v", style.YELLOW),
     "corner": ("d", "white"),
+    "end of complete chatter": ("<", style.VERMILLION),
     "homoclinic": ("*", style.BLACK),
 }
 _OTHER = ("X", "white")

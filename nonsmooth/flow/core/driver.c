@@ -59,7 +59,7 @@ static int spirals_out(Run *r, const int8_t *letter) {
         error_scales(r, r->x, held_of(r, letter), r->chosen.unknowns);
       }
       double own = r->slope[i * w + i] * r->slope[j * w + j], crossed = r->slope[i * w + j] * r->slope[j * w + i];
-      if (r->slope[j * w + j] > 0 && own != 0 && fabs(own - crossed) <= TIED * fabs(own)) return i;
+      if (r->slope[j * w + j] * factor_of(r, j) > 0 && own != 0 && fabs(own - crossed) <= TIED * fabs(own)) return i;
     }
   return -1;
 }

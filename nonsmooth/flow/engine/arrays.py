@@ -108,9 +108,8 @@ def options_of(
     o: Options,
     dense: bool,
     at: tuple[int, int] | None = None,
-    start_mode: int = -1,
 ) -> ctypes.Structure:
-    """Options as C reads them; the start's mode by its number."""
+    """Options as C reads them."""
     kind, count = at or (-1, 0)
     limit = 2**62  # no run has so many events
     made: Any = structure("Options")(
@@ -122,7 +121,7 @@ def options_of(
         int(min(o.max_steps, limit)),
         int(min(o.max_events, limit)),
         int(min(o.max_jumps, limit)),
-        start_mode,
+        -1,
         kind,
         min(count, limit),
         int(dense),
@@ -168,24 +167,18 @@ def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
 
 
 def batch_of(
-    x: Array,
-    p: Array,
-    t_start: float,
-    chunk: Chunk,
-    times: Array | None,
-    which: NDArray[np.intp] | None,
+    x: Array, p: Array, t_start: float, chunk: Chunk, times: Array | None
 ) -> ctypes.Structure:
     """What C reads and where it writes; all arrays live as long as the caller's."""
-    count = len(x) if which is None else len(which)
     stride = p.shape[-1] if p.ndim > 1 else 0
     results = (chunk.x, chunk.t, chunk.status, chunk.itinerary, chunk.kinds)
     kept = (chunk.at_x, chunk.at_t, chunk.totals)
-    arrays = [address(a) for a in (which, x, p, *results, *kept)]
+    arrays = [address(a) for a in (None, x, p, *results, *kept)]
     room = 0 if chunk.sample_t is None else chunk.sample_t.shape[1]
     times_stride = 0 if times is None or times.ndim == 1 else times.shape[1]
     width = chunk.kinds.shape[1]
     samples = [address(a) for a in (times, chunk.sample_t, chunk.sample_x)]
-    return structure("Batch")(count, stride, t_start, *arrays, room, times_stride, *samples, width)
+    return structure("Batch")(len(x), stride, t_start, *arrays, room, times_stride, *samples, width)
 
 
 def words_of(

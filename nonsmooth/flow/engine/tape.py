@@ -464,16 +464,9 @@ class TapeEngine:
         """Letters of a mode, of which all bytes are given."""
         width = self.system.surface_count + len(self.system.impacts)
         letters = self._spelled(np.frombuffer(row[:width], np.int8).tolist())
-        return self.shown.widened(letters, np.frombuffer(row[width:])[self._discrete :])
-
-    @property
-    def _discrete(self) -> int:
-        return len(self.system.definition.discrete)
-
-    def _values(self, table: int) -> Array:
-        """Values of the discrete states and cells of tables in the modes that were met."""
-        width = self.system.surface_count + len(self.system.impacts)
-        return np.ascontiguousarray(self._met(table)[:, width:]).view(np.float64)
+        return self.shown.widened(
+            letters, np.frombuffer(row[width:])[len(self.system.definition.discrete) :]
+        )
 
     def _met(self, table: int) -> NDArray[np.int8]:
         """Modes that were met, as bytes."""
@@ -483,12 +476,13 @@ class TapeEngine:
         return met[:-1].reshape(count, width)
 
     def _labels(self, table: int) -> list[tuple[float, ...]]:
-        """Values of the discrete states in the modes that were met."""
-        return (
-            [*map(tuple, self._values(table)[:, : self._discrete].tolist())]
-            if self._discrete
-            else []
-        )
+        """Values of the discrete states in the modes that were met; empty without any."""
+        count = len(self.system.definition.discrete)
+        if not count:
+            return []
+        width = self.system.surface_count + len(self.system.impacts)
+        values = np.ascontiguousarray(self._met(table)[:, width:]).view(np.float64)
+        return [*map(tuple, values[:, :count].tolist())]
 
     def _spelled(self, signs: list[int]) -> str:
         """Letters of all switching functions and contacts; see ``core/state.c`` for those of sets."""
@@ -515,7 +509,7 @@ class TapeEngine:
         chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
         x, p = np.ascontiguousarray(x, float), self.shown.with_cells(p)
-        batch = batch_of(x, p, options.t_start, chunk, times, None)
+        batch = batch_of(x, p, options.t_start, chunk, times)
         start, done = self._letters(options.start_mode), np.zeros(1, np.int64)
         c_options = options_of(self.shown.system, options, dense=False, at=at)
         given = (ctypes.byref(batch), ctypes.byref(c_options))

@@ -27,8 +27,7 @@ from ...model import (
     require_system,
 )
 from ...model.checks import positive
-from ...model.laws.frozen import Frozen, frozen
-from ...model.laws.limit_directions import limit_directions_of
+from ...model.laws.frozen import Frozen, frozen, limit_directions_of
 from ..discrete_states import with_discrete_states_held
 from .surface_point import TOLERANCE
 

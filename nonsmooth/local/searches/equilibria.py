@@ -174,7 +174,7 @@ def find_equilibrium(
     (array([0.5, 0.5]), 'real', 'stable node')
     """
     k = side_index(side)
-    if isinstance(system, FilippovSystem) and _needs_mode(system, mode):
+    if isinstance(system, FilippovSystem) and needs_mode(system, mode):
         return _of_mode(system, near, mode, parameters, tol, max_iterations)
     require_autonomous(system, "equilibrium")
     where, x = surface_at(system, near, parameters, 0.0, surface, mode, smooth=True, flight=True)
@@ -191,7 +191,7 @@ def find_equilibrium(
     return equilibrium_at(where, found, side)
 
 
-def _needs_mode(system: FilippovSystem, mode: str | None) -> bool:
+def needs_mode(system: FilippovSystem, mode: str | None) -> bool:
     """Whether a mode has to name what slides and what is closed, or does so."""
     if system.complementarity or system.constraints:
         return True
@@ -219,7 +219,7 @@ def _of_mode(
     numbers = mode_equations(system, mode)
 
     def equations(u: Array) -> tuple[Array, Array]:
-        field, slope, h, gradient, _ = numbers.copied(u, p)
+        field, slope, h, gradient, *_ = numbers.copied(u, p)
         rows = gradient.reshape(-1, n)
         along = null_space(rows).T if len(rows) else np.eye(n)
         values = np.concatenate([along @ field.ravel(), h.ravel()])
@@ -228,7 +228,13 @@ def _of_mode(
     start = system.extended_point(near, 0.0)
     what = f"equilibrium of mode {mode!r}"
     found = search(equations, start, tol=tol, max_iterations=max_iterations, what=what)
-    _, slope, _, gradient, guards = numbers.copied(found.x, p)
+    return equilibrium_of_mode(system, mode, found, p)
+
+
+def equilibrium_of_mode(system: FilippovSystem, mode: str, found: Found, p: Array) -> Equilibrium:
+    """Describe the equilibrium at a point where the field of a mode and what it keeps vanish."""
+    n = system.dimension
+    _, slope, _, gradient, guards, *_ = mode_equations(system, mode).copied(found.x, p)
     along = null_space(gradient) if gradient.size else np.eye(n)
     eigenvalues = by_real_part(along.T @ slope @ along)
     scale = float(np.max(np.abs(eigenvalues), initial=0.0))

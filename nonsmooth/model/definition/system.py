@@ -953,12 +953,12 @@ _ELEMENTS = {
     "complementarity": (
         "complementarity conditions",
         "They work in simulate, ensemble, outcomes, sensitivity, classify, region, find_equilibrium, find_fold, "
-        "periodic_orbit and continue_orbit.",
+        "continue_equilibrium, periodic_orbit and continue_orbit.",
     ),
     "constraints": (
         "constraints",
         "They work in simulate, ensemble, outcomes, sensitivity, classify, region, find_equilibrium, find_fold, "
-        "periodic_orbit and continue_orbit. Write the motion in coordinates that satisfy them.",
+        "continue_equilibrium, periodic_orbit and continue_orbit. Write the motion in coordinates that satisfy them.",
     ),
 }
 

@@ -319,13 +319,17 @@ def kept_maps(system: FilippovSystem, kept: Sequence[int]) -> list[EventMap]:
 
 def rest_maps(system: FilippovSystem, mode: str, elements: Sequence[int]) -> list[EventMap]:
     """What is zero where surfaces, sets and contacts rest, by their positions in a mode: functions and their rates."""
-    d, lower, count, kept = system.definition, raised_of(system).lower, len(system.entries), []
-    for k in elements:
-        if k < count:
-            kept += [e for i in system.entries[k] for e in (d.open_surfaces[i], *lower[i])]
-        else:
-            kept += [d.gaps[k - count], d.gap_rates[k - count]]
-    return [function_map(system, mode, e) for e in kept]
+
+    def build() -> list[EventMap]:
+        d, lower, count, kept = system.definition, raised_of(system).lower, len(system.entries), []
+        for k in elements:
+            if k < count:
+                kept += [e for i in system.entries[k] for e in (d.open_surfaces[i], *lower[i])]
+            else:
+                kept += [d.gaps[k - count], d.gap_rates[k - count]]
+        return [function_map(system, mode, e) for e in kept]
+
+    return system.cached(("rest maps", mode, tuple(elements)), build)
 
 
 def atoms_at(

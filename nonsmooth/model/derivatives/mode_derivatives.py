@@ -59,7 +59,8 @@ def guard_rate_gradient(system: FilippovSystem, mode: str, guard: Guard) -> Eval
 
 
 def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
-    """(x, p) -> field, its derivative, functions that are kept at zero, theirs, and guards without events."""
+    """(x, p) -> field, its derivative, functions that are kept at zero, theirs, guards without events, and derivatives of
+    field and functions by parameters."""
 
     def build() -> list[ca.SX]:
         of_mode, x = motion(system, mode), system.extended_states
@@ -79,6 +80,7 @@ def mode_equations(system: FilippovSystem, mode: str) -> Evaluator:
             if guard.kind in ("surface", "exit", "impact", "release")
         ]
         field, h, functions = of_mode.field, every[kept], of_mode.functions[guards]
-        return [field, ca.jacobian(field, x), h, ca.jacobian(h, x), functions]
+        of_p = [ca.jacobian(e, system.parameter_symbols) for e in (field, h)]
+        return [field, ca.jacobian(field, x), h, ca.jacobian(h, x), functions, *of_p]
 
     return evaluator(system, ("equations of a mode", mode), build)

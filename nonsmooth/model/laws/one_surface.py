@@ -80,6 +80,11 @@ def one_surface(system: FilippovSystem, mode: str, element: int | None) -> OneSu
     )
 
 
+def condition_as_surface(system: FilippovSystem) -> FilippovSystem:
+    """The system with a surface in place of its one complementarity condition, on which it slides where that is closed."""
+    return system.cached("condition as surface", lambda: _Held(system, "o", 0).sliding())
+
+
 class _Held:
     """Fields and functions of one element, the others held."""
 
@@ -130,17 +135,27 @@ class _Held:
         if self.kind == "surface":
             h = self.coupled.kept[self.element]
             return self._with(_with_sides(self.system, h, [above, self.at(-1, field)]))
-        own = ca.SX.sym("own")
-        push = ca.jacobian(self.at(0, field, own), own)
-        row = self.at(0, self.coupled.layer[self.element], own)
-        first = ca.substitute(row, own, 0)
-        slope = ca.jacobian(row, own)
-        if slope.is_zero():
-            raise self._together([self.element])
+        h, push, first, slope = self._one_sided(self.element)
         load = -first / slope
-        h = first if self.kind == "algebraic" else self.coupled.kept[self.element]
         made = _with_sides(self.system, h, [above, above + load * push])
         return self._with(made, push, load)
+
+    def _one_sided(self, element: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+        """The function of a condition or contact, what its unknown adds to the field, and its equation without and by it."""
+        field, own = self.coupled.field, ca.SX.sym("own")
+        push = ca.jacobian(self.at(0, field, own), own)
+        row = self.at(0, self.coupled.layer[element], own)
+        first, slope = ca.substitute(row, own, 0), ca.jacobian(row, own)
+        if slope.is_zero():
+            raise self._together([element])
+        return first if self.kind == "algebraic" else self.coupled.kept[element], push, first, slope
+
+    def sliding(self) -> FilippovSystem:
+        """A surface that is reached from below, or continuous, in place of the condition."""
+        assert self.element is not None
+        h, push, first, slope = self._one_sided(self.element)
+        above, rate = self.at(1, self.coupled.field), 0 if self.kind == "algebraic" else 1
+        return _with_sides(self.system, h, [above, above + (rate - first) / slope * push])
 
     def _together(self, which: Sequence[int]) -> DefinitionError:
         names = [*self.system.surface_names, *self.system.impacts]

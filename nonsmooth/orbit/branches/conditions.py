@@ -31,6 +31,9 @@ from ..runs.legs import Leg, surface_of
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
 
+#: Tests that a user gives: the prefix of the names of events, and the extremum of a cost.
+USER, COST = "event: ", "extremum of the cost"
+
 #: Entries of a return map beyond which its small multipliers have lost their digits.
 _NO_DIGITS = 1e6
 
@@ -64,7 +67,7 @@ class Condition:
 
 def is_smooth(name: str) -> bool:
     """Whether a test is that of a smooth bifurcation, which does not end an itinerary."""
-    return name in _SMOOTH
+    return name in _SMOOTH or name == COST or name.startswith(USER)
 
 
 def conditions_of(
@@ -95,6 +98,7 @@ def condition_row(
     i, n = condition.leg, problem.dimension
     starts, durations = problem.split(u)
     duration, count = float(durations[i]), problem.size
+    own = count - len(durations) * (n + 1) + i * n
 
     def value(x: Array, q: Array) -> float:
         if condition.what == "start":
@@ -110,7 +114,7 @@ def condition_row(
     sizes = 1e-6 * np.maximum(np.abs(starts).max(axis=0), 1e-3)
     for k in range(n):
         step = sizes[k] * np.eye(n)[k]
-        row[i * n + k] = (value(x + step, p) - value(x - step, p)) / (2 * sizes[k])
+        row[own + k] = (value(x + step, p) - value(x - step, p)) / (2 * sizes[k])
     for j, k in enumerate(free):
         size = 1e-6 * max(abs(float(p[k])), 1e-3)
         step = size * np.eye(p.size)[k]

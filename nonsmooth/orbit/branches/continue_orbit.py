@@ -7,8 +7,9 @@ the cycle x - r F1/2 with legs r and c r closes to third order (Cristiano et al.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -34,6 +35,7 @@ from ..periodic.boundary_value_problem import BoundaryProblem
 from ..periodic.find_periodic import periodic_orbit
 from ..periodic.multipliers import leg_maps
 from ..periodic.orbit import PeriodicOrbit, named
+from ..periodic.orbit_functions import OrbitFunction, read_rows
 from ..periodic.orbit_run import orbit_run
 from ..periodic.symmetry import mirrored
 from ..runs.itinerary import leg_between
@@ -70,6 +72,10 @@ def continue_orbit(
     max_points: int = 1000,
     through: bool = True,
     progress: bool = False,
+    events: Mapping[str, OrbitFunction] = MappingProxyType({}),
+    constraints: Sequence[OrbitFunction] = (),
+    free: Sequence[str] = (),
+    cost: OrbitFunction | None = None,
 ) -> Branch:
     """Follow a periodic orbit as a parameter varies.
 
@@ -98,6 +104,14 @@ def continue_orbit(
         Whether to change the itinerary and go on beyond events that end it.
     progress : bool, optional
         Whether to show a bar that counts points. After Ctrl-C the points computed so far are returned.
+    events : mapping of str to OrbitFunction, optional
+        Functions of :func:`orbit_functions` whose zeros along the branch are events of these names.
+    constraints : sequence of OrbitFunction, optional
+        Functions that are zero along the branch, from an orbit as the start.
+    free : sequence of str, optional
+        As many further parameters that vary, so that the constraints hold.
+    cost : OrbitFunction, optional
+        A function whose extrema along the branch are events, ``"extremum of the cost"``.
 
     Returns
     -------
@@ -106,8 +120,8 @@ def continue_orbit(
         doubling"``, ``"Neimark-Sacker"``, ``"pitchfork"`` (of symmetric orbits), ``"branch
         point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
         ``"adding-sliding"``, ``"impact grazing"``, ``"grazing of a soft switch"``,
-        ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``;
-        ``"Hopf"`` where orbits without events shrink to an equilibrium, ``"boundary equilibrium"`` (with its
+        ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``,
+        ``"end of complete chatter"``; ``"Hopf"`` where orbits without events shrink to an equilibrium, ``"boundary equilibrium"`` (with its
         class) or ``"two-fold"`` where others shrink to a point of a surface, ``"focus-centre-limit cycle"``,
         ``"homoclinic"`` and ``"infinite period at a boundary node"``.
 
@@ -142,16 +156,30 @@ def continue_orbit(
             f"orbit={orbit!r} is no PeriodicOrbit or event of a branch. Find one with periodic_orbit."
         )
     system = orbit.curve.system if isinstance(orbit, BranchEvent) else orbit.system
-    free = (parameter_index(system, parameter),)
+    more = [parameter_index(system, name) for name in ([free] if isinstance(free, str) else free)]
+    of_user = read_rows(system, events, constraints, cost, more)
+    chosen = (*more, parameter_index(system, parameter))
+    if len(set(chosen)) < len(chosen):
+        raise DefinitionError(f"free={free!r} names a parameter twice, or {parameter!r} itself.")
     if isinstance(orbit, BranchEvent):
+        if more:
+            raise DefinitionError("constraints= need an orbit as the start. Give event.orbit.")
         low, high = check_bounds(bounds, orbit.parameter, parameter)
-        curve, rows = first_orbits(orbit, free, high - low)
+        curve, rows = first_orbits(orbit, chosen, high - low)
     else:
-        curve, rows = curve_of(orbit, free)
-    start = rows[-1]
+        curve, rows = curve_of(orbit, chosen)
+    start, curve.rows = rows[-1], of_user
     low, high = check_bounds(bounds, float(start[-1]), parameter)
-    curve.widths = np.array([high - low])
-    curve.scale = np.append(curve.scale[:-1], high - low)
+    sizes = np.maximum(np.abs(curve.p[more]), 1e-3)
+    curve.widths = np.append(sizes, high - low)
+    curve.scale = np.append(curve.scale[: curve.problem.size], curve.widths)
+    for function in (
+        *of_user.events.values(),
+        *of_user.constraints,
+    ):  # raises where one is not defined
+        function.rule(curve.problem.whole, curve.evaluation(start), curve.p, ())
+    if more:
+        start = _constrained(curve, start)
     away = Departure(curve, rows, (start - rows[0]) / curve.scale) if len(rows) > 1 else None
     return follow_branch(
         curve,
@@ -164,6 +192,22 @@ def continue_orbit(
         progress=progress,
         away=away,
     )
+
+
+def _constrained(curve: OrbitCurve, start: Array) -> Array:
+    """The orbit at the value of the parameter at which the constraints hold."""
+    found = curve.unknowns_at(start, float(start[-1]))
+    if found is None:
+        values = [
+            c.rule(curve.problem.whole, curve.evaluation(start), curve.p, ())[0]
+            for c in curve.rows.constraints
+        ]
+        raise ConvergenceError(
+            f"constraints: no orbit near the start fulfils them; they are {values} there. Start closer, or name "
+            "other parameters in free=.",
+            point=start,
+        )
+    return found
 
 
 def first_orbits(event: BranchEvent, free: tuple[int, ...], width: float) -> Begun:
@@ -199,7 +243,9 @@ def curve_of(orbit: PeriodicOrbit, free: tuple[int, ...]) -> Begun:
     """An orbit as a point of its branch."""
     p, u = orbit.parameter_vector, orbit.unknowns
     longest = _LONG * float(orbit.evaluation.durations.sum())
-    return OrbitCurve(orbit.problem, p, free, np.ones(1), u, longest), [np.append(u, p[list(free)])]
+    return OrbitCurve(orbit.problem, p, free, np.ones(len(free)), u, longest), [
+        np.append(u, p[list(free)])
+    ]
 
 
 def _switched(event: BranchEvent, free: tuple[int, ...]) -> Begun:

@@ -22,7 +22,13 @@ from ...local.discrete_states import with_discrete_states_held
 from ...local.point.surface_point import SIDES, LocalSurface, Side, side_index, surface_at
 from ...local.read_only import ReadOnly
 from ...local.searches.boundary_equilibria import boundary_equilibrium_at
-from ...local.searches.equilibria import Equilibrium, by_real_part, equilibrium_at, find_equilibrium
+from ...local.searches.equilibria import (
+    Equilibrium,
+    by_real_part,
+    equilibrium_at,
+    find_equilibrium,
+    needs_mode,
+)
 from ...local.searches.pseudo_equilibria import (
     find_pseudo_equilibrium,
     pseudo_equilibrium_at,
@@ -36,10 +42,10 @@ from .branch import Branch, BranchCurve, BranchEvent, FarSide, check_bounds, fol
 from .normal_forms import hopf_coefficient
 
 #: Length of the first step from a boundary equilibrium.
-_START = 1e-4
+START = 1e-4
 
 #: A switching function or weight below minus this is that of a virtual equilibrium.
-_VIRTUAL = 1e-9
+VIRTUAL = 1e-9
 
 #: Relative error of a state.
 _ROUNDING = 1e-13
@@ -231,7 +237,7 @@ class EquilibriumCurve(Equilibria):
     def faults(self, u: Array) -> list[str]:
         mode, h = self.mode_at(u), self.local_surface(u).switches(u[: self.n])
         signs = [1.0 if letter == "+" else -1.0 for letter in mode]
-        return [self._boundary_of(j) for j, s in enumerate(signs) if s * h[j] < -_VIRTUAL]
+        return [self._boundary_of(j) for j, s in enumerate(signs) if s * h[j] < -VIRTUAL]
 
     def _boundary_of(self, surface: int) -> str:
         own = "boundary equilibrium"
@@ -333,7 +339,7 @@ class _PseudoEquilibriumCurve(Equilibria):
         tests, mode = self.tests(Point(u, np.zeros(u.size))), self.where.mode
         signs = {name: -1.0 if mode[j] == "-" else 1.0 for name, j in self._met.items()}
         signs |= dict.fromkeys(_ALPHA, 1.0)
-        return [name for name, sign in signs.items() if sign * tests[name] < -_VIRTUAL]
+        return [name for name, sign in signs.items() if sign * tests[name] < -VIRTUAL]
 
     @property
     def _met(self) -> dict[str, int]:
@@ -387,7 +393,7 @@ def _leave(curve: Equilibria, u: Array, inward: float | Array) -> Departure | No
     else:
         growth = float((inward * curve.scale) @ tangent)
     direction = tangent if growth > 0 else -tangent
-    return depart(curve, u, direction, _START, direction)
+    return depart(curve, u, direction, START, direction)
 
 
 @with_discrete_states_held
@@ -414,7 +420,8 @@ def continue_equilibrium(
     Parameters
     ----------
     system, parameters, surface, mode
-        As in :func:`region`; a smooth system has neither surface nor mode.
+        As in :func:`region`; a smooth system has neither surface nor mode. With complementarity conditions, constraints
+        or closed contacts ``mode`` has all letters, also those of what slides or is closed.
     near : array_like (n,)
         Guess of the first one.
     parameter : str
@@ -439,8 +446,8 @@ def continue_equilibrium(
     Branch
         Its ``solutions`` are Equilibrium and PseudoEquilibrium. Events: ``"fold"``, ``"Hopf"`` (with
         its first Lyapunov coefficient, for an eigenvector of length one), ``"branch point"``,
-        ``"pseudo-saddle-node"``, ``"boundary equilibrium"`` of any surface (persistence or nonsmooth
-        fold, in its ``far_side``), ``"two-fold"`` (sliding changes its stability), ``"intersection"``
+        ``"pseudo-saddle-node"``, ``"boundary equilibrium"`` of any surface, condition or contact (persistence or
+        nonsmooth fold, in its ``far_side``), ``"two-fold"`` (sliding changes its stability), ``"intersection"``
         (a pseudo-equilibrium meets another surface, where its branch ends).
 
     Raises
@@ -471,30 +478,21 @@ def continue_equilibrium(
     >>> [found.kind for found in branch.at(1.0)]
     ['pseudo-saddle', 'stable pseudo-node']
     """
-    require_system(system)
-    require_autonomous(system, "continuation of equilibria")
+    require_system(system, complementarity=True, joints=True)
+    require_autonomous(system, "continuation of equilibria", elements=True)
     positive(step, "step")
     whole(max_points, "max_points", least=2)
     index = parameter_index(system, parameter)
-    where, _ = surface_at(system, near, parameters, 0.0, surface, mode, smooth=side is not None)
-    value = float(where.parameters[index])
+    value = float(system.parameter_vector(parameters)[index])
     low, high = check_bounds(bounds, value, parameter)
     given: dict[str, Any] = dict(parameters=parameters, surface=surface, mode=mode)
-    curve: Equilibria
-    if side is None:
-        require_linear(system, surface, "pseudo-equilibrium")
-        pseudo = find_pseudo_equilibrium(system, near, **given)
-        size = max(1.0, float(np.abs(pseudo.point).max()))
-        scale = np.append(np.full(system.dimension, size), [1.0, high - low])
-        curve = _PseudoEquilibriumCurve(where, (index,), scale)
-        start = np.append(pseudo.point, [pseudo.alpha, value])
+    ends = index, value, high - low
+    if needs_mode(system, mode):
+        curve, start = _in_mode(system, near, ends, parameters, mode)
+    elif side is None:
+        curve, start = _pseudo(system, near, ends, given)
     else:
-        found = find_equilibrium(system, near, side=side, **given)
-        size = max(1.0, float(np.abs(found.point).max()))
-        curve = EquilibriumCurve(
-            where, (index,), np.append(np.full(system.dimension, size), high - low), side
-        )
-        start = np.append(found.point, value)
+        curve, start = _of_field(system, near, ends, side, given)
     return follow_branch(
         curve,
         start,
@@ -505,3 +503,56 @@ def continue_equilibrium(
         through=through,
         progress=progress,
     )
+
+
+#: Number of a parameter, its value at the start, and the width of its bounds.
+_Ends = tuple[int, float, float]
+
+
+def _of_field(
+    system: FilippovSystem, near: ArrayLike, ends: _Ends, side: Side, given: dict[str, Any]
+) -> tuple[Equilibria, Array]:
+    """Equilibria of one field, and the first one."""
+    index, value, width = ends
+    names = (given[name] for name in ("parameters", "surface", "mode"))
+    where, _ = surface_at(system, near, next(names), 0.0, *names, smooth=True)
+    found = find_equilibrium(system, near, side=side, **given)
+    curve = EquilibriumCurve(where, (index,), _scale(system, found.point, [width]), side)
+    return curve, np.append(found.point, value)
+
+
+def _pseudo(
+    system: FilippovSystem, near: ArrayLike, ends: _Ends, given: dict[str, Any]
+) -> tuple[Equilibria, Array]:
+    """Pseudo-equilibria, and the first one."""
+    index, value, width = ends
+    names = (given[name] for name in ("parameters", "surface", "mode"))
+    where, _ = surface_at(system, near, next(names), 0.0, *names)
+    require_linear(system, given["surface"], "pseudo-equilibrium")
+    found = find_pseudo_equilibrium(system, near, **given)
+    curve = _PseudoEquilibriumCurve(where, (index,), _scale(system, found.point, [1.0, width]))
+    return curve, np.append(found.point, [found.alpha, value])
+
+
+def _in_mode(
+    system: FilippovSystem,
+    near: ArrayLike,
+    ends: _Ends,
+    parameters: Parameters | None,
+    mode: str | None,
+) -> tuple[Equilibria, Array]:
+    """Equilibria of a mode with conditions, contacts or joints, and the first one."""
+    from .mode_equilibria import ModeEquilibria  # which needs this module
+
+    index, value, width = ends
+    found, p = (
+        find_equilibrium(system, near, parameters=parameters, mode=mode),
+        system.parameter_vector(parameters),
+    )
+    scale = _scale(system, found.point, [width])
+    return ModeEquilibria(system, found.mode, p, (index,), scale), np.append(found.point, value)
+
+
+def _scale(system: FilippovSystem, point: Array, more: list[float]) -> Array:
+    size = max(1.0, float(np.abs(point).max()))
+    return np.append(np.full(system.dimension, size), more)

@@ -124,6 +124,7 @@ _NEIGHBOURS = 1e-5
 _TANGENT = 1e-7
 
 SOFT, FORCE = "grazing of a soft switch", "grazing of a jumping force"
+CHATTER_END = "end of complete chatter"
 
 #: Grazing of a soft switch by the orbits of a centre, at whose value of the parameter all of these exist.
 CENTRE = "focus-centre-limit cycle"
@@ -134,6 +135,12 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     legs, i = problem.legs, test.leg
     leg, guard = legs[i], test.guard
     before, after = neighbours(problem, i)
+    if before.repeats and (
+        test.what == "duration" or (guard is not None and guard.kind == "release")
+    ):
+        return CHATTER_END
+    if leg.repeats and test.what == "duration":
+        return "impact grazing"  # the first impact
     if test.what == "interior":
         assert guard is not None
         return _grazed(problem, leg, guard, test, at, p)
@@ -239,7 +246,8 @@ def changed_itinerary(
     problem: BoundaryProblem, kind: str, conditions: Sequence[Condition], u: Array, p: Array
 ) -> ChangedItinerary | None:
     """The itinerary beyond a bifurcation; None where nothing continues it."""
-    found: ChangedItinerary | None = ChangedItinerary(problem, u, tuple(range(len(problem.legs))))
+    every = tuple(range(len(problem.legs)))
+    found: ChangedItinerary | None = ChangedItinerary(problem.whole, problem.undivided(u), every)
     for condition in conditions:
         assert found is not None
         if condition.leg not in found.origin:
@@ -390,6 +398,8 @@ def _missed(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | No
     if not _stays(flow.end, leg.at_end(before.problem.system, flow.end, p).after):
         return None
     count = len(before.problem.legs)
+    if before.problem.legs[(i + 1) % count].repeats:
+        return None  # what repeats begins behind it
     turned = rotated(before, i, p) if i + 1 == count > 1 else before
     i = 0 if turned is not before else i
     editor = LegEditor(turned.problem, turned.u, turned.origin)
@@ -429,6 +439,8 @@ def _start_guard(problem: BoundaryProblem, legs: Sequence[Leg], i: int) -> Guard
     """The guard that fails where leg ``i`` vanishes: of the leg after it."""
     removed, after = legs[i], legs[(i + 1) % len(legs)]
     mode = after.mode if i + 1 < len(legs) else mode_after(removed)
+    if i + 1 == len(legs) and problem.symmetry is not None:  # as the first leg sees it
+        removed, mode = mirrored(problem, removed), after.mode
     surface = surface_of(problem.system, removed)
     for guard in guarded_field(problem.system, mode).motion.guards:
         if guard.kind == "surface" and guard.element == surface and removed.kind == "exit":

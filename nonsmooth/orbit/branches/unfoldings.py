@@ -31,7 +31,7 @@ from .itinerary_changes import FORCE, ChangedItinerary
 _TANGENT = 1e-6
 
 _SMOOTH = "persistence: the derivative of the return map is continuous"
-_VERDICTS = {
+VERDICTS = {
     "crossing-sliding": _SMOOTH,
     "switching-sliding": _SMOOTH,
     "adding-sliding": _SMOOTH,
@@ -41,6 +41,7 @@ _VERDICTS = {
     "grazing of a soft switch": _SMOOTH,
     "focus-centre-limit cycle": "the cycle is born from the largest orbit of a centre",
     "grazing of a jumping force": "the return map has a square root: stability is lost at once",
+    "end of complete chatter": "the contact opens before impacts have accumulated: finitely many follow",
     "grazing, escaping": "the orbit leaves along the other field: nothing continues it",
     "two-fold": "the orbit passes a two-fold, where its future may not be unique",
     "corner": "two events at one time, {one} and {other}; the itinerary beyond is not known here: "
@@ -76,7 +77,7 @@ def far_side(
             return FarSide(itinerary, _verdict(numbers, "with either order"), ReadOnly(numbers))
     except (NonsmoothError, np.linalg.LinAlgError) as error:
         return FarSide(itinerary, f"not classified: {error}")
-    verdict = _VERDICTS.get(kind, "")
+    verdict = VERDICTS.get(kind, "")
     if kind == "corner":
         i = test.leg
         of, guard = problem.system, test.guard
@@ -91,7 +92,7 @@ def _root(
     """The square root of a grazed impact, or of a reset that is one."""
     numbers = impact_numbers(problem, test, at, p)
     if "n.A.w" not in numbers:
-        return FarSide(itinerary, _VERDICTS[kind], ReadOnly(numbers))
+        return FarSide(itinerary, VERDICTS[kind], ReadOnly(numbers))
     if numbers["n.(I - A)^-1.A.w"] > 0.0:
         what = "the visit" if kind == FORCE else "the impact"
         verdict = f"nonsmooth fold: the orbits with and without {what} meet and vanish"

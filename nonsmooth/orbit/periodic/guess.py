@@ -141,6 +141,8 @@ def recurrence(
     starts = [k + 1 for k in closed if k + 1 < len(parts)]
     if len(starts) < 2:
         return _without_events(run, parts, symmetry, period, first, about, whole)
+    rests = [k for k in starts if parts[k - 1].leg.repeats]
+    starts = rests if len(rests) > 1 else starts  # the others may be of unfinished chatter
     scale = _scales(run)
     anchor = starts[0] if first else starts[-1]
     others = [k for k in starts if (k > anchor if first else k < anchor)]

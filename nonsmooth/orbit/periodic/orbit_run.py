@@ -72,7 +72,9 @@ def orbit_run(
         end, following, first = leg.t + leg.duration, legs[(k + 1) % len(legs)], len(coefficients)
         given: dict[str, Any] = {"t_start": leg.t, "parameters": parameters, "tol": 1e-12}
         endless = leg.kind == "limit"
-        if endless or system.sets:  # at an end on a set one mode has no field
+        if (
+            endless or system.sets or system.written.tables
+        ):  # where one mode has no field, or there are many
             run = simulate(system, leg.start, end, **given)
         else:
             run = follow(system, leg.start, end, mode=leg.mode, **given)

@@ -214,7 +214,7 @@ def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class LegFlow:
     """Flow of a leg from its start over its duration."""
 
@@ -251,7 +251,7 @@ def integrate_leg(
     if leg.repeats:
         from .limit_leg import limit_flow  # which needs this module
 
-        return limit_flow(system, leg, x, duration, p, chosen)
+        return limit_flow(system, leg, x, duration, p, chosen)[0]
     if system.sets:
         hit = leg.ends(system) if to_end and leg.reaches_set(system) else None
         arcs = [Arc(leg.mode, x, duration, hit, _still_left(system, leg, x, p))]
@@ -317,7 +317,7 @@ def flows_of(found: CarriedLegs) -> list[LegFlow]:
     return result
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)  # made for each event: frozen ones take thrice the time
 class Stretch:
     """A leg of a run: where it starts and ends."""
 
@@ -371,7 +371,9 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
             shown, group = group[0], [cells.event(e) for e in group]
             first, last = group[0], group[-1]
         x_end = _extended(system, first.x, first.t)
-        if len(group) == 1 and first.kind in ("crossing", "entry", "exit"):
+        if len(group) == 1 and (
+            first.kind in ("crossing", "entry", "exit") or _strikes_alone(system, first)
+        ):
             key = (first.mode_before, first.kind, first.element, first.side, first.mode_after)
             leg = known.get(key) or known.setdefault(key, leg_of(system, first, p))
         else:
@@ -397,9 +399,7 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
         as_shown = shown.mode_before, shown.element
         result.append(Stretch(leg, t, first.t - t, x, x_end, after, system, p, as_shown))
         t, x = last.t, after
-        if _closes(
-            result, last.mode_after
-        ):  # the last of many impacts, at a speed that is lost in rounding
+        if _closes(result, last.mode_after):  # at a speed that is lost in rounding
             none = Leg(leg.mode, "limit", leg.element)
             result.append(Stretch(none, t, 0.0, x, x, x, system, p, as_shown))
     if run.accumulation_time is not None:  # the run ends where no motion follows the limit
@@ -615,6 +615,15 @@ def corner(t: float, one: str, other: str) -> str:
         f"and {other!r} at the same instant (a corner). Its derivative depends on which of them comes "
         "first: move the start or a parameter."
     )
+
+
+def _strikes_alone(system: FilippovSystem, event: Event) -> bool:
+    """Whether an event is an impact in which nothing else may take part."""
+    if event.kind != "impact" or len(system.impacts) > 1:
+        return False
+    mode = event.mode_before
+    by = lambda: not struck_by(system, system.widened(mode), 0).carried
+    return bool(system.cached(("strikes alone", mode), by))
 
 
 def _letters(system: FilippovSystem, event: Event, p: Array) -> str:

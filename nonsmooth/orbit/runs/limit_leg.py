@@ -20,11 +20,11 @@ from .variation import carried, passages_to
 
 _TOLERANCE = 1e-12
 
-#: Relative difference of two fields below which they are that of one leg.
-_SAME = 1e-3
-
 #: A limit is searched for over so many times the duration of its leg, and over more if it is not found.
-_LONGER = (1.3, 4.0, 16.0)
+_LONGER = (1.3, 4.0)
+
+#: Times between events that accumulate do not become so many times as long as they have been.
+_GROWS = 10.0
 
 
 def merged(parts: Sequence[Stretch]) -> list[Stretch]:
@@ -61,24 +61,21 @@ def limit_run(
         run = simulate(system, x[:n], t_end, t_start=t, parameters=given, tol=_TOLERANCE)
         parts = stretches(run)
         i = next((k for k, part in enumerate(parts) if part.leg.kind == "limit"), None)
-        if i is not None and parts[i].leg.element == leg.element and i + 1 < len(parts):
-            return run, parts, i
+        if i is None or i + 1 == len(parts) or parts[i].leg.element != leg.element:
+            continue
+        spans = np.array([part.duration for part in parts[:i]])
+        if (spans > _GROWS * np.minimum.accumulate(spans)).any():
+            break  # that is the limit of other events, after these have ceased
+        return run, parts, i
     raise ConvergenceError(
         f"{leg_name(system, leg)} from {x.tolist()}: events do not accumulate.", point=x
     )
 
 
 def limit_flow(
-    system: FilippovSystem,
-    leg: Leg,
-    x: Array,
-    duration: float,
-    p: Array,
-    chosen: tuple[int, ...],
-    then: Array | None = None,
-) -> LegFlow:
-    """The flow of a leg of infinitely many events from ``x`` (N,), with derivatives; ``then``: the field where the next leg
-    begins, at the limit up to residuals."""
+    system: FilippovSystem, leg: Leg, x: Array, duration: float, p: Array, chosen: tuple[int, ...]
+) -> tuple[LegFlow, Array]:
+    """The flow of a leg of infinitely many events from ``x`` (N,), with derivatives, and the field (N,) behind it."""
     run, parts, i = limit_run(system, leg, _on_event(system, leg, x, p), duration, p)
     try:
         passed = passages_to(run, parts, i, 0, chosen)
@@ -89,8 +86,6 @@ def limit_flow(
     assert times is not None and part.limit is not None and part.limit.after is not None
     t_x, t_p = times
     value, after = part.limit.limit.value, part.limit.after
-    if then is not None and np.abs(then - after).max() <= _SAME * np.abs(after).max():
-        after = then  # so that directions that are lost are so exactly
     state = value[1:] if part.limit.rest is None else part.limit.rest.x
     end = np.append(state, value[0] - parts[0].t - duration)
     by_start, by_parameters = (
@@ -98,7 +93,7 @@ def limit_flow(
         for own, times in zip(ends, (t_x, t_p), strict=True)
     )
     rate = np.append(np.zeros(len(x)), -1.0)
-    return LegFlow(end, by_start, by_parameters, rate)
+    return LegFlow(end, by_start, by_parameters, rate), after
 
 
 def _on_event(system: FilippovSystem, leg: Leg, x: Array, p: Array) -> Array:

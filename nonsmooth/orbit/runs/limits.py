@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...flow.constants import LAGS
 from ...model import Array, DegenerateError, FilippovSystem
@@ -30,8 +31,11 @@ from .legs import Leg, Stretch
 #: Largest ratio of durations from one point to the next; most of them; repetitions of a block that make a pattern.
 _RATIO, _MOST, _REPEATS = 0.6, 14, 3
 
+#: Events before those of an extrapolation from which its ratio may be taken too.
+_MORE = 3
+
 #: Durations of the last block, relative to the longest, at which an extrapolation may end.
-_LASTS = tuple(10.0**-k for k in range(2, 9))
+_LASTS = tuple(10.0**-k for k in range(3, 7))
 
 #: Error of an extrapolation, relative to the change of the events, above which it has no derivatives.
 _UNRESOLVED = 1e-3
@@ -54,8 +58,7 @@ class Limit:
     by_times: Array
     #: (1 + N,): Derivative of ``value`` by the ratio.
     by_ratio: Array
-    #: Estimated errors, relative to the change of the events: of ``value``, and of derivatives.
-    change: float
+    #: Estimated error of derivatives, relative to the change of the events.
     error: float
 
     def arrive(self, dt: Array, dx: Array) -> tuple[Array, Array]:
@@ -146,77 +149,136 @@ def limit_of(parts: Sequence[Stretch], tail: range, block: int, what: str) -> Li
     """The limit of the events that end the legs of a tail: the best of extrapolations that end sooner and later."""
     times = np.array([parts[i].t + parts[i].duration for i in tail])
     states = np.array([parts[i].after for i in tail])
-    lasts = times[block:] - times[:-block]
-    found = list[Limit]()
+    lasts, found = times[block:] - times[:-block], list[_Estimate]()
     if len(lasts) > 1 and lasts.min() > 0.0:
         ratio = min(max(lasts[-1] / lasts[max(len(lasts) - 1 - block, 0)], 1e-300), 0.9999)
         stride = block * max(1, math.ceil(math.log(_RATIO) / math.log(ratio) - 1e-9))
         longest = float(lasts.max())
         ends = [int(np.flatnonzero(lasts >= part * longest)[-1]) + block for part in _LASTS]
+        q = np.column_stack([times, states])
         for end in {*ends, len(times) - 1}:
             noise = _EPSILON * longest / float(lasts[end - block])
             rows = np.arange(end % stride, end + 1, stride)[-_MOST - 1 :]
-            points = [int(tail[k]) for k in rows]
-            found += _extrapolations(times[rows], states[rows], points, longest, noise)
-    best = min(found, key=lambda limit: limit.error, default=None)
-    if best is None or not best.error < _UNRESOLVED:
-        raise DegenerateError(
-            f"{what}: events accumulate, and the last {len(tail)} of them do not give the derivatives of their limit. "
-            "Simulate with a smaller tol, or end the run before."
-        )
-    return replace(best, value=min(found, key=lambda limit: limit.change).value)
+            found += _estimates(q[rows], rows, longest, noise)
+    best = min(found, key=lambda estimate: estimate.error, default=None)
+    if best is not None and best.error < _UNRESOLVED:
+        value = min(found, key=lambda estimate: estimate.change).value
+        least, limit = math.inf, None
+        for m in range(
+            best.m, min(best.m + _MORE, len(best.rows) - 1) + 1
+        ):  # the ratio needs more than the limit
+            points = best.rows[-m - 1 :]
+            own = _extrapolated(q[points], tuple(int(tail[k]) for k in points), best.error)
+            miss = (
+                math.inf if own is None else float(np.max(np.abs(own.value - value) / best.scale))
+            )
+            if miss < least:
+                least, limit = miss, own
+        if limit is not None:
+            return replace(limit, value=value)
+    raise DegenerateError(
+        f"{what}: events accumulate, and the last {len(tail)} of them do not give the derivatives of their limit. "
+        "Simulate with a smaller tol, or end the run before."
+    )
 
 
-def _extrapolations(
-    times: Array, states: Array, points: Sequence[int], longest: float, noise: float
-) -> list[Limit]:
-    """Limits by the last three events, four, and so on, with estimates of their errors."""
-    size = np.maximum(np.ptp(states, axis=0), _EPSILON * np.abs(states).max(axis=0))
-    scale = np.append(longest, np.where(size > 0.0, size, 1.0))
-    found, before = list[Limit](), np.append(times[-1], states[-1])
-    for m in range(2, len(times)):
-        limit = _extrapolated(times[-m - 1 :], states[-m - 1 :], tuple(points[-m - 1 :]))
-        if limit is None:
-            break
-        change = float(np.max(np.abs(limit.value - before) / scale))
-        error = max(change, _EPSILON) + noise * float(np.abs(limit.weights).sum())
-        found.append(replace(limit, change=change, error=error))
-        before = limit.value
+def geometric_limit(values: Array) -> tuple[float, float]:
+    """The limit of values (k,) whose changes fall nearly by a ratio, and its change by more of them, relative to them."""
+    change = np.diff(values)
+    if len(change) < 2 or not (change.all() and (change * change[0] > 0.0).all()):
+        return math.nan, math.inf
+    q = (np.sign(change[0]) * values)[:, None]
+    found = _estimates(q, np.arange(len(q)), float(np.abs(change).max()), 0.0)
+    best = min(found, key=lambda estimate: estimate.change, default=None)
+    if best is None:
+        return math.nan, math.inf
+    return float(np.sign(change[0]) * best.value[0]), best.change
+
+
+class _Estimate(NamedTuple):
+    """An extrapolation of the last m + 1 events of ``rows`` to a limit, with errors of the limit and of its derivatives."""
+
+    rows: NDArray[np.intp]
+    m: int
+    value: Array
+    scale: Array
+    change: float
+    error: float
+
+
+def _estimates(q: Array, rows: NDArray[np.intp], longest: float, noise: float) -> list[_Estimate]:
+    """Limits by the last three events q (k, 1 + N), by four, and so on."""
+    size = np.maximum(np.ptp(q, axis=0), _EPSILON * np.abs(q).max(axis=0))
+    size[0], spans = longest, np.diff(q[:, 0])
+    scale, found, before = np.where(size > 0.0, size, 1.0), list[_Estimate](), q[-1]
+    sigma = _ratio(spans[1:] / spans[:-1]) if len(spans) > 1 else None
+    if sigma is None:
+        return found
+    for w in _all_weights(sigma, len(spans))[1:]:
+        value = q[-1] + w.real @ (q[-len(w) :] - q[-1])
+        change = max(float(np.max(np.abs(value - before) / scale)), _EPSILON)
+        error = change + noise * float(np.abs(w).sum())
+        found.append(_Estimate(rows, len(w) - 1, value, scale, change, error))
+        before = value
     return found
 
 
-def _extrapolated(times: Array, states: Array, points: tuple[int, ...]) -> Limit | None:
-    """Extrapolate m + 1 events, in equal steps, to their limit; None where they have none."""
-    spans = np.diff(times)
+def _ratio(ratios: Array) -> float | None:
+    """The limit of ratios (k,) that are a series in powers of it; None where they do not fall below 1."""
+    sigma = float(ratios[-1])
+    for _ in range(8):
+        if not 0.0 < sigma < 1.0:
+            return None
+        best, least, before = sigma, math.inf, float(ratios[-1])
+        for w in _all_weights(sigma, len(ratios) - 1):
+            value = float(w.real @ ratios[-len(w) :])
+            if abs(value - before) < least:
+                best, least = value, abs(value - before)
+            before = value
+        if abs(best - sigma) <= _EPSILON:
+            break
+        sigma = best
+    return sigma if 0.0 < sigma < 1.0 else None
+
+
+def _extrapolated(q: Array, points: tuple[int, ...], error: float) -> Limit | None:
+    """Extrapolate m + 1 events q (m + 1, 1 + N), in equal steps, to their limit; None where they have none."""
+    spans = np.diff(q[:, 0])
     ratios = spans[1:] / spans[:-1]
     sigma, steps = float(ratios[-1]), len(ratios) - 1
     for _ in range(8):
         if not 0.0 < sigma < 1.0:
             return None
-        own = extrapolation_weights(complex(sigma, _STEP), steps)
+        own = extrapolation_weights(sigma, steps)
         sigma, last = float(own.real @ ratios), sigma
         if abs(sigma - last) <= _EPSILON:
             break
     if not 0.0 < sigma < 1.0:
         return None
-    own = extrapolation_weights(complex(sigma, _STEP), steps)
+    own = extrapolation_weights(sigma, steps)
     of_ratios = own.real / (1.0 - own.imag @ (ratios - ratios[-1]) / _STEP)
     of_spans = np.append(0.0, of_ratios / spans[:-1])
     of_spans[:-1] -= of_ratios * ratios / spans[:-1]
-    w = extrapolation_weights(complex(sigma, _STEP), len(spans))
-    q = np.column_stack([times, states])
-    moved = q - q[-1]
+    w, moved = extrapolation_weights(sigma, len(spans)), q - q[-1]
     by_times = np.append(0.0, of_spans) - np.append(of_spans, 0.0)
-    return Limit(points, q[-1] + w.real @ moved, w.real, by_times, w.imag @ moved / _STEP, 0.0, 0.0)
+    value, by_ratio = q[-1] + w.real @ moved, w.imag @ moved / _STEP
+    return Limit(points, value, w.real, by_times, by_ratio, error)
 
 
-def extrapolation_weights(sigma: complex, m: int) -> Array:
-    """Weights w_i of m + 1 values, with their derivatives by the ratio as imaginary parts."""
-    w, power = np.ones(1, complex), 1.0 + 0.0j
+def extrapolation_weights(sigma: float, m: int) -> NDArray[np.complex128]:
+    """Weights w_i of m + 1 values, with their derivatives by the ratio, times ``_STEP``, as imaginary parts."""
+    return _all_weights(sigma, m)[-1] if m else np.ones(1, complex)
+
+
+def _all_weights(sigma: float, m: int) -> list[NDArray[np.complex128]]:
+    """Those of two values, of three, up to m + 1."""
+    w, power, step, found = [1.0 + 0.0j], 1.0 + 0.0j, complex(sigma, _STEP), []
     for _ in range(m):
-        power *= sigma
-        w = (np.append(0.0, w) - power * np.append(w, 0.0)) / (1.0 - power)
-    return w
+        power *= step
+        part = 1.0 / (1.0 - power)
+        w = [(a - power * b) * part for a, b in zip([0.0, *w], [*w, 0.0], strict=True)]
+        found.append(np.array(w))
+    return found
 
 
 def rest_at(

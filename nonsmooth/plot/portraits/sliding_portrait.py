@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...local.point.regions import Region
 from ...local.scans.box import Box
 from ...local.scans.surface_scan import REGIONS, SurfaceScan
-from ...model import Array, FilippovSystem, Parameters, real, whole
+from ...model import Array, FilippovSystem, Parameters, condition_as_surface, real, whole
 from ...orbit.manifolds.sliding_orbits import SlidingOrbits
 from .. import style
 from ..arguments import held, require_one_surface
@@ -32,6 +32,7 @@ _TEXTS = (
     "$C_1$: crossing up",
     "$C_2$: crossing down",
 )
+_OF_CONDITION = ("$D_a$: closed", "", "$C_1$: opens", "$C_2$: closes")
 _DASHES: dict[bool, Any] = {True: "-", False: style.DASHED}
 _CANARD, _FAUX, _MANIFOLD = "canard", "faux canard", "manifold of a pseudo-saddle"
 _SPECIAL: dict[str, tuple[str, Any]] = {
@@ -71,7 +72,8 @@ def sliding_portrait(
     Parameters
     ----------
     system : FilippovSystem
-        Three states besides discrete ones, one surface, no explicit time.
+        Three states besides discrete ones, one surface or complementarity condition, no explicit time. A condition slides
+        where it is closed.
     box : (xmin, xmax, ymin, ymax) or ((xmin, xmax), (ymin, ymax))
         Limits of the two coordinates.
     coordinates : (str, str), optional
@@ -126,6 +128,7 @@ def sliding_portrait(
     """
     (one,) = held(system, holding, "this picture has no panels")
     system = one.system
+    texts = _OF_CONDITION if system.complementarity else _TEXTS
     require_one_surface(
         system,
         "sliding_portrait",
@@ -133,11 +136,13 @@ def sliding_portrait(
         "Use phase_portrait for two states; hold states of a larger one.",
     )
     whole(orbits, "orbits", least=0)
+    if system.complementarity:
+        system = condition_as_surface(system)
     values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
     scan = SurfaceScan.of(system, values, Box.read(box), coordinates, real(guess, "guess"))
     with canvas(ax, size, (7.0, 4.8), colors=colors, look=look, title=title) as page:
         axes = page.ax
-        portrait = _Portrait(page, scan)
+        portrait = _Portrait(page, scan, texts)
         portrait.draw(orbits)
         names, limits = [system.state_names[i] for i in scan.shown], scan.box.limits
         axes.set(xlim=limits[:2], ylim=limits[2:], xlabel=names[0], ylabel=names[1])
@@ -151,8 +156,8 @@ def sliding_portrait(
 class _Portrait:
     """Draws one portrait."""
 
-    def __init__(self, page: Canvas, scan: SurfaceScan):
-        self.page, self.ax, self.scan = page, page.ax, scan
+    def __init__(self, page: Canvas, scan: SurfaceScan, texts: Sequence[str]):
+        self.page, self.ax, self.scan, self.texts = page, page.ax, scan, texts
         self.flow = SlidingOrbits(scan)
         self.labels = Labels(self.ax)
         self.named: dict[str, Array] = {}
@@ -195,7 +200,7 @@ class _Portrait:
         )
 
     def _tint(self, kind: int) -> Any:
-        return self.page.color(_TEXTS[kind], _TINTS[kind])
+        return self.page.color(self.texts[kind], _TINTS[kind])
 
     def _orbit(self, attracting: bool) -> dict[str, Any]:
         color = style.ATTRACTING if attracting else style.REPELLING
@@ -294,7 +299,7 @@ class _Portrait:
     def legend(self) -> None:
         """Explain colours, lines and marks beside the axes."""
         handles: list[Line2D | Patch] = [
-            Patch(facecolor=self._tint(k), edgecolor="#BBBBBB", label=_TEXTS[k])
+            Patch(facecolor=self._tint(k), edgecolor="#BBBBBB", label=self.texts[k])
             for k in range(4)
             if np.any(self.scan.regions == k)
         ]

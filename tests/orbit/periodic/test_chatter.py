@@ -59,6 +59,24 @@ def test_derivatives_and_multipliers_are_those_of_runs() -> None:
     values = values[np.argsort(-np.abs(values))]
     assert np.abs(np.abs(values[:2]) - np.abs(orbit.multipliers[:2])).max() < 1e-10
     assert orbit.multipliers[2:].tolist() == [0.0, 0.0]
-    h = 1e-5
+    h = 2e-5
     near = [ns.periodic_orbit(MASS, orbit, parameters={"r": 0.4 + way}).start for way in (-h, h)]
-    assert orbit.derivative("r").start == pytest.approx((near[1] - near[0]) / (2 * h), abs=1e-8)
+    assert orbit.derivative("r").start == pytest.approx((near[1] - near[0]) / (2 * h), abs=1e-7)
+
+
+#: Values of parameters at which impacts no longer accumulate before the release: bisection of exact bounces, 40 digits.
+ENDS = {"r": (0.76, 0.7757628161871), "A": (0.63, 0.6389395324781), "w": (5.6, 5.652165657861)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ENDS)
+def test_a_branch_ends_where_chatter_is_complete_no_longer(name: str) -> None:
+    near, end = ENDS[name]
+    given = {"parameters": {name: near}, "tol": 1e-12}
+    run = ns.simulate(TABLE, [0.9, 0.0], 9.0, t_start=0.2, **given)
+    orbit = ns.periodic_orbit(TABLE, run)
+    branch = ns.continue_orbit(orbit, name, bounds=(near, 1.05 * end), step=0.2)
+    (event,) = branch.events
+    assert event.kind == "end of complete chatter"
+    assert event.parameter == pytest.approx(end, rel=2e-7)
+    assert all(z.stability == "superstable" for z in branch.solutions)

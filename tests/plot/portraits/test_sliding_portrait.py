@@ -126,3 +126,16 @@ def test_the_name_of_a_class_is_inside_of_a_narrow_frame(box):
     system = ns.textbook.two_fold("VV-C1").system
     figure = ns.plot.sliding_portrait(system, box, size=(3.4, 4.4))
     assert [fault for fault in faults(figure) if "VV-C1" in fault] == []
+
+
+def test_a_condition_slides_where_it_is_closed():
+    """z = 0 is closed for x < 0.4, with rest at x = 0.3 y, y = 0.2 (0.4 - x)."""
+    x, y, z, push = (ca.SX.sym(name) for name in ("x", "y", "z", "push"))
+    field = [0.2 * push - y, x - 0.3 * y, x - 0.4 + push]
+    conditions = [ns.Complementarity(z, push)]
+    system = ns.FilippovSystem([x, y, z], field=field, complementarity=conditions)
+    axes = ns.plot.sliding_portrait(system, (-1, 1, -1, 1)).axes[0]
+    (rest,) = (line for line in axes.lines if line.get_gid() == "stable pseudo-focus")
+    assert_allclose(rest.get_xydata()[0], np.array([0.024, 0.08]) / 1.06, atol=1e-10)
+    texts = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "$D_a$: closed" in texts and "$C_1$: opens" in texts

@@ -51,10 +51,10 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
     return "".join([*parts, *_step_texts(system), *map(driver_text, after)])
 
 
-def device_source(system: FilippovSystem, order: int, threads: int, resident: int = 1) -> str:
+def device_source(system: FilippovSystem, order: int, threads: int) -> str:
     """C++ source of the same engine with a trajectory for each thread, for CUDA or any compiler."""
     head, program = _lanes_head(system, order)
-    sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n#define RANDOM 0\n"
+    sizes = f"#define THREADS {threads}\n#define RESIDENT 1\n#define RANDOM 0\n"
     before = ("core/common.h", "kernel/lane.h", "kernel/functions.h", "kernel/polynomials.h")
     parts = [driver_text("kernel/cuda.h"), sizes, head, *map(driver_text, before), program]
     return "".join([*parts, *_step_texts(system), driver_text("kernel/cuda.c")])
@@ -73,28 +73,28 @@ def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
     # The sliding field has no 0/0 where both fields are tangent.
     cancelled = not m or of.continuous[0] or of.scaled[0]
     modes, affine = (listed(map(int, flags)) for flags in (shape.affine_modes, shape.affine))
-    defines = (
-        f"#define SLOTS {len(shape.affine)}\n#define STOPS {len(system.stops)}\n"
-        f"#define CANCELLED {int(cancelled)}\n#define ROWS {len(shape.rows)}\n"
-        f"#define GUARDS {len(shape.slots)}\n#define NAMED {int(bool(shape.own))}\n"
-        f"#define CURVED {int(any(of.linearity.curved_guards[:m]))}\n"
-        f"#define LINEAR {int(all(shape.affine_modes))}\n"
-        f"static const int DIRECTION[] = {{{directions}}};\n"
-        f"static const long long AFFINE_MODES[] = {{{modes}}};\n"
-        f"static const int ROW[] = {{{listed(shape.rows) or 0}}}, SLOT[] = {{{listed(shape.slots) or 0}}};\n"
-        f"static const int AFFINE[] = {{{affine or 1}}}, OWN_STATE[] = {{{listed(shape.own) or 0}}};\n"
-    )
-    return facts_header() + _sizes(system, order) + defines, program
-
-
-def _sizes(system: FilippovSystem, order: int) -> str:
     # Steps of lanes have a longest one, where all terms vanish; one as long is the driver's.
     sizes: dict[str, float] = {
         "LONGEST": 0.5 * 10 ** (300 / (order + 2)),
         "N": system.extended_dimension,
         "ND": system.dimension,
         "P": order,
-        "M": system.surface_count,
+        "M": m,
         "TIMED": int(system.time_dependent),
+        "SLOTS": len(shape.affine),
+        "STOPS": len(system.stops),
+        "CANCELLED": int(cancelled),
+        "ROWS": len(shape.rows),
+        "GUARDS": len(shape.slots),
+        "NAMED": int(bool(shape.own)),
+        "CURVED": int(any(of.linearity.curved_guards[:m])),
+        "LINEAR": int(all(shape.affine_modes)),
     }
-    return "".join(f"#define {name} {value!r}\n" for name, value in sizes.items())
+    numbers = "".join(f"#define {name} {value!r}\n" for name, value in sizes.items())
+    arrays = (
+        f"static const int DIRECTION[] = {{{directions}}};\n"
+        f"static const long long AFFINE_MODES[] = {{{modes}}};\n"
+        f"static const int ROW[] = {{{listed(shape.rows) or 0}}}, SLOT[] = {{{listed(shape.slots) or 0}}};\n"
+        f"static const int AFFINE[] = {{{affine or 1}}}, OWN_STATE[] = {{{listed(shape.own) or 0}}};\n"
+    )
+    return facts_header() + numbers + arrays, program

@@ -111,7 +111,7 @@ def _continue(
     x, done = np.ascontiguousarray(records["x"]), np.zeros(1, np.int64)
     own, p = records.ctypes.data, engine.shown.with_cells(p)
     c_options = options_of(engine.system, options, dense=False, at=at)
-    batch = batch_of(x, p, options.t_start, out, None, None)
+    batch = batch_of(x, p, options.t_start, out, None)
     rest = (own, records.dtype.itemsize // 8, int(to_end), BURST)
     out.itinerary[:] = 0
     with engine.held_table() as table, engine.held_run(table) as run:

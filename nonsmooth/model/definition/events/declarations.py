@@ -11,7 +11,7 @@ import casadi as ca
 from ...checks import real
 from ...errors import DefinitionError
 from ...reading import Expression, column, items_of, listed, scalar
-from ..discrete_choices import without_choices
+from ..discrete_states import without_choices
 
 
 @dataclass(frozen=True)

@@ -479,6 +479,28 @@ def test_friction_by_the_reaction_of_a_joint_is_refused_with_what_to_write():
         )
 
 
+@pytest.mark.parametrize("pull", [1.0, -1.0])
+def test_a_piston_rubs_on_its_guide_by_the_size_of_the_side_force(pull):
+    """The guide carries pull (1 - x/2): with f = x - x^2/4 up to x = 2, then 2 - f, the piston stops where v^2/2 = mu f."""
+    side, rho, mu = ca.SX.sym("side"), pull * (1 - 0.5 * x), 0.3
+    dry = ns.Friction(u, load=side * rho, kinetic=mu)
+    piston = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, dry.force, r - rho],
+        surfaces=[dry, rho],
+        multipliers=[side],
+        constraints=ns.Constraint(y, reaction=r),
+    )
+    run = ns.simulate(piston, [0, 0, 2.2, 0], 12.0, tol=1e-12)
+    passed, stopped = (event for event in run.events if event.kind != "end")
+    assert (passed.name, stopped.name) == ("h1", "h0")
+    energy = lambda speed: speed**2 / 2
+    np.testing.assert_allclose(energy(passed.x[2]), energy(2.2) - mu, rtol=1e-11)
+    np.testing.assert_allclose(run.x[-1, 0], 2 + 2 * np.sqrt(energy(2.2) / mu - 1), rtol=1e-11)
+    by_speed = 2.2 / mu / np.sqrt(energy(2.2) / mu - 1)
+    np.testing.assert_allclose(ns.sensitivity(run).dx_dx0[0, 2], by_speed, rtol=1e-9)
+
+
 def test_functions_for_other_systems_refuse_constraints():
     with pytest.raises(ns.DefinitionError, match="has constraints, which this function"):
         ns.find_homoclinic(pendulum(0.1), [1.0, 0.0, 0.0, 0.0], "damping")

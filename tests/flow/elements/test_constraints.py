@@ -422,6 +422,7 @@ def test_orbits_and_their_multipliers_are_those_by_the_angle(drag, e):
     found, want = (ns.periodic_orbit(s, ns.simulate(s, start, 150.0)) for s, start in starts)
     assert found.stability == want.stability == "asymptotically stable"
     np.testing.assert_allclose(found.multipliers, [*want.multipliers, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(found.trajectory.x[-1], found.start, atol=1e-9)
     branch = ns.continue_orbit(found, "a", bounds=(0.48, 0.52))
     assert not branch.events and {end.name for end in branch.ends} == {"REACHED_BOUND"}
 

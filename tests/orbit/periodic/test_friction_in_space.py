@@ -150,6 +150,14 @@ def test_a_block_on_a_belt_sticks_and_slips_by_itself():
         np.testing.assert_allclose(np.diff(entries)[-3:], one.period, rtol=1e-10)
 
 
+def test_friction_does_not_bound_a_resonance():
+    """x'' + x = cos t with a friction of 0.3 grows without bound: there is no orbit, however far away one looks."""
+    system = held((ca.cos(T), 0.6 * ca.sin(T)), (1, 1), mu=0.3)
+    run = ns.simulate(system, [0.4, 0.1, 0, 0], 150.0)
+    with pytest.raises(ns.ConvergenceError, match="ran away"):
+        ns.periodic_orbit(system, run)
+
+
 def test_half_of_a_symmetric_orbit_is_enough():
     system = held(SLOW)
     run = ns.simulate(system, [0.3, 0.1, 0, 0], 150.0, tol=1e-12)

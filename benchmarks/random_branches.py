@@ -206,7 +206,9 @@ def faults(branch: Branch) -> list[str]:
         at, (x, t) = f"at {branch.values[k]:.6g}", inside(orbit)
         run = moved(orbit, x, t, 1e-12)
         if not run.status.complete:
-            if near > 1e-5:
+            folds = [e.parameter for e in branch.events if e.kind == "two-fold"]
+            beside = any(abs(branch.values[k] - q) < 1e-3 for q in folds)
+            if near > 1e-5 and not (beside and run.status is ns.Status.NON_UNIQUE):
                 found.append(f"{at} {orbit.itinerary}: simulation ends {run.status}")
             continue
         missed = float(np.abs(run.x[-1] - x).max()) / (1 + float(np.abs(x).max()))
@@ -228,7 +230,8 @@ def _of_multipliers(orbit: PeriodicOrbit) -> list[str]:
         return []
     near = min((abs(m.relative) for m in orbit.margins), default=1.0)
     own = orbit.multipliers
-    if near < 1e-3 or not np.abs(own).max() < 1e3:
+    growth = float(np.abs(orbit.evaluation.flows.by_start).max())  # on the way
+    if near < 1e-3 or not np.abs(own).max() < 1e3 or growth > 1e4:
         return []
     values = differences(orbit, *inside(orbit))
     apart = max(float(np.abs(values - m).min()) for m in own)

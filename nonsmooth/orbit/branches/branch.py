@@ -352,6 +352,10 @@ class BranchCurve(Curve):
         """The event at a located zero; None if there is none."""
         raise NotImplementedError
 
+    def again(self, u: Array, tangent: Array | None = None) -> Departure | None:
+        """The same curve from a point of it with better equations; None if there are none."""
+        return None
+
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """The start of the branch beyond an event that ends this curve."""
         return None
@@ -440,6 +444,9 @@ def follow_branch(
     return branch
 
 
+#: End of an arc whose equations are to be divided, and most pieces of a branch.
+DIVIDE, _PIECES = "legs to divide", 48
+
 #: Size of a test at the start, relative to that beside it, at which the start is its zero.
 _ZERO = 1e-9
 
@@ -477,10 +484,11 @@ class _Half:
     end: BranchEnd = BranchEnd.EVENT
     reason: str = ""
 
-    def name_end(self, curve: BranchCurve, u: Array) -> None:
+    def name_end(self) -> None:
         """The event at the last point of a curve that could not be followed."""
+        curve, point = self.nodes[-1]
         try:
-            last = curve.ending(u, self.end)
+            last = curve.ending(point.u, self.end)
         except (NonsmoothError, np.linalg.LinAlgError):
             return
         if last is not None:
@@ -516,10 +524,12 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         return arc
 
     def following(departure: Departure, arc: Arc) -> Departure | None:
+        assert isinstance(departure.curve, BranchCurve)
+        if arc.end in (DIVIDE, "lost", "step too small"):
+            return departure.curve.again(arc.points[-1].u, arc.points[-1].tangent)
         event = known[id(arc.zeros[-1])] if through and arc.zeros else None
         if event is None or arc.zeros[-1].name != arc.end:
             return None
-        assert isinstance(departure.curve, BranchCurve)
         try:
             return departure.curve.onward(event, arc.zeros[-1])
         except (NonsmoothError, np.linalg.LinAlgError):  # the itinerary beyond has no orbit
@@ -530,7 +540,7 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
 
     whole = ("bound", "closed", "interrupted", "points")
     for departure, arc in pieces(
-        first, follow, following, last=lambda arc: arc.end in whole, apart=0.0
+        first, follow, following, last=lambda arc: arc.end in whole, apart=0.0, most=_PIECES
     ):
         at = departure.curve
         assert isinstance(at, BranchCurve)
@@ -542,8 +552,8 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         found = [known[id(zero)] for zero in arc.zeros]
         half.events += _distinct(found)
         half.end, half.reason = end_of(arc), arc.reason
-        if half.end in (BranchEnd.PERIOD_DIVERGES, BranchEnd.STEP_TOO_SMALL, BranchEnd.FAILED):
-            half.name_end(at, arc.points[-1].u)
+    if half.end in (BranchEnd.PERIOD_DIVERGES, BranchEnd.STEP_TOO_SMALL, BranchEnd.FAILED):
+        half.name_end()
     return half
 
 
@@ -612,7 +622,7 @@ def _drop_turning(arc: Arc) -> None:
 
 def end_of(arc: Arc) -> BranchEnd:
     """Name the end of an arc."""
-    if arc.end in ("lost", "step too small"):
+    if arc.end in ("lost", "step too small", DIVIDE):
         return BranchEnd.STEP_TOO_SMALL
     if arc.end == "period diverges":
         return BranchEnd.PERIOD_DIVERGES

@@ -98,6 +98,7 @@ def condition_row(
     i, n = condition.leg, problem.dimension
     starts, durations = problem.split(u)
     duration, count = float(durations[i]), problem.size
+    own = count - len(durations) * (n + 1) + i * n
 
     def value(x: Array, q: Array) -> float:
         if condition.what == "start":
@@ -113,7 +114,7 @@ def condition_row(
     sizes = 1e-6 * np.maximum(np.abs(starts).max(axis=0), 1e-3)
     for k in range(n):
         step = sizes[k] * np.eye(n)[k]
-        row[i * n + k] = (value(x + step, p) - value(x - step, p)) / (2 * sizes[k])
+        row[own + k] = (value(x + step, p) - value(x - step, p)) / (2 * sizes[k])
     for j, k in enumerate(free):
         size = 1e-6 * max(abs(float(p[k])), 1e-3)
         step = size * np.eye(p.size)[k]

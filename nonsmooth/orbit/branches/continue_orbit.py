@@ -177,7 +177,7 @@ def continue_orbit(
         *of_user.events.values(),
         *of_user.constraints,
     ):  # raises where one is not defined
-        function.rule(curve.problem, curve.evaluation(start), curve.p, ())
+        function.rule(curve.problem.whole, curve.evaluation(start), curve.p, ())
     if more:
         start = _constrained(curve, start)
     away = Departure(curve, rows, (start - rows[0]) / curve.scale) if len(rows) > 1 else None
@@ -199,7 +199,7 @@ def _constrained(curve: OrbitCurve, start: Array) -> Array:
     found = curve.unknowns_at(start, float(start[-1]))
     if found is None:
         values = [
-            c.rule(curve.problem, curve.evaluation(start), curve.p, ())[0]
+            c.rule(curve.problem.whole, curve.evaluation(start), curve.p, ())[0]
             for c in curve.rows.constraints
         ]
         raise ConvergenceError(

@@ -246,7 +246,8 @@ def changed_itinerary(
     problem: BoundaryProblem, kind: str, conditions: Sequence[Condition], u: Array, p: Array
 ) -> ChangedItinerary | None:
     """The itinerary beyond a bifurcation; None where nothing continues it."""
-    found: ChangedItinerary | None = ChangedItinerary(problem, u, tuple(range(len(problem.legs))))
+    every = tuple(range(len(problem.legs)))
+    found: ChangedItinerary | None = ChangedItinerary(problem.whole, problem.undivided(u), every)
     for condition in conditions:
         assert found is not None
         if condition.leg not in found.origin:

@@ -148,9 +148,9 @@ class _Around:
     def __init__(
         self, problem: BoundaryProblem, at: Evaluation, p: Array, units: Array, size: float
     ):
-        self.problem, self.p, self.units, self.size = problem, p, units, size
+        self.problem, self.p, self.units, self.size = problem.whole, p, units, size
         self.start = problem.pack(at.starts, at.durations)
-        self.sizes = problem.scales(self.start, p)
+        self.sizes = problem.whole.scales(self.start, p)
         self.here = self._slope_at(np.zeros(problem.dimension))
 
     def along(self, q: Complex, turning: bool) -> tuple[Complex, Complex]:

@@ -22,13 +22,15 @@ from ...model import Array, ConvergenceError, DefinitionError, NonsmoothError
 from ...solvers.continuation import Departure, Point, Zero
 from ...solvers.newton import converge
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, eliminated
+from ..periodic.divided_legs import divided, to_divide
 from ..periodic.find_periodic import at_two_fold
 from ..periodic.multipliers import return_map
 from ..periodic.orbit import PeriodicOrbit, faults_of, named
-from ..periodic.orbit_functions import UserRows
+from ..periodic.orbit_functions import OrbitFunction, UserRows
 from ..periodic.symmetry import halves, prime_period, require_symmetric
 from ..runs.legs import integrate_leg, shown_itinerary
 from .branch import (
+    DIVIDE,
     BranchCurve,
     BranchEnd,
     BranchEvent,
@@ -83,13 +85,13 @@ class OrbitEquations(BranchCurve):
         return p
 
     def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
-        p, unknowns = self.parameters_at(u), u[: self.problem.size]
+        p, unknowns = self.parameters_at(u), self.problem.undivided(u)
         if self.rows.constraints:
             raise DefinitionError(
                 "a branch with constraints= has no curves in two parameters and no other branches. Continue an orbit "
                 "without constraints."
             )
-        curve = type(self)(self.problem, p, free, widths, unknowns, self.longest)
+        curve = type(self)(self.problem.whole, p, free, widths, unknowns, self.longest)
         curve.known = self.known
         return curve, np.append(unknowns, p[list(free)])
 
@@ -108,9 +110,16 @@ class OrbitEquations(BranchCurve):
         if not self.rows.constraints:
             return at.residual, at.whole
         p = self.parameters_at(u)
-        more = [c.rule(self.problem, at, p, self.free) for c in self.rows.constraints]
+        more = [self.of_user(c, at, p, self.free) for c in self.rows.constraints]
         values = [value for value, _ in more]
         return np.append(at.residual, values), np.vstack([at.whole, *(row for _, row in more)])
+
+    def of_user(
+        self, function: OrbitFunction, at: Evaluation, p: Array, free: tuple[int, ...]
+    ) -> tuple[float, Array]:
+        """A function of the user, of whole legs, with its derivatives by the unknowns."""
+        value, row = function.rule(self.problem.whole, at, p, free)
+        return value, np.append(np.zeros(self.problem.size - self.problem.whole.size), row)
 
     def values(self, u: Array) -> Array | None:
         if self.rows.constraints:
@@ -179,9 +188,9 @@ class OrbitCurve(OrbitEquations):
         at, p, self._last = self.evaluation(point.u), self.parameters_at(point.u), b""
         found = conditions_of(self.problem, at, p, self.known)
         for name, function in self.rows.events.items():
-            found[USER + name] = function.rule(self.problem, at, p, ())[0]
+            found[USER + name] = self.of_user(function, at, p, ())[0]
         if self.rows.cost is not None:
-            row = self.rows.cost.rule(self.problem, at, p, self.free)[1]
+            row = self.of_user(self.rows.cost, at, p, self.free)[1]
             found[COST] = float(row @ (point.tangent * self.scale))
         if self._on_plane:  # the flow across the plane on which the orbit starts
             assert self.problem.phase is not None
@@ -268,8 +277,27 @@ class OrbitCurve(OrbitEquations):
 
     def out(self, u: Array) -> str:
         """``"period diverges"`` where it is long and grows at a constant parameter; else empty."""
+        if to_divide(self.problem, self.evaluation(u)) and self.again(u) is not None:
+            return DIVIDE
         durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
         return "period diverges" if u[durations].sum() > self.longest and self._steep(u) else ""
+
+    def again(self, u: Array, tangent: Array | None = None) -> Departure | None:
+        """The same branch with legs divided where derivatives grow along them; None where nothing changes."""
+        p, own = self.parameters_at(u), self.problem
+        try:
+            problem, v = divided(own, u[: own.size], p)
+        except NonsmoothError:
+            return None
+        if problem is own:
+            return None
+        curve, k = self.with_problem(problem, v, p), own.undivided(u).size + len(self.free)
+        inside = np.resize(self.scale[-k:][: own.dimension], problem.size - own.undivided(u).size)
+        curve.scale = np.concatenate([inside, self.scale[-k:]])
+        start, way = np.append(v, u[own.size :]), np.zeros(curve.scale.size)
+        way[-k:] = 1.0 if tangent is None else tangent[-k:]
+        found = curve.correct(start, way / np.linalg.norm(way))
+        return None if found is None else Departure(curve, [found], way / np.linalg.norm(way))
 
     def _steep(self, u: Array) -> bool:
         """Whether the period grows steeply with the parameter."""
@@ -403,7 +431,8 @@ class OrbitCurve(OrbitEquations):
         n, leg = self.problem.dimension, self.problem.legs[0]
         begin = integrate_leg(self.system, leg, x, _LATER * float(duration), p).end[None, :n]
         unknowns = self.problem.pack(begin, np.array([duration]))
-        curve = self.with_problem(replace(self.problem, reference=begin[0]), unknowns, p)
+        phased = replace(self.problem.whole, reference=begin[0])
+        curve = self.with_problem(phased, unknowns, p)
         return curve, np.append(unknowns, u[k:])
 
     def _at_another_phase(self, u: Array, at: Condition) -> BranchEvent | None:
@@ -446,7 +475,7 @@ class OrbitCurve(OrbitEquations):
             of_user = FarSide("", f"{function.name} = 0")
             return self._event(zero.name.removeprefix(USER), self, zero.point, "", of_user)
         if zero.name == COST and self.rows.cost is not None:
-            cost = self.rows.cost.rule(self.problem, at, p, ())[0]
+            cost = self.of_user(self.rows.cost, at, p, ())[0]
             of_user = FarSide("", f"{self.rows.cost.name} is extremal", ReadOnly({"cost": cost}))
             return self._event(COST, self, zero.point, "", of_user)
         if zero.name == "branch point":
@@ -592,7 +621,7 @@ Located = tuple[str, OrbitCurve, Point, str, FarSide]
 def _as_doubling(curve: OrbitCurve, zero: Zero) -> Located | None:
     """Recognise a branch point as the period doubling of an orbit of half the period."""
     u, p = zero.point.u, curve.parameters_at(zero.point.u)
-    problem, once = prime_period(curve.problem, u[: curve.problem.size], p)
+    problem, once = prime_period(curve.problem.whole, curve.problem.undivided(u), p)
     whole = float(curve.problem.split(u)[1].sum())
     if round(whole / float(problem.split(once)[1].sum())) != 2:
         return None
@@ -602,7 +631,7 @@ def _as_doubling(curve: OrbitCurve, zero: Zero) -> Located | None:
 def _as_pitchfork(curve: OrbitCurve, zero: Zero) -> Located | None:
     """Recognise a branch point as the pitchfork of an orbit that is symmetric under a reflection."""
     u, p = zero.point.u, curve.parameters_at(zero.point.u)
-    for problem, half in halves(curve.problem, u[: curve.problem.size], p):
+    for problem, half in halves(curve.problem.whole, curve.problem.undivided(u), p):
         found = _part(curve, problem, half, zero, "pitchfork")
         if found is not None:
             return found

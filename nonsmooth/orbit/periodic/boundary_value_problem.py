@@ -85,6 +85,8 @@ class Evaluation:
     durations: Array
     #: (n, n) or None: The projector at the first start onto what constraints allow.
     allowed: Array | None = None
+    #: The same of the parts of divided legs, as legs; None where no leg is divided.
+    parts: Evaluation | None = None
 
     @property
     def jacobian(self) -> Array:
@@ -181,14 +183,28 @@ class BoundaryProblem:
         """Number of unknowns."""
         return len(self.legs) * (self.dimension + 1)
 
+    @property
+    def whole(self) -> BoundaryProblem:
+        """The problem with undivided legs."""
+        return self
+
+    def parts_of(self, i: int) -> range:
+        """The parts of a leg among those of all legs."""
+        return range(i, i + 1)
+
+    def undivided(self, u: Array) -> Array:
+        """The unknowns of undivided legs, without free parameters."""
+        return u[: self.size]
+
     def pack(self, starts: Array, durations: Array) -> Array:
         """Unknowns from starts (N, n) and durations (N,)."""
         return np.concatenate([np.ravel(starts), np.ravel(durations)])
 
     def split(self, u: Array) -> tuple[Array, Array]:
         """Starts (N, n) and durations (N,) of unknowns."""
-        count = len(self.legs) * self.dimension
-        return u[:count].reshape(len(self.legs), self.dimension), u[count : self.size]
+        count = len(self.legs)
+        at = count * self.dimension
+        return u[:at].reshape(count, self.dimension), u[at : at + count]
 
     @cached_property
     def wrap(self) -> Array:

@@ -29,6 +29,7 @@ from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
 from ..runs.legs import Leg, leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
+from .divided_legs import divided, to_divide
 from .guess import Start, about_of, is_about, starts_of
 from .orbit import PeriodicOrbit, faults_of, named
 from .symmetry import prime_period, require_symmetric, symmetry_matrix
@@ -121,6 +122,7 @@ def periodic_orbit(
     Notes
     -----
     Unknowns are starts and durations of the legs (multiple shooting by Taylor series; no mesh).
+    Impacts or switches that accumulate are one leg, which the itinerary shows with dots, as in ``"c o o..."``.
     Multipliers: products of variational and saltation matrices, Leine & Nijmeijer 2004, ch. 7.
 
     Examples
@@ -215,19 +217,49 @@ def _solved(
     begun, guessed, system = start.problem, start.unknowns, start.problem.system
     if not begun.legs[-1].timed:
         begun, guessed = prime_period(begun, guessed, start.p)
-    solver = _Solver(begun, start.p, budget)
-    u, at = solver.solve(guessed, most, damped)
-    problem, once = prime_period(begun, u, start.p)
-    if problem is not begun:
-        u, at = _Solver(problem, start.p, budget).solve(once, most)
+    problem, u, at, iterations = _closed_orbit(begun, guessed, start.p, most, budget, damped)
+    part, once = prime_period(begun, problem.undivided(u), start.p)
+    if part is not begun:
+        problem, u, at, _ = _closed_orbit(part, once, start.p, most, budget)
     require_motion(problem, at, start)
     require_duration(problem, at, about_of(system, period, start.p))
     _require_multiplicity(problem, multiplicity)
     faults = tuple(faults_of(problem, at, start.p))
-    orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, solver.iterations, faults)
+    orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, iterations, faults)
     require_simple(orbit)
     require_symmetric(orbit)
     return orbit
+
+
+def _closed_orbit(
+    problem: BoundaryProblem,
+    guess: Array,
+    p: Array,
+    most: int,
+    budget: _Budget,
+    damped: bool = True,
+) -> tuple[BoundaryProblem, Array, Evaluation, int]:
+    """The orbit near a guess, with legs divided where derivatives grow along them; how many steps it took."""
+    solver, found = _Solver(problem, p, budget), None
+    try:
+        found = solver.solve(guess, most, damped)
+        if not to_divide(problem, found[1]):
+            return problem, *found, solver.iterations
+        parts, start = divided(problem, guess, p)
+    except ConvergenceError:
+        parts, start = divided(problem, guess, p) if damped else (problem, guess)
+        if parts is problem:
+            raise
+    if parts is not problem:
+        try:
+            finer = _Solver(parts, p, budget)
+            orbit = finer.solve(start, most, damped)
+            return parts, *orbit, solver.iterations + finer.iterations
+        except ConvergenceError:
+            if found is None:
+                raise
+    assert found is not None
+    return problem, *found, solver.iterations
 
 
 def _require_multiplicity(problem: BoundaryProblem, wanted: int | None) -> None:
@@ -249,9 +281,10 @@ def _beside(
     except (ConvergenceError, DegenerateError):
         return None
     begun, guessed = prime_period(start.problem, start.unknowns, start.p)
-    if orbit.faults or orbit.problem.size != begun.size:
+    own, u = orbit.problem.whole, orbit.problem.undivided(orbit.unknowns)
+    if orbit.faults or own.size != begun.size:
         return None
-    away = np.abs(orbit.unknowns - guessed) / orbit.problem.scales(orbit.unknowns, start.p)
+    away = np.abs(u - guessed) / own.scales(u, start.p)
     return orbit if away.max() <= _BESIDE else None
 
 
@@ -281,6 +314,9 @@ _FAR = 10.0
 
 #: Directions that equations say less of than the others, by these factors.
 _WEAK = (1e-15, 1e-8, 1e-6, 1e-4, 1e-2)
+
+#: Residual, relative to the orbit, with which it does not close.
+_CLOSES = 1e-7
 
 #: Equations of which singular values would take minutes, and residuals that cannot be smaller.
 _LARGE, _CLOSED = 1000, 1e-9
@@ -346,12 +382,20 @@ class _Solver:
         nearest = self._of_family(equations, u / scales, root, max_iterations)
         last[:] = before
         if nearest is not root and nearest is not None:
-            return self._polished(nearest * scales, _POLISH)
+            return self._closed(*self._polished(nearest * scales, _POLISH))
         if root is None and damped and u.size <= _LARGE:
             root = self._damped(equations, u / scales, 2 * max_iterations)
         if root is None:
             raise self._failure(reason)
-        return self._polished(root * scales)
+        return self._closed(*self._polished(root * scales))
+
+    def _closed(self, u: Array, at: Evaluation) -> tuple[Array, Evaluation]:
+        """Refuse what no step brings nearer to an orbit."""
+        sizes = self._sizes(at.jacobian * self.problem.scales(u))
+        if not float(np.abs(at.residual / sizes).max()) <= _CLOSES:
+            self.last = u, at
+            raise self._failure("")
+        return u, at
 
     def _of_family(
         self, equations: Equations, v: Array, root: Array | None, most: int

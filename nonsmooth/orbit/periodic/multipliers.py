@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, ConvergenceError, DegenerateError
-from ..runs.legs import integrate_leg, leg_name
+from ..runs.legs import Leg, integrate_leg, leg_name
 from ..runs.saltation import passages, saltations
 from .boundary_value_problem import BoundaryProblem, Evaluation, jacobian_indices
 from .cyclic_qr import Factor, Product
@@ -168,12 +168,15 @@ class Multipliers:
     @cached_property
     def _parts(self) -> list[list[tuple[Array, Array]]]:
         """Derivatives (S, N) of the parts of each leg, by starts in units of the orbit, and fields at their ends."""
-        flows = self.at.flows
-        legs = enumerate(zip(flows.by_start * self._units, flows.rate, strict=True))
-        whole = [bool(leg.repeats) for leg in self.problem.legs]
-        return [
-            [(x, rate)] if whole[i] or self._even(x) else self._cut(i, x) for i, (x, rate) in legs
-        ]
+        at, result = self.at.parts or self.at, list[list[tuple[Array, Array]]]()
+        for i, leg in enumerate(self.problem.legs):
+            result.append([])
+            for k in self.problem.parts_of(i):
+                whole = at.flows.by_start[k] * self._units, at.flows.rate[k]
+                even = bool(leg.repeats) or self._even(whole[0])
+                start, duration = at.starts[k], float(at.durations[k])
+                result[-1] += [whole] if even else self._cut(leg, start, duration, whole)
+        return result
 
     def _even(self, part: Array) -> bool:
         """Whether derivatives (S, N) do not grow too differently."""
@@ -184,17 +187,18 @@ class Multipliers:
         count = self._count + 1  # discrete states do not move
         return bool(sizes[0] <= _STIFF * sizes[count - 1])
 
-    def _cut(self, i: int, whole: Array) -> list[tuple[Array, Array]]:
-        problem, units, n = self.problem, self._units, self.problem.dimension
-        leg, duration, count = problem.legs[i], float(self.at.durations[i]), 2
+    def _cut(
+        self, leg: Leg, start: Array, duration: float, whole: tuple[Array, Array]
+    ) -> list[tuple[Array, Array]]:
+        system, units, n, count = self.problem.system, self._units, self.problem.dimension, 2
         while True:
-            parts, x = list[tuple[Array, Array]](), self.at.starts[i]
+            parts, x = list[tuple[Array, Array]](), start
             for _ in range(count):
                 try:
-                    flow = integrate_leg(problem.system, leg, x, duration / count, self.p)
+                    flow = integrate_leg(system, leg, x, duration / count, self.p)
                 except ConvergenceError:  # rounding of the parts leads it astray
-                    return [(whole, self.at.flows.rate[i])]
-                x, part = flow.end[:n], np.zeros_like(whole)
+                    return [whole]
+                x, part = flow.end[:n], np.zeros_like(whole[0])
                 part[: len(flow.by_start)] = flow.by_start * units
                 parts.append((part, flow.rate))
             if count >= _PARTS or all(self._even(part) for part, _ in parts):

@@ -52,7 +52,7 @@ class OrbitFunction:
 
     def __call__(self, orbit: PeriodicOrbit) -> float:
         """Evaluate it at an orbit."""
-        return self.rule(orbit.problem, orbit.evaluation, orbit.parameter_vector, ())[0]
+        return self.rule(orbit.problem.whole, orbit.evaluation, orbit.parameter_vector, ())[0]
 
     def derivative(self, orbit: PeriodicOrbit, parameter: str) -> float:
         """Derivative by a parameter along the branch of an orbit.

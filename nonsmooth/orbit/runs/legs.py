@@ -214,7 +214,7 @@ def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class LegFlow:
     """Flow of a leg from its start over its duration."""
 
@@ -317,7 +317,7 @@ def flows_of(found: CarriedLegs) -> list[LegFlow]:
     return result
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)  # made for each event: frozen ones take thrice the time
 class Stretch:
     """A leg of a run: where it starts and ends."""
 
@@ -399,9 +399,7 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
         as_shown = shown.mode_before, shown.element
         result.append(Stretch(leg, t, first.t - t, x, x_end, after, system, p, as_shown))
         t, x = last.t, after
-        if _closes(
-            result, last.mode_after
-        ):  # the last of many impacts, at a speed that is lost in rounding
+        if _closes(result, last.mode_after):  # at a speed that is lost in rounding
             none = Leg(leg.mode, "limit", leg.element)
             result.append(Stretch(none, t, 0.0, x, x, x, system, p, as_shown))
     if run.accumulation_time is not None:  # the run ends where no motion follows the limit

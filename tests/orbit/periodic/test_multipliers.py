@@ -18,6 +18,9 @@ CASES = {
 }
 
 
+DAMPING = ca.SX.sym("d")
+
+
 def random_factors(seed, count, n):
     rng = np.random.default_rng(seed)
     return [rng.normal(size=(n, n)) for _ in range(count)]
@@ -65,9 +68,9 @@ def test_a_long_product_keeps_the_eigenvalues_that_its_matrix_has_lost():
 
 
 def passengers(mixed):
-    """A relay oscillator with passengers that decay and grow, as in LM1."""
+    """A relay oscillator with passengers that decay and grow, as in LM1; legs grow by 7e6."""
     x, v, z, w = (ca.SX.sym(s) for s in "xvzw")
-    sides = [[v, s - x - 0.2 * v, x - 40 * z, 5 * w + v] for s in (1, -1)]
+    sides = [[v, s - x - 2 * DAMPING * v, x - 40 * z, 5 * w + v] for s in (1, -1)]
     if not mixed:
         return [x, v, z, w], v, sides, np.eye(4)
     k = np.array([[1, 2, 0, 1], [0, 1, 3, 0], [1, 2, 1, 2], [2, 5, 3, 3.0]])
@@ -80,14 +83,37 @@ def passengers(mixed):
 @pytest.mark.parametrize("mixed", [False, True])
 def test_multipliers_of_passengers_that_decay_and_grow(mixed):
     states, surface, (above, below), k = passengers(mixed)
-    system = ns.FilippovSystem(states, surface=surface, above=above, below=below)
+    system = ns.FilippovSystem(
+        states, surface=surface, above=above, below=below, parameters={DAMPING: 0.1}
+    )
     start = k @ [float(text) for text in CASES["LM1"]["start"]]
     orbit = ns.periodic_orbit(system, start, itinerary=["+", "-"])
+    assert orbit.problem.parts_of(1)[0] > 1 and orbit.residual < 1e-12
     expected = np.sort([float(text) for text in CASES["LM1"]["log_multipliers"]])[::-1]
     found = orbit.floquet.logarithms.real
-    np.testing.assert_allclose(found, np.delete(expected, 1), atol=10 * orbit.error_estimate)
-    assert orbit.error_estimate < 1e-7 and orbit.stability.startswith("unstable, 1")
+    np.testing.assert_allclose(found, np.delete(expected, 1), atol=1e-9, rtol=1e-12)
+    assert orbit.error_estimate < 1e-11 and orbit.stability.startswith("unstable, 1")
     assert orbit.multipliers[-1] == pytest.approx(float(CASES["LM1"]["multipliers"][2]), rel=1e-9)
+    assert orbit.derivative("d").period == pytest.approx(2 * np.pi * 0.1 / 0.99**1.5, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_branch_of_legs_that_are_divided_has_all_multipliers():
+    states, surface, (above, below), _ = passengers(False)
+    system = ns.FilippovSystem(
+        states, surface=surface, above=above, below=below, parameters={DAMPING: 0.1}
+    )
+    start = [float(text) for text in CASES["LM1"]["start"]]
+    orbit = ns.periodic_orbit(system, start, itinerary=["+", "-"])
+    branch = ns.continue_orbit(orbit, "d", bounds=(0.05, 0.3))
+    assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2 and not branch.events
+    for one in branch.orbits[:: len(branch) // 6]:
+        d = one.parameters["d"]
+        period = 2 * np.pi / np.sqrt(1 - d * d)
+        expected = np.array([5.0, -d, -40.0]) * period
+        np.testing.assert_allclose(one.floquet.logarithms.real, expected, atol=1e-8)
+        assert one.period == pytest.approx(period, rel=1e-12)
+    assert branch[0.2].period == pytest.approx(2 * np.pi / np.sqrt(0.96), rel=1e-12)
 
 
 def test_multipliers_of_a_half_are_roots_of_those_of_the_whole():

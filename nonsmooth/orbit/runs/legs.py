@@ -164,7 +164,9 @@ class Leg:
         if self.kind in by_states:
             mode = system.widened(self.mode) if self.kind == "impact" else ""
             given = mode, self.kind, self.element, self.letters, self.atom
-            return instant_map(system, *given)(x, p)
+            at = instant_map(system, *given)(x, p)
+            below = self.kind in ("crossing", "entry") and self.mode[self.element] == "-"
+            return at.negative if system.sets and below else at
         own, every = self.map(system), tuple(range(len(p)))
         assert own is not None
         if self.field(system).entries == len(x):

@@ -153,6 +153,7 @@ def test_grazing_of_a_wall_is_a_resonance_curve_and_an_interrupt_keeps_its_part(
     cut = ns.continue_bifurcation(event, ("F", "z"), bounds=[(0.2, 1), (0.02, 0.3)], progress=True)
     assert ns.orbit.BranchEnd.INTERRUPTED in cut.ends and 1 < len(cut) < len(curve)
     assert np.abs(F - np.hypot(1 - w * w, 2 * z * w)).max() < 1e-12
+    assert not any(curve.solution(k).is_virtual for k in range(len(curve)))  # a touch is no passage
 
 
 @pytest.mark.slow

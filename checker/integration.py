@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import Any
 
@@ -62,6 +63,11 @@ class Orbit:
         finest = min([w for w in widths if w > wide / 10**6], default=Fraction(1, 10**20))
         digits = len(str(int(1 / finest)))
         digits = min(60, max(16, digits + 6)) if not wide else min(_DIGITS, digits + 6)
+        self.tolerance, self.order = 10.0**-digits, max(16, int(0.8 * digits))
+
+    def aim(self, width: float) -> None:
+        """Set tolerance and order of the steps for a width of the end."""
+        digits = min(_DIGITS, max(12, 8 - math.floor(math.log10(width))))
         self.tolerance, self.order = 10.0**-digits, max(16, int(0.8 * digits))
 
     @property

@@ -26,6 +26,8 @@ class Pieces:
         self.record, self.sections = record, record["sections"]
         self.given = [(number(a), number(b)) for a, b in record["parameters"]]
         self.size = len(record["graph"]["field"])
+        widths = [number(b) - number(a) for a, b in record["point"]]
+        self.finest = max(1e-170, float(min(widths, default=0)))
         self.planes = [(s["position"], number(s["value"])) for s in self.sections]
 
     def system(self, u: list[Iv]) -> tuple[list[Iv], Matrix]:
@@ -49,9 +51,11 @@ class Pieces:
         (k, value), (k2, value2) = self.planes[i], self.planes[j]
         start = [(Fraction(v.a, UNIT), Fraction(v.b, UNIT)) for v in u]
         start.insert(k, (value, value))
-        part = {"start": start, "events": [], "end": [pair for pair in start if pair[0] < pair[1]]}
-        orbit = Orbit(self.record | part, [*start, *self.given])
+        orbit = Orbit(
+            self.record | {"start": start, "events": [], "end": []}, [*start, *self.given]
+        )
         orbit.smooth = any(v.a < v.b for v in u)
+        orbit.aim(min((v.b - v.a) / UNIT for v in u) if orbit.smooth else self.finest)
         if orbit.mode != own["mode"]:
             raise CheckError(f"piece {i + 1} begins in {orbit.mode!r}")
         events, far = list(self.record["claims"]["events"][i]), Iv.of(self.record["longest"])
@@ -84,17 +88,22 @@ def check_periodic(record: dict[str, Any]) -> str:
     image = krawczyk(pieces, box, matrix)
     if not all(k.inside(b) for k, b in zip(image, box, strict=True)):
         raise CheckError("Krawczyk's operator does not map the box into its interior")
-    point, _ = zero_near(pieces, record, box)
-    m, period, D = pieces.size - 1, whole(0), None
+    point = [Iv(v.a - 1, v.b + 1) for v in zero_near(pieces, record, box)[0]]
+    m, period = pieces.size - 1, whole(0)
+    D = [[whole(int(i == j)) for j in range(m)] for i in range(m)]
     for i in range(len(pieces.sections)):
         _, own, time = pieces.piece(i, point[i * m : (i + 1) * m])
-        period, D = period + time, own if D is None else product(own, D)
+        period, D = period + time, product(own, D)
     inside([period], [claims["period"]], "the period")
     summary = (
         f"exactly one periodic orbit in the box, with {sum(map(len, claims['events']))} events"
     )
     if claims["label"]:
-        if D is None or stability(multipliers(D, claims["multipliers"])) != claims["label"]:
+        known = claims.get("multipliers")
+        found = "asymptotically stable" if known is None and contracts(D) else ""
+        if known is not None:
+            found = stability(multipliers(D, known))
+        if found != claims["label"]:
             raise CheckError(f"it is not proven to be {claims['label']}")
         summary += f"; {claims['label']}"
     return summary
@@ -129,6 +138,15 @@ def multipliers(D: Matrix, claimed: list[list[list[str]]]) -> list[Complex]:
     if len(discs) != m:
         raise CheckError("there are not as many multipliers as claimed")
     return boxes
+
+
+def contracts(D: Matrix) -> bool:
+    """Whether a power of a matrix makes all vectors shorter."""
+    for _ in range(12):
+        if all(sum(_size(v) for v in row) < UNIT for row in D):
+            return True
+        D = product(D, D)
+    return False
 
 
 def stability(boxes: list[Complex]) -> str:

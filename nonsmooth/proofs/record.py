@@ -12,7 +12,7 @@ from .arithmetic.flint import arb
 from .arithmetic.instructions import Program
 from .arithmetic.intervals import Numbers, ends, exact, fraction
 from .arithmetic.krawczyk import Zero
-from .surface_functions import SystemGraph
+from .surface_functions import SurfaceFunctions, SystemGraph
 
 FORMAT = "nonsmooth proof 1"
 
@@ -74,7 +74,7 @@ def motion_of(system: FilippovSystem, numbers: Numbers, modes: Iterable[str]) ->
     one = lambda e: system_graph.insert([e])[0] if e.numel() else []
     maps = [one(d.maps[:, k]) for k in range(len(system.resets))]
     rows = [one(d.surfaces), field, one(d.guards), one(d.gaps), one(d.restitutions), *maps]
-    sliding = {w: _factored(system_graph, rows[0], w, numbers) for w in modes if "s" in w}
+    sliding = {w: _factored(system_graph, w, numbers) for w in modes if "s" in w}
     rows += [[d.factor, *d.direction] for d in sliding.values()]
     program = Program(graph, rows)
     names = ("surfaces", "field", "guards", "gaps", "restitutions")
@@ -93,17 +93,10 @@ def motion_of(system: FilippovSystem, numbers: Numbers, modes: Iterable[str]) ->
     }
 
 
-def _factored(
-    system_graph: SystemGraph, surfaces: list[int], mode: str, numbers: Numbers
-) -> Difference:
+def _factored(system_graph: SystemGraph, mode: str, numbers: Numbers) -> Difference:
     """The factor that both fields' difference has where a surface slides."""
-    graph, i = system_graph.graph, mode.index("s")
-    fields = []
-    for s in (1.0, -1.0):
-        signs = [1.0 if c == "+" else -1.0 for c in mode[: len(surfaces)]]
-        signs[i] = s
-        fields.append(system_graph.field([graph.constant(v) for v in signs]))
-    return Difference(graph, fields, system_graph.gradient(surfaces[i]), numbers)
+    own = SurfaceFunctions(system_graph.system, mode.index("s"), mode, system_graph)
+    return Difference(own.graph, own.fields, own.gradient(own.h), numbers)
 
 
 def problem_record(instance: Any, coincident: bool = False) -> dict[str, Any]:

@@ -164,7 +164,9 @@ class Leg:
         if self.kind in by_states:
             mode = system.widened(self.mode) if self.kind == "impact" else ""
             given = mode, self.kind, self.element, self.letters, self.atom
-            return instant_map(system, *given)(x, p)
+            at = instant_map(system, *given)(x, p)
+            below = self.kind in ("crossing", "entry") and self.mode[self.element] == "-"
+            return at.negative if system.sets and below else at
         own, every = self.map(system), tuple(range(len(p)))
         assert own is not None
         if self.field(system).entries == len(x):
@@ -214,7 +216,7 @@ def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class LegFlow:
     """Flow of a leg from its start over its duration."""
 
@@ -317,7 +319,7 @@ def flows_of(found: CarriedLegs) -> list[LegFlow]:
     return result
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)  # made for each event: frozen ones take thrice the time
 class Stretch:
     """A leg of a run: where it starts and ends."""
 
@@ -399,17 +401,14 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
         as_shown = shown.mode_before, shown.element
         result.append(Stretch(leg, t, first.t - t, x, x_end, after, system, p, as_shown))
         t, x = last.t, after
-        if _closes(
-            result, last.mode_after
-        ):  # the last of many impacts, at a speed that is lost in rounding
+        if _closes(result, last.mode_after):  # at a speed that is lost in rounding
             none = Leg(leg.mode, "limit", leg.element)
             result.append(Stretch(none, t, 0.0, x, x, x, system, p, as_shown))
     if run.accumulation_time is not None:  # the run ends where no motion follows the limit
-        if result[-1].leg.timed:
-            t, x = result[-1].t, result.pop().start
-        mode = run.events[-1].mode_before
+        cut = result.pop() if result[-1].leg.timed else None
+        t, x = (t, x) if cut is None else (cut.t, cut.start)
+        mode, left = run.events[-1].mode_before, run.accumulation_time - t
         leg = Leg(cells.mode(mode) if cells else mode, "limit")
-        left = run.accumulation_time - t
         result.append(Stretch(leg, t, left, x, x, x, system, p, (mode, -1)))
     return result
 

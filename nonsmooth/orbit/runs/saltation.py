@@ -35,7 +35,7 @@ GRAZING = 1e-8
 _CONTINUOUS = 1e-10
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Saltation:
     """Derivatives through an event, or stacked through many: S = g_x - (f+ - g_x f-) dt_x."""
 

@@ -230,7 +230,7 @@ def _gauss(stages: int) -> tuple[Array, Array, Array]:
     return (x + 1) / 2, w / 2, np.linalg.solve(values.T, integrals.T).T / 2
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Passage:
     """A leg of a run and the event that ends it, with derivatives."""
 

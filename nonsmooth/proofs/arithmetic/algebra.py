@@ -12,9 +12,9 @@ from typing import Any
 
 from .flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx
 from .instructions import ExpressionGraph
-from .intervals import Numbers, exact
+from .intervals import COMMON, Numbers, exact
 
-_POLYNOMIAL = {"const", "add", "sub", "mul", "div", "neg", "sq", "twice", "power"}
+_POLYNOMIAL = {"const", "sq", "power", *COMMON}
 
 
 class Algebra:
@@ -39,8 +39,10 @@ class Algebra:
                     self._value[k] = args[0] * self._value[self._inverse[k]]
                 elif node.op == "const":
                     self._value[k] = self.constant(exact(node.payload, numbers))
+                elif node.op in COMMON:
+                    self._value[k] = COMMON[node.op](*args)
                 else:
-                    self._value[k] = self._combine(node.op, args, node.payload)
+                    self._value[k] = args[0] ** (2 if node.op == "sq" else node.payload)
 
     def _is_polynomial(self, k: int) -> bool:
         return self.graph.nodes[k].op in _POLYNOMIAL
@@ -48,19 +50,6 @@ class Algebra:
     def constant(self, value: Fraction) -> fmpq_mpoly:
         """A constant polynomial."""
         return self.ring.constant(fmpq(value.numerator, value.denominator))
-
-    def _combine(self, op: str, a: Sequence[Any], payload: Any) -> Any:
-        if op == "add":
-            return a[0] + a[1]
-        if op == "sub":
-            return a[0] - a[1]
-        if op == "mul":
-            return a[0] * a[1]
-        if op == "neg":
-            return -a[0]
-        if op == "twice":
-            return a[0] + a[0]
-        return a[0] ** (2 if op == "sq" else payload)
 
     def __getitem__(self, k: int) -> fmpq_mpoly:
         """The polynomial of a node."""

@@ -20,11 +20,7 @@ def eigenvalue_kind(jacobian: Sequence[Sequence[arb]]) -> tuple[str, str, dict[s
     if found is None:
         return "", "the eigenvalues are not proven to be apart", {}
     real = [sign(re) for re, _ in found]
-    values: dict[str, arb] = {}
-    for k, (re, im) in enumerate(sorted(found, key=lambda v: (float(v[0]), float(v[1])))):
-        values[f"eigenvalue{k + 1}" + ("" if im.is_zero() else "_real")] = re
-        if not im.is_zero():
-            values[f"eigenvalue{k + 1}_imaginary"] = im
+    values = numbered("eigenvalue", sorted(found, key=lambda v: (float(v[0]), float(v[1]))))
     if 0 in real:
         return "", "the real part of an eigenvalue has no proven sign", values
     if len(set(real)) > 1:
@@ -38,26 +34,39 @@ def eigenvalues(matrix: arb_mat) -> list[tuple[arb, arb]] | None:
     return _small(matrix) if matrix.nrows() <= 2 else _isolated(matrix)
 
 
+def numbered(name: str, found: Sequence[tuple[arb, arb]], first: int = 1) -> dict[str, arb]:
+    """Names of numbers in order, with one for each part of those that are not real."""
+    values = {}
+    for k, (re, im) in enumerate(found, first):
+        values[f"{name}{k}" + ("" if im.is_zero() else "_real")] = re
+        if not im.is_zero():
+            values[f"{name}{k}_imaginary"] = im
+    return values
+
+
 def _small(matrix: arb_mat) -> list[tuple[arb, arb]] | None:
     """Eigenvalues of a 1 x 1 or 2 x 2 matrix in closed form, also double ones."""
     if matrix.nrows() == 1:
         return [(matrix[0, 0], arb(0))]
-    half = (matrix[0, 0] + matrix[1, 1]) / 2
-    lean = (matrix[0, 0] - matrix[1, 1]) / 2
-    disc = lean * lean + matrix[0, 1] * matrix[1, 0]
+    (a, b), (c, d) = matrix.tolist()
+    half, lean = (a + d) / 2, (a - d) / 2
+    return roots(half, lean * lean + b * c, a * d - b * c, sign(half))
+
+
+def roots(half: arb, disc: arb, product: arb, side: int) -> list[tuple[arb, arb]] | None:
+    """Two numbers by half of their sum, whose sign is ``side``, its square less the product, and the product."""
     if disc < 0:
         r = (-disc).sqrt()
         return [(half, -r), (half, r)]
-    if disc > 0 or disc.is_zero():
-        r = disc.sqrt()
-        det = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
-        low, high = half - r, half + r
-        if half > 0:  # the small one from the product, without cancellation
-            low = det / high
-        elif half < 0:
-            high = det / low
-        return [(low, arb(0)), (high, arb(0))]
-    return None
+    if not (disc > 0 or disc.is_zero()):
+        return None
+    r = disc.sqrt()
+    low, high = half - r, half + r
+    if side > 0:  # the small one from the product, without cancellation
+        low = product / high
+    elif side < 0:
+        high = product / low
+    return [(low, arb(0)), (high, arb(0))]
 
 
 def _isolated(matrix: arb_mat) -> list[tuple[arb, arb]] | None:

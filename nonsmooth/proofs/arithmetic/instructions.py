@@ -152,6 +152,10 @@ class ExpressionGraph:
                 todo += self.nodes[k].args
         return sorted(found)
 
+    def inputs(self, roots: Iterable[int]) -> list[tuple[int, int]]:
+        """The inputs that nodes depend on."""
+        return [self.nodes[k].source for k in self.ancestors(roots) if self.nodes[k].op == "input"]
+
 
 @dataclass(frozen=True)
 class _Inserted:

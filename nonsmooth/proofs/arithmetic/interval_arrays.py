@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .flint import arb
 from .instructions import Program
-from .intervals import OPERATIONS, Numbers, exact, power_of, precision
+from .intervals import COMMON, OPERATIONS, Arithmetic, Numbers, exact, power_of, precision
 
 Floats = NDArray[np.float64]
 _INF = np.inf
@@ -141,12 +141,7 @@ def _hull(low: float, high: float) -> arb:
 
 _APPLY: dict[str, Callable[..., Intervals]] = {
     **{op: _one_by_one(f) for op, f in OPERATIONS.items() if op != "pi"},
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
-    "neg": lambda a: -a,
-    "twice": lambda a: a + a,
+    **COMMON,
     "inv": lambda a: points(np.float64(1.0)) / a,
     "sq": _square,
     "sqrt": _sqrt,
@@ -160,26 +155,13 @@ _APPLY: dict[str, Callable[..., Intervals]] = {
 }
 
 
-class Batch:
+class Batch(Arithmetic):
     """The arithmetic of many intervals at once."""
 
-    power = staticmethod(power)
-
-    def __init__(self, inputs: Sequence[Sequence[Intervals]], numbers: Numbers):
-        self.inputs, self.numbers = inputs, numbers
+    operations, power = _APPLY, staticmethod(power)
 
     def constant(self, value: float | Fraction) -> Intervals:
-        """The doubles around a constant."""
-        q = exact(value, self.numbers) if isinstance(value, float) else value
-        return of_fractions(q, q)
-
-    def symbol(self, vector: int, position: int) -> Intervals:
-        """Return an input."""
-        return self.inputs[vector][position]
-
-    def apply(self, op: str, args: Sequence[Intervals]) -> Intervals:
-        """Enclose an operation."""
-        return _APPLY[op](*args)
+        return of_fractions(*[exact(value, self.numbers)] * 2)
 
 
 def evaluate_many(

@@ -7,10 +7,12 @@ that is not finite. Where a function jumps or has no value, the result is not fi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from decimal import Decimal
 from fractions import Fraction
+from functools import partial
 from typing import Any, Literal
 
 from ...model import NonsmoothError, OptionError
@@ -95,15 +97,24 @@ def inside(a: arb, b: arb) -> bool:
     return bool(a.is_finite() and b.is_finite() and b.contains_interior(a))
 
 
+def within(point: Sequence[arb], box: Sequence[arb]) -> bool:
+    """Whether a box holds another."""
+    return all(b.contains(a) for a, b in zip(point, box, strict=True))
+
+
 @contextmanager
-def precision(bits: int) -> Iterator[None]:
-    """Set the working precision inside a ``with`` block."""
-    old = ctx.prec
-    ctx.prec = bits
+def _set(name: str, value: int) -> Iterator[None]:
+    """Set a property of the context inside a ``with`` block."""
+    old = getattr(ctx, name)
+    setattr(ctx, name, value)
     try:
         yield
     finally:
-        ctx.prec = old
+        setattr(ctx, name, old)
+
+
+#: Blocks with another working precision in bits, and with series of another length.
+precision, length = partial(_set, "prec"), partial(_set, "cap")
 
 
 # Operations --------------------------------------------------------------------------------------
@@ -141,7 +152,18 @@ def _atan2(y: arb, x: arb) -> arb:
     return arb.atan2(y, x)
 
 
+#: Operations that are the same in every arithmetic.
+COMMON: dict[str, Callable[..., Any]] = {
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
+    "div": operator.truediv,
+    "neg": operator.neg,
+    "twice": lambda a: a + a,
+}
+
 OPERATIONS: dict[str, Callable[..., arb]] = {
+    **COMMON,
     **{
         op: getattr(arb, op)
         for op in (
@@ -149,12 +171,6 @@ OPERATIONS: dict[str, Callable[..., arb]] = {
             *("tanh", "asinh", "acosh", "atanh", "erf", "erfinv", "expm1", "log1p"),
         )
     },
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
-    "neg": lambda a: -a,
-    "twice": lambda a: a + a,
     "inv": lambda a: 1 / a,
     "sq": square,
     "pow": lambda a, b: (b * a.log()).exp(),
@@ -167,13 +183,25 @@ OPERATIONS: dict[str, Callable[..., arb]] = {
 }
 
 
-class Enclosures:
+class Arithmetic:
+    """An arithmetic of programs: inputs by vector and position, and how constants are read."""
+
+    operations: Mapping[str, Callable[..., Any]]
+
+    def __init__(self, inputs: Sequence[Sequence[Any]], numbers: Numbers = "stored"):
+        self.inputs, self.numbers = inputs, numbers
+
+    def symbol(self, vector: int, position: int) -> Any:
+        return self.inputs[vector][position]
+
+    def apply(self, op: str, args: Sequence[Any]) -> Any:
+        return self.operations[op](*args)
+
+
+class Enclosures(Arithmetic):
     """The arithmetic in which a program's values are enclosed."""
 
-    power = staticmethod(power)
-
-    def __init__(self, inputs: Sequence[Sequence[arb]], numbers: Numbers = "stored"):
-        self.inputs, self.numbers = inputs, numbers
+    operations, power = OPERATIONS, staticmethod(power)
 
     def constant(self, value: float | Fraction) -> arb:
         """Enclose a constant."""
@@ -183,10 +211,22 @@ class Enclosures:
             return arb(value)
         return enclose(exact(value, self.numbers))
 
-    def symbol(self, vector: int, position: int) -> arb:
-        """Return an input."""
-        return self.inputs[vector][position]
 
-    def apply(self, op: str, args: Sequence[arb]) -> arb:
-        """Enclose an operation."""
-        return OPERATIONS[op](*args)
+class Rationals(Arithmetic):
+    """The arithmetic of fractions; None for what is not rational or not known."""
+
+    operations = COMMON | {"inv": lambda a: 1 / a, "sq": lambda a: a * a}
+
+    def constant(self, value: float | Fraction) -> Fraction | None:
+        return exact(value, self.numbers)
+
+    def power(self, a: Fraction | None, n: int) -> Fraction | None:
+        return None if a is None else a**n
+
+    def apply(self, op: str, args: Sequence[Fraction | None]) -> Any:
+        if None in args or op not in self.operations:
+            return None
+        try:
+            return self.operations[op](*args)
+        except ZeroDivisionError:
+            return None

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from .equations import Equations, column, entries
 from .flint import arb, arb_mat, ctx
-from .intervals import inside, precision, radius
+from .intervals import inside, precision, radius, within
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def _narrowed(equations: Equations, u: list[arb], found: Zero) -> Zero:
     """Contract the enclosure to the working precision; an exact zero has radius 0."""
     for guess in _exact_guesses(u):
         values = entries(equations.values(guess))
-        if all(v.is_zero() for v in values) and _within(guess, found.box):
+        if all(v.is_zero() for v in values) and within(guess, found.box):
             return Zero(guess, found.box, found.image, found.matrix)
     point = found.point
     held = max([radius(a) for v in equations.held for a in v], default=0.0)
@@ -149,10 +149,6 @@ def _narrowed(equations: Equations, u: list[arb], found: Zero) -> Zero:
         if not gain:
             break
     return Zero(point, found.box, found.image, found.matrix)
-
-
-def _within(point: Sequence[arb], box: Sequence[arb]) -> bool:
-    return all(b.contains(a) for a, b in zip(point, box, strict=True))
 
 
 def _exact_guesses(u: Sequence[arb]) -> list[list[arb]]:

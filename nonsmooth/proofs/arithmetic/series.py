@@ -6,25 +6,13 @@ as they hold reciprocals as doubles.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
-from .flint import arb, arb_series, ctx, fmpq
+from .flint import arb, arb_series, ctx
 from .instructions import Program
-from .intervals import OPERATIONS, Numbers, exact, power_of
-
-
-@contextmanager
-def length(count: int) -> Iterator[None]:
-    """Set the length of series inside a ``with`` block."""
-    old = ctx.cap
-    ctx.cap = count
-    try:
-        yield
-    finally:
-        ctx.cap = old
+from .intervals import COMMON, OPERATIONS, Arithmetic, Enclosures, Numbers, length, power_of
 
 
 def _unknown() -> arb_series:
@@ -70,18 +58,14 @@ def _still(op: str) -> Callable[..., arb_series]:
     return apply
 
 
-_APPLY: dict[str, Callable[..., arb_series]] = {
+_APPLY: dict[str, Callable[..., Any]] = {
+    **COMMON,
+    "pow": OPERATIONS["pow"],
     **{
         op: getattr(arb_series, op)
         for op in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "erf")
     },
     **{op: _still(op) for op in ("fabs", "fmin", "fmax")},
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
-    "neg": lambda a: -a,
-    "twice": lambda a: a + a,
     "sq": lambda a: a * a,
     "inv": lambda a: _one() / a,
     "sinh": lambda a: (a.exp() - (-a).exp()) / 2,
@@ -92,7 +76,6 @@ _APPLY: dict[str, Callable[..., arb_series]] = {
     "atanh": lambda a: ((1 + a) / (1 - a)).log() / 2,
     "expm1": lambda a: a.exp() - 1,
     "log1p": lambda a: (1 + a).log(),
-    "pow": lambda a, b: (b * a.log()).exp(),
     "hypot": lambda a, b: (a * a + b * b).sqrt(),
     "atan2": _atan2,
     "erfinv": _erfinv,
@@ -100,24 +83,13 @@ _APPLY: dict[str, Callable[..., arb_series]] = {
 }
 
 
-class Series:
+class Series(Arithmetic):
     """The arithmetic of power series."""
 
     power = staticmethod(_power)
 
-    def __init__(self, inputs: Sequence[Sequence[arb_series]], numbers: Numbers):
-        self.inputs, self.numbers = inputs, numbers
-
     def constant(self, value: float | Fraction) -> arb_series:
-        """A constant, exactly or enclosed."""
-        if isinstance(value, float) and self.numbers == "stored":
-            return arb_series([arb(value)])
-        q = exact(value, self.numbers)
-        return arb_series([arb(fmpq(q.numerator, q.denominator))])
-
-    def symbol(self, vector: int, position: int) -> arb_series:
-        """Return an input."""
-        return self.inputs[vector][position]
+        return arb_series([Enclosures((), self.numbers).constant(value)])
 
     def apply(self, op: str, args: Sequence[arb_series]) -> arb_series:
         """Enclose an operation's series; no coefficient is known where the value is not."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..arithmetic.flint import arb
 from ..arithmetic.intervals import sign
 from ..proof import UnprovenError
-from .modes import EventFunction, Modes, mode_after
+from .modes import EventFunction, Modes
 from .validated_flow import ValidatedFlow
 
 
@@ -67,17 +67,21 @@ class OrbitEnclosure(ValidatedFlow):
             raise UnprovenError(f"{where}: on {len(unknown)} surfaces at once, which is not proven")
         zeros = 0
         for j in unknown:
-            l1, l2 = self.modes.rates(j, mode, x, self.p)
-            found = mode_after(l1, l2)
-            if found is None:
-                raise UnprovenError(
-                    f"{where}: on {self.modes.name(j)} with L1 in {l1.str(5)}, L2 in {l2.str(5)}: "
-                    "where it goes is undecided"
-                )
-            letter, zeros = found
+            letter, zeros = self._beyond(j, mode, x, f"{where}, on {self.modes.name(j)}")
             mode = self.modes.replaced(mode, j, letter)
         self.mode = mode
         self.zeros = self._zeros_of(unknown[0], zeros) if unknown else {}
+
+    def _beyond(self, surface: int, mode: str, x: list[arb], where: str) -> tuple[str, int]:
+        """The letter after a point of a surface, and how many coefficients of h are zero in that mode."""
+        l1, l2 = self.modes.rates(surface, mode, x, self.p)
+        letters = {(-1, 1): ("s", 0), (1, 1): ("+", 1), (-1, -1): ("-", 1)}
+        found = letters.get((sign(l1), sign(l2)))
+        if found is None:
+            raise UnprovenError(
+                f"{where}: L1 in {l1.str(5)}, L2 in {l2.str(5)}, so what follows is undecided"
+            )
+        return found
 
     def _zeros_of(self, surface: int, count: int) -> dict[int, int]:
         """Number of leading Taylor coefficients of a switching function that are zero after its event."""
@@ -138,14 +142,8 @@ class OrbitEnclosure(ValidatedFlow):
             if letter == before[j]:
                 raise UnprovenError(f"{function.name} at t = {self.t.str(8)} is not crossed")
         else:
-            l1, l2 = self.modes.rates(j, before, x, self.p)
-            found = mode_after(l1, l2)
-            if found is None:
-                raise UnprovenError(
-                    f"{function.name} at t = {self.t.str(8)}: L1 in {l1.str(5)}, L2 in {l2.str(5)}, so "
-                    "what follows is undecided"
-                )
-            letter, zeros = found
+            where = f"{function.name} at t = {self.t.str(8)}"
+            letter, zeros = self._beyond(j, before, x, where)
             kind = "entry" if letter == "s" else "crossing"
         self.mode = self.modes.replaced(before, j, letter)
         self.zeros = self._zeros_of(j, zeros)

@@ -11,8 +11,7 @@ from ...model import DefinitionError, FilippovSystem
 from ..arithmetic.algebra import Difference
 from ..arithmetic.flint import arb, arb_mat
 from ..arithmetic.instructions import ExpressionGraph, Program
-from ..arithmetic.intervals import Enclosures, Numbers, hull, sign
-from ..arithmetic.rationals import is_zero
+from ..arithmetic.intervals import Enclosures, Numbers, Rationals, hull, sign
 from ..arithmetic.series import along, coefficients
 from ..proof import UnprovenError
 from ..surface_functions import SurfaceFunctions, SystemGraph
@@ -54,17 +53,9 @@ class Mode:
         self._jacobian = Program(graph, rows)
         self._event_values = Program(graph, [nodes])
         self._slopes = Program(graph, [graph.gradient(k, x) for k in nodes])
-        moving = graph.ancestors(k for row in rows for k in row)
-        inputs = [graph.nodes[k].payload for k in moving if graph.nodes[k].op == "input"]
-        self.affine = all(index[0] == 1 for index in inputs)  # type: ignore[index]
-        rows = [graph.gradient(k, x) for k in nodes]
-        self.affine_functions = [
-            all(
-                graph.nodes[a].op != "input" or graph.nodes[a].source[0] == 1
-                for a in graph.ancestors(row)
-            )
-            for row in rows
-        ]
+        still = lambda rows: {v for v, _ in graph.inputs(k for row in rows for k in row)} <= {1}
+        self.affine = still(rows)
+        self.affine_functions = [still([graph.gradient(k, x)]) for k in nodes]
 
     def _values(self, program: Program, x: Sequence[arb], p: Sequence[arb]) -> list[list[arb]]:
         return program(Enclosures([x, p, []], self.numbers))
@@ -179,10 +170,7 @@ def _impact(system_graph: SystemGraph, k: int, count: int) -> EventFunction:
     reactions[k] = graph.symbol(4, 0)
     field = system_graph.field(multipliers, reactions)
     column = [graph.gradient(f, [reactions[k]])[0] for f in field]
-    inputs = [
-        graph.nodes[a].source for a in graph.ancestors(column) if graph.nodes[a].op == "input"
-    ]
-    if any(vector in (3, 4) for vector, _ in inputs):
+    if any(vector in (3, 4) for vector, _ in graph.inputs(column)):
         raise DefinitionError(
             f"A multiplier enters the impulse of {name!r} (friction), or a reaction enters nonlinearly. "
             "certify_orbit proves impacts without friction only."
@@ -285,8 +273,8 @@ class Modes:
     def surfaces_at(self, x: Sequence[Range], p: Sequence[Range]) -> list[int]:
         """The surfaces on which exact starts lie; inputs with a width are unknown."""
         inputs = [[a if a == b else None for a, b in vector] for vector in (x, p)]
-        zero = lambda h: is_zero(Program(self.graph, [[h]]), inputs, self.numbers)
-        return [j for j, h in enumerate(self.h) if zero(h)]
+        (values,) = Program(self.graph, [self.h])(Rationals(inputs, self.numbers))
+        return [j for j, h in enumerate(values) if h == 0]
 
     def end_at(
         self, name: str, position: int, value: int, direction: int = 1, index: int = -1
@@ -378,12 +366,3 @@ def _sliding(
         graph.apply("sub", [f, graph.apply("mul", [ratio, g])])
         for f, g in zip(fields[0], difference.direction, strict=True)
     ]
-
-
-def mode_after(l1: arb, l2: arb) -> tuple[str, int] | None:
-    """The mode after a point of the surface, and how many coefficients of h are zero in it."""
-    if l1 < 0 and l2 > 0:
-        return "s", 0
-    if l1 > 0 and l2 > 0:
-        return "+", 1
-    return ("-", 1) if l1 < 0 and l2 < 0 else None

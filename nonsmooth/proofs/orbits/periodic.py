@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 from ...model import OptionError, require_plain
 from ...orbit import PeriodicOrbit
 from ..arithmetic.decimals import given
-from ..arithmetic.eigenvalues import eigenvalues
+from ..arithmetic.eigenvalues import eigenvalues, numbered
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.equations import Equations, column
 from ..arithmetic.flint import arb, arb_mat, ctx
@@ -58,7 +58,6 @@ class Piece(NamedTuple):
     derivative: arb_mat
     duration: arb
     events: list[EnclosedEvent]
-    steps: int
 
 
 def sections_of(orbit: PeriodicOrbit) -> list[Section]:
@@ -105,7 +104,7 @@ class Shooting(Equations):
         n = modes.system.dimension
         self.free = [[i for i in range(n) if i != s.position] for s in sections]
         self.n, self.held = sum(map(len, self.free)), []
-        self.why, self._steps = "", _STEPS
+        self.why = ""
         self._last: tuple[Any, Any] = (None, None)
 
     def holding(self, held: list[list[Any]]) -> Shooting:
@@ -158,8 +157,8 @@ class Shooting(Equations):
             raise UnprovenError(f"leg {i + 1} is in mode {flow.mode!r}, not {own.mode!r}")
         event = None
         while event is None or event.kind != "end":
-            if flow.steps >= self._steps:
-                raise UnprovenError(f"leg {i + 1} needs more than {self._steps} steps")
+            if flow.steps >= _STEPS:
+                raise UnprovenError(f"leg {i + 1} needs more than {_STEPS} steps")
             if len(flow.events) == own.events:
                 flow.end = self.ends[j]
             event = flow.step_through()
@@ -172,7 +171,16 @@ class Shooting(Equations):
         derivative = arb_mat([[rows[a][b] for b in self.free[i]] for a in self.free[j]])
         hull = flow.hull()
         end = [hull[k] for k in self.free[j]]
-        return Piece(end, derivative, flow.t, flow.events, flow.steps)
+        return Piece(end, derivative, flow.t, flow.events)
+
+
+def contracts(matrix: arb_mat) -> bool:
+    """Whether a power of a matrix makes all vectors shorter, so that its eigenvalues are inside of the unit circle."""
+    for _ in range(12):
+        if all(sum((abs(v) for v in row), arb(0)) < 1 for row in matrix.tolist()):
+            return True
+        matrix = matrix * matrix
+    return False
 
 
 @dataclass(frozen=True)
@@ -203,15 +211,16 @@ class OrbitInstance:
         return self.parameters
 
     @property
+    def unknowns(self) -> list[tuple[int, int]]:
+        """Leg and state of each unknown."""
+        n = range(self.orbit.system.dimension)
+        return [(i, k) for i, s in enumerate(self.sections) for k in n if k != s.position]
+
+    @property
     def names(self) -> list[str]:
         """Names of the unknowns: states at the planes."""
         states = self.orbit.system.state_names
-        return [
-            states[k] + (f" in leg {i + 1}" if i else "")
-            for i, s in enumerate(self.sections)
-            for k in range(len(states))
-            if k != s.position
-        ]
+        return [states[k] + (f" in leg {i + 1}" if i else "") for i, k in self.unknowns]
 
     def halves(self, start: list[float], exists: bool) -> list[OrbitInstance]:
         """The same orbit over both halves of the widest range."""
@@ -250,16 +259,14 @@ class OrbitInstance:
         events = [[[e.kind, e.function.name, e.after] for e in p.events] for p in pieces]
         values, label = {"period": period, "multiplier1": arb(1)}, ""
         claims = {"label": label, "period": interval(period), "events": events}
-        if found is None:
-            why = "the multipliers are not proven to be apart"
-            return Classification("", self.kind, why, values=values, claims=claims)
-        sizes = [(re * re + im * im).sqrt() for re, im in found]
+        if found is None:  # a multiple one, perhaps
+            label = "asymptotically stable" if contracts(product) else ""
+            why = "" if label else "the multipliers are not proven to be apart"
+            claims["label"] = label
+            return Classification(label, self.kind, why, values=values, claims=claims)
+        sizes = [re * re + im * im for re, im in found]
         order = sorted(range(len(found)), key=lambda k: -float(sizes[k].mid()))
-        for k, j in enumerate(order):
-            re, im = found[j]
-            values[f"multiplier{k + 2}" + ("" if im.is_zero() else "_real")] = re
-            if not im.is_zero():
-                values[f"multiplier{k + 2}_imaginary"] = im
+        values |= numbered("multiplier", [found[j] for j in order], 2)
         outside = sum(bool(s > 1) for s in sizes)
         if all(s < 1 for s in sizes):
             label = "asymptotically stable"
@@ -274,14 +281,9 @@ class OrbitInstance:
     def _distance(self, zero: Zero, period: arb) -> float:
         """Of the proven orbit from the given one, relative to its size."""
         size = np.maximum(np.ptp(self.orbit.trajectory.x, axis=0), 1e-300)
-        own = [i for s in self.sections for i in range(len(size)) if i != s.position]
-        found = [abs(float(period.mid()) - self.orbit.period) / self.orbit.period]
-        given_start = [
-            s.start[i] for s in self.sections for i in range(len(size)) if i != s.position
-        ]
-        for v, x, i in zip(zero.point, given_start, own, strict=True):
-            found.append(abs(float(v.mid()) - x) / size[i])
-        return max(found)
+        found = np.array([float(v.mid()) for v in [*zero.point, period]])
+        scale = [*(size[k] for _, k in self.unknowns), self.orbit.period]
+        return float(np.max(np.abs(found - [*self.start, self.orbit.period]) / scale))
 
     def statement(
         self,
@@ -292,12 +294,13 @@ class OrbitInstance:
         values: Mapping[str, Enclosure],
     ) -> str:
         """The theorem in words."""
-        states, parts = self.orbit.system.state_names, list[str]()
-        names, m = list(box), len(box) // len(self.sections)
+        states, m = self.orbit.system.state_names, len(box) // len(self.sections)
+        parts, boxes = list[str](), list(box.values())
         for i, s in enumerate(self.sections):
-            own = {names[i * m + a].split(" in leg")[0]: box[names[i * m + a]] for a in range(m)}
+            free = [k for k in range(m + 1) if k != s.position]
+            own = zip((states[k] for k in free), boxes[i * m :], strict=False)
             plane = intervals({states[s.position]: given(s.value, s.value)})
-            parts.append(f"{plane} in the box {intervals(own)}" if own else plane)
+            parts.append(f"{plane} in the box {intervals(dict(own))}")
         head = "Theorem" if classification.label else "Theorem on existence"
         first = dict(list(point.items())[:m])
         return paragraph(
@@ -306,7 +309,7 @@ class OrbitInstance:
             + (f"; and so on through {len(parts)} legs." if len(parts) > 6 else "."),
             f"It is {classification.label}." if classification.label else "",
             f"{listed(values)}.",
-            f"In leg 1 {listed(first)}." if first else "",
+            f"In leg 1 {listed(first)}.",
             f"Not decided: {classification.why}." if classification.why else "",
             READ[self.numbers],
         )
@@ -363,6 +366,8 @@ def _refusal(orbit: PeriodicOrbit) -> str:
     for i, leg in enumerate(orbit.legs):
         if set(leg.mode) - set("+-o"):
             return f"Leg {i + 1} slides or is in contact (mode {leg.mode!r}), and only crossing orbits are proven."
+    if not any(leg.event for leg in orbit.legs):
+        return "The orbit has no events, so no plane of a leg comes after one."
     if orbit.system.dimension < 2:
         return (
             "An orbit of one state crosses its planes in points, so nothing is left to be proven."

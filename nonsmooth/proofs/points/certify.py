@@ -13,7 +13,7 @@ from ...model import FilippovSystem, OptionError, real, whole
 from ...orbit import PeriodicOrbit
 from ..arithmetic.decimals import enclosure, given, inner
 from ..arithmetic.flint import arb
-from ..arithmetic.intervals import Numbers, between, precision, radius
+from ..arithmetic.intervals import Numbers, between, precision, radius, within
 from ..arithmetic.krawczyk import Zero, prove_zero
 from ..orbits.periodic import OrbitInstance, orbit_instance
 from ..proof import READ, Classification, Proof, hulls, intervals, paragraph
@@ -181,12 +181,8 @@ def prove_instance(
             for key in ("point", "box")
         )
         # Where one is in the other's box of uniqueness, they are one zero.
-        same = _all_in(point, zero.box) or _all_in(zero.point, box)
+        same = within(point, zero.box) or within(zero.point, box)
     return proof if same else None
-
-
-def _all_in(point: Sequence[arb], box: Sequence[arb]) -> bool:
-    return all(b.contains(v) for b, v in zip(box, point, strict=True))
 
 
 def _wide(instance: Instance) -> bool:

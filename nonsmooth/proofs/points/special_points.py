@@ -151,14 +151,20 @@ def _meaning(label: str) -> list[str]:
     ]
 
 
-class Folds(PointProblem):
-    """h = L_i = 0."""
-
-    kind = "fold"
+class OfOneField(PointProblem):
+    """A problem about F1 or F2."""
 
     def __init__(self, functions: SurfaceFunctions, numbers: Numbers, side: Side):
         super().__init__(functions, numbers)
         self.side, self._k = side, side_index(side)
+        if self.kind == "equilibrium":
+            _autonomous(functions, self.kind)
+
+
+class Folds(OfOneField):
+    """h = L_i = 0."""
+
+    kind = "fold"
 
     @cached_property
     def nodes(self) -> list[int]:
@@ -205,15 +211,10 @@ def _beside(other: arb, k: int) -> str:
     return f"The other field crosses the surface there; {sliding} sliding begins at the fold."
 
 
-class Equilibria(PointProblem):
+class Equilibria(OfOneField):
     """F_i = 0."""
 
     kind = "equilibrium"
-
-    def __init__(self, functions: SurfaceFunctions, numbers: Numbers, side: Side):
-        super().__init__(functions, numbers)
-        self.side, self._k = side, side_index(side)
-        _autonomous(functions, self.kind)
 
     @property
     def nodes(self) -> list[int]:

@@ -19,6 +19,7 @@ from ..arithmetic.equations import Equations
 from ..arithmetic.flint import arb
 from ..arithmetic.instructions import Program
 from ..arithmetic.interval_arrays import Floats, Intervals, evaluate_many, of_enclosure, points
+from ..arithmetic.intervals import within
 from ..arithmetic.krawczyk import Zero, prove_zero
 
 _MANY = 4096  # pieces at once
@@ -144,7 +145,7 @@ class Search:
         if found is None:
             self._failures += 1
             return
-        known = [_within(found.point, z.box) or _within(z.point, found.box) for z in self.zeros]
+        known = [within(found.point, z.box) or within(z.point, found.box) for z in self.zeros]
         near = [
             all(a.overlaps(b) for a, b in zip(found.point, z.point, strict=True))
             for z in self.zeros
@@ -223,10 +224,6 @@ def _holds(low: Floats, high: Floats, point: Sequence[arb]) -> bool:
     return all(
         arb(float(a)) <= v and v <= arb(float(b)) for a, b, v in zip(low, high, point, strict=True)
     )
-
-
-def _within(point: Sequence[arb], box: Sequence[arb]) -> bool:
-    return all(b.contains(a) for a, b in zip(point, box, strict=True))
 
 
 def _inner(box: Sequence[arb]) -> tuple[Floats, Floats]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from ..arithmetic.eigenvalues import roots
 from ..arithmetic.flint import arb
 from ..arithmetic.intervals import hull, sign
 
@@ -46,9 +47,8 @@ def proven_class(second: Sequence[arb], coincident: bool = False) -> ProvenClass
     # Where L1j = L2j, g = -(|L11| + |L22|)/root <= -2.
     above = -1 if coincident or lean < 0 or gap < 0 else 1 if lean > 0 and gap > 0 else 0
     jordan = not coincident and bool(lean > 0 and gap.is_zero())
-    label = _label(
-        FOLDS[s], _Signs(sign(delta), delta.is_zero(), _trace(s, trace, coincident)), above
-    )
+    t = -s[0] if coincident and s[0] != s[1] else sign(trace)  # there that of L22 - L11
+    label = _label(FOLDS[s], delta, t, above)
     if jordan:
         between = {-1: "mix-0|mix-C", 1: "mix-0|mix-F"}.get(sign(trace), "")
         label = f"boundary disc=0: {between}" if FOLDS[s] in ("VI", "IV") and between else label
@@ -82,28 +82,16 @@ def _both(a: arb, b: arb) -> arb:
     return a.intersection(b) if a.overlaps(b) else a
 
 
-def _trace(s: tuple[int, int], trace: arb, coincident: bool) -> int:
-    """Sign of T; with equal fields T has that of L22 - L11."""
-    return -s[0] if coincident and s[0] != s[1] else sign(trace)
-
-
-@dataclass(frozen=True)
-class _Signs:
-    delta: int
-    zero: bool
-    trace: int
-
-
-def _label(folds: str, signs: _Signs, above: int) -> str:
-    d, t = signs.delta, signs.trace
+def _label(folds: str, delta: arb, t: int, above: int) -> str:
+    d = sign(delta)
     if folds == "VV":
         if d < 0 or t < 0:
             return "VV-C1"
-        return _either(d, signs.zero, t > 0, "VV-F", "VV-C1|VV-F")
+        return _either(delta, t > 0, "VV-F", "VV-C1|VV-F")
     if folds == "II":
         if d < 0 or t > 0:
             return "II-F"
-        return _either(d, signs.zero, t < 0, "II-C", "II-C|II-F")
+        return _either(delta, t < 0, "II-C", "II-C|II-F")
     if above < 0:
         return "mix-0"
     if above == 0:
@@ -111,28 +99,23 @@ def _label(folds: str, signs: _Signs, above: int) -> str:
     if d < 0:
         return "mix-S"
     node = {-1: "mix-C", 1: "mix-F"}.get(t, "")
-    return _either(d, signs.zero, bool(node), node, f"mix-S|{node}")
+    return _either(delta, bool(node), node, f"mix-S|{node}")
 
 
-def _either(delta: int, zero: bool, holds: bool, label: str, between: str) -> str:
+def _either(delta: arb, holds: bool, label: str, between: str) -> str:
     """A label where Delta > 0, a boundary where Delta = 0."""
     if not holds:
         return ""
-    return label if delta > 0 else f"boundary Delta=0: {between}" if zero else ""
+    return label if delta > 0 else f"boundary Delta=0: {between}" if delta.is_zero() else ""
 
 
 def _numbers(nu1: arb, nu2: arb, delta: arb, trace: int) -> dict[str, arb]:
     t = nu1 + nu2
     found = {"nu1": nu1, "nu2": nu2, "Delta": delta, "T": t}
-    disc = t * t - 4 * delta
-    if disc > 0:
-        r = disc.sqrt()
-        low, high = (t - r) / 2, (t + r) / 2
-        if trace > 0:  # the small one from the product, without cancellation
-            low = delta / high
-        elif trace < 0:
-            high = delta / low
-        found |= {"eigenvalue_low": low, "eigenvalue_high": high}
-    elif disc < 0:
-        found |= {"eigenvalue_real": t / 2, "eigenvalue_imaginary": (-disc).sqrt() / 2}
-    return found
+    both = roots(t / 2, t * t / 4 - delta, delta, trace)
+    if both is None:
+        return found
+    (low, left), (high, right) = both
+    if left.is_zero():
+        return found | {"eigenvalue_low": low, "eigenvalue_high": high}
+    return found | {"eigenvalue_real": low, "eigenvalue_imaginary": right}

@@ -32,6 +32,18 @@ THIRD = ns.FilippovSystem(
 KICK = ns.FilippovSystem(
     [x, v], field=[v, -x - 0.1 * v], resets=[ns.Reset(x, [x, v + 0.3], 1, "kick")]
 )
+HEAT = ns.FilippovSystem(  # warmer from 1/2 to 1, cooler from 1 to 1/2: 2 log(6/5) + 2 log(3/2)
+    [x, v],
+    field=[v - 0.5 * x, 0 * v],
+    resets=[ns.Reset(x - 1, [x, -1], 1, "off"), ns.Reset(x - 0.5, [x, 1], -1, "on")],
+)
+TWIN = [-0.3 * y + x, -0.3 * z + v]  # two states with the same multiplier
+DOUBLE = ns.FilippovSystem(
+    [x, v, y, z],
+    surface=v,
+    above=[v, 1 - x - 0.2 * v, *TWIN],
+    below=[v, -1 - x - 0.2 * v, *TWIN],
+)
 DAMPING = 0.75 * (1 + a - b)  # -0.75 between -1 and 1, and 0.75 beyond
 VAN_DER_POL = ns.FilippovSystem(
     [x, v], field=[v, -DAMPING * v - x], surfaces=[x - 1, x + 1], multipliers=[a, b]
@@ -124,6 +136,7 @@ def test_piecewise_affine_orbits_have_the_closed_form(name):
 KNOWN = {
     "relay": (relay(0.1), [-6.38, 0.01], "6.3148388339965529095", "0.53180208294425965119"),
     "kick": (KICK, [-0.1, 0.8], "6.2910540457760034274", "0.73011538017940582909"),
+    "heat": (HEAT, [0.625, 1.0], "1.1755733298042381", "0"),
 }
 
 
@@ -227,6 +240,8 @@ def test_orbits_are_checked_and_altered_ones_are_not(tmp_path):
     orbits = [
         *((system, guess) for system, guess, _ in AFFINE.values()),
         (CUBIC, [2.0, 0.0]),
+        (HEAT, [0.625, 1.0]),
+        (DOUBLE, [-6.38, 0.01, 0.0, 0.0]),
         (KICK, [-0.1, 0.8]),
     ]
     records = [ns.certify(ns.periodic_orbit(s, guess=g)).record for s, g in orbits]

@@ -37,6 +37,7 @@ GALLERY = (
     "stick_slip",
     "leine",
     "friction_drive",
+    "pushed_block",
     "belt",
     "relay",
     "plane_friction",

@@ -29,7 +29,7 @@ PERIOD = 6.736837191765135
 #: Programs that take seconds: they run among the slow tests.
 DEAR = {
     *("atlas", "basins", "belt", "buck", "friction_drive", "harvest", "impact", "plane_friction"),
-    *("hybrid", "relay", "walker", "wells"),
+    *("hybrid", "pushed_block", "relay", "walker", "wells"),
 }
 EACH = [
     pytest.param(name, marks=[pytest.mark.slow] if name in DEAR else [])
@@ -259,6 +259,26 @@ def test_forced_friction_is_den_hartogs():
     for curve in found["curves"]:
         W, friction = curve.values.T
         assert np.abs(friction - found["first_stop"](W)).max() < 1e-10
+
+
+@pytest.mark.slow
+def test_curves_of_the_pushed_block_in_closed_form():
+    """Lines of grazing and of adding-sliding, and the four points at which curves meet."""
+    found = ran("pushed_block")
+    curves, points = found["curves"], [point.values for point in found["points"]]
+    assert all(not curve.solution(k).is_virtual for curve in curves for k in range(len(curve)))
+    for curve in curves:
+        push, amplitude = np.abs(curve.values.T)
+        if curve.kind == "grazing-sliding":
+            assert np.abs(push - 1 - amplitude / math.sqrt(5)).max() < 1e-11
+        elif curve.kind == "adding-sliding":
+            assert np.abs(push - np.abs(amplitude - 1)).max() < 1e-11
+    top = math.hypot(1, 2.5 * math.tanh(math.pi / 4) + 0.5)
+    wanted = [(0, 1), (1.4338290190161366, 2.4338290190161366), (0, top)]
+    assert len(points) == 4
+    for point in points:
+        assert min(np.abs(np.abs(point) - one).max() for one in wanted) < 1e-9
+    assert found["regions"][0.0, 3.2] == "+ -" and found["regions"][1.1, 1.0] == "+ s"
 
 
 @pytest.mark.slow

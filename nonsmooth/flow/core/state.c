@@ -289,10 +289,13 @@ static void *place(char *base, size_t *used, size_t size, size_t count) {
 
 /* Modes by number ------------------------------------------------------------------------------ */
 
-/* Letters lead from the root of a tree to a leaf, whose child is one more than the number of the mode. */
+/* Letters, four at a time, lead from the root of a tree to a leaf, whose child is one more than the number of the mode. */
 static int32_t mode_number(Table *t, const int8_t *letter) {
   int32_t at = 0;
-  for (int i = 0; i < t->width; i++) at = tree_child(&t->leaves, at, letter[i]);
+  for (int i = 0, four = 0; i < t->width; i += 4, four = 0) {
+    memcpy(&four, letter + i, t->width - i < 4 ? t->width - i : 4);
+    at = tree_child(&t->leaves, at, four);
+  }
   int32_t *number = &t->leaves.node[at].child;
   if (*number) return *number - 1;
   if (t->count == t->room) {

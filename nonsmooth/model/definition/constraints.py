@@ -120,8 +120,9 @@ def require_constraints(d: Definition) -> None:
         if ca.depends_on(effect, every):
             raise DefinitionError(
                 f"reaction of {name!r}: {reaction} is multiplied with {reaction} or another unknown. A joint's reaction enters "
-                "linearly. Give friction at a joint a load of its own, nonsmooth.Friction(slip, load=), or make the joint of "
-                "contacts with a clearance."
+                "linearly. Give friction at a joint a load of its own: with the reaction as an expression rho of the states, "
+                "Friction(slip, load=side*rho) beside surfaces=[rho], multipliers=[side], or make the joint of contacts with "
+                "a clearance."
             )
         if effect.is_zero():
             raise DefinitionError(

@@ -6,7 +6,7 @@ g is the identity if the event does not reset the state.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 
 import casadi as ca
@@ -92,6 +92,16 @@ class AtEvent:
     gradient: Array  # of e by states and multipliers (N + k,)
     by_parameters: Array  # of e (q,)
     smooth: bool = False  # whether g is the identity
+
+    @property
+    def negative(self) -> AtEvent:
+        """The same with a function of the other sign."""
+        return replace(
+            self,
+            value=-self.value,
+            gradient=-self.gradient,
+            by_parameters=-self.by_parameters,
+        )
 
     @classmethod
     def smooth_at(cls, x: Array, value: float, gradient: Array, by_parameters: Array) -> AtEvent:

@@ -166,6 +166,7 @@ def continue_bifurcation(
             bounds=[(k + i, low, high) for i, (low, high) in enumerate(limits)],
             report=lambda _: bar.update(),
         )
+        _drop_singular(arc)
         if arc.end == VIRTUAL and len(arc.points) > 1:
             arc.points.pop()
             last = arc.points[-1].arclength
@@ -229,6 +230,15 @@ def _curve_of(
         ends=(end_of(halves[0]), end_of(halves[-1])),
         curve=curve,
     )
+
+
+def _drop_singular(arc: Arc) -> None:
+    """Drop zeros beside the end of an arc, where legs vanish and the equations become singular."""
+    if not arc.zeros or arc.zeros[-1].name != arc.end:
+        return
+    last = arc.zeros[-1]
+    away = lambda zero: float(np.abs(zero.point.u[-2:] - last.point.u[-2:]).max())
+    arc.zeros[:] = [zero for zero in arc.zeros if zero is last or away(zero) > _MERGED]
 
 
 def _occurs(curve: EventCurve | ConnectionCurve, zero: Zero) -> bool:

@@ -352,6 +352,10 @@ class BranchCurve(Curve):
         """The event at a located zero; None if there is none."""
         raise NotImplementedError
 
+    def unresolved(self, u: Array) -> str:
+        """Why doubles do not resolve the curve beyond a point; empty if not known."""
+        return ""
+
     def again(self, u: Array, tangent: Array | None = None) -> Departure | None:
         """The same curve from a point of it with better equations; None if there are none."""
         return None
@@ -491,7 +495,9 @@ class _Half:
             last = curve.ending(point.u, self.end)
         except (NonsmoothError, np.linalg.LinAlgError):
             return
-        if last is not None:
+        if last is None:
+            self.reason = curve.unresolved(point.u) or self.reason
+        else:
             self.events.append(last)
             diverges = last.kind in ("homoclinic", "infinite period at a boundary node")
             self.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from ...flow.fixed import first_terms
-from ...model import Array, NonsmoothError
+from ...model import Array, DegenerateError, NonsmoothError
 from ...model.derivatives.event_maps import surface_map
 from ...model.derivatives.variational import guarded_field, variational_field
 from ...solvers.continuation import Curve, Point, Secant, Zero
@@ -164,7 +164,10 @@ class EventCurve(Curve):
         """The function that vanishes on the curve."""
         if self.name == "fold":
             return self._bordered(u)[0]
-        return float(self.base.tests(Point(u, np.zeros(u.size)))[self.name])
+        found = self.base.tests(Point(u, np.zeros(u.size)))
+        if self.name not in found:
+            raise DegenerateError(f"the test of the {self.name} is not defined there")
+        return float(found[self.name])
 
     def _bordered(self, u: Array) -> tuple[float, Array]:
         """The test of a fold, zero where the square Jacobian is singular, and its null vector."""

@@ -70,7 +70,7 @@ def hopf_point(
 
 #: Largest distance of the point of a surface from the small orbit, relative to that orbit, and to the first
 #: orbit of the family: rounding may shrink the last one to a point beside it.
-_NEAR, _BESIDE = 30.0, 1e-6
+_NEAR, _BESIDE = 30.0, 1e-5
 
 
 def extent(problem: BoundaryProblem, u: Array, p: Array) -> float:

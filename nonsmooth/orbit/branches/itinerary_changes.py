@@ -439,6 +439,8 @@ def _start_guard(problem: BoundaryProblem, legs: Sequence[Leg], i: int) -> Guard
     """The guard that fails where leg ``i`` vanishes: of the leg after it."""
     removed, after = legs[i], legs[(i + 1) % len(legs)]
     mode = after.mode if i + 1 < len(legs) else mode_after(removed)
+    if i + 1 == len(legs) and problem.symmetry is not None:  # as the first leg sees it
+        removed, mode = mirrored(problem, removed), after.mode
     surface = surface_of(problem.system, removed)
     for guard in guarded_field(problem.system, mode).motion.guards:
         if guard.kind == "surface" and guard.element == surface and removed.kind == "exit":

@@ -24,7 +24,7 @@ from ...solvers.newton import converge
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, eliminated
 from ..periodic.divided_legs import divided, to_divide
 from ..periodic.find_periodic import at_two_fold
-from ..periodic.multipliers import return_map
+from ..periodic.multipliers import Multipliers, return_map
 from ..periodic.orbit import PeriodicOrbit, faults_of, named
 from ..periodic.orbit_functions import OrbitFunction, UserRows
 from ..periodic.symmetry import halves, prime_period, require_symmetric
@@ -160,6 +160,9 @@ _COLLAPSED = 1e-6
 
 #: Share of the way to an event at which the orbit before it is checked.
 _JUST = 0.99
+
+#: Logarithm of a multiplier beyond which doubles do not separate the parameters of orbits.
+_STEEPEST = 23.0
 
 #: Component of the parameter in a tangent below which a branch is vertical.
 _VERTICAL = 1e-6
@@ -328,6 +331,16 @@ class OrbitCurve(OrbitEquations):
         if node is not None or (end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u)):
             return node
         return homoclinic_end(self.describe(u), name, width)
+
+    def unresolved(self, u: Array) -> str:
+        p, k = self.parameters_at(u), self.problem.size
+        growth = Multipliers(self.problem, self.problem.evaluate(u[:k], p), p).logarithms.real
+        if not growth.size or growth[0] < _STEEPEST:
+            return ""
+        return (
+            f"A multiplier has grown to {np.exp(min(growth[0], 700.0)):.1e}: beyond, orbits differ by less than the "
+            "parameter's rounding, as where canards grow."
+        )
 
     def _shrunk(self, u: Array, part: float) -> BranchEvent | None:
         """The point of a surface to which an orbit shrinks, if it is small relative to the first one."""

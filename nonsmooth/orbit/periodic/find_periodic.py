@@ -546,6 +546,9 @@ _SHRUNK, _SINGULAR = 1e-2, 1e-9
 #: Motion by fewer spacings of numbers of the size of a state is lost in rounding.
 _SPACINGS = 8.0
 
+#: Gaps between legs, beside the size of the guess, from which an orbit is none.
+_OPEN = 1e-3
+
 #: What moves by no more than this part of its size rests.
 _STILL = 1e-6
 
@@ -557,6 +560,7 @@ def require_motion(problem: BoundaryProblem, at: Evaluation, start: Start) -> No
     guess = float(np.abs(start.problem.split(start.unknowns)[1]).sum())
     period, x = float(np.abs(at.durations).sum()), at.starts[0, :n]
     _require_resolved(problem, at)
+    _require_closed(problem, at, start)
     way = float(np.abs(at.flows.rate[0]).max()) * period
     rests = problem.legs[-1].timed and not problem.system.time_dependent
     shrunk = period <= _SHRUNK * guess and _singular(problem, at)
@@ -570,6 +574,23 @@ def require_motion(problem: BoundaryProblem, at: Evaluation, start: Start) -> No
         f"{period:.2g} (guess {guess:.6g}). It is an equilibrium, or a point "
         "where legs vanish: start closer to the orbit.",
         point=x,
+    )
+
+
+def _require_closed(problem: BoundaryProblem, at: Evaluation, start: Start) -> None:
+    """Refuse states that do not close in the size of the guess: they ran away, to where they close beside their size."""
+    n, count = problem.dimension, len(problem.legs)
+    own = problem.system.dimension
+    size = float(start.problem.scales(start.unknowns, start.p)[:own].max())
+    gaps = np.abs(at.residual[: count * n].reshape(count, n)[:, :own])
+    if gaps.max() <= _OPEN * size:
+        return
+    raise ConvergenceError(
+        f"periodic orbit: Newton's method ran away to states of the size {np.abs(at.starts[:, :own]).max():.2g} from a "
+        f"guess of the size {size:.2g}, and does not close (by {gaps.max():.2g}). There may be no orbit: does the motion "
+        "grow without bound, as at a resonance?",
+        residual=float(gaps.max()),
+        point=at.starts[0, :own],
     )
 
 

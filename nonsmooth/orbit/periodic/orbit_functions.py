@@ -64,9 +64,9 @@ class OrbitFunction:
         parameter : str
             Its name.
         """
-        problem, p = orbit.problem, orbit.parameter_vector
+        problem, p = orbit.problem.whole, orbit.parameter_vector
         free = (parameter_index(orbit.system, parameter),)
-        at = problem.evaluate(orbit.unknowns, p, free)
+        at = problem.evaluate(orbit.problem.undivided(orbit.unknowns), p, free)
         row = self.rule(problem, at, p, free)[1]
         change = -problem.solve(at.jacobian, at.by_parameters[:, 0])
         return float(row[:-1] @ change + row[-1])

@@ -72,9 +72,8 @@ def orbit_run(
         end, following, first = leg.t + leg.duration, legs[(k + 1) % len(legs)], len(coefficients)
         given: dict[str, Any] = {"t_start": leg.t, "parameters": parameters, "tol": 1e-12}
         endless = leg.kind == "limit"
-        if (
-            endless or system.sets or system.written.tables
-        ):  # where one mode has no field, or there are many
+        # one mode has no field at its ends on sets, drifts off joints, or is one of many of tables
+        if endless or system.sets or system.written.tables or system.constraints:
             run = simulate(system, leg.start, end, **given)
         else:
             run = follow(system, leg.start, end, mode=leg.mode, **given)

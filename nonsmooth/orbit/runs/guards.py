@@ -194,15 +194,16 @@ def _violations(
 ) -> list[str]:
     """Violations of one guard inside a leg, earliest first."""
     ordered = sorted(values)
+    largest = max((abs(v) for _, v, _ in ordered), default=0.0)  # where the gradient vanishes
     if guard.kind in ("stop", "reset", "zero", "atom"):
         if guard.kind == "atom" or not system.definition.plain:
             return []  # the orbit is run, with its conditions
-        for (_, a, _), (t, b, _) in pairwise(ordered):
+        clear = [(t, v) for t, v, _ in ordered if abs(v) > _NEGATIVE * largest]  # not a touch
+        for (_, a), (t, b) in pairwise(clear):
             if a * b < 0.0 and guard.side in (0, 1 if b > a else -1) and guard.kind != "zero":
                 name = guard_name(system, guard)
                 return [f"{guard.kind} {name!r} reaches zero {t:.6g} after its start"]
         return []
-    largest = max((abs(v) for _, v, _ in ordered), default=0.0)  # where the gradient vanishes
     low = [(t, v) for t, v, scale in ordered if v < -_NEGATIVE * max(scale, largest)]
     if not low:
         return []

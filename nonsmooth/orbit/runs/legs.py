@@ -164,7 +164,9 @@ class Leg:
         if self.kind in by_states:
             mode = system.widened(self.mode) if self.kind == "impact" else ""
             given = mode, self.kind, self.element, self.letters, self.atom
-            return instant_map(system, *given)(x, p)
+            at = instant_map(system, *given)(x, p)
+            below = self.kind in ("crossing", "entry") and self.mode[self.element] == "-"
+            return at.negative if system.sets and below else at
         own, every = self.map(system), tuple(range(len(p)))
         assert own is not None
         if self.field(system).entries == len(x):
@@ -403,11 +405,10 @@ def stretches(run: Trajectory, begins: bool = True, driven: bool = False) -> lis
             none = Leg(leg.mode, "limit", leg.element)
             result.append(Stretch(none, t, 0.0, x, x, x, system, p, as_shown))
     if run.accumulation_time is not None:  # the run ends where no motion follows the limit
-        if result[-1].leg.timed:
-            t, x = result[-1].t, result.pop().start
-        mode = run.events[-1].mode_before
+        cut = result.pop() if result[-1].leg.timed else None
+        t, x = (t, x) if cut is None else (cut.t, cut.start)
+        mode, left = run.events[-1].mode_before, run.accumulation_time - t
         leg = Leg(cells.mode(mode) if cells else mode, "limit")
-        left = run.accumulation_time - t
         result.append(Stretch(leg, t, left, x, x, x, system, p, (mode, -1)))
     return result
 

@@ -422,6 +422,7 @@ def test_orbits_and_their_multipliers_are_those_by_the_angle(drag, e):
     found, want = (ns.periodic_orbit(s, ns.simulate(s, start, 150.0)) for s, start in starts)
     assert found.stability == want.stability == "asymptotically stable"
     np.testing.assert_allclose(found.multipliers, [*want.multipliers, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(found.trajectory.x[-1], found.start, atol=1e-9)
     branch = ns.continue_orbit(found, "a", bounds=(0.48, 0.52))
     assert not branch.events and {end.name for end in branch.ends} == {"REACHED_BOUND"}
 
@@ -477,6 +478,28 @@ def test_friction_by_the_reaction_of_a_joint_is_refused_with_what_to_write():
             multipliers=[lam],
             constraints=ns.Constraint(y, reaction=r),
         )
+
+
+@pytest.mark.parametrize("pull", [1.0, -1.0])
+def test_a_piston_rubs_on_its_guide_by_the_size_of_the_side_force(pull):
+    """The guide carries pull (1 - x/2): with f = x - x^2/4 up to x = 2, then 2 - f, the piston stops where v^2/2 = mu f."""
+    side, rho, mu = ca.SX.sym("side"), pull * (1 - 0.5 * x), 0.3
+    dry = ns.Friction(u, load=side * rho, kinetic=mu)
+    piston = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, dry.force, r - rho],
+        surfaces=[dry, rho],
+        multipliers=[side],
+        constraints=ns.Constraint(y, reaction=r),
+    )
+    run = ns.simulate(piston, [0, 0, 2.2, 0], 12.0, tol=1e-12)
+    passed, stopped = (event for event in run.events if event.kind != "end")
+    assert (passed.name, stopped.name) == ("h1", "h0")
+    energy = lambda speed: speed**2 / 2
+    np.testing.assert_allclose(energy(passed.x[2]), energy(2.2) - mu, rtol=1e-11)
+    np.testing.assert_allclose(run.x[-1, 0], 2 + 2 * np.sqrt(energy(2.2) / mu - 1), rtol=1e-11)
+    by_speed = 2.2 / mu / np.sqrt(energy(2.2) / mu - 1)
+    np.testing.assert_allclose(ns.sensitivity(run).dx_dx0[0, 2], by_speed, rtol=1e-9)
 
 
 def test_functions_for_other_systems_refuse_constraints():

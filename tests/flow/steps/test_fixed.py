@@ -48,3 +48,16 @@ def test_what_is_not_finite_is_refused():
     system = ns.FilippovSystem([x, y], field=[1, x**2 + y**2 + k], parameters={k: 0.0})
     with pytest.raises(ns.ConvergenceError, match="duration"):
         integrated(system, [0.0, 1.0], 5.0)
+
+
+def test_derivatives_through_implicit_steps_of_a_flow():
+    """The Brusselator far from its Hopf point; by differences of the flow."""
+    system = ns.FilippovSystem(
+        [x, y], field=[1 - k * x + x**2 * y, (k - 1) * x - x**2 * y], parameters={k: 10.0}
+    )
+    start, steps = np.array([0.174, 24.8]), 1e-5 * np.eye(2)
+    for duration in (3.0, 5.0, 8.0):
+        found = integrated(system, start, duration)[:, 1:3]
+        two = [[integrated(system, start + s * d, duration)[:, 0] for s in (1, -1)] for d in steps]
+        differences = np.transpose([(a - b) / 2e-5 for a, b in two])
+        np.testing.assert_allclose(found, differences, rtol=0, atol=1e-6 * np.abs(found).max())

@@ -2,8 +2,8 @@
 
 /* A smooth field of n states and functions that are watched along it, as the outputs of one program; errors of
  * states of one group have one scale, those of group -1 are exact. After the states come columns of derivatives, by
- * the start and by parameters; the program's last outputs are entries of the field's derivatives, row after row, by
- * the states and by those parameters. */
+ * the start and by parameters; the program's last outputs are entries of the field's derivatives, column after column,
+ * by the states and by those parameters. */
 typedef struct {
   int32_t n, watched, order, groups, starts, columns;
   const int32_t *group;
@@ -66,17 +66,15 @@ static void expand_column(Flow *w, int column, const double *z) {
     if (w->bend[q] && (g->column[q] < n || of_p)) active[count++] = q;
   }
   for (int k = 0; moves && k < order; k++) {
-    for (int a = 0; a < count;) {
-      int row = g->row[active[a]];
-      double sum = 0;
-      for (; a < count && g->row[active[a]] == row; a++) {
-        int q = active[a], j = g->column[q];
-        const double *c = w->rules + f->series.output[n + f->watched + q];
-        sum += j >= n ? c[k] : product_of(own + j * stride, terms[j], c, w->bend[q], k);
-      }
-      if (sum == 0) continue;
-      own[row * stride + k + 1] = sum * PART[k + 1];
-      terms[row] = k + 2;
+    for (int a = 0; a < count; a++) {
+      int q = active[a], j = g->column[q];
+      const double *c = w->rules + f->series.output[n + f->watched + q];
+      own[g->row[q] * stride + k + 1] += j >= n ? c[k] : product_of(own + j * stride, terms[j], c, w->bend[q], k);
+    }
+    for (int i = 0; i < n; i++) {
+      if (own[i * stride + k + 1] == 0) continue;
+      own[i * stride + k + 1] *= PART[k + 1];
+      terms[i] = k + 2;
     }
   }
 }

@@ -281,7 +281,7 @@ def read_definition(
         hysteresis=hysteresis_of(entries),
         complementarity=tuple(condition.name for condition in conditions),
         **_contacts(impacts),
-        **_events(stops, resets, clocks, discrete, x, t, p),
+        **_events(stops, resets, clocks, discrete, x, t, p, joints.field),
     )
     require_consistent(definition)
     return definition
@@ -330,13 +330,20 @@ def _events(
     x: ca.SX,
     t: ca.SX,
     p: ca.SX,
+    field: ca.SX,
 ) -> dict[str, Any]:
     """Parts of a definition that stops, resets, clocks and discrete states make."""
     _require_directions([*stops, *resets])
     maps, named = read_maps(resets, x)
     moving = ca.vertcat(x[: x.numel() - len(discrete)], t)
     atoms = Atoms(ca.vertcat(x, t), moving, p)
-    rules = read_rules(stops, resets, atoms, named)
+    try:
+        rules = read_rules(stops, resets, atoms, named)
+    except DefinitionError:  # a field that is not smooth is named first: a guard is often a part of it
+        known = ca.vertcat(x, t)
+        others = [s for s in ca.symvar(field) if not ca.depends_on(s, known)]
+        require_smooth(field, known, ca.vertcat(*others), "field")
+        raise
     ticks = len(resets) - len(clocks)
     require_no_endless_level(
         rules[: len(stops) + ticks], len(stops), resets[:ticks], atoms.functions, x

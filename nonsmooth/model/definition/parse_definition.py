@@ -339,7 +339,9 @@ def _events(
     atoms = Atoms(ca.vertcat(x, t), moving, p)
     try:
         rules = read_rules(stops, resets, atoms, named)
-    except DefinitionError:  # a field that is not smooth is named first: a guard is often a part of it
+    except (
+        DefinitionError
+    ):  # a field that is not smooth is named first: a guard is often a part of it
         known = ca.vertcat(x, t)
         others = [s for s in ca.symvar(field) if not ca.depends_on(s, known)]
         require_smooth(field, known, ca.vertcat(*others), "field")

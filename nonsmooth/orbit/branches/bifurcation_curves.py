@@ -6,8 +6,9 @@ which other curves leave.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -149,30 +150,7 @@ def continue_bifurcation(
     whole(max_points, "max_points", least=2)
     bar = progress_bar(None, progress, " points")
 
-    def follow(departure: Departure) -> Arc:
-        curve = departure.curve
-        assert isinstance(curve, (EventCurve, ConnectionCurve))
-        u = departure.rows[-1]
-        curve.base.restart(curve.without(u) if isinstance(curve, EventCurve) else u)
-        if isinstance(curve, EventCurve):
-            curve.secant.forget()
-        k = departure.rows[-1].size - 2
-        arc = trace(
-            curve,
-            departure.rows,
-            departure.tangent,
-            step=step,
-            most=max_points,
-            bounds=[(k + i, low, high) for i, (low, high) in enumerate(limits)],
-            report=lambda _: bar.update(),
-        )
-        _drop_singular(arc)
-        if arc.end == VIRTUAL and len(arc.points) > 1:
-            arc.points.pop()
-            last = arc.points[-1].arclength
-            arc.zeros[:] = [zero for zero in arc.zeros if zero.point.arclength <= last]
-        return arc
-
+    follow = partial(_follow, limits=limits, step=step, most=max_points, report=bar.update)
     try:
         if isinstance(event, CodimensionTwo):
             assert event.meeting is not None
@@ -200,6 +178,39 @@ def continue_bifurcation(
     finally:
         bar.close()
     return _curve_of(event.kind, names, curve, halves)
+
+
+def _follow(
+    departure: Departure,
+    *,
+    limits: Sequence[tuple[float, float]],
+    step: float,
+    most: int,
+    report: Callable[[], object],
+) -> Arc:
+    """Follow a curve from where it departs."""
+    curve = departure.curve
+    assert isinstance(curve, (EventCurve, ConnectionCurve))
+    u = departure.rows[-1]
+    curve.base.restart(curve.without(u) if isinstance(curve, EventCurve) else u)
+    if isinstance(curve, EventCurve):
+        curve.secant.forget()
+    k = departure.rows[-1].size - 2
+    arc = trace(
+        curve,
+        departure.rows,
+        departure.tangent,
+        step=step,
+        most=most,
+        bounds=[(k + i, low, high) for i, (low, high) in enumerate(limits)],
+        report=lambda _: report(),
+    )
+    _drop_singular(arc)
+    if arc.end == VIRTUAL and len(arc.points) > 1:
+        arc.points.pop()
+        last = arc.points[-1].arclength
+        arc.zeros[:] = [zero for zero in arc.zeros if zero.point.arclength <= last]
+    return arc
 
 
 def _free(curve: BranchCurve, names: Sequence[str]) -> tuple[int, ...]:

@@ -124,7 +124,7 @@ def check(problem: Problem, other: Other) -> None:
 
 def far_surface(problem: Problem, rng: np.random.Generator) -> Other:
     m, (first, *rest) = len(problem.surfaces), problem.field
-    assume(not problem.hidden)
+    assume(not problem.hidden and np.max(run(problem).x[:, 0]) < 1000)
     pushed = [f"{first}+0.1*(l{m}+1)", *rest]
     far = replace(problem, field=pushed, surfaces=[*problem.surfaces, "x0-1000"])
     return Other(far, word=lambda mode: mode[:m] + "-" + mode[m:])

@@ -132,7 +132,17 @@ def main(kind: str, arguments: list[str]) -> int:
     own = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST_XDIST")}
     environment = {**own, **(preloaded(folder) if kind == "sanitize" else {})}
     environment |= {"NONSMOOTH_INSTRUMENT": f"{kind}:{folder}", "PYTHONPATH": str(ROOT)}
-    given = arguments or ["-m", "not slow and not slow_cases and not browser", "tests/flow"]
+    others = [
+        "engine/test_webassembly.py",
+        "engine/building/test_library.py",
+        "test_saved_files.py",
+    ]
+    given = arguments or [
+        *("-m", "not slow and not slow_cases and not browser", "tests/flow"),
+        *(
+            f"--ignore=tests/flow/{name}" for name in others
+        ),  # processes without the driver's library
+    ]
     command = [
         sys.executable,
         "-m",

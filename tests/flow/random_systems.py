@@ -245,17 +245,23 @@ def package_words(system: Any, problem: Problem) -> Callable[[str], str]:
     if not problem.tables:
         return lambda mode: mode.split(",")[0]
     rng, n = np.random.default_rng(0), len(problem.states)
-    points = [rng.normal(size=n + 1) for _ in range(3)]
+    points = [rng.normal(size=n + 1) for _ in range(20)]
     model, known = Model(problem), list(problem.numbers.values())
-    true = np.array([model.guards(x[:n], x[n])[: model.m] for x in points])
+    true = [model.guards(x[:n], x[n])[: len(problem.surfaces)] for x in points]
     found = [system.surface_function(i) for i in range(system.surface_count)]
     arguments = [system.extended_states, system.parameter_symbols]
     heights = ca.Function("h", arguments, [ca.vertcat(*found)])
     size = system.extended_dimension
-    given = np.array([np.ravel(heights(x[:size], known)) for x in points])
-    parts = [[np.ptp(h / g) < 1e-9 for g in given.T] for h in true.T[: len(problem.surfaces)]]
-    own, count = [part.index(True) for part in parts], len(found)
-    return lambda mode: "".join(mode[i] for i in own) + mode.split(",")[0][count:]
+    given = [np.ravel(heights(x[:size], known)) for x in points]
+    alike = np.sum(np.sign(true)[:, :, None] * np.sign(given)[:, None, :], axis=0)  # or opposite
+    own, count = [(i, row[i]) for row in alike for i in [np.argmax(np.abs(row))]], len(found)
+    turned = str.maketrans("+-", "-+")
+
+    def word(mode: str) -> str:
+        letters = [mode[i] if way > 0 else mode[i].translate(turned) for i, way in own]
+        return "".join(letters) + mode.split(",")[0][count:]
+
+    return word
 
 
 def package_events(run: Any, problem: Problem) -> list[tuple[float, str, str]]:

@@ -214,44 +214,49 @@ def _solved(equations: Equations, guess: Array) -> Array | None:
 
 def _degenerate(curve: EventCurve, base: OrbitCurve, u: Array, names: set[str]) -> Meeting | None:
     """The landing or exit at a degenerate tangency near a point, located in the itinerary with fewest legs."""
-    at, system = curve.condition, base.system
+    at = curve.condition
     if at is None or at.guard is None:
         return None
-    legs, guard, i, k = base.problem.legs, at.guard, at.leg, base.problem.size
-    surface = guard.element
-    before = ChangedItinerary(base.problem, u[:k], tuple(range(len(legs))))
-    order, start = 0, i
-    if at.what == "start":
-        if legs[i - 1].kind == "crossing":
-            found = _changed(base, Condition("duration", i), u)
-            if not names & {CUSP, f"duration {i}"} or found is None or not found.test:
-                return None
-            before = found
-            start = int(found.test.split()[1])
-        elif CUSP not in names:
-            return None
-    elif names & {HIGHER, AT_START, AT_END} and guard.kind in ("exit", "surface"):
-        leg, last = legs[i], legs[i - 1]
-        begins, ends = {"exit": ("entry", "exit"), "surface": ("exit", "entry")}[guard.kind]
-        if last.kind == begins and surface_of(system, last) == surface and AT_START in names:
-            order = 0 if guard.kind == "exit" else 2
-        elif leg.kind == ends and surface_of(system, leg) == surface:
-            start, order = (i + 1) % len(legs), 2 if guard.kind == "exit" else 0
-        else:
-            return None
-    else:
+    found = _after_tangency(base, u, at, names)
+    count = 0 if found is None else len(found[0].problem.legs)
+    if found is None or count < 2:
         return None
-    count = len(before.problem.legs)
-    if count > 1 and start == 0:
-        turned = rotated(before, count - 1, base.parameters_at(u))
-        before, start = turned, 1
-    own = _own_guard(before, start, surface, order, guard)
-    if own is None or count < 2:
+    before, start, order = found
+    if start == 0:
+        before, start = rotated(before, count - 1, base.parameters_at(u)), 1
+    own = _own_guard(before, start, at.guard.element, order, at.guard)
+    if own is None:
         return None
     point = Degenerate(start, own, order)
     regular, guess = _with(base, u, before)
     located = _located(regular, guess, point)
     return None if located is None else Meeting(regular, located, curve, "", at=point)
+
+
+def _after_tangency(
+    base: OrbitCurve, u: Array, at: Condition, names: set[str]
+) -> tuple[ChangedItinerary, int, int] | None:
+    """The itinerary with fewest legs beside a degenerate tangency, the leg that begins there, and its order."""
+    legs, i, guard, system = base.problem.legs, at.leg, at.guard, base.system
+    assert guard is not None
+    same = ChangedItinerary(base.problem, u[: base.problem.size], tuple(range(len(legs))))
+    if at.what == "start" and legs[i - 1].kind == "crossing":
+        found = _changed(base, Condition("duration", i), u)
+        if not names & {CUSP, f"duration {i}"} or found is None or not found.test:
+            return None
+        return found, int(found.test.split()[1]), 0
+    if at.what == "start":
+        return (same, i, 0) if CUSP in names else None
+    ends = {"exit": ("entry", "exit", 0), "surface": ("exit", "entry", 2)}.get(guard.kind)
+    if ends is None or not names & {HIGHER, AT_START, AT_END}:
+        return None
+    begins_by, ends_by, order = ends
+    if legs[i - 1].kind == begins_by and surface_of(system, legs[i - 1]) == guard.element:
+        if AT_START in names:
+            return same, i, order
+    if legs[i].kind == ends_by and surface_of(system, legs[i]) == guard.element:
+        return same, (i + 1) % len(legs), 2 - order
+    return None
 
 
 def _own_guard(
@@ -321,7 +326,10 @@ def leaving(
         if _is_known(meeting, curve):
             continue
         for way in ways:
-            kind = curve.base.named(curve.name, curve.without(way.rows[-1]))
+            inner = curve.without(way.rows[-1])
+            if not curve.base.occurs(curve.name, inner):  # a neutral saddle
+                continue
+            kind = curve.base.named(curve.name, inner)
             curve.settle(way.rows[-1])
             yield kind, curve, way
 

@@ -409,6 +409,17 @@ def test_networks_whose_diodes_join_capacities(seed):
     assert is_that_of_its_network(seed)
 
 
+@pytest.mark.parametrize("seed", [16, 28, 31, 35, 40])
+def test_networks_with_a_small_resistance_in_each_port_are_close_to_ideal(seed):
+    (*rates, d), start = network(seed)
+    ideal, real = (
+        ns.simulate(circuit(*rates, d + r * np.eye(len(d))), start, t_end=5.0, tol=1e-9)
+        for r in (0, 1e-6)
+    )
+    assert real.status is REACHED, real.message
+    assert abs(real.x[-1] - ideal.x[-1]).max() < 1e-4
+
+
 @pytest.mark.slow
 def test_random_networks_of_diodes():
     found = [is_that_of_its_network(seed) for seed in range(120)]

@@ -32,11 +32,15 @@ def takens():
 
 def test_folds_and_hopf_points_meet_in_a_bogdanov_takens_point(takens):
     hopf, fold = (next(e for e in takens.events if e.kind == k) for k in ("Hopf", "fold"))
+    leave = lambda point: ns.continue_bifurcation(point, ("a", "b"), bounds=BOX)
     folds = ns.continue_bifurcation(fold, ("a", "b"), bounds=BOX)
     assert np.abs(folds.values[:, 1] ** 2 - 4 * folds.values[:, 0]).max() < 1e-12
     assert [point.kind for point in folds.special] == ["Bogdanov-Takens"]
     assert np.abs(folds.special[0].values).max() < 1e-10
+    (half,) = leave(folds.special[0])  # on the other side neutral saddles
+    assert half.kind == "Hopf" and np.abs(half.values[-1] - [0.0, -1.5]).max() < 1e-12
     hopfs = ns.continue_bifurcation(hopf, ("a", "b"), bounds=BOX)
+    assert [one.kind for one in leave(hopfs.special[0])] == ["fold", "fold"]
     assert np.abs(hopfs.values[:, 0]).max() < 1e-12
     assert (
         np.ptp(hopfs.values[:, 1]) > 1.4 and hopfs.values[:, 1].max() < 1e-9

@@ -104,7 +104,7 @@ def assert_real(curve: BifurcationCurve) -> None:
     assert not virtual, (curve, virtual)
 
 
-_FAST = ("CT1", "CT4", "CT5", "CT7")
+_FAST = ("CT1", "CT5", "CT7")
 
 
 @pytest.mark.parametrize(

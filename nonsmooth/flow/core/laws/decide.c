@@ -773,8 +773,21 @@ static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   }
 }
 
+/* What multipliers of complementarity conditions can be, where all elements are such: their solution, as estimates by
+ * the diagonal are far too large where that is a small resistance. */
+static void estimate_multipliers(const Run *r, Decision *d) {
+  int k = d->count;
+  double *nu = d->large, *q = d->block, *m = q + k;
+  for (int i = 0; i < k; i++) {
+    if (!has_law(r, d->own[i], COMPLEMENTARITY_LAW)) return;
+    q[i] = -d->a[i];
+  }
+  memcpy(m, d->matrix, sizeof(double) * k * k);
+  if (k > 1 && lemke_scaled(m, q, k, nu, d->work, d->pivot)) memcpy(d->room, nu, sizeof(double) * k);
+}
+
 /* Scales of the law at the point. */
-static void begin_decision(Decision *d) {
+static void begin_decision(const Run *r, Decision *d) {
   int k = d->count;
   d->most = 0;
   for (int i = 0; i < k; i++) { /* what reactions can be, then rows */
@@ -784,6 +797,7 @@ static void begin_decision(Decision *d) {
   }
   for (int i = 0; i < k; i++)
     for (int j = 0; j < k && !d->is_contact[i]; j++) d->room[i] += fabs(d->share[i * k + j]) * d->room[j];
+  estimate_multipliers(r, d);
   for (int i = 0; i < k; i++) {
     d->yard[i] = fabs(d->a[i]);
     for (int j = 0; j < k; j++) d->yard[i] += fabs(d->matrix[i * k + j]) * d->room[j];
@@ -876,7 +890,7 @@ static int begin_law(Run *r, const int8_t *letter, const Known *known, int known
   d->last = ORDERS;
   if (!read_law(r, d)) return 0;
   find_blocks(d);
-  begin_decision(d);
+  begin_decision(r, d);
   read_old(r, d, letter, known, known_count);
   find_touched(d, letter);
   return 1;

@@ -263,7 +263,7 @@ def read_definition(
     joints = joints_of(joined, listed(held), f)
     own = [*[condition.entry() for condition in conditions], *joints.entries]
     sizes, entries = (*sizes, *[1] * len(own)), [*entries, *own]
-    definition = Definition(
+    parts: dict[str, Any] = dict(
         states=x,
         time=t,
         parameters=p,
@@ -281,10 +281,18 @@ def read_definition(
         hysteresis=hysteresis_of(entries),
         complementarity=tuple(condition.name for condition in conditions),
         **_contacts(impacts),
-        **_events(stops, resets, clocks, discrete, x, t, p),
     )
+    definition = _with_events(parts, (stops, resets, clocks, discrete, x, t, p))
     require_consistent(definition)
     return definition
+
+
+def _with_events(parts: dict[str, Any], events: tuple[Any, ...]) -> Definition:
+    try:
+        return Definition(**parts, **_events(*events))
+    except DefinitionError:  # a fault of the field is named before those of its guards
+        require_consistent(Definition(**parts, **_events((), (), (), (), *events[4:])))
+        raise
 
 
 def _multipliers_and_field(

@@ -29,8 +29,8 @@ from ..surface_functions import enclosed, parameter_ranges
 from .itinerary import EnclosedEvent, OrbitEnclosure
 from .modes import EventFunction, Modes
 
-#: Samples of a leg, and the share of it, among which its plane is chosen.
-_SAMPLES, _SHARE = 24, 0.6
+#: Samples of a leg, and shares of it, among which its plane is chosen: the first with a monotone state.
+_SAMPLES, _SHARES = 24, (0.6, 0.1, 0.01, 0.001)
 
 #: An orbit farther than this from the given one, relative to its size, is another one.
 _NEAR = 1e-6
@@ -70,13 +70,16 @@ def sections_of(orbit: PeriodicOrbit) -> list[Section]:
         passed += 1
         if leg.duration <= 0:
             continue
-        t = leg.t + leg.duration * np.linspace(1e-6, _SHARE, _SAMPLES)
-        x = run(t)[:, :n]
-        steps = np.diff(x, axis=0) / size
-        same = np.sign(steps) == np.sign(steps[0])
-        count = np.where(same.all(axis=0), len(steps), same.argmin(axis=0))
+        for share in _SHARES:
+            t = leg.t + leg.duration * np.linspace(1e-6, share, _SAMPLES)
+            x = run(t)[:, :n]
+            steps = np.diff(x, axis=0) / size
+            same = np.sign(steps) == np.sign(steps[0])
+            count = np.where(same.all(axis=0), len(steps), same.argmin(axis=0))
+            if np.any(count > 4):
+                break
         at = np.maximum(count * 2 // 3, 1)  # the states are monotone up to there and beyond
-        k = int(np.argmax(np.abs(steps[at - 1, np.arange(n)]) * (count > 2)))
+        k = int(np.argmax(np.abs(steps[at - 1, np.arange(n)]) * (count > 4)))
         around = slice(at[k] - 1, at[k] + 2)
         unit = 2.0 ** np.floor(np.log2(np.ptp(x[around, k]) / 4))  # a number with few digits
         value = unit * np.round(x[at[k], k] / unit)

@@ -171,14 +171,14 @@ def moved(orbit: PeriodicOrbit, x: Array, t: float, tol: float) -> ns.Trajectory
 
 
 def differences(orbit: PeriodicOrbit, x: Array, t: float) -> Array:
-    """Eigenvalues of the derivative of the motion over a period, by central differences."""
-    n, h = x.size, 1e-5
-    columns = [
-        (moved(orbit, x + h * e, t, 1e-13).x[-1] - moved(orbit, x - h * e, t, 1e-13).x[-1])
-        / (2 * h)
-        for e in np.eye(n)
-    ]
-    return np.asarray(np.linalg.eigvals(np.array(columns).T))
+    """Eigenvalues of the derivative of the motion over a period, by central differences of fourth order."""
+    slopes = list[Array]()
+    for h in (1e-5, 5e-6):
+        ends = [
+            moved(orbit, x + s * h * e, t, 1e-13).x[-1] for e in np.eye(x.size) for s in (1.0, -1.0)
+        ]
+        slopes.append((np.array(ends[::2]) - ends[1::2]) / (2 * h))
+    return np.asarray(np.linalg.eigvals((4 * slopes[1] - slopes[0]).T / 3))
 
 
 def _kinds(kinds: Sequence[str]) -> Counter[str]:
@@ -261,7 +261,7 @@ def branch_of(kind: str, seed: int) -> tuple[Branch | None, str]:
     if not run.status.complete or np.abs(run.x[-1]).max() > 1e3:
         return None, f"no run: {run.status}"
     try:
-        orbit = ns.periodic_orbit(system, run)
+        orbit = ns.periodic_orbit(system, run, max_time=15)
     except ns.NonsmoothError as error:
         return None, f"no orbit: {type(error).__name__}"
     return ns.continue_orbit(orbit, "q", bounds=(0.2, 3.0), max_points=300), ""

@@ -245,7 +245,7 @@ def package_words(system: Any, problem: Problem) -> Callable[[str], str]:
     if not problem.tables:
         return lambda mode: mode.split(",")[0]
     rng, n = np.random.default_rng(0), len(problem.states)
-    points = [rng.normal(size=n + 1) for _ in range(20)]
+    points = [rng.normal(size=n + 1) * 10 ** rng.uniform(-1, 4) for _ in range(30)]
     model, known = Model(problem), list(problem.numbers.values())
     true = [model.guards(x[:n], x[n])[: len(problem.surfaces)] for x in points]
     found = [system.surface_function(i) for i in range(system.surface_count)]

@@ -263,7 +263,7 @@ def read_definition(
     joints = joints_of(joined, listed(held), f)
     own = [*[condition.entry() for condition in conditions], *joints.entries]
     sizes, entries = (*sizes, *[1] * len(own)), [*entries, *own]
-    definition = Definition(
+    parts: dict[str, Any] = dict(
         states=x,
         time=t,
         parameters=p,
@@ -281,10 +281,18 @@ def read_definition(
         hysteresis=hysteresis_of(entries),
         complementarity=tuple(condition.name for condition in conditions),
         **_contacts(impacts),
-        **_events(stops, resets, clocks, discrete, x, t, p, joints.field),
     )
+    definition = _with_events(parts, (stops, resets, clocks, discrete, x, t, p))
     require_consistent(definition)
     return definition
+
+
+def _with_events(parts: dict[str, Any], events: tuple[Any, ...]) -> Definition:
+    try:
+        return Definition(**parts, **_events(*events))
+    except DefinitionError:  # a fault of the field is named before those of its guards
+        require_consistent(Definition(**parts, **_events((), (), (), (), *events[4:])))
+        raise
 
 
 def _multipliers_and_field(
@@ -330,22 +338,13 @@ def _events(
     x: ca.SX,
     t: ca.SX,
     p: ca.SX,
-    field: ca.SX,
 ) -> dict[str, Any]:
     """Parts of a definition that stops, resets, clocks and discrete states make."""
     _require_directions([*stops, *resets])
     maps, named = read_maps(resets, x)
     moving = ca.vertcat(x[: x.numel() - len(discrete)], t)
     atoms = Atoms(ca.vertcat(x, t), moving, p)
-    try:
-        rules = read_rules(stops, resets, atoms, named)
-    except (
-        DefinitionError
-    ):  # a field that is not smooth is named first: a guard is often a part of it
-        known = ca.vertcat(x, t)
-        others = [s for s in ca.symvar(field) if not ca.depends_on(s, known)]
-        require_smooth(field, known, ca.vertcat(*others), "field")
-        raise
+    rules = read_rules(stops, resets, atoms, named)
     ticks = len(resets) - len(clocks)
     require_no_endless_level(
         rules[: len(stops) + ticks], len(stops), resets[:ticks], atoms.functions, x

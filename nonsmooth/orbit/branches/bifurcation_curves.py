@@ -186,7 +186,7 @@ def _follow(
     limits: Sequence[tuple[float, float]],
     step: float,
     most: int,
-    report: Callable[[], object],
+    report: Callable[[], None],
 ) -> Arc:
     """Follow a curve from where it departs."""
     curve = departure.curve

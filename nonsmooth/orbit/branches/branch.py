@@ -493,11 +493,11 @@ class _Half:
         curve, point = self.nodes[-1]
         try:
             last = curve.ending(point.u, self.end)
+            said = "" if last is not None else curve.unresolved(point.u)
         except (NonsmoothError, np.linalg.LinAlgError):
             return
-        if last is None:
-            self.reason = curve.unresolved(point.u) or self.reason
-        else:
+        self.reason = said or self.reason
+        if last is not None:
             self.events.append(last)
             diverges = last.kind in ("homoclinic", "infinite period at a boundary node")
             self.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT

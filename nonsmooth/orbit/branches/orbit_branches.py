@@ -334,7 +334,8 @@ class OrbitCurve(OrbitEquations):
 
     def unresolved(self, u: Array) -> str:
         p, k = self.parameters_at(u), self.problem.size
-        growth = Multipliers(self.problem, self.problem.evaluate(u[:k], p), p).logarithms.real
+        found = Multipliers(self.problem, self.problem.evaluate(u[:k], p), p)
+        growth = np.zeros(0) if found.refusal else found.logarithms.real
         if not growth.size or growth[0] < _STEEPEST:
             return ""
         return (

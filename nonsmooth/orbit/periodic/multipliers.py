@@ -58,7 +58,8 @@ class Multipliers:
             passages(self.at.flows.ended, *events_of(self.problem, self.at))
         except DegenerateError as error:
             return str(error)
-        return ""
+        finite = np.isfinite(self.at.flows.by_start).all()
+        return "" if finite else "derivatives along the orbit are beyond the range of numbers"
 
     @cached_property
     def logarithms(self) -> NDArray[np.complex128]:

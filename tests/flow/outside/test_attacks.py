@@ -70,14 +70,16 @@ def test_derivatives_that_are_not_resolved_are_refused():
         ns.sensitivity(run)
 
 
-def test_rest_after_infinitely_many_events_has_no_derivative():
+def test_rest_after_infinitely_many_events_depends_on_nothing_but_its_begin():
     twisting = ns.FilippovSystem(
         [x, v], field=[v, -2 * lam - 0.9 * kap], surfaces=[x, v], multipliers=[lam, kap]
     )
     run = ns.simulate(twisting, [1.0, 0.1], 9.0)
     assert run.x[-1].tolist() == [0, 0]
-    with pytest.raises(ns.DegenerateError, match="accumulate"):
-        ns.sensitivity(run)
+    found = ns.sensitivity(run)
+    np.testing.assert_allclose(found.dx_dx0, 0, rtol=0, atol=1e-15)
+    ends = [ns.simulate(twisting, [1.0 + s, 0.1], 9.0).events[-2].t for s in (1e-5, -1e-5)]
+    np.testing.assert_allclose(found.dt_dx0[-1, 0], (ends[0] - ends[1]) / 2e-5, rtol=1e-6)
 
 
 def test_derivatives_of_rest_that_a_load_ends():

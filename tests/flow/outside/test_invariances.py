@@ -94,6 +94,10 @@ def check(problem: Problem, other: Other) -> None:
     base, found = run(problem), other.run or run(other.problem)
     assert found.status == base.status
     ours, theirs = package_events(base, problem), package_events(found, other.problem or problem)
+    if base.status == ns.Status.ACCUMULATION:  # how many events are counted depends on rounding
+        limit = other.time(found.accumulation_time)
+        assert abs(limit - base.accumulation_time) <= 1000 * TOLERANCE * (1 + limit)
+        return
     close = 1e-4  # impacts that accumulate: their number depends on rounding
     ends = [t for t, what, mode in ours if what == "mode" and mode.endswith("c")]
 
@@ -120,7 +124,7 @@ def check(problem: Problem, other: Other) -> None:
 
 def far_surface(problem: Problem, rng: np.random.Generator) -> Other:
     m, (first, *rest) = len(problem.surfaces), problem.field
-    assume(not problem.hidden)
+    assume(not problem.hidden and np.max(run(problem).x[:, 0]) < 1000)
     pushed = [f"{first}+0.1*(l{m}+1)", *rest]
     far = replace(problem, field=pushed, surfaces=[*problem.surfaces, "x0-1000"])
     return Other(far, word=lambda mode: mode[:m] + "-" + mode[m:])

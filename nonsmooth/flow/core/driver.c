@@ -221,6 +221,18 @@ static int with_touched(Run *r, int32_t *onto, int kept) {
   return all;
 }
 
+/* Rates of contacts that an impact leaves at zero are so to the rounding of the state before it, not of that after. */
+static void keep_rates_zero(Run *r, const double *before, int32_t *involved, int count) {
+  double *scale = r->small;
+  int n = 0;
+  surface_scales(r, before);
+  for (int k = 0; k < count; k++) scale[k] = r->rates[r->kept_rows + (involved[k] = rate_row(r, r->m + involved[k]))];
+  surface_values(r, r->x);
+  for (int k = 0; k < count; k++)
+    if (r->rates[involved[k]] != 0 && fabs(r->rates[involved[k]]) <= ON_SURFACE * scale[k]) involved[n++] = involved[k];
+  project(r, involved, n);
+}
+
 /* The impulses of a gap that closes, and of the contacts that are closed there. */
 static void impact(Run *r, int row) {
   int before = r->mode, contact = r->now.index[row] - r->m, count = 0;
@@ -238,6 +250,7 @@ static void impact(Run *r, int row) {
   if (wrong >= 0) { finish(r, INCONSISTENT, RESTITUTION, wrong); return; }
   if (!strike(r, involved, count, 0, r->at_work)) { finish(r, INCONSISTENT, NO_IMPULSE, contact); return; }
   memcpy(r->x, r->at_work, sizeof(double) * r->n);
+  keep_rates_zero(r, x, involved, count);
   note(r);
   settle_in(r);
   event(r, IMPACT, before, row, x);

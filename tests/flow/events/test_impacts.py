@@ -1,6 +1,8 @@
 """Gaps that cannot close: impacts, rest after an accumulation, friction at the contact, release, each at
 its closed form."""
 
+from itertools import pairwise
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -265,3 +267,12 @@ def test_a_neighbour_is_not_behind_by_the_error_of_a_root():
         start = [0.1 + 0.07 * k, 0.75 + 0.05 * k, 0.1 * k, -0.3 * k, 0.3 * k, -0.2]
         run = ns.simulate(system, start, 3.0, tol=1e-8)
         assert run.status is ns.Status.REACHED_END, run.message
+
+
+@pytest.mark.parametrize("tol", [1e-8, 1e-9, 1e-10, 1e-11, 1e-12])
+def test_a_plastic_impact_is_one_event(tol):
+    """A jamming contact of the woodpecker stops a rate of 25, of which rounding leaves 7e-15."""
+    run = ns.textbook.woodpecker().run(tol=tol)
+    impacts = [(e.name, e.t) for e in run.events if e.kind == "impact"]
+    assert all(one[0] != two[0] or two[1] - one[1] > 1e-6 for one, two in pairwise(impacts))
+    assert [name for name, _ in impacts[:4]] == ["high", "beak", "high", "low"]

@@ -220,8 +220,13 @@ def split(problem: Problem, rng: np.random.Generator) -> Other:
     second = run(other, start=first.x[-1], t_start=middle, t_end=shift + problem.t_end)
     events = [*first.events, *second.events]
     given = dict(system=first.system, segments=first.segments)
-    both = SimpleNamespace(status=second.status, x=second.x, events=events, **given)
+    limit = second.accumulation_time
+    both = SimpleNamespace(
+        status=second.status, x=second.x, events=events, accumulation_time=limit, **given
+    )
     times = [e.t for e in base.events]
+    if base.accumulation_time is not None:
+        times.append(base.accumulation_time)
     near = lambda t: min(times, key=lambda s: abs(s - (t - shift)))
     return Other(other, run=both, time=near if shift else lambda t: t)
 

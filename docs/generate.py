@@ -14,6 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
+
 import bounce
 import nonsmooth as ns
 from nonsmooth.flow.status import ADVICE
@@ -144,6 +146,26 @@ def problems() -> str:
     return table(("name", "title", "source", "known values"), rows)
 
 
+def problem_pictures() -> str:
+    """A run of each of them."""
+    shown = [
+        f"**{p.title}** (`{p.name}`)\n\n![States of a run of {p.name} over time](gallery/textbook_{p.name}.png)"
+        for p in (build() for build in ns.textbook.PROBLEMS.values())
+    ]
+    return "\n\n".join(shown)
+
+
+def draw_problems(folder: Path) -> list[Path]:
+    """Draw a run of each textbook problem into a folder."""
+    paths = []
+    for name, build in ns.textbook.PROBLEMS.items():
+        figure = ns.plot.trajectory(build().run())
+        paths.append(folder / f"textbook_{name}.png")
+        figure.savefig(paths[-1], bbox_inches="tight", dpi=80, metadata={"Software": None})
+        plt.close(figure)
+    return paths
+
+
 def regions() -> str:
     """What the fields do at a point of the surface."""
     when = {
@@ -266,6 +288,7 @@ PARTS: dict[str, Callable[[], str]] = {
         error_table,
         obligations,
         problems,
+        problem_pictures,
         regions,
         gallery,
     )

@@ -48,6 +48,8 @@ def on_files(files: Files, config: Any) -> Files:
             path = PICTURES / f"{picture}.svg"
             figure.savefig(path, bbox_inches="tight", dpi=120, metadata={"Date": None})
             files.append(File.generated(config, f"gallery/{path.name}", abs_src_path=str(path)))
+    for path in generate.draw_problems(PICTURES):
+        files.append(File.generated(config, f"gallery/{path.name}", abs_src_path=str(path)))
     for animation in animations.ANIMATIONS:
         for path in animations.write(animation, PICTURES):
             files.append(File.generated(config, f"gallery/{path.name}", abs_src_path=str(path)))

@@ -476,7 +476,7 @@ class TapeEngine:
         return met[:-1].reshape(count, width)
 
     def _labels(self, table: int) -> list[tuple[float, ...]]:
-        """Values of the discrete states in the modes that were met; empty without any."""
+        """Values of the discrete states in the modes of the run; empty without any."""
         count = len(self.system.definition.discrete)
         if not count:
             return []

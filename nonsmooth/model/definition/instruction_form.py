@@ -36,7 +36,7 @@ MOST, DEEPEST = 200_000, 4_000
 
 
 def _require(conditions: Iterator[tuple[bool, str]]) -> None:
-    """Refuse what does not meet conditions, which are asked in their order."""
+    """Raise DefinitionError for the first condition that does not hold."""
     for holds, what in conditions:
         if not holds:
             raise DefinitionError(f"system: expected {what}, received something else.")
@@ -210,7 +210,7 @@ _EMPTY = {(0, 0), (0, 1), (1, 0)}
 
 
 def _conditions(d: Definition) -> Iterator[tuple[bool, str]]:
-    """What a definition has to be for CasADi and the driver, beside what is asked of all."""
+    """Conditions of CasADi and of the driver on a definition, beside those of ``require_consistent``."""
     n, m, guards, k = d.states.numel(), d.surfaces.numel(), len(d.rules), len(d.resets)
     yield guards == len(d.stops) + k, "a rule of each event"
     columns = {

@@ -290,7 +290,7 @@ def read_definition(
 def _with_events(parts: dict[str, Any], events: tuple[Any, ...]) -> Definition:
     try:
         return Definition(**parts, **_events(*events))
-    except DefinitionError:  # a fault of the field is named before those of its guards
+    except DefinitionError:  # an error of the field is reported before those of its guards
         require_consistent(Definition(**parts, **_events((), (), (), (), *events[4:])))
         raise
 

@@ -15,7 +15,15 @@ from numpy.typing import ArrayLike
 from ...flow.simulate import simulate
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
-from ...model import Array, DegenerateError, NonsmoothError, OptionError, real, real_array
+from ...model import (
+    Array,
+    DegenerateError,
+    NonsmoothError,
+    OptionError,
+    PointError,
+    real,
+    real_array,
+)
 from .limits import extrapolation_weights
 
 Side = Mapping[str, Any] | ArrayLike
@@ -83,7 +91,13 @@ def _direction(run: Trajectory, side: Side) -> tuple[Array, dict[str, float]]:
             f"side has {unknown or 'no entry'}. Give a direction of the start, or a mapping with 'x0' and names among {list(known)}."
         )
     values = {str(name): value for name, value in given.items()}
-    x = real_array(values.pop("x0", np.zeros(n)), "side")
+    try:
+        x = real_array(values.pop("x0", np.zeros(n)), "side")
+    except PointError:
+        raise OptionError(
+            f"side is {side!r}. Give a direction of the start: {n} numbers, or a mapping with 'x0' and names among "
+            f"{list(known)}."
+        ) from None
     p = {name: real(value, f"side[{name!r}]") for name, value in values.items()}
     if x.shape != (n,) or not np.isfinite(x).all() or not (x.any() or any(p.values())):
         raise OptionError(

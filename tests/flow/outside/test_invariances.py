@@ -224,10 +224,13 @@ def split(problem: Problem, rng: np.random.Generator) -> Other:
     both = SimpleNamespace(
         status=second.status, x=second.x, events=events, accumulation_time=limit, **given
     )
-    times = [e.t for e in base.events]
-    if base.accumulation_time is not None:
-        times.append(base.accumulation_time)
-    near = lambda t: min(times, key=lambda s: abs(s - (t - shift)))
+    last = base.accumulation_time
+    times = np.array([*(e.t for e in base.events), *([] if last is None else [last])])
+
+    def near(t: float) -> float:
+        k = np.searchsorted(times, t - shift)
+        return float(min(times[max(k - 1, 0) : k + 1], key=lambda one: abs(one - (t - shift))))
+
     return Other(other, run=both, time=near if shift else lambda t: t)
 
 

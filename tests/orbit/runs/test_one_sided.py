@@ -71,7 +71,7 @@ def test_a_side_without_a_derivative_or_direction_raises() -> None:
     run = ns.simulate(WALL, [0.5, -1.0], 2.0)
     with pytest.raises(ns.DegenerateError, match="no finite limit"):  # the square root
         ns.sensitivity(run, side=[-1, 0])
-    for side in ([0, 0], {"q": 1.0}, {}, [1, 2, 3], [np.nan, 1]):
+    for side in ([0, 0], {"q": 1.0}, {}, [1, 2, 3], [np.nan, 1], "left"):
         with pytest.raises(ns.OptionError, match="side"):
             ns.sensitivity(run, side=side)
 

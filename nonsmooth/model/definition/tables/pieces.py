@@ -145,7 +145,7 @@ def places_of(d: Definition) -> list[int]:
 
 
 def beyond_cells(d: Definition, signs: Sequence[float]) -> set[int]:
-    """Surfaces of breakpoints that are not beside the cell where surfaces have signs: others are met before them."""
+    """Surfaces of breakpoints that are not beside the cell where surfaces have signs: others are reached before them."""
     places, found = places_of(d), set[int]()
     for table in d.tables:
         first = places[table.element]

@@ -95,8 +95,7 @@ IMPROVED = 1e-16
 SYMMETRIC = 1e-12
 DEPENDENT = 1e-24
 
-#: A multiplier's bound in an impact, and the time of a slip: parts that they may be off by.
-ROOM = 1e-9
+#: Part that the time of a slip may be off by.
 SLIP_ROOT = 1e-6
 
 #: Numbers beyond these are no sizes any more; of a quotient with such a value and divisor nothing is left.

@@ -15,9 +15,8 @@
 typedef struct {
   double t_end, rtol, atol, max_step, rest_below; /* the last: 0 for none */
   int64_t max_steps, max_events, max_jumps;
-  int32_t start_mode, at_kind;
   int64_t at_count;
-  int32_t dense, hit_after, method, pad;
+  int32_t at_kind, dense, hit_after, method;
   /* Events that are hits: kinds as bits; whether each guard is named, by kind and index; side (or 0). */
   int64_t hit_kinds, hit_width, hit_side, hit_skip, hit_every, hit_count;
   const int8_t *hit_named;
@@ -27,11 +26,10 @@ typedef struct {
 /* Letters of a set: off it, h carried along after that, its first step away from it, and one without friction. */
 enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5, IDLE = 6 };
 
-/* Trajectories of a call: all of the arrays, or those listed in ``which``; where results go. */
+/* Trajectories of a call; where results go. */
 typedef struct {
   int64_t count, p_stride;
   double t0;
-  const int64_t *which;
   const double *x0, *p;
   double *x, *t;
   int8_t *status;

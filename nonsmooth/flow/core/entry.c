@@ -423,7 +423,7 @@ static int run_all(Run *r, int64_t *next, const Batch *b, const Options *o, cons
                    int64_t width, int64_t budget) {
   static const Output none;
   for (; *next / 2 < b->count; *next += 1) {
-    int64_t k = *next / 2, i = b->which ? b->which[k] : k;
+    int64_t i = *next / 2;
     Left *left = records ? (Left *)(records + i * width) : 0;
     if (*next % 2 == 0 && !records) sample_into(r, b, i);
     if (*next % 2 == 0 && left && left->begun) {

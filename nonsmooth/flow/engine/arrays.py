@@ -121,9 +121,8 @@ def options_of(
         int(min(o.max_steps, limit)),
         int(min(o.max_events, limit)),
         int(min(o.max_jumps, limit)),
-        -1,
-        kind,
         min(count, limit),
+        kind,
         int(dense),
     )
     made.method = METHODS.index(o.method)
@@ -173,7 +172,7 @@ def batch_of(
     stride = p.shape[-1] if p.ndim > 1 else 0
     results = (chunk.x, chunk.t, chunk.status, chunk.itinerary, chunk.kinds)
     kept = (chunk.at_x, chunk.at_t, chunk.totals)
-    arrays = [address(a) for a in (None, x, p, *results, *kept)]
+    arrays = [address(a) for a in (x, p, *results, *kept)]
     room = 0 if chunk.sample_t is None else chunk.sample_t.shape[1]
     times_stride = 0 if times is None or times.ndim == 1 else times.shape[1]
     width = chunk.kinds.shape[1]

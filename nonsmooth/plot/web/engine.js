@@ -84,7 +84,7 @@ class Engine {
     const limits = { max_steps: steps, max_events: events, max_jumps: 1000 };
     this.write("Options", {
       ...{ t_end: tEnd, rtol: tol, atol: tol, max_step: maxStep, rest_below: 0, ...limits },
-      ...{ start_mode: -1, at_kind: -1, at_count: 0, dense: +dense, hit_after: 0, method: 0 },
+      ...{ at_kind: -1, at_count: 0, dense: +dense, hit_after: 0, method: 0 },
       ...{
         hit_every: 1,
         hit_width: this.system.named,
@@ -298,7 +298,6 @@ class Engine {
         count,
         p_stride: stride,
         t0: options.tStart ?? 0,
-        which: 0,
         x0: starts,
         p: values,
         x: ends,

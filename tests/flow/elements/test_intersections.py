@@ -196,18 +196,3 @@ def test_an_intersection_is_left_at_any_tolerance(tol):
     assert run.itinerary == "ss +s" and run.status is ns.Status.REACHED_END
     left = np.arcsin(1.06 / np.hypot(1.2, 0.15)) - np.arctan2(0.15, 1.2)
     assert abs(run.events[0].t - left) <= 10 * tol
-
-
-def test_sliding_into_a_two_fold_of_one_of_two_surfaces():
-    """The other surface is far away: t* = -(1, 1) M^-1 z0 as with one surface, then no future."""
-    x, y, z, w, one, two = (ca.SX.sym(s) for s in ("x", "y", "z", "w", "one", "two"))
-    above, below = ca.vertcat(-y, 1, -2), ca.vertcat(z, -1, 1)
-    field = ca.vertcat((above + below) / 2 + one * (above - below) / 2, two)
-    system = ns.FilippovSystem(
-        [x, y, z, w], field=field, surfaces=[x, w - 10], multipliers=[one, two]
-    )
-    start = [0.7, 0.3]
-    run = ns.simulate(system, [0.0, *start, 0.0], 10.0, tol=1e-12)
-    assert run.status is ns.Status.NON_UNIQUE and run.itinerary == "s-"
-    m = np.array([[-1.0, 1.0], [1.0, -2.0]])
-    assert run.t[-1] == pytest.approx(-np.ones(2) @ np.linalg.solve(m, start), abs=1e-9)

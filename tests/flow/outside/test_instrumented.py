@@ -17,7 +17,7 @@ def test_runs_under_sanitizers(tmp_path):
     if not preloaded(tmp_path):
         pytest.skip("no library of the address sanitizer")
     files = [
-        "events/test_contract.py",
+        "test_runs.py",
         "outside/test_random_hybrid.py",
         "events/test_impacts.py",
         *FLOW.glob("outside/test_reviews_*.py"),

@@ -199,6 +199,11 @@ def __getattr__(name: str) -> object:
         return importlib.import_module(".plot.explorer", __name__).explore
     if name in _OF_PROOFS:
         return getattr(importlib.import_module(".proofs", __name__), name)
+    for home in ("flow", "local", "orbit"):
+        if name in globals()[home].__all__:
+            raise AttributeError(
+                f"module 'nonsmooth' has {name} in nonsmooth.{home}: use ns.{home}.{name}"
+            )
     raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}")
 
 

@@ -84,3 +84,12 @@ def test_the_algebra_of_two_folds_needs_no_system():
         thing = getattr(ns.two_folds, name)
         if inspect.isfunction(thing):
             assert "system" not in inspect.signature(thing).parameters
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("poincare", "ns.orbit.poincare"), ("Event", "ns.flow.Event"), ("nothing", "no attribute")],
+)
+def test_a_name_that_is_not_at_the_top_is_answered_with_its_place(name, said):
+    with pytest.raises(AttributeError, match=said):
+        getattr(ns, name)

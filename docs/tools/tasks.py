@@ -79,6 +79,14 @@ TASKS = {
         "sensitivity orbit.Sensitivity gradient orbit.Gradient vjp orbit.saltation_matrix lyapunov_spectrum "
         "orbit.LyapunovSpectrum",
     ),
+    "interop": _task(
+        "JAX, PyTorch, SymPy",
+        "Runs as functions that JAX and PyTorch differentiate, and systems from SymPy's equations. Each needs its library, "
+        "by the extras `jax`, `torch` and `sympy`.",
+        "nonsmooth",
+        "interop.jax.simulate interop.jax.ensemble interop.torch.simulate interop.torch.ensemble "
+        "interop.sympy.system interop.sympy.expression",
+    ),
     "branches": _task(
         "Vary a parameter",
         "Orbits and equilibria followed as a parameter varies, the events on the way, and their curves "

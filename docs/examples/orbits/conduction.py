@@ -1,7 +1,7 @@
 """A boost converter, from continuous to discontinuous conduction
 
 A clock switches a boost converter, and a diode (`ns.Complementarity`) keeps the current of its coil from becoming
-negative. With $K = 2L/(RT)$ falling the load becomes light, and one branch passes from continuous conduction, where the
+negative. With $K = 2 L/(R T)$ falling the load becomes light, and one branch passes from continuous conduction, where the
 gain is $1/(1 - D)$, to discontinuous conduction, where it is $(1 + sqrt(1 + 4 D^2/K))/2$ (circles; Erickson &
 Maksimovic, Fundamentals of Power Electronics, chapter 5, for a large capacity). The border, a corner of the branch, is
 followed in $D$ and $K$; the formula is $K = D (1 - D)^2$ (circles).

@@ -3,7 +3,7 @@
 A forced oscillator before a spring at $x = 1$ that is 29 times as stiff as its own. The force is continuous there, so
 where the orbit first touches the spring, at $A = |1 - w^2 + 2 i z w|$, its multipliers are continuous and the branch
 goes through. Soon after it the period doubles, and doubles again: branches of one, two, four and eight periods of the
-force, broken where they are unstable. Dots are long runs, and in the middle there is chaos.
+force, broken where they are unstable. Dots are long runs.
 """
 
 import casadi as ca

@@ -36,7 +36,7 @@ from .arrays import (
 )
 from .building.codegen import tape_order
 from .library import core_library
-from .recording import Output, Recorder, Rooms, rooms_of
+from .recording import LOOSE, Output, Recorder, Rooms, rooms_of
 from .shown import Shown
 from .structures import declare, structure
 
@@ -331,8 +331,8 @@ class TapeEngine:
         # ``motion`` and ``mode`` are those of a run or event that is continued.
         width = self._c.rules.width
         motion = None if motion is None else self._checked(motion)
-        rooms = {"rooms": self._rooms} if dense else {}
-        output = Output(self.system.extended_dimension, self.order, motion=width, **rooms)
+        rooms = self._rooms if dense else LOOSE
+        output = Output(self.system.extended_dimension, self.order, rooms, width)
         recorder = Recorder(output, self.system.dimension, dense, read_at)
         x, p = np.array(x, float), self.shown.with_cells(p)
         start, known = self._letters(options.start_mode), self._letters(mode)

@@ -176,6 +176,52 @@ def test_a_section_is_met_by_the_motion_only():
     assert np.allclose(run.sample_t, np.arange(6) + 0.5, rtol=0, atol=1e-12)
 
 
+def test_events_know_what_they_led_to():
+    """A ramp that a clock restarts, over a surface."""
+    ramp = ns.FilippovSystem(
+        [x, y],
+        surface=x - 0.5,
+        above=[1, 2],
+        below=[1, 0],
+        resets=ns.Reset(x - 1, [x - 1, y], 1, "clock"),
+    )
+    run = ns.simulate(ramp, [0.0, 0.0], 1.25)
+    assert [(e.kind, e.name, e.mode_before, e.mode_after) for e in run.events] == [
+        ("crossing", "h0", "-", "+"),
+        ("reset", "clock", "+", "-"),
+        ("end", "REACHED_END", "-", "-"),
+    ]
+    reset = run.events[1]
+    assert abs(reset.x[0] - 1.0) < 1e-14 and abs(reset.x_after[0]) < 1e-14
+    assert all(np.array_equal(e.x, e.x_after) for e in run.events if e.kind != "reset")
+
+
+@pytest.mark.parametrize(
+    ("event", "start", "is_said"),
+    [
+        (ns.Reset(x - 1, [0], 1, "kick"), 2.0, True),
+        (ns.Stop(x - 1, 1, "kick"), 2.0, True),
+        (ns.Stop(x - 1, 1, "kick"), 0.0, False),  # not true
+        (ns.Reset(x - 1, [0], 0, "kick"), 2.0, False),  # either way: no condition
+        (ns.Reset(x - 1, [0], 1, "kick", initially=True), 2.0, False),
+        (ns.Reset(x - 1, [0], 1, "kick", initially=False), 2.0, False),
+        (ns.Reset(x - 1, [0], 1, "kick", level=True), 2.0, False),
+    ],
+)
+def test_an_event_that_is_true_at_the_start_and_silent_is_named(event, start, is_said):
+    given = {"stops": [event]} if isinstance(event, ns.Stop) else {"resets": [event]}
+    run = ns.simulate(ns.FilippovSystem([x], field=[1], **given), [start], 0.5)
+    assert ("'kick' was true at the start" in run.message) == is_said
+    assert "initially=True" in run.message or not is_said
+
+
+def test_an_event_that_is_true_at_the_start_and_happens_later_is_not_named():
+    kick = ns.Reset(x - 0.5, [x - 1, y], 1, "kick")
+    system = ns.FilippovSystem([x, y], field=[y, -x], resets=[kick])
+    run = ns.simulate(system, [1.0, 0.0], 6.0)
+    assert any(e.name == "kick" for e in run.events) and "at the start" not in run.message
+
+
 # restart ----------------------------------------------------------------------------------------
 
 

@@ -115,13 +115,14 @@ static void set_series(Run *r, Expansion *e, const int32_t *start) {
   EACH_LEAVING(r, e, f) leaving = 1;
   for (int k = 0; k <= r->order; k++) {
     open_order(r, e, k);
-    if (leaving && leave_sets(r, e, k, 1)) {
-      close_order(r, e, k - 1);
-      close_sets(r, e, k - 1);
-      open_order(r, e, k);
-      leave_sets(r, e, k, 0);
-    }
-    if (!leaving && k && e->l.slides) follow_layer(r, e, k, start);
+    if (leaving) {
+      if (leave_sets(r, e, k, 1)) {
+        close_order(r, e, k - 1);
+        close_sets(r, e, k - 1);
+        open_order(r, e, k);
+        leave_sets(r, e, k, 0);
+      }
+    } else if (k && e->l.slides) follow_layer(r, e, k, start);
     if (k && (leaving || e->l.slides)) close_order(r, e, k);
     close_sets(r, e, k);
     if (k < r->order) next_states(r, e, k);

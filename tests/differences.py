@@ -21,13 +21,13 @@ def require(system, start, t_end, itinerary=None, **options) -> ns.orbit.Sensiti
     )
     kept = options.get("rows", slice(None))
 
-    def run(z, tol=options.get("tol", 1e-14)):
+    def run(z, tol):
         given = dict(zip(system.parameter_names, z[n:], strict=True))
         other = {"t_start": t_start, "parameters": given, "t_eval": times}
         return ns.simulate(system, z[:n], t_end, tol=tol, **other)
 
     def values(z):
-        other = run(z)
+        other = run(z, options.get("tol", 1e-14))
         if only:
             return other.x[-1, kept]
         assert other.itinerary == own.itinerary

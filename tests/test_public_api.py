@@ -59,7 +59,8 @@ def test_dir_is_the_public_api_and_nothing_else():
 def test_modules_at_the_top_are_those_of_its_docstring():
     modules = {n for n in ns.__all__ if isinstance(getattr(ns, n), types.ModuleType)}
     assert modules == {
-        *("continuation", "flow", "local", "orbit", "plot", "proofs", "textbook", "two_folds"),
+        *("continuation", "flow", "interop", "local", "orbit"),
+        *("plot", "proofs", "textbook", "two_folds"),
     }
     for name in modules:
         assert name in inspect.getdoc(ns)

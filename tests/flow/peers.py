@@ -1,5 +1,7 @@
 """Problems of other collections as data: a system in strings, a start, and what is true of its motion."""
 
+import ast
+import builtins
 import json
 import math
 from collections.abc import Callable
@@ -48,7 +50,7 @@ def cases(path: Path = CASES) -> list[dict[str, Any]]:
 
 
 class Problem:
-    """One problem; ``let`` names expressions, ``numbers`` names values, ``system`` has the arguments of a FilippovSystem,
+    """One problem; unknown names are symbols, ``let`` names expressions, ``numbers`` names values, ``system`` has the arguments of a FilippovSystem,
     ``textbook`` names one; ``within`` is the tolerance, or one of times ``t`` and one of states ``x``."""
 
     def __init__(self, data: dict[str, Any]):
@@ -63,9 +65,13 @@ class Problem:
     @cached_property
     def space(self) -> dict[str, Any]:
         """Names that the strings may use."""
-        space = WORDS | self.data.get("numbers", {})
-        space |= {name: ca.SX.sym(name) for name in self.data["symbols"].split()}
-        for name, text in self.data.get("let", {}).items():
+        given, let = WORDS | self.data.get("numbers", {}), self.data.get("let", {})
+        texts = [*let.values(), *self.data.get("system", {}).values()]
+        nodes = [node for text in texts for node in ast.walk(ast.parse(text, mode="eval"))]
+        names = {node.id for node in nodes if isinstance(node, ast.Name)}
+        unknown = sorted(names - let.keys() - given.keys() - {*dir(builtins)})
+        space = given | {name: ca.SX.sym(name) for name in unknown}
+        for name, text in let.items():
             space[name] = eval(text, space)  # our own text
         return space
 
@@ -94,7 +100,7 @@ class Problem:
 
     def within(self, what: str) -> float:
         given = self.data.get("within", 1e-8)
-        return given.get(what, 1e-8) if isinstance(given, dict) else given
+        return self.number(given.get(what, 1e-8) if isinstance(given, dict) else given)
 
     @property
     def options(self) -> dict[str, Any]:
@@ -195,6 +201,10 @@ COMPARED: dict[str, Callable[[Problem, ns.Trajectory, Any], bool]] = {
     "kinds": lambda _, run, true: [event.kind for event in run.events] == true.split(),
     "counts": lambda _, run, true: all(
         len(_of_kinds(run, [kind])) == n for kind, n in true.items()
+    ),
+    "names": lambda _, run, true: all(
+        " ".join(event.name for event in run.events if event.kind == kind) == names
+        for kind, names in true.items()
     ),
     "jumps": lambda own, run, true: _named(own, _jumps(run), true),
     "first": lambda own, run, true: _named(own, _jumps(run)[: len(true)], true),

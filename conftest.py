@@ -8,6 +8,7 @@ draws all its examples.
 import contextlib
 import gc
 import importlib
+import importlib.util
 import os
 import sys
 from collections.abc import Iterator
@@ -33,6 +34,13 @@ SHIPPED = {
 }
 COMPILED = HERE / "tests" / "flow" / "engine"
 WHOLE = os.environ.get("HYPOTHESIS_PROFILE", "quick") != "quick"
+
+#: Bridges to libraries that are not installed.
+collect_ignore = [
+    f"nonsmooth/interop/{name}.py"
+    for name in ("jax", "sympy", "torch")
+    if importlib.util.find_spec(name) is None
+]
 
 # As often as Python collects garbage by default, it takes a twentieth of the time and finds little.
 gc.set_threshold(50_000, 20, 100)

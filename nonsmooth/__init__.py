@@ -22,8 +22,8 @@ never guesses where the future is not unique. Every error derives from Nonsmooth
 The top level has the functions, the classes and the errors that most programs use. Analysis at one point
 and its results are in ``local``, events and parts of runs in ``flow``, orbits, derivatives and their results
 in ``orbit``, proofs and enclosures in ``proofs``. The algebra of two-folds, which needs no system, is in
-``two_folds``; ``continuation`` follows curves of any equations; ``plot`` draws, and ``textbook`` has named
-systems with closed-form answers.
+``two_folds``; ``continuation`` follows curves of any equations; ``plot`` draws, ``interop`` connects to JAX,
+PyTorch and SymPy, and ``textbook`` has named systems with closed-form answers.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ from .orbit import (
 from .solvers import continuation
 
 if TYPE_CHECKING:
-    from . import plot, proofs, textbook
+    from . import interop, plot, proofs, textbook
     from .plot.explorer import explore
     from .proofs import (
         certify,
@@ -164,6 +164,7 @@ __all__ = [
     "find_two_fold",
     "flow",
     "gradient",
+    "interop",
     "load",
     "local",
     "lyapunov_spectrum",
@@ -190,15 +191,20 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Import pictures, textbook and proofs on first use (matplotlib is slow to import)."""
+    """Import pictures, bridges, textbook and proofs on first use (matplotlib is slow to import)."""
     import importlib
 
-    if name in ("plot", "proofs", "textbook"):
+    if name in ("interop", "plot", "proofs", "textbook"):
         return importlib.import_module(f".{name}", __name__)
     if name == "explore":
         return importlib.import_module(".plot.explorer", __name__).explore
     if name in _OF_PROOFS:
         return getattr(importlib.import_module(".proofs", __name__), name)
+    for home in ("flow", "local", "orbit"):
+        if name in globals()[home].__all__:
+            raise AttributeError(
+                f"module 'nonsmooth' has {name} in nonsmooth.{home}: use ns.{home}.{name}"
+            )
     raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}")
 
 

@@ -59,7 +59,8 @@ def test_dir_is_the_public_api_and_nothing_else():
 def test_modules_at_the_top_are_those_of_its_docstring():
     modules = {n for n in ns.__all__ if isinstance(getattr(ns, n), types.ModuleType)}
     assert modules == {
-        *("continuation", "flow", "local", "orbit", "plot", "proofs", "textbook", "two_folds"),
+        *("continuation", "flow", "interop", "local", "orbit"),
+        *("plot", "proofs", "textbook", "two_folds"),
     }
     for name in modules:
         assert name in inspect.getdoc(ns)
@@ -84,3 +85,12 @@ def test_the_algebra_of_two_folds_needs_no_system():
         thing = getattr(ns.two_folds, name)
         if inspect.isfunction(thing):
             assert "system" not in inspect.signature(thing).parameters
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("poincare", "ns.orbit.poincare"), ("Event", "ns.flow.Event"), ("nothing", "no attribute")],
+)
+def test_a_name_that_is_not_at_the_top_is_answered_with_its_place(name, said):
+    with pytest.raises(AttributeError, match=said):
+        getattr(ns, name)

@@ -2,7 +2,7 @@
 
 ``compiled`` has the driver, which decides at events; the modules here turn its arrays into results.
 
-The contract of events (``tests/flow/events/test_contract.py`` and ``test_event_cases.py`` check each sentence):
+The contract of events (``tests/flow/test_runs.py`` and ``events/test_event_cases.py`` check each sentence):
 
 1. A stop or reset is due when its condition becomes true. The condition of a guard is that it passes zero in
    its direction: falling (-1), rising (1), either way (0). A touch without a passage is no event.

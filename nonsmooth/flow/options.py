@@ -91,9 +91,9 @@ class Options:
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> Options:
         """Return the options among the arguments of a function, by name."""
-        own = {f.name: given[f.name] for f in fields(cls) if f.name in given}
-        tol = tolerances(given["tol"], given["rtol"], given["atol"])
-        return cls(**own | tol._asdict())
+        own = {name: given[name] for name in _NAMES if name in given}
+        own["rtol"], own["atol"] = tolerances(given["tol"], given["rtol"], given["atol"])
+        return cls(**own)
 
     @property
     def begins_late(self) -> bool:
@@ -114,4 +114,8 @@ class Options:
 
     def _set(self, name: str, value: float) -> None:
         """Replace an option by its checked value."""
-        object.__setattr__(self, name, value)
+        if value is not getattr(self, name):
+            object.__setattr__(self, name, value)
+
+
+_NAMES = tuple(f.name for f in fields(Options))

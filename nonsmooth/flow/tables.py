@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-def library(name: str, what: str) -> Any:
+def library(name: str, what: str, extra: str = "tables") -> Any:
     """Import an optional library."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
         raise OptionError(
             f"{what} needs {name}, which cannot be imported ({error}). Install it with "
-            "python -m pip install 'nonsmooth-dynamics[tables]'."
+            f"python -m pip install 'nonsmooth-dynamics[{extra}]'."
         ) from error
 
 

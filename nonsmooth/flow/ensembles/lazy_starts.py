@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,29 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from ...model import Array, PointError
 
 Index = NDArray[np.int64]
-
-
-@runtime_checkable
-class LazyStarts(Protocol):
-    """Starts that are computed from their numbers."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the starts, without the axis of the states."""
-        ...
-
-    @property
-    def dimension(self) -> int:
-        """Number of states."""
-        ...
-
-    def at(self, index: Index) -> Array:
-        """States (m, n) of the starts with the numbers (m,), counted along the last axis first."""
-        ...
-
-    def state(self) -> tuple[Any, ...]:
-        """Everything that the starts depend on."""
-        ...
 
 
 class Grid:
@@ -212,6 +189,9 @@ class RandomStarts:
         """Return everything that the starts depend on, for the hash of a store."""
         low, high = np.asarray(self.low), np.asarray(self.high)
         return "random", self.count, low.tobytes(), high.tobytes(), self.seed
+
+
+LazyStarts = Grid | RandomStarts
 
 
 def _split_mix(seed: np.uint64, number: NDArray[np.uint64]) -> NDArray[np.uint64]:

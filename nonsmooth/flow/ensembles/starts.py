@@ -15,7 +15,7 @@ from ...model import Array, FilippovSystem, OptionError, PointError, Surfaces, c
 from ...model.definition.discrete_states import require_allowed
 from ..constants import ON_SURFACE
 from ..options import Options
-from .lazy_starts import Grid, Index, LazyStarts, RandomStarts, part_of
+from .lazy_starts import Index, LazyStarts, part_of
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Starts:
 
     def cut(self, first: int, last: int) -> Cut:
         """Starts and parameters of the trajectories first to last - 1, for another process."""
-        if not isinstance(self.x0, (Grid, RandomStarts)):
+        if not isinstance(self.x0, LazyStarts):
             x, p = self.part(first, last)
             return Cut(p, x)
         t_start = self.t_start if self.system.time_dependent else None
@@ -105,7 +105,7 @@ class Starts:
     def rows(self, which: slice | Index) -> tuple[Array, Array]:
         """Extended starts and parameters of some trajectories, by their numbers."""
         n = self.system.dimension
-        if not isinstance(self.x0, np.ndarray):  # isinstance with a protocol is slow
+        if not isinstance(self.x0, np.ndarray):
             x = part_of(self.x0, self.shape, _numbered(which))
         else:
             x = _rows(self.x0, self.shape, which, n)

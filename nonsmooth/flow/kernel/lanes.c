@@ -1,5 +1,12 @@
 /* A step of W trajectories, for one mode or all of them: state.h. What differs by the law is in surface.c and set.c. */
 
+/* Short where the series of a step need no checks. */
+#if SET || ROWS + GUARDS > 0
+#define SHORT_OR_CHECKED OUTLINED
+#else
+#define SHORT_OR_CHECKED INLINE
+#endif
+
 /* Lanes just loaded get their modes. */
 static void begin(Lanes *s, Work *w, I fresh) {
   I unclear = begin_modes(s, fresh);
@@ -41,7 +48,7 @@ INLINE void guard_ratio(const Options *o, Step *e, int j, const T *gradient, I c
 }
 
 /* Not ``finite`` is also a lane where the last terms vanish, or are far smaller, and earlier ones bound the step. */
-OUTLINED T step_size(const Lanes *s, const Options *o, Step *e, int mode, I *finite) {
+SHORT_OR_CHECKED T step_size(const Lanes *s, const Options *o, Step *e, int mode, I *finite) {
   T last = BC(1e-300), before = BC(1e-300), third = BC(0), fourth = BC(0), sum = BC(0);
   UNROLL for (int i = 0; i < N; i++) {
     const T *c = e->c[i];
@@ -291,7 +298,7 @@ INLINE I disagrees(const Lanes *s, const Step *e, int mode, T at, int degree, I 
 
 /* The states at the ends of steps, which are shortened at a set to where the polynomials agree; shortened lanes have no
  * event. Lanes whose step is not clear: it may not see what comes, or its defect stays too large. */
-OUTLINED I verify(const Lanes *s, Step *e, int mode, T *end) {
+SHORT_OR_CHECKED I verify(const Lanes *s, Step *e, int mode, T *end) {
   I unclear = {0};
 #if ROWS + GUARDS > 0
   I bent = s->live & is_bent(s, mode), missed = {0};

@@ -544,10 +544,10 @@ def _from_recurrence(
         span = forcing(p)[0]
         starts[:, -1] -= span * math.floor(starts[0, -1] / span)
     legs = tuple(part.leg for part in found.parts)
-    return _problem(system, legs, starts, durations, found.periods, forcing, mirror, p)
+    return equations_of(system, legs, starts, durations, found.periods, forcing, mirror, p)
 
 
-def _problem(
+def equations_of(
     system: FilippovSystem,
     legs: tuple[Leg, ...],
     starts: Array,
@@ -557,6 +557,7 @@ def _problem(
     mirror: Array | None,
     p: Array,
 ) -> Start:
+    """The equations of an orbit through legs, with a phase condition where one leg has no event."""
     phase = reference = None
     if forcing is not None and not forcing.found:
         _require_period(system, legs, starts, durations, forcing(p)[0], p)
@@ -606,7 +607,7 @@ def _from_word(
         periods = max(1.0, round(count)) if mirror is None else round(count - 0.5) + 0.5
         if multiplicity is not None:
             periods = multiplicity / (1.0 if mirror is None else 2.0)
-    return _problem(system, legs, starts[: len(legs)], durations, periods, forcing, mirror, p)
+    return equations_of(system, legs, starts[: len(legs)], durations, periods, forcing, mirror, p)
 
 
 def _from_mode(
@@ -619,7 +620,7 @@ def _from_mode(
         apart.append(float(np.abs(y[:n] - x[:n]).max()))
     count = 1 + int(np.argmin(apart)) if multiplicity is None else multiplicity
     durations = np.array([count * span])
-    return _problem(system, (leg,), x[None].copy(), durations, count, forcing, None, p)
+    return equations_of(system, (leg,), x[None].copy(), durations, count, forcing, None, p)
 
 
 def _followed(

@@ -147,46 +147,6 @@ def test_capacitors_that_are_joined_share_their_charge():
     assert run.itinerary == "c"
 
 
-def test_a_reset_to_a_forbidden_state_jumps_on():
-    """A charge that is put on the first capacitor is shared at once; level stops see where the jump led."""
-    u, v, i, t = (ca.SX.sym(name) for name in "uvit")
-    system = ns.FilippovSystem(
-        [u, v],
-        field=[-i / 2, i],
-        complementarity=ns.Complementarity(v - u, multiplier=i, name="diode"),
-        resets=ns.Reset(t - 1, {u: u + 3}, 1, "charge"),
-        stops=ns.Stop(v - 1.9, 1, "full"),
-        time=t,
-    )
-    run = ns.simulate(system, [0.0, 0.0], t_end=3.0)
-    kinds = [(event.kind, event.name, event.t) for event in run.events]
-    assert kinds == [("reset", "charge", 1), ("jump", "diode", 1), ("stop", "full", 1)]
-    assert abs(run.x[-1] - 2).max() < 1e-14
-
-
-def test_a_sweeping_interval_carries_the_point():
-    """Play: the point is pushed by an interval of half width 1 round 2 sin t; extremes are those of 2 sin t -+ 1."""
-    x, low, high, t = (ca.SX.sym(name) for name in ("x", "low", "high", "t"))
-    centre = 2 * ca.sin(t)
-    system = ns.FilippovSystem(
-        [x],
-        field=[low - high],
-        complementarity=[
-            ns.Complementarity(x - centre + 1, multiplier=low, name="low"),
-            ns.Complementarity(centre + 1 - x, multiplier=high, name="high"),
-        ],
-        time=t,
-    )
-    run = ns.simulate(system, [0.0], t_end=7.5)
-    assert run.itinerary == "oo co oo oc oo co"
-    assert [event.kind for event in run.events[:4]] == ["contact", "release"] * 2
-    times = [event.t for event in run.events[:4]]
-    assert times == pytest.approx([np.pi / 6, np.pi / 2, np.pi, 3 * np.pi / 2])
-    assert abs(run(2.0) - 1) < 1e-12
-    assert abs(run(5.0) + 1) < 1e-12
-    assert run(4.0)[0] == pytest.approx(2 * np.sin(4.0) + 1, abs=1e-10)
-
-
 def test_an_inconsistent_start_is_projected():
     """From outside a disc to its nearest point, and from outside a corner to the corner."""
     x, y, a, b = (ca.SX.sym(name) for name in "xyab")
@@ -223,41 +183,6 @@ def test_a_jump_from_outside_an_ellipse_is_to_its_nearest_point():
     assert abs(found[0] ** 2 / 4 + found[1] ** 2 - 1) < 1e-13
     assert abs(normal[0] * away[1] - normal[1] * away[0]) < 1e-12
     assert normal @ away > 0
-
-
-def test_roots_in_the_field_beside_a_condition():
-    """A tank that fills and empties over a floor: x' = q - sqrt(x + 1), which is not negative at 0."""
-    x, lam, t = ca.SX.sym("x"), ca.SX.sym("lam"), ca.SX.sym("t")
-    floor = ns.Complementarity(x, multiplier=lam, name="floor")
-    system = ns.FilippovSystem(
-        [x], field=[0.5 - ca.sqrt(x + 1) + lam], complementarity=floor, time=t
-    )
-    run = ns.simulate(system, [1.0], t_end=5.0)
-    s0, s1 = np.sqrt(2), 1.0  # s = sqrt(x + 1): 2 s s' = 1/2 - s
-    empty = 2 * (s0 - s1) + np.log((s0 - 0.5) / (s1 - 0.5))
-    assert run.itinerary == "o c"
-    assert run.events[0].t == pytest.approx(empty, abs=1e-8)
-
-
-def test_a_projected_field_slides_into_a_corner_and_out():
-    """In x, y >= 0 a field presses on one edge, then on both, and leaves one after the other."""
-    x, y, a, b, t = (ca.SX.sym(name) for name in "xyabt")
-    system = ns.FilippovSystem(
-        [x, y],
-        field=[ca.cos(t) + a, ca.cos(t - 0.5) + b],
-        complementarity=[
-            ns.Complementarity(x, multiplier=a, name="left"),
-            ns.Complementarity(y, multiplier=b, name="bottom"),
-        ],
-        time=t,
-    )
-    run = ns.simulate(system, [0.0, 0.0], t_end=2 * np.pi, tol=1e-12)
-    assert run.itinerary == "oo co cc oc oo"
-    times = [np.pi, np.pi + 1, 1.5 * np.pi, 1.5 * np.pi + 0.5]
-    assert run.events.t[:4] == pytest.approx(times, abs=1e-10)
-    assert run.events.column("name").tolist()[:4] == ["left", "bottom"] * 2
-    assert abs(run(4.5)).max() < 1e-14
-    assert abs(run.x[-1] - [1, 1 - np.sin(0.5)]).max() < 1e-10
 
 
 def test_a_system_says_what_it_has():
@@ -428,22 +353,6 @@ def test_random_networks_of_diodes():
     assert [is_that_of_its_network(seed, 9) for seed in (1, 2, 5)] == [True] * 3
 
 
-def test_a_set_that_vanishes_ends_the_run():
-    x, low, high, t = (ca.SX.sym(name) for name in ("x", "low", "high", "t"))
-    walls = [
-        ns.Complementarity(x - t, multiplier=low, name="low"),
-        ns.Complementarity(1 - x, multiplier=high, name="high"),
-    ]
-    system = ns.FilippovSystem([x], field=[low - high], complementarity=walls, time=t)
-    run = ns.simulate(system, [0.5], t_end=2.0)
-    assert run.status is ns.Status.INCONSISTENT
-    assert run.t[-1] == pytest.approx(1)
-    assert "'low' and 'high'" in run.message
-    run = ns.simulate(system, [0.5], t_end=3.0, t_start=2.0)
-    assert run.status is ns.Status.INCONSISTENT
-    assert "y of 'low' is negative" in run.message
-
-
 def test_conditions_beside_contacts_friction_and_constraints():
     """Parts that do not act on one another are what each is alone."""
     x, y, i, u, v, lam, t = (ca.SX.sym(name) for name in ("x", "y", "i", "u", "v", "lam", "t"))
@@ -472,17 +381,6 @@ def test_conditions_beside_contacts_friction_and_constraints():
     assert abs(run.x[-1, 3:] - ns.simulate(coil, [0.3], t_end=8.0).x[-1]).max() < 1e-8
     assert {len(mode) for mode in run.itinerary.split()} == {3}
     assert {mode[1] for mode in run.itinerary.split()} == {"o", "c"}
-
-
-def test_switches_in_a_right_hand_side_go_with_conditions():
-    x, lam = ca.SX.sym("x"), ca.SX.sym("lam")
-    clip = ns.Complementarity(lam - (x - 1), multiplier=lam, name="clip")
-    system = ns.FilippovSystem.from_expression(
-        [x], [2 * ca.sign(x + 0.5) - x - 3 * lam], complementarity=clip
-    )
-    run = ns.simulate(system, [0.0], t_end=1.0, tol=1e-10)
-    assert run.itinerary == "+o +c"
-    assert abs(run.x[-1, 0] - 1.1767374444450632788) < 1e-9  # as degree-zero-diode of the cases
 
 
 REFUSED = {

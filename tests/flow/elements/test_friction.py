@@ -72,19 +72,6 @@ def test_a_stribeck_curve_beside_scipy():
     np.testing.assert_allclose(run(at + 3), beside.y[:, -1], atol=1e-9)
 
 
-def test_friction_in_a_plane_turns_against_the_slip():
-    """A puck slides straight, for the time v0 over mu g, whatever its direction."""
-    friction = ns.Friction([v, w], load=9.81, kinetic=0.2)
-    puck = ns.FilippovSystem(
-        [x, y, v, w], field=[v, w, *ca.vertsplit(friction.force)], surfaces=[friction]
-    )
-    run = ns.simulate(puck, [0.0, 0.0, 3.0, 4.0], 4.0, tol=1e-11)
-    far = 25 / (2 * 0.2 * 9.81)
-    assert run.itinerary == "* s"
-    np.testing.assert_allclose(run.x[-1], [0.6 * far, 0.8 * far, 0, 0], atol=1e-9)
-    assert times(run, "entry")[0] == pytest.approx(5 / (0.2 * 9.81), abs=1e-9)
-
-
 def test_coefficients_may_be_parameters_and_a_load_a_function():
     mu, rest = ca.SX.sym("mu"), ca.SX.sym("rest")
     friction = ns.Friction(v, load=10 + ca.sin(t), kinetic=mu, static=rest)
@@ -107,26 +94,6 @@ def test_several_frictions_beside_a_surface_with_its_own_multiplier():
     assert run.status is ns.Status.REACHED_END
     with pytest.raises(ns.DefinitionError, match="expected 1, for what brings none"):
         ns.FilippovSystem([x, v], field=[v, first.force - lam], surfaces=[first, x], multipliers=[])
-
-
-def test_two_feet_have_one_slip_and_a_friction_each():
-    """Both loads are 1/2: it slides for 1/mu."""
-    first, second, b = (ca.SX.sym(s) for s in ("first", "second", "b"))
-    feet = [ns.Friction(v, load=r, kinetic=0.5) for r in (first, second)]
-    gaps = [
-        ns.Impact(y - b, reaction=first, name="left"),
-        ns.Impact(y + b, reaction=second, name="right"),
-    ]
-    spin, fall = ca.SX.sym("spin"), ca.SX.sym("fall")
-    block = ns.FilippovSystem(
-        [y, b, v, fall, spin],
-        field=[fall, spin, feet[0].force + feet[1].force, first + second - 1, second - first],
-        surfaces=feet,
-        impacts=gaps,
-    )
-    run = ns.simulate(block, [0, 0, 1, 0, 0], 3.0)
-    assert run.status is ns.Status.REACHED_END
-    assert abs(times(run, "entry")[0] - 2.0) < 1e-12
 
 
 def test_a_system_with_friction_is_saved_and_read(tmp_path):

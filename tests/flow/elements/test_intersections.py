@@ -9,18 +9,6 @@ import nonsmooth as ns
 x, y, z, w, lam, kap, b = (ca.SX.sym(s) for s in ("x", "y", "z", "w", "lam", "kap", "b"))
 
 
-def test_two_contacts_at_rest_arrive_one_after_the_other():
-    """x' = -sgn x, y' = -2 sgn y, z' = 1 + sgn x: y sticks at 1/2, x at 1, and z goes on at 1."""
-    system = ns.FilippovSystem(
-        [x, y, z], field=[-lam, -2 * kap, 1 + lam], multipliers=[lam, kap], surfaces=[x, y]
-    )
-    run = ns.simulate(system, [1.0, 1.0, 0.0], 5.0, tol=1e-12)
-    assert run.itinerary == "++ +s ss" and run.status is ns.Status.REACHED_END
-    assert [e.kind for e in run.events] == ["entry", "entry", "end"]
-    np.testing.assert_allclose([e.t for e in run.events], [0.5, 1.0, 5.0], atol=1e-13)
-    np.testing.assert_allclose(run.x[-1], [0.0, 0.0, 2.0 + 4.0], atol=1e-12)
-
-
 def test_bilinear_law_leaves_the_intersection_at_its_closed_form():
     """x1' = -s1 + x3/2, x2' = -s2 + x3/4, x3' = 1 + s1 s2/2: s1 = 1 at t = 4 atan(1/2)."""
     system = ns.FilippovSystem(
@@ -39,15 +27,6 @@ def test_bilinear_law_leaves_the_intersection_at_its_closed_form():
     # Beyond, x1' = -1 + x3/2 with s2 = x3/4 still sliding: x3' = 1 + x3/8.
     s = 2.5 - run.events[0].t
     assert run.x[-1, 2] == pytest.approx(-8 + 10 * np.exp(s / 8), abs=1e-10)
-
-
-def test_spiralling_sliding_at_the_limit_of_two_relays():
-    """The intersection that attracts through infinitely many crossings holds the state."""
-    system = ns.FilippovSystem(
-        [x, y], field=[-lam + 2 * kap, -2 * lam - kap], multipliers=[lam, kap], surfaces=[x, y]
-    )
-    run = ns.simulate(system, [0.0, 0.0], 1.0)
-    assert run.itinerary == "ss" and run.x[-1].tolist() == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("damping", [0.5, 0.0, -0.5])
@@ -79,15 +58,6 @@ def test_friction_that_changes_in_time_does_not_end_sliding(growth):
     assert run.itinerary.endswith("ss") and run.status is ns.Status.REACHED_END
 
 
-def test_sliding_that_repels_is_kept_until_its_multiplier_is_at_the_bound():
-    """h' = lambda - t is zero for lambda = t, until t = 1; then x' = -1 - t."""
-    t = ca.SX.sym("t")
-    system = ns.FilippovSystem([x], field=[lam - t], surfaces=[x], multipliers=[lam], time=t)
-    run = ns.simulate(system, [0.0], 2.0, start_mode="s")
-    assert run.itinerary == "s -" and run.events[0].t == pytest.approx(1, abs=1e-12)
-    assert run.x[-1, 0] == pytest.approx(-2.5, abs=1e-12)
-
-
 def test_more_modes_than_are_tried_may_hold():
     """Six surfaces with a product of multipliers: of 3^6 modes none is ruled out."""
     h, m = ca.SX.sym("h", 6), ca.SX.sym("m", 6)
@@ -97,12 +67,6 @@ def test_more_modes_than_are_tried_may_hold():
     )
     run = ns.simulate(system, [0.0] * 6, 1.0)
     assert run.status is ns.Status.NON_UNIQUE and "may hold" in run.message
-
-
-def test_an_intersection_that_repels_is_not_unique():
-    system = ns.FilippovSystem([x, y], field=[lam, kap], multipliers=[lam, kap], surfaces=[x, y])
-    run = ns.simulate(system, [0.0, 0.0], 1.0)
-    assert run.status is ns.Status.NON_UNIQUE and "an intersection" in run.message
 
 
 @pytest.mark.parametrize("turns", [20, pytest.param(200, marks=pytest.mark.slow)])
@@ -116,34 +80,6 @@ def test_curved_intersection_does_not_drift(turns):
     assert run.itinerary == "ss"
     assert np.abs(np.linalg.norm(run.x, axis=1) - 1).max() < 1e-12
     np.testing.assert_allclose(run.x[-1], [1.0, 0.0, 0.0], atol=1e-8)
-
-
-def test_hidden_dynamics_slides_nonlinearly():
-    """Jeffrey: x1' = -lam + b, x2' = 2 lam^2 - 1 slides with lam = b, x2' = 2 b^2 - 1."""
-    system = ns.FilippovSystem(
-        [x, y], field=[-lam + b, 2 * lam**2 - 1], multipliers=lam, surface=x,
-        parameters={b: 0.2}, hidden=True,
-    )  # fmt: skip
-    run = ns.simulate(system, [0.5, 0.0], 3.0, tol=1e-13)
-    assert run.itinerary == "+ s"
-    arrival = 0.5 / 0.8
-    assert run.events[0].t == pytest.approx(arrival, abs=1e-12)
-    assert run.x[-1, 1] == pytest.approx(arrival - 0.92 * (3.0 - arrival), abs=1e-11)
-
-
-def test_hidden_sliding_where_linear_filippov_crosses():
-    """grad h . f = (lam - .5)(lam + .2) - y: with y = 0 both sides push up (L1 = .6, L2 = 1.2)...
-
-    ... yet lam = -.2 is a stable layer equilibrium: from below (lam = -1 rising) the motion
-    sticks there until the two solutions merge at y = -.1225 as y falls.
-    """
-    field = [(lam - 0.5) * (lam + 0.2) - y, -0.1]
-    hidden = ns.FilippovSystem([x, y], field=field, multipliers=lam, surface=x, hidden=True)
-    run = ns.simulate(hidden, [-1.0, 0.2], 6.0, tol=1e-12)
-    assert run.itinerary == "- s +"
-    assert run.events[1].x[1] == pytest.approx(-0.1225, abs=1e-13)
-    linear = ns.FilippovSystem([x, y], surface=x, above=[0.6 - y, -0.1], below=[1.2 - y, -0.1])
-    assert ns.simulate(linear, [-1.0, 0.2], 6.0).itinerary == "- +"
 
 
 def test_nonlinear_multipliers_need_the_word():
@@ -180,34 +116,3 @@ def test_no_motion_along_an_intersection_has_no_range():
     )
     with pytest.raises(ns.PointError, match="intersection"):
         ns.local.intersection_range(system, [0.0, 0.0], of=x)
-
-
-@pytest.mark.parametrize("tol", [1e-3, 1e-4, 1e-5, 1e-7, 1e-8, 1e-10, 1e-13])
-def test_an_intersection_is_left_at_any_tolerance(tol):
-    """(1.2 sin z + 0.15 cos z)/1.06 = lambda reaches 1: one surface is left, the other holds. To the
-    tolerance of the run the multiplier may still be below 1 there."""
-    system = ns.FilippovSystem(
-        [x, y, z],
-        field=[-lam + 0.3 * kap + 1.2 * ca.sin(z), -kap - 0.2 * lam + ca.cos(z) / 2, 1],
-        multipliers=[lam, kap],
-        surfaces=[x, y],
-    )
-    run = ns.simulate(system, [0.0, 0.0, 0.0], 1.5, tol=tol)
-    assert run.itinerary == "ss +s" and run.status is ns.Status.REACHED_END
-    left = np.arcsin(1.06 / np.hypot(1.2, 0.15)) - np.arctan2(0.15, 1.2)
-    assert abs(run.events[0].t - left) <= 10 * tol
-
-
-def test_sliding_into_a_two_fold_of_one_of_two_surfaces():
-    """The other surface is far away: t* = -(1, 1) M^-1 z0 as with one surface, then no future."""
-    x, y, z, w, one, two = (ca.SX.sym(s) for s in ("x", "y", "z", "w", "one", "two"))
-    above, below = ca.vertcat(-y, 1, -2), ca.vertcat(z, -1, 1)
-    field = ca.vertcat((above + below) / 2 + one * (above - below) / 2, two)
-    system = ns.FilippovSystem(
-        [x, y, z, w], field=field, surfaces=[x, w - 10], multipliers=[one, two]
-    )
-    start = [0.7, 0.3]
-    run = ns.simulate(system, [0.0, *start, 0.0], 10.0, tol=1e-12)
-    assert run.status is ns.Status.NON_UNIQUE and run.itinerary == "s-"
-    m = np.array([[-1.0, 1.0], [1.0, -2.0]])
-    assert run.t[-1] == pytest.approx(-np.ones(2) @ np.linalg.solve(m, start), abs=1e-9)

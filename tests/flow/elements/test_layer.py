@@ -74,31 +74,6 @@ def test_products_of_multipliers_are_solved_together(count):
     np.testing.assert_allclose(lam_, a + np.prod(lam_) / 4, rtol=0, atol=1e-14)
 
 
-def test_all_solutions_of_a_product_are_found():
-    """1/8 - a + 3 a b/2 with b = a: attracting at the smaller root of 3 a^2/2 - a + 1/8, not at the other."""
-    a, b, v = (ca.SX.sym(s) for s in "abv")
-    field = [1 / 8 - a + 1.5 * a * b, 2 * (a - b), a]
-    system = ns.FilippovSystem([x, y, v], field=field, multipliers=[a, b], surfaces=[x, y])
-    run = ns.simulate(system, [0.0, 0.0, 0.0], 1.0, tol=1e-12)
-    assert run.status is REACHED and run.itinerary == "ss"
-    assert run.x[-1, 2] == pytest.approx(1 / 6, abs=1e-14)
-    both = ns.simulate(system, [0.0, 0.0, 0.0], 1.0, start_mode="ss")
-    assert both.status is ns.Status.NON_UNIQUE and "2 sliding solutions" in both.message
-
-
-@pytest.mark.parametrize("tol", [1e-6, 1e-8, 1e-10, 1e-12])
-def test_a_pair_of_multipliers_folds(tol):
-    """y - a + 0.9 a b and y - b + 0.9 a b with a = b: two solutions merge at y = 1/3.6, a = 1/1.8."""
-    a, b, u = (ca.SX.sym(s) for s in "abu")
-    field = [y - a + 0.9 * a * b, y - b + 0.9 * a * b, 0.1, a]
-    system = ns.FilippovSystem([x, z, y, u], field=field, multipliers=[a, b], surfaces=[x, z])
-    run = ns.simulate(system, [0.0, 0.0, 0.0, 0.0], 3.0, tol=tol)
-    assert run.status is REACHED and run.itinerary == "ss ++"
-    assert run.events[0].t == pytest.approx(10 / 3.6, abs=tol)
-    # a = (1 - sqrt(1 - 3.6 y))/1.8 along the slide
-    assert run.events[0].x[3] == pytest.approx(10 / 1.8 / 10.8, abs=10 * tol)
-
-
 @pytest.mark.parametrize("hump", [0.65, 1.5])
 def test_blocks_with_static_friction_do_not_disturb_one_another(hump):
     """Two blocks on one belt, not coupled: the events of each are those of it alone."""
@@ -139,23 +114,3 @@ def test_hidden_laws_of_two_surfaces_act_on_one_another():
     own = run.x[-1, 2:]
     rates = [0.3 - own[0] - own[0] ** 3 - 0.4 * own[1], 0.2 - own[1] - own[1] ** 3 + 0.5 * own[0]]
     np.testing.assert_allclose(rates, 0.0, atol=1e-14)
-
-
-def test_static_friction_on_a_table_lets_go_at_its_maximum():
-    """The load is a reaction: v' = t - 0.4 r lam (1 + 3/2 (1 - lam^2)) with r = 9.81."""
-    v, w, r = (ca.SX.sym(s) for s in "vwr")
-    friction = 0.4 * r * lam * (1 + 1.5 * (1 - lam**2))
-    system = ns.FilippovSystem(
-        [x, v, y, w],
-        field=[v, t - friction, w, r - 9.81],
-        surface=v,
-        multipliers=lam,
-        impacts=ns.Impact(y, reaction=r, restitution=0.0),
-        time=t,
-        hidden=True,
-    )
-    run = ns.simulate(system, [0.0, 0.0, 0.0, 0.0], 8.0, tol=1e-11)
-    assert run.status is REACHED
-    top = 0.4 * 9.81 * 2.5 * (2 / 3) * np.sqrt(2.5 / 4.5)
-    assert run.events[0].t == pytest.approx(top, abs=1e-10)
-    assert run.x[-1, 1] == pytest.approx((64 - top**2) / 2 - 0.4 * 9.81 * (8 - top), abs=1e-8)

@@ -3,7 +3,6 @@
 import math
 
 import casadi as ca
-import numpy as np
 import pytest
 
 import nonsmooth as ns
@@ -26,67 +25,6 @@ def _twisting(one, two, push=0.0):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("force", [-lam - v, -lam, -lam + v, 0.9 * ca.sin(t) - lam - v])
-def test_rest_is_the_only_future_whatever_the_damping(force):
-    run = ns.simulate(_relay(force), [0, 0], 5.0)
-    assert (run.status, run.itinerary) == (ns.Status.REACHED_END, "s")
-    assert run.x[-1].tolist() == [0, 0]
-    many = ns.ensemble(_relay(force), [[0, 0]], 5.0)
-    assert many.status[0] == run.status and many.x[0].tolist() == [0, 0]
-
-
-def test_rest_ends_where_the_load_exceeds_the_multiplier():
-    run = ns.simulate(_relay(t - lam), [0, 0], 3.0)
-    assert run.itinerary == "s +" and run.events[0].t == pytest.approx(1.0, abs=1e-12)
-    np.testing.assert_allclose(run.x[-1], [4 / 3, 2], rtol=0, atol=1e-9)
-
-
-def test_larger_load_leaves_at_once():
-    run = ns.simulate(_relay(2 - lam), [0, 0], 3.0)
-    assert run.itinerary == "+" and run.x[-1] == pytest.approx([4.5, 3])
-    run = ns.simulate(_relay(-2 - lam), [0, 0], 3.0)
-    assert run.itinerary == "-" and run.x[-1] == pytest.approx([-4.5, -3])
-
-
-def test_load_that_equals_the_multiplier_is_decided_by_its_rate():
-    assert ns.simulate(_relay(1 + t - lam), [0, 0], 1.0).itinerary == "+"
-    assert ns.simulate(_relay(1 - t - lam), [0, 0], 1.0).itinerary == "s"
-
-
-def test_relay_that_repels_has_several_motions():
-    assert ns.simulate(_relay(lam), [0, 0], 1.0).status is ns.Status.NON_UNIQUE
-
-
-@pytest.mark.parametrize(("two", "push"), [(-1, 0.0), (-1, 1.5), (-1, 2.5), (-2.9, 0.0)])
-def test_twisting_that_spirals_out_has_several_motions(two, push):
-    """Half a turn multiplies the speed by sqrt((3 - push - two) / (3 - push + two)) > 1, or a side is left for good."""
-    run = ns.simulate(_twisting(3, two, push), [0, 0], 1.0)
-    assert (run.status, run.t[-1]) == (ns.Status.NON_UNIQUE, 0)
-    many = ns.ensemble(_twisting(3, two, push), [[0, 0]], 1.0)
-    assert many.status[0] == ns.Status.NON_UNIQUE
-    if push < 2:
-        rests = ns.simulate(_twisting(3, two, push), [0, 0], 1.0, start_mode="ss")
-        assert rests.status is ns.Status.REACHED_END and rests.x[-1].tolist() == [0, 0]
-
-
-@pytest.mark.parametrize("push", [0.0, 0.5])
-def test_third_degree_is_not_unique(push):
-    system = ns.FilippovSystem([x, v, a], field=[v, a, push - lam], surfaces=[x], multipliers=[lam])
-    run = ns.simulate(system, [0, 0, 0], 1.0)
-    assert run.status is ns.Status.NON_UNIQUE and "third derivative" in run.message
-    run = ns.simulate(system, [0, 0, 0], 1.0, start_mode="s")
-    assert run.status is ns.Status.REACHED_END and run.x[-1].tolist() == [0, 0, 0]
-    run = ns.simulate(system, [0, 0, 1], 0.5)
-    assert run.itinerary == "+"
-
-
-def test_passage_with_speed_is_a_crossing():
-    run = ns.simulate(_relay(-lam), [0, 1], 3.0)
-    assert run.itinerary == "+ -" and run.events[0].t == pytest.approx(2.0, abs=1e-12)
-    run = ns.simulate(_relay(-lam), [0, -1], 1.0)
-    assert run.itinerary == "-"
-
-
 def _limit_of_twisting(one, two, start):
     """Time until x'' = -one sgn x - two sgn v rests, and after its first zero."""
     time, far = 0.0, start
@@ -106,44 +44,11 @@ def test_twisting_comes_to_rest_at_its_limit(one, two):
     assert rest.t == pytest.approx(limit, abs=1e-8)
 
 
-def test_twisting_holds_a_disturbance():
-    run = ns.simulate(_twisting(3.0, 1.2, 0.3 * ca.sin(t)), [1.0, 0.0], 20.0)
-    assert run.status is ns.Status.REACHED_END and abs(run.x[-1]).max() < 1e-12
-
-
-def test_twisting_rests_until_the_sum_of_both_is_reached():
-    run = ns.simulate(_twisting(1.0, 0.3, 0.02 * t), [0, 0], 70.0)
-    assert run.itinerary == "ss ++"
-    assert run.events[0].t == pytest.approx(65.0, abs=2e-8)  # the sum is 1.3 to 4e-10
-    np.testing.assert_allclose(run.x[-1], [0.02 * 125 / 6, 0.01 * 25], rtol=0, atol=1e-8)
-
-
 def test_nothing_before_the_limit_is_passed_over():
     limit = _limit_of_twisting(5.0, 2.0, 0.2)
     for early in (1e-3, 1e-6):
         run = ns.simulate(_twisting(5.0, 2.0), [0.2, 0], limit - early)
         assert run.t[-1] == limit - early and not run.itinerary.endswith("s")
-
-
-def test_rocking_block_comes_to_rest():
-    block = ns.FilippovSystem(
-        [x, v], surface=x, above=[v, -4 * ca.sin(0.25 - x)], below=[v, -4 * ca.sin(-0.25 - x)],
-        resets=ns.Reset(x, [x, 0.925 * v], name="impact"),
-    )  # fmt: skip
-    run = ns.simulate(block, [0.2, 0.0], 20.0)
-    assert run.status is ns.Status.REACHED_END and run.x[-1].tolist() == [0, 0]
-    rest = run.events[-2]
-    assert (rest.kind, rest.name, rest.mode_after) == ("rest", "h0", "s")
-
-
-def test_two_relays_rest_at_the_limit_of_their_spiral():
-    spiral = ns.FilippovSystem(
-        [x, v, z], field=[-lam + 2 * kap, -2 * lam - kap, 1 + x], multipliers=[lam, kap], surfaces=[x, v]
-    )  # fmt: skip
-    run = ns.simulate(spiral, [1.0, 0.5, 0.0], 2.0)
-    rest = next(event for event in run.events if event.kind == "rest")
-    assert rest.t == pytest.approx(0.75, abs=1e-9) and rest.name == "h0 and h1"
-    assert run.itinerary.endswith("ss") and run.x[-1][:2].tolist() == [0, 0]
 
 
 def test_slow_relay_rests_below_a_speed():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.differences import require
 
 x, y, v, t, q, g, p = (ca.SX.sym(name) for name in ("x", "y", "v", "t", "q", "g", "p"))
 REACHED = ns.Status.REACHED_END
@@ -176,6 +177,52 @@ def test_a_section_is_met_by_the_motion_only():
     assert np.allclose(run.sample_t, np.arange(6) + 0.5, rtol=0, atol=1e-12)
 
 
+def test_events_know_what_they_led_to():
+    """A ramp that a clock restarts, over a surface."""
+    ramp = ns.FilippovSystem(
+        [x, y],
+        surface=x - 0.5,
+        above=[1, 2],
+        below=[1, 0],
+        resets=ns.Reset(x - 1, [x - 1, y], 1, "clock"),
+    )
+    run = ns.simulate(ramp, [0.0, 0.0], 1.25)
+    assert [(e.kind, e.name, e.mode_before, e.mode_after) for e in run.events] == [
+        ("crossing", "h0", "-", "+"),
+        ("reset", "clock", "+", "-"),
+        ("end", "REACHED_END", "-", "-"),
+    ]
+    reset = run.events[1]
+    assert abs(reset.x[0] - 1.0) < 1e-14 and abs(reset.x_after[0]) < 1e-14
+    assert all(np.array_equal(e.x, e.x_after) for e in run.events if e.kind != "reset")
+
+
+@pytest.mark.parametrize(
+    ("event", "start", "is_said"),
+    [
+        (ns.Reset(x - 1, [0], 1, "kick"), 2.0, True),
+        (ns.Stop(x - 1, 1, "kick"), 2.0, True),
+        (ns.Stop(x - 1, 1, "kick"), 0.0, False),  # not true
+        (ns.Reset(x - 1, [0], 0, "kick"), 2.0, False),  # either way: no condition
+        (ns.Reset(x - 1, [0], 1, "kick", initially=True), 2.0, False),
+        (ns.Reset(x - 1, [0], 1, "kick", initially=False), 2.0, False),
+        (ns.Reset(x - 1, [0], 1, "kick", level=True), 2.0, False),
+    ],
+)
+def test_an_event_that_is_true_at_the_start_and_silent_is_named(event, start, is_said):
+    given = {"stops": [event]} if isinstance(event, ns.Stop) else {"resets": [event]}
+    run = ns.simulate(ns.FilippovSystem([x], field=[1], **given), [start], 0.5)
+    assert ("'kick' was true at the start" in run.message) == is_said
+    assert "initially=True" in run.message or not is_said
+
+
+def test_an_event_that_is_true_at_the_start_and_happens_later_is_not_named():
+    kick = ns.Reset(x - 0.5, [x - 1, y], 1, "kick")
+    system = ns.FilippovSystem([x, y], field=[y, -x], resets=[kick])
+    run = ns.simulate(system, [1.0, 0.0], 6.0)
+    assert any(e.name == "kick" for e in run.events) and "at the start" not in run.message
+
+
 # restart ----------------------------------------------------------------------------------------
 
 
@@ -266,37 +313,9 @@ def test_a_clock_sets_a_latch_that_a_current_clears():
 # derivatives and orbits --------------------------------------------------------------------------
 
 
-def slopes(system, start, t_end, step=1e-6):
-    """Derivatives of the end by central differences."""
-    columns = []
-    for i in range(len(start)):
-        moved = step * np.eye(len(start))[i]
-        ends = [
-            ns.simulate(system, np.array(start) + s * moved, t_end, tol=1e-12).x[-1]
-            for s in (1, -1)
-        ]
-        columns.append((ends[0] - ends[1]) / (2 * step))
-    return np.array(columns).T
-
-
 @pytest.mark.parametrize("push", [0.3, 0.6])
 def test_derivatives_through_a_chain_of_jumps(push):
-    run = ns.simulate(neurons(push=push), [0.0, 0.5, 0.4], 2.0, tol=1e-12)
-    found = ns.sensitivity(run).dx_dx0
-    assert np.allclose(found, slopes(neurons(push=push), [0.0, 0.5, 0.4], 2.0), rtol=0, atol=1e-8)
-
-
-def test_derivatives_of_a_condition_are_right_whichever_function_passes():
-    both = ns.Reset(ca.logic_and(x >= 1, y >= 1), {x: 0.1 * x, y: 0.2 * y * y})
-    system = ns.FilippovSystem([x, y], field=[1 + 0.1 * y, 0.2 + 0.1 * x], resets=both)
-    late = ns.simulate(system, [0.0, 1.2], 1.2, tol=1e-12)
-    assert fired(late) == ["reset"]
-    found = ns.sensitivity(late).dx_dx0
-    assert np.allclose(found, slopes(system, [0.0, 1.2], 1.2), rtol=0, atol=1e-8)
-    other = ns.simulate(system, [1.5, 0.8], 1.5, tol=1e-12)  # the second function decides the time
-    assert fired(other) == ["reset"]
-    found = ns.sensitivity(other).dx_dx0
-    assert np.allclose(found, slopes(system, [1.5, 0.8], 1.5), rtol=0, atol=1e-8)
+    require(neurons(push=push), [0.0, 0.5, 0.4], 2.0)
 
 
 def test_derivatives_at_a_corner_are_refused():

@@ -17,9 +17,9 @@ def test_runs_under_sanitizers(tmp_path):
     if not preloaded(tmp_path):
         pytest.skip("no library of the address sanitizer")
     files = [
-        "events/test_contract.py",
+        "test_runs.py",
         "outside/test_random_hybrid.py",
         "events/test_impacts.py",
-        *FLOW.glob("outside/test_reviews_*.py"),
+        "outside/test_reviews.py",
     ]
     assert main("sanitize", ["-m", "not slow", *[str(FLOW / file) for file in files]]) == 0

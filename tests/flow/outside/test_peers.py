@@ -34,11 +34,11 @@ def test_an_ensemble_ends_as_known(data):
         problem.system,
         np.tile(problem.start, (5, 1)),
         problem.t_end,
-        **{"tol": 1e-10, **data.get("options", {})},
+        **{"tol": 1e-10, **problem.options},
         work=ns.Work(threads=1, progress=False),
     )
     assert ns.Status(int(many.status[2])).name == data.get("status", "REACHED_END")
-    assert problem.error(many.x[2], problem.data["end"]) <= problem.within
+    assert problem.error(many.x[2], problem.data["end"]) <= problem.within("x")
 
 
 @pytest.mark.slow

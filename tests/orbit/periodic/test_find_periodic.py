@@ -160,3 +160,21 @@ def test_multiplicity_of_a_run_and_of_one_mode() -> None:
     assert orbit.period == pytest.approx(4 * np.pi)
     run = ns.simulate(system, [0.1], 80.0)
     assert ns.periodic_orbit(system, run, multiplicity=1).period == pytest.approx(4 * np.pi)
+
+
+@pytest.mark.parametrize("law", ["relay", "friction"])
+@pytest.mark.parametrize("start", [1.0, 0.55])
+def test_orbits_of_a_neutral_family_are_named_as_such_also_where_it_touches_a_surface(law, start):
+    """A block on a belt with constant friction circles the equilibrium, at most where it touches the belt's speed."""
+    x, v, b = symbols("x v b")
+    given = {"surface": v - b, "above": [v, -x - 0.4], "below": [v, 0.4 - x]}
+    if law == "friction":
+        friction = ns.Friction(v - b, load=1, kinetic=0.4)
+        given = {"field": [v, friction.force - x], "surfaces": [friction]}
+    system = ns.FilippovSystem([x, v], parameters={b: 0.3}, **given)
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [start, 0.0], 100.0))
+    assert orbit.itinerary == "-" and orbit.period == pytest.approx(2 * np.pi, rel=1e-12)
+    assert np.abs(orbit.multipliers - 1.0).max() < 1e-9
+    assert "neutral" in orbit.stability and "family" in str(orbit)
+    branch = ns.continue_orbit(orbit, "b", bounds=(0.1, 0.9))
+    assert not branch.events and all("neutral family" in reason for reason in branch.reasons)

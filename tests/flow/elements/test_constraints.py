@@ -572,7 +572,10 @@ WIRES = {
     "axis": (lambda s: ca.vertcat(0 * s, s), lambda q: [q[0]], 2),
     "helix": (
         lambda s: ca.vertcat(ca.cos(s), ca.sin(s), 0.3 * s),
-        lambda q: [(ca.sumsqr(q[:2]) - 1) / 2, q[0] * ca.sin(q[2] / 0.3) - q[1] * ca.cos(q[2] / 0.3)],
+        lambda q: [
+            (ca.sumsqr(q[:2]) - 1) / 2,
+            q[0] * ca.sin(q[2] / 0.3) - q[1] * ca.cos(q[2] / 0.3),
+        ],
         3,
     ),
 }

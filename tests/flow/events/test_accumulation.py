@@ -197,7 +197,9 @@ def test_events_end_where_the_field_has_no_series(kind, phase):
 
 @pytest.mark.parametrize("power", [1, 2])
 @pytest.mark.parametrize("restitution", [0.3, 0.5, 0.8])
-def test_resets_that_come_to_rest_have_moved_the_other_states_by_their_whole_sum(restitution, power):
+def test_resets_that_come_to_rest_have_moved_the_other_states_by_their_whole_sum(
+    restitution, power
+):
     """Each passage of zero, from the speeds 1, e, e^2, ..., adds a power of its speed: a geometric series."""
     passes = ns.Reset(y, {v: restitution * v, w: w + ca.fabs(v) ** power}, 0)
     switched = ns.FilippovSystem(

@@ -416,6 +416,9 @@ _BESIDE, _SEVERAL = 8, 200
 #: Relative distance of a recurrence at which a run is not simulated further.
 _GOOD = 0.02
 
+#: Parts of an orbit without events at whose ends it may begin, and part of its size below which a state is small.
+_SAMPLES, _ALMOST_ZERO = 64, 1e-3
+
 #: Time after which a second run begins where there are resets, in the same unit.
 _LATER = 0.05
 
@@ -576,11 +579,26 @@ def equations_of(
             starts[0, -1] = 0.0
             phase[-1] = 1.0
         else:
-            rate = rate_at(system, legs[0], starts[0], p)
+            starts, rate = _well_begun(system, legs[0], starts[0], float(durations[0]), p)
             phase = rate / float(np.linalg.norm(rate))
         reference = starts[0]
     problem = BoundaryProblem(system, legs, mirror, periods, forcing, phase, reference)
     return Start(problem, problem.pack(starts, durations), p)
+
+
+def _well_begun(
+    system: FilippovSystem, leg: Leg, x: Array, duration: float, p: Array
+) -> tuple[Array, Array]:
+    """The start (1, n) of a leg, or where it moves fastest if a state is almost zero there, and the rate there."""
+    states, n = [x], system.dimension
+    for _ in range(_SAMPLES):
+        states.append(integrate_leg(system, leg, states[-1], duration / _SAMPLES, p).end[:n])
+    rates = [rate_at(system, leg, state, p) for state in states]
+    sizes = np.abs(states).max(axis=0)
+    scale, k = np.where(sizes > 0.0, sizes, 1.0), 0
+    if (np.abs(x) < _ALMOST_ZERO * sizes).any():
+        k = int(np.argmax([np.linalg.norm(rate / scale) for rate in rates]))
+    return states[k][None].copy(), rates[k]
 
 
 def _from_word(

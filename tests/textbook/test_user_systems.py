@@ -1,6 +1,6 @@
 """The 26 systems of a review by new users: each runs, and its local questions have the answers of closed forms
 and of scipy. Tests have the numbers of the review; 16 is in tests/bounce. More runs of 2, 5, 9, 11, 12, 14, 19 to
-22, 24 and 26 are in tests/flow/outside, tests/cases (peers.json, stiff.json) and the textbook.
+22, 24 and 26 are in tests/flow/outside, testset, tests/cases (stiff.json) and the textbook.
 """
 
 import functools

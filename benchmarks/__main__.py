@@ -9,24 +9,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from . import (
-    bounces,
-    bounces_in_space,
-    burridge_knopoff,
-    gpu,
-    itineraries,
-    long_runs,
-    other_interpreters,
-    periodic_orbits,
-    proof_checks,
-    proof_times,
-    reading,
-    report,
-    resources,
-    short_runs,
-    startup,
-    two_folds,
-)
+from . import burridge_knopoff, gpu, report
+from .analysis import periodic_orbits, proof_checks, proof_times, two_folds
+from .bouncing import bounces, bounces_in_space, itineraries
+from .runs import long_runs, other_interpreters, reading, resources, short_runs, startup
 from .timing import ROOT, machine
 
 BOUNCES = ("linear", "nonlinear")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import library, reference
-from .itineraries import pairs
+from .bouncing.itineraries import pairs
 from .problems import Array, Codes, landings, random_starts
 
 BOUNCES = ("linear", "nonlinear")

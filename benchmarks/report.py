@@ -10,7 +10,10 @@ from typing import Any
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import Labels
 
-from . import bounces_in_space, gpu, periodic_orbits, proof_checks, reading
+from . import gpu
+from .analysis import periodic_orbits, proof_checks
+from .bouncing import bounces_in_space
+from .runs import reading
 
 #: Targets, and whether more or less is better.
 TARGETS = {

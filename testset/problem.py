@@ -16,6 +16,8 @@ import nonsmooth as ns
 from nonsmooth.flow.constants import KINDS
 
 CASES = Path(__file__).with_name("problems.json")
+#: Small systems of the tests, in the same form.
+RUNS = CASES.parents[1] / "tests" / "cases" / "runs.json"
 
 _CASADI = (
     *("sin", "cos", "tan", "exp", "log", "sqrt", "fabs", "sign", "fmin", "fmax", "atan2", "floor"),

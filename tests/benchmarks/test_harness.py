@@ -11,17 +11,9 @@ import pytest
 
 import bounce
 import nonsmooth as ns
-from benchmarks import (
-    bounces_in_space,
-    burridge_knopoff,
-    library,
-    periodic_orbits,
-    problems,
-    proof_checks,
-    proof_times,
-    reference,
-    two_folds,
-)
+from benchmarks import burridge_knopoff, library, problems, reference
+from benchmarks.analysis import periodic_orbits, proof_checks, proof_times, two_folds
+from benchmarks.bouncing import bounces_in_space
 from benchmarks.peers import (
     diffrax_modes,
     heyoka_callbacks,

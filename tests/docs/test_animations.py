@@ -1,20 +1,12 @@
 """Moving pictures have as many moments as asked for, move, and end with a still of the last one."""
 
-import importlib.util
 import itertools
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
-Image = pytest.importorskip("PIL.Image")
-
-DOCS = Path(__file__).parents[2] / "docs"
-_spec = importlib.util.spec_from_file_location("docs_animations", DOCS / "animations.py")
-animations = importlib.util.module_from_spec(_spec)
-sys.modules[_spec.name] = animations  # dataclasses look their module up
-_spec.loader.exec_module(animations)
+from docs.tools import animations
 
 
 @pytest.mark.slow_cases("funnel")

@@ -1,26 +1,17 @@
 """The page of a paper shows its record where there is one; the picture of the architecture is legible."""
 
-import importlib
-
-import pytest
-
+from docs.tools import architecture, elsewhere
 from papers.__main__ import NAMES
 from papers.pictures import faults
 
 
-@pytest.fixture
-def elsewhere(monkeypatch, pytestconfig):
-    monkeypatch.syspath_prepend(pytestconfig.rootpath / "docs")
-    return importlib.import_module("elsewhere")
-
-
-def test_every_paper_has_a_page(elsewhere):
+def test_every_paper_has_a_page():
     assert elsewhere.PAPERS == NAMES
     pages = elsewhere.pages()
     assert all(pages[f"papers/{name}.md"].count("\n# ") <= 1 for name in NAMES)
 
 
-def test_the_record_takes_the_place_of_the_table_of_claims(elsewhere, monkeypatch, tmp_path):
+def test_the_record_takes_the_place_of_the_table_of_claims(monkeypatch, tmp_path):
     for folder in ("papers", "build"):
         (tmp_path / folder / "welander_1982").mkdir(parents=True)
     (tmp_path / "papers" / "welander_1982" / "README.md").write_text(
@@ -39,6 +30,5 @@ def test_the_record_takes_the_place_of_the_table_of_claims(elsewhere, monkeypatc
     assert "papers/welander_1982/one.png" in elsewhere.pictures()
 
 
-def test_the_picture_of_the_architecture_is_legible(monkeypatch, pytestconfig):
-    monkeypatch.syspath_prepend(pytestconfig.rootpath / "docs")
-    assert faults(importlib.import_module("architecture").figure()) == []
+def test_the_picture_of_the_architecture_is_legible():
+    assert faults(architecture.figure()) == []

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import html
 import re
-import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -13,9 +12,7 @@ import pytest
 
 pytest.importorskip("latex2mathml", reason="formulas are typeset with the docs extra")
 
-sys.path.append(str(Path(__file__).parents[2] / "docs"))  # docs is not a package
-
-from formulas import among_words, formula, page
+from docs.tools.formulas import among_words, formula, page
 
 
 def bare(made: str) -> str:

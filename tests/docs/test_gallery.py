@@ -3,10 +3,8 @@
 The numbers come from outside the programs: closed forms, and the references of the textbook.
 """
 
-import importlib.util
 import math
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,14 +12,10 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 import nonsmooth as ns
+from docs.tools import generate
 from papers.pictures import faults
 
-DOCS = Path(__file__).parents[2] / "docs"
-_spec = importlib.util.spec_from_file_location("docs_generate", DOCS / "generate.py")
-generate = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(generate)
-
-#: The period of docs/examples/stick_slip.py: both fields are linear, so the slip ends at a root of
+#: The period of docs/examples/friction/stick_slip.py: both fields are linear, so the slip ends at a root of
 #: a sum of exponentials, found here to 30 digits with mpmath.
 PERIOD = 6.736837191765135
 
@@ -70,7 +64,7 @@ def test_program_draws(name, tmp_path):
 
 
 def test_gallery_is_all_programs():
-    assert sorted(generate.GALLERY) == sorted(p.stem for p in generate.EXAMPLES.glob("*.py"))
+    assert sorted(generate.GALLERY) == sorted(p.stem for p in generate.EXAMPLES.glob("*/*.py"))
 
 
 def test_two_fold_is_the_teixeira_singularity():

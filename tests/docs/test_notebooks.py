@@ -1,17 +1,10 @@
 """A tutorial becomes a notebook with what its programs print and draw, and a page with its pictures."""
 
-import importlib.util
 import json
-import sys
-from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).parents[2] / "docs"
-_spec = importlib.util.spec_from_file_location("docs_notebooks", DOCS / "notebooks.py")
-notebooks = importlib.util.module_from_spec(_spec)
-sys.modules[_spec.name] = notebooks  # dataclasses look their module up
-_spec.loader.exec_module(notebooks)
+from docs.tools import notebooks
 
 PAGE = """# A page
 

@@ -1,7 +1,6 @@
 """The built site is complete, its links resolve, and it needs no network."""
 
 import html.parser
-import importlib.util
 import os
 import re
 import shutil
@@ -11,13 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from docs.tools import generate, pictures
 from tests.browser import WIDTHS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-_spec = importlib.util.spec_from_file_location("docs_generate", DOCS / "generate.py")
-generate = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(generate)
 
 #: What a page loads, by tag and attribute; a plain link to elsewhere loads nothing.
 LOADS = {
@@ -57,9 +54,6 @@ def loads(text):
 
 def test_pictures_of_the_readme_are_what_its_programs_draw(tmp_path):
     image = pytest.importorskip("matplotlib.image")
-    spec = importlib.util.spec_from_file_location("docs_pictures", DOCS / "pictures.py")
-    pictures = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(pictures)
     made = pictures.draw(tmp_path)
     assert [path.name for path in made] == ["two_fold.png", "bounce.png"]
     for path in made:
@@ -68,12 +62,12 @@ def test_pictures_of_the_readme_are_what_its_programs_draw(tmp_path):
             assert abs(ours - theirs) <= 0.02 * ours  # fonts differ a little between versions
         rows, columns = (min(a, b) for a, b in zip(kept.shape[:2], drawn.shape[:2], strict=True))
         difference = abs(kept[:rows, :columns] - drawn[:rows, :columns]).mean()
-        assert difference < 0.02, "run `python docs/pictures.py` and look at the pictures"
+        assert difference < 0.02, "run `python docs/tools/pictures.py` and look at the pictures"
 
 
 def test_readme_shows_the_measured_table():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert generate.measured() in text, "copy what docs/elsewhere.py's measured() returns"
+    assert generate.measured() in text, "copy what docs/tools/elsewhere.py's measured() returns"
 
 
 # The built site ------------------------------------------------------------------------------------

@@ -1,6 +1,5 @@
 """Every formula of the pages becomes MathML."""
 
-import importlib.util
 import re
 from pathlib import Path
 
@@ -8,10 +7,9 @@ import pytest
 
 pytest.importorskip("latex2mathml", reason="formulas are typeset with the docs extra")
 
+from docs.tools import typeset
+
 DOCS = Path(__file__).parents[2] / "docs"
-_spec = importlib.util.spec_from_file_location("docs_typeset", DOCS / "typeset.py")
-typeset = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(typeset)
 
 CODE = re.compile(r"^```.*?^```$|`[^`\n]*`", re.MULTILINE | re.DOTALL)
 FORMULA = re.compile(r"\$\$(.+?)\$\$|\$([^$]+?)\$", re.DOTALL)

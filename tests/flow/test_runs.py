@@ -1,18 +1,16 @@
 """Small systems (``tests/cases/runs.json``) end, switch and jump where the closed form says; many at once do as one."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import nonsmooth as ns
-from testset.problem import Problem, cases
+from testset.problem import RUNS, Problem, cases
 
 every = pytest.mark.parametrize(
     "data",
     [
         pytest.param(own, id=own["id"], marks=[pytest.mark.slow] * own.get("slow", False))
-        for own in cases(Path(__file__).parents[1] / "cases" / "runs.json")
+        for own in cases(RUNS)
     ],
 )
 

@@ -6,7 +6,6 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import nonsmooth as ns
@@ -325,54 +324,3 @@ def test_close_events_of_hipparchus(case, moves):
     error = np.abs([one[1] - other[1] for one, other in zip(found, expected, strict=True)])
     # twenty roots: a product known to rounding, so ill-conditioned as Wilkinson's
     assert error.max() < (1e-9 if case == "twenty" else 1e-12)
-
-
-@pytest.mark.slow
-def test_static_friction_above_kinetic():
-    """Break-aways of x'' + 0.1 x' + x = 1.3 cos(0.3 t) - friction, by an event loop with scipy's DOP853."""
-    z, speed, push, static, t_end = 0.05, 0.3, 1.3, 1.1, 200.0
-    hump = brentq(lambda c: (2 / 3) * (1 + c) ** 1.5 / math.sqrt(3 * c) - static, 0.5, 5)
-    law = w * (1 + hump * (1 - w**2))
-    system = ns.FilippovSystem(
-        [x, v],
-        surface=v,
-        multipliers=w,
-        field=[v, -2 * z * v - x + push * ca.cos(speed * t) - law],
-        time=t,
-        hidden=True,
-    )
-    run = ns.simulate(system, [0.0, 1.0], t_end, tol=1e-11)
-    found = [e.t for e in run.events if e.kind == "exit"]
-    now, state, sign, true = 0.0, np.array([0.0, 1.0]), 1, []
-    while True:
-
-        def force(s, state=state):
-            return -state[0] + push * np.cos(speed * s)
-
-        def stopped(s, q):
-            return q[1]
-
-        stopped.terminal, stopped.direction = True, -sign
-        leg = solve_ivp(
-            lambda s, q, sign=sign: [q[1], -2 * z * q[1] + force(s, q) - sign],
-            (now, t_end), state, events=stopped, rtol=1e-12, atol=1e-13, method="DOP853", max_step=0.5,
-        )  # fmt: skip
-        now, state = leg.t[-1], leg.y[:, -1].copy()
-        if leg.status != 1:
-            break
-        state[1] = 0.0
-        if abs(force(now, state)) > static:
-            sign = int(np.sign(force(now, state)))
-            continue
-        grid = np.linspace(now, now + 2 * math.pi / speed, 200_001)
-        over = np.flatnonzero(np.abs(force(grid, state)) > static)
-        if not over.size or grid[over[0]] > t_end:
-            break
-        now = brentq(
-            lambda s, state=state: abs(force(s, state)) - static,
-            grid[over[0] - 1], grid[over[0]], xtol=1e-14,
-        )  # fmt: skip
-        sign = int(np.sign(force(now, state)))
-        true.append(now)
-    assert run.status == REACHED and len(found) == len(true) == 19
-    assert np.abs(np.array(found) - true).max() < 1e-10

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from benchmarks import proof_checks
+from benchmarks.analysis import proof_checks
 
 x, y, z = (ca.SX.sym(s) for s in "xyz")
 BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from benchmarks import bounces_in_space
+from benchmarks.bouncing import bounces_in_space
 from nonsmooth.flow.engine import lanes as engine
 from nonsmooth.flow.engine.lanes import lanes_for
 from nonsmooth.flow.engine.tape import tape_for

@@ -14,8 +14,8 @@ import numpy as np
 
 import nonsmooth as ns
 
-from . import reference
-from .problems import T_MAX, bounce_system, code, random_starts
+from .. import reference
+from ..problems import T_MAX, bounce_system, code, random_starts
 
 #: The box of all lists.
 BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]

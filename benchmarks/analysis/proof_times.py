@@ -10,7 +10,7 @@ import casadi as ca
 import bounce
 import nonsmooth as ns
 
-from .timing import alternate
+from ..timing import alternate
 
 
 def chebyshev(n: int, u: ca.SX) -> ca.SX:

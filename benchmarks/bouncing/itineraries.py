@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from . import library, reference
-from .problems import LETTERS, Array, Codes, landings, random_starts
+from .. import library, reference
+from ..problems import LETTERS, Array, Codes, landings, random_starts
 
 DEFAULT, TIGHT = 1e-10, 1e-14
 #: Distance between the two ends of a bisected pair of starts.

@@ -16,7 +16,7 @@ from scipy.optimize import fsolve
 
 import nonsmooth as ns
 
-from .timing import alternate
+from ..timing import alternate
 
 
 def system() -> ns.FilippovSystem:

@@ -10,9 +10,9 @@ import numpy as np
 import bounce
 import nonsmooth as ns
 
-from . import library
-from .problems import D1, D2, ETA, KAPPA, MU, T_MAX, Array, G, landings
-from .timing import alternate
+from .. import library
+from ..problems import D1, D2, ETA, KAPPA, MU, T_MAX, Array, G, landings
+from ..timing import alternate
 
 NAME = "friction in the plane"
 TOLERANCE = 1e-9

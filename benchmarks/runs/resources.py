@@ -13,8 +13,8 @@ from typing import Any
 
 import nonsmooth as ns
 
-from .problems import T_MAX, bounce_system, random_starts
-from .timing import alternate, fresh
+from ..problems import T_MAX, bounce_system, random_starts
+from ..timing import alternate, fresh
 
 #: Floating-point operations of an ideal bounce at 1e-9: the expansion alone, at the best order.
 IDEAL_FLOP = {"linear": 3.5e3, "nonlinear": 19.4e3}

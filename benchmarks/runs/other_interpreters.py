@@ -13,8 +13,8 @@ import numpy as np
 
 import nonsmooth as ns
 
-from .problems import BELTS, STICK, STICK_START, stick_slip_system
-from .timing import run_peer
+from ..problems import BELTS, STICK, STICK_START, stick_slip_system
+from ..timing import run_peer
 
 BELT, T_END = BELTS["many events"], 100.0
 #: Label, environment variable, script, steps to try.

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .timing import fresh
+from ..timing import fresh
 
 _SCRIPT = """
 import json, time

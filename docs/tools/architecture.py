@@ -1,4 +1,4 @@
-"""Draw the picture of the architecture again: `python docs/architecture.py`."""
+"""Draw the picture of the architecture again: `python docs/tools/architecture.py`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.patches import FancyBboxPatch
 import nonsmooth as ns
 from nonsmooth.plot import style
 
-PICTURE = Path(__file__).parent / "images" / "architecture.png"
+PICTURE = Path(__file__).parents[1] / "images" / "architecture.png"
 
 #: From top to bottom: names of one layer, and what it is for.
 LAYERS = (

@@ -11,17 +11,20 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-DOCS = Path(__file__).parent
-sys.path[:0] = [str(DOCS), str(DOCS.parent)]
+from mkdocs.structure.files import File, Files
 
-import animations  # noqa: E402
-import api  # noqa: E402  (neighbours; docs is not a package)
-import elsewhere  # noqa: E402
-import formulas  # noqa: E402
-import generate  # noqa: E402
-import notebooks  # noqa: E402
-import typeset  # noqa: E402
-from mkdocs.structure.files import File, Files  # noqa: E402
+DOCS = Path(__file__).parents[1]
+sys.path.insert(0, str(DOCS.parent))  # mkdocs runs this file by its path
+
+from docs.tools import (  # noqa: E402
+    animations,
+    api,
+    elsewhere,
+    formulas,
+    generate,
+    notebooks,
+    typeset,
+)
 
 PICTURES = DOCS.parent / "build" / "gallery"
 #: A list of exceptions in brackets, and a dash before a description that is not there.

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .peers import diffrax_modes, heyoka_modes
-from .timing import fresh
+from ..peers import diffrax_modes, heyoka_modes
+from ..timing import fresh
 
 _OURS = """
 from benchmarks.problems import bounce_system, random_starts, T_MAX

@@ -10,10 +10,10 @@ import numpy as np
 
 import nonsmooth as ns
 
-from .bounces import TARGET, ladder
-from .peers import heyoka_modes, scipy_dop853
-from .problems import BELTS, LETTERS, STICK_START, Array, stick_slip, stick_slip_system
-from .timing import alternate
+from ..bouncing.bounces import TARGET, ladder
+from ..peers import heyoka_modes, scipy_dop853
+from ..problems import BELTS, LETTERS, STICK_START, Array, stick_slip, stick_slip_system
+from ..timing import alternate
 
 #: The last state, and a number that two itineraries share if they are the same.
 End = tuple[Array, int]

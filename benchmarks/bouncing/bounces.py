@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from . import library, reference
-from .peers import diffrax_modes, heyoka_callbacks, heyoka_modes, scipy_dop853
-from .problems import Array, random_starts
-from .reference import Ends
-from .timing import alternate
+from .. import library, reference
+from ..peers import diffrax_modes, heyoka_callbacks, heyoka_modes, scipy_dop853
+from ..problems import Array, random_starts
+from ..reference import Ends
+from ..timing import alternate
 
 #: Largest error on the random starts at which speeds are compared.
 TARGET = 1e-9

@@ -125,7 +125,7 @@ def _outputs(cell: Cell) -> list[dict[str, Any]]:
 
 
 def refresh(path: Path) -> None:
-    """Write what the blocks of a page print into the page: `python docs/notebooks.py PAGE`."""
+    """Write what the blocks of a page print into the page: `python docs/tools/notebooks.py PAGE`."""
     page = path.read_text(encoding="utf-8")
     done = iter([cell for cell in run(page, path.stem) if cell.program])
 

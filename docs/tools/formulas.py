@@ -10,7 +10,7 @@ from __future__ import annotations
 import html
 import re
 
-import typeset
+from . import typeset
 
 _GREEK = (
     "alpha|beta|gamma|delta|epsilon|eps|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|upsilon|"

@@ -9,7 +9,6 @@ from __future__ import annotations
 import inspect
 import re
 import runpy
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,13 +20,11 @@ import nonsmooth as ns
 from nonsmooth.flow.status import ADVICE
 from nonsmooth.local.two_folds.classification import TABLE
 
-DOCS = Path(__file__).parent
-sys.path.append(str(DOCS))  # docs is not a package
+from .animations import animations
+from .elsewhere import measured
+from .markdown_table import first_line, table
 
-from animations import animations  # noqa: E402
-from elsewhere import measured  # noqa: E402
-from markdown_table import first_line, table  # noqa: E402
-
+DOCS = Path(__file__).parents[1]
 EXAMPLES = DOCS / "examples"
 
 #: The gallery, in the order of the page.
@@ -201,9 +198,15 @@ PAGES = {
 }
 
 
+def example(name: str) -> Path:
+    """The program of this name, in the folder of its subject."""
+    (path,) = EXAMPLES.glob(f"*/{name}.py")
+    return path
+
+
 def run_example(name: str) -> dict[str, Any]:
     """Run a program of the gallery and return what it defines; `figure` is its picture."""
-    return runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name=name)
+    return runpy.run_path(str(example(name)), run_name=name)
 
 
 def pictures(name: str) -> list[tuple[str, str]]:
@@ -221,7 +224,7 @@ def drawn(name: str, defined: dict[str, Any]) -> dict[str, Any]:
 
 def described(name: str) -> tuple[str, str, str]:
     """Return title, text and source of a program of the gallery."""
-    source = (EXAMPLES / f"{name}.py").read_text(encoding="utf-8")
+    source = example(name).read_text(encoding="utf-8")
     found = re.match(r'"""(.*?)\n\n(.*?)\n"""\n', source, re.DOTALL)
     assert found is not None, f"{name}.py: expected a docstring of a title and a text"
     return found.group(1), found.group(2), source
@@ -239,7 +242,7 @@ def gallery() -> str:
         )
         parts.append(
             f"## {title}\n\n{text}\n\n{shown}\n\n"
-            f'??? example "The program: `docs/examples/{name}.py`"\n\n'
+            f'??? example "The program: `{example(name).relative_to(DOCS.parent).as_posix()}`"\n\n'
             f"    ```python\n{program}\n    ```\n"
         )
     return "\n".join(parts)

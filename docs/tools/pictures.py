@@ -1,4 +1,4 @@
-"""Draw the README's pictures again: `python docs/pictures.py`.
+"""Draw the README's pictures again: `python docs/tools/pictures.py`.
 
 It runs the programs in the README, so the pictures are what the text beside them draws.
 """
@@ -10,7 +10,7 @@ import re
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "images"
 
 

@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from .timing import fresh
+from ..timing import fresh
 
 NAME = "reading"
 

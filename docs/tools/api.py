@@ -8,17 +8,14 @@ import sys
 from collections.abc import Iterable, Iterator
 from functools import cache
 from operator import attrgetter
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import bounce
 import nonsmooth as ns
 
-sys.path.append(str(Path(__file__).parent))  # docs is not a package
-
-from markdown_table import first_line, table
-from tasks import ERRORS, GOLF, TASKS, Task
+from .markdown_table import first_line, table
+from .tasks import ERRORS, GOLF, TASKS, Task
 
 PACKAGES = {
     "nonsmooth": ns,

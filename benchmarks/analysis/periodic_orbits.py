@@ -21,8 +21,8 @@ import numpy as np
 import nonsmooth as ns
 from nonsmooth.orbit.runs.leg_integration import LegIntegrator
 
-from .peers import scipy_shooting
-from .timing import Timing, alternate
+from ..peers import scipy_shooting
+from ..timing import Timing, alternate
 
 TOLERANCES = (1e-9, 1e-11, 1e-13)
 

@@ -1,0 +1,1 @@
+"""Analysis: periodic orbits and branches, two-folds, proofs."""

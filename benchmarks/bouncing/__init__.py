@@ -1,0 +1,1 @@
+"""Bounces: work and precision, rates in 3-D, wrong itineraries."""

@@ -1,0 +1,1 @@
+"""Pages of the documentation, programs of its gallery and the tools that build the site."""

@@ -171,6 +171,13 @@ def summary(run):
     )
 
 
+def small_memory(patched):
+    """Let the driver fill its memory after every few steps."""
+    patched.setattr(recording, "_FIRST", (3, 6, 6))
+    for name in ("_GIVEN", "_LARGEST"):
+        patched.setattr(recording, name, 0)
+
+
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_a_run_without_polynomials_is_the_same_otherwise(name, monkeypatch):
     problem = PROBLEMS[name]()
@@ -180,7 +187,7 @@ def test_a_run_without_polynomials_is_the_same_otherwise(name, monkeypatch):
         given = dict(parameters=p, max_steps=300, **more)
         run = ns.simulate(problem.system, start, end, **given)
         with monkeypatch.context() as patched:
-            patched.setattr(recording, "_LARGEST", 1)  # memory is taken over after every few steps
+            small_memory(patched)
             pieces = ns.simulate(problem.system, start, end, **given)
             loose = ns.simulate(problem.system, start, end, dense=False, **given)
         assert summary(run) == summary(pieces) == summary(loose)
@@ -206,7 +213,7 @@ def test_an_instant_with_many_jumps_fits_into_small_memory(jumps, monkeypatch):
     more = ns.Reset(k - 0.5, [x, k + 1], 1, "more", level=True, when=k < jumps)
     system = ns.FilippovSystem([x, k], field=[1, 0], resets=[first, more])
     run = ns.simulate(system, [0.5, 0.0], 21.0, max_jumps=1000)
-    monkeypatch.setattr(recording, "_LARGEST", 1)
+    small_memory(monkeypatch)
     assert summary(ns.simulate(system, [0.5, 0.0], 21.0, dense=False, max_jumps=1000)) == summary(
         run
     )
@@ -215,20 +222,15 @@ def test_an_instant_with_many_jumps_fits_into_small_memory(jumps, monkeypatch):
 
 def test_states_apart_from_the_points_are_kept_too():
     """An event need not be at a point of the run."""
-    output = recording.Output(2, 3)
-    recorder = recording.Recorder(output, 2, True, None)
-    own = output.written((1, 3, 3))
-    own["start"][:], own["step_mode"][:], own["coefficients"][:] = 0.0, 0, 0.0
+    own = recording.Output(2, 3).written((1, 3, 3))
     own["point_t"][:], own["point_x"][:] = [0.0, 1.0, 1.0], [[0, 0], [1, 1], [2, 2]]
     own["event_t"][:], own["event_x"][:] = [0.5, 1.0, 1.0], [[5, 5], [1, 1], [2, 2]]
     own["event_after_x"][:] = [[5, 6], [2, 2], [-0.0, 2]]
     for name in ("kind", "before", "after", "guard"):
         own[f"event_{name}"][:] = 0
-    found = recorder.finished((1, 3, 3))
-    found = found["make_happened"]()
-    states, rows, jumps = found.states, found.event_rows, found.event_jumps
-    assert states[rows].tolist() == [[5, 5], [1, 1], [2, 2], [2, 2]]
-    assert states[rows + jumps].tolist() == [[5, 6], [2, 2], [0, 2], [2, 2]]
+    states, rows, jumps = recording.states_of_events(own, own["point_x"])
+    assert states[rows].tolist() == [[5, 5], [1, 1], [2, 2]]
+    assert states[rows + jumps].tolist() == [[5, 6], [2, 2], [0, 2]]
     assert np.signbit(states[rows + jumps][2, 0]) and len(states) == 7
 
 

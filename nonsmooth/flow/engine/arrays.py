@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,21 +19,6 @@ from .structures import structure
 
 #: Steps of one call of C; between calls Python hears Ctrl-C and requests to stop.
 BURST = 4096
-
-
-class Happened(NamedTuple):
-    """Events and segments of a run as arrays; the end is one of the e + 1 events."""
-
-    event_t: Array  # (e + 1,)
-    event_rows: NDArray[np.int64]  # rows of their states in ``states``
-    event_jumps: NDArray[np.bool_]  # whether the state after each is the next row
-    event_codes: NDArray[np.int32]  # positions in ``keys``; the end is after them
-    event_motions: Array  # (e, w): what a restart after each needs; empty without dense output
-    segment_modes: NDArray[np.int32]  # (k,): numbers of their modes
-    segment_starts: Array  # (k + 1,): times at which they begin, and the last one ends
-    segment_firsts: NDArray[np.int64]  # numbers of their first steps; zero without dense output
-    states: Array  # the points of the run, then what else is the state of an event
-    keys: Sequence[tuple[int, ...]]  # kind, modes before and after, guard (``guard_of``) or -1
 
 
 @dataclass
@@ -64,23 +48,13 @@ class Run:
     implicit: NDArray[np.bool_]  # (s,): whether steps are implicit
     sample_x: Array  # (K, n): states at the times to be read before the end, unless it is dense
     event_count: int  # without the end
-    make_happened: Callable[[], Happened]  # events and segments, when they are first read
-    few: Any  # arrays by name, what the driver wrote, if events and steps are few
-
-    @cached_property
-    def happened(self) -> Happened:
-        """Events and segments."""
-        return self.make_happened()
+    written: Any  # arrays by name, what the driver wrote
+    few: bool  # whether events and points are few, so that they are read one by one
 
     def each(self) -> list[tuple[int, float, Array]]:
         """Guard, time and state of each event but the end."""
-        if self.few is not None:
-            rows, t, x = (self.few[f"event_{name}"] for name in ("guard", "t", "x"))
-            return [*zip(rows.tolist(), t.tolist(), x, strict=True)]
-        found = self.happened
-        guards = [found.keys[code][-1] for code in found.event_codes[:-1]]
-        states = found.states[found.event_rows[:-1]]
-        return [*zip(guards, found.event_t.tolist()[:-1], states, strict=True)]
+        rows, t, x = (self.written[f"event_{name}"] for name in ("guard", "t", "x"))
+        return [*zip(rows.tolist(), t.tolist(), x, strict=True)]
 
 
 def guard_of(system: FilippovSystem, code: int) -> Guard:

@@ -21,14 +21,15 @@ from ..status import ADVICE, Status
 from ..trajectory import Continuation, Facts, Steps, Trajectory
 from ..warn import warn_of_facts
 from .arrays import Run, guard_of
+from .recording import changes_of, codes_of, states_of_events
 
 
 def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> Trajectory:
     """Convert a run."""
-    status, few = Status(run.status), run.few
+    status = Status(run.status)
     limit = None if math.isnan(run.limit) else run.limit
     events = Events.when_read(
-        partial(_events, system, run), few and partial(_few_events, system, run)
+        partial(_events, system, run), partial(_few_events, system, run) if run.few else None
     )
     rested = {e.name: None for e in events if e.kind == "rest_below"} if options.rest_below else ()
     facts = Facts(
@@ -46,7 +47,8 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         x=run.x,
         events=events,
         segments=Segments.when_read(
-            partial(_segments, system, run), few and partial(_few_segments, system, run)
+            partial(_segments, system, run),
+            partial(_few_segments, system, run) if run.few else None,
         ),
         status=status,
         message=f"{message_of(system, options, run)} {ADVICE[status]}{_unmet(system, run)}",
@@ -64,7 +66,7 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
 
 def _few_events(system: FilippovSystem, run: Run) -> list[Event]:
     """Events of a short run, one by one."""
-    own, n, kept = run.few, system.dimension, len(run.motion) > 0
+    own, n, kept = run.written, system.dimension, len(run.motion) > 0
     columns = (own[f"event_{name}"].tolist() for name in ("kind", "before", "after", "guard"))
     labels, times = _labels(system, run, [*zip(*columns, strict=True)]), own["event_t"].tolist()
     before, after = (own[name][:, :n].copy() for name in ("event_x", "event_after_x"))
@@ -94,17 +96,21 @@ def _labels(system: FilippovSystem, run: Run, keys: Sequence[tuple[int, ...]]) -
 
 def _events(system: FilippovSystem, run: Run) -> Events:
     """Events of a run, with its end unless a stop is the last of them."""
-    found = run.happened
-    labels = _labels(system, run, found.keys)
-    status, width = Status(run.status), len(run.motion)
-    motions = found.event_motions if width else np.zeros((0, 0))
-    labels, own = [*labels, _end_label(system, run)], slice(None)
-    if status is Status.STOPPED:  # by the last event
-        motions, own = motions[:-1], slice(-1)
+    own, width = run.written, len(run.motion)
+    states, rows, jumps = states_of_events(own, run.x)
+    codes, keys = codes_of(own)
+    t, labels = own["event_t"], _labels(system, run, keys)
+    motions = own["event_motion"] if width and run.dense else np.zeros((0, width))
+    if Status(run.status) is Status.STOPPED:
+        motions = motions[:-1]
+    else:
+        t, rows, jumps = (
+            np.append(a, b) for a, b in ((t, run.t[-1]), (rows, len(run.x) - 1), (jumps, False))
+        )
+        codes, labels = np.append(codes, np.int32(len(labels))), [*labels, _end_label(system, run)]
     if width:
         motions = np.concatenate([motions, run.motion[None]])
-    numbers = found.event_rows[own], found.event_jumps[own], found.event_codes[own]
-    return Events(found.event_t[own], found.states, *numbers, tuple(labels), motions)
+    return Events(t, states, rows, jumps, codes, tuple(labels), motions)
 
 
 def _end_label(system: FilippovSystem, run: Run) -> Label:
@@ -131,7 +137,7 @@ def _label(system: FilippovSystem, kind: int, before: str, after: str, code: int
 
 def _few_segments(system: FilippovSystem, run: Run) -> list[Segment]:
     """Segments of a short run, one by one."""
-    own = run.few
+    own = run.written
     modes = (own["step_mode"] & ~IMPLICIT_STEP).tolist()
     starts, end = own["start"].tolist(), float(run.t[-1])
     shown, discrete = run.letters, len(system.definition.discrete)
@@ -161,14 +167,15 @@ def _only_segment(system: FilippovSystem, run: Run) -> Segment:
 
 def _segments(system: FilippovSystem, run: Run) -> Segments:
     """Stretches of steps in one mode."""
-    found, shown = run.happened, [system.spelled(letters) for letters in run.letters]
-    labels = run.labels or [()] * len(shown)
-    if not len(found.segment_modes):
+    own, shown = run.written, [system.spelled(letters) for letters in run.letters]
+    changes, labels = changes_of(own["step_mode"]), run.labels or [()] * len(shown)
+    if not len(changes):
         return Segments.of([_only_segment(system, run)])
-    times, first = found.segment_starts, found.segment_firsts
+    times = np.append(own["start"][changes], run.t[-1])
+    first = changes if run.dense else np.zeros(len(changes), np.int64)
     last = np.append(first[1:], len(run.starts)) if run.dense else first
-    modes = tuple(map(ShownMode, shown, labels))
-    return Segments(times[:-1], times[1:], first, last, found.segment_modes, modes)
+    codes, modes = own["step_mode"][changes] & ~IMPLICIT_STEP, tuple(map(ShownMode, shown, labels))
+    return Segments(times[:-1], times[1:], first, last, codes, modes)
 
 
 def _unmet(system: FilippovSystem, run: Run) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Mapping, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...model import Array
 from ..constants import IMPLICIT_STEP, KINDS
 from ..trajectory import Steps
-from .arrays import Happened, address
+from .arrays import address
 from .structures import structure
 
 #: Arrays in the order of C's pointers: type, and what there is one of for each entry; those of floats first.
@@ -38,13 +38,15 @@ _ARRAYS: dict[str, tuple[type, int]] = {
 Rooms = tuple[int, int, int]
 #: Room for them at first; the block of a larger run grows from there.
 _FIRST: Rooms = (64, 128, 64)
+#: The same where steps are not kept.
+LOOSE: Rooms = (1024, 128, 64)
 #: What C needs to be free before a step.
 _NEEDED: Rooms = (2, 4, 4)
 
-#: Most bytes of polynomials that are given to a run since an earlier one needed them, largest block that grows.
-_GIVEN, _LARGEST = 1 << 26, 1 << 22
-#: How blocks grow: pages that are not written cost nothing.
-_MUCH = 16
+#: Most bytes of polynomials that are given to a run since an earlier one needed them, most bytes that grow much.
+_GIVEN, _LARGEST = 1 << 26, 1 << 18
+#: How arrays grow: pages that are not written cost nothing; and those that are large, by a part.
+_MUCH, _PART = 16, 8
 
 #: Events and points that are read one by one.
 _FEW = 200
@@ -77,26 +79,28 @@ def _layout(
 
 
 class Output:
-    """A block of memory that the driver fills with steps, points and events."""
+    """Memory that the driver fills with steps, points and events: a block, then an array for each that grows."""
 
-    def __init__(self, n: int, order: int, rooms: Rooms = _FIRST, motion: int = 0):
+    def __init__(self, n: int, order: int, rooms: Rooms | None = None, motion: int = 0):
         self.motion, self._sizes = motion, (n, order, motion)
-        most = _GIVEN // (8 * n * (order + 1) + 1)
-        self._allot(tuple(map(max, _FIRST, (min(own, most) for own in rooms))))
-        self._point_to((0, 0, 0))
-
-    def _allot(self, rooms: Any) -> None:
-        self._rooms: Rooms = rooms
-        self._arrays, self._places, size = _layout(*self._sizes, rooms)
+        most, given = _GIVEN // (8 * n * (order + 1) + 1), rooms or _FIRST
+        steps, points, events = (
+            max(a, min(own, most)) for a, own in zip(_FIRST, given, strict=True)
+        )
+        self._rooms: Rooms = steps, points, events
+        self._arrays, places, size = _layout(*self._sizes, self._rooms)
         self._block = np.empty(size, np.uint8)
-
-    def _point_to(self, counts: Sequence[int]) -> None:
+        self._grown: dict[str, NDArray[Any]] = {}
         first = address(self._block) or 0
-        at = [first + place for place in self._places]
-        self.pointer = ctypes.byref(structure("Output")(*counts, *self._rooms, *at))
+        self._point_to((0, 0, 0), [first + place for place in places])
 
-    def written(self, counts: Sequence[int]) -> Written:
+    def _point_to(self, counts: Sequence[int], places: Sequence[int]) -> None:
+        self.pointer = ctypes.byref(structure("Output")(*counts, *self._rooms, *places))
+
+    def written(self, counts: Sequence[int]) -> Arrays:
         """What was written; a copy where nearly all of a large block would be kept for nothing."""
+        if self._grown:
+            return {name: self._grown[name][: counts[kind]] for name, (_, kind) in _ARRAYS.items()}
         found = Written(self._block, self._arrays, counts)
         few = all(_MUCH * size < room for size, room in zip(counts, self._rooms, strict=True))
         if few and self._rooms != _FIRST:
@@ -107,33 +111,27 @@ class Output:
             return copy
         return found
 
-    def full(self, counts: Sequence[int]) -> list[bool]:
-        """Whether steps, points and events have no room for another step."""
-        return [a + b > c for a, b, c in zip(counts, _NEEDED, self._rooms, strict=True)]
-
-    @property
-    def grows(self) -> bool:
-        """Whether the block is small enough to grow."""
-        return _MUCH * self._block.nbytes < _LARGEST
-
-    def begin_with(
-        self, rest: dict[str, NDArray[Any]], growing: Sequence[bool] = (False,) * 3
-    ) -> None:
-        """Go on in a block with this content, larger for what is ``growing`` and where half is taken."""
-        rest = {name: array.copy() for name, array in rest.items()}
-        counts = [len(rest[name]) for name in ("start", "point_t", "event_t")]
-        rooms = tuple(
-            room * (_MUCH if grows else 2 if 2 * (count + needed) > room else 1)
-            for room, count, needed, grows in zip(
-                self._rooms, counts, _NEEDED, growing, strict=True
-            )
+    def grow(self, counts: Sequence[int]) -> None:
+        """Go on with this content and with more room for what has none for another step."""
+        own, grown = self.written(counts), self._grown
+        size = sum(own[name].nbytes for name in _ARRAYS)
+        steps, points, events = (
+            room
+            if count + needed <= room
+            else _MUCH * room
+            if size < _LARGEST
+            else room + room // _PART + needed
+            for room, count, needed in zip(self._rooms, counts, _NEEDED, strict=True)
         )
-        if rooms != self._rooms:
-            self._allot(rooms)
-        written = Written(self._block, self._arrays, counts)
-        for name, array in rest.items():
-            written[name][...] = array
-        self._point_to(counts)
+        self._rooms = steps, points, events
+        for name, (_, kind) in _ARRAYS.items():
+            array = grown.get(name)
+            if array is None:
+                array = own[name].copy()
+            array.resize((self._rooms[kind], *array.shape[1:]), refcheck=False)
+            grown[name] = array
+        self._grown = grown
+        self._point_to(counts, [array.ctypes.data for array in grown.values()])
 
 
 class Written:
@@ -152,7 +150,7 @@ class Written:
         return np.ndarray((self.counts[kind], *shape), dtype, self._block, place)
 
 
-_Arrays = Written | dict[str, NDArray[Any]]
+Arrays = Written | dict[str, NDArray[Any]]
 
 
 def rooms_of(counts: Sequence[int]) -> Rooms:
@@ -161,196 +159,104 @@ def rooms_of(counts: Sequence[int]) -> Rooms:
     return steps, points, events
 
 
-class Growing:
-    """An array that grows at its end; where memory can be moved by its pages, without a copy."""
-
-    def __init__(self, like: NDArray[Any]):
-        self._size, self._array = 0, np.empty((0, *like.shape[1:]), like.dtype)
-
-    def add(self, rows: NDArray[Any]) -> None:
-        """Append rows."""
-        size = self._size + len(rows)
-        if size > len(self._array):
-            self._array.resize((size + size // 16, *rows.shape[1:]), refcheck=False)
-        self._array[self._size : size] = rows
-        self._size = size
-
-    def array(self) -> NDArray[Any]:
-        """Return the array; it grows no more."""
-        self._array.resize((self._size, *self._array.shape[1:]), refcheck=False)
-        return self._array
-
-
 class Recorder:
     """Points, events, changes of the mode and, if dense, steps of one run."""
 
-    # What can no longer change, all before the instant of the last point, is taken out of the blocks whenever
-    # they are full. The state of an event is nearly always one of the points, so its row is kept. Events and
-    # segments of a run that fits into the blocks are made when they are first read.
+    # The state of an event is nearly always one of the points, so its row is kept. Events and segments are made when
+    # they are first read.
 
     def __init__(self, output: Output, dimension: int, dense: bool, read_at: Array | None):
         self.output, self._n, self._dense = output, dimension, dense
-        self._kept: dict[str, Growing] = {}
-        self._keys: dict[tuple[int, ...], int] = {}
-        self._apart: list[Array] = []
-        self._mode, self._counts = -1, np.zeros(3, np.int64)
         self._times = np.zeros(0) if read_at is None or dense else read_at
         self._samples: list[Array] = []
         self._last: Steps | None = None
+        #: Without dense output, start and mode of steps that were left out: those that begin a segment.
+        self._begun: dict[str, list[NDArray[Any]]] = {"start": [], "step_mode": []}
 
     def make_room(self, counts: Sequence[int]) -> None:
-        """Take out what was written, or give the driver larger blocks as long as they are small."""
-        own, full = self.output.written(counts), self.output.full(counts)
-        if self.output.grows:
-            self.output.begin_with({name: own[name] for name in _ARRAYS}, full)
-            return
-        now = own["point_t"][-1]
-        at_end = [own[name].searchsorted(now, side="left") for name in ("point_t", "event_t")]
-        ends = (counts[STEP], *map(int, at_end))
-        taken = {name: own[name][: ends[kind]] for name, (_, kind) in _ARRAYS.items()}
-        found = self._steps(taken, now)
-        self._keep(found | self._happened(taken, found["x"]))
-        self.output.begin_with(
-            {name: own[name][ends[kind] :] for name, (_, kind) in _ARRAYS.items()}
-        )
-
-    def _keep(self, found: dict[str, NDArray[Any]]) -> None:
-        for name, array in found.items():
-            self._kept.setdefault(name, Growing(array)).add(array)
+        """Give the driver more room."""
+        steps, points, events = counts
+        if not self._dense:
+            own, steps = self.output.written(counts), 0
+            self._sample(own)
+            changes = changes_of(own["step_mode"])
+            for name, begun in self._begun.items():
+                begun.append(own[name][changes])
+        self.output.grow((steps, points, events))
 
     def finished(self, counts: Sequence[int]) -> dict[str, Any]:
         """Return the arrays of the whole run, as ``Run`` has them."""
-        own: _Arrays = self.output.written(counts)
-        total = [one + more for one, more in zip(self._counts.tolist(), counts, strict=True)]
-        self.rooms = rooms_of(total)
-        now = float(own["point_t"][-1])
-        found = self._steps(own, now)
+        own = self.output.written(counts)
+        self.rooms = rooms_of(counts)
         if not self._dense:
-            copies = {name: own[name].copy() for name in _ARRAYS if name != "coefficients"}
-            own = copies | {"coefficients": own["coefficients"][:0].copy()}
-            found |= {"t": own["point_t"], "x": own["point_x"][:, : self._n]}
-            found |= {"starts": np.zeros(0), "implicit": np.zeros(0, bool)}
-            found["coefficients"] = own["coefficients"]
-        if not self._kept:
-            happened, few = partial(self._read, own, found["x"], now), max(total[1:]) <= _FEW
-        else:
-            self._keep(found | self._happened(own, found["x"]))
-            self._keep(self._end(now))
-            found = {name: growing.array() for name, growing in self._kept.items()}
-            whole, few = self._whole(found), False
-            happened = partial(lambda: whole)
-        names = ("t", "x", "starts", "coefficients", "implicit")
-        return {name: found[name] for name in names} | {
-            "sample_x": np.vstack(self._samples) if self._samples else found["x"][:0],
-            "event_count": total[2],
-            "make_happened": happened,
-            "few": own if few else None,
-        }
-
-    def _read(self, own: _Arrays, x: Array, now: float) -> Happened:
-        """Events and segments of a run that fits into the blocks."""
-        found = {"x": x} | self._happened(own, x)
-        end = self._end(now)
-        return self._whole(found | {name: np.append(found[name], end[name]) for name in end})
-
-    def _end(self, now: float) -> dict[str, NDArray[Any]]:
-        """The row of the end of the run, after those of its events and segments."""
+            self._sample(own)
+            begun = {name: np.concatenate([*k, own[name]]) for name, k in self._begun.items()}
+            if isinstance(own, Written):  # views of a block with the polynomials
+                own = {name: own[name].copy() for name in _ARRAYS}
+            own = own | begun | {"coefficients": own["coefficients"][:0].copy()}
+        steps = counts[STEP] if self._dense else 0
+        x = own["point_x"][:, : self._n]
         return {
-            "event_t": np.array([now]),
-            "event_rows": self._counts[1:2] - 1,
-            "event_jumps": np.zeros(1, np.bool_),
-            "event_codes": np.array([len(self._keys)], np.int32),
-            "segment_starts": np.array([now]),
+            "t": own["point_t"],
+            "x": x,
+            "starts": own["start"][:steps],
+            "coefficients": own["coefficients"],
+            "implicit": own["step_mode"][:steps] >= IMPLICIT_STEP,
+            "sample_x": np.vstack(self._samples) if self._samples else x[:0],
+            "event_count": counts[EVENT],
+            "written": own,
+            "few": max(counts[1:]) <= _FEW,
         }
 
-    def _whole(self, found: dict[str, NDArray[Any]]) -> Happened:
-        """Events and segments, with the states that are no points after those that are."""
-        x, rows = found["x"], found["event_rows"]
-        rows[rows < 0] = len(x) - 1 - rows[rows < 0]
-        if not self._dense:
-            found |= {
-                "event_motions": np.zeros((0, self.output.motion)),
-                "segment_firsts": np.broadcast_to(np.int64(0), len(found["segment_modes"])),
-            }
-        names = [name for name in Happened._fields if name in found]
-        states = np.vstack([x, *self._apart]) if self._apart else x
-        return Happened(states=states, keys=[*self._keys], **{name: found[name] for name in names})
-
-    def _steps(self, own: _Arrays, now: float) -> dict[str, NDArray[Any]]:
-        """Points and steps before ``now``; without dense output the samples there."""
-        found = {"t": own["point_t"], "x": own["point_x"][:, : self._n]}
-        if self._dense:
-            implicit = own["step_mode"] >= IMPLICIT_STEP
-            of_steps = {"starts": own["start"], "coefficients": own["coefficients"]}
-            return found | of_steps | {"implicit": implicit}
-        self._sample(Steps(own["start"], own["coefficients"]), now)
-        return found
-
-    def _happened(self, own: _Arrays, x: Array) -> dict[str, NDArray[Any]]:
-        """Events and changes of the mode, which follow on those before."""
-        modes, found = own["step_mode"] & ~IMPLICIT_STEP, self._events(own, x)
-        changes = np.flatnonzero(modes[1:] != modes[:-1]) + 1
-        if len(modes) and modes[0] != self._mode:
-            changes = np.append(0, changes)
-        found["segment_modes"] = modes[changes]
-        found["segment_starts"] = own["start"][changes]
-        if self._dense:
-            found["segment_firsts"] = changes + self._counts[0]
-            found["event_motions"] = own["event_motion"]
-        self._mode = int(modes[-1]) if len(modes) else self._mode
-        self._counts += len(modes), len(x), len(own["event_t"])
-        return found
-
-    def _events(self, own: _Arrays, x: Array) -> dict[str, NDArray[Any]]:
-        """Rows of the states of events among the points, and numbers of their labels."""
-        t, before, after = (own[f"event_{name}"] for name in ("t", "x", "after_x"))
-        before, after = before[:, : self._n], after[:, : self._n]
-        jumps = _differ(before, after)
-        earlier: NDArray[np.int64] = np.cumsum(jumps) - jumps
-        rows = np.searchsorted(own["point_t"], t, side="left")
-        rows += earlier - earlier[np.searchsorted(t, t, side="left")]
-        wrong = rows + jumps >= len(x)
-        at = np.where(wrong, 0, rows)
-        if len(t):
-            wrong |= _differ(x[at], before) | _differ(x[at + (jumps & ~wrong)], after)
-        rows += self._counts[1]
-        if wrong.any():
-            pairs = np.stack([before[wrong], after[wrong]], axis=1).reshape(-1, self._n)
-            rows[wrong] = -1 - np.arange(0, len(pairs), 2) - sum(map(len, self._apart))
-            jumps |= wrong
-            self._apart.append(pairs)
-        return {
-            "event_t": t,
-            "event_rows": rows,
-            "event_jumps": jumps,
-            "event_codes": self._codes(own),
-        }
-
-    def _codes(self, own: _Arrays) -> NDArray[np.int32]:
-        """Numbers of the different kinds of events, with their modes and guards."""
-        columns = [own[f"event_{name}"] for name in ("kind", "before", "after", "guard")]
-        if len(columns[0]) < _FEW:
-            each = zip(*(column.tolist() for column in columns), strict=True)
-            return np.array([self._keys.setdefault(k, len(self._keys)) for k in each], np.int32)
-        kind, before, after, guard = (column.astype(np.int64) for column in columns)
-        sizes = (len(KINDS), int(before.max()) + 1, int(after.max()) + 1)
-        packed = kind + sizes[0] * (before + sizes[1] * (after + sizes[2] * (guard + 1)))
-        _, first, inverse = np.unique(packed, return_index=True, return_inverse=True)
-        keys = zip(*(a[first].tolist() for a in (kind, before, after, guard)), strict=True)
-        numbers = [self._keys.setdefault(key, len(self._keys)) for key in keys]
-        return np.array(numbers, np.int32)[inverse]
-
-    def _sample(self, steps: Steps, now: float) -> None:
-        """Read the run at its sample times before ``now``."""
+    def _sample(self, own: Arrays) -> None:
+        """Read the run at its sample times before the last point."""
+        steps, now = Steps(own["start"], own["coefficients"]), own["point_t"][-1]
         count = int(np.searchsorted(self._times, now, side="left"))
         times, self._times = self._times[:count], self._times[count:]
         begin = steps.starts[0] if len(steps) else math.inf
         early = 0 if self._last is None else int(np.searchsorted(times, begin, side="left"))
-        for own, at in ((self._last, times[:early]), (steps, times[early:])):
-            if own is not None and len(at):
-                self._samples.append(own.at(at, self._n))
+        for part, at in ((self._last, times[:early]), (steps, times[early:])):
+            if part is not None and len(at):
+                self._samples.append(part.at(at, self._n))
         if len(steps):
             self._last = Steps(steps.starts[-1:].copy(), np.array(steps.coefficients[-1:]))
+
+
+def changes_of(modes: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Numbers of the steps that begin a segment."""
+    own = modes & ~IMPLICIT_STEP
+    return np.append(np.arange(min(len(own), 1)), np.flatnonzero(own[1:] != own[:-1]) + 1)
+
+
+def states_of_events(own: Arrays, x: Array) -> tuple[Array, NDArray[np.int64], NDArray[np.bool_]]:
+    """Points of a run with the states of events that are none behind them, rows of the events' states, and whether the
+    state after each is the next row."""
+    t, before, after = (own[f"event_{name}"] for name in ("t", "x", "after_x"))
+    before, after = before[:, : x.shape[1]], after[:, : x.shape[1]]
+    jumps = _differ(before, after)
+    earlier: NDArray[np.int64] = np.cumsum(jumps) - jumps
+    rows = np.searchsorted(own["point_t"], t, side="left")
+    rows += earlier - earlier[np.searchsorted(t, t, side="left")]
+    wrong = rows + jumps >= len(x)
+    at = np.where(wrong, 0, rows)
+    wrong |= _differ(x[at], before) | _differ(x[at + (jumps & ~wrong)], after)
+    if not wrong.any():
+        return x, rows, jumps
+    pairs = np.stack([before[wrong], after[wrong]], axis=1).reshape(-1, x.shape[1])
+    rows[wrong] = len(x) + np.arange(0, len(pairs), 2)
+    return np.vstack([x, pairs]), rows, jumps | wrong
+
+
+def codes_of(own: Arrays) -> tuple[NDArray[np.int32], list[tuple[int, ...]]]:
+    """Numbers of the different kinds of events, with their modes and guards, and these."""
+    columns = [
+        own[f"event_{name}"].astype(np.int64) for name in ("kind", "before", "after", "guard")
+    ]
+    sizes, packed = [len(KINDS), *(int(c.max(initial=0)) + 1 for c in columns[1:3])], 0
+    kind, before, after, guard = columns
+    packed = kind + sizes[0] * (before + sizes[1] * (after + sizes[2] * (guard + 1)))
+    _, first, inverse = np.unique(packed, return_index=True, return_inverse=True)
+    return inverse.astype(np.int32), [*zip(*(c[first].tolist() for c in columns), strict=True)]
 
 
 def _differ(one: Array, other: Array) -> NDArray[np.bool_]:

@@ -33,12 +33,7 @@ HIDDEN = ns.FilippovSystem(
     parameters={a: 0.5},
     hidden=True,
 )
-MIXED = [
-    Leg("-", "entry", 0, -1),
-    Leg("s", "exit", 0, 1),
-    Leg("+", "reset", 0, -1),
-    Leg("-"),
-]
+MIXED = [Leg("-", "entry", 0, -1), Leg("s", "exit", 0, 1), Leg("+", "reset", 0, -1), Leg("-")]
 
 
 def together_and_apart(system, legs, starts, durations, chosen):

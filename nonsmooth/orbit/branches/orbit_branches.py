@@ -321,7 +321,7 @@ class OrbitCurve(OrbitEquations):
             return BranchEvent(CHATTER_END, value, self.describe(near), side, curve=self)
         at, p = self.evaluation(u), self.parameters_at(u)
         for i, leg in enumerate(self.problem.legs):
-            if at_two_fold(self.system, leg, at.flows.end[i, : at.flows.sizes[i]], p, _REACHED):
+            if at_two_fold(self.system, leg, at.flows.end[i], p, _REACHED):
                 side = FarSide(
                     "", "a slide ends at a two-fold, beyond which its future is not unique"
                 )

@@ -26,11 +26,15 @@ from .problems import Array
 
 Made = tuple[ns.FilippovSystem, Array, float]
 
-#: Seconds for a system; nodes that are simulated; relative errors of closure and of multipliers.
-LIMIT, NODES, CLOSURE, DIFFERENCE = 60, 10, 1e-7, 1e-4
+#: Seconds for a system; nodes that are simulated; relative errors of closure and of multipliers; growth of
+#: derivatives along an orbit beyond which rounding decides a simulation of it.
+LIMIT, NODES, CLOSURE, DIFFERENCE, LOST = 60, 10, 1e-7, 1e-4, 1e13
 
 #: Ends of a branch that say nothing of its orbits.
 NAMELESS = (BranchEnd.STEP_TOO_SMALL, BranchEnd.FAILED)
+
+#: Events beside which rounding decides how a simulation goes on, or when.
+BESIDE = ("two-fold", "infinite period at a boundary node")
 
 #: Events at which a multiplier passes the unit circle.
 SMOOTH = ("fold", "branch point", "period doubling", "Neimark-Sacker", "pitchfork")
@@ -193,6 +197,8 @@ def _events(orbit: PeriodicOrbit) -> Counter[str]:
 def faults(branch: Branch) -> list[str]:
     """What is wrong on a branch."""
     found, count = list[str](), len(branch)
+    events = {event.parameter for event in branch.events}
+    beside = [event.parameter for event in branch.events if event.kind in BESIDE]
     for orbit in branch.orbits:
         try:
             _ = orbit.multipliers, orbit.stability
@@ -200,22 +206,20 @@ def faults(branch: Branch) -> list[str]:
             found.append(f"a node that raises: {error}")
     for k in range(0, count, max(1, count // NODES)):
         orbit = branch.orbits[k]
-        if not np.isfinite(orbit.multipliers).all() or any(e.orbit is orbit for e in branch.events):
+        if not np.isfinite(orbit.multipliers).all() or branch.values[k] in events:
             continue
         near = min((abs(m.relative) for m in orbit.margins), default=1.0)
         at, (x, t) = f"at {branch.values[k]:.6g}", inside(orbit)
+        growth = float(np.abs(orbit.evaluation.flows.by_start).max())  # as beside a saddle
+        if growth > LOST or any(abs(branch.values[k] - q) < 1e-3 for q in beside):
+            continue
         run = moved(orbit, x, t, 1e-12)
         if not run.status.complete:
-            folds = [e.parameter for e in branch.events if e.kind == "two-fold"]
-            beside = any(abs(branch.values[k] - q) < 1e-3 for q in folds)
-            if near > 1e-5 and not (beside and run.status is ns.Status.NON_UNIQUE):
+            if near > 1e-5:
                 found.append(f"{at} {orbit.itinerary}: simulation ends {run.status}")
             continue
         missed = float(np.abs(run.x[-1] - x).max()) / (1 + float(np.abs(x).max()))
         largest = max(1.0, float(np.abs(orbit.multipliers).max()))
-        growth = float(
-            np.abs(orbit.evaluation.flows.by_start).max()
-        )  # on the way, as beside a saddle
         if missed > CLOSURE * largest + 1e-11 * growth and near > 1e-5:
             found.append(f"{at} {orbit.itinerary}: does not close by {missed:.1e} of {largest:.1e}")
         elif largest < 1e3 and near > 1e-5:
@@ -305,7 +309,7 @@ def main(numbers: Sequence[int] = (), classes: Sequence[str] = ()) -> Counter[st
             counts.update([f"branches of {kind}", *(f"end {end}" for end in branch.ends)])
             counts.update(f"event {event.kind}" for event in branch.events)
             for end, why in zip(branch.ends, branch.reasons, strict=True):
-                named = "A multiplier has grown" in why
+                named = "A multiplier has grown" in why or "neutral family" in why
                 if (end in NAMELESS and not named) or "corner" in why or "unclassified" in why:
                     print(kind, seed - 1, end, branch.values[[0, -1]], why[:200], flush=True)
     counts["seconds"] = round(time.perf_counter() - began)

@@ -22,7 +22,17 @@ RUNS = CASES.with_name("runs.json")
 
 _CASADI = (
     *("sin", "cos", "tan", "exp", "log", "sqrt", "fabs", "sign", "fmin", "fmax", "atan2", "floor"),
-    *("tanh", "if_else", "logic_and", "logic_or", "jacobian", "solve", "vertcat", "vertsplit"),
+    *(
+        "tanh",
+        "erf",
+        "if_else",
+        "logic_and",
+        "logic_or",
+        "jacobian",
+        "solve",
+        "vertcat",
+        "vertsplit",
+    ),
     *("horzcat", "mtimes", "inv"),
 )
 _CONSTRUCTS = (

@@ -33,90 +33,11 @@ def peak(load=10.0):
     )
 
 
-def full_wave():
-    both = [condition(V - ca.sin(T), A, "p"), condition(V + ca.sin(T), B, "m")]
-    return ns.FilippovSystem(
-        [V], field=[A + B - V / R], complementarity=both, time=T, parameters={R: 10.0}
-    )
-
-
-def side_by_side():
-    both = [condition(V + R * (A + B) - ca.sin(T), lam, name) for lam, name in ((A, "p"), (B, "m"))]
-    return ns.FilippovSystem(
-        [V], field=[A + B - V / 10], complementarity=both, time=T, parameters={R: 0.1}
-    )
-
-
-def bridge():
-    a, b, c, d = FOUR
-    four = [R * (a + b) - c, R * (a + b) - d, a - V, V + b]
-    conditions = [condition(y, lam, f"d{lam}") for y, lam in zip(four, FOUR, strict=True)]
-    return ns.FilippovSystem(
-        [V, I], field=[-I - c + d, V], complementarity=conditions, parameters={R: 0.5}
-    )
-
-
 def disc():
     inside = condition((1 - X**2 - Y**2) / 2, A, "edge")
     return ns.FilippovSystem(
         [X, Y], field=[R - A * X, -A * Y], complementarity=inside, parameters={R: 1.0}
     )
-
-
-def corner():
-    return ns.FilippovSystem(
-        [X, Y],
-        field=[ca.cos(T) + A, ca.cos(T - R) + B],
-        complementarity=[condition(X, A, "left"), condition(Y, B, "bottom")],
-        time=T,
-        parameters={R: 0.5},
-    )
-
-
-def capacitors(**events):
-    return ns.FilippovSystem(
-        [X, Y],
-        field=[-A / R, A],
-        complementarity=condition(Y - X, A, "diode"),
-        parameters={R: 2.0},
-        **events,
-    )
-
-
-CHARGED = {"resets": ns.Reset(T - 1, {X: X + 3}, 1, "charge"), "time": T}
-RUNS = {
-    "degree zero": (rectifier(), [0.3], 10.0, "o c o c o"),
-    "degree one": (peak(), [0.3], 10.0, "o c o c o"),
-    "two in turn": (full_wave(), [0.3], 5.0, "oo co oo oc oo"),
-    "side by side": (side_by_side(), [0.3], 10.0, "oo cc oo cc oo"),
-    "bridge": (bridge(), [1.0, 0.1], 3.0, "coco ococ"),
-    "disc": (disc(), [0.0, -0.5], 2.0, "o c"),
-    "corner": (corner(), [0.1, 0.2], 6.0, "oo co cc oc oo"),
-    "jump at the start": (capacitors(), [3.0, 1.0], 1.0, "c"),
-    "jump after a reset": (capacitors(**CHARGED), [0.0, 0.5], 2.0, "o c"),
-}
-
-
-@pytest.mark.parametrize("name", RUNS)
-def test_derivatives_are_those_of_neighbours(name):
-    system, start, end, itinerary = RUNS[name]
-    run = ns.simulate(system, start, end, tol=1e-12)
-    assert run.itinerary == itinerary
-    found, h = ns.sensitivity(run), 1e-6
-    p = system.parameter_vector()[0]
-
-    def final(x, r=p):
-        return ns.simulate(system, x, end, tol=1e-13, parameters={"R": r}).x[-1]
-
-    for k, unit in enumerate(h * np.eye(len(start))):
-        slope = (final(start + unit) - final(start - unit)) / (2 * h)
-        assert abs(found.dx_dx0[:, k] - slope).max() < 1e-8
-    slope = (final(start, p + h) - final(start, p - h)) / (2 * h)
-    assert abs(found.dx_dp[:, 0] - slope).max() < 1e-8
-    row = np.arange(1.0, 1.0 + len(start))
-    by_start, by_parameters = ns.vjp(run, row)
-    assert abs(by_start - row @ found.dx_dx0).max() < 1e-12
-    assert abs(by_parameters - row @ found.dx_dp).max() < 1e-12
 
 
 def test_two_conditions_that_close_at_one_instant_are_a_corner():

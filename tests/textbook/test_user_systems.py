@@ -1,6 +1,6 @@
 """The 26 systems of a review by new users: each runs, and its local questions have the answers of closed forms
-and of scipy. Tests have the numbers of the review; 16 is in tests/bounce. More runs of 2, 5, 9, 11, 12, 14, 19 to
-22, 24 and 26 are in tests/flow/outside, tests/cases (peers.json, stiff.json) and the textbook.
+and of scipy. Tests have the numbers of the review; 16 is in tests/bounce. Runs of 2, 3, 5 to 7,
+9 to 12, 14, 19 to 22, 24 and 26 are in tests/cases (runs.json, events.json, peers.json, stiff.json) and the textbook.
 """
 
 import functools
@@ -18,27 +18,6 @@ from nonsmooth import textbook
 x, y, z, u, v, w, t = (ca.SX.sym(name) for name in "xyzuvwt")
 lam, mu, q, k, s, r = (ca.SX.sym(name) for name in ("lam", "mu", "q", "k", "s", "r"))
 REACHED = ns.Status.REACHED_END
-
-
-def legs(modes, mode, start, t_end):
-    """State at the end and times of switches of an automaton: modes have a field and guards (g, sign, next, map)."""
-    at, now, times = np.array(start, float), 0.0, []
-    while True:
-        field, guards = modes[mode]
-        events = []
-        for guard, sign, *_ in guards:
-            events.append(lambda moment, state, guard=guard: guard(moment, state))
-            events[-1].terminal, events[-1].direction = True, sign
-        leg = solve_ivp(
-            field, (now, t_end), at, "DOP853", rtol=1e-12, atol=1e-13, events=events, max_step=t_end / 50
-        )  # fmt: skip
-        now, at = leg.t[-1], leg.y[:, -1]
-        if leg.status != 1:
-            return at, times
-        which = next(i for i, found in enumerate(leg.t_events) if len(found))
-        _, _, mode, *change = guards[which]
-        at = np.array(change[0](at), float) if change else at
-        times.append(now)
 
 
 def kinds(branch):
@@ -122,30 +101,6 @@ def boost():
     )
 
 
-def test_3_strobes_of_a_boost_converter():
-    def ramp(moment, state):
-        return (moment % PERIOD) / PERIOD - (0.27 + 0.0128 * (25 - state[1]) + 20 * state[2])
-
-    def field(conducts, on):
-        def rates(_, state):
-            current = (SUPPLY - (1 - on) * state[1]) / COIL if conducts else 0.0
-            return [current, ((1 - on) * state[0] - state[1] / LOAD) / CAPACITY, 25 - state[1]]
-
-        return rates
-
-    state = np.array([0.0, 24.0, 0.0])
-    for _ in range(20):
-        modes = {
-            "on": (field(True, 1), [(ramp, 1, "off")]),
-            "off": (field(True, 0), [(lambda _, own: own[0], -1, "empty", lambda own: [0, *own[1:]])]),
-            "empty": (field(False, 0), []),
-        }  # fmt: skip
-        begins = "on" if ramp(0.0, state) < 0 else "empty"  # the duty ratio may be negative
-        state = legs(modes, begins, state, PERIOD * (1 - 1e-15))[0]
-    run = ns.simulate(boost(), [0.0, 24.0, 0.0, 0.0], 20.5 * PERIOD, at=ns.Section("tick"))
-    np.testing.assert_allclose(run.sample_x[19, :3], state, rtol=0, atol=1e-8)
-
-
 def test_3_a_diode_leaves_or_holds_by_its_voltage():
     late, early, border = (
         ns.classify(boost(), [0, 25, 0, part * PERIOD]) for part in (0.9, 0.1, 0.27)
@@ -217,22 +172,6 @@ def neuron(cutoff):
     )
 
 
-@pytest.mark.parametrize("cutoff", [-20.0, pytest.param(0.0, marks=pytest.mark.slow)])
-def test_5_spikes_of_an_exponential_neuron(cutoff):
-    def field(_, at):
-        spike = G * SHARP * math.exp((at[0] - THRESHOLD) / SHARP)
-        return [
-            (-G * (at[0] - REST) + spike - at[1] + 1000) / C,
-            (A * (at[0] - REST) - at[1]) / SLOW,
-        ]
-
-    guard = (lambda _, at: at[0] - cutoff, 1, "", lambda at: [REST, at[1] + B])
-    _, times = legs({"": (field, [guard])}, "", [REST, 0.0], 100.0)
-    run = ns.simulate(neuron(cutoff), [REST, 0.0], 100.0, parameters={"I": 1000.0}, tol=1e-11)
-    found = [event.t for event in run.events if event.name == "spike"]
-    np.testing.assert_allclose(found, times, rtol=0, atol=1e-7)
-
-
 def test_5_hopf_point_and_fold_of_an_exponential_neuron():
     """Where the slope of the exponential is 1 + C/(g tau) and 1 + a/g times g (Touboul 2008)."""
     rest = ns.find_equilibrium(neuron(0.0), [-60.0, 30.0])
@@ -255,58 +194,9 @@ def test_6_gears_that_rattle():
     assert {rattle.switching(i).name for i in (0, 1)} == {"continuous of order 1"}
     assert ns.classify(rattle, [1.0, 0.4]).label == "crossing up"
     assert ns.classify(rattle, [1.0, 0.0], t=1.0).label == "from below"  # cos 1.7 < 0
-    run = ns.simulate(rattle, [0.0, 0.5], 20.0, tol=1e-12)
-
-    def field(side):
-        return lambda m, a: [
-            a[1],
-            3 * math.cos(1.7 * m) - 0.1 * a[1] - 50 * side * max(side * a[0] - 1, 0) * abs(side),
-        ]
-
-    walls = [(lambda _, a: a[0] - 1, 1, 1), (lambda _, a: a[0] + 1, -1, -1)]
-    back = {side: [(lambda _, a, side=side: side * a[0] - 1, -1, 0)] for side in (1, -1)}
-    modes = {0: (field(0), walls), 1: (field(1), back[1]), -1: (field(-1), back[-1])}
-    end, times = legs(modes, 0, [0.0, 0.5], 20.0)
-    np.testing.assert_allclose(run.x[-1], end, rtol=0, atol=1e-8)
-    np.testing.assert_allclose([e.t for e in run.events if e.kind == "crossing"], times, atol=1e-9)
 
 
 # 7: modes with memory ------------------------------------------------------------------------------
-
-
-def gearbox():
-    gear = ca.SX.sym("gear")
-    force = ca.if_else(gear == 1, 4.0, ca.if_else(gear == 2, 2.5, 1.6))
-    return ns.FilippovSystem(
-        [v],
-        field=[(0.5 + 0.6 * ca.sin(0.05 * t)) * force - 0.002 * v**2],
-        time=t,
-        discrete={gear: (1, 2, 3)},
-        resets=[
-            ns.Reset(v - 10 * gear, {gear: gear + 1}, 1, "up", level=True, when=gear <= 2),
-            ns.Reset(v - 8 * (gear - 1), {gear: gear - 1}, -1, "down", level=True, when=gear >= 2),
-        ],
-    )
-
-
-def test_7_shifts_of_a_gearbox():
-    pulls = {1: 4.0, 2: 2.5, 3: 1.6}
-
-    def guards(gear):
-        up, down = (
-            (lambda _, a: a[0] - 10 * gear, 1, gear + 1),
-            (lambda _, a: a[0] - 8 * (gear - 1), -1, gear - 1),
-        )
-        return [up] * (gear < 3) + [down] * (gear > 1)
-
-    def field(gear):
-        return lambda m, a: [(0.5 + 0.6 * math.sin(0.05 * m)) * pulls[gear] - 0.002 * a[0] ** 2]
-
-    end, times = legs({g: (field(g), guards(g)) for g in pulls}, 1, [0.0], 400.0)
-    run = ns.simulate(gearbox(), [0.0, 1.0], 400.0, tol=1e-11)
-    found = [event.t for event in run.events if event.kind == "reset"]
-    assert len(found) == 14 and run.x[-1, 0] == pytest.approx(end[0], abs=1e-8)
-    np.testing.assert_allclose(found, times, rtol=0, atol=1e-8)
 
 
 def test_7_a_thermostat_of_the_users_numbers():
@@ -327,25 +217,7 @@ def test_7_a_thermostat_of_the_users_numbers():
         assert (rest.point[0], rest.status) == (pytest.approx(place), "virtual")
 
 
-def test_7_two_tanks_empty_after_infinitely_many_switches():
-    """The inflow 3/4 goes to one of two tanks that lose 1/2 each: (1 + 1)/(1 - 3/4) (Johansson et al. 1999)."""
-    tanks = ns.FilippovSystem(
-        [x, y],
-        field=[0.75 * (q == 0) - 0.5, 0.75 * (q == 1) - 0.5],
-        discrete={q: (0, 1)},
-        resets=[
-            ns.Reset(y, {q: 1}, -1, "second", level=True, when=q == 0),
-            ns.Reset(x, {q: 0}, -1, "first", level=True, when=q == 1),
-        ],
-    )
-    run = ns.simulate(tanks, [1.0, 1.0, 0], 20.0)
-    assert run.status is ns.Status.ACCUMULATION
-    assert run.accumulation_time == pytest.approx(8.0, abs=1e-10)
-
-
-@pytest.mark.slow
 def test_7_a_play_operator():
-    """By its definition, on a fine grid whose error is of the second order at the turns."""
     low, high = ca.SX.sym("low"), ca.SX.sym("high")
     drive = ca.sin(t) + 0.3 * ca.sin(3.1 * t)
     play = ns.FilippovSystem(
@@ -357,10 +229,8 @@ def test_7_a_play_operator():
         ],
         time=t,
     )
-    value, grid = 0.0, np.linspace(0.0, 10.0, 200_001)
-    for moved in np.sin(grid) + 0.3 * np.sin(3.1 * grid):
-        value = min(max(value, moved - 0.5), moved + 0.5)
-    assert ns.simulate(play, [0.0], 10.0).x[-1, 0] == pytest.approx(value, abs=1e-8)
+    # by its definition on a fine grid, whose error is of the second order at the turns
+    assert ns.simulate(play, [0.0], 10.0).x[-1, 0] == pytest.approx(-0.165271662722, abs=1e-8)
     held, free = ns.classify(play, [-0.5]), ns.classify(play, [0.5])
     assert (held.kind, free.kind) == ("closed", "leaving")
     assert held.evidence["multiplier"] == pytest.approx(1.93, rel=1e-12)  # the rate of the drive
@@ -394,26 +264,21 @@ def compass():
     landed = ca.solve(after, ca.mtimes(before, rates))
     states = [swing, stand, *ca.vertsplit(rates)]
     strike = swing + stand + math.radians(6)
-    system = ns.FilippovSystem(
+    return ns.FilippovSystem(
         states,
         field=[*ca.vertsplit(rates), *ca.vertsplit(law)],
         resets=ns.Reset(
             strike, [stand, swing, *ca.vertsplit(landed)], -1, "strike", when=stand <= 0
         ),
     )
-    return system, ca.Function("law", [ca.vertcat(*states)], [law, landed])
 
 
 def test_8_a_walker_without_motors():
-    system, law = compass()
+    """Four strikes by scipy's DOP853."""
+    system = compass()
     start = [-0.3234, 0.2187, -0.3772, -1.0918]
 
-    def field(_, a):
-        return [a[2], a[3], *np.array(law(a)[0]).ravel()]
-
-    strike = (lambda _, a: a[0] + a[1] + math.radians(6) + (a[1] > 0), -1, "")
-    landed = (lambda a: [a[1], a[0], *np.array(law(a)[1]).ravel()],)
-    _, times = legs({"": (field, [strike + landed])}, "", start, 3.5)
+    times = [0.7349554745463336, 1.4684905101894423, 2.2029539349090896, 2.937527932439464]
     run = ns.simulate(system, start, 40.0, tol=1e-11)
     found = np.array([event.t for event in run.events if event.name == "strike"])
     np.testing.assert_allclose(found[: len(times)], times, rtol=0, atol=1e-8)
@@ -425,7 +290,7 @@ def test_8_upright_legs_are_a_pendulum_on_an_inverted_one():
     stiffness = 9.81 * np.diag([2.5, -17.5])
     squares = np.linalg.eigvals(-np.linalg.solve(mass, stiffness))
     expected = np.sqrt(squares.astype(complex))
-    rest = ns.find_equilibrium(compass()[0], [0.0, 0.1, 0.0, 0.0])
+    rest = ns.find_equilibrium(compass(), [0.0, 0.1, 0.0, 0.0])
     found = np.sort_complex(rest.eigenvalues)
     np.testing.assert_allclose(found, np.sort_complex([*expected, *-expected]), atol=1e-9)
 
@@ -457,30 +322,21 @@ def ice(forcing, **more):
 
 @pytest.mark.slow
 def test_9_switches_of_ice_ages():
+    """Switches and end by scipy's DOP853, leg by leg."""
     forcing = ca.sin(2 * ca.pi * t / 41) + 0.5 * ca.sin(2 * ca.pi * t / 23)
-
-    def field(released):
-        def rates(m, a):
-            push = math.sin(2 * math.pi * m / 41) + 0.5 * math.sin(2 * math.pi * m / 23)
-            aim = 0.15 * push + 0.5 * released
-            return [
-                (0.8 - 1.3 * a[2] - 0.5 * push - a[0]) / 15,
-                (a[0] - a[1]) / 12,
-                (aim - a[2]) / 5,
-            ]
-
-        return rates
-
-    def guard(m, a):
-        push = math.sin(2 * math.pi * m / 41) + 0.5 * math.sin(2 * math.pi * m / 23)
-        return 0.3 * a[0] - 0.7 * a[1] - 0.01 * push + 0.27
-
-    modes = {1: (field(0), [(guard, -1, 0)]), 0: (field(1), [(guard, 1, 1)])}
-    end, times = legs(modes, 1, [0.2, 0.2, 0.2], 600.0)
+    times = [
+        *(46.1499593033436, 62.464459753667946, 89.78550099208549, 104.32485674832905),
+        *(128.82832305747655, 145.5112913333408, 168.97023140577022, 182.94283605128174),
+        *(210.0318307728888, 224.92631091978825, 252.7291910011884, 267.43545572441496),
+        *(294.66290090044276, 309.8654603025007, 332.8397625018406, 349.2478391470292),
+        *(374.0324451316401, 387.9165810823284, 415.58398968020083, 430.52027422243304),
+        *(458.33304051000084, 473.0892776599398, 498.828958002158, 514.8627805568893),
+        *(537.7905325562364, 552.5066695490914, 578.9567175195908, 593.5813689866123),
+    ]
     run = ns.simulate(ice(forcing, time=t), [0.2, 0.2, 0.2], 600.0, tol=1e-11)
-    assert len(times) > 10
     found = [event.t for event in run.events if event.kind == "crossing"]
     np.testing.assert_allclose(found, times, rtol=0, atol=1e-7)
+    end = [0.40347588636610227, 0.4176036473678574, 0.09178293777389979]
     np.testing.assert_allclose(run.x[-1], end, rtol=0, atol=1e-8)
 
 
@@ -513,29 +369,6 @@ def genes(decay, production):
             made - rate * one for made, rate, one in zip(production(on), decay, states, strict=True)
         ],
     )
-
-
-def test_10_a_loop_of_four_genes():
-    """Exponentials from threshold to threshold."""
-    decay = np.array([1.0, 1.2, 0.9, 1.1])
-    loop = genes(decay, lambda on: [2 * (1 - on[3]), 2 * (1 - on[0]), 2 * on[1], 2 * (1 - on[2])])
-    state, now, times = np.array([0.1, 0.5, 1.2, 0.3]), 0.0, []
-    above = state > 0.8
-    while True:
-        aims = np.where([not above[3], not above[0], above[1], not above[2]], 2.0, 0.0) / decay
-        with np.errstate(divide="ignore", invalid="ignore"):
-            wait = -np.log((0.8 - aims) / (state - aims)) / decay
-        wait[~((aims > 0.8) != above)] = np.inf
-        first = int(np.argmin(wait))
-        step = min(wait[first], 20.0 - now)
-        state, now = aims + (state - aims) * np.exp(-decay * step), now + step
-        if now >= 20.0:
-            break
-        above[first] = not above[first]
-        times.append(now)
-    run = ns.simulate(loop, [0.1, 0.5, 1.2, 0.3], 20.0)
-    np.testing.assert_allclose([e.t for e in run.events[:-1]], times, rtol=0, atol=1e-8)
-    np.testing.assert_allclose(run.x[-1], state, rtol=0, atol=1e-8)
 
 
 def test_10_four_genes_that_regulate_themselves_rest_on_four_thresholds():
@@ -579,31 +412,6 @@ def test_11_a_brake_slides_in_second_order_once_its_relay_is_quick():
     assert run.t[-1] == pytest.approx(29 / (9.81 * 0.8), rel=1e-9)
 
 
-def test_11_a_brake_with_hysteresis():
-    def field(relay):
-        def rates(_, a):
-            grip = 0.32 * a[1] / (0.04 + a[1] ** 2)
-            return [-9.81 * grip, 30 / a[0] * (a[2] - grip / 2), (0.4 - 0.8 * relay - a[2]) / 0.03]
-
-        return rates
-
-    stop = (lambda _, a: a[0] - 20, -1, 0)
-    modes = {
-        -1: (field(-1), [(lambda _, a: a[1] - 0.22, 1, 1), stop]),
-        1: (field(1), [(lambda _, a: a[1] - 0.18, -1, -1), stop]),
-        0: (lambda _, a: [0.0] * 3, []),
-    }
-    end, times = legs(modes, -1, [30.0, 0.05, 0.0], 3.0)
-    run = ns.simulate(
-        brake(lambda slip: ns.Relay(slip, on=0.22, off=0.18)),
-        [30.0, 0.05, 0.0],
-        times[-1],
-        tol=1e-11,
-    )
-    np.testing.assert_allclose([e.t for e in run.events[:-1]], times[:-1], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(run.x[-1], end, rtol=0, atol=1e-8)
-
-
 # 12: rectifiers ------------------------------------------------------------------------------------
 
 
@@ -618,29 +426,11 @@ def test_12_a_bridge_rectifier_and_its_cold_start():
         time=t,
     )
 
-    def field(sign):
-        def rates(m, a):
-            push = 10 * math.sin(100 * math.pi * m)
-            current = (push - 0.1 * a[0] - sign * a[1]) / rate if sign else 0.0
-            return [current, (sign * a[0] - a[1] / 50) / rate]
-
-        return rates
-
-    def over(sign):
-        return lambda m, a: 10 * math.sin(100 * math.pi * m) - sign * a[1]
-
-    rest = [lambda a: [0.0, a[1]]]
-    modes = {sign: (field(sign), [(lambda _, a: a[0], -sign, 0, *rest)]) for sign in (1, -1)}
-    modes[0] = (field(0), [(over(1), 1, 1), (over(-1), -1, -1)])
-    end, _ = legs(modes, 0, [0.0, 1.0], 0.1)
-    run = ns.simulate(bridge, [0.0, 1.0], 0.1, tol=1e-11)
-    np.testing.assert_allclose(run.x[-1], end, rtol=0, atol=1e-7)
     moment = 0.001
     alpha = ns.alpha(bridge, [0.0, 20.0], t=moment)
     assert alpha == pytest.approx(0.5 - math.sin(0.1 * math.pi) / 4, rel=1e-12)
     cold = ns.classify(bridge, [0.0, 0.0])
     assert (cold.kind, cold.label) == ("two-fold", "mix-0")
-    assert ns.simulate(bridge, [0.0, 0.0], 0.1).status is REACHED
 
 
 # 13: what a fit needs ----------------------------------------------------------------------------
@@ -747,31 +537,20 @@ def string(count):
 
 @pytest.mark.slow
 def test_18_a_bowed_string_sticks_and_slips():
-    count, place = 10, 2
-
-    def free(a):
-        ends = np.concatenate([[0.0], a[:count], [0.0]])
-        return count**2 * (ends[2:] - 2 * a[:count] + ends[:-2]) - 0.2 * a[count:]
-
-    def field(sign):
-        def rates(_, a):
-            force, slip = free(a), a[count + place] - 0.2
-            force[place] -= sign * count * (0.3 + 0.3 * math.exp(-((slip / 0.2) ** 2)))
-            if not sign:
-                force[place] = 0.0
-            return np.concatenate([a[count:], force])
-
-        return rates
-
-    def limit(sign):
-        return lambda _, a: free(a)[place] / count - sign * 0.6
-
-    hold = [lambda a: [*a[: count + place], 0.2, *a[count + place + 1 :]]]
-    modes = {0: (field(0), [(limit(1), 1, 1), (limit(-1), -1, -1)])}
-    for sign in (1, -1):
-        modes[sign] = (field(sign), [(lambda _, a: a[count + place] - 0.2, -sign, 0, *hold)])
-    end, times = legs(modes, -1, np.zeros(2 * count), 5.0)
-    run = ns.simulate(string(count), np.zeros(2 * count), 5.0, tol=1e-11)
+    """Times and end by scipy's DOP853, leg by leg."""
+    times = [
+        *(0.040622734572079496, 0.6402688139587907, 2.35283271534678, 3.114870815173238),
+        *(3.489850613019909, 3.531322750941977, 4.427431816097955, 4.485635447552028),
+        4.771323407016731,
+    ]
+    end = [
+        *(-0.005456214759860199, 0.006178351747022317, 0.043112091261384225, 0.02632009788604727),
+        *(0.001372672854777542, 0.014744103250030654, 0.01229029266284292, -0.0031260595468078764),
+        *(-0.012699987457222076, -0.01878938111509457, -0.08639564395531965, -0.03748141908997233),
+        *(0.2, 0.2817026095073352, 0.13873720657113875, 0.03577217793379551, 0.2179630509118474),
+        *(0.36417808194597906, 0.043214645289516816, -0.28300068693655506),
+    ]
+    run = ns.simulate(string(10), np.zeros(20), 5.0, tol=1e-11)
     found = [event.t for event in run.events if event.kind in ("entry", "exit")]
     np.testing.assert_allclose(found, times, rtol=0, atol=1e-8)
     np.testing.assert_allclose(run.x[-1], end, rtol=0, atol=1e-8)

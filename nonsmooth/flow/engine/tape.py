@@ -154,8 +154,8 @@ class TapeEngine:
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         entries = None
         if derived:
-            series, entries = self._derived()
-            tape = replace(tape, series=series, free=series)
+            series, free, entries = self._derived()
+            tape = replace(tape, series=series, free=free)
         self._c = self._structure(self.coupled, tape)
         if entries is not None:
             self._c.derivatives = self._entries(entries)
@@ -163,12 +163,12 @@ class TapeEngine:
         self._known_modes = dict[bytes, str]()
         self._last_spelled: tuple[bytes | None, list[str]] = (None, [])
 
-    def _derived(self) -> tuple[Series, Entries]:
+    def _derived(self) -> tuple[Series, Series, Entries]:
         return self.system.cached("derived", lambda: derived_series_of(self.coupled))
 
     def add_implicit(self) -> None:
         """Give the driver the field's derivatives, which implicit steps need."""
-        series, entries = self._derived()
+        series, _, entries = self._derived()
         implicit = self._series(series, 0)
         self._c.derivatives = self._entries(entries)
         self._c.places = self._at(_places(entries, self.system.extended_dimension))

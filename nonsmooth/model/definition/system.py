@@ -944,7 +944,7 @@ _ELEMENTS = {
     "sets": (
         "vector multipliers",
         "Sets of codimension two and three work in simulate, ensemble, sensitivity, region, limit_directions, poincare, "
-        "attractors, periodic_orbit, continue_orbit and phase_response.",
+        "attractors, lyapunov_spectrum, periodic_orbit, continue_orbit and phase_response.",
     ),
     "remembering": (
         "elements with hysteresis",

@@ -51,10 +51,13 @@ class PlainField:
 
     @cached_property
     def groups(self) -> tuple[NDArray[np.intp], ...]:
-        """Entries whose errors are measured together; the time is exact."""
-        moving = np.arange(self.entries)
+        """Entries whose errors are measured together: each alone, as states may be small; the time is exact."""
         system = self.motion.system
-        return (np.delete(moving, system.dimension) if system.time_dependent else moving,)
+        return tuple(
+            np.array([k])
+            for k in range(self.entries)
+            if not (system.time_dependent and k == system.dimension)
+        )
 
     @cached_property
     def series(self) -> Series:

@@ -240,18 +240,28 @@ def _rules_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> _Rules:
     return _Rules(rules, rows, *summed(rules, rows))
 
 
-def derived_series_of(coupled: Coupled) -> tuple[Series, Entries]:
-    """Rules of all that any mode needs and of its derivatives, and the places of these in their matrix."""
+def derived_series_of(coupled: Coupled) -> tuple[Series, Series, Entries]:
+    """Rules of all that a mode needs and of its derivatives: in any, and in one where nothing slides. Places of the
+    derivatives in their matrix."""
     n, size = coupled.system.extended_dimension, coupled.moving.numel()
     derivatives, entries = sparse_entries(coupled.derivatives)
     outputs = [*coupled.outputs, _moving_slopes(coupled)[2], derivatives]
     inputs = [coupled.moving, coupled.parameter_symbols]
     program = _rules_of(inputs, coupled.awake(outputs))
-    held = {n + i for i, own in enumerate(coupled.scaled) if own} - {
-        n + i for i in coupled.system.set_of
-    }
-    moves, unknown = lambda k: k not in held, lambda k: n <= k < size
-    return _series(program, range(len(outputs)), moves, unknown, _time_of(coupled)), entries
+    of_sets, time = {n + i for i in coupled.system.set_of}, _time_of(coupled)
+    held = {n + i for i, own in enumerate(coupled.scaled) if own} - of_sets
+    wanted, rows = range(len(outputs) - 1), program.rows[-1]
+    every = _series(
+        program, wanted, lambda k: k not in held, lambda k: n <= k < size, time, more=rows
+    )
+    follow = lambda k: k in of_sets
+    own = [
+        j
+        for j, k in zip(rows, entries.column.tolist(), strict=True)
+        if not n <= k < size or follow(k)
+    ]
+    free = _series(program, wanted[:-1], lambda k: k < n or follow(k), follow, time, more=own)
+    return every, free, entries
 
 
 def _series(
@@ -260,8 +270,9 @@ def _series(
     moves: Callable[[int], bool],
     unknown: Callable[[int], bool],
     time: int | None = None,
+    more: Sequence[int] = (),
 ) -> Series:
-    """Rules as the interpreter reads them."""
+    """Rules as the interpreter reads them, with ``more`` whose later coefficients are read only if they move."""
     rules, rows = program.rules, program.rows
     still = [_is_still(rule) for rule in rules]
     change = [not own for own in still]
@@ -272,7 +283,7 @@ def _series(
     is_time = [rule.source == (0, time) for rule in rules]
     arguments = [rule.args for rule in rules]
     roots = [j for k in wanted for j in rows[k]]
-    found = reached(arguments, change, roots)
+    found = reached(arguments, change, [*roots, *more])
     # What does not move has later coefficients, zeros, only where they are read.
     read = [*roots, *(a for j in found if rules[j].rule == "atan2" for a in rules[j].args)]
     zeros = reached(arguments, change, [j for j in read if not moving[j]])
@@ -288,7 +299,7 @@ def _series(
         set() if _are_knotted(rules, some, second) else some for some in (before, after)
     )
     loop = [j for j in later if j not in before and j not in after]
-    values = reached([_valued(rule) for rule in rules], change, roots)
+    values = reached([_valued(rule) for rule in rules], change, [*roots, *more])
     lists = {
         "still": [j for j, own in enumerate(still) if own],
         "values": [j for j in values if not is_input[j]],

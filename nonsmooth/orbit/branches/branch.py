@@ -628,7 +628,7 @@ def _drop_turning(arc: Arc) -> None:
 
 def end_of(arc: Arc) -> BranchEnd:
     """Name the end of an arc."""
-    if arc.end in ("lost", "step too small", DIVIDE):
+    if arc.end in ("lost", "step too small", "two-fold", DIVIDE):
         return BranchEnd.STEP_TOO_SMALL
     if arc.end == "period diverges":
         return BranchEnd.PERIOD_DIVERGES

@@ -200,18 +200,24 @@ def node_end(orbit: PeriodicOrbit, parameter: str, width: float) -> BranchEvent 
     n, system = orbit.system.dimension, orbit.system
     if system.time_dependent:
         return None
-    speeds = np.linalg.norm(orbit.evaluation.flows.before[:, :n], axis=1)
+    at = (
+        orbit.evaluation
+    )  # it leaves slowly from where a leg begins, or comes slowly to where one ends
+    rates = np.vstack([at.flows.before[: len(at.durations), :n], at.flows.rate[:, :n]])
+    speeds = np.linalg.norm(rates, axis=1)
     slowest = int(np.argmin(speeds))
     if not speeds[slowest] < _SLOW * speeds.max():
         return None
-    x, value = orbit.evaluation.starts[slowest, :n], orbit.parameters[parameter]
-    for at in _surfaces(orbit.problem):
+    x = np.vstack([at.starts[:, :n], at.flows.end[:, :n]])[slowest]
+    value = orbit.parameters[parameter]
+    for surface in _surfaces(orbit.problem):
         for side in SIDES:
-            found = _boundary(orbit, x, parameter, at, side)
+            found = _boundary(orbit, x, parameter, surface, side)
             if found is None or not abs(found[1].parameter - value) < _CLOSE * width:
                 continue
             values = found[1].solution.eigenvalues
-            if not np.iscomplex(values).any() and np.all(values.real * values.real[0] > 0):
+            slow = values[np.argmin(np.abs(values.real))]  # along which it comes or leaves
+            if not np.iscomplex(slow) and np.all(values.real * slow.real > 0):
                 verdict = "the period diverges like the logarithm of the distance"
                 kind = "infinite period at a boundary node"
                 return BranchEvent(kind, found[1].parameter, orbit, FarSide("", verdict))

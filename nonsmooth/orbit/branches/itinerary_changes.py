@@ -123,6 +123,9 @@ _NEIGHBOURS = 1e-5
 #: Sine of the angle at which a field is tangent to a surface.
 _TANGENT = 1e-7
 
+#: L of the other field, relative to its gradient and the state, where a slide touches both folds.
+_BOTH = 1e-9
+
 SOFT, FORCE = "grazing of a soft switch", "grazing of a jumping force"
 CHATTER_END = "end of complete chatter"
 
@@ -187,7 +190,12 @@ def _grazed(
     if guard.kind in ("reset", "stop", "atom"):
         return f"grazing of a {'stop' if guard.kind == 'stop' else 'reset'}"
     if guard.kind == "exit":
-        return "adding-sliding"
+        t = touching(
+            problem.system, leg, test, at.starts[test.leg], float(at.durations[test.leg]), p
+        )[0]
+        y = integrate_leg(problem.system, leg, at.starts[test.leg], t, p).end
+        ends = replace(leg, kind="exit", element=guard.element, side=guard.side)
+        return "two-fold" if at_two_fold(problem.system, ends, y, p, _BOTH) else "adding-sliding"
     if is_condition(problem, guard):
         return _touch(
             problem,

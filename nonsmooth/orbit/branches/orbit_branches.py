@@ -28,6 +28,7 @@ from ..periodic.multipliers import Multipliers, return_map
 from ..periodic.orbit import PeriodicOrbit, faults_of, named
 from ..periodic.orbit_functions import OrbitFunction, UserRows
 from ..periodic.symmetry import halves, prime_period, require_symmetric
+from ..runs.guards import watch
 from ..runs.legs import integrate_leg, shown_itinerary
 from .branch import (
     DIVIDE,
@@ -154,6 +155,16 @@ _TINY, _SMALL = 1e-4, 1e-2
 
 #: L of the other field where a slide ends, relative to its gradient and the state, at the last step to a two-fold.
 _REACHED = 1e-6
+
+#: The same that is rounding: the slide of a branch ends at the two-fold, as it tends to it exponentially.
+_ROUNDED = 1e-11
+
+#: Relative singular value of the equations with the parameter below which their solutions form a surface.
+_SURFACE = 1e-10
+
+#: Change of the parameter, over its bounds, per relative change of the period below which it is rounding, and part of
+#: the longest period from which this is computed.
+_UNRESOLVED, _LATE = 1e-12, 0.2
 
 #: Period relative to that of the guess below which a solution is a point.
 _COLLAPSED = 1e-6
@@ -282,8 +293,16 @@ class OrbitCurve(OrbitEquations):
         """``"period diverges"`` where it is long and grows at a constant parameter; else empty."""
         if to_divide(self.problem, self.evaluation(u)) and self.again(u) is not None:
             return DIVIDE
+        if self._at_two_fold(u, _ROUNDED):
+            return "two-fold"
         durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
-        return "period diverges" if u[durations].sum() > self.longest and self._steep(u) else ""
+        period = float(u[durations].sum())
+        if period > self.longest:
+            return "period diverges" if self._steep(u, _STEEP) else ""
+        if not (period > _LATE * self.longest and self._steep(u, 1.0 / _UNRESOLVED)):
+            return ""
+        of_family = Multipliers(self.problem, self.evaluation(u), self.parameters_at(u)).repeats
+        return "" if of_family else "period diverges"
 
     def again(self, u: Array, tangent: Array | None = None) -> Departure | None:
         """The same branch with legs divided where derivatives grow along them; None where nothing changes."""
@@ -302,12 +321,12 @@ class OrbitCurve(OrbitEquations):
         found = curve.correct(start, way / np.linalg.norm(way))
         return None if found is None else Departure(curve, [found], way / np.linalg.norm(way))
 
-    def _steep(self, u: Array) -> bool:
+    def _steep(self, u: Array, least: float = _STEEP) -> bool:
         """Whether the period grows steeply with the parameter."""
         durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
         tangent = np.linalg.svd(self.equations(u)[1] * self.scale)[2][-1] * self.scale
         growth = abs(float(tangent[durations].sum())) * float(self.widths[-1])
-        return bool(growth > _STEEP * float(u[durations].sum()) * abs(float(tangent[-1])))
+        return bool(growth > least * float(u[durations].sum()) * abs(float(tangent[-1])))
 
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
         """The point to which the orbit shrinks, the end of its chatter, or the homoclinic orbit at which its period diverges."""
@@ -319,21 +338,49 @@ class OrbitCurve(OrbitEquations):
             value, near = chatter
             side = FarSide("", VERDICTS[CHATTER_END])
             return BranchEvent(CHATTER_END, value, self.describe(near), side, curve=self)
-        at, p = self.evaluation(u), self.parameters_at(u)
-        for i, leg in enumerate(self.problem.legs):
-            if at_two_fold(self.system, leg, at.flows.end[i], p, _REACHED):
-                side = FarSide(
-                    "", "a slide ends at a two-fold, beyond which its future is not unique"
-                )
-                return self._event("two-fold", self, Point(u, np.zeros(u.size)), "", side)
+        for verb in ("ends at", "passes"):
+            if self._at_two_fold(u, _REACHED, inside=verb == "passes"):
+                verdict = f"a slide {verb} a two-fold, beyond which its future is not unique"
+                point = Point(u, np.zeros(u.size))
+                return self._event("two-fold", self, point, "", FarSide("", verdict))
         name, width = self.system.parameter_names[self.free[-1]], float(self.widths[-1])
         node = node_end(self.describe(u), name, width)
         if node is not None or (end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u)):
             return node
         return homoclinic_end(self.describe(u), name, width)
 
+    def _at_two_fold(self, u: Array, part: float, inside: bool = False) -> bool:
+        """Whether a slide ends at a two-fold, or comes to one ``inside`` its leg."""
+        at, p = self.evaluation(u), self.parameters_at(u)
+        for i, leg in enumerate(self.problem.legs):
+            state, ends = at.flows.end[i, : at.flows.sizes[i]], [leg]
+            if inside and leg.mode.count("s") == 1 and at.durations[i] > 0.0:
+                x, duration = at.starts[i], float(at.durations[i])
+                seen = watch(self.system, leg, x, duration, p).approaches
+                near = min(seen, key=lambda a: abs(a.value), default=None)
+                if near is None or near.guard.kind != "exit":
+                    continue
+                state = integrate_leg(self.system, leg, x, near.t, p).end
+                k = near.guard.element
+                ends = [replace(leg, kind="exit", element=k, side=s) for s in (1, -1)]
+            if all(at_two_fold(self.system, end, state, p, part) for end in ends):
+                return True
+        return False
+
+    def _of_surface(self, u: Array) -> bool:
+        """Whether the solutions form a surface at a point, to first order."""
+        jacobian = self.equations(u)[1] * self.scale
+        rows = np.linalg.norm(jacobian, axis=1)
+        values = np.linalg.svd(jacobian / np.where(rows > 0.0, rows, 1.0)[:, None])[1]
+        return bool(values[-1] <= _SURFACE * values[0])
+
     def unresolved(self, u: Array) -> str:
         p, k = self.parameters_at(u), self.problem.size
+        if self._of_surface(u):
+            return (
+                "The orbit is one of a neutral family at every value of the parameter (the multiplier 1 twice): the "
+                "orbits form a surface, on which no branch is distinguished."
+            )
         found = Multipliers(self.problem, self.problem.evaluate(u[:k], p), p)
         growth = np.zeros(0) if found.refusal else found.logarithms.real
         if not growth.size or growth[0] < _STEEPEST:

@@ -96,10 +96,12 @@ class Product:
         # the difference does not see the rounding of the factors themselves, which is ten times as large
         found = self.logarithms
         other = self.reversed.logarithms if found.size else found
-        if found.size != other.size:
-            return math.inf
-        sizes = np.exp(np.minimum(found.real, 0.0))
-        return 10.0 * float((sizes * np.abs(found.real - other.real)).max(initial=0.0))
+        n = min(
+            found.size, other.size
+        )  # directions that one of them takes for lost are as small as that
+        lost = np.exp(np.minimum([*found.real[n:], *other.real[n:]], 0.0)).max(initial=0.0)
+        apart = np.exp(np.minimum(found.real[:n], 0.0)) * np.abs(found.real[:n] - other.real[:n])
+        return 10.0 * float(max(apart.max(initial=0.0), lost))
 
 
 def _like(matrix: Array) -> Array:

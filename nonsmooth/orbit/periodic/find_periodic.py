@@ -27,10 +27,10 @@ from ...model import (
 from ...model.checks import positive
 from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
-from ..runs.legs import Leg, leg_name, shown_itinerary
+from ..runs.legs import Leg, integrate_leg, leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
 from .divided_legs import divided, to_divide
-from .guess import Start, about_of, is_about, starts_of
+from .guess import Start, about_of, equations_of, is_about, starts_of
 from .orbit import PeriodicOrbit, faults_of, named
 from .symmetry import prime_period, require_symmetric, symmetry_matrix
 
@@ -226,9 +226,38 @@ def _solved(
     _require_multiplicity(problem, multiplicity)
     faults = tuple(faults_of(problem, at, start.p))
     orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, iterations, faults)
+    orbit = _of_neutral_family(orbit, most, budget) or orbit
     require_simple(orbit)
     require_symmetric(orbit)
     return orbit
+
+
+#: Part of the period of which the square, the height of a touch, is rounding.
+_TOUCH = 1e-6
+
+
+def _of_neutral_family(orbit: PeriodicOrbit, most: int, budget: _Budget) -> PeriodicOrbit | None:
+    """The last orbit of a neutral family without events, of which the slides where it touches a surface are rounding."""
+    system, p, durations = orbit.system, orbit.parameter_vector, orbit.evaluation.durations
+    legs = orbit.problem.whole.legs
+    short = np.abs(durations) <= _TOUCH * orbit.period
+    modes = {leg.mode for leg, slides in zip(legs, short, strict=True) if not slides}
+    slides = all(leg.kind == "exit" for leg, own in zip(legs, short, strict=True) if own)
+    if system.time_dependent or orbit.symmetric or len(modes) != 1 or not (short.any() and slides):
+        return None
+    i, leg = int(np.argmin(short)), Leg(modes.pop())
+    x = integrate_leg(system, leg, orbit.evaluation.starts[i], 0.4 * float(durations[i]), p).end
+    for span in (durations[i], durations.sum()):
+        begun = equations_of(system, (leg,), x[None], np.array([span]), 0.0, None, None, p)
+        try:
+            problem, u, at, count = _closed_orbit(begun.problem, begun.unknowns, p, most, budget)
+        except (ConvergenceError, DegenerateError):
+            continue
+        faults = tuple(faults_of(problem, at, p))
+        found = PeriodicOrbit(system, orbit.parameters, problem, u, at, count, faults)
+        if found.floquet.repeats and not faults:
+            return found
+    return None
 
 
 def _closed_orbit(

@@ -416,6 +416,9 @@ _BESIDE, _SEVERAL = 8, 200
 #: Relative distance of a recurrence at which a run is not simulated further.
 _GOOD = 0.02
 
+#: Parts of an orbit without events at whose ends it may begin, and part of its size below which a state is small.
+_SAMPLES, _ALMOST_ZERO = 64, 1e-3
+
 #: Time after which a second run begins where there are resets, in the same unit.
 _LATER = 0.05
 
@@ -544,10 +547,10 @@ def _from_recurrence(
         span = forcing(p)[0]
         starts[:, -1] -= span * math.floor(starts[0, -1] / span)
     legs = tuple(part.leg for part in found.parts)
-    return _problem(system, legs, starts, durations, found.periods, forcing, mirror, p)
+    return equations_of(system, legs, starts, durations, found.periods, forcing, mirror, p)
 
 
-def _problem(
+def equations_of(
     system: FilippovSystem,
     legs: tuple[Leg, ...],
     starts: Array,
@@ -557,6 +560,7 @@ def _problem(
     mirror: Array | None,
     p: Array,
 ) -> Start:
+    """The equations of an orbit through legs, with a phase condition where one leg has no event."""
     phase = reference = None
     if forcing is not None and not forcing.found:
         _require_period(system, legs, starts, durations, forcing(p)[0], p)
@@ -575,11 +579,26 @@ def _problem(
             starts[0, -1] = 0.0
             phase[-1] = 1.0
         else:
-            rate = rate_at(system, legs[0], starts[0], p)
+            starts, rate = _well_begun(system, legs[0], starts[0], float(durations[0]), p)
             phase = rate / float(np.linalg.norm(rate))
         reference = starts[0]
     problem = BoundaryProblem(system, legs, mirror, periods, forcing, phase, reference)
     return Start(problem, problem.pack(starts, durations), p)
+
+
+def _well_begun(
+    system: FilippovSystem, leg: Leg, x: Array, duration: float, p: Array
+) -> tuple[Array, Array]:
+    """The start (1, n) of a leg, or where it moves fastest if a state is almost zero there, and the rate there."""
+    states, n = [x], system.dimension
+    for _ in range(_SAMPLES):
+        states.append(integrate_leg(system, leg, states[-1], duration / _SAMPLES, p).end[:n])
+    rates = [rate_at(system, leg, state, p) for state in states]
+    sizes = np.abs(states).max(axis=0)
+    scale, k = np.where(sizes > 0.0, sizes, 1.0), 0
+    if (np.abs(x) < _ALMOST_ZERO * sizes).any():
+        k = int(np.argmax([np.linalg.norm(rate / scale) for rate in rates]))
+    return states[k][None].copy(), rates[k]
 
 
 def _from_word(
@@ -606,7 +625,7 @@ def _from_word(
         periods = max(1.0, round(count)) if mirror is None else round(count - 0.5) + 0.5
         if multiplicity is not None:
             periods = multiplicity / (1.0 if mirror is None else 2.0)
-    return _problem(system, legs, starts[: len(legs)], durations, periods, forcing, mirror, p)
+    return equations_of(system, legs, starts[: len(legs)], durations, periods, forcing, mirror, p)
 
 
 def _from_mode(
@@ -619,7 +638,7 @@ def _from_mode(
         apart.append(float(np.abs(y[:n] - x[:n]).max()))
     count = 1 + int(np.argmin(apart)) if multiplicity is None else multiplicity
     durations = np.array([count * span])
-    return _problem(system, (leg,), x[None].copy(), durations, count, forcing, None, p)
+    return equations_of(system, (leg,), x[None].copy(), durations, count, forcing, None, p)
 
 
 def _followed(

@@ -28,8 +28,8 @@ _AT_ZERO = 1e-9
 #: Condition number of the derivatives of a leg above which it is divided.
 _STIFF = 1e4
 
-#: Most parts of a leg.
-_PARTS = 1024
+#: How often a leg is halved at most.
+_HALVINGS = 10
 
 
 #: Sine of the angle of a multiplier below which it is real.
@@ -100,7 +100,7 @@ class Multipliers:
     @property
     def repeats(self) -> bool:
         """Whether an autonomous orbit has the multiplier 1 twice, as in a family of orbits."""
-        if self.refusal or self.problem.system.time_dependent:
+        if self.refusal or self.problem.system.time_dependent or not 10.0 * self.error <= _UNSURE:
             return False
         return bool((np.abs(self.logarithms) <= max(_NEUTRAL, 10.0 * self.error)).any())
 
@@ -189,22 +189,22 @@ class Multipliers:
         return bool(sizes[0] <= _STIFF * sizes[count - 1])
 
     def _cut(
-        self, leg: Leg, start: Array, duration: float, whole: tuple[Array, Array]
+        self, leg: Leg, x: Array, duration: float, whole: tuple[Array, Array], halvings: int = 1
     ) -> list[tuple[Array, Array]]:
-        system, units, n, count = self.problem.system, self._units, self.problem.dimension, 2
-        while True:
-            parts, x = list[tuple[Array, Array]](), start
-            for _ in range(count):
-                try:
-                    flow = integrate_leg(system, leg, x, duration / count, self.p)
-                except ConvergenceError:  # rounding of the parts leads it astray
-                    return [whole]
-                x, part = flow.end[:n], np.zeros_like(whole[0])
-                part[: len(flow.by_start)] = flow.by_start * units
-                parts.append((part, flow.rate))
-            if count >= _PARTS or all(self._even(part) for part, _ in parts):
-                return parts
-            count *= 2
+        """Parts of a leg, halved where derivatives grow too differently."""
+        n, half, parts = self.problem.dimension, 0.5 * duration, list[tuple[Array, Array]]()
+        for _ in range(2):
+            try:
+                flow = integrate_leg(self.problem.system, leg, x, half, self.p)
+            except ConvergenceError:  # rounding of the parts leads it astray
+                return [whole]
+            moved = np.zeros_like(whole[0])
+            moved[: len(flow.by_start)] = flow.by_start * self._units
+            part = moved, flow.rate
+            last = halvings >= _HALVINGS or self._even(moved)
+            parts += [part] if last else self._cut(leg, x, half, part, halvings + 1)
+            x = flow.end[:n]
+        return parts
 
 
 def _across(field: Array) -> Array:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -24,19 +25,25 @@ from ...model import (
     Parameters,
     mode_field,
     real,
+    require_plain,
     require_system,
     whole,
 )
-from .legs import LegFlow, Stretch, carry_leg, stretches
+from .legs import Leg, LegFlow, Stretch, stretches
 from .limits import limits_of
-from .variation import carried, passages_to, saltation_after
+from .variation import beginning_of, carried, flows_over, passages_over, passages_to
 
 #: Relative size of a column of R at an event below which a direction is lost, as in an entry to sliding.
 _LOST = 1e-12
 
-#: Largest ratio of the growths of two columns on a leg; beyond it rounding spoils the smaller one, and the
-#: leg is divided.
+#: Largest ratio of the growths of two directions on a piece of a leg; beyond it rounding spoils the smaller one.
 _RATIO = 1e6
+
+#: Steps of the run in a piece of a leg, and pieces that are carried in one call.
+_STEPS, _AT_A_TIME = 256, 64
+
+#: Gauss's rule for each step of a run.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 #: Tolerance of the sum of the logarithms of growths at an event, which is that of its determinant.
 _MISSED = 1e-6
@@ -119,7 +126,7 @@ def lyapunov_spectrum(
     Parameters
     ----------
     system : FilippovSystem
-        With scalar multipliers; an attractor is reached from the start.
+        Of which an attractor is reached from the start.
     x0 : array_like (n,)
         States at the start.
     t_end : float
@@ -145,7 +152,7 @@ def lyapunov_spectrum(
     DegenerateError
         The run ends early, grazes a surface, or meets two at one instant.
     DefinitionError
-        ``system`` is not a FilippovSystem, or has vector multipliers.
+        ``system`` is not a FilippovSystem, or has vector multipliers beside rules.
     PointError
         A start of a wrong shape or not finite.
     ParameterError
@@ -169,7 +176,9 @@ def lyapunov_spectrum(
     >>> ns.lyapunov_spectrum(decay, [1.0, 1.0, 0.5], t_end=100.0, transient=60.0).exponents.round(6)
     array([ 0.      , -0.443147, -1.      ])
     """
-    require_system(system, complementarity=True)
+    require_system(system, sets=True, complementarity=True)
+    if system.sets:
+        require_plain(system, "lyapunov_spectrum with sets")
     n = system.dimension - len(system.definition.discrete)
     count = n if k is None else whole(k, "k")
     if count > n:
@@ -219,7 +228,7 @@ class _Frame:
         self.q = np.linalg.qr(np.random.default_rng(0).normal(size=(self.n, count)))[0]
         self.bounds = np.linspace(begin, float(run.t[-1]), _BLOCKS + 1)
         self.logs = np.zeros((_BLOCKS, count))
-        self.volume, self.t = 0.0, float(run.t[0])
+        self.volume, self.rate, self.t = 0.0, 0.0, float(run.t[0])
 
     def follow(self, progress: bool) -> LyapunovSpectrum:
         """Follow the run and return its exponents."""
@@ -229,15 +238,17 @@ class _Frame:
         complete, j = True, 0
         try:
             while j < len(parts):
-                i = limits.get(j, j)
-                if i > j:
-                    self._limit(parts, j, i)
+                end = limits.get(j, j) + 1
+                if j in limits:
+                    self._limit(parts, j, end - 1)
                 else:
-                    flow = self._leg(parts[j])
-                    following = parts[j + 1] if j + 1 < len(parts) else None
-                    self._event(parts[j], flow, following)
-                bar.update(i + 1 - j)
-                j = i + 1
+                    own = self._pieces(parts[j])
+                    while end < len(parts) and end not in limits and len(own) < _AT_A_TIME:
+                        own += self._pieces(parts[end])
+                        end += 1
+                    self._follow_pieces(own, parts[end] if end < len(parts) else None)
+                bar.update(end - j)
+                j = end
         except KeyboardInterrupt:
             complete = False
             if self.t <= self.bounds[1]:
@@ -246,37 +257,73 @@ class _Frame:
             bar.close()
         return self._spectrum(complete)
 
-    def _leg(self, part: Stretch) -> LegFlow:
-        """Integrate a leg in pieces that end at the bounds of blocks."""
+    def _pieces(self, part: Stretch) -> list[Stretch]:
+        """Pieces of a leg that end at the bounds of blocks and after some steps of the run."""
+        pieces = self._cut(part, np.union1d(self.bounds, self._inner(part, self.rate)))
+        return [beginning_of(part), *pieces] if part.system.sets else pieces
+
+    def _inner(self, part: Stretch, rate: float) -> Array:
+        """Times inside a leg between which directions grow apart by no more than ``_RATIO``, if so at a ``rate``: ends of
+        steps of the run as far as they suffice."""
+        starts, end = self.run.steps.starts, part.t + part.duration
+        first = int(np.searchsorted(starts, part.t, side="right"))
+        steps = starts[first : np.searchsorted(starts, end)]
+        count = math.ceil(rate * part.duration / math.log(_RATIO))
+        count = max(1, count, len(steps) // _STEPS + 1)
+        if count <= len(steps):
+            return steps[np.arange(1, count) * len(steps) // count]
+        return np.union1d(steps, np.linspace(part.t, end, count + 1)) if count > 1 else steps[:0]
+
+    def _cut(self, part: Stretch, times: Array) -> list[Stretch]:
+        """A leg cut at those of some times that are inside."""
         end = part.t + part.duration
-        inner = self.bounds[(self.bounds > part.t) & (self.bounds < end)].tolist()
-        cuts = [*inner, end]
-        x, t = part.start, part.t
-        for cut in cuts:
-            flow = self._piece(part, x, t, cut - t, 0)
-            x, t = flow.end[: len(x)], cut
-        self.t = end
-        return flow
+        times = times[(times > part.t) & (times < end)]
+        if not len(times):
+            return [part]
+        x = self.run(times)
+        if len(part.start) > x.shape[1]:
+            x = np.column_stack([x, times])
+        edges, states = [part.t, *times.tolist(), end], [part.start, *x, part.end]
+        pieces = list[Stretch]()
+        for k in range(len(times) + 1):
+            leg, after = (part.leg, part.after) if k == len(times) else (Leg(part.leg.mode), x[k])
+            leg = replace(leg, left=() if k else part.leg.left)
+            duration, span = edges[k + 1] - edges[k], states[k : k + 2]
+            own = replace(part, leg=leg, t=edges[k], duration=duration, start=span[0], end=span[1])
+            pieces.append(replace(own, after=after))
+        return pieces
 
-    def _piece(self, part: Stretch, x: Array, t: float, duration: float, depth: int) -> LegFlow:
-        flow = carry_leg(part.system, part.leg, x, duration, part.p)
-        if not self.q.shape[1]:
-            return flow
-        q, r = np.linalg.qr(flow.by_start[: self.n, : self.n] @ self.q)
+    def _follow_pieces(self, pieces: Sequence[Stretch], following: Stretch | None) -> None:
+        """Carry directions over pieces of legs and through the events between them."""
+        after = [] if following is None else [beginning_of(following)]
+        for one in passages_over(self.run, [*pieces, *after])[: len(pieces)]:
+            part = one.stretch
+            if self.q.shape[1] and part.duration:
+                self._grow(part, one.flow)
+            elif self.q.shape[1]:  # neighbours of a state on a set reach it at once
+                self._lose(one.flow.by_start[: self.n, : self.n], part, part.t)
+            if one.event is not None and self.q.shape[1]:
+                self._lose(one.event.matrix[: self.n, : self.n], part, self.t)
+        if self.q.shape[1] == self.n:
+            self._add_divergence(pieces)
+
+    def _grow(self, part: Stretch, flow: LegFlow) -> None:
+        """Carry directions over a piece of a leg, divided where one grows so much more that another is lost in it."""
+        matrix = flow.by_start[: self.n, : self.n]
+        q, r = np.linalg.qr(matrix @ self.q)
         growth = np.abs(np.diag(r))
-        if depth < 40 and not _resolved(growth):
-            half = self._piece(part, x, t, duration / 2, depth + 1)
-            return self._piece(part, half.end[: len(x)], t + duration / 2, duration / 2, depth + 1)
-        self._count(q, growth, t + duration / 2)
-        if t >= self.bounds[0] and self.q.shape[1] == self.n:
-            self.volume += self._divergence(part, t, duration)
-        return flow
-
-    def _event(self, part: Stretch, flow: LegFlow, following: Stretch | None) -> None:
-        event = saltation_after(self.run, part, flow, following, None)
-        if event is None or part.leg.kind == "end" or not self.q.shape[1]:
-            return
-        self._lose(event.matrix[: self.n, : self.n], part, self.t)
+        finite = bool(np.isfinite(growth).all()) and growth.min() > 0.0
+        spread = math.log(growth.max() / growth.min()) if finite else math.log(_HUGE)
+        self.rate = spread / part.duration
+        pieces = self._cut(part, self._inner(part, self.rate))
+        if len(pieces) > 1 and (finite or not part.system.sets):
+            for own, its_flow in zip(pieces, flows_over(self.run, pieces), strict=True):
+                self._grow(own, its_flow)
+        elif part.system.sets and not growth.min() > _LOST * growth.max():
+            self._lose(matrix, part, self.t)  # a set is reached at its end
+        else:
+            self._count(q, growth, part.t + part.duration / 2)
+        self.t = part.t + part.duration
 
     def _lose(self, matrix: Array, part: Stretch, end: float) -> None:
         """Apply the matrix (n, n) of an event, or of what happens until ``end``, at which directions may be lost."""
@@ -330,27 +377,39 @@ class _Frame:
         found = np.searchsorted(self.bounds, t - AT_END * max(1.0, abs(t)), side="left")
         return min(int(found) - 1, _BLOCKS - 1)
 
-    def _divergence(self, part: Stretch, t: float, duration: float) -> float:
-        """Integral of the divergence of a mode's field along the run, by Gauss's rule on each step."""
-        run, system, mode = self.run, part.system, part.leg.mode
-        if len(mode) > system.surface_count or mode.count("s") > 1 or any(system.nonlinear):
-            return math.nan
+    def _add_divergence(self, pieces: Sequence[Stretch]) -> None:
+        """Add the integral of the divergence of the fields along legs, by Gauss's rule on each step."""
+        kinds = dict[str, list[Stretch]]()
+        for part in pieces:
+            if part.t >= self.bounds[0] and part.duration:
+                kinds.setdefault(part.leg.mode, []).append(part)
+        for mode, parts in kinds.items():
+            system, steps = parts[0].system, self.run.steps.starts
+            unknown = system.sets or len(mode) > system.surface_count or mode.count("s") > 1
+            if unknown or any(system.nonlinear):
+                self.volume = math.nan
+                return
+            edges = np.array([(part.t, part.t + part.duration) for part in parts])
+            inside = np.searchsorted(steps, edges).tolist()
+            spans = [
+                np.unique([a, *steps[i:j], b])
+                for (a, b), (i, j) in zip(edges.tolist(), inside, strict=True)
+            ]
+            low = np.concatenate([span[:-1] for span in spans])
+            half = (np.concatenate([span[1:] for span in spans]) - low) / 2
+            times = (low[:, None] + half[:, None] * (1.0 + _NODES)).ravel()
+            x = self.run(times)
+            if system.time_dependent:
+                x = np.column_stack([x, times])
+            values = np.array(self._divergence(system, mode)(x.T, parts[0].p)).reshape(-1, 8)
+            self.volume += float(half @ (values @ _WEIGHTS))
 
+    def _divergence(self, system: FilippovSystem, mode: str) -> ca.Function:
         def build() -> list[object]:
             field = mode_field(system, mode)
             return [sum(system.gradient(field[i])[i] for i in range(self.n))]
 
-        function = system.function(("divergence", mode), build)
-        inner = run.t[(run.t > t) & (run.t < t + duration)]
-        edges = np.unique([t, *inner, t + duration])
-        nodes, weights = np.polynomial.legendre.leggauss(8)
-        middle, half = (edges[1:] + edges[:-1]) / 2, np.diff(edges) / 2
-        times = (middle[:, None] + half[:, None] * nodes).ravel()
-        x = run(times)
-        if system.time_dependent:
-            x = np.column_stack([x, times])
-        values = np.array(function(x.T, part.p)).reshape(-1, 8)
-        return float(half @ (values @ weights))
+        return system.function(("divergence", mode), build)
 
     def _spectrum(self, complete: bool) -> LyapunovSpectrum:
         done = _BLOCKS if complete else int(np.searchsorted(self.bounds, self.t, side="right")) - 1
@@ -397,8 +456,3 @@ def _regular(matrix: Array) -> bool:
         scaled = scaled / largest
     values = np.linalg.svd(signs * scaled, compute_uv=False)
     return bool(values[-1] > _LOST * values[0])
-
-
-def _resolved(growth: Array) -> bool:
-    finite = bool(np.all(np.isfinite(growth)))
-    return finite and bool(growth.max() <= _RATIO * growth.min())

@@ -319,7 +319,7 @@ def passages(
         counts, spans = np.diff(cuts), np.array([(part.t, part.duration) for part in parts])
         begun, durations = np.repeat(spans, counts, axis=0).T
         since = np.clip(times[: cuts[-1]] - begun, 0.0, durations)
-    found = _passages(run, parts, chosen, since, cuts, back)
+    found = passages_over(run, parts, chosen, since, cuts, back)
     if not system.sets:
         _require_certain(run, found)
     first = parts[0]
@@ -329,28 +329,33 @@ def passages(
     return [replace(found[0], held=held), *found[1:]]
 
 
+def beginning_of(part: Stretch) -> Stretch:
+    """The first instant of a leg."""
+    x, leg = part.start, Leg(part.leg.mode, left=part.leg.left)
+    return replace(part, leg=leg, duration=0.0, end=x, after=x)
+
+
 def passages_to(
     run: Trajectory, parts: Sequence[Stretch], i: int, first: int = 0, chosen: tuple[int, ...] = ()
 ) -> list[Passage]:
     """Legs and events of a run from leg ``first`` to the limit that ends leg i, and where the next one starts."""
     own = list(parts[first : i + 2])
     if i + 1 < len(parts):
-        then = own[-1]
-        own[-1] = replace(
-            then, leg=Leg(then.leg.mode), duration=0.0, end=then.start, after=then.start
-        )
-    return _passages(run, own, chosen, NONE, [0] * (len(own) + 1), False)
+        own[-1] = beginning_of(own[-1])
+    return passages_over(run, own, chosen)
 
 
-def _passages(
+def passages_over(
     run: Trajectory,
     parts: Sequence[Stretch],
-    chosen: tuple[int, ...],
-    since: Array,
-    cuts: Sequence[int],
-    back: bool,
+    chosen: tuple[int, ...] = (),
+    since: Array = NONE,
+    cuts: Sequence[int] = (),
+    back: bool = False,
 ) -> list[Passage]:
-    flows = _flows(run, parts, chosen, since, cuts, back)
+    """Legs of a run with derivatives, also at times ``since`` their starts that are cut by legs; or recorded."""
+    cuts = cuts or [0] * (len(parts) + 1)
+    flows = flows_over(run, parts, chosen, since, cuts, back)
     limits, repeating = _limits(parts, flows)
     events = _saltations(run, parts, flows, repeating)
     every = zip(parts, flows, events, pairwise(cuts), strict=True)
@@ -387,15 +392,16 @@ def carried(
         yield part, begin, times, (dx, dp)
 
 
-def _flows(
+def flows_over(
     run: Trajectory,
     parts: Sequence[Stretch],
-    chosen: tuple[int, ...],
-    since: Array,
-    cuts: Sequence[int],
-    back: bool,
+    chosen: tuple[int, ...] = (),
+    since: Array = NONE,
+    cuts: Sequence[int] = (),
+    back: bool = False,
 ) -> list[LegFlow]:
     """Flows of legs, with samples at times ``since`` their starts that are cut by legs."""
+    cuts = cuts or [0] * (len(parts) + 1)
     system = parts[0].system
     arcs = [part.leg.arc(system, part.start, part.duration) for part in parts]
     p = np.array([part.p for part in parts]) if system is not run.system else parts[0].p

@@ -31,15 +31,6 @@ def _end(system, start, t_end):
     return run
 
 
-@pytest.mark.parametrize("restitution", [0.5, 0.8, 0.9, 0.99])
-def test_contact_closes_at_the_limit(restitution):
-    limit = math.sqrt(2 / _G) * (1 + 2 * restitution / (1 - restitution))
-    run = ns.simulate(_ball(restitution), [1, 0, 0], limit + 1)
-    contact = [event for event in run.events if event.kind == "contact"]
-    assert [event.t for event in contact] == pytest.approx([limit], abs=1e-12)
-    assert run.status is ns.Status.REACHED_END and run.x[-1][:2].tolist() == [0, 0]
-
-
 @pytest.mark.parametrize(
     ("restitution", "growth"), [(0.3, -4.0), (0.527, -2.3), (0.5, -2.4), (0.7, 20.0)]
 )
@@ -144,16 +135,6 @@ def test_ball_on_a_sprung_plate_after_waiting():
         return ns.simulate(system, [1.0, 0, -0.3, 0, 0], wait + 15, max_events=10**6).x[-1]
 
     np.testing.assert_allclose(at_end(1e5), at_end(1.0), rtol=0, atol=1e-8)
-
-
-def test_resets_end_at_their_limit():
-    floor = ns.Reset(y, [y, -0.75 * v], direction=-1)
-    system = ns.FilippovSystem([y, v], field=[v, -8], resets=floor)
-    run = ns.simulate(system, [1, 0], 4)
-    assert run.status is ns.Status.ACCUMULATION
-    assert run.accumulation_time == pytest.approx(3.5, abs=1e-12)
-    run = ns.simulate(system, [1, 0], 3.5 - 2**-18)
-    assert run.status is ns.Status.REACHED_END
 
 
 def _turning():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.differences import require
 
 LAWS = ("newton", "moreau", "poisson")
 
@@ -177,14 +178,6 @@ def test_three_contacts_with_friction_part_after_an_impact_or_have_none(seed, fi
         assert not struck("moreau", normals, tangents, weight, v, np.full(3, 0.6), 0.8)
 
 
-def slope_by(system, start, t_end, name, value, small=1e-6):
-    ends = [
-        ns.simulate(system, start, t_end, parameters={name: value + s}).x[-1]
-        for s in (small, -small)
-    ]
-    return (ends[0] - ends[1]) / (2 * small)
-
-
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("inertia", [0.5, 2.0])
 def test_derivatives_pass_through_an_impact_beside_a_closed_contact(law, inertia):
@@ -200,10 +193,9 @@ def test_derivatives_pass_through_an_impact_beside_a_closed_contact(law, inertia
         ],
         parameters={g: 9.81},
     )
-    run = ns.simulate(system, [0.3, 0.3, 0.0, 0.0], 0.5)
-    assert "impact" in [event.kind for event in run.events]
-    want = slope_by(system, [0.3, 0.3, 0.0, 0.0], 0.5, "g", 9.81)
-    np.testing.assert_allclose(ns.sensitivity(run).dx_dp[:, 0], want, atol=1e-7)
+    start = [0.3, 0.3, 0.0, 0.0]
+    assert "impact" in [event.kind for event in ns.simulate(system, start, 0.5).events]
+    require(system, start, 0.5, of=[4], within=1e-9)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -219,12 +211,7 @@ def test_derivatives_pass_through_an_oblique_impact(law, speed):
         impacts=ns.Impact(y, restitution=0.5, reaction=r, law=law),
         parameters={mu: 0.3},
     )
-    start = [0.0, 1.0, speed, 0.0, 0.0]
-    run = ns.simulate(system, start, 1.0)
-    own = ns.sensitivity(run)
-    np.testing.assert_allclose(own.dx_dp[:, 0], slope_by(system, start, 1.0, "mu", 0.3), atol=1e-7)
-    ends = [ns.simulate(system, [0, 1.0, speed + s, 0, 0], 1.0).x[-1] for s in (1e-6, -1e-6)]
-    np.testing.assert_allclose(own.dx_dx0[:, 2], (ends[0] - ends[1]) / 2e-6, atol=1e-7)
+    require(system, [0.0, 1.0, speed, 0.0, 0.0], 1.0, of=[2, 5], within=1e-9)
 
 
 def test_all_impacts_have_one_law():

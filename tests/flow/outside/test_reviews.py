@@ -6,24 +6,12 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 import nonsmooth as ns
 
 h, k, x, y, u, v, w, z, t, a, b = (ca.SX.sym(name) for name in "hkxyuvwztab")
 th, l1, l2, r1, r2 = (ca.SX.sym(name) for name in ("th", "l1", "l2", "r1", "r2"))
 REACHED = ns.Status.REACHED_END
-
-
-@pytest.mark.parametrize("tol", [1e-6, 1e-8, 1e-10])
-def test_returns_to_a_curved_section_are_counted_once(tol):
-    """The 40th return by scipy's DOP853 with steps of at most 0.1 is at 151.5334."""
-    pendulum = ns.FilippovSystem([x, v], field=[v, -1.3 * ca.sin(x) + 0.1 * (1 - x * x) * v])
-    section = ca.sin(1.1 * x + 0.7 * v) - 0.9
-    points = ns.orbit.poincare(pendulum, section, [1.0, 0.5], count=40, tol=tol)
-    assert np.diff(points.t).min() > 1e-3
-    assert abs(points.t[-1] - 151.5334) < 1e-3
 
 
 GRAVITY, RESTITUTION = 9.81, 0.8
@@ -185,106 +173,6 @@ def test_a_hump_of_friction_releases_at_the_same_force_each_time(hump):
     assert len(left) >= 3 and np.abs(np.array(left) + 0.4 * top).max() < 1e-8
 
 
-LEVELS = np.random.default_rng(3).uniform(-0.9, 0.9, 100)
-
-
-def resets_of(run):
-    return np.array([e.t for e in run.events if e.kind == "reset"])
-
-
-GUARDS = {
-    "time": ns.FilippovSystem(
-        [k],
-        field=[1],
-        parameters={h: 0.0},
-        time=t,
-        resets=ns.Reset(ca.sin(t) - h, [k + 1], direction=1),
-    ),
-    "state": ns.FilippovSystem(
-        [x, k],
-        field=[1, 0],
-        parameters={h: 0.0},
-        resets=ns.Reset(ca.sin(x) - h, [x, k + 1], direction=1),
-    ),
-    "oscillator": ns.FilippovSystem(
-        [x, v, k],
-        field=[v, -x, 0],
-        parameters={h: 0.0},
-        resets=ns.Reset(x - h, [x, v, k + 1], direction=1),
-    ),
-}
-STARTS = {"time": [0.0], "state": [0.0, 0.0], "oscillator": [0.0, 1.0, 0.0]}
-
-
-@pytest.mark.parametrize("guard", GUARDS)
-@pytest.mark.parametrize("tol", [1e-8, 1e-10, 1e-12])
-def test_a_sine_guard_is_located_where_the_arcsine_says(guard, tol):
-    for level in LEVELS:
-        true = np.arcsin(level) + 2 * np.pi * np.arange(-1, 5)
-        true = true[(true > 1e-6) & (true < 20.0)]
-        run = ns.simulate(GUARDS[guard], STARTS[guard], 20.0, parameters={"h": level}, tol=tol)
-        found = resets_of(run)
-        assert len(found) == len(true), level
-        assert np.abs(found - true).max() < 100 * tol, level
-
-
-FINE = np.linspace(0, 20.0, 400_001)
-CURVED = {
-    "x": (x, np.cos(FINE)),
-    "sin t": (ca.sin(t), np.sin(FINE)),
-    "sin 3t": (ca.sin(3 * t), np.sin(3 * FINE)),
-    "x + sin 3.1t": (x + ca.sin(3.1 * t), np.cos(FINE) + np.sin(3.1 * FINE)),
-    "x^3": (x**3, np.cos(FINE) ** 3),
-    "xv": (x * v, -np.cos(FINE) * np.sin(FINE)),
-}
-
-
-def rises(values):
-    return int(((values[:-1] < 0) & (values[1:] >= 0)).sum())
-
-
-@pytest.mark.parametrize("name", CURVED)
-@pytest.mark.parametrize("tol", [1e-6, 1e-10, 1e-13])
-def test_a_reset_fires_once_a_passage(name, tol):
-    guard, dense = CURVED[name]
-    kick = ns.Reset(guard - h, [x, v, k + 1], direction=1, name="kick")
-    system = ns.FilippovSystem(
-        [x, v, k], field=[v, -x, 0], parameters={h: 0.0}, time=t, resets=kick
-    )
-    for level in LEVELS[:60]:
-        run = ns.simulate(system, [1.0, 0.0, 0.0], 20.0, parameters={"h": level}, tol=tol)
-        assert run.x[-1, 2] == rises(dense - level), level
-
-
-def test_a_section_is_met_once_a_passage():
-    guard, dense = CURVED["x + sin 3.1t"]
-    system = ns.FilippovSystem([x, v], field=[v, -x], time=t)
-    for level in LEVELS:
-        at = ns.Section(guard - float(level), direction=1)
-        run = ns.simulate(system, [1.0, 0.0], 20.0, at=at)
-        assert len(run.sample_t) == rises(dense - level), level
-
-
-@pytest.mark.parametrize("speed", [3.0, 5.0, 10.0, 30.0])
-def test_the_first_impact_on_a_shaken_table(speed):
-    table = ns.FilippovSystem(
-        [y, v],
-        field=[v, -9.81],
-        impacts=ns.Impact(y - 0.1 * ca.sin(speed * t), restitution=0.8),
-        time=t,
-    )
-    for height in (0.5, 1.0, 2.0, 5.0):
-        run = ns.simulate(table, [height, 0.0], 1.3)
-        grid = np.linspace(1e-9, 1.3, 200_001)
-
-        def gap(s, height=height):
-            return height - 4.905 * s * s - 0.1 * np.sin(speed * s)
-
-        below = np.flatnonzero(gap(grid) < 0)
-        true = brentq(gap, grid[below[0] - 1], grid[below[0]], xtol=1e-15)
-        assert abs(next(e.t for e in run.events if e.kind == "impact") - true) < 1e-12
-
-
 def at(*roots):
     return math.prod([t - root for root in roots])
 
@@ -325,54 +213,3 @@ def test_close_events_of_hipparchus(case, moves):
     error = np.abs([one[1] - other[1] for one, other in zip(found, expected, strict=True)])
     # twenty roots: a product known to rounding, so ill-conditioned as Wilkinson's
     assert error.max() < (1e-9 if case == "twenty" else 1e-12)
-
-
-@pytest.mark.slow
-def test_static_friction_above_kinetic():
-    """Break-aways of x'' + 0.1 x' + x = 1.3 cos(0.3 t) - friction, by an event loop with scipy's DOP853."""
-    z, speed, push, static, t_end = 0.05, 0.3, 1.3, 1.1, 200.0
-    hump = brentq(lambda c: (2 / 3) * (1 + c) ** 1.5 / math.sqrt(3 * c) - static, 0.5, 5)
-    law = w * (1 + hump * (1 - w**2))
-    system = ns.FilippovSystem(
-        [x, v],
-        surface=v,
-        multipliers=w,
-        field=[v, -2 * z * v - x + push * ca.cos(speed * t) - law],
-        time=t,
-        hidden=True,
-    )
-    run = ns.simulate(system, [0.0, 1.0], t_end, tol=1e-11)
-    found = [e.t for e in run.events if e.kind == "exit"]
-    now, state, sign, true = 0.0, np.array([0.0, 1.0]), 1, []
-    while True:
-
-        def force(s, state=state):
-            return -state[0] + push * np.cos(speed * s)
-
-        def stopped(s, q):
-            return q[1]
-
-        stopped.terminal, stopped.direction = True, -sign
-        leg = solve_ivp(
-            lambda s, q, sign=sign: [q[1], -2 * z * q[1] + force(s, q) - sign],
-            (now, t_end), state, events=stopped, rtol=1e-12, atol=1e-13, method="DOP853", max_step=0.5,
-        )  # fmt: skip
-        now, state = leg.t[-1], leg.y[:, -1].copy()
-        if leg.status != 1:
-            break
-        state[1] = 0.0
-        if abs(force(now, state)) > static:
-            sign = int(np.sign(force(now, state)))
-            continue
-        grid = np.linspace(now, now + 2 * math.pi / speed, 200_001)
-        over = np.flatnonzero(np.abs(force(grid, state)) > static)
-        if not over.size or grid[over[0]] > t_end:
-            break
-        now = brentq(
-            lambda s, state=state: abs(force(s, state)) - static,
-            grid[over[0] - 1], grid[over[0]], xtol=1e-14,
-        )  # fmt: skip
-        sign = int(np.sign(force(now, state)))
-        true.append(now)
-    assert run.status == REACHED and len(found) == len(true) == 19
-    assert np.abs(np.array(found) - true).max() < 1e-10

@@ -94,3 +94,36 @@ def test_such_branches_are_drawn():
     assert any(
         "boundary equilibrium" in str(t.get_text()) for t in figure.axes[0].get_legend().texts
     )
+
+
+def test_an_orbit_that_comes_slowly_to_a_boundary_equilibrium_has_an_infinite_period():
+    """A stable equilibrium at the height mu, with a fast pair of complex eigenvalues, reaches the surface at mu = 0."""
+    z = ca.SX.sym("z")
+    below = [-3 * X - z, -(Y - MU) - X, X - 3 * z]
+    system = ns.FilippovSystem(
+        [X, Y, z], surface=Y, above=[1, 1 - X, -z], below=below, parameters={MU: 0.5}
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 0.1, 0.0], 60.0))
+    branch = ns.continue_orbit(orbit, "mu", bounds=(-0.3, 0.6))
+    assert [event.kind for event in branch.events] == ["infinite period at a boundary node"]
+    assert abs(branch.events[0].parameter) < 1e-12 and "logarithm" in branch.reasons[0]
+    assert branch.ends[0] is ns.orbit.BranchEnd.PERIOD_DIVERGES
+
+
+@pytest.mark.parametrize("slope", [0.0, 1.0])
+@pytest.mark.parametrize("share", [1.0, 2.0])
+def test_a_slide_that_comes_to_a_two_fold_inside_ends_its_branch_there(slope, share):
+    """L1 = -(x^2 + z) and L2 = k (x^2 + 2 z) vanish together at x = 0 where z, which a reset sets to mu, is zero."""
+    z, w = ca.SX.sym("z"), ca.SX.sym("w")
+    system = ns.FilippovSystem(
+        [X, Y, z, w],
+        surface=Y,
+        above=[1 + slope * X, -(X**2 + z), 0, -w],
+        below=[1 - slope * X / 2, share * (X**2 + 2 * z), 0, 1 - w],
+        resets=[ns.Reset(X - 1, [X - 2, Y, MU, w], direction=1)],
+        parameters={MU: 0.5},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 0.0, 0.5, 0.0], 30.0))
+    branch = ns.continue_orbit(orbit, "mu", bounds=(-0.3, 0.6))
+    assert [event.kind for event in branch.events] == ["two-fold"]
+    assert abs(branch.events[0].parameter) < 1e-12 and "unique" in branch.reasons[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
 from tests.orbit.periodic_cases import stick_slip, symbols
@@ -160,3 +161,43 @@ def test_multiplicity_of_a_run_and_of_one_mode() -> None:
     assert orbit.period == pytest.approx(4 * np.pi)
     run = ns.simulate(system, [0.1], 80.0)
     assert ns.periodic_orbit(system, run, multiplicity=1).period == pytest.approx(4 * np.pi)
+
+
+@pytest.mark.parametrize("law", ["relay", "friction"])
+@pytest.mark.parametrize("start", [1.0, 0.55])
+def test_orbits_of_a_neutral_family_are_named_as_such_also_where_it_touches_a_surface(law, start):
+    """A block on a belt with constant friction circles the equilibrium, at most where it touches the belt's speed."""
+    x, v, b = symbols("x v b")
+    given = {"surface": v - b, "above": [v, -x - 0.4], "below": [v, 0.4 - x]}
+    if law == "friction":
+        friction = ns.Friction(v - b, load=1, kinetic=0.4)
+        given = {"field": [v, friction.force - x], "surfaces": [friction]}
+    system = ns.FilippovSystem([x, v], parameters={b: 0.3}, **given)
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [start, 0.0], 100.0))
+    assert orbit.itinerary == "-" and orbit.period == pytest.approx(2 * np.pi, rel=1e-12)
+    assert np.abs(orbit.multipliers - 1.0).max() < 1e-9
+    assert "neutral" in orbit.stability and "family" in str(orbit)
+    branch = ns.continue_orbit(orbit, "b", bounds=(0.1, 0.9))
+    assert not branch.events and all("neutral family" in reason for reason in branch.reasons)
+
+
+@pytest.mark.parametrize("half", [0.3, 0.25, 0.24])
+@pytest.mark.parametrize("simulated", [True, False])
+def test_an_orbit_is_found_to_all_digits_where_a_state_is_almost_zero(half, simulated):
+    """Prey falls to 2e-14 between the outbreaks; in logarithms of the states it is a relaxation oscillation."""
+    system = ns.textbook.harvested_prey_predator().system
+    values = {"b": half, "alpha": 3.0}
+
+    def field(t, u):
+        eaten = 0.3556 / (half + np.exp(u[0]))
+        return [1 - np.exp(u[0]) - eaten * np.exp(u[1]), eaten * np.exp(u[0]) - 0.0444]
+
+    rises = lambda t, u: u[1] - np.log(0.5)
+    rises.direction = 1
+    start = np.log([0.87, 0.5])
+    truth = solve_ivp(
+        field, (-1, 500), start, method="DOP853", rtol=1e-13, atol=1e-13, events=rises
+    )
+    run = ns.simulate(system, [0.5, 0.5], 600.0, parameters=values)
+    orbit = ns.periodic_orbit(system, run if simulated else [0.5, 0.5], parameters=values)
+    assert orbit.period == pytest.approx(np.diff(truth.t_events[0])[-1], rel=1e-11)

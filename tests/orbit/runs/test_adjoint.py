@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import casadi as ca
@@ -11,8 +10,6 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from tests.orbit.runs.test_set_sensitivity import block
-from tests.orbit.test_complementarity import RUNS as DIODES
 
 CASES = {
     case["id"]: case
@@ -95,78 +92,6 @@ SLIDER = ns.FilippovSystem(  # a surface that is crossed, slid on, and left
     below=[1 + y * x, 2 + b * y - x],
     parameters={a: 0.3, b: 0.7},
 )
-STICKER = ns.FilippovSystem(  # a driven block on a dry floor, which sticks
-    [x, v],
-    field=[v, -x + a * ca.cos(t) - b * lam],
-    multipliers=lam,
-    surface=v,
-    time=t,
-    parameters={a: 1.3, b: 0.4},
-)
-IMPACTS = ns.FilippovSystem(
-    [y, v],
-    field=[v, -1 - a * v],
-    impacts=ns.Impact(y - 0.1 * ca.sin(3 * t), restitution=r),
-    time=t,
-    parameters={a: 0.1, r: 0.7},
-)
-RESETS = ns.FilippovSystem(  # a jump that carries the state through a surface, and a clock
-    [x, y],
-    surface=y,
-    above=[1 + y, -1 - x],
-    below=[2 * y, 0.5 + a * x],
-    parameters={a: 0.4, b: 0.2},
-    resets=[ns.Reset(x - 1, [x - 1.5, -y - a], 1)],
-    clocks=ns.Clock(0.9, map=[x + b * y, y]),
-)
-STIFF = ns.FilippovSystem(
-    [x, y, w],
-    surface=x - 0.2,
-    above=[-1 - a * x + y, -k * (y - 0.3 * x) + w * x, -w + x],
-    below=[1 + a * y, -k * (y + w), x * w + 0.1],
-    parameters={a: 0.3, k: 1e5},
-)
-RUNS = {
-    "slide": (SLIDER, [-1.0, 0.9], 4.0),
-    "stick": (STICKER, [1.5, 0.2], 9.0),
-    "impacts": (IMPACTS, [1.0, 0.0], 4.0),
-    "resets": (RESETS, [0.1, 2.0, 0.1], 3.3),
-    "stiff": (STIFF, [1.0, 0.5, 0.2], 4.0),
-    "plane": (block(), [0.0, 0.0, 0.3, 0.4], 4.0),
-    **{name: (system, start, end) for name, (system, start, end, _) in DIODES.items()},
-}
-
-
-def differences(of: Callable[[np.ndarray], np.ndarray], at: np.ndarray, h: float) -> np.ndarray:
-    """Central differences of order four, the directions last."""
-    weights = {1: 8 / 12, -1: -8 / 12, 2: -1 / 12, -2: 1 / 12}
-    rows = [sum(w * of(at + j * h * e) for j, w in weights.items()) / h for e in np.eye(len(at))]
-    return np.moveaxis(np.array(rows), 0, -1)
-
-
-@pytest.mark.parametrize("name", RUNS)
-def test_rows_and_columns_and_differences_agree_at_samples(name) -> None:
-    system, start, end = RUNS[name]
-    rng, n = np.random.default_rng(1), len(start)
-    times = np.sort([0.0, end, *rng.uniform(0.0, end, 6)])
-    run = ns.simulate(system, start, end, t_eval=times, tol=1e-13)
-    s = ns.sensitivity(run)
-    rows, row = rng.normal(size=(len(times), n)), rng.normal(size=n)
-    by_start, by_parameters = ns.vjp(run, row, samples=rows)
-    columns = np.concatenate([s.dsample_dx0, s.dsample_dp], axis=2)
-    whole = np.hstack([s.dx_dx0, s.dx_dp])
-    expected = row @ whole + np.einsum("ki,kij->j", rows, columns)
-    size = 1.0 + np.abs(columns).max()
-    assert np.abs(np.concatenate([by_start, by_parameters]) - expected).max() < 1e-12 * size
-    assert np.abs(columns[-1] - whole).max() < 1e-12 * size
-
-    def sampled(z: np.ndarray) -> np.ndarray:
-        given = dict(zip(system.parameter_names, z[n:], strict=True))
-        return ns.simulate(system, z[:n], end, t_eval=times, parameters=given, tol=1e-13).sample_x
-
-    z = np.concatenate([start, system.parameter_vector()])
-    free = slice(n, None) if name == "plane" else slice(None)  # a start at rest is a corner
-    assert np.abs(differences(sampled, z, 1e-4)[..., free] - columns[..., free]).max() < 1e-6 * size
 
 
 def test_samples_at_an_event_are_on_the_side_of_their_states() -> None:

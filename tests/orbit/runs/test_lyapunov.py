@@ -110,7 +110,7 @@ def test_invalid_options_raise(options, error, message):
 def test_an_interrupt_keeps_the_exponents_so_far(monkeypatch):
     clock = ns.Clock(1.0, map=[x / 2])
     system = ns.FilippovSystem([x], field=[0.0 * x], clocks=clock)
-    interrupt(monkeypatch, lyapunov, "carry_leg", 101)
+    interrupt(monkeypatch, lyapunov, "passages_over", 3)
     found = ns.lyapunov_spectrum(system, [1.0, 0.0], t_end=200.0, transient=40.0, k=2)
     assert not found.complete and 10.0 <= found.t < 160.0 and "interrupted" in repr(found)
     assert np.allclose(np.sort(found.exponents), [-math.log(2), 0.0], atol=1e-9)
@@ -167,3 +167,31 @@ def test_a_passenger_of_a_chattering_ball_has_the_exponent_of_its_decay() -> Non
     found = ns.lyapunov_spectrum(table, [0.45, 1.5, 0.1], 8.0, t_start=0.2, transient=2.5)
     assert found.exponents.tolist() == [pytest.approx(-0.2, rel=1e-9), -math.inf, -math.inf]
     assert found.errors[0] < 1e-9
+
+
+def friction_in_the_plane(strength: float) -> ns.FilippovSystem:
+    """A pushed mass on springs, and a passenger w that follows it at the rate 1."""
+    x, y, u, v, w, t = (ca.SX.sym(s) for s in "xyuvwt")
+    lam = ca.SX.sym("lam", 2)
+    along = -x - x**3 - u / 10 + 1.2 * ca.cos(t) - strength * lam[0] + y / 5
+    across = -1.5 * y - v / 10 + 0.9 * ca.sin(t) - strength * lam[1] + 0.3 * x
+    surface, field = ca.vertcat(u, v), [u, v, along, across, x - w]
+    return ns.FilippovSystem(
+        [x, y, u, v, w], field=field, surfaces=[surface], multipliers=[lam], time=t
+    )
+
+
+def test_slip_in_the_plane_has_the_volume_of_its_derivatives():
+    system, start = friction_in_the_plane(0.9), [1.0, 0.2, 0.5, 0.1, 0.3]
+    found = ns.lyapunov_spectrum(system, start, t_end=30.0, transient=0.0)
+    slope = ns.sensitivity(ns.simulate(system, start, 30.0), wrt="x0").dx_dx0
+    assert found.exponents.sum() * 30.0 == pytest.approx(np.linalg.slogdet(slope)[1], rel=1e-10)
+    assert math.isnan(found.sum_check)
+
+
+def test_sticking_in_the_plane_loses_the_velocities_and_keeps_the_passenger():
+    start = [1.0, 0.2, 0.5, 0.1, 0.3]
+    found = ns.lyapunov_spectrum(friction_in_the_plane(2.2), start, t_end=60.0)
+    assert (found.exponents[-2:] == -math.inf).all()
+    assert found.exponents[2] == pytest.approx(-1.0, abs=0.05)
+    assert (np.abs(found.exponents[:2]) < 0.1).all()

@@ -16,6 +16,7 @@ static void pull_links(const Slopes *g, int group, int k) {
     if (l->factor == MINUS) own = -own;
     if (l->factor == TIMES_ORDER) own *= k + 1;
     if (l->factor == OVER_ORDER) own *= PART[k + 1];
+    if (l->terms == 1 && l->first == 0) { l->from[at] += l->value * own; continue; }
     for (int j = l->first; j <= last; j++) l->from[at - j] += l->by[j] * own;
   }
 }

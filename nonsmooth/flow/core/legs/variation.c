@@ -28,7 +28,7 @@ typedef struct {
 
 /* One term of the recursion: to coefficient k of ``to`` the sum of products of coefficients of ``by``, from ``first`` to
  * below ``terms``, with those of ``from`` up to k + ahead, times a factor. */
-typedef struct { double *to, *from; const double *by; int32_t first, terms, ahead, factor, known; } Link; /* known: coefficients of ``from`` up to the last that is not zero */
+typedef struct { double *to, *from; const double *by; double value; int32_t first, terms, ahead, factor, known; } Link; /* value: of ``by``, if it has one term; known: coefficients of ``from`` up to the last that is not zero */
 enum { PLUS, MINUS, TIMES_ORDER, OVER_ORDER }; /* the last two: k + 1 and its inverse */
 
 /* Links in the order in which they are used: distances of sets at the start; of an order directions of sets, sums,
@@ -45,8 +45,8 @@ typedef struct {
   double *of_states, *of_series, *h, *p;
 } Variation;
 
-/* Entries of the program's derivatives: where those by each of its inputs begin, terms of their series, at most so many;
- * the ones by what moves that count in a mode. The recursion that they give. */
+/* Entries of the program's derivatives: where those by each of its inputs begin, terms of their series, at most so many
+ * in any mode and in one where nothing slides; the ones by what moves that count in a mode. The recursion that they give. */
 typedef struct {
   int32_t *first, *terms, *most, *active, count, leaving, begin[GROUPS + 1];
   Link *link;
@@ -76,7 +76,7 @@ static size_t place_variation(const Run *r, size_t columns, Slopes *g, Variation
   g->v = v;
   g->first = INTEGERS(moving_size(r) + r->s->parameters + 1);
   g->terms = INTEGERS(entries);
-  g->most = INTEGERS(entries);
+  g->most = INTEGERS(2 * entries);
   g->active = INTEGERS(entries);
   g->link = place(base, &used, sizeof(Link), 2 * entries + w * w + n + 16 * w);
   v->h = DOUBLES((columns + 1) * r->m);
@@ -97,14 +97,9 @@ static size_t place_variation(const Run *r, size_t columns, Slopes *g, Variation
 
 static void clear_variation(const Variation *v) { memset(v->states, 0, sizeof(double) * v->room); }
 
-static void begin_slopes(const Run *r, Slopes *g) {
+/* Terms that entries have at most by the lists of a program. */
+static void most_terms(const Run *r, const Series *t, int32_t *most) {
   const Entries *e = &r->s->derivatives;
-  const Series *t = &r->s->series;
-  int inputs = moving_size(r) + r->s->parameters;
-  for (int j = 0, q = 0; j <= inputs; j++) {
-    while (q < e->count && e->column[q] < j) q++;
-    g->first[j] = q;
-  }
   int8_t *moves = calloc(t->size, 1);
   for (int l = 0; moves && l < t->later.count; l++) {
     const Rule *q = t->rule + t->later.rule[l];
@@ -114,12 +109,23 @@ static void begin_slopes(const Run *r, Slopes *g) {
   }
   for (int l = 0; moves && l < t->inputs; l++) moves[t->input[l] / r->stride] = 1;
   for (int q = 0; q < e->count; q++)
-    g->most[q] = moves && !moves[(derivative_row(r, q) - r->series) / r->stride] ? 1 : r->stride;
+    most[q] = moves && !moves[(derivative_row(r, q) - r->series) / r->stride] ? 1 : r->stride;
   free(moves);
 }
 
+static void begin_slopes(const Run *r, Slopes *g) {
+  const Entries *e = &r->s->derivatives;
+  int inputs = moving_size(r) + r->s->parameters;
+  for (int j = 0, q = 0; j <= inputs; j++) {
+    while (q < e->count && e->column[q] < j) q++;
+    g->first[j] = q;
+  }
+  most_terms(r, &r->s->series, g->most);
+  most_terms(r, &r->s->free, g->most + e->count);
+}
+
 static void add_link(Slopes *g, double *to, double *from, const double *by, int first, int terms, int ahead, int factor) {
-  g->link[g->begin[GROUPS]++] = (Link){to, from, by, first, terms, ahead, factor, 0};
+  g->link[g->begin[GROUPS]++] = (Link){to, from, by, *by, first, terms, ahead, factor, 0};
 }
 
 /* A link of coefficients of one order. */
@@ -225,14 +231,18 @@ static void link_up(Run *r, const Expansion *e, Slopes *g) {
 /* Entries of an expansion that count, and their recursion. */
 static void measure_slopes(Run *r, const Expansion *e, Slopes *g, int at_point) {
   int size = moving_size(r);
+  const int32_t *most = g->most + (e->l.is_free ? r->s->derivatives.count : 0);
+  const double *row = 0;
+  int room = 0, known = 0;
   g->count = 0;
   for (int j = 0; j < size + r->s->parameters; j++) {
     int i = j < r->n || j >= size ? -1 : unknown_at(r, j), counts = j < r->n || j >= size;
     counts |= i >= 0 && (is_moving(r, i) || e->l.letter[i] == 0);
-    for (int q = g->first[j]; q < g->first[j + 1]; q++) {
-      g->terms[q] = 0;
-      if (!counts || !is_wanted(r, e, r->s->derivatives.row[q], at_point)) continue;
-      g->terms[q] = terms_of(derivative_row(r, q), g->most[q]);
+    if (!counts) memset(g->terms + g->first[j], 0, sizeof(int32_t) * (g->first[j + 1] - g->first[j]));
+    for (int q = g->first[j]; counts && q < g->first[j + 1]; q++) {
+      const double *own = derivative_row(r, q);
+      if (own != row || most[q] != room) known = terms_of(row = own, room = most[q]);
+      g->terms[q] = is_wanted(r, e, r->s->derivatives.row[q], at_point) ? known : 0;
       if (g->terms[q] && j < size) g->active[g->count++] = q;
     }
   }
@@ -243,7 +253,7 @@ static void measure_slopes(Run *r, const Expansion *e, Slopes *g, int at_point) 
 static void follow_links(const Slopes *g, int first_group, int last_group, int k) {
   for (Link *l = g->link + g->begin[first_group], *end = g->link + g->begin[last_group + 1]; l < end; l++) {
     double sum;
-    if (l->terms == 1) sum = l->from[k] * *l->by;
+    if (l->terms == 1) sum = l->from[k] * l->value;
     else {
       int at = k + l->ahead, newest = at - l->first, first = at < l->terms ? 0 : at + 1 - l->terms;
       if (k == 0) l->known = terms_of(l->from, newest + 1);

@@ -1,6 +1,6 @@
 """The 26 systems of a review by new users: each runs, and its local questions have the answers of closed forms
 and of scipy. Tests have the numbers of the review; 16 is in tests/bounce. Runs of 2, 3, 5 to 7,
-9 to 12, 14, 19 to 22, 24 and 26 are in tests/cases (runs.json, events.json, peers.json, stiff.json) and the textbook.
+9 to 12, 14, 19 to 22, 24 and 26 are in testset, tests/cases (runs.json, events.json, stiff.json) and the textbook.
 """
 
 import functools

@@ -123,7 +123,11 @@ def special_point(curve: EventCurve | ConnectionCurve, zero: Zero, event: str) -
         solution = base.describe(u)
     except (ArithmeticError, ValueError):
         solution = None
-    return CodimensionTwo(kind, u[-2:], solution, meeting)
+    values, touched = u[-2:], getattr(curve, "condition", None)
+    if zero.name == "Hopf" and isinstance(base, OrbitCurve) and touched is not None:
+        shrunk = base.hopf(u, touched.guard)  # the equilibrium on the surface
+        values = values if shrunk is None else shrunk[1]
+    return CodimensionTwo(kind, values, solution, meeting)
 
 
 def _kind(curve: EventCurve | ConnectionCurve, zero: Zero, event: str) -> str:

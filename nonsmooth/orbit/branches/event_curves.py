@@ -28,13 +28,13 @@ from ...flow.fixed import first_terms
 from ...model import Array, DegenerateError, NonsmoothError
 from ...model.derivatives.event_maps import surface_map
 from ...model.derivatives.variational import guarded_field, states_at
-from ...solvers.continuation import Curve, Point, Secant, Zero
+from ...solvers.continuation import Curve, Departure, Point, Secant, Zero
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import return_map
 from ..periodic.orbit import PeriodicOrbit
 from ..runs.guards import CONDITIONS
 from ..runs.legs import Leg, integrate_leg
-from .branch import BranchCurve
+from .branch import DIVIDE, BranchCurve
 from .conditions import Condition, minima, touching
 from .itinerary_changes import grown
 from .normal_forms import normal_form, torus_pair
@@ -195,10 +195,10 @@ class EventCurve(Curve):
     def _touching_rows(self, u: Array, inner: Array) -> tuple[Array, Array]:
         """The guard and its rate at the touch, and their derivatives by the unknowns."""
         # Where the touch is only the point of the flow matters; there both are differentiated numerically.
-        leg, x, _, p = self._leg(inner)
+        leg, _, _, p = self._leg(inner)
         assert self.condition is not None
         n, k, free = self.problem.dimension, self.columns, self.base.free
-        begin, t = self.condition.leg * n, float(u[k])
+        x, begin, t, share = self.problem.begun_at(inner[:k], self.condition.leg, float(u[k]))
         flow = integrate_leg(self.base.system, leg, x, t, p, free)
         terms, y, rows = self._guard(leg, flow.end, p), flow.end, np.zeros((2, u.size))
         by_state = np.empty((2, y.size))
@@ -208,6 +208,7 @@ class EventCurve(Curve):
             by_state[:, j] = change[:2] / (2.0 * step[j])
         rows[:, begin : begin + n] = by_state @ flow.by_start
         rows[:, k] = terms[1], 2.0 * terms[2]
+        rows[:, k - len(self.problem.legs) + self.condition.leg] -= share * rows[:, k]
         for j, index in enumerate(free):
             step = 1e-6 * max(abs(float(p[index])), 1e-3) * np.eye(p.size)[index]
             change = self._guard(leg, y, p + step) - self._guard(leg, y, p - step)
@@ -227,9 +228,13 @@ class EventCurve(Curve):
 
     def terms(self, u: Array) -> Array:
         """Coefficients of the guard in the time from the touch: its value, rate, half the second derivative, ..."""
-        leg, x, _, p = self._leg(self.without(u))
-        y = integrate_leg(self.base.system, leg, x, float(u[self.columns]), p).end
-        return self._guard(leg, y, p)
+        inner = self.without(u)
+        leg, _, _, p = self._leg(inner)
+        assert self.condition is not None
+        x, _, t, _ = self.problem.begun_at(
+            inner[: self.columns], self.condition.leg, float(u[self.columns])
+        )
+        return self._guard(leg, integrate_leg(self.base.system, leg, x, t, p).end, p)
 
     def renewed(self, point: Point) -> Point | None:
         tangent = self.base.turned(self.without(point.u), self.without(point.tangent))
@@ -279,7 +284,31 @@ class EventCurve(Curve):
         return self.real and ending is None and bool(self.faults(new.u))
 
     def out(self, u: Array) -> str:
-        return VIRTUAL if self.real and self.faults(u) else ""
+        if self.real and self.faults(u):
+            return VIRTUAL
+        inner = self.without(u)
+        if self.base.is_to_divide(inner) and self.base.redivided(inner)[0] is not self.base:
+            return DIVIDE
+        return ""
+
+    def again(self, u: Array, tangent: Array) -> Departure | None:
+        """The same curve with legs divided where derivatives grow along them; None where nothing changes."""
+        base, start = self.base.redivided(self.without(u))
+        if base is self.base:
+            return None
+        curve = EventCurve(
+            base, self.name, start, float(u[self.columns]) if self.touches else None, whole=False
+        )
+        curve.real = self.real
+        curve.settle(curve.start)
+        way, kept = np.zeros(curve.scale.size), self.problem.undivided(self.without(u)).size
+        kept += self.touches + 2
+        way[-kept:] = tangent[-kept:]
+        way /= np.linalg.norm(way)
+        found = curve.correct(curve.start, way)
+        if found is None:
+            return None
+        return Departure(curve, [found], curve.along(curve.scaled(found / curve.scale)[1], way)[0])
 
     # tests --------------------------------------------------------------------------------------
 

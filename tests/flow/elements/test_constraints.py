@@ -543,3 +543,53 @@ def test_elements_of_a_dictionary_are_in_its_symbols():
         {"x": state, "ode": ode}, impacts=ns.Impact(state[0], 0.5, reaction=r)
     )
     assert ns.simulate(ball, [1.0, 0.0], t_end=9.0).x[-1] == pytest.approx([0, 0], abs=1e-9)
+
+
+def _on_a_wire(place, ties, count):
+    """A bead on a wire with friction in all directions, and the same by its place s on the wire, with one multiplier."""
+    q, w, s = ca.SX.sym("q", count), ca.SX.sym("w", count), ca.SX.sym("s")
+    force, mu = ca.vertcat(1.5 * ca.cos(2 * t), 1.5 * ca.sin(3 * t), 0.7 * ca.sin(t))[:count], 0.5
+    both, f = ca.SX.sym("both", count), ca.SX.sym("f", len(ties(q)))
+    reactions = sum(f[k] * ca.gradient(g, q) for k, g in enumerate(ties(q)))
+    free = ns.FilippovSystem(
+        [*ca.vertsplit(q), *ca.vertsplit(w)],
+        field=[*ca.vertsplit(w), *ca.vertsplit(force - mu * both + reactions)],
+        surfaces=[w],
+        multipliers=[both],
+        constraints=[ns.Constraint(g, reaction=f[k]) for k, g in enumerate(ties(q))],
+        time=t,
+    )
+    tangent = ca.jacobian(place(s), s)
+    square = ca.dot(tangent, tangent)
+    along = (ca.dot(force, tangent) - mu * lam * ca.sqrt(square)) / square
+    plain = ns.FilippovSystem([s, v], field=[v, along], surfaces=[v], multipliers=[lam], time=t)
+    return free, plain, ca.Function("placed", [s, v], [place(s), tangent * v])
+
+
+WIRES = {
+    "circle": (lambda s: ca.vertcat(ca.cos(s), ca.sin(s)), lambda q: [(ca.sumsqr(q) - 1) / 2], 2),
+    "line": (lambda s: ca.vertcat(0.6 * s, 0.8 * s), lambda q: [0.8 * q[0] - 0.6 * q[1]], 2),
+    "axis": (lambda s: ca.vertcat(0 * s, s), lambda q: [q[0]], 2),
+    "helix": (
+        lambda s: ca.vertcat(ca.cos(s), ca.sin(s), 0.3 * s),
+        lambda q: [
+            (ca.sumsqr(q[:2]) - 1) / 2,
+            q[0] * ca.sin(q[2] / 0.3) - q[1] * ca.cos(q[2] / 0.3),
+        ],
+        3,
+    ),
+}
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0), (1.0, 0.8)])
+@pytest.mark.parametrize("wire", WIRES)
+def test_friction_in_space_holds_and_releases_along_a_joint(wire, start):
+    """Where a joint takes a part of the load, the least friction that holds decides when it slips."""
+    free, plain, placed_at = _on_a_wire(*WIRES[wire])
+    place = lambda z: np.concatenate([np.ravel(part) for part in placed_at(*z)])
+    run = ns.simulate(free, place(start), 6.0, tol=1e-10)
+    want = ns.simulate(plain, start, 6.0, tol=1e-10)
+    assert run.status is ns.Status.REACHED_END, run.message
+    np.testing.assert_allclose(run.x[-1], place(want.x[-1]), atol=1e-9)
+    ends = [e.t for e in want.events if e.kind != "crossing"]
+    np.testing.assert_allclose([e.t for e in run.events if e.kind != "crossing"], ends, atol=1e-9)

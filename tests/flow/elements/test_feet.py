@@ -131,3 +131,36 @@ def test_a_ball_in_a_wedge_stops_if_the_impacts_are_plastic(law, angle):
     inward = -(n[0] + n[1]) / np.linalg.norm(n[0] + n[1])
     run = ns.simulate(ball, [*-inward, *inward], 2.0)
     np.testing.assert_allclose(run.x[-1], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("mu", [0.1, 0.6])
+@pytest.mark.parametrize("angles", [(0.3, 0.3), (0.5, 0.9), (0.0, 1.2)])
+def test_a_block_in_a_wedge_climbs_the_wall_that_it_is_pushed_up(angles, mu, side):
+    """The other wall lets go where friction at the one is at its limit; loads are not determined until then."""
+    x, y, u, v, t = (ca.SX.sym(name) for name in "xyuvt")
+    lam, n = ca.SX.sym("lam", 2), ca.SX.sym("n", 2)
+    force, gaps, slips = ca.vertcat(side * 10 * t, -9.81), [], []
+    for k, sign in enumerate((-1, 1)):
+        c, s = np.cos(angles[k]), sign * np.sin(angles[k])
+        gaps.append(ns.Impact(c * y - s * x, reaction=n[k], name=f"wall{k}"))
+        slips.append(c * u + s * v)
+        force += n[k] * (ca.vertcat(-s, c) - mu * lam[k] * ca.vertcat(c, s))
+    wedge = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, force[0], force[1]],
+        surfaces=slips,
+        multipliers=[lam[0], lam[1]],
+        impacts=gaps,
+        time=t,
+    )
+    run = ns.simulate(wedge, [0, 0, 0, 0], 3.0, tol=1e-10)
+    wall = angles[side > 0]
+    push, weight = np.cos(wall) - mu * np.sin(wall), np.sin(wall) + mu * np.cos(wall)
+    slips_at = 0.981 * weight / push if push > 0 else np.inf
+    assert run.status is ns.Status.REACHED_END, run.message
+    climbs = max(3 - slips_at, 0) ** 3 / 6 * 10 * push
+    at = climbs * np.array([side * np.cos(wall), np.sin(wall)])
+    np.testing.assert_allclose(run.x[-1, :2], at, atol=1e-6)
+    assert len(run.events) == (2 if climbs else 1)
+    np.testing.assert_allclose(run.events[0].t, min(slips_at, 3), atol=1e-7)

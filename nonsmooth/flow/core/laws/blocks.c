@@ -258,7 +258,7 @@ static int class_of(const Block *k, int i, const double *nu, double part) {
   if (k->is_contact[i]) return w < -zero ? BELOW : nu[i] > room ? INSIDE : AT_BOTTOM;
   if (w > zero) return ABOVE;
   if (w < -zero) return BELOW;
-  if (state == UNDECIDED && bound <= room) return UNDECIDED;
+  if (state == UNDECIDED && bound <= room_zero(k, i, zero_of(k, i, terms), bound)) return UNDECIDED;
   if (state != AT_BOTTOM && bound - nu[i] <= room) return AT_TOP;
   if (state != AT_TOP && nu[i] + bound <= room) return AT_BOTTOM;
   return INSIDE;

@@ -35,12 +35,7 @@ HIDDEN = ns.FilippovSystem(
     parameters={a: 0.5},
     hidden=True,
 )
-MIXED = [
-    Leg("-", "entry", 0, -1),
-    Leg("s", "exit", 0, 1),
-    Leg("+", "reset", 0, -1),
-    Leg("-"),
-]
+MIXED = [Leg("-", "entry", 0, -1), Leg("s", "exit", 0, 1), Leg("+", "reset", 0, -1), Leg("-")]
 
 
 def test_legs_by_their_program_equal_those_by_their_modes():

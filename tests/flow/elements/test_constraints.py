@@ -210,9 +210,7 @@ def test_a_moving_pivot_drives_the_bob():
         time=t,
     )
     plain = ns.FilippovSystem(
-        [angle, rate],
-        field=[rate, -ca.cos(angle) - 0.9 * ca.sin(3 * t) * ca.sin(angle)],
-        time=t,
+        [angle, rate], field=[rate, -ca.cos(angle) - 0.9 * ca.sin(3 * t) * ca.sin(angle)], time=t
     )
     start = [np.cos(0.2), np.sin(0.2), 0.3, 0.0]  # with the pivot's speed
     run = ns.simulate(system, start, 8.0, tol=1e-11)

@@ -44,8 +44,7 @@ THREE = [(0.5, 0), (-0.25, 0.4), (-0.25, -0.4)]
 
 
 @pytest.mark.parametrize(
-    ("feet", "mu"),
-    [(THREE, 0.3), (FOUR, 0.3), pytest.param(FOUR, 1.2, marks=pytest.mark.slow)],
+    ("feet", "mu"), [(THREE, 0.3), (FOUR, 0.3), pytest.param(FOUR, 1.2, marks=pytest.mark.slow)]
 )
 def test_a_table_that_slides_stops_where_a_block_does(feet, mu):
     """Four feet share the load in more than one way; at 1.2 one of them hardly has any."""

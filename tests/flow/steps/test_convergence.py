@@ -58,10 +58,7 @@ def stick_slip():
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     slip = v - 0.2
     system = ns.FilippovSystem(
-        [x, v],
-        surface=slip,
-        above=[v, -x - 1 / (1 + 3 * slip)],
-        below=[v, -x + 1 / (1 - 3 * slip)],
+        [x, v], surface=slip, above=[v, -x - 1 / (1 + 3 * slip)], below=[v, -x + 1 / (1 - 3 * slip)]
     )
     slipping, period, landing = (
         4.2959995254801548834,

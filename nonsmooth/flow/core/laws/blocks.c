@@ -545,15 +545,15 @@ static int move_into_cones(const Block *k, double *nu, double *work, int32_t *pi
   if (n == 1 || n > size || !(unit > 0)) return 0;
   for (double tau = 1; tau < 1 / TIED; tau *= 3)
     for (int again = 0; again < 20; again++) {
-      while (again == 0 && tau == 1 && !barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) if ((s = 2 * s + 1) > 1e6) return 0;
+      while (again == 0 && tau == 1 && !barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) if ((s = 2 * s + 1) > 1 / MERGED) return 0;
       if (!barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) return 0;
       memcpy(step, grad, sizeof(double) * n);
       if (!solve(hess, step, n)) return 0;
-      double decrement = sqrt(larger(dot(grad, step, n), 0)), part = decrement > 0.25 ? 1 / (1 + decrement) : 1;
+      double decrement = sqrt(larger(dot(grad, step, n), 0)), part = 1 / (1 + decrement);
       for (int l = 0; l < n - 1; l++) for (int i = 0; i < size; i++) nu[i] -= part * step[l] * z[(int64_t)l * size + i];
       s -= part * step[n - 1];
       if (s < -0.5) return 1;
-      if (decrement < 1e-3) break;
+      if (decrement < WEAK) break;
     }
   return s < -TIED;
 }

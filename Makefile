@@ -12,7 +12,7 @@ PYTEST := $(BIN)/python -m pytest --quiet -n 2 --dist worksteal
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help reproduce test check bench docs lint wasm clean
+.PHONY: help reproduce test check bench testset docs lint wasm clean
 
 help: ## list the verbs
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -28,6 +28,9 @@ check: lint ## everything that must hold before a release: lint, then all tests
 
 bench: .venv/.bench ## measured speeds, beside the peers
 	@$(BIN)/python -m benchmarks
+
+testset: .venv/.bench ## the test set of nonsmooth problems, beside the peers that are installed
+	@$(BIN)/python -m testset
 
 docs: .venv/.docs .venv/.test ## the documentation, into build/docs/, with the records of the papers
 	@test -f build/welander_1982/results.md || $(BIN)/python -m papers

@@ -1,4 +1,4 @@
-"""The driver's library in a wheel, and what the metadata takes from the one setting `tool.nonsmooth.repository`.
+"""The driver's library in a wheel, and what the metadata takes from the settings in `tool.nonsmooth`.
 
 An index page shows README.md away from the repository, so its relative links and pictures would be
 broken there. With an address they become absolute; without one pictures are left out and links become
@@ -57,7 +57,9 @@ class CustomMetadataHook(MetadataHookInterface):  # type: ignore[misc]
         """Fill in links and the long description."""
         root = Path(self.root)
         project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
-        repository = project["tool"]["nonsmooth"]["repository"]
+        settings = project["tool"]["nonsmooth"]
+        repository = settings["repository"]
+        metadata["authors"] = [{"name": author["name"]} for author in settings["authors"]]
         text = (root / "README.md").read_text(encoding="utf-8")
         metadata["urls"] = urls(repository)
         metadata["readme"] = {

@@ -28,6 +28,7 @@ def pages() -> dict[str, str]:
     found = {
         "changelog.md": text_of("CHANGELOG.md"),
         "benchmarks.md": text_of("benchmarks/README.md"),
+        "testset.md": text_of("testset/README.md"),
         "cite.md": cite(),
     }
     for name in PAPERS:

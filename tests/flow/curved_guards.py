@@ -99,11 +99,11 @@ def run(seed: int, counts: Counts, tol: float = 1e-10) -> None:
             counts.worst = max(counts.worst, float(np.abs(met - true).max()))
 
 
-def main(shapes: int, seed: int = 0) -> Counts:
+def main(shapes: int, seed: int = 0, tol: float = 1e-10) -> Counts:
     """Compare many guards and print the counts."""
     counts = Counts()
     for k in range(shapes):
-        run(seed + k, counts)
+        run(seed + k, counts, tol)
     print(counts)
     return counts
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-
-from .peers import RUNS, Problem, cases
+from testset.problem import RUNS, Problem, cases
 
 every = pytest.mark.parametrize(
     "data",

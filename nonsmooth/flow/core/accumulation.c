@@ -16,25 +16,22 @@ static int block_of(const Run *r, double *left, double *error) {
   if (at_once) return AT_ONCE;
   for (int l = 0; l < LAG_COUNT; l++) {
     int lag = LAGS[l], need = BLOCKS * lag, same = 1;
-    double block[BLOCKS], low = INFINITY, high = 0, ratio = 0, change = 0, before = 0;
+    double block[BLOCKS], ratio = 0, change = 0, before = 0;
     if (r->history < need + lag) return 0;
-    for (int b = BLOCKS - 1; b >= 0 && same; b--) { /* most events do not accumulate: the last blocks say so */
+    for (int b = 0; b < BLOCKS && same; b++) { /* most events do not accumulate: the last blocks say so */
       block[b] = 0;
-      for (int k = 0; k < lag; k++) block[b] += back(r, need - b * lag - k)->interval;
-      same = b == BLOCKS - 1 || block[b + 1] < SHRINKS * block[b];
+      for (int k = 1; k <= lag; k++) block[b] += back(r, b * lag + k)->interval;
+      same = b == 0 || block[b - 1] < SHRINKS * block[b];
     }
     for (int k = 1; k <= need && same; k++) same = back(r, k)->pattern == back(r, k + lag)->pattern;
-    if (!same) continue;
-    for (int b = 1; b < BLOCKS; b++) {
+    if (!same || !shrink_alike(block)) continue;
+    for (int b = BLOCKS - 2; b >= 0; b--) {
       before = change;
       change = block[b] - *left;
-      ratio = block[b] / block[b - 1]; /* not a number after an empty block */
+      ratio = block[b] / block[b + 1];
       *left = block[b] * ratio / (1 - ratio);
       change += *left;
-      low = ratio > 0 ? fmin(low, ratio) : -INFINITY;
-      high = fmax(high, ratio);
     }
-    if (!(high < SHRINKS && high - low <= SPREAD * (1 - ratio))) continue;
     *error = fabs(change);
     if (!(*error < ratio * fabs(before))) return lag;
     double rest = change * change / (before - change);
@@ -237,10 +234,21 @@ static int leaves_jumps(Run *r, Expansion *e, int block) {
   return value != 0;
 }
 
+/* What further resets up to the limit would add to states that come to no rest, as a geometric series. */
+static void add_jumps(Run *r, int block) {
+  for (int i = 0; r->s->resets && r->history > 2 * block && i < r->s->dimension; i++) {
+    double last = 0, before = 0;
+    for (int k = 1; k <= 2 * block; k++) *(k > block ? &before : &last) += r->jumped[(r->history - k) % HISTORY * r->n + i];
+    double ratio = last / before;
+    if (last != 0 && fabs(ratio) < SHRINKS && r->x[i] == r->saved[i]) r->x[i] += last * ratio / (1 - ratio);
+  }
+}
+
 /* Rest where crossings and resets accumulate; 0 where no motion follows from there. */
 static int come_to_rest(Run *r, double left, const double *near, int block) {
   int before = r->mode, count = vanishing(r, near, r->involved);
   if (!count || !choose_rest(r, r->involved, count, near)) return 0;
+  add_jumps(r, block);
   expand(r, r->chosen.letter, r->x, r->chosen.unknowns, &r->e);
   if (leaves_jumps(r, &r->e, block)) {
     memcpy(r->x, r->saved, sizeof(double) * r->n);
@@ -321,8 +329,10 @@ static void rest_if_slow(Run *r) {
 }
 
 /* Store an event among the last ones. */
-static void remember(Run *r, int kind, int guard) {
+static void remember(Run *r, int kind, int guard, const double *x) {
   int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->met.kind << 32) + (guard < 0 ? -1 : shown_index(r));
+  double *jumped = r->jumped + (r->s->resets ? r->history % HISTORY * r->n : 0);
+  for (int i = 0; r->s->resets && i < r->n; i++) jumped[i] = kind == RESET ? r->x[i] - x[i] : 0;
   r->past[r->history++ % HISTORY] = (Happened){r->since, pattern, kind, r->met};
   r->since = 0;
 }

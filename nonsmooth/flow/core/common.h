@@ -48,6 +48,17 @@ typedef struct {
 /* An event: the time since the one before; kinds of event and guard, and its index, as a number. */
 typedef struct { double interval; int64_t pattern; } Recent;
 
+/* Whether times, the last one first, shrink like a geometric series. */
+static inline int shrink_alike(const double *block) {
+  double low = INFINITY, high = 0;
+  for (int b = 0; b < BLOCKS - 1; b++) {
+    double ratio = block[b] / block[b + 1]; /* not a number after an empty block */
+    low = ratio < low ? ratio : ratio > 0 ? low : -INFINITY;
+    high = ratio > high ? ratio : high;
+  }
+  return high < SHRINKS && high - low <= SPREAD * (1 - block[0] / block[1]);
+}
+
 /* What a run is between two steps: lanes give it to the driver for a step that is not clear, and take it back. */
 typedef struct {
   double t, since, length, shortened; /* since: the last event; length of the step before in this mode, or 0 */

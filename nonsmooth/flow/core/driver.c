@@ -161,7 +161,7 @@ static void start_in(Run *r, const int8_t *asked) {
   if (r->s->sets) idle_sets(r, letter, 0);
   memcpy(r->letter, letter, r->width);
   enter_mode(r);
-  if (r->s->joints > 1) find_dependent(r, &r->now, r->letter, r->unknowns);
+  if (r->s->joints) find_dependent(r, &r->now, r->letter, r->unknowns);
   int found = find_unknowns(r, &r->now);
   if (found != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, found); return; }
   if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);

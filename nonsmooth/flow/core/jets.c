@@ -115,8 +115,14 @@ static void set_series(Run *r, Expansion *e, const int32_t *start) {
   EACH_LEAVING(r, e, f) leaving = 1;
   for (int k = 0; k <= r->order; k++) {
     open_order(r, e, k);
-    if (leaving) leave_sets(r, e, k);
-    else if (k && e->l.slides) follow_layer(r, e, k, start);
+    if (leaving) {
+      if (leave_sets(r, e, k, 1)) {
+        close_order(r, e, k - 1);
+        close_sets(r, e, k - 1);
+        open_order(r, e, k);
+        leave_sets(r, e, k, 0);
+      }
+    } else if (k && e->l.slides) follow_layer(r, e, k, start);
     if (k && (leaving || e->l.slides)) close_order(r, e, k);
     close_sets(r, e, k);
     if (k < r->order) next_states(r, e, k);
@@ -250,8 +256,9 @@ static int invert_layer(Run *r, const Layout *l, const double *unknowns, double 
     size[i] = is_bounded(r, own) ? fabs(factor_of(r, own)) : fabs(unknowns[own]);
     most = larger(size[i], most);
   }
-  for (int i = 0; i < n; i++) size[i] = larger(size[i], MERGED * (most > 0 ? most : 1));
-  for (int i = 0; r->s->sets && r->c && i < n; i++) size[i] = sqrt(size[i]); /* shares in proportion to the bounds */
+  most = most > 0 ? most : 1;
+  for (int i = 0; i < n; i++) size[i] = has_law(r, l->sliding[i], JOINT_LAW) ? most / MERGED : larger(size[i], MERGED * most);
+  for (int i = 0; r->s->sets && i < n; i++) size[i] = sqrt(size[i]); /* shares in proportion to the bounds */
   return invert_any(m, n, size, inverse, size + n, r->pending) && 0;
 }
 

@@ -311,10 +311,12 @@ static int certificate(const double *m, int n, const int8_t *span, double *work,
   int is_positive = 1, is_symmetric;
   if (!finite_all(m, n * n)) return NOTHING;
   for (int i = 0; i < n; i++) {
+    double own = m[i * n + i];
+    for (int j = 0; span && j < n; j++) if (first_row(span, i) == first_row(span, j)) own = larger(m[j * n + j], own);
     is_positive &= m[i * n + i] > 0;
-    if (m[i * n + i] < 0) return NOTHING;
+    if (m[i * n + i] < (span ? -SINGULAR * own : 0)) return NOTHING;
+    scale[i] = own > 0 ? sqrt(own) : 1;
   }
-  for (int i = 0; i < n; i++) scale[i] = m[i * n + i] > 0 ? sqrt(m[i * n + i]) : 1;
   for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) a[i * n + j] = m[i * n + j] / (scale[i] * scale[j]);
   if (!span && is_positive && is_dominant(a, n, rest)) return UNIQUE_AND_STABLE;
   is_symmetric = symmetrised(a, n, span, d, b, pending);

@@ -93,7 +93,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, shown_index(r), r->met.side, x);
   if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, element(r, r->m)->shown, 0, x); /* impacts that accumulated */
   if (kind == END || kind == STOP) return;
-  remember(r, kind, guard);
+  remember(r, kind, guard, x);
   if (r->instant.running) return; /* at the end of the instant */
   see_limit(r);
   if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);

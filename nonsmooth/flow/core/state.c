@@ -251,6 +251,7 @@ typedef struct {
   OF(int8_t, idle, m) OF(int8_t, vanishes, most) /* sets without friction; nodes of a program that are zero */ \
   OF(double, of_defect, rows) OF(int8_t, key, w + 8 * (s->rules.discrete + s->tables)) /* of_defect: errors of guards */ \
   OF(int32_t, cell, w) OF(double, levels, all + 1) /* of tables; values of functions onto which a state is put */ \
+  OF(double, jumped, s->resets ? HISTORY * n : 0) /* by the last events, states where those are resets */ \
   OF(double, met_at, rows) OF(double, hidden, rows) /* root of each guard in the step, or -1; what rounding hides of it */
   RUN_ARRAYS(DECLARED)
 } Run;

@@ -215,9 +215,13 @@ static double output_rounding(const Run *r, int output) {
   return error < INFINITY ? error : 0;
 }
 
-/* The same of a guard that is a function of states and time. */
+/* The same of a guard: of its terms where it is a distance from a bound. */
 static double guard_rounding(const Run *r, const Expansion *e, int row) {
-  int kind = e->l.kind[row];
+  int kind = e->l.kind[row], i = e->l.index[row];
+  const double *lam = r->vector + r->n + i;
+  double factor = kind == EXIT_GUARD || kind == SLIP_GUARD ? row_of(r, r->n + 2 * r->width + i)[0] : 0;
+  if (kind == EXIT_GUARD) return ROUNDING * (fabs(factor) + fabs(*lam));
+  if (kind == SLIP_GUARD) return ROUNDING * (factor * factor + dot(lam, lam, size_of(r, i)));
   if (!has_height(kind)) return 0;
   return output_rounding(r, r->n + (is_atom(kind) ? 3 * r->width + row - e->l.atoms : r->width + e->l.index[row]));
 }

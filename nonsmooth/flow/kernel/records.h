@@ -6,29 +6,14 @@
  * which step that is so. */
 typedef struct { Recent event[HISTORY]; int64_t count, row, steps; double shortened; } Past;
 
-/* Sum of the last intervals but ``back``. */
-static double block(const Past *p, int64_t back, int lag) {
-  double sum = 0;
-  for (int k = 0; k < lag; k++) sum += p->event[(p->count - 1 - back - k) % HISTORY].interval;
-  return sum;
-}
-
 /* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
 static int may_accumulate(const Past *p) {
   for (int l = 0; l < LAG_COUNT; l++) {
     int lag = LAGS[l];
+    double block[BLOCKS] = {0};
     if (p->count < (BLOCKS + 1) * lag) return 0;
-    double later = block(p, 0, lag), low = INFINITY, high = 0, last = 0;
-    if (!(later > 0)) return 1;
-    for (int b = 1; b < BLOCKS; b++) {
-      double earlier = block(p, b * lag, lag), ratio = later / earlier;
-      low = smaller(ratio, low);
-      high = larger(ratio, high);
-      if (b == 1) last = ratio;
-      if (!(high < SHRINKS && high - low <= SPREAD * (1 - last))) break;
-      if (b == BLOCKS - 1) return 1;
-      later = earlier;
-    }
+    for (int k = 0; k < BLOCKS * lag; k++) block[k / lag] += p->event[(p->count - 1 - k) % HISTORY].interval;
+    if (!(block[0] > 0) || shrink_alike(block)) return 1;
   }
   return 0;
 }

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import random
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 
 import casadi as ca
@@ -115,6 +115,15 @@ def vanish_on(expressions: Sequence[ca.SX], surface: ca.SX, variables: ca.SX) ->
     return _modular(expressions, [surface], variables) is True
 
 
+def that_vanish_on(expressions: Sequence[ca.SX], surface: ca.SX, variables: ca.SX) -> list[bool]:
+    """Which of many expressions are zero wherever ``surface`` is: most are not, at one point of it."""
+    drawn = next(_values_on(expressions, [surface], variables), None)
+    zero = [True] * len(expressions) if drawn is None else [not value for value in drawn[0]]
+    return [
+        may and vanish_on([e], surface, variables) for e, may in zip(expressions, zero, strict=True)
+    ]
+
+
 def decide_zero(
     expressions: Sequence[ca.SX], surfaces: Sequence[ca.SX], variables: ca.SX
 ) -> tuple[bool | None, str]:
@@ -134,28 +143,35 @@ def _modular(
     expressions: Sequence[ca.SX], surfaces: Sequence[ca.SX], variables: ca.SX
 ) -> bool | None:
     """Zero, not zero, or None where elementary functions or a surface of high degree leave it open."""
+    for trial, (found, guessed) in enumerate(_values_on(expressions, surfaces, variables)):
+        if any(found):
+            return None if guessed else False
+        if trial + 1 == _TRIALS:
+            return True
+    return None
+
+
+def _values_on(
+    expressions: Sequence[ca.SX], surfaces: Sequence[ca.SX], variables: ca.SX
+) -> Iterator[tuple[list[int], bool]]:
+    """Values at random points of surfaces, and whether elementary functions were guessed."""
     used = [
         (s, ca.depends_on(variables, s)) for s in ca.symvar(ca.vertcat(*surfaces, *expressions))
     ]
     vectors = [ca.vertcat(*[s for s, moves in used if moves is kind]) for kind in (True, False)]
     nodes, rows = instructions(vectors, [ca.vertcat(*surfaces), ca.vertcat(*expressions)])
-    generator, trials = random.Random(0), 0
+    generator = random.Random(0)
     for seed in range(_DRAWS):
         values = [[generator.randrange(PRIME) for _ in range(v.numel())] for v in vectors]
         try:
             point = _on_surfaces(nodes, rows[0], values, seed)
             if point is None:
-                return None
+                return
             algebra = _Modular(point, seed)
             found = evaluate(nodes, algebra)
         except _Undecided:
             continue
-        if any(found[k] for k in rows[1]):
-            return None if algebra.guesses else False
-        trials += 1
-        if trials == _TRIALS:
-            return True
-    return None
+        yield [found[k] for k in rows[1]], algebra.guesses
 
 
 def _on_surfaces(

@@ -26,7 +26,7 @@ from ..definition.complementarity import rate_of
 from ..definition.roots import gate_roots, roots_of
 from ..definition.system import FilippovSystem
 from ..expressions.cancel import cancel_common_factor
-from ..expressions.identity import vanish_on
+from ..expressions.identity import that_vanish_on, vanish_on
 from ..expressions.linearity import linearity
 from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
@@ -126,7 +126,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
             continue  # products of multipliers, or hidden dynamics; a constant
         if len(members) == 1:  # what vanishes with h has no part in sliding
             h = system.definition.surfaces[members[0]]
-            acts = [not vanish_on([e], h, x) for e in entries]
+            acts = [not vanishes for vanishes in that_vanish_on(entries, h, x)]
             places = [own for own, is_there in zip(places, acts, strict=True) if is_there]
             entries = [e for e, is_there in zip(entries, acts, strict=True) if is_there]
         if not entries:

@@ -9,16 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from ...flow.ensembles.progress import progress_bar
-from ...model import Array, ConvergenceError, DefinitionError, OptionError, whole
+from ...model import (
+    Array,
+    ConvergenceError,
+    DefinitionError,
+    NonsmoothError,
+    OptionError,
+    whole,
+)
 from ...model.checks import positive
-from ...solvers.continuation import Arc, Curve, Departure, Zero, directions, trace
+from ...solvers.continuation import Arc, Curve, Departure, Zero, directions, pieces, trace
 from ..homoclinic.homoclinic_orbits import Connection
-from .branch import BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of
+from .branch import DIVIDE, BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of
 from .codimension_two import CodimensionTwo, leaving, special_point
 from .event_curves import VIRTUAL, EventCurve
 from .homoclinic_curves import ConnectionCurve, event_of
@@ -26,8 +33,18 @@ from .homoclinic_curves import ConnectionCurve, event_of
 #: Ends of arcs that are no events.
 _WHOLE = ("bound", "closed", "interrupted", "points", VIRTUAL)
 
+#: Ends of pieces beyond which legs may have to be divided.
+_DIVISIBLE = (DIVIDE, "lost", "step too small")
+
 #: Points of codimension two closer than this, relative to their sizes, are one.
 _MERGED = 1e-6
+
+
+#: The equations of a point of a curve, and their unknowns.
+Node = tuple[EventCurve | ConnectionCurve, Array]
+
+#: The equations of a piece of a curve, and its points.
+Piece = tuple[EventCurve | ConnectionCurve, Arc]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,23 +59,20 @@ class BifurcationCurve:
         Names of the two parameters.
     values : ndarray (k, 2)
         Their values along the curve.
-    points : tuple of k ndarray
-        Unknowns of the equations at each point.
     special : tuple of CodimensionTwo
         Points of codimension two on the curve.
     ends : tuple of two BranchEnd
         Why the curve ends at its two ends.
-    curve : Curve
-        The equations, from which other curves start.
+    nodes : tuple of k (Curve, ndarray)
+        For each point the equations and their unknowns.
     """
 
     kind: str
     parameters: tuple[str, str]
     values: Array
-    points: tuple[Array, ...]
     special: tuple[CodimensionTwo, ...]
     ends: tuple[BranchEnd, BranchEnd]
-    curve: EventCurve | ConnectionCurve
+    nodes: tuple[Node, ...]
 
     def solution(self, k: int) -> Any:
         """Return the equilibrium or orbit at a point of the curve.
@@ -68,7 +82,8 @@ class BifurcationCurve:
         k : int
             Number of the point: a row of ``values``.
         """
-        return self.curve.describe(self.points[k])
+        curve, u = self.nodes[k]
+        return curve.describe(u)
 
     def __len__(self) -> int:
         return len(self.values)
@@ -156,9 +171,9 @@ def continue_bifurcation(
             assert event.meeting is not None
             found = leaving(event.meeting, _free(event.meeting.base, names), widths)
             return tuple(
-                _curve_of(kind, names, curve, [Arc(arc.points[:1], end="event"), arc])
+                _curve_of(kind, names, [[(curve, Arc(half[0][1].points[:1], end="event"))], half])
                 for kind, curve, departure in found
-                for arc in [follow(departure)]
+                for half in [follow(departure)]
             )
         assert event.point is not None
         base, start = event.curve.begun_later(event.point.u)
@@ -170,17 +185,39 @@ def continue_bifurcation(
             curve = EventCurve(base, event.test, start)
             start = curve.start
         start = _on_curve(curve, start, event.kind)
-        halves, tangent = list[Arc](), directions(curve, start)[0]
+        halves, tangent = list[list[Piece]](), directions(curve, start)[0]
         for way in (-tangent, tangent):
-            if halves and halves[0].end in ("closed", "interrupted"):
+            if halves and halves[0][-1][1].end in ("closed", "interrupted"):
                 break
             halves.append(follow(Departure(curve, [start], way)))
     finally:
         bar.close()
-    return _curve_of(event.kind, names, curve, halves)
+    return _curve_of(event.kind, names, halves)
 
 
-def _follow(
+def _follow(departure: Departure, **options: Any) -> list[Piece]:
+    """Follow a curve from where it departs, in pieces between which legs of orbits are divided."""
+
+    def following(at: Departure, arc: Arc) -> Departure | None:
+        last = arc.points[-1]
+        if arc.end not in _DIVISIBLE or not isinstance(at.curve, EventCurve):
+            return None
+        try:
+            return at.curve.again(last.u, last.tangent)
+        except (NonsmoothError, np.linalg.LinAlgError):
+            return None
+
+    found = pieces(
+        departure,
+        partial(_traced, **options),
+        following,
+        last=lambda arc: arc.end in _WHOLE,
+        apart=0.0,
+    )
+    return [(cast("EventCurve | ConnectionCurve", at.curve), arc) for at, arc in found]
+
+
+def _traced(
     departure: Departure,
     *,
     limits: Sequence[tuple[float, float]],
@@ -188,7 +225,7 @@ def _follow(
     most: int,
     report: Callable[[], None],
 ) -> Arc:
-    """Follow a curve from where it departs."""
+    """Follow a curve with the same equations."""
     curve = departure.curve
     assert isinstance(curve, (EventCurve, ConnectionCurve))
     u = departure.rows[-1]
@@ -217,29 +254,28 @@ def _free(curve: BranchCurve, names: Sequence[str]) -> tuple[int, ...]:
     return tuple(curve.system.parameter_names.index(name) for name in names)
 
 
-def _curve_of(
-    kind: str,
-    names: tuple[str, str],
-    curve: EventCurve | ConnectionCurve,
-    halves: list[Arc],
-) -> BifurcationCurve:
-    """The curve of two arcs from one point, or of one that is closed."""
-    points = [*reversed(halves[0].rows), *(halves[1].rows[1:] if len(halves) > 1 else ())]
-    zeros = [*reversed(halves[0].zeros), *(halves[1].zeros if len(halves) > 1 else ())]
-    if isinstance(curve, EventCurve):
-        curve.limits = [half.rows[-1] for half in halves if half.end not in _WHOLE]
-    for u in (points[0], points[-1]):
-        curve.base.require_valid(u if isinstance(curve, ConnectionCurve) else curve.without(u))
+def _curve_of(kind: str, names: tuple[str, str], halves: list[list[Piece]]) -> BifurcationCurve:
+    """The curve of two halves from one point, or of one that is closed."""
+    nodes, zeros = list[Node](), list[tuple[EventCurve | ConnectionCurve, Zero]]()
+    for half in halves:
+        nodes.reverse()
+        zeros.reverse()
+        for curve, arc in half:
+            nodes += [(curve, u) for u in (arc.rows[1:] if nodes else arc.rows)]
+            zeros += [(curve, zero) for zero in arc.zeros]
+        if isinstance(curve, EventCurve) and arc.end not in _WHOLE:
+            curve.limits.append(arc.rows[-1])
+    for at, u in (nodes[0], nodes[-1]):
+        at.base.require_valid(u if isinstance(at, ConnectionCurve) else at.without(u))
     return BifurcationCurve(
         kind=kind,
         parameters=names,
-        values=np.array([u[-2:] for u in points]),
-        points=tuple(points),
+        values=np.array([u[-2:] for _, u in nodes]),
         special=tuple(
-            _merged([special_point(curve, zero, kind) for zero in zeros if _occurs(curve, zero)])
+            _merged([special_point(at, zero, kind) for at, zero in zeros if _occurs(at, zero)])
         ),
-        ends=(end_of(halves[0]), end_of(halves[-1])),
-        curve=curve,
+        ends=(end_of(halves[0][-1][1]), end_of(halves[-1][-1][1])),
+        nodes=tuple(nodes),
     )
 
 

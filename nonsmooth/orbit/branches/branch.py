@@ -360,6 +360,14 @@ class BranchCurve(Curve):
         """The same curve from a point of it with better equations; None if there are none."""
         return None
 
+    def is_to_divide(self, u: Array) -> bool:
+        """Whether derivatives grow too much on a leg of an orbit."""
+        return False
+
+    def redivided(self, u: Array) -> tuple[BranchCurve, Array]:
+        """The same equations with legs of an orbit divided, and a guess at the point; themselves if nothing changes."""
+        return self, u
+
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """The start of the branch beyond an event that ends this curve."""
         return None

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...flow.fixed import first_terms
 from ...model import Array, DegenerateError, Guard, NonsmoothError
-from ...model.derivatives.variational import guarded_field, variational_field
+from ...model.derivatives.variational import guarded_field, states_at
 from ...solvers.continuation import Departure, Point, Zero
 from ...solvers.newton import Equations, Secant, converge
 from ..runs.legs import integrate_leg, surface_of
@@ -123,7 +123,11 @@ def special_point(curve: EventCurve | ConnectionCurve, zero: Zero, event: str) -
         solution = base.describe(u)
     except (ArithmeticError, ValueError):
         solution = None
-    return CodimensionTwo(kind, u[-2:], solution, meeting)
+    values, touched = u[-2:], getattr(curve, "condition", None)
+    if zero.name == "Hopf" and isinstance(base, OrbitCurve) and touched is not None:
+        shrunk = base.hopf(u, touched.guard)  # the equilibrium on the surface
+        values = values if shrunk is None else shrunk[1]
+    return CodimensionTwo(kind, values, solution, meeting)
 
 
 def _kind(curve: EventCurve | ConnectionCurve, zero: Zero, event: str) -> str:
@@ -282,7 +286,7 @@ def _located(base: OrbitCurve, guess: Array, point: Degenerate) -> Array | None:
     def terms(v: Array) -> Array:
         u = v * base.scale
         p, x = base.parameters_at(u), problem.split(u[: problem.size])[0][point.leg]
-        y = variational_field(base.system, mode).states_at(x, p)
+        y = states_at(base.system, mode, x, p)
         return np.asarray(first_terms(guards, y, p)[1][row, point.order : point.order + 2])
 
     more = Secant(terms, 1.0)

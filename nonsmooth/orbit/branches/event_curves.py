@@ -27,14 +27,14 @@ import numpy as np
 from ...flow.fixed import first_terms
 from ...model import Array, DegenerateError, NonsmoothError
 from ...model.derivatives.event_maps import surface_map
-from ...model.derivatives.variational import guarded_field, variational_field
-from ...solvers.continuation import Curve, Point, Secant, Zero
+from ...model.derivatives.variational import guarded_field, states_at
+from ...solvers.continuation import Curve, Departure, Point, Secant, Zero
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import return_map
 from ..periodic.orbit import PeriodicOrbit
 from ..runs.guards import CONDITIONS
 from ..runs.legs import Leg, integrate_leg
-from .branch import BranchCurve
+from .branch import DIVIDE, BranchCurve
 from .conditions import Condition, minima, touching
 from .itinerary_changes import grown
 from .normal_forms import normal_form, torus_pair
@@ -195,10 +195,10 @@ class EventCurve(Curve):
     def _touching_rows(self, u: Array, inner: Array) -> tuple[Array, Array]:
         """The guard and its rate at the touch, and their derivatives by the unknowns."""
         # Where the touch is only the point of the flow matters; there both are differentiated numerically.
-        leg, x, _, p = self._leg(inner)
+        leg, _, _, p = self._leg(inner)
         assert self.condition is not None
         n, k, free = self.problem.dimension, self.columns, self.base.free
-        begin, t = self.condition.leg * n, float(u[k])
+        x, begin, t, share = self.problem.begun_at(inner[:k], self.condition.leg, float(u[k]))
         flow = integrate_leg(self.base.system, leg, x, t, p, free)
         terms, y, rows = self._guard(leg, flow.end, p), flow.end, np.zeros((2, u.size))
         by_state = np.empty((2, y.size))
@@ -208,6 +208,7 @@ class EventCurve(Curve):
             by_state[:, j] = change[:2] / (2.0 * step[j])
         rows[:, begin : begin + n] = by_state @ flow.by_start
         rows[:, k] = terms[1], 2.0 * terms[2]
+        rows[:, k - len(self.problem.legs) + self.condition.leg] -= share * rows[:, k]
         for j, index in enumerate(free):
             step = 1e-6 * max(abs(float(p[index])), 1e-3) * np.eye(p.size)[index]
             change = self._guard(leg, y, p + step) - self._guard(leg, y, p - step)
@@ -220,14 +221,20 @@ class EventCurve(Curve):
         field = guarded_field(self.base.system, leg.mode)
         assert self.condition is not None
         return np.asarray(
-            first_terms(field, y, p)[1][field.motion.guards.index(self.condition.guard)]
+            first_terms(field, states_at(self.base.system, leg.mode, y, p), p)[1][
+                field.motion.guards.index(self.condition.guard)
+            ]
         )
 
     def terms(self, u: Array) -> Array:
         """Coefficients of the guard in the time from the touch: its value, rate, half the second derivative, ..."""
-        leg, x, _, p = self._leg(self.without(u))
-        y = integrate_leg(self.base.system, leg, x, float(u[self.columns]), p).end
-        return self._guard(leg, y, p)
+        inner = self.without(u)
+        leg, _, _, p = self._leg(inner)
+        assert self.condition is not None
+        x, _, t, _ = self.problem.begun_at(
+            inner[: self.columns], self.condition.leg, float(u[self.columns])
+        )
+        return self._guard(leg, integrate_leg(self.base.system, leg, x, t, p).end, p)
 
     def renewed(self, point: Point) -> Point | None:
         tangent = self.base.turned(self.without(point.u), self.without(point.tangent))
@@ -277,7 +284,31 @@ class EventCurve(Curve):
         return self.real and ending is None and bool(self.faults(new.u))
 
     def out(self, u: Array) -> str:
-        return VIRTUAL if self.real and self.faults(u) else ""
+        if self.real and self.faults(u):
+            return VIRTUAL
+        inner = self.without(u)
+        if self.base.is_to_divide(inner) and self.base.redivided(inner)[0] is not self.base:
+            return DIVIDE
+        return ""
+
+    def again(self, u: Array, tangent: Array) -> Departure | None:
+        """The same curve with legs divided where derivatives grow along them; None where nothing changes."""
+        base, start = self.base.redivided(self.without(u))
+        if base is self.base:
+            return None
+        curve = EventCurve(
+            base, self.name, start, float(u[self.columns]) if self.touches else None, whole=False
+        )
+        curve.real = self.real
+        curve.settle(curve.start)
+        way, kept = np.zeros(curve.scale.size), self.problem.undivided(self.without(u)).size
+        kept += self.touches + 2
+        way[-kept:] = tangent[-kept:]
+        way /= np.linalg.norm(way)
+        found = curve.correct(curve.start, way)
+        if found is None:
+            return None
+        return Departure(curve, [found], curve.along(curve.scaled(found / curve.scale)[1], way)[0])
 
     # tests --------------------------------------------------------------------------------------
 
@@ -398,10 +429,10 @@ def _beginnings(
     i, guard, system = condition.leg, condition.guard, problem.system
     field = guarded_field(system, problem.legs[i].mode)
     k = field.motion.guards.index(guard)
-    y = variational_field(system, problem.legs[i].mode).states_at(at.starts[i], p)
+    y = states_at(system, problem.legs[i].mode, at.starts[i], p)
     order = 2 if problem.legs[i - 1].kind == "crossing" else 1
     before = at.events[i - 1]
-    rate = at.by_leg[i - 1].rate[: before.gradient.size]
+    rate = at.by_leg[i - 1].rate
     return {
         CUSP: float(first_terms(field, y, p)[1][k, order]),
         TWO_FOLD: float(before.gradient @ rate),

@@ -11,15 +11,16 @@ fused focus; di Bernardo et al. 2008, ch. 5.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from ...flow.fixed import first_terms
 from ...local.point.surface_point import SIDES, Numbers, Side, surface_at
 from ...local.searches.boundary_equilibria import find_boundary_equilibrium
-from ...model import Array, FilippovSystem, NonsmoothError
-from ...model.derivatives.variational import variational_field
+from ...model import Array, FilippovSystem, Guard, NonsmoothError
+from ...model.derivatives.variational import guarded_field, variational_field
 from ...solvers.continuation import Point, Zero
 from ...solvers.newton import Secant, converge
 from ..periodic.boundary_value_problem import BoundaryProblem
@@ -33,16 +34,29 @@ _NEAR_HOPF = 0.1
 
 
 def hopf_point(
-    system: FilippovSystem, mode: str, x: Array, p: Array, index: int
-) -> tuple[Array, float, float] | None:
-    """The Hopf point near a small orbit of one mode."""
-    field, n = variational_field(system, mode).linear, system.dimension
-    size = np.append(np.full(n, max(1.0, float(np.abs(x).max()))), max(abs(float(p[index])), 1e-3))
+    system: FilippovSystem,
+    mode: str,
+    x: Array,
+    p: Array,
+    free: Sequence[int],
+    guard: Guard | None = None,
+) -> tuple[Array, Array, float] | None:
+    """The Hopf point near a small orbit of one mode; with two free parameters on the surface of a guard."""
+    field, n, some = variational_field(system, mode).linear, system.dimension, list(free)
+    size = np.full(n, max(1.0, float(np.abs(x).max())))
+    size = np.append(size, np.maximum(np.abs(p[some]), 1e-3))
 
     def parameters(u: Array) -> Array:
         q = p.copy()
-        q[index] = u[-1]
+        q[some] = u[n:]
         return q
+
+    def height(u: Array) -> list[float]:
+        if guard is None:
+            return []
+        guarded, q = guarded_field(system, mode), parameters(u)
+        y = variational_field(system, mode).states_at(u[:n], q)
+        return [float(first_terms(guarded, y, q)[1][guarded.motion.guards.index(guard), 0])]
 
     def pair(u: Array) -> complex:
         """The complex eigenvalue next to the imaginary axis."""
@@ -55,9 +69,9 @@ def hopf_point(
     def equations(v: Array) -> Array:
         u = v * size
         rate = np.asarray(field.copied(u[:n], parameters(u))[0], float).ravel()[:n]
-        return np.append(rate, pair(u).real)
+        return np.array([*rate, pair(u).real, *height(u)])
 
-    start = np.append(x, p[index])
+    start = np.append(x, p[some])
     try:
         root = converge(Secant(equations, 1.0), start / size)
     except (NonsmoothError, np.linalg.LinAlgError):
@@ -65,7 +79,7 @@ def hopf_point(
     if root is None or not np.abs(root - start / size).max() < _NEAR_HOPF:
         return None
     u = root * size
-    return u[:n], float(u[-1]), pair(u).imag
+    return u[:n], u[n:], pair(u).imag
 
 
 #: Largest distance of the point of a surface from the small orbit, relative to that orbit, and to the first

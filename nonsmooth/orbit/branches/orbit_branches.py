@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...local.read_only import ReadOnly
-from ...model import Array, ConvergenceError, DefinitionError, NonsmoothError
+from ...model import Array, ConvergenceError, DefinitionError, Guard, NonsmoothError
 from ...solvers.continuation import Departure, Point, Zero
 from ...solvers.newton import converge
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, eliminated
@@ -323,7 +323,7 @@ class OrbitCurve(OrbitEquations):
 
     def out(self, u: Array) -> str:
         """``"period diverges"`` where it is long and grows at a constant parameter; else empty."""
-        if to_divide(self.problem, self.evaluation(u)) and self.again(u) is not None:
+        if self.is_to_divide(u) and self.again(u) is not None:
             return DIVIDE
         if self._at_two_fold(u, _ROUNDED):
             return "two-fold"
@@ -338,20 +338,33 @@ class OrbitCurve(OrbitEquations):
 
     def again(self, u: Array, tangent: Array | None = None) -> Departure | None:
         """The same branch with legs divided where derivatives grow along them; None where nothing changes."""
+        curve, start = self.redivided(u)
+        if curve is self:
+            return None
+        k = self.problem.undivided(u).size + len(self.free)
+        way = np.zeros(curve.scale.size)
+        way[-k:] = 1.0 if tangent is None else tangent[-k:]
+        way /= np.linalg.norm(way)
+        found = curve.correct(start, way)
+        return None if found is None else Departure(curve, [found], way)
+
+    def is_to_divide(self, u: Array) -> bool:
+        """Whether derivatives grow too much on a leg."""
+        return to_divide(self.problem, self.evaluation(u))
+
+    def redivided(self, u: Array) -> tuple[OrbitCurve, Array]:
+        """The same equations with legs divided where derivatives grow along them, and a guess at the point."""
         p, own = self.parameters_at(u), self.problem
         try:
             problem, v = divided(own, u[: own.size], p)
         except NonsmoothError:
-            return None
+            return self, u
         if problem is own:
-            return None
+            return self, u
         curve, k = self.with_problem(problem, v, p), own.undivided(u).size + len(self.free)
         inside = np.resize(self.scale[-k:][: own.dimension], problem.size - own.undivided(u).size)
         curve.scale = np.concatenate([inside, self.scale[-k:]])
-        start, way = np.append(v, u[own.size :]), np.zeros(curve.scale.size)
-        way[-k:] = 1.0 if tangent is None else tangent[-k:]
-        found = curve.correct(start, way / np.linalg.norm(way))
-        return None if found is None else Departure(curve, [found], way / np.linalg.norm(way))
+        return curve, np.append(v, u[own.size :])
 
     def _steep(self, u: Array, least: float = _STEEP) -> bool:
         """Whether the period grows steeply with the parameter."""
@@ -362,6 +375,9 @@ class OrbitCurve(OrbitEquations):
 
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
         """The point to which the orbit shrinks, the end of its chatter, or the homoclinic orbit at which its period diverges."""
+        size, first = self._sizes(u) if self._on_plane else (1.0, 1.0)
+        if size <= _SMALL * first and self.hopf(u) is not None:
+            return self._hopf(u)
         shrunk = self._shrunk(u, _SMALL)
         if shrunk is not None:
             return shrunk
@@ -410,14 +426,19 @@ class OrbitCurve(OrbitEquations):
             "parameter's rounding, as where canards grow."
         )
 
+    def _sizes(self, u: Array) -> tuple[float, float]:
+        """Of the orbit and of the first one."""
+        size, first = (
+            extent(self.problem, v[: self.problem.size], self.parameters_at(v))
+            for v in (u, self.begin)
+        )
+        return size, first
+
     def _shrunk(self, u: Array, part: float) -> BranchEvent | None:
         """The point of a surface to which an orbit shrinks, if it is small relative to the first one."""
         if self.system.time_dependent or self.system.coupled or not self.system.surface_count:
             return None
-        first = extent(
-            self.problem, self.begin[: self.problem.size], self.parameters_at(self.begin)
-        )
-        size = extent(self.problem, u[: self.problem.size], self.parameters_at(u))
+        size, first = self._sizes(u)
         if not size <= part * first:
             return None
         name = self.system.parameter_names[self.free[-1]]
@@ -553,7 +574,7 @@ class OrbitCurve(OrbitEquations):
 
     def _smooth_event(self, zero: Zero) -> BranchEvent | None:
         if zero.name == "Hopf":
-            return self._hopf(zero)
+            return self._hopf(zero.point.u)
         at, p = self.evaluation(zero.point.u), self.parameters_at(zero.point.u)
         if zero.name.startswith(USER):
             function = self.rows.events[zero.name.removeprefix(USER)]
@@ -570,20 +591,23 @@ class OrbitCurve(OrbitEquations):
         side = _smooth_side(self.problem, at, p, zero.name)
         return None if side is None else self._event(zero.name, self, zero.point, zero.name, side)
 
-    def _hopf(self, zero: Zero) -> BranchEvent:
-        """The Hopf point of the equilibrium to which the orbit shrinks."""
-        u, leg = zero.point.u, self.problem.legs[0]
-        p, (starts, durations) = self.parameters_at(u), self.problem.split(u)
+    def hopf(self, u: Array, guard: Guard | None = None) -> tuple[Array, Array, float] | None:
+        """The Hopf point beside a small orbit: equilibrium, free parameters and frequency."""
+        leg, p = self.problem.legs[0], self.parameters_at(u)
+        starts, durations = self.problem.split(u[: self.problem.size])
         opposite = integrate_leg(self.system, leg, starts[0], 0.5 * float(durations[0]), p).end
-        n = self.system.dimension
-        middle = 0.5 * (starts[0] + opposite[: self.problem.dimension])[:n]
-        found = hopf_point(self.system, leg.mode, middle, p, self.free[-1])
-        verdict = "the orbit shrinks to an equilibrium"
-        event = self._event("Hopf", self, zero.point, "", FarSide("", verdict))
+        middle = 0.5 * (starts[0] + opposite[: self.problem.dimension])[: self.system.dimension]
+        free = self.free if guard is not None else self.free[-1:]
+        return hopf_point(self.system, leg.mode, middle, p, free, guard)
+
+    def _hopf(self, u: Array) -> BranchEvent:
+        """The Hopf point of the equilibrium to which the orbit shrinks."""
+        found, side = self.hopf(u), FarSide("", "the orbit shrinks to an equilibrium")
+        event = self._event("Hopf", self, Point(u, np.zeros(u.size)), "", side)
         if found is None:
             return event
         numbers = ReadOnly({"frequency": found[2]})
-        return replace(event, parameter=found[1], coefficients=numbers)
+        return replace(event, parameter=float(found[1][0]), coefficients=numbers)
 
     def _edited(
         self, kind: str, conditions: list[Condition], u: Array, p: Array

@@ -192,6 +192,11 @@ class BoundaryProblem:
         """The parts of a leg among those of all legs."""
         return range(i, i + 1)
 
+    def begun_at(self, u: Array, i: int, t: float) -> tuple[Array, int, float, float]:
+        """The last start of a part of a leg before a time t since its start: the state, its place among the unknowns,
+        the time since then, and how much less that is per duration of the leg."""
+        return self.split(u)[0][i], i * self.dimension, t, 0.0
+
     def undivided(self, u: Array) -> Array:
         """The unknowns of undivided legs, without free parameters."""
         return u[: self.size]

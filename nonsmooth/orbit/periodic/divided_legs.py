@@ -109,6 +109,15 @@ class DividedProblem(BoundaryProblem):
     def residual(self, u: Array, p: Array, extended: bool = False) -> Array | None:
         return None
 
+    def begun_at(self, u: Array, i: int, t: float) -> tuple[Array, int, float, float]:
+        starts, durations = self.split(u)
+        k, n = self.parts[i], self.dimension
+        j = min(max(int(k * t / durations[i]), 0), k - 1) if durations[i] > 0.0 else 0
+        if j == 0:
+            return starts[i], self._inner + i * n, t, 0.0
+        at = (sum(self.parts[:i]) - i + j - 1) * n
+        return u[at : at + n], at, t - j / k * durations[i], j / k
+
     def parts_of(self, i: int) -> range:
         _, first, last = self._places
         return range(int(first[i]), int(last[i]) + 1)

@@ -100,34 +100,3 @@ def test_a_box_falls_flat_on_four_feet(law):
     assert first.kind == "impact" and abs(first.t - np.sqrt(0.4 / G)) < 1e-11
     assert abs(first.x_after[3:]).max() < 1e-11  # friction takes the speed, within the impact
     np.testing.assert_allclose(run.x[-1, 3:], 0.0, atol=1e-9)
-
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-def test_a_ball_in_a_corner_returns_its_speed(law, e):
-    """Both walls are struck at one instant; they are orthogonal, so that each turns its own rate."""
-    ball = ns.FilippovSystem(
-        [x, y, u, v],
-        field=[u, v, 0, 0],
-        impacts=[
-            ns.Impact(x, restitution=e, name="wall", law=law),
-            ns.Impact(y, restitution=e, name="floor", law=law),
-        ],
-    )
-    run = ns.simulate(ball, [1.0, 2.0, -1.0, -2.0], 2.0)
-    np.testing.assert_allclose(run.x[-1], [e, 2 * e, e, 2 * e], atol=1e-12)
-
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("angle", [0.4, 1.0, 2.5])
-def test_a_ball_in_a_wedge_stops_if_the_impacts_are_plastic(law, angle):
-    """Walls at any angle: with e = 0 and both approached, the ball stays in the wedge."""
-    n = np.array([[0.0, 1.0], [np.sin(angle), -np.cos(angle)]])
-    ball = ns.FilippovSystem(
-        [x, y, u, v],
-        field=[u, v, 0, 0],
-        impacts=[ns.Impact(n[k, 0] * x + n[k, 1] * y, name=f"wall{k}", law=law) for k in range(2)],
-    )
-    inward = -(n[0] + n[1]) / np.linalg.norm(n[0] + n[1])
-    run = ns.simulate(ball, [*-inward, *inward], 2.0)
-    np.testing.assert_allclose(run.x[-1], 0.0, atol=1e-9)

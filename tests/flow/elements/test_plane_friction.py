@@ -126,22 +126,6 @@ def test_several_sets_and_a_surface():
     assert run.x[-1, :2] == pytest.approx(travelled, abs=1e-11)
 
 
-@pytest.mark.parametrize("both", [True, False])
-def test_two_sets_are_met_at_one_time(both):
-    # Two equal pucks stop at once; coupled by a spring of no force they stay at rest.
-    v, w = plane.columns("v1", "v2"), plane.columns("w1", "w2")
-    one, two = (ca.vertcat(*plane.columns(f"{n}1", f"{n}2")) for n in "lm")
-    field = [-0.5 * one[0], -0.5 * one[1], -0.5 * two[0], -0.5 * two[1]]
-    system = ns.FilippovSystem(
-        [*v, *w], field=field, surfaces=[ca.vertcat(*v), ca.vertcat(*w)], multipliers=[one, two]
-    )
-    start = [0.6, 0.8, -0.8, 0.6] if both else [0.0, 0.0, -0.8, 0.6]
-    run = ns.simulate(system, start, 3.0)
-    assert run.itinerary.split()[-1] == "ss" and set(run.itinerary[:2]) <= set("*s")
-    assert run.events[-2].t == pytest.approx(2.0, abs=1e-12)
-    assert not run.x[-1].any()
-
-
 def _puck(**more):
     x, v = plane.columns("x1", "x2"), plane.columns("v1", "v2")
     lam, (mu, pull) = ca.vertcat(*plane.columns("l1", "l2")), plane.columns("mu", "pull")
@@ -155,70 +139,7 @@ def _puck(**more):
     )
 
 
-@pytest.mark.parametrize("rate", [1.0, 7.0])
-@pytest.mark.parametrize("ratio", [2.0, 4.0])
-def test_a_set_is_reached_beside_a_contact_with_a_moving_floor(rate, ratio):
-    v, w, q, s, t, r = plane.columns("v", "w", "q", "s", "t", "r")
-    lam, floor = ca.vertcat(*plane.columns("l1", "l2")), 0.2 * ca.sin(rate * t)
-    system = ns.FilippovSystem(
-        [v, w, q, s],
-        field=[-lam[0], -ratio * lam[1], s, r - 20],
-        surfaces=[ca.vertcat(v, w)],
-        multipliers=[lam],
-        impacts=ns.Impact(q - floor, reaction=r),
-        time=t,
-    )
-    run = ns.simulate(system, [0.5, 0.3, 0.0, 0.2 * rate], 1.0)
-    assert (run.status, run.itinerary) == (ns.Status.REACHED_END, "*c sc")
-    moves = [0.2 * np.sin(rate), 0.2 * rate * np.cos(rate)]
-    np.testing.assert_allclose(run.x[-1], [0, 0, *moves], atol=1e-9)
-
-
-def test_no_friction_is_allowed():
-    run = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"mu": 0.0, "pull": 1.0})
-    assert run.status == ns.Status.REACHED_END and run.itinerary == "*"
-    assert run.x[-1] == pytest.approx([2.0, 0.0, 2.0, 0.0], abs=1e-12)
-    run = ns.simulate(_puck(), [0, 0, 1, 0], 2.0, parameters={"mu": 0.0, "pull": -1.0})
-    assert run.x[-1] == pytest.approx([0.0, 0.0, -1.0, 0.0], abs=1e-12)
-
-
-def test_friction_that_pushes_has_no_unique_future():
-    run = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"mu": -0.5})
-    assert run.status == ns.Status.NON_UNIQUE
-    assert "negative direction" in run.message
-    moving = ns.simulate(_puck(), [0, 0, 3, 4], 2.0, parameters={"mu": -0.5})
-    assert moving.x[-1, 2:] == pytest.approx([3.6, 4.8], abs=1e-12)
-
-
-@pytest.mark.parametrize(("k", "pull"), [(2, 0.0), (2, 0.3), (3, 0.0)])
-def test_friction_that_misses_a_direction_leaves_its_multiplier_open(k, pull):
-    h, lam = ca.SX.sym("h", k), ca.SX.sym("lam", k)
-    system = ns.FilippovSystem(
-        h, field=pull - ca.vertcat(lam[0], ca.SX(k - 1, 1)), surfaces=[h], multipliers=[lam]
-    )
-    run = ns.simulate(system, np.eye(1, k)[0], 5.0)
-    if pull:
-        assert run.itinerary == "*"
-        return
-    assert run.status == ns.Status.NON_UNIQUE
-    assert "singular" in run.message
-    assert run.events[-1].t == pytest.approx(1.0, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("pull", "itinerary", "speed"), [(0.3, "s", 0.0), (0.6, "*", 0.2), (-0.6, "*", -0.2)]
-)
-def test_a_start_on_the_set_sticks_or_leaves(pull, itinerary, speed):
-    run = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"pull": pull})
-    assert run.itinerary == itinerary
-    assert run.x[-1, 2] == pytest.approx(speed, abs=1e-12)
-
-
 def test_a_mode_to_start_in():
-    run = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"pull": 0.6}, start_mode="*")
-    assert run.itinerary == "*"
-    refused = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"pull": 0.6}, start_mode="s")
-    assert refused.status == ns.Status.NON_UNIQUE
     # Letters that only runs know, one for each component, none, no letters
     for mode in ("+", "i", "b", "ll", "**", "", 1):
         for run in (ns.simulate, ns.ensemble):
@@ -292,10 +213,7 @@ def test_what_is_no_set_is_refused():
             ns.FilippovSystem(v, field=[0] * 4, surfaces=surfaces, multipliers=multipliers)
     with pytest.raises(ns.DefinitionError, match=r"multiplier \[l1, l2\].*linear"):
         ns.FilippovSystem(
-            v,
-            field=[l1 * l2, 0, 0, 0],
-            surfaces=[pair],
-            multipliers=[ca.vertcat(l1, l2)],
+            v, field=[l1 * l2, 0, 0, 0], surfaces=[pair], multipliers=[ca.vertcat(l1, l2)]
         )
 
 
@@ -390,10 +308,7 @@ def test_a_set_is_reached_whatever_the_unit_of_time(size, skew):
     lam, c = ca.SX.sym("lam", 2), 2.943
     force = -c * ca.vertcat(lam[0] - skew * lam[1], skew * lam[0] + lam[1])
     block = ns.FilippovSystem(
-        [x, y, u, v],
-        field=ca.vertcat(u, v, force),
-        surfaces=[ca.vertcat(u, v)],
-        multipliers=[lam],
+        [x, y, u, v], field=ca.vertcat(u, v, force), surfaces=[ca.vertcat(u, v)], multipliers=[lam]
     )
     options = dict(atol=1e-12 * size, rtol=1e-12)
     run = ns.simulate(block, [0.0, 0.0, size, size], 5 * size, **options)
@@ -491,11 +406,7 @@ def test_sets_and_surfaces_that_act_on_one_another_in_any_units():
     m = root @ root.T / 5 + 0.3 * np.eye(5)
     force = scale * ca.mtimes(ca.DM(m), ca.vertcat(*lam))
     system = ns.FilippovSystem(
-        h,
-        field=pull * ca.cos(T) - force,
-        surfaces=[h[:2], h[2:4], h[4]],
-        multipliers=lam,
-        time=T,
+        h, field=pull * ca.cos(T) - force, surfaces=[h[:2], h[2:4], h[4]], multipliers=lam, time=T
     )
     run = ns.simulate(system, np.zeros(5), 3.0)
     assert run.status is ns.Status.REACHED_END

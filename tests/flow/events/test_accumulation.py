@@ -31,15 +31,6 @@ def _end(system, start, t_end):
     return run
 
 
-@pytest.mark.parametrize("restitution", [0.5, 0.8, 0.9, 0.99])
-def test_contact_closes_at_the_limit(restitution):
-    limit = math.sqrt(2 / _G) * (1 + 2 * restitution / (1 - restitution))
-    run = ns.simulate(_ball(restitution), [1, 0, 0], limit + 1)
-    contact = [event for event in run.events if event.kind == "contact"]
-    assert [event.t for event in contact] == pytest.approx([limit], abs=1e-12)
-    assert run.status is ns.Status.REACHED_END and run.x[-1][:2].tolist() == [0, 0]
-
-
 @pytest.mark.parametrize(
     ("restitution", "growth"), [(0.3, -4.0), (0.527, -2.3), (0.5, -2.4), (0.7, 20.0)]
 )
@@ -146,16 +137,6 @@ def test_ball_on_a_sprung_plate_after_waiting():
     np.testing.assert_allclose(at_end(1e5), at_end(1.0), rtol=0, atol=1e-8)
 
 
-def test_resets_end_at_their_limit():
-    floor = ns.Reset(y, [y, -0.75 * v], direction=-1)
-    system = ns.FilippovSystem([y, v], field=[v, -8], resets=floor)
-    run = ns.simulate(system, [1, 0], 4)
-    assert run.status is ns.Status.ACCUMULATION
-    assert run.accumulation_time == pytest.approx(3.5, abs=1e-12)
-    run = ns.simulate(system, [1, 0], 3.5 - 2**-18)
-    assert run.status is ns.Status.REACHED_END
-
-
 def _turning():
     """The surface is crossed at 1 - 2**(-k / 2 - 1 / 4), and has no series at the limit 1."""
     turns = ca.cos(2 * ca.pi * ca.log(1 - v) / np.log(2.0))
@@ -193,3 +174,19 @@ def test_events_end_where_the_field_has_no_series(kind, phase):
     times = [event.t for event in run.events if event.kind == kind]
     zeros = [math.exp(-math.pi * (k + 0.5) - phase) for k in range(-1, len(times))]
     assert times == pytest.approx([1 - at for at in zeros if at < 1][: len(times)], abs=1e-12)
+
+
+@pytest.mark.parametrize("power", [1, 2])
+@pytest.mark.parametrize("restitution", [0.3, 0.5, 0.8])
+def test_resets_that_come_to_rest_have_moved_the_other_states_by_their_whole_sum(
+    restitution, power
+):
+    """Each passage of zero, from the speeds 1, e, e^2, ..., adds a power of its speed: a geometric series."""
+    passes = ns.Reset(y, {v: restitution * v, w: w + ca.fabs(v) ** power}, 0)
+    switched = ns.FilippovSystem(
+        [y, v, w], surfaces=[y], multipliers=[lam], field=[v, -lam, 0], resets=[passes]
+    )
+    run = ns.simulate(switched, [0.5, 0.0, 0.0], 20.0)
+    assert run.status is ns.Status.REACHED_END and run.itinerary.endswith("s")
+    np.testing.assert_allclose(run.x[-1], [0, 0, 1 / (1 - restitution**power)], atol=1e-13)
+    assert abs(run.events[-2].t - 1 - 2 * restitution / (1 - restitution)) < 1e-13

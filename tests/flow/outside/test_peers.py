@@ -1,13 +1,38 @@
-"""Problems of other tools' collections (``tests/cases/peers.json``): closed forms and integrators of their own."""
+"""Problems of other tools' collections (``testset/problems.json``): closed forms and integrators of their own."""
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from testset.problem import Problem, cases
 
-from ..independent.contacts import follow
-from ..peers import Problem, cases
+from ..independent.contacts import Mechanism, follow
+
+
+def mechanism(problem):
+    """The same mechanism for an integrator that shares no code with the package."""
+    given = {name: problem.read(text) for name, text in problem.data["mechanism"].items()}
+    q, v = ca.vertcat(*given["q"]), ca.vertcat(*given["v"])
+    gaps, slips = ca.vertcat(*given["gaps"]), ca.vertcat(*given["slips"])
+    rates = ca.vertcat(ca.mtimes(ca.jacobian(gaps, q), v), slips)
+
+    def values(expression, *arguments):
+        made = ca.Function("f", list(arguments), [ca.densify(ca.SX(expression))])
+        flat = expression.is_column()
+        return lambda *at: np.array(made(*at)).ravel() if flat else np.array(made(*at))
+
+    return Mechanism(
+        mass=values(given["mass"], q),
+        force=values(ca.vertcat(*given["force"]), q, v),
+        gaps=values(gaps, q),
+        normals=values(ca.jacobian(gaps, q), q),
+        tangents=values(ca.jacobian(slips, v), q),
+        bias=values(ca.mtimes(ca.jacobian(rates, q), v), q, v),
+        restitution=given["restitution"],
+        friction=given["friction"],
+    )
+
 
 every = pytest.mark.parametrize(
     "data",
@@ -49,8 +74,20 @@ def test_an_integrator_of_contacts_ends_there_too(data):
     problem, start = Problem(data), np.array(Problem(data).start)
     half = len(start) // 2
     step = problem.t_end / 150
-    end = follow(problem.mechanism(), start[:half], start[half:], problem.t_end, step)
+    end = follow(mechanism(problem), start[:half], start[half:], problem.t_end, step)
     assert problem.error(end, problem.data["end"]) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "data", [own for own in cases() if "orbit" in own], ids=lambda own: own["id"]
+)
+def test_an_orbit_has_its_period_and_multipliers(data):
+    problem = Problem(data)
+    run = ns.simulate(problem.system, problem.start, 3 * problem.t_end)
+    found = ns.periodic_orbit(problem.system, run)
+    assert abs(found.period - problem.t_end) < 1e-9
+    true = [problem.number(text) for text in data["orbit"]["multipliers"]]
+    assert np.allclose(found.multipliers, true, rtol=0, atol=1e-9)
 
 
 def test_time_does_not_run_backward():

@@ -36,11 +36,7 @@ def test_off_the_surface_the_sliding_field_keeps_its_level():
 
 
 PENDULUM = ns.FilippovSystem(
-    [x, y],
-    field=[y, -ca.sin(x) - lam * (1 + 0.2 * ca.cos(t))],
-    multipliers=lam,
-    surface=y,
-    time=t,
+    [x, y], field=[y, -ca.sin(x) - lam * (1 + 0.2 * ca.cos(t))], multipliers=lam, surface=y, time=t
 )
 
 
@@ -100,3 +96,12 @@ def test_a_run_has_no_more_steps_than_were_allowed():
     run = ns.flow.follow(PENDULUM, [1.0, 0.5], 100.0, mode="+", max_steps=3)
     assert run.status is ns.Status.TOO_MANY_STEPS
     assert len(run.steps) == 3
+
+
+def test_a_mode_with_two_sliding_solutions_is_not_unique():
+    """lam kap = 1/4 and lam = kap along the corner: both 1/2 or both -1/2."""
+    kap = ca.SX.sym("kap")
+    system = ns.FilippovSystem(
+        [x, y], surfaces=[x, y], multipliers=[lam, kap], field=[lam * kap - 0.25, lam - kap]
+    )
+    assert ns.flow.follow(system, [0.0, 0.0], 1.0, mode="ss").status is ns.Status.NON_UNIQUE

@@ -4,10 +4,12 @@ their points of codimension two."""
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 import nonsmooth as ns
+from nonsmooth.orbit import BranchEnd
 from tests.orbit.interrupts import interrupt
-from tests.orbit.periodic_cases import impact_oscillator, table
+from tests.orbit.periodic_cases import impact_oscillator, symbols, table
 
 x, y, z, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "a", "b"))
 BOX = [(-1, 1), (-1.5, 1)]
@@ -218,4 +220,46 @@ def test_a_grazing_of_orbits_without_events_from_their_hopf_point():
     curve = ns.continue_bifurcation(event, ("T", "K"), bounds=[(0.5, 3.0), (2.0, 2.5)], step=0.05)
     assert curve.values[-1] == pytest.approx([2.07020393, 2.5], abs=1e-8)
     assert curve.special[0].kind == "grazing-sliding with Hopf"
-    assert curve.special[0].values == pytest.approx([20 / 13 * (1 - 7 / 27), 27 / 13], abs=1e-3)
+    assert curve.special[0].values == pytest.approx([20 / 13 * (1 - 7 / 27), 27 / 13], abs=1e-12)
+
+
+def test_grazing_of_relaxation_oscillations():
+    """A leg of T = 72 with a minimum of 6e-9; values of alpha, the maximum, by scipy; Hopf point in closed form."""
+    system = ns.textbook.harvested_prey_predator().system
+    orbit = ns.periodic_orbit(system, [0.5, 1.0], parameters={"alpha": 2.6, "b": 0.33})
+    assert orbit.period == pytest.approx(71.875315, abs=1e-6)
+    (event,) = ns.continue_orbit(orbit, "alpha", bounds=(2.3, 2.7)).events
+    for low, high, top in ((0.3, 0.34, 2.453951), (0.32, 0.4, 2.529183)):
+        bounds = [(0.5, 4.0), (low, high)]
+        curve = ns.continue_bifurcation(event, ("alpha", "b"), bounds=bounds)
+        assert curve.ends == (BranchEnd.REACHED_BOUND,) * 2
+        assert max(curve.values.tolist(), key=lambda v: v[1]) == pytest.approx(
+            [top, high], abs=1e-6
+        )
+
+
+@pytest.mark.slow
+def test_legs_are_divided_along_a_curve():
+    """A relay oscillator with passengers, whose derivatives grow by 7e6 along a leg, grazes x + v = c."""
+    x, v, z, w, d, c = symbols("x v z w d c")
+    push = 5 * (1 + ca.sign(x + v - c))
+    rate = [v - push, ca.sign(v) - x - 2 * d * v - push, x - 40 * z, 5 * w + v]
+    system = ns.FilippovSystem.from_expression([x, v, z, w], rate, parameters={d: 0.1, c: 12.0})
+
+    def top(damping: float) -> float:
+        turn = np.sqrt(1 - damping**2)
+        far = 2 / (1 - np.exp(-damping * np.pi / turn))  # the amplitude about the middle of a leg
+
+        def height(t: float) -> float:
+            fall = far * np.exp(-damping * t)
+            moved = np.cos(turn * t) + (damping - 1) / turn * np.sin(turn * t)
+            return float(fall * moved - 1)  # - (x + v)
+
+        return -minimize_scalar(height, (1.0, 2.5, 3.1), tol=1e-13).fun
+
+    start = [-6.3868231843577333, 0.0, -0.1595860406386929, -0.2735860335513412]
+    orbit = ns.periodic_orbit(system, start, itinerary=["-+", "--"])
+    (event,) = ns.continue_orbit(orbit, "c", bounds=(8.5, 12.5)).events
+    curve = ns.continue_bifurcation(event, ("c", "d"), bounds=[(2, 20), (0.08, 0.2)], step=0.1)
+    assert curve.ends == (BranchEnd.REACHED_BOUND,) * 2 and not curve.special
+    assert np.abs(curve.values[:, 0] - [top(one) for one in curve.values[:, 1]]).max() < 1e-11

@@ -455,11 +455,7 @@ def test_a_leg_that_does_not_exist_beyond_a_bifurcation_ends_no_branch():
         return [top - bit, above / 2122, below / 374]
 
     drill = ns.FilippovSystem(
-        [phi, top, bit],
-        surface=bit,
-        above=fields(1),
-        below=fields(-1),
-        parameters={speed: 14.0},
+        [phi, top, bit], surface=bit, above=fields(1), below=fields(-1), parameters={speed: 14.0}
     )
     orbit = ns.periodic_orbit(drill, ns.simulate(drill, [0.0] * 3, 400.0))
     branch = ns.continue_orbit(orbit, "speed", bounds=(8.0, 14.8))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.differences import require
-from tests.flow.peers import RUNS, Problem, cases
+from testset.problem import RUNS, Problem, cases
 
 
 @pytest.mark.parametrize(

@@ -344,6 +344,19 @@ static void keep_vector(Decision *d, int i, int order) {
   }
 }
 
+/* Rows of a vector have one rounding; what it has left of their slopes where joints allow no slip is zero. */
+static void clean_rows(Block *b, int i, int size) {
+  double most = 0, floor = largest_of(b->floor + i, size);
+  for (int q = 0; q < size; q++) b->floor[i + q] = floor;
+  for (int pass = 0; pass < 2; pass++)
+    for (int q = 0; q < size; q++)
+      for (int c = i; c < i + size; c++) {
+        double *of = b->matrix + (i + q) * b->size + c;
+        if (pass == 0) most = larger(fabs(*of), most);
+        else if (fabs(*of) <= VANISHES * most) *of = 0;
+      }
+}
+
 /* Rows of a vector that is at its bound, in axes along and across it: its part along is at a bound, that across is
  * where w keeps its direction. */
 static void turn_rows(const Decision *d, Block *b, int i, int order) {
@@ -353,6 +366,7 @@ static void turn_rows(const Decision *d, Block *b, int i, int order) {
   along_bound(d, own, order, nu, w);
   for (int c = 0; c < n; c++) turn_vector(axes, size, 1, b->matrix + i * n + c, n);
   for (int c = 0; c < n; c++) turn_vector(axes, size, 1, b->matrix + c * n + i, 1);
+  clean_rows(b, i, size);
   double terms = length_of(b->a + i, size);
   turn_vector(axes, size, 1, b->a + i, 1);
   for (int q = 0; q < size; q++) if (fabs(b->a[i + q]) <= VANISHES * terms) b->a[i + q] = 0;
@@ -398,6 +412,7 @@ static Block part_of_law(Decision *d, int order, int which) {
     int own = b.own[i], size = d->span[own];
     if (size >= 0) span[i] = 0;
     if (size <= 0) continue;
+    clean_rows(&b, i, size);
     if (order > d->began[own]) { /* its rows are like those of other elements */
       memset(span + i, 0, size);
       if (b.state[i] != INSIDE) turn_rows(d, &b, i, order);
@@ -449,6 +464,19 @@ static void refuse_negative(Run *r, const Block *b) {
   }
 }
 
+/* The part of its scale by which what one of many solutions leaves of a bound is zero: none where it is inside all bounds by
+ * more than ``part``; else all that are closer to theirs than others by far. Such reactions are made zero. */
+static double find_tight(const Block *b, double *nu, double part) {
+  double most = 0;
+  int is_tight = 0;
+  for (int i = 0; i < b->size; i++) if (b->is_contact[i]) most = larger(nu[i], most);
+  for (int i = 0; i < b->size; i++)
+    is_tight |= b->is_contact[i] ? nu[i] <= part * most : bound_of(b, i, nu) - fabs(nu[i]) <= part * bound_of(b, i, nu);
+  if (!is_tight) return 0;
+  for (int i = 0; i < b->size; i++) if (b->is_contact[i] && nu[i] <= sqrt(part) * most) nu[i] = 0;
+  return sqrt(part);
+}
+
 /* Solutions of a block at an order; where the old unknowns are one, what its guard says of an element is known. */
 static int solutions_of(Run *r, Decision *d, int order, int which, double *found, int8_t *class) {
   Block b = part_of_law(d, order, which);
@@ -483,9 +511,11 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
       is_dependent |= d->is_known[b.own[i]] && d->proved[which] < UNIQUE;
       contacts |= b.is_contact[i];
     }
+    double loose = KNOWN_TO * r->o.rtol;
+    if (agrees && is_dependent && contacts && !b.span) loose = find_tight(&b, nu, loose);
     for (int i = 0; i < n; i++) {
       int is_loose = agrees && (is_dependent ? contacts : d->is_known[b.own[i]]), own = b.own[i], size = d->span[own];
-      double part = is_loose && !(is_dependent && b.span) ? KNOWN_TO * r->o.rtol : 0; /* loads are shared anew */
+      double part = is_loose && !(is_dependent && b.span) ? loose : 0; /* loads are shared anew */
       class[q * n + i] = (int8_t)(size < 0 ? class[q * n + i - 1] : span_of(&b, i) ? class_of_vector(&b, i, nu, part)
                                                                                    : class_of(&b, i, nu, part));
     }
@@ -744,7 +774,7 @@ static int find_dependent(Run *r, const Layout *l, const int8_t *letter, const d
 static int hold(Run *r, Continuation *to, int may_depend) {
   Layout *l = &r->trial.l;
   lay_out(r, to->letter, l);
-  if ((may_depend || r->s->joints > 1) && !find_dependent(r, l, to->letter, to->unknowns))
+  if ((may_depend || r->s->joints) && !find_dependent(r, l, to->letter, to->unknowns))
     finish(r, NON_UNIQUE, UNDETERMINED_RATES, 0);
   if (l->slides && !improve(r, l, r->x, to->unknowns, 1) && r->s->joints) finish(r, INCONSISTENT, DEAD_POINT, 0);
   return r->status == RUNNING;

@@ -138,9 +138,51 @@ static int leaving_matrix(Run *r, const Expansion *e, int k, int *count) {
   return all;
 }
 
-/* Coefficients k of directions in which sets are left and k + 1 of the distances, with those of what slides. */
-static void leave_sets(Run *r, Expansion *e, int k) {
-  if (k == 0) { leave_at_rates(r, e); return; }
+/* Solve it in place of b: what is not determined is small, but reactions of joints. */
+static void leaving_rates(Run *r, const Expansion *e, double *a, int all, double *b) {
+  double *inverse = r->decision->work, *size = inverse + (int64_t)all * all, *rest = size + all;
+  int is_solved;
+  if (r->s->joints || r->c) {
+    for (int i = 0; i < all; i++) size[i] = i < e->l.slides && has_law(r, e->l.sliding[i], JOINT_LAW) ? 1 / MERGED : 1;
+    is_solved = invert_any(a, all, size, inverse, rest, r->decision->pivot);
+    apply(inverse, b, all, rest);
+    memcpy(b, rest, sizeof(double) * all);
+  } else is_solved = solve(a, b, all);
+  if (!is_solved) for (int i = 0; i < all; i++) b[i] = NAN;
+}
+
+/* Where joints restrict the slip of a set that is left without a rate, rows of order k say what coefficients k - 1 of its
+ * direction are across, with those of what slides: whether they have changed those. ``b`` is what is left of the rows. */
+static int turn_leaving(Run *r, Expansion *e, int k, const double *a, int all, const double *b) {
+  double *z = r->decision->work, *y = z + (int64_t)all * all, *turned = y + (int64_t)all * all, *rest = turned + (int64_t)all * all;
+  int stride = r->stride, slides = e->l.slides, at = slides, changes = 0, count = null_space(a, all, all, z, rest, r->decision->pivot);
+  for (int i = 0; count && i < all; i++) for (int j = 0; j < all; j++) turned[i * all + j] = a[j * all + i];
+  if (!count || null_space(turned, all, all, y, rest, r->decision->pivot) != count) return 0;
+  double *d = turned, *change = d + (int64_t)count * count;
+  memset(d, 0, sizeof(double) * count * count);
+  for (int l = 0; l < count; l++) {
+    double *own = y + (int64_t)l * all, terms = 0;
+    change[l] = -dot(own, b, all);
+    for (int i = 0; i < all; i++) terms += fabs(own[i] * b[i]);
+    if (fabs(change[l]) <= VANISHES * terms) change[l] = 0;
+    changes |= change[l] != 0;
+  }
+  EACH_LEAVING(r, e, f)
+    for (int end = at + size_of(r, f); at < end; at++)
+      for (int l = 0; l < count * count; l++)
+        d[l] += (k + 1) * e->rates[(int64_t)f * (stride + 1) + 2] * y[l / count * all + at] * z[l % count * all + at];
+  if (!changes || !solve_any(d, change, count, INFINITY, rest, r->decision->pivot)) return 0;
+  for (int i = 0; i < at; i++) {
+    double *to = (i < slides ? e->series : e->lambda) + (int64_t)r->pending[i] * stride + k - 1;
+    for (int l = 0; l < count; l++) *to += change[l] * z[l * all + i];
+  }
+  return 1;
+}
+
+/* Coefficients k of directions in which sets are left and k + 1 of the distances, with those of what slides; 1 where those
+ * before have changed. */
+static int leave_sets(Run *r, Expansion *e, int k, int may_turn) {
+  if (k == 0) { leave_at_rates(r, e); return 0; }
   int slides = e->l.slides, stride = r->stride, n, all = leaving_matrix(r, e, k, &n), at = slides, column = n;
   const int32_t *which = r->pending;
   double *a = r->work, *b = a + (int64_t)all * all;
@@ -158,12 +200,13 @@ static void leave_sets(Run *r, Expansion *e, int k) {
     }
     column++;
   }
-  int is_solved = r->c ? solve_any(a, b, all, INFINITY, r->decision->work, r->decision->pivot) : solve(a, b, all);
-  if (!is_solved) for (int i = 0; i < all; i++) b[i] = NAN;
+  if (r->s->joints && may_turn && k > 1 && turn_leaving(r, e, k, a, all, b)) return 1;
+  leaving_rates(r, e, a, all, b);
   for (int i = 0; i < slides; i++) e->series[(int64_t)which[i] * stride + k] = b[i];
   for (int i = slides; i < n; i++) e->lambda[(int64_t)which[i] * stride + k] = b[i];
   at = n;
   EACH_LEAVING(r, e, s) e->rates[(int64_t)s * (stride + 1) + k + 1] = b[at++];
+  return 0;
 }
 
 /* Coefficients k + 1 of h that is carried along. */

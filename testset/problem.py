@@ -15,13 +15,13 @@ import numpy as np
 import nonsmooth as ns
 from nonsmooth.flow.constants import KINDS
 
-from .independent.contacts import Mechanism
-
-CASES = Path(__file__).parents[1] / "cases" / "peers.json"
-RUNS = CASES.with_name("runs.json")
+CASES = Path(__file__).with_name("problems.json")
+#: Small systems of the tests, in the same form.
+RUNS = CASES.parents[1] / "tests" / "cases" / "runs.json"
 
 _CASADI = (
     *("sin", "cos", "tan", "exp", "log", "sqrt", "fabs", "sign", "fmin", "fmax", "atan2", "floor"),
+    *("asin", "acos", "erf"),
     *("tanh", "if_else", "logic_and", "logic_or", "jacobian", "solve", "vertcat", "vertsplit"),
     *("horzcat", "mtimes", "inv"),
 )
@@ -31,7 +31,7 @@ _CONSTRUCTS = (
 )
 #: Names that the strings of a system use.
 WORDS = {n: getattr(ca, n) for n in _CASADI} | {"pi": math.pi, "matrix": ca.DM}
-WORDS |= {n: getattr(ns, n) for n in _CONSTRUCTS}
+WORDS |= {n: getattr(ns, n) for n in (*_CONSTRUCTS, "table")}
 #: Names that the strings of numbers use.
 NUMBERS = {n: getattr(math, n) for n in dir(math) if not n.startswith("_")}
 
@@ -113,29 +113,6 @@ class Problem:
         if "section" in self.data:
             options["at"] = ns.Section(self.read(self.data["section"]))
         return ns.simulate(self.system, self.start, self.t_end, **options)
-
-    def mechanism(self) -> Mechanism:
-        """The same mechanism for an integrator that shares no code with the package."""
-        given = {name: self.read(text) for name, text in self.data["mechanism"].items()}
-        q, v = ca.vertcat(*given["q"]), ca.vertcat(*given["v"])
-        gaps, slips = ca.vertcat(*given["gaps"]), ca.vertcat(*given["slips"])
-        rates = ca.vertcat(ca.mtimes(ca.jacobian(gaps, q), v), slips)
-
-        def values(expression: ca.SX, *arguments: ca.SX) -> Any:
-            made = ca.Function("f", list(arguments), [ca.densify(ca.SX(expression))])
-            flat = expression.is_column()
-            return lambda *at: np.array(made(*at)).ravel() if flat else np.array(made(*at))
-
-        return Mechanism(
-            mass=values(given["mass"], q),
-            force=values(ca.vertcat(*given["force"]), q, v),
-            gaps=values(gaps, q),
-            normals=values(ca.jacobian(gaps, q), q),
-            tangents=values(ca.jacobian(slips, v), q),
-            bias=values(ca.mtimes(ca.jacobian(rates, q), v), q, v),
-            restitution=given["restitution"],
-            friction=given["friction"],
-        )
 
     def error(self, found: np.ndarray, true: dict[str, str]) -> float:
         """The largest relative error of the states that are named."""

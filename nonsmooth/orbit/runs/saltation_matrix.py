@@ -7,7 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import Array, FilippovSystem, Parameters, PointError, require_system
+from ...model import (
+    Array,
+    DefinitionError,
+    FilippovSystem,
+    Parameters,
+    PointError,
+    require_system,
+)
 from ...model.derivatives.event_maps import AtEvent, surface_map
 from .guards import begin_fault, change_fault
 from .itinerary import leg_between
@@ -77,7 +84,13 @@ def saltation_matrix(
     array([[ 1. , -1. ],
            [ 0. ,  0.5]])
     """
-    require_system(system, complementarity=True)
+    require_system(system, sets=True, complementarity=True)
+    if system.sets:
+        raise DefinitionError(
+            f"system: {system!r} has vector multipliers, of whose events a point does not determine the matrix: a motion "
+            "enters a set at a direction of its own. sensitivity(run).dx_dx0 of a run through the event has it, and "
+            "PeriodicOrbit.monodromy over a period."
+        )
     p, x = system.parameter_vector(parameters), system.extended_point(point, t)
     for mode in (before, after):
         system.parse_letters(mode)  # raises for an invalid mode

@@ -210,3 +210,41 @@ def test_a_half_orbit_that_loses_its_stop() -> None:
     curve = ns.continue_bifurcation(event, ("f", "w"), bounds=[(0.1, 1.0), (0.3, 0.95)], step=0.1)
     assert_real(curve)
     assert np.abs(curve.special[0].values - [1 / 3, 1 / 2]).max() < 1e-9
+
+
+def test_the_tongue_of_a_forced_neuron():
+    """TO1: two orbits of one spike a period meet on a fold in closed form; it ends where they touch the threshold before."""
+    v, amplitude, period = symbols("v A T")
+    values, current = CASES["TO1"], 1.2
+    system = ns.FilippovSystem(
+        [v], field=[current + amplitude * ca.cos(2 * ca.pi * t / period) - v], time=t,
+        resets=[ns.Reset(v - 1, [0 * v], 1)], parameters={amplitude: float(values["A used"]), period: 1.9},
+    )  # fmt: skip
+    branch = ns.continue_orbit(
+        ns.periodic_orbit(system, ns.simulate(system, [0.0], 60.0)), "A", bounds=(0.05, 0.3)
+    )
+    found = sorted(
+        (o.legs[0].t % 1.9, float(o.multipliers[0].real))
+        for o in branch.at(float(values["A used"]))
+    )
+    truth = [
+        [float(v) for v in row] for row in values["firing phases and multipliers (two orbits)"]
+    ]
+    assert np.abs(np.array(found) - truth).max() < 1e-11
+    (fold,) = (e for e in branch.events if e.kind == "fold")
+    assert fold.parameter == pytest.approx(float(values["A at the edge, T=1.9"]), abs=1e-14)
+    curve = ns.continue_bifurcation(fold, ("A", "T"), bounds=[(0.0, 2.0), (1.0, 3.0)])
+    a_edge, t_edge = curve.values.T
+    w = 2 * np.pi / t_edge
+    level = 1 / (1 - np.exp(-t_edge))
+    assert np.abs(a_edge - np.abs(level - current) * np.hypot(1, w)).max() < 1e-13
+    (point,) = curve.special
+    assert point.kind == "fold with grazing of a reset" and BranchEnd.EVENT in curve.ends
+    amplitude, period = point.values
+    w = 2 * np.pi / period
+    since = np.linspace(0.0, 0.98 * period, 20001)  # after a spike at the extremum of the drive
+    sign = np.sign(1 / (1 - np.exp(-period)) - current)
+    wave = sign * amplitude / np.hypot(1, w) * (np.cos(w * since) - np.exp(-since))
+    before = current * (1 - np.exp(-since)) + wave
+    inside = before[1:-1][(before[1:-1] > before[:-2]) & (before[1:-1] > before[2:])]
+    assert inside.max() == pytest.approx(1.0, abs=1e-8)

@@ -71,14 +71,8 @@ def test_balls_have_sources():
         (lambda: bounce.Landing(1.0, math.inf, 0.0), "ydot"),
         (lambda: bounce.Landing.polar(-1.0, 0.5, 0.0), "speed"),
         (lambda: bounce.Landing.polar(28.5, 37.3, 0.0), "angle"),
-        (
-            lambda: bounce.Scaling(bounce.golf.GOLF, 0.0),
-            "time",
-        ),
-        (
-            lambda: bounce.Scaling(bounce.golf.GOLF, 1e-3, "both"),
-            "convention",
-        ),
+        (lambda: bounce.Scaling(bounce.golf.GOLF, 0.0), "time"),
+        (lambda: bounce.Scaling(bounce.golf.GOLF, 1e-3, "both"), "convention"),
         (lambda: bounce.Scaling.from_stiffness(bounce.golf.GOLF, -1.0), "stiffness"),
     ],
 )

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import nonsmooth as ns
@@ -24,6 +25,7 @@ PERIOD = 6.736837191765135
 DEAR = {
     *("atlas", "basins", "belt", "buck", "friction_drive", "harvest", "impact", "plane_friction"),
     *("hybrid", "pushed_block", "relay", "walker", "wells"),
+    *("chatter", "conduction", "soft_impact", "synchrony"),
 }
 EACH = [
     pytest.param(name, marks=[pytest.mark.slow] if name in DEAR else [])
@@ -370,3 +372,169 @@ def test_the_oscillator_grazes_where_its_free_response_reaches_the_wall():
     before = forces < 0.99 * size
     free = (forces / (1 - 2.2**2 + 0.22j)).real[before]
     assert np.abs(x[before] - free[:, None]).max() < 1e-6
+
+
+def oscillation(x, v, s, *, force, w, z, phase=0.0, stiffness=1.0, constant=0.0):
+    """State at times s of x'' + 2 z x' + stiffness x = force cos(w s + phase) + constant, in closed form."""
+    driven = force * np.exp(1j * phase) / (stiffness - w * w + 2j * z * w)
+    rate = -z + 1j * math.sqrt(stiffness - z * z)
+    y = x - driven.real - constant / stiffness
+    free = y - 1j * (v - (1j * w * driven).real + z * y) / rate.imag
+    turned, fallen = driven * np.expm1(1j * w * s), free * np.expm1(rate * s)
+    return x + (turned + fallen).real, v + (1j * w * turned + rate * fallen).real
+
+
+def first_zero(f, times):
+    """The first root of f between neighbours of a grid of times, or None."""
+    signs = np.sign(f(times))
+    changes = np.flatnonzero(signs[1:] != signs[:-1])
+    if not len(changes):
+        return None
+    a, b = times[changes[0]], times[changes[0] + 1]
+    return brentq(f, a, b, xtol=1e-15, rtol=1e-14) if f(a) * f(b) < 0 else a  # a zero to rounding
+
+
+def soft_periods(state, force, count):
+    """A soft impact oscillator after so many periods of its force, arc by arc in closed form."""
+    w, z, extra = 0.85, 0.1, 29.0
+    (x, v), t, end, free = state, 0.0, 2 * math.pi * count / w, state[0] < 1
+    while True:
+        given = dict(force=force, w=w, z=z, phase=w * t)
+        given |= {} if free else dict(stiffness=1 + extra, constant=extra)
+        arc = lambda s, x=x, v=v, given=given: oscillation(x, v, s, **given)
+        times = np.linspace(1e-6, end - t, 400 * count)
+        s = first_zero(lambda s, arc=arc: arc(s)[0] - 1, times)
+        if s is None:
+            return np.array(arc(end - t))
+        (x, v), t, free = arc(s), t + s, not free
+
+
+@pytest.mark.slow
+def test_the_soft_stop_doubles_where_its_closed_form_arcs_say():
+    found = ran("soft_impact")
+    kinds = [event.kind for event in found["single"].events]
+    assert kinds == ["grazing of a soft switch", "period doubling"]
+    touch = math.hypot(1 - 0.85**2, 2 * 0.1 * 0.85)
+    assert found["single"].events[0].parameter == pytest.approx(touch, rel=1e-12)
+    assert "+ -" in [orbit.itinerary for orbit in found["single"].solutions]
+    seen = []
+    for branch in ("single", "double", "four", "eight"):
+        for event in found[branch].events:
+            if event.kind != "period doubling":
+                continue
+            run, count = event.orbit.trajectory, round(event.orbit.period / found["period"])
+            at = math.ceil(run.t[0] / found["period"]) * found["period"]
+            start = run(at if at <= run.t[-1] else at - event.orbit.period)
+            after = lambda x, A=event.parameter, count=count: soft_periods(x, A, count)
+            assert np.abs(after(start) - start).max() < 1e-9
+            step = 1e-6 * np.eye(2)
+            slope = np.column_stack([(after(start + d) - after(start - d)) / 2e-7 for d in step])
+            assert np.abs(np.linalg.eigvals(slope) + 1).min() < 1e-4
+            seen.append(count)
+    assert set(seen) == {1, 2, 4, 8}
+
+
+def border_current(duty, K, C):
+    """Current at the tick of a boost converter's orbit in continuous conduction, by matrix exponentials."""
+    on = np.array([[0, 0, 1], [0, -K / (2 * C), 0], [0, 0, 0]])
+    off = np.array([[0, -1, 1], [1 / C, -K / (2 * C), 0], [0, 0, 0]])
+    period = expm((1 - duty) * off) @ expm(duty * on)
+    return np.linalg.solve(np.eye(2) - period[:2, :2], period[:2, 2])[0]
+
+
+@pytest.mark.slow
+def test_the_converter_passes_into_discontinuous_conduction_at_the_border_of_the_textbook():
+    found = ran("conduction")
+    border = [brentq(lambda K, C=C: border_current(0.4, K, C), 0.12, 0.17) for C in (100.0, 1000.0)]
+    assert found["border"].parameter == pytest.approx(border[0], abs=1e-11)
+    errors = np.abs(np.array(border) - 0.4 * 0.6**2)
+    assert errors[1] < 0.11 * errors[0] < 3e-6  # the formula is the limit of a large capacity
+    for duty, K in found["curve"].values[::20]:
+        assert abs(border_current(duty, K, 100.0)) < 1e-9
+    branch = found["branch"]
+    assert branch.values.min() == 0.02 and branch.values.max() == 0.3
+    for K, itinerary in ((0.05, "+o +c -o"), (0.12, "+o +c -o"), (0.16, "+o -o"), (0.29, "+o -o")):
+        orbit = branch[K]
+        assert orbit.itinerary == itinerary
+        assert found["mean"](orbit) == pytest.approx(float(found["ideal"](K)), rel=2e-4)
+
+
+def bounces(force, state=(0.0, 0.0), restitution=0.6):
+    """Impacts of one period from the lift, in closed form: their times after it, and that of the limit or None."""
+    lift = -math.acos(1 / force)
+    (x, v), t, times, grid = state, 0.0, [], np.linspace(0.3, 7.0, 2000)
+    while True:
+        given = dict(force=force, w=1.0, z=0.05, phase=t + lift, constant=-1.0)
+        s = first_zero(lambda s, v=v, given=given: oscillation(x, v, s, **given)[0], grid)
+        t, v = t + s, -restitution * oscillation(x, v, s, **given)[1]
+        times.append(t)
+        pull = 1 - force * math.cos(t + lift)  # on the stop, downwards
+        if pull <= 0 or t > 2 * math.pi:
+            return times, None
+        rest = 2 * v / pull / (1 - restitution)
+        if rest < 1e-6 * (2 * math.pi - t):
+            return times, t + rest
+        grid = np.geomspace(min(0.4 * v / pull, 0.1), 8.0, 2000)
+
+
+@pytest.mark.slow
+def test_chatter_and_its_end_are_those_of_closed_form_bounces():
+    found = ran("chatter")
+    for force in (1.1, 1.5, 1.9):
+        orbit = found["complete"][force]
+        (leg,) = [leg for leg in orbit.legs if leg.mode == "c"]
+        assert bounces(force)[1] + leg.duration == pytest.approx(2 * math.pi, abs=1e-9)
+        assert orbit.multipliers.tolist() == [0.0, 0.0]
+    low, high = 1.9, 1.98
+    for _ in range(30):
+        middle = (low + high) / 2
+        low, high = (middle, high) if bounces(middle)[1] else (low, middle)
+    end = found["end"]
+    assert end.kind == "end of complete chatter"
+    assert end.parameter == pytest.approx(low, abs=1e-7)
+    distances = found["touches"] - low
+    ratios = distances[:-1] / distances[1:]
+    assert np.abs(ratios[:3] - 0.6).max() < 0.02 and np.all(np.diff(np.abs(ratios - 0.6)) > 0)
+
+
+@pytest.mark.slow
+def test_oscillators_stay_in_step_as_matrix_exponentials_say():
+    found = ran("synchrony")
+    orbit = found["orbit"]
+    matrix = np.array([[-1.0, 0, 0], [1, -1, 0], [0, 1, -1]])
+    slope = {"first lag to second": np.zeros((3, 3)), "second lag to first": np.zeros((3, 3))}
+    slope["first lag to second"][1, 0] = slope["second lag to first"][0, 1] = 1.0
+
+    def rate(name, kappa):
+        product = np.eye(3)
+        for leg, after in zip(orbit.legs, (*orbit.legs[1:], orbit.legs[0]), strict=True):
+            jump = np.zeros((3, 3))
+            jump[0, 2] = (2.0 if leg.mode == "+" else -2.0) / after.start[1]
+            product = (
+                (np.eye(3) + jump) @ expm((matrix - kappa * slope[name]) * leg.duration) @ product
+            )
+        return math.log(max(abs(np.linalg.eigvals(product)))) / orbit.period
+
+    for name, curve in found["curves"].items():
+        true = np.array([rate(name, kappa) for kappa in found["kappa"]])
+        chosen = np.abs(found["kappa"] - 1) > 0.05  # two multipliers are equal near 1
+        assert np.abs(curve - true)[chosen].max() < 1e-9
+    for name, kappa, simulated in found["rates"]:
+        assert simulated == pytest.approx(rate(name, kappa), abs=1e-4)
+    assert brentq(lambda k: rate("first lag to second", k), 1.1, 1.5) == pytest.approx(
+        1.28, abs=5e-3
+    )
+    assert brentq(lambda k: rate("second lag to first", k), 1.7, 2.1) == pytest.approx(
+        1.874, abs=5e-3
+    )
+    for laplacian, eigenvalue in ((found["PAIR"], 2), (found["RING"], 3), (found["CHAIN"], 3)):
+        for kappa, holds in ((1.2, True), (1.4, False)):
+            coupling = found["COUPLINGS"]["first lag to second"]
+            system = found["network"](laplacian, coupling)
+            kick = 1e-4 * np.random.default_rng(0).standard_normal((3, len(laplacian)))
+            start = np.array(orbit.start)[:, None] + kick
+            run = ns.simulate(
+                system, start.ravel(), 20 * orbit.period, parameters={"s": kappa / eigenvalue}
+            )
+            spread = np.ptp(run.x[-1].reshape(3, -1), axis=1).max()
+            assert (spread < 1e-6) == holds and (spread > 1e-3) != holds

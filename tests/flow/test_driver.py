@@ -94,10 +94,7 @@ def test_super_twisting_control_rests_at_its_limit():
     so that v is multiplied by -exp(-pi k1 / sqrt(8 k2 - k1^2)) from crossing to crossing."""
     k1, k2 = 1.5, 1.1
     system = ns.FilippovSystem(
-        [x, v],
-        surface=x,
-        above=[v - k1 * ca.sqrt(x), -k2],
-        below=[v + k1 * ca.sqrt(-x), k2],
+        [x, v], surface=x, above=[v - k1 * ca.sqrt(x), -k2], below=[v + k1 * ca.sqrt(-x), k2]
     )
     ratio = np.exp(-np.pi * k1 / np.sqrt(8 * k2 - k1**2))
     run = ns.simulate(system, [1.0, 0.5], 10.0)

@@ -37,10 +37,7 @@ def test_two_surfaces_name_the_same_thing_alike(first):
     lam, mu = ca.SX.sym("lam"), ca.SX.sym("mu")
     both = [(lam, v - 1), (mu, x - 50)] if first else [(mu, x - 50), (lam, v - 1)]
     system = ns.FilippovSystem(
-        [x, v],
-        field=[v, -x - lam],
-        multipliers=[m for m, _ in both],
-        surfaces=[h for _, h in both],
+        [x, v], field=[v, -x - lam], multipliers=[m for m, _ in both], surfaces=[h for _, h in both]
     )
     k = 0 if first else 1
     expected = [(kind, name.replace("0", str(k)), k, side) for kind, name, _, side in STICK_SLIP]
@@ -147,11 +144,7 @@ def test_states_and_parameters_may_be_called_like_multipliers():
     for names in (("x", "v", "f", "u"), ("lambda0", "h0", "lambda1", "L_F1 h")):
         a, b, f, u = (ca.SX.sym(name) for name in names)
         system = ns.FilippovSystem(
-            [a, b],
-            surfaces=[b - 1],
-            multipliers=[u],
-            field=[b, -a - f * u],
-            parameters={f: 1.0},
+            [a, b], surfaces=[b - 1], multipliers=[u], field=[b, -a - f * u], parameters={f: 1.0}
         )
         run = ns.simulate(system, [0.0, -0.5], 6.0)
         derivative = ns.sensitivity(run)

@@ -6,6 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import nonsmooth as ns
+from tests.orbit.test_hybrid_automata import thermostat as room
 
 x, v, q, g, k, c = (ca.SX.sym(s) for s in ("x", "v", "q", "g", "k", "c"))
 UP = ns.Reset(x - 1, {q: 1}, 1, level=True, when=q == 0, name="up")
@@ -26,14 +27,6 @@ def pushed():
     )
 
 
-def room():
-    on = ns.Reset(x - 18, {q: 1}, -1, level=True, when=q == 0, name="on")
-    off = ns.Reset(x - 22, {q: 0}, 1, level=True, when=q == 1, name="off")
-    return ns.FilippovSystem(
-        [x], field=[k * q - x], discrete={q: (0, 1)}, resets=[on, off], parameters={k: 30.0}
-    )
-
-
 @pytest.mark.parametrize(("value", "at"), [(0, 0.0), (1, 30.0)])
 def test_an_equilibrium_is_that_of_the_discrete_state_and_has_no_eigenvalue_for_it(value, at):
     found = ns.find_equilibrium(room(), [20.0, value])
@@ -42,7 +35,7 @@ def test_an_equilibrium_is_that_of_the_discrete_state_and_has_no_eigenvalue_for_
     assert found.status == "virtual"  # the heating changes at 18 and 22 degrees
     at_rest = ns.classify(room(), [at, value])
     assert (at_rest.kind, at_rest.label) == ("equilibrium", "virtual stable node")
-    inside = {"k": 20.0}
+    inside = {"a": 20.0}
     if value:
         assert ns.find_equilibrium(room(), [20.0, 1], parameters=inside).status == "real"
 

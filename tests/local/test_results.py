@@ -11,11 +11,7 @@ import nonsmooth as ns
 
 x, y, z, mu, lam, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "mu", "lam", "a", "b"))
 SPACE = ns.FilippovSystem(
-    [x, y, z],
-    surface=x,
-    above=[-y, 1, -2],
-    below=[z, -1, 1 + mu * y],
-    parameters={mu: 0.1},
+    [x, y, z], surface=x, above=[-y, 1, -2], below=[z, -1, 1 + mu * y], parameters={mu: 0.1}
 )
 PLANE = ns.FilippovSystem([x, y], surface=y, above=[x, y - 1 + x], below=[-2, 1 + x])
 FOCUS = ns.FilippovSystem(

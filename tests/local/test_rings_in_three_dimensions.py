@@ -45,10 +45,7 @@ def fields(sigma, nu, x):
 
 def system(sigma, nu):
     x = ca.vertcat(*(ca.SX.sym(s) for s in "xyz"))
-    f = [
-        ca.vertcat(-x[1], -sigma[0], nu[0]),
-        ca.vertcat(x[2], nu[1], sigma[1]),
-    ]
+    f = [ca.vertcat(-x[1], -sigma[0], nu[0]), ca.vertcat(x[2], nu[1], sigma[1])]
     for k in (0, 1):
         f[k] += ca.vertcat(*(ca.mtimes([x.T, ca.DM(QUADRATIC[k, a]), x]) for a in range(3)))
     return ns.FilippovSystem(ca.vertsplit(x), surface=x[0], above=f[0], below=f[1])

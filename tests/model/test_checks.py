@@ -14,12 +14,7 @@ X, Y, P, T, LAM = (ca.SX.sym(name) for name in ("x", "y", "p", "t", "lam"))
 
 def relay(**options):
     return ns.FilippovSystem(
-        [X, Y],
-        surface=Y,
-        above=[Y, -X - P],
-        below=[Y, -X + P],
-        parameters={P: 0.4},
-        **options,
+        [X, Y], surface=Y, above=[Y, -X - P], below=[Y, -X + P], parameters={P: 0.4}, **options
     )
 
 

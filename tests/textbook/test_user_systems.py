@@ -88,11 +88,7 @@ def boost():
     duty = 0.27 + k * (25 - v) + 20 * z
     return ns.FilippovSystem(
         [x, v, z],
-        field=[
-            (SUPPLY - (1 - on) * v + u) / COIL,
-            ((1 - on) * x - v / LOAD) / CAPACITY,
-            25 - v,
-        ],
+        field=[(SUPPLY - (1 - on) * v + u) / COIL, ((1 - on) * x - v / LOAD) / CAPACITY, 25 - v],
         surfaces=[clock.phase / PERIOD - duty],
         multipliers=[lam],
         complementarity=ns.Complementarity(x, multiplier=u, name="diode"),
@@ -472,11 +468,7 @@ def test_15_two_folds_and_the_hopf_point_of_a_washout_filter():
         return [1 - on * y, on * x - y / 2, 2 * (x - z)]
 
     system = ns.FilippovSystem(
-        [x, y, z],
-        surface=y - 2 + k * (x - z),
-        above=rates(1),
-        below=rates(0),
-        parameters={k: 1.4},
+        [x, y, z], surface=y - 2 + k * (x - z), above=rates(1), below=rates(0), parameters={k: 1.4}
     )
     rest = ns.find_pseudo_equilibrium(system, [2.0, 2.0, 2.0])
     assert rest.alpha == pytest.approx(0.5, rel=1e-12)
@@ -698,11 +690,7 @@ def test_25_a_cycle_is_born_while_sliding():
     """r' = r (mu - r^2) on z = 0, attracting up to x = 50."""
     spin = [mu * x - y - x * (x**2 + y**2), x + mu * y - y * (x**2 + y**2)]
     system = ns.FilippovSystem(
-        [x, y, z],
-        surface=z,
-        above=[*spin, 0.02 * x - 1],
-        below=[*spin, 1],
-        parameters={mu: -0.2},
+        [x, y, z], surface=z, above=[*spin, 0.02 * x - 1], below=[*spin, 1], parameters={mu: -0.2}
     )
     rest = ns.find_pseudo_equilibrium(system, [0.1, 0.1, 0.0])
     assert rest.kind == "stable pseudo-focus"

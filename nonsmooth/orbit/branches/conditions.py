@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ...flow.fixed import first_terms
 from ...model import Array, Evaluator, FilippovSystem, Guard, evaluator
 from ...model.derivatives.event_maps import keeps_zero
-from ...model.derivatives.variational import guarded_field, variational_field
+from ...model.derivatives.variational import guarded_field, states_at
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import Multipliers, finite_return_map
 from ..runs.cell_field import Guarded, field_of
@@ -103,7 +103,7 @@ def condition_row(
     def value(x: Array, q: Array) -> float:
         if condition.what == "start":
             leg, before = problem.legs[i], problem.legs[i - 1]
-            y = variational_field(problem.system, leg.mode).states_at(x, q)
+            y = states_at(problem.system, leg.mode, x, q)
             first = first_terms(guarded_field(problem.system, leg.mode), y, q)[1]
             rows = _starting(problem.system, i, leg, before)
             found = {test.name: float(first[k, order]) for k, order, test in rows}
@@ -170,7 +170,7 @@ class _Tests:
                 found.append((own, sign * speeds[i]))
             if others:
                 if not durations[i] > 0.0:
-                    state = at.by_leg[i].end
+                    state = states_at(self.system, self.legs[i].mode, at.by_leg[i].end, p)
                     values = guard_values(self.system, self.legs[i].mode)(state, p)[1][:, 0]
                 found += [(condition, float(values[k])) for k, condition in others]
             found += _interior(self.inside[i], self.guards.fields[i], rows, p)

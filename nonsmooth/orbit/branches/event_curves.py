@@ -27,7 +27,7 @@ import numpy as np
 from ...flow.fixed import first_terms
 from ...model import Array, DegenerateError, NonsmoothError
 from ...model.derivatives.event_maps import surface_map
-from ...model.derivatives.variational import guarded_field, variational_field
+from ...model.derivatives.variational import guarded_field, states_at
 from ...solvers.continuation import Curve, Departure, Point, Secant, Zero
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import return_map
@@ -221,7 +221,9 @@ class EventCurve(Curve):
         field = guarded_field(self.base.system, leg.mode)
         assert self.condition is not None
         return np.asarray(
-            first_terms(field, y, p)[1][field.motion.guards.index(self.condition.guard)]
+            first_terms(field, states_at(self.base.system, leg.mode, y, p), p)[1][
+                field.motion.guards.index(self.condition.guard)
+            ]
         )
 
     def terms(self, u: Array) -> Array:
@@ -427,10 +429,10 @@ def _beginnings(
     i, guard, system = condition.leg, condition.guard, problem.system
     field = guarded_field(system, problem.legs[i].mode)
     k = field.motion.guards.index(guard)
-    y = variational_field(system, problem.legs[i].mode).states_at(at.starts[i], p)
+    y = states_at(system, problem.legs[i].mode, at.starts[i], p)
     order = 2 if problem.legs[i - 1].kind == "crossing" else 1
     before = at.events[i - 1]
-    rate = at.by_leg[i - 1].rate[: before.gradient.size]
+    rate = at.by_leg[i - 1].rate
     return {
         CUSP: float(first_terms(field, y, p)[1][k, order]),
         TWO_FOLD: float(before.gradient @ rate),

@@ -99,15 +99,9 @@ def test_a_flight_curves_with_the_axis(command, tmp_path):
             ["--first-only", "--side-spin", "1", "--axis-tilt", "10", "--launch-angle", "9"],
             "--axis-tilt",
         ),
-        (
-            ["--axis-tilt", "95", "--launch-angle", "28"],
-            "--axis-tilt",
-        ),
+        (["--axis-tilt", "95", "--launch-angle", "28"], "--axis-tilt"),
         (["--axis-tilt", "10", "--launch-angle", "2.2rad"], "--launch-angle"),
-        (
-            ["--first-only", "--side-slope", "95"],
-            "--side-slope",
-        ),
+        (["--first-only", "--side-slope", "95"], "--side-slope"),
     ],
 )
 def test_usage_errors(command, argv, message):

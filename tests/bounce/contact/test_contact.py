@@ -303,10 +303,7 @@ def own(**attributes):
         (dict(normal_force=lambda self, s, p: -math.sin(s.y)), "normal_force"),
         (dict(extra_states=dict(z="a")), "z"),
         (dict(extra_states=dict(z=math.nan)), "z"),
-        (
-            dict(extra_states=dict(z=0.0), extra_rates=lambda self, s, p: [-s.z]),
-            "extra_rates",
-        ),
+        (dict(extra_states=dict(z=0.0), extra_rates=lambda self, s, p: [-s.z]), "extra_rates"),
     ],
 )
 def test_a_model_that_cannot_be_built(attributes, message):

@@ -292,18 +292,10 @@ def test_bristles_are_refused():
     ("call", "error", "words"),
     [
         (lambda: bounce.dividing_curve(TURF, 1.0), ns.OptionError, "ydot"),
-        (
-            lambda: bounce.dividing_curve(TURF, reach=0),
-            ns.OptionError,
-            "reach",
-        ),
+        (lambda: bounce.dividing_curve(TURF, reach=0), ns.OptionError, "reach"),
         (lambda: bounce.dividing_curve("turf"), bounce.ModelError, "model"),
         (lambda: bounce.maps.dividing_surface(TURF, []), ns.OptionError, "ydot"),
-        (
-            lambda: bounce.maps.critical_eta(TURF, bounds=(0.1, 0.5)),
-            ns.ConvergenceError,
-            "eta",
-        ),
+        (lambda: bounce.maps.critical_eta(TURF, bounds=(0.1, 0.5)), ns.ConvergenceError, "eta"),
     ],
 )
 def test_bad_input(call, error, words):

@@ -168,11 +168,7 @@ def test_gravity_that_varies_is_in_every_load(model, default, tmp_path):
         (lambda: bounce.lift_off("turf", 1, -1, 0), bounce.ModelError, "model"),
         (lambda: bounce.lift_off(TURF, "a", -1, 0), bounce.LandingError, "xdot"),
         (lambda: bounce.lift_off(TURF, [1, 2], -1, [1, 2, 3]), bounce.LandingError, "broadcast"),
-        (
-            lambda: bounce.lift_off(TURF, 1, -1, 0, parameters={"nu": 1}),
-            ns.ParameterError,
-            "'nu'",
-        ),
+        (lambda: bounce.lift_off(TURF, 1, -1, 0, parameters={"nu": 1}), ns.ParameterError, "'nu'"),
     ],
 )
 def test_bad_input(call, error, words):

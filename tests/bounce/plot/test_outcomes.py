@@ -11,9 +11,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 import bounce
 import nonsmooth as ns
-
-TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
-PAPER = ("S+", "S+ S-", "S+ R S+", "S+ R S-", "S-", "S- S+", "S- R S+", "S- R S-")
+from tests.bounce.maps.test_outcomes import PAPER, TURF
 
 
 @pytest.fixture(scope="module")

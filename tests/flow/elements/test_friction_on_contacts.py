@@ -44,8 +44,7 @@ THREE = [(0.5, 0), (-0.25, 0.4), (-0.25, -0.4)]
 
 
 @pytest.mark.parametrize(
-    ("feet", "mu"),
-    [(THREE, 0.3), (FOUR, 0.3), pytest.param(FOUR, 1.2, marks=pytest.mark.slow)],
+    ("feet", "mu"), [(THREE, 0.3), (FOUR, 0.3), pytest.param(FOUR, 1.2, marks=pytest.mark.slow)]
 )
 def test_a_table_that_slides_stops_where_a_block_does(feet, mu):
     """Four feet share the load in more than one way; at 1.2 one of them hardly has any."""
@@ -103,3 +102,33 @@ def test_components_with_different_loads_are_refused():
             multipliers=[lam],
             impacts=[ns.Impact(x, reaction=r, name="one"), ns.Impact(x, reaction=s, name="two")],
         )
+
+
+@pytest.mark.parametrize("side", [0.0, 0.5])
+@pytest.mark.parametrize(("angle", "mu"), [(0.7, 0.2), (0.7, 0.5), (1.0, 0.2), (1.0, 0.5)])
+def test_a_block_in_a_groove_holds_as_long_as_any_loads_can_hold_it(angle, mu, side):
+    """Friction across the groove presses it against both walls: the most that holds is 1/sqrt(1 - k^2) of what slides."""
+    t, q, w, n = ca.SX.sym("t"), ca.SX.sym("q", 3), ca.SX.sym("w", 3), ca.SX.sym("n", 2)
+    limit = mu * G / np.cos(angle)
+    force, gaps, slips, multipliers = ca.vertcat(limit * t, side, -G), [], [], []
+    for k, sign in enumerate((-1, 1)):
+        c, s, lam = np.cos(angle), sign * np.sin(angle), ca.SX.sym(f"lam{k}", 2)
+        gaps.append(ns.Impact(c * q[2] - s * q[1], reaction=n[k], name=f"wall{k}"))
+        slips.append(ca.vertcat(w[0], c * w[1] + s * w[2]))
+        multipliers.append(lam)
+        force += n[k] * ca.vertcat(-mu * lam[0], -s - mu * c * lam[1], c - mu * s * lam[1])
+    groove = ns.FilippovSystem(
+        [*ca.vertsplit(q), *ca.vertsplit(w)],
+        field=[*ca.vertsplit(w), *ca.vertsplit(force)],
+        surfaces=slips,
+        multipliers=multipliers,
+        impacts=gaps,
+        time=t,
+    )
+    run = ns.simulate(groove, [0] * 6, 2.0)
+    assert run.status is ns.Status.REACHED_END and run.itinerary == "sscc **cc"
+    release = 1 / np.sqrt(1 - (mu * np.tan(angle)) ** 2)
+    if side == 0:
+        assert abs(run.events[0].t - release) < 1e-7
+        speed = limit * (1 - (release - 1) ** 2) / 2
+        np.testing.assert_allclose(run.x[-1, 3:], [speed, 0, 0], atol=1e-6)

@@ -103,11 +103,7 @@ def test_hidden_laws_of_two_surfaces_act_on_one_another():
     a, b, u, w = (ca.SX.sym(s) for s in "abuw")
     first, second = 0.3 - a - a**3 - 0.4 * b, 0.2 - b - b**3 + 0.5 * a
     system = ns.FilippovSystem(
-        [x, y, u, w],
-        field=[first, second, a, b],
-        surfaces=[x, y],
-        multipliers=[a, b],
-        hidden=True,
+        [x, y, u, w], field=[first, second, a, b], surfaces=[x, y], multipliers=[a, b], hidden=True
     )
     run = ns.simulate(system, [0.0, 0.0, 0.0, 0.0], 1.0, tol=1e-12)
     assert run.status is REACHED and run.itinerary == "ss"

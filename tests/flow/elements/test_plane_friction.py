@@ -213,10 +213,7 @@ def test_what_is_no_set_is_refused():
             ns.FilippovSystem(v, field=[0] * 4, surfaces=surfaces, multipliers=multipliers)
     with pytest.raises(ns.DefinitionError, match=r"multiplier \[l1, l2\].*linear"):
         ns.FilippovSystem(
-            v,
-            field=[l1 * l2, 0, 0, 0],
-            surfaces=[pair],
-            multipliers=[ca.vertcat(l1, l2)],
+            v, field=[l1 * l2, 0, 0, 0], surfaces=[pair], multipliers=[ca.vertcat(l1, l2)]
         )
 
 
@@ -311,10 +308,7 @@ def test_a_set_is_reached_whatever_the_unit_of_time(size, skew):
     lam, c = ca.SX.sym("lam", 2), 2.943
     force = -c * ca.vertcat(lam[0] - skew * lam[1], skew * lam[0] + lam[1])
     block = ns.FilippovSystem(
-        [x, y, u, v],
-        field=ca.vertcat(u, v, force),
-        surfaces=[ca.vertcat(u, v)],
-        multipliers=[lam],
+        [x, y, u, v], field=ca.vertcat(u, v, force), surfaces=[ca.vertcat(u, v)], multipliers=[lam]
     )
     options = dict(atol=1e-12 * size, rtol=1e-12)
     run = ns.simulate(block, [0.0, 0.0, size, size], 5 * size, **options)
@@ -412,11 +406,7 @@ def test_sets_and_surfaces_that_act_on_one_another_in_any_units():
     m = root @ root.T / 5 + 0.3 * np.eye(5)
     force = scale * ca.mtimes(ca.DM(m), ca.vertcat(*lam))
     system = ns.FilippovSystem(
-        h,
-        field=pull * ca.cos(T) - force,
-        surfaces=[h[:2], h[2:4], h[4]],
-        multipliers=lam,
-        time=T,
+        h, field=pull * ca.cos(T) - force, surfaces=[h[:2], h[2:4], h[4]], multipliers=lam, time=T
     )
     run = ns.simulate(system, np.zeros(5), 3.0)
     assert run.status is ns.Status.REACHED_END

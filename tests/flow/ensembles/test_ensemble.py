@@ -131,10 +131,7 @@ def test_process_pool_gives_the_same_bits(system, starts):
         same(
             here,
             ensemble(
-                pickle.loads(pickle.dumps(system)),
-                starts,
-                5.0,
-                work=Work(chunk=50, executor=pool),
+                pickle.loads(pickle.dumps(system)), starts, 5.0, work=Work(chunk=50, executor=pool)
             ),
         )
 
@@ -151,8 +148,7 @@ def test_dask_cluster_gives_the_same_bits(system, starts):
         distributed.Client(cluster) as client,
     ):
         same(
-            here,
-            ensemble(system, starts, 5.0, work=Work(chunk=50, executor=client.get_executor())),
+            here, ensemble(system, starts, 5.0, work=Work(chunk=50, executor=client.get_executor()))
         )
 
 

@@ -326,35 +326,6 @@ def test_derivatives_at_a_corner_are_refused():
         ns.sensitivity(ns.simulate(system, [0.0, 0.5], 1.5))
 
 
-def test_the_orbit_of_a_thermostat():
-    run = ns.simulate(thermostat(), [15.0, 0], 20.0)
-    orbit = ns.periodic_orbit(thermostat(), run)
-    assert abs(orbit.period - 2 * LN3) < 1e-12 and orbit.itinerary == "q=0 q=1"
-    assert orbit.stability == "asymptotically stable"
-
-
-def test_the_multiplier_of_a_relay_with_hysteresis():
-    relay = ns.FilippovSystem(
-        [x, v],
-        discrete={q: (-1, 1)},
-        field=[v, -x - 0.2 * v + q],
-        resets=[
-            ns.Reset(x - 0.3, {q: -1}, 1, "down", level=True, when=q == 1),
-            ns.Reset(x + 0.3, {q: 1}, -1, "up", level=True, when=q == -1),
-        ],
-    )
-    run = ns.simulate(relay, [0.0, 0.0, 1], 100.0)
-    orbit = ns.periodic_orbit(relay, run)
-    assert len(orbit.multipliers) == 2
-    speed = next(e.x[1] for e in reversed(run.events) if e.name == "up")
-    once = ns.Section("up", count=1)
-    back = [
-        ns.simulate(relay, [-0.3, speed + s, 1], 50.0, at=once, tol=1e-12).sample_x[0, 1]
-        for s in (1e-6, -1e-6)
-    ]
-    assert abs(orbit.multipliers[1] - (back[0] - back[1]) / 2e-6) < 1e-7
-
-
 def test_a_triple_zero_is_one_passage():
     """A flat guard: its root is located to a millionth only, and the motion goes on."""
     count = ns.Reset(y, {v: v + 1}, 0)

@@ -143,12 +143,7 @@ def test_rows_of_a_forced_ensemble_that_begins_late_are_single_runs(end):
     t_start = 1.7e9
     field = [v, -x + 1.3 * ca.cos(OMEGA * (t - t_start)) - 0.4 * lam]
     system = ns.FilippovSystem(
-        [x, v],
-        field=field,
-        multipliers=lam,
-        surface=v,
-        time=t,
-        stops=ns.Stop(t - t_start - 20),
+        [x, v], field=field, multipliers=lam, surface=v, time=t, stops=ns.Stop(t - t_start - 20)
     )
     starts = np.random.default_rng(0).normal(size=(80, 2))
     many = ns.ensemble(system, starts, t_start + end, t_start=t_start, work=ns.Work(progress=False))

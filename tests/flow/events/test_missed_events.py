@@ -18,11 +18,7 @@ def make_oscillator():
     """h = x + 1 - depth over x = cos: a dip of that depth once a period; z is the time below."""
     x, v, z, depth = (ca.SX.sym(s) for s in ("x", "v", "z", "depth"))
     return ns.FilippovSystem(
-        [x, v, z],
-        surface=x + 1 - depth,
-        above=[v, -x, 0],
-        below=[v, -x, 1],
-        parameters=[depth],
+        [x, v, z], surface=x + 1 - depth, above=[v, -x, 0], below=[v, -x, 1], parameters=[depth]
     )
 
 

@@ -63,36 +63,7 @@ def test_rest_after_infinitely_many_events_depends_on_nothing_but_its_begin():
     np.testing.assert_allclose(found.dt_dx0[-1, 0], (ends[0] - ends[1]) / 2e-5, rtol=1e-6)
 
 
-def test_derivatives_of_rest_that_a_load_ends():
-    # it leaves rest at t = 1/a, so that x = a s^3/6 and v = a s^2/2 with s = 3 - 1/a
-    relay = ns.FilippovSystem(
-        [x, v], field=[v, a * time - lam], surfaces=[x], multipliers=[lam], time=time,
-        parameters={a: 1.0},
-    )  # fmt: skip
-    run = ns.simulate(relay, [0.0, 0.0], 3.0)
-    np.testing.assert_allclose(run.x[-1], [4 / 3, 2], rtol=0, atol=1e-9)
-    found = ns.sensitivity(run)
-    np.testing.assert_allclose(found.dx_dp, [[10 / 3], [4]], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found.dt_dp, [[-1]], rtol=0, atol=1e-9)
-    assert not found.dx_dx0.any() and not found.dt_dx0.any()  # starts that rest too
-
-
-def test_derivatives_of_rest_that_lasts():
-    # the multiplier is the load a + y at rest, and y' = -(a + y)
-    body = ns.FilippovSystem(
-        [x, v, y], field=[v, a + y - 3 * lam - v, -3 * lam], surfaces=[x], multipliers=[lam],
-        parameters={a: 0.5},
-    )  # fmt: skip
-    run = ns.simulate(body, [0.0, 0.0, 0.3], 2.0)
-    found, left = ns.sensitivity(run), math.exp(-2)
-    np.testing.assert_allclose(run.x[-1], [0, 0, 0.8 * left - 0.5], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found.dx_dx0, np.diag([0, 0, left]), rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found.dx_dp, [[0], [0], [left - 1]], rtol=0, atol=1e-9)
-    cost = ns.gradient(run, y)
-    np.testing.assert_allclose(cost.x0, [0, 0, left], rtol=0, atol=1e-9)
-
-
-def test_derivatives_of_rest_on_a_curve_and_of_dependent_multipliers():
+def test_derivatives_of_rest_on_a_curve():
     # x = sin(a t) at rest, also where a changes: the speed that it starts with is a
     curve = ns.FilippovSystem(
         [x, v, y], field=[v, -3 * lam, a], surfaces=[x - ca.sin(y)], multipliers=[lam],
@@ -101,15 +72,6 @@ def test_derivatives_of_rest_on_a_curve_and_of_dependent_multipliers():
     found = ns.sensitivity(ns.simulate(curve, [0.0, 1.0, 0.0], 1.0))
     wanted = [[math.cos(1)], [math.cos(1) - math.sin(1)], [1]]
     np.testing.assert_allclose(found.dx_dp, wanted, rtol=0, atol=1e-9)
-    # v' = 0 asks of two multipliers for their sum a, and y' = -a - y
-    twisting = ns.FilippovSystem(
-        [x, v, y], field=[v, a - 2 * lam - 0.9 * kap, -2 * lam - 0.9 * kap - y],
-        surfaces=[x, v], multipliers=[lam, kap], parameters={a: 0.3},
-    )  # fmt: skip
-    found = ns.sensitivity(ns.simulate(twisting, [0.0, 0.0, 0.5], 1.0))
-    left = math.exp(-1)
-    np.testing.assert_allclose(found.dx_dx0, np.diag([0, 0, left]), rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found.dx_dp, [[0], [0], [left - 1]], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("values", ["now", "trigger"])

@@ -10,8 +10,7 @@ FOUND = [700662, 1100040, 1101568, 1101728]
 
 
 @pytest.mark.parametrize(
-    "seed",
-    [*FOUND, *[pytest.param(s, marks=[pytest.mark.slow] * (s >= 30)) for s in range(215)]],
+    "seed", [*FOUND, *[pytest.param(s, marks=[pytest.mark.slow] * (s >= 30)) for s in range(215)]]
 )
 def test_random_system(seed):
     verdict, _, _ = compare(seed, more=seed not in FOUND)

@@ -21,10 +21,7 @@ GRAVITY, RESTITUTION = 9.81, 0.8
 def test_the_last_impacts_do_not_depend_on_the_age_of_a_run(kick):
     clock = ns.Clock(20.0, map=[y, v + 5.0])
     system = ns.FilippovSystem(
-        [y, v],
-        field=[v, -GRAVITY],
-        impacts=ns.Impact(y, restitution=RESTITUTION),
-        clocks=clock,
+        [y, v], field=[v, -GRAVITY], impacts=ns.Impact(y, restitution=RESTITUTION), clocks=clock
     )
     began = 20.0 * (kick - 1)  # the ball rests there: every kick is as the first
     run = ns.simulate(system, [0, 0, 0], 20.0 * kick + 19, max_events=10**6)

@@ -36,11 +36,7 @@ def test_off_the_surface_the_sliding_field_keeps_its_level():
 
 
 PENDULUM = ns.FilippovSystem(
-    [x, y],
-    field=[y, -ca.sin(x) - lam * (1 + 0.2 * ca.cos(t))],
-    multipliers=lam,
-    surface=y,
-    time=t,
+    [x, y], field=[y, -ca.sin(x) - lam * (1 + 0.2 * ca.cos(t))], multipliers=lam, surface=y, time=t
 )
 
 

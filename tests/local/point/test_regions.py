@@ -140,11 +140,7 @@ def test_several_surfaces():
         (lambda: region(OSCILLATOR, [0.2]), ns.PointError, "point.*shape"),
         (lambda: region(OSCILLATOR, [0.2, math.inf]), ns.PointError, "point.*finite"),
         (lambda: region(OSCILLATOR, None), ns.PointError, "2"),
-        (
-            lambda: region(OSCILLATOR, [0.2, 0.3], tol=-1),
-            ns.OptionError,
-            r"\btol\b",
-        ),
+        (lambda: region(OSCILLATOR, [0.2, 0.3], tol=-1), ns.OptionError, r"\btol\b"),
         (lambda: region(OSCILLATOR, [0.2, 0.3], tol="x"), ns.OptionError, "tol.*'x'"),
         (lambda: region(OSCILLATOR, [0.2, 0.3], surface=-1), ns.DefinitionError, "surface"),
         (

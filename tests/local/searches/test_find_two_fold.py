@@ -226,11 +226,7 @@ NORMAL = ns.FilippovSystem([X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1
         (lambda: find_two_fold(NORMAL, [0, math.nan, 0]), ns.PointError, "point.*finite"),
         (lambda: find_two_fold(NORMAL, "abc"), ns.PointError, "point.*numbers"),
         (lambda: find_two_fold(NORMAL, [0, 0, 0], parameters={"q": 1}), ns.ParameterError, "'q'"),
-        (
-            lambda: find_two_fold(NORMAL, [0, 0, 0], tol=0),
-            ns.OptionError,
-            r"\btol\b",
-        ),
+        (lambda: find_two_fold(NORMAL, [0, 0, 0], tol=0), ns.OptionError, r"\btol\b"),
         (
             lambda: find_two_fold(NORMAL, [0] * 3, max_iterations=0),
             ns.OptionError,

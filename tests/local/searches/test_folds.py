@@ -136,11 +136,7 @@ def test_explicit_time():
         (lambda s: find_fold(s, [0, 0, 0]), ns.PointError, "point.*shape"),
         (lambda s: find_fold(s, [0, 0], hold="x"), ns.DefinitionError, "free states"),
         (lambda s: find_fold(s, [0, 0], parameters={"q": 1}), ns.ParameterError, "'q'"),
-        (
-            lambda s: find_fold(s, [0, 0], side="-"),
-            ns.ConvergenceError,
-            "fold of F2",
-        ),
+        (lambda s: find_fold(s, [0, 0], side="-"), ns.ConvergenceError, "fold of F2"),
         (lambda s: find_fold(s, [0, 0], tol=math.nan), ns.OptionError, "tol"),
     ],
 )

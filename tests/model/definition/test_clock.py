@@ -65,10 +65,7 @@ def test_lifted_expressions_take_clocks_too():
     [
         (lambda: ns.Clock(0.0), "period of 'clock'"),
         (lambda: ns.Clock("one"), "period of 'clock'"),
-        (
-            lambda: ns.FilippovSystem([x], field=[1], clocks=[1.0]),
-            "clocks",
-        ),
+        (lambda: ns.FilippovSystem([x], field=[1], clocks=[1.0]), "clocks"),
         (
             lambda: ns.FilippovSystem([x], field=[1], clocks=ns.Clock(1, map=[x, x])),
             "map of 'clock'",

@@ -151,13 +151,6 @@ def same_runs(lifted, written, start, t_end):
     return one
 
 
-def test_dry_friction():
-    written = ns.FilippovSystem([x, y], field=[y, -x - 0.4 * lam], multipliers=lam, surface=y)
-    run = same_runs(lift([x, y], [y, -x - 0.4 * ca.sign(y)]), written, [3.0, 0.0], 20.0)
-    assert run.itinerary == "- + - + s"
-    assert run.x[-1, 0] == pytest.approx(-0.2, abs=1e-10)
-
-
 def test_stick_slip_with_a_speed_that_weakens_friction():
     """Leine's oscillator: fabs in the denominator is continuous, so there is one reading."""
     force = ca.sign(0.2 - y) / (1 + 3 * ca.fabs(y - 0.2))
@@ -172,19 +165,6 @@ def test_stick_slip_with_a_speed_that_weakens_friction():
     run = same_runs(system, written, [0.0, 0.0], 30.0)
     sticks = [e.t for e in run.events if e.kind == "entry"]
     assert np.diff(sticks)[-1] == pytest.approx(12.001031294830578647, abs=1e-9)
-
-
-def test_two_relays():
-    s1, s2 = ca.sign(x), ca.sign(y)
-    l1, l2 = ca.SX.sym("l1"), ca.SX.sym("l2")
-    written = ns.FilippovSystem(
-        [x, y], surfaces=[x, y], multipliers=[l1, l2], field=[-l1 + 2 * l2, -2 * l1 - l2]
-    )
-    run = same_runs(lift([x, y], [-s1 + 2 * s2, -2 * s1 - s2]), written, [1.0, 0.5], 2.0)
-    rest = run.events[-2]
-    assert run.status is ns.Status.REACHED_END and rest.kind == "rest"
-    assert rest.t == pytest.approx(0.75, abs=1e-9)
-    assert np.abs(run.x[-1]).max() < 1e-12
 
 
 def test_harvest_with_if_else():
@@ -204,35 +184,6 @@ def test_harvest_with_if_else():
         parameters={level: 1.0},
     )
     same_runs(system, written, [0.3, 0.6], 60.0)
-
-
-def test_state_dependent_jump_with_a_parameter():
-    """IFDIFF's example: the range p <= x < p + 0.5 is two surfaces, and explicit time is kept."""
-    p = ca.SX.sym("p")
-    inside = ca.logic_and(x >= p, x < p + 0.5)
-    system = lift([x, y], [0.01 * t**2 + y**3, 5 * inside], parameters={p: 5.437}, time=t)
-    run = ns.simulate(system, [1.0, 0.0], 20.0, tol=1e-13)
-    assert [s.function for s in system.lifted] == ["(x-p)", "((p+0.5)-x)"]
-    switches = [e.t for e in run.events if e.kind == "crossing"]
-    np.testing.assert_allclose(switches, [11.000275475194824, 11.270040323650827], atol=1e-9)
-    np.testing.assert_allclose(run.x[-1], [49.2550674190591, 1.34882424228], rtol=1e-9)
-
-
-def test_saturation_crosses_its_corners():
-    """x'' = -sat(x) from (2, 0): each corner is at the time of its closed form."""
-    system = lift([x, y], [y, -ca.fmax(ca.fmin(x, 1), -1)])
-    run = ns.simulate(system, [2.0, 0.0], 4.0, tol=1e-13)
-    first = np.sqrt(2.0)  # 2 - t^2/2 = 1
-    second = first + 2 * np.arctan(1 / first)  # cos s - sqrt(2) sin s = -1
-    crossings = [e.t for e in run.events if e.kind == "crossing"]
-    np.testing.assert_allclose(crossings[:2], [first, second], atol=1e-11)
-
-
-def test_absolute_value_slides_where_it_should():
-    """x' = -1 + 2 fabs(y) ... y' = -sign(y): sliding on y = 0, where fabs(y) = 0."""
-    run = ns.simulate(lift([x, y], [-1 + 2 * ca.fabs(y), -ca.sign(y)]), [0.0, 0.5], 2.0)
-    assert run.itinerary == "+ s"
-    assert run.x[-1, 0] == pytest.approx(-2.0 + 2 * 0.5**2 / 2, abs=1e-9)
 
 
 # report and refusals ---------------------------------------------------------------------------
@@ -267,14 +218,6 @@ def test_other_readings_on_the_surface_are_reported(expression, hidden):
     system = lift([x, y], [expression, 1])
     assert any(s.hidden for s in system.lifted) is hidden
     assert any("hidden dynamics" in str(s) for s in system.lifted) is hidden
-
-
-def test_hidden_dynamics_is_read_as_filippov():
-    """Jeffrey's example: off the surface y' = 1, and so it is on it."""
-    system = lift([x, y], [0.2 - ca.sign(x), 2 * ca.sign(x) ** 2 - 1])
-    assert ns.simulate(system, [0.0, 0.0], 1.0).x[-1, 1] == pytest.approx(1.0)
-    hidden = lift([x, y], [0.2 - ca.sign(x), 2 * ca.sign(x) ** 2 - 1], hidden=True)
-    assert ns.simulate(hidden, [0.0, 0.0], 1.0).x[-1, 1] == pytest.approx(-0.92)
 
 
 def test_hidden_keeps_only_what_is_nonlinear_on_the_surface():

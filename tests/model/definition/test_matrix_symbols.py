@@ -24,10 +24,7 @@ def room(x, q):
     on = ns.Reset(x - 18, {q: 1}, -1, level=True, when=q == 0, name="on")
     off = ns.Reset(ca.logic_and(x >= 22, q == 1), {q: 0}, level=True, name="off")
     return ns.FilippovSystem(
-        [x],
-        field=[30 * ca.if_else(q == 1, 1, 0) - x],
-        discrete={q: (0, 1)},
-        resets=[on, off],
+        [x], field=[30 * ca.if_else(q == 1, 1, 0) - x], discrete={q: (0, 1)}, resets=[on, off]
     )
 
 

@@ -125,27 +125,17 @@ def test_both_walls_of_a_gap_are_springs():
 
 def test_modes_of_the_other_surface():
     system = ns.FilippovSystem(
-        [x, v, y],
-        field=[v, -x - l1 * (1 + l2), 1 - 2 * l2],
-        surfaces=[x, y],
-        multipliers=[l1, l2],
+        [x, v, y], field=[v, -x - l1 * (1 + l2), 1 - 2 * l2], surfaces=[x, y], multipliers=[l1, l2]
     )
     kinds = {mode: system.switching(0, mode=mode).kind for mode in ("++", "+-", "+s")}
-    assert kinds == {
-        "++": "velocity continuous",
-        "+-": "continuous",
-        "+s": "velocity continuous",
-    }
+    assert kinds == {"++": "velocity continuous", "+-": "continuous", "+s": "velocity continuous"}
     assert system.switching(0).kind == "velocity continuous"
 
 
 def test_sliding_of_another_surface_makes_a_jump_of_force_one_of_velocity():
     """While y slides, the force of the wall enters y' and with it the multiplier that moves x."""
     system = ns.FilippovSystem(
-        [x, v, y],
-        field=[v + l2, -x, 0.2 * l1 - 2 * l2],
-        surfaces=[x, y],
-        multipliers=[l1, l2],
+        [x, v, y], field=[v + l2, -x, 0.2 * l1 - 2 * l2], surfaces=[x, y], multipliers=[l1, l2]
     )
     assert system.switching(0, mode="++").kind == "velocity continuous"
     assert system.switching(0, mode="+s").kind == "generic"

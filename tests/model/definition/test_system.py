@@ -110,14 +110,8 @@ WRONG = {
     "both forms": ({"field": [v, x]}, "above=.*field="),
     "surface twice": ({"surfaces": [v]}, "surface=.*surfaces="),
     "a wrong direction": ({"stops": [ns.Stop(x, 2)]}, "direction of 'stop'"),
-    "a surface with a multiple zero": (
-        {"surface": (v - 1) ** 3},
-        "surface 0.*factor",
-    ),
-    "a stop with a double zero": (
-        {"stops": [ns.Stop(x * (v - x) ** 2)]},
-        "stop 'stop'.*factor",
-    ),
+    "a surface with a multiple zero": ({"surface": (v - 1) ** 3}, "surface 0.*factor"),
+    "a stop with a double zero": ({"stops": [ns.Stop(x * (v - x) ** 2)]}, "stop 'stop'.*factor"),
     "a reset map of the wrong length": ({"resets": [ns.Reset(x, [x])]}, "map of reset 'reset'"),
 }
 

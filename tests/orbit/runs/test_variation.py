@@ -47,17 +47,6 @@ def test_gradients_through_crossing_impact_and_entry_are_the_closed_forms() -> N
 x, y, v, w, t, a, b, lam, other = (ca.SX.sym(s) for s in "x y v w t a b lam other".split())
 
 
-def test_a_stop_moves_the_end() -> None:
-    system = ns.FilippovSystem([x, y], field=[y, -a], stops=ns.Stop(x, -1), parameters={a: 2.0})
-    run = ns.simulate(system, [1.0, 0.0], 9.0, tol=1e-14)  # x = x0 - t^2: v = -2 sqrt(a x0/2)
-    s = ns.sensitivity(run)
-    assert s.dx_dx0[1, 0] == pytest.approx(-1.0, rel=1e-13)
-    assert s.dx_dp[1, 0] == pytest.approx(-0.5, rel=1e-13)
-    assert np.abs(s.dx_dx0[0]).max() < 1e-15
-    assert s.dt_end_dx0[0] == pytest.approx(0.5, rel=1e-13)
-    assert ns.gradient(run, y).x0 == pytest.approx(s.dx_dx0[1], rel=1e-13)
-
-
 @settings(deadline=None, max_examples=4)
 @given(st.integers(0, 10**6))
 def test_adjoint_and_forward_agree_on_random_systems(seed: int) -> None:
@@ -258,22 +247,6 @@ def test_invalid_arguments_raise() -> None:
     assert ns.sensitivity(run, wrt="r").dx_dp.shape == (2, 1)
 
 
-def test_events_without_names_of_their_own_have_their_own_derivatives() -> None:
-    """A free particle between two walls: x(4) = .1 + .45 (dx) ..., each bounce by its own restitution."""
-    walls = [ns.Impact(1 - x, restitution=0.5), ns.Impact(x + 1, restitution=0.9)]
-    system = ns.FilippovSystem([x, v], field=[v, 0 * v], impacts=walls)
-    run = ns.simulate(system, [0.1, 1.3], 4.0, tol=1e-13)
-    assert [e.name for e in run.events[:2]] == ["impact", "impact 2"]
-    t1 = 0.9 / 1.3  # of the first bounce; the second is 2/(.5 v) later
-    t2 = t1 + 2 / 0.65
-    by_v = 0.45 * (4 - t2) - 0.585 * (
-        -0.9 / 1.3**2 - 2 / (0.5 * 1.3**2)
-    )  # d/dv of -1 + .45 v (4 - t2)
-    by_x = -0.585 * (-1 / 1.3)
-    found = ns.sensitivity(run).dx_dx0
-    assert np.abs(found - [[by_x, by_v], [0.0, 0.45]]).max() < 1e-12
-
-
 def test_numbers_of_names_avoid_names_that_are_given() -> None:
     stops = [ns.Stop(x - k, name=name) for k, name in enumerate(["a", "a", "a 2", "a", "b"])]
     system = ns.FilippovSystem([x, v], field=[v, -x], stops=stops)
@@ -296,22 +269,6 @@ def test_events_of_one_name_across_kinds_have_their_own_derivatives(kind) -> Non
     assert np.abs(found - expected).max() < 1e-12
     again = pickle.loads(pickle.dumps(system))
     assert again == system and again.impacts == system.impacts
-
-
-def test_an_event_with_the_name_of_a_surface_has_its_own_derivative() -> None:
-    """A reset called h0 beside a surface h0 through which the speed falls from v to v - 1."""
-    system = ns.FilippovSystem(
-        [x, v],
-        surface=x,
-        above=[v - 1, 0],
-        below=[v, 0],
-        resets=[ns.Reset(x - 1, [x / 2, 2 * v], direction=1, name="h0")],
-    )
-    assert system.resets == (("h0 2", 1),)
-    run = ns.simulate(system, [-1.0, 2.0], 1.6, tol=1e-13)
-    # x = 0 at 1/2, 1 at 3/2; then x = 1/2 + (2 v - 1) (1.6 - t2), t2 = -x0/v + 1/(v - 1)
-    expected = [[3 / 2, 2 * 0.1 + 3 * (1 / 4 + 1)], [0.0, 2.0]]
-    assert np.abs(ns.sensitivity(run).dx_dx0 - expected).max() < 1e-12
 
 
 def test_the_order_in_which_two_surfaces_of_position_are_met_makes_a_corner():

@@ -3,7 +3,6 @@
 from itertools import pairwise
 
 import casadi as ca
-import matplotlib
 import numpy as np
 import pytest
 from matplotlib.text import Text
@@ -12,20 +11,9 @@ from numpy.testing import assert_allclose
 import nonsmooth as ns
 from nonsmooth.local.scans.box import Box
 from nonsmooth.local.scans.plane_scan import PlaneScan
+from tests.local.scans.test_plane_scan import harvest
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
-
-
-def harvest(level):
-    a, d, effort, b = 0.3556, 0.0444, 0.2067, 0.3
-    psi = a * x / (b + x)
-    prey = x * (1 - x) - psi * y
-    return ns.FilippovSystem(
-        [x, y],
-        surface=y - level,
-        above=[prey, psi * y - d * y - effort * y],
-        below=[prey, psi * y - d * y],
-    )
 
 
 @pytest.mark.slow
@@ -100,16 +88,6 @@ def test_given_starts_and_parameters_are_used():
 def test_a_box_without_the_surface_is_drawn():
     figure = ns.plot.phase_portrait(harvest(5.0), (0.1, 1.2, 0.3, 1.5), title="below")
     assert figure.axes[0].get_title() == "below"
-
-
-@pytest.mark.slow
-def test_global_settings_are_left_alone_and_files_are_written(tmp_path):
-    before = dict(matplotlib.rcParams)
-    figure = ns.plot.phase_portrait(harvest(0.95), (0.0, 1.2, 0.3, 1.5))
-    assert dict(matplotlib.rcParams) == before
-    for suffix, start in (("png", b"\x89PNG"), ("pdf", b"%PDF-"), ("svg", b"<?xml")):
-        figure.savefig(tmp_path / f"plane.{suffix}")
-        assert (tmp_path / f"plane.{suffix}").read_bytes().startswith(start)
 
 
 @pytest.mark.slow

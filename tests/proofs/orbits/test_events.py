@@ -107,10 +107,7 @@ def test_two_surfaces_agree_with_the_simulation(seed):
 def test_one_surface_is_crossed_while_another_slides():
     """Friction that is stronger for y > 0: the slider sticks on both sides, and y = t/2 - 1."""
     system = ns.FilippovSystem(
-        [u, y],
-        field=[0.25 - (1 + 0.5 * b) * a, 0.5],
-        surfaces=[u, y],
-        multipliers=[a, b],
+        [u, y], field=[0.25 - (1 + 0.5 * b) * a, 0.5], surfaces=[u, y], multipliers=[a, b]
     )
     orbit = ns.certify_orbit(system, ["0.25", -1], t_end=3)
     assert orbit.proven and orbit.itinerary == "+- s- s+"

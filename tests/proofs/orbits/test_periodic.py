@@ -44,10 +44,7 @@ WARM = ns.FilippovSystem(  # the same, not linear
 )
 TWIN = [-0.3 * y + x, -0.3 * z + v]  # two states with the same multiplier
 DOUBLE = ns.FilippovSystem(
-    [x, v, y, z],
-    surface=v,
-    above=[v, 1 - x - 0.2 * v, *TWIN],
-    below=[v, -1 - x - 0.2 * v, *TWIN],
+    [x, v, y, z], surface=v, above=[v, 1 - x - 0.2 * v, *TWIN], below=[v, -1 - x - 0.2 * v, *TWIN]
 )
 DAMPING = 0.75 * (1 + a - b)  # -0.75 between -1 and 1, and 0.75 beyond
 VAN_DER_POL = ns.FilippovSystem(

@@ -60,10 +60,7 @@ WIDE = arb(0, 1e-3)
     [
         (matrix([math.nan, 0], [0, 1]), "the Jacobian is not finite"),
         ([[arb(1), WIDE], [WIDE, arb(1)]], "the eigenvalues are not proven to be apart"),
-        (
-            matrix([1, 1, 0], [0, 1, 1], [0, 0, 1]),
-            "the eigenvalues are not proven to be apart",
-        ),
+        (matrix([1, 1, 0], [0, 1, 1], [0, 0, 1]), "the eigenvalues are not proven to be apart"),
         ([[WIDE]], "the real part of an eigenvalue has no proven sign"),
         (matrix([0, -1], [1, 0]), "the real part of an eigenvalue has no proven sign"),
     ],

@@ -146,23 +146,11 @@ UNITS = {f"{k} [rad/s]" if "omega" in k else f"{k} [m/s]": v for k, v in DATA.it
     [
         (TRUE, DATA, dict(parameters=["nu"]), ns.ParameterError, "nu"),
         (TRUE, DATA, dict(parameters=[]), ns.ParameterError, "parameters"),
-        (
-            bounce.laws.PennerBounce(),
-            UNITS,
-            dict(parameters=["tilt"]),
-            ns.ParameterError,
-            "tilt",
-        ),
+        (bounce.laws.PennerBounce(), UNITS, dict(parameters=["tilt"]), ns.ParameterError, "tilt"),
         (TRUE, UNITS, dict(parameters=["mu"]), bounce.ModelError, "scaling"),
         ("turf", DATA, dict(parameters=["mu"]), bounce.ModelError, "model"),
         (TRUE, DATA, dict(parameters=["mu"], weights={"slip": 1.0}), ns.OptionError, "weights"),
-        (
-            TRUE,
-            DATA,
-            dict(parameters=["mu"], bounds={"eta": (0, 1)}),
-            ns.OptionError,
-            "bounds",
-        ),
+        (TRUE, DATA, dict(parameters=["mu"], bounds={"eta": (0, 1)}), ns.OptionError, "bounds"),
         (
             TRUE,
             DATA,

@@ -92,20 +92,11 @@ def without(*names):
         (without("speed"), "xdot"),
         (without("lift_off"), "lift_off_speed"),
         (without("lift_off_angle"), "lift_off_angle"),
-        (
-            {**without("spin"), "spin [furlongs]": [1, 2]},
-            "furlongs",
-        ),
-        (
-            {**without("spin"), "spin": [1, 2]},
-            "spin",
-        ),
+        ({**without("spin"), "spin [furlongs]": [1, 2]}, "furlongs"),
+        ({**without("spin"), "spin": [1, 2]}, "spin"),
         ({**without("angle"), "angle": [1, 2]}, "angle"),
         ({**without("spin"), "spin [rpm]": [1]}, "spin"),
-        (
-            {**without("spin"), "spin [rpm]": [1, "fast"]},
-            "row 2: .*fast",
-        ),
+        ({**without("spin"), "spin [rpm]": [1, "fast"]}, "row 2: .*fast"),
         ({k: [] for k in POLAR}, "data"),
         ({**POLAR, "Speed [mph]": [1, 2]}, "speed"),
         (42, "data"),

@@ -10,12 +10,7 @@ from pathlib import Path
 import pytest
 
 from nonsmooth.flow.engine.building import store
-from nonsmooth.flow.engine.building.build import (
-    build,
-    compile_library,
-    find_compiler,
-    library_key,
-)
+from nonsmooth.flow.engine.building.build import build, compile_library, find_compiler, library_key
 from nonsmooth.flow.saving import files
 from nonsmooth.flow.warn import CompilerWarning, warn_once
 

@@ -212,6 +212,7 @@ def test_a_half_orbit_that_loses_its_stop() -> None:
     assert np.abs(curve.special[0].values - [1 / 3, 1 / 2]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_the_tongue_of_a_forced_neuron():
     """TO1: two orbits of one spike a period meet on a fold in closed form; it ends where they touch the threshold before."""
     v, amplitude, period = symbols("v A T")
@@ -280,6 +281,7 @@ def test_the_orbit_with_contact_doubles_and_folds_beside_a_grazing() -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_double_crossing_sliding() -> None:
     """Both landings of the symmetric orbit at their tangencies: A = sqrt(1 + (2.5 (1 - q)/(1 + q) + 1/2)^2)."""
     q = np.exp(-np.pi / 2)

@@ -200,6 +200,7 @@ def test_a_grazing_meets_a_two_fold():
     assert np.abs(curve.values[:, 0] - 1).max() < 1e-12
     (special,) = curve.special
     assert special.kind == "grazing-sliding with two-fold"
+    assert curve.ends == (BranchEnd.EVENT, BranchEnd.REACHED_BOUND)
     assert np.abs(special.values - [1, 0]).max() < 1e-11
 
 

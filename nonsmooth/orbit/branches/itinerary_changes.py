@@ -605,16 +605,19 @@ def departures(curve: Any, u: Array, fresh: Sequence[int]) -> list[Departure]:
     """Ways to leave an event into the side where the itinerary holds, new legs growing from zero."""
     for size in _STARTS:
         ways: list[tuple[Array, Array]] = []
+        tangent = None
         try:
             tangent = np.linalg.svd(curve.scaled(u / curve.scale)[1])[2][-1]
         except (NonsmoothError, np.linalg.LinAlgError):  # no derivatives there
-            return []
+            if not fresh:
+                return []
         if fresh:
             problem, axis = curve.problem, np.zeros(u.size)
             axis[[problem.size - len(problem.legs) + i for i in fresh]] = len(fresh) ** -0.5
             by = size * float(curve.scale[problem.size - 1])
             ways.append((curve.grown(u, fresh, by), axis))
-        ways += [(u + s * size * tangent * curve.scale, tangent) for s in (1.0, -1.0)]
+        if tangent is not None:
+            ways += [(u + s * size * tangent * curve.scale, tangent) for s in (1.0, -1.0)]
         result = list[Departure]()
         for guess, axis in ways:
             found = curve.correct(guess, axis)

@@ -642,6 +642,8 @@ def _drop_turning(arc: Arc) -> None:
 
 def end_of(arc: Arc) -> BranchEnd:
     """Name the end of an arc."""
+    if arc.zeros and arc.zeros[-1].name == arc.end:
+        return BranchEnd.EVENT
     if arc.end in ("lost", "step too small", "two-fold", DIVIDE):
         return BranchEnd.STEP_TOO_SMALL
     if arc.end == "period diverges":

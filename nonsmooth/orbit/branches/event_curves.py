@@ -36,7 +36,7 @@ from ..runs.guards import CONDITIONS
 from ..runs.legs import Leg, integrate_leg
 from .branch import DIVIDE, BranchCurve
 from .conditions import Condition, minima, touching
-from .itinerary_changes import grown
+from .itinerary_changes import grown, soft_switch
 from .normal_forms import normal_form, torus_pair
 from .unfoldings import contact_at, contact_numbers
 
@@ -404,8 +404,8 @@ def _touches(
     others = [value for t, value in near if abs(t - touch) > _APART * duration]
     if others:
         found[SECOND] = min(others)
-    if guard.kind != "surface":
-        return found
+    if guard.kind != "surface" or soft_switch(problem, leg, guard.element):
+        return found  # nothing slides beyond
     y = integrate_leg(problem.system, leg, x, touch, p).end[: problem.dimension]
     try:
         _, other, _ = contact_at(problem, leg, guard.element, guard.side, y, p)

@@ -173,7 +173,7 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
         return "grazing-sliding" if came == left else "crossing-sliding"
     if before.kind == leg.kind == "crossing" and before.mode == after.mode:
         if surface_of(problem.system, before) == surface_of(problem.system, leg):
-            return _soft(problem, leg, surface_of(problem.system, leg)) or "corner"
+            return soft_switch(problem, leg, surface_of(problem.system, leg)) or "corner"
     if leg.kind == "entry" and before.kind == "exit":
         return "adding-sliding" if after.mode == before.mode or len(legs) == 2 else "corner"
     if leg.kind == "entry" and before.kind == "crossing":
@@ -212,7 +212,7 @@ def _grazed(
     )
     field = leg_between(problem.system, leg.mode, other).map(problem.system)
     assert field is not None
-    soft = _soft(problem, leg, guard.element)
+    soft = soft_switch(problem, leg, guard.element)
     if soft == SOFT:
         return soft
     gradient = field(y, p).gradient[: problem.dimension]
@@ -239,7 +239,7 @@ def _leads_away(problem: BoundaryProblem, mode: str, surface: int, y: Array, p: 
     return float(first_terms(field, states, p)[1][own, 2]) > 0.0
 
 
-def _soft(problem: BoundaryProblem, leg: Leg, surface: int) -> str:
+def soft_switch(problem: BoundaryProblem, leg: Leg, surface: int) -> str:
     """The grazing of a surface on which nothing slides; empty where something may."""
     known = {i for i, letter in enumerate(leg.mode) if letter in "+-s"}
     mode = leg.mode[: len(problem.system.entries)] if len(known) == len(leg.mode) else None
@@ -605,16 +605,19 @@ def departures(curve: Any, u: Array, fresh: Sequence[int]) -> list[Departure]:
     """Ways to leave an event into the side where the itinerary holds, new legs growing from zero."""
     for size in _STARTS:
         ways: list[tuple[Array, Array]] = []
+        tangent = None
         try:
             tangent = np.linalg.svd(curve.scaled(u / curve.scale)[1])[2][-1]
         except (NonsmoothError, np.linalg.LinAlgError):  # no derivatives there
-            return []
+            if not fresh:
+                return []
         if fresh:
             problem, axis = curve.problem, np.zeros(u.size)
             axis[[problem.size - len(problem.legs) + i for i in fresh]] = len(fresh) ** -0.5
             by = size * float(curve.scale[problem.size - 1])
             ways.append((curve.grown(u, fresh, by), axis))
-        ways += [(u + s * size * tangent * curve.scale, tangent) for s in (1.0, -1.0)]
+        if tangent is not None:
+            ways += [(u + s * size * tangent * curve.scale, tangent) for s in (1.0, -1.0)]
         result = list[Departure]()
         for guess, axis in ways:
             found = curve.correct(guess, axis)

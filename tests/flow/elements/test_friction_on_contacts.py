@@ -14,7 +14,9 @@ G = 9.81
 pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.flow.warn.DecisionWarning")
 
 
-def table(mu, feet, height=0.4, inertia=(0.1, 0.15, 0.2), e=0.0, pull=(0, 0), **others):
+def table(
+    mu, feet, height=0.4, inertia=(0.1, 0.15, 0.2), e=0.0, pull=(0, 0), law="newton", **others
+):
     """A rigid body of unit mass on feet, at small angles."""
     q, w, r = ca.SX.sym("q", 6), ca.SX.sym("w", 6), ca.SX.sym("r", len(feet))
     force, gaps, slips, multipliers = ca.SX.zeros(6), [], [], []
@@ -25,7 +27,7 @@ def table(mu, feet, height=0.4, inertia=(0.1, 0.15, 0.2), e=0.0, pull=(0, 0), **
         force[:3] += push
         force[3:] += ca.cross(p, push)
         gap = q[2] + q[3] * py - q[4] * px
-        gaps.append(ns.Impact(gap, reaction=r[i], restitution=e, name=f"foot{i}"))
+        gaps.append(ns.Impact(gap, reaction=r[i], restitution=e, law=law, name=f"foot{i}"))
         slips.append((w[:3] + ca.cross(w[3:], p))[:2])
         multipliers.append(lam)
     rates = ca.vertcat(force[:2], force[2] - G, force[3:] / ca.DM(inertia))

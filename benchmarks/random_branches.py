@@ -309,7 +309,7 @@ def main(numbers: Sequence[int] = (), classes: Sequence[str] = ()) -> Counter[st
             counts.update([f"branches of {kind}", *(f"end {end}" for end in branch.ends)])
             counts.update(f"event {event.kind}" for event in branch.events)
             for end, why in zip(branch.ends, branch.reasons, strict=True):
-                named = "A multiplier has grown" in why or "neutral family" in why
+                named = "A multiplier has grown" in why
                 if (end in NAMELESS and not named) or "corner" in why or "unclassified" in why:
                     print(kind, seed - 1, end, branch.values[[0, -1]], why[:200], flush=True)
     counts["seconds"] = round(time.perf_counter() - began)

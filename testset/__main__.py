@@ -1,4 +1,7 @@
-"""Run the test set and write build/testset/: ``python -m testset [--more] [TOOL ...]``."""
+"""Run the test set and write build/testset/: ``python -m testset [--more] [--record] [TOOL ...]``.
+
+``--more`` runs problems that a tool has not run yet, ``--record`` puts the table into README.md.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import sys
 import time
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from . import peers
@@ -54,32 +58,43 @@ def outcome(tool: str, data: dict[str, Any]) -> dict[str, Any]:
     return {"error": float(error), "seconds": seconds, "within": problem.within("x")}
 
 
+def wrong(found: dict[str, Any]) -> list[str]:
+    """Problems whose end is wrong without a message."""
+    done = {name: own for name, own in found.items() if "error" in own}
+    return [name for name, own in done.items() if own["error"] > max(WRONG, own["within"])]
+
+
 def row(tool: str, found: dict[str, Any]) -> str:
     """A line of the table."""
-    done = [own for own in found.values() if "error" in own]
-    right = [own for own in done if own["error"] <= max(WRONG, own["within"])]
-    failed = [own for own in found.values() if "failed" in own]
-    not_for = [own for own in found.values() if "not for it" in own]
-    errors = sorted(own["error"] for own in right)
-    middle = f"{statistics.median(errors):.0e}" if errors else ""
-    seconds = f"{statistics.median(own['seconds'] for own in right):.3f}" if right else ""
-    cells = (tool, len(right), len(done) - len(right), len(failed), len(not_for), middle, seconds)
-    return "| " + " | ".join(map(str, cells)) + " |"
+    bad, failed, not_for = (
+        wrong(found),
+        *([name for name, own in found.items() if key in own] for key in ("failed", "not for it")),
+    )
+    right = [own for name, own in found.items() if name not in {*bad, *failed, *not_for}]
+    middle = (
+        [statistics.median(own[key] for own in right) for key in ("error", "seconds")]
+        if right
+        else [0.0] * 2
+    )
+    counts = map(len, (found, right, bad, failed, not_for))
+    return (
+        "| " + " | ".join(map(str, (tool, *counts, f"{middle[0]:.0e}", f"{middle[1]:.2f}"))) + " |"
+    )
 
 
 def table(results: dict[str, dict[str, Any]]) -> str:
-    """All tools."""
-    head = "| tool | right | silently wrong | failed with a message | cannot be written | median error | median seconds |"
-    return "\n".join(
-        [head, "|---|--:|--:|--:|--:|--:|--:|", *(row(*pair) for pair in results.items())]
-    )
+    """All tools, and the names of what is silently wrong."""
+    head = "| tool | problems | right | silently wrong | gave up | cannot be written | median error | median s |"
+    lines = [head, "|---|--:|--:|--:|--:|--:|--:|--:|", *(row(*pair) for pair in results.items())]
+    names = (f"- {tool}: {', '.join(wrong(found)) or 'none'}" for tool, found in results.items())
+    return "\n".join([*lines, "", "Silently wrong are:", "", *names])
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run tools that are installed, keep the results of the others from the last run."""
     chosen = [*(sys.argv[1:] if arguments is None else arguments)]
-    more = "--more" in chosen
-    chosen = [name for name in chosen if name != "--more"]
+    more, record = "--more" in chosen, "--record" in chosen
+    chosen = [name for name in chosen if not name.startswith("--")]
     FOLDER.mkdir(parents=True, exist_ok=True)
     tools = {OURS: "nonsmooth"} | {name: own[0] for name, own in peers.PEERS.items()}
     results = dict[str, dict[str, Any]]()
@@ -94,7 +109,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
                     path.write_text(json.dumps(found, indent=1))
         if path.exists():
             results[tool] = json.loads(path.read_text())
-    (FOLDER / "results.md").write_text(table(results) + "\n", encoding="utf-8")
+    if record:
+        page = Path(__file__).with_name("README.md")
+        before, _, rest = page.read_text(encoding="utf-8").partition("<!-- results -->\n")
+        after = rest.partition("<!-- end of results -->\n")[2]
+        marked = f"<!-- results -->\n{table(results)}\n<!-- end of results -->\n"
+        page.write_text(before + marked + after, encoding="utf-8")
     print(table(results))
 
 

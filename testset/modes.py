@@ -209,10 +209,14 @@ class Modes:
                     )
                 continue
             if kind == "exit":
-                signs = (*signs[:i], side[0], *signs[i + 1 :])
+                open_ = [side[0] if j == i else s or None for j, s in enumerate(signs)]
+                signs = self.signs(x, t, open_)
                 continue
             normal = self.normals(x, t).reshape(m, -1)[i]
             if np.any(normal):
                 x = x - self.at_h(x, t)[i] * normal / (normal @ normal)
-            signs = self.signs(x, t, [None if j == i or s == 0 else s for j, s in enumerate(signs)])
+            near = np.abs(self.at_h(x, t)[:m]) < ON
+            signs = self.signs(
+                x, t, [None if near[j] or j == i else s for j, s in enumerate(signs)]
+            )
         raise GaveUp(f"{EVENTS} events")

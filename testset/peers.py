@@ -18,6 +18,7 @@ from .modes import SECONDS, GaveUp, Modes, NotForModes, Solver
 
 #: The tolerance of all, and steps at least in a whole run, as events are seen at the ends of steps.
 TOL, LONGEST = 1e-10, 200
+NEAR, NUDGE = 1e-13, 1e-15
 
 
 def numbers(x: ca.SX, t: ca.SX, e: ca.SX) -> Any:
@@ -136,7 +137,7 @@ def sksundae(x: ca.SX, t: ca.SX, field: ca.SX, guards: ca.SX) -> Any:
 
 
 def heyoka(x: ca.SX, t: ca.SX, field: ca.SX, guards: ca.SX) -> Any:
-    """taylor_adaptive with terminal events."""
+    """taylor_adaptive with terminal events; a start on a guard is pushed off it, where it would hide the next root."""
     import heyoka as hy
 
     names = (
@@ -151,7 +152,16 @@ def heyoka(x: ca.SX, t: ca.SX, field: ca.SX, guards: ca.SX) -> Any:
     equations = [(s, hy.expression(0.0) + f) for s, f in zip(names, right, strict=True)]
     taylor = hy.taylor_adaptive(equations, [0.1] * len(names), t_events=events, tol=1e-12)
 
+    normals = ca.jacobian(guards, x)
+    outputs = (guards, normals @ field + ca.jacobian(guards, t), normals)
+    at = ca.Function("g", [x, t], [ca.densify(e) for e in outputs])
+
     def leg(t: float, x: np.ndarray, t_end: float) -> Any:
+        if events:
+            on, rates, normals = (np.array(v) for v in at.call([x, t]))
+            for value, rate, normal in zip(on.ravel(), rates.ravel(), normals, strict=True):
+                if abs(value) < NEAR and rate > 0 and np.any(normal):
+                    x = x + (NUDGE - value) * normal / (normal @ normal)
         taylor.time, taylor.state[:] = t, x
         if events:
             taylor.reset_cooldowns()

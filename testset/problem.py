@@ -31,7 +31,7 @@ _CONSTRUCTS = (
 )
 #: Names that the strings of a system use.
 WORDS = {n: getattr(ca, n) for n in _CASADI} | {"pi": math.pi, "matrix": ca.DM}
-WORDS |= {n: getattr(ns, n) for n in _CONSTRUCTS}
+WORDS |= {n: getattr(ns, n) for n in (*_CONSTRUCTS, "table")}
 #: Names that the strings of numbers use.
 NUMBERS = {n: getattr(math, n) for n in dir(math) if not n.startswith("_")}
 

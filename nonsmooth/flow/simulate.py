@@ -14,10 +14,12 @@ from .engine.tape import tape_for
 from .ensembles.starts import require_start, require_start_mode
 from .events import Event
 from .options import Options
+from .other_names import hinted
 from .section import Section, read_sampling, sampled, sectioned
 from .trajectory import Trajectory
 
 
+@hinted
 def simulate(
     system: FilippovSystem,
     x0: ArrayLike | None = None,

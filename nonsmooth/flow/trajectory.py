@@ -14,6 +14,7 @@ from ..notebook import card, lines
 from . import tables
 from .events import Events, Segments, ShownMode
 from .names import shown_mode
+from .other_names import ATTRIBUTES
 from .saving import Savable, savable
 from .status import Status
 
@@ -222,6 +223,10 @@ class Trajectory(
             if one not in shown:
                 shown[one] = shown_mode(self.system, one.mode, one.discrete) or "o"
         return " ".join([shown[one] for one in modes])
+
+    def __getattr__(self, name: str) -> Any:
+        hint = f". It has {ATTRIBUTES[name]}" if name in ATTRIBUTES else ""
+        raise AttributeError(f"'Trajectory' object has no attribute {name!r}{hint}")
 
     def __call__(self, t: ArrayLike, side: str = "right") -> Array:
         """Evaluate the dense output.

@@ -126,15 +126,19 @@ def system(
     FilippovSystem(2 states: x, v; 1 surface: v; parameters: mu)
     """
     sympy = library("sympy", "interop.sympy", "sympy")
-    states = {
-        (key.expr if isinstance(key, sympy.Derivative) else key): value
-        for key, value in equations.items()
-    }
+    if not isinstance(equations, Mapping):
+        raise DefinitionError(
+            f"equations: expected a mapping from states to right-hand sides, received {equations!r}."
+        )
+    parameters = {sympy.sympify(key): value for key, value in (parameters or {}).items()}
+    given = {sympy.sympify(key): value for key, value in equations.items()}
+    plain = lambda key: key.expr if isinstance(key, sympy.Derivative) else key
+    states = {plain(key): value for key, value in given.items()}
     times = {time} if time is not None else {key.args[0] for key in states if key.args}
     if len(times) > 1:
         raise DefinitionError(f"equations have the times {sorted(map(str, times))}. Give one.")
     named = lambda key: ca.SX.sym(key.func.__name__ if key.args else key.name)
-    symbols = {key: named(key) for key in [*states, *(parameters or {}), *times]}
+    symbols = {key: named(key) for key in [*states, *parameters, *times]}
     rates = [expression(value, symbols) for value in states.values()]
     clock = next(
         (symbols[key] for key in times if ca.depends_on(ca.vertcat(*rates), symbols[key])), None
@@ -142,6 +146,6 @@ def system(
     return FilippovSystem.from_expression(
         [symbols[key] for key in states],
         rates,
-        parameters={symbols[key]: value for key, value in (parameters or {}).items()},
+        parameters={symbols[key]: value for key, value in parameters.items()},
         time=clock,
     )

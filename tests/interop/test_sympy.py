@@ -60,6 +60,13 @@ def test_functions_of_time_are_states():
     assert abs(end - (np.exp(-2) + np.sin(2) - np.cos(2)) / 2) < 1e-10
 
 
+def test_states_and_parameters_may_be_named_by_strings():
+    system = ns.interop.sympy.system({"x": v, "v": -x - mu}, {"mu": 0.5})
+    assert system.state_names == ("x", "v") and system.parameter_names == ("mu",)
+    with pytest.raises(ns.DefinitionError, match="expected a mapping"):
+        ns.interop.sympy.system([sp.Eq(x, v)])
+
+
 def test_expressions_make_stops():
     symbols = {x: X, v: V}
     stop = ns.Stop(ns.interop.sympy.expression(x - 1, symbols), 1, "end")

@@ -16,7 +16,7 @@ x, v, t = (ca.SX.sym(s) for s in ("x", "v", "t"))
 QUIET = ns.Work(threads=1, progress=False)
 AXIS = np.linspace(-1.9, 2.1, 5)
 GRID = {"x": AXIS, "v": AXIS}
-_DATA = json.loads((Path(__file__).parents[1] / "data" / "orbits_2.json").read_text())
+_DATA = json.loads((Path(__file__).parents[1] / "cases" / "orbits_2.json").read_text())
 KICKED = next(case["values"] for case in _DATA if case["id"] == "BA1")
 
 

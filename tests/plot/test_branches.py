@@ -9,6 +9,8 @@ import nonsmooth as ns
 
 x, y, t, a, b = (ca.SX.sym(s) for s in ("x", "y", "t", "a", "b"))
 BOX = [(-1, 1), (-1.5, 1)]
+PULL = 0.2 * (y - 0.5) - x
+BELT = ns.FilippovSystem([x, y], surface=y - 0.5, above=[y, PULL - 1], below=[y, PULL + 1])
 
 
 @pytest.fixture(scope="module")
@@ -125,20 +127,14 @@ def test_curves_in_two_parameters_with_their_special_points(takens):
 
 @pytest.mark.slow
 def test_an_orbit_has_its_modes_and_lies_over_a_portrait():
-    block = ns.FilippovSystem(
-        [x, y],
-        surface=y - 0.5,
-        above=[y, -x - 1 + 0.2 * (y - 0.5)],
-        below=[y, -x + 1 + 0.2 * (y - 0.5)],
-    )
-    orbit = ns.periodic_orbit(block, ns.simulate(block, [0.3, 0.4], 30))
+    orbit = ns.periodic_orbit(BELT, ns.simulate(BELT, [0.3, 0.4], 30))
     ax = ns.plot.periodic_orbit(orbit).axes[0]
     drawn = np.concatenate([np.column_stack(line.get_data()) for line in ax.lines[:2]])
     assert_allclose(drawn.max(axis=0), orbit.trajectory(np.linspace(0, 1, 2)).max(axis=0), atol=2)
     assert np.abs(drawn[:, 1].max() - 0.5) < 1e-9  # it sticks to the belt and slips below it
     words = [text.get_text() for text in ax.get_legend().get_texts()]
     assert words == ["mode \N{MINUS SIGN}", "mode s", "event", "surface"]
-    under = ns.plot.phase_portrait(block, (-2, 2, -1, 1))
+    under = ns.plot.phase_portrait(BELT, (-2, 2, -1, 1))
     assert ns.plot.periodic_orbit(orbit, ax=under.axes[0]) is under.axes[0]
     assert len(under.axes[0].get_legend().get_texts()) > 4  # of both
 
@@ -169,13 +165,7 @@ def test_bad_input(takens, call, error, words):
 
 
 def test_structural_multipliers_are_named():
-    block = ns.FilippovSystem(
-        [x, y],
-        surface=y - 0.5,
-        above=[y, -x - 1 + 0.2 * (y - 0.5)],
-        below=[y, -x + 1 + 0.2 * (y - 0.5)],
-    )
-    orbit = ns.periodic_orbit(block, ns.simulate(block, [0.3, 0.4], 30))
+    orbit = ns.periodic_orbit(BELT, ns.simulate(BELT, [0.3, 0.4], 30))
     ax = ns.plot.multipliers(orbit).axes[0]
     names = [text.get_text() for part in ax.artists for text in part.get_children()]
     assert sorted(names) == ["of sliding", "of the flow"]

@@ -16,6 +16,7 @@ from ..engine.building.compilers import ADVICE, CompilerError, find_compiler
 from ..engine.lanes import lanes_for
 from ..engine.tape import library, tape_for
 from ..options import Options
+from ..other_names import hinted
 from ..results import Chunk, Collected, Ensemble
 from ..section import KINDS_OF_SECTIONS, read_sampling, sectioned
 from ..warn import warn_once
@@ -34,6 +35,7 @@ _FEW, _FEW_WITH_SETS = 64, 4000
 _MANY = 100_000
 
 
+@hinted
 def ensemble(
     system: FilippovSystem,
     x0: ArrayLike | LazyStarts,

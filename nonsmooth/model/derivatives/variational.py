@@ -17,7 +17,7 @@ from ..errors import DegenerateError
 from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator, evaluator
 from ..laws.motion import Motion, motion, solved
-from ..laws.multipliers import newton_multipliers, sliding_multipliers
+from ..laws.multipliers import sliding_multipliers
 from ..printing.tape import Entries, Series, series_of, sparse_entries
 from ..values import Array
 
@@ -122,21 +122,23 @@ class VariationalField(PlainField):
     def _evaluator(self, what: Hashable, build: Callable[[], Sequence[ca.SX]]) -> Evaluator:
         return evaluator(self.motion.system, (what, self.motion.mode), build, self.states)
 
-    def start(self, x: Array, p: Array, unknowns: Array | None = None) -> Array:
-        """States and columns at the start of a leg, as one row; ``unknowns`` is a guess of multipliers."""
-        return self.initial(x, p, unknowns).T.ravel()
+    def start(self, x: Array) -> Array:
+        """States and columns at the start of a leg without multipliers that are states, as one row."""
+        z = np.eye(1 + self.columns, self.entries, -1)
+        z[0] = x
+        return z.ravel()
 
     def matrix(self, z: Array) -> Array:
         """The matrix (x, X, P) of states and columns, (N + k, 1 + N + q)."""
         return z.reshape(1 + self.columns, self.entries).T
 
-    def initial(self, x: Array, p: Array, unknowns: Array | None = None) -> Array:
+    def initial(self, x: Array, p: Array) -> Array:
         """The matrix (x, X, P) at the start of a leg, (N + k, 1 + N + q)."""
         n, matrix = self.by_start, np.eye(self.entries, 1 + self.columns, 1)
         matrix[n:] = matrix[:, 1 + n :] = 0.0
         matrix[:n, 0] = x
         if self.entries > n:
-            matrix[n:, 0] = self._unknowns(x, p, unknowns)
+            matrix[n:, 0] = self._unknowns(x, p)
             matrix[n:, 1:] = self._multipliers.copied(matrix[:, 0], p)[0]
         return matrix
 
@@ -144,17 +146,11 @@ class VariationalField(PlainField):
         """Extended states (N,) and the multipliers that are states of the leg; (N + k,)."""
         if self.entries == self.by_start:
             return x
-        return np.concatenate([x, self._unknowns(x, p, None)])
+        return np.concatenate([x, self._unknowns(x, p)])
 
-    def _unknowns(self, x: Array, p: Array, near: Array | None) -> Array:
+    def _unknowns(self, x: Array, p: Array) -> Array:
         system, mode = self.motion.system, self.motion.mode
         coupled, which = coupled_of(system), list(self.motion.unknowns)
-        if near is not None:
-            guess = np.zeros(coupled.count)
-            guess[which] = near
-            found = newton_multipliers(coupled, mode, x, guess, p, 30)
-            if found is not None:
-                return np.asarray(found[which])
         solutions = sliding_multipliers(coupled, mode, x, p, stable_only=any(system.nonlinear))
         if len(solutions) != 1:
             raise DegenerateError(
@@ -174,6 +170,11 @@ def variational_field(
         return VariationalField(motion(system, mode), chosen)
 
     return system.cached(("variational field", mode, chosen), build)
+
+
+def states_at(system: FilippovSystem, mode: str, x: Array, p: Array) -> Array:
+    """Extended states (N,) and the multipliers that are states of a mode's flow; (N + k,)."""
+    return variational_field(system, mode).states_at(x, p)
 
 
 class GuardedField(PlainField):

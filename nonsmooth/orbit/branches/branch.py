@@ -436,14 +436,17 @@ def follow_branch(
         bar.update()
 
     step = min(step, 1.0)  # a step is no longer than the bounds are wide
-    if away is None:
-        start = _off_events(curve, start, 0.01 * step, bounds)
     forward = np.zeros(start.size)
     forward[-1] = 1.0
+    halves = [] if away is None else [_Half(reason="It begins at an event.")]
+    if away is None:
+        try:
+            start = _off_events(curve, start, 0.01 * step, bounds)
+        except KeyboardInterrupt:
+            halves = [_Half([(curve, Point(start, forward))], end=BranchEnd.INTERRUPTED)]
     options: dict[str, Any] = dict(step=step, max_points=max_points, report=report, bounds=bounds)
     ways = [Departure(curve, [start], sign * forward) for sign in (-1.0, 1.0)]
-    halves = [] if away is None else [_Half(reason="It begins at an event.")]
-    for way in ways if away is None else [away]:
+    for way in ways[len(halves) :] if away is None else [away]:
         if halves and halves[0].end in (BranchEnd.CLOSED, BranchEnd.INTERRUPTED):
             halves.append(_Half(end=halves[0].end))
             continue
@@ -518,7 +521,10 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
     def follow(departure: Departure) -> Arc:
         curve = departure.curve
         assert isinstance(curve, BranchCurve)
-        curve.restart(departure.rows[-1])
+        try:
+            curve.restart(departure.rows[-1])
+        except KeyboardInterrupt:
+            return Arc([Point(departure.rows[-1], departure.tangent)], end="interrupted")
         arc = trace(
             curve,
             departure.rows,
@@ -636,6 +642,8 @@ def _drop_turning(arc: Arc) -> None:
 
 def end_of(arc: Arc) -> BranchEnd:
     """Name the end of an arc."""
+    if arc.zeros and arc.zeros[-1].name == arc.end:
+        return BranchEnd.EVENT
     if arc.end in ("lost", "step too small", "two-fold", DIVIDE):
         return BranchEnd.STEP_TOO_SMALL
     if arc.end == "period diverges":

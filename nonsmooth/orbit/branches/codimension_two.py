@@ -18,7 +18,7 @@ import numpy as np
 
 from ...flow.fixed import first_terms
 from ...model import Array, DegenerateError, Guard, NonsmoothError
-from ...model.derivatives.variational import guarded_field, variational_field
+from ...model.derivatives.variational import guarded_field, states_at
 from ...solvers.continuation import Departure, Point, Zero
 from ...solvers.newton import Equations, Secant, converge
 from ..runs.legs import integrate_leg, surface_of
@@ -286,7 +286,7 @@ def _located(base: OrbitCurve, guess: Array, point: Degenerate) -> Array | None:
     def terms(v: Array) -> Array:
         u = v * base.scale
         p, x = base.parameters_at(u), problem.split(u[: problem.size])[0][point.leg]
-        y = variational_field(base.system, mode).states_at(x, p)
+        y = states_at(base.system, mode, x, p)
         return np.asarray(first_terms(guards, y, p)[1][row, point.order : point.order + 2])
 
     more = Secant(terms, 1.0)

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...flow.fixed import first_terms
-from ...model import Array, Evaluator, FilippovSystem, Guard, evaluator
+from ...model import Array, Evaluator, FilippovSystem, Guard, evaluator, layer_of
 from ...model.derivatives.event_maps import keeps_zero
-from ...model.derivatives.variational import guarded_field, variational_field
+from ...model.derivatives.variational import guarded_field, states_at
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import Multipliers, finite_return_map
 from ..runs.cell_field import Guarded, field_of
@@ -103,11 +103,12 @@ def condition_row(
     def value(x: Array, q: Array) -> float:
         if condition.what == "start":
             leg, before = problem.legs[i], problem.legs[i - 1]
-            y = variational_field(problem.system, leg.mode).states_at(x, q)
+            y = states_at(problem.system, leg.mode, x, q)
             first = first_terms(guarded_field(problem.system, leg.mode), y, q)[1]
             rows = _starting(problem.system, i, leg, before)
-            found = {test.name: float(first[k, order]) for k, order, test in rows}
-            return found.get(condition.name, np.nan)
+            found = {test.name: (float(first[k, order]), test) for k, order, test in rows}
+            rate, test = found.get(condition.name, (np.nan, condition))
+            return _through(problem.system, before, leg, test, rate, x, q)
         return touching(problem.system, problem.legs[i], condition, x, duration, q)[1]
 
     row, x = np.zeros(count + len(free)), starts[i]
@@ -164,13 +165,16 @@ class _Tests:
         for i, (rows, begin, values) in enumerate(watched):
             first = begin[len(begin) - len(self.inside[i]) :].tolist()
             found.append((self.durations[i], durations[i]))
-            found += [(condition, first[k][order]) for k, order, condition in self.starts[i]]
+            for k, order, condition in self.starts[i]:
+                rate, last = first[k][order], self.legs[i - 1]
+                rate = _through(self.system, last, self.legs[i], condition, rate, at.starts[i], p)
+                found.append((condition, rate))
             own, sign, others = self.ends[i]
             if own is not None:
                 found.append((own, sign * speeds[i]))
             if others:
                 if not durations[i] > 0.0:
-                    state = at.by_leg[i].end
+                    state = states_at(self.system, self.legs[i].mode, at.by_leg[i].end, p)
                     values = guard_values(self.system, self.legs[i].mode)(state, p)[1][:, 0]
                 found += [(condition, float(values[k])) for k, condition in others]
             found += _interior(self.inside[i], self.guards.fields[i], rows, p)
@@ -223,6 +227,39 @@ def _order(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> int |
     if guard.kind == "impact" and guard.ends(before.kind, before.element, before.side):
         return None
     return 0
+
+
+#: Points at which hidden dynamics is sampled, a polynomial of the degree of which agrees with it.
+_LAYER = np.polynomial.chebyshev.chebpts1(9)
+
+
+def _through(
+    system: FilippovSystem,
+    before: Leg,
+    leg: Leg,
+    condition: Condition,
+    rate: float,
+    x: Array,
+    p: Array,
+) -> float:
+    """The rate away from a surface that was crossed; with hidden dynamics its least inside, at whose zero it sticks."""
+    guard = condition.guard
+    k = -1 if guard is None or guard.kind != "surface" else guard.element
+    if not system.definition.hidden or before.kind != "crossing" or surface_of(system, before) != k:
+        return rate
+    layer, i, sign = layer_of(system), system.entries[k][0], 1.0 if leg.mode[k] == "+" else -1.0
+    lam = np.array([{"+": 1.0, "-": -1.0}.get(a, 0.0) for a in leg.mode[: system.surface_count]])
+    slides = np.array([a == "s" for a in leg.mode[: system.surface_count]])
+    rates = list[float]()
+    for value in _LAYER:
+        lam[i] = value
+        numbers = layer.at(x, lam, p)
+        if numbers.rates_l.reshape(len(lam), -1)[i][slides].any():  # by what slides beside it
+            return rate
+        rates.append(sign * float(numbers.rates[i]))
+    inside = np.polynomial.Chebyshev.fit(_LAYER, rates, len(_LAYER) - 1, domain=[-1, 1])
+    turns = [r.real for r in inside.deriv().roots() if abs(r.imag) < 1e-6 and abs(r.real) < 1.0]
+    return min(float(inside(value)) for value in [-1.0, 1.0, *turns])
 
 
 def _ending(

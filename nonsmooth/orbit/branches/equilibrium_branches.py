@@ -113,14 +113,15 @@ class Equilibria(BranchCurve):
 
     def occurs(self, test: str, u: Array) -> bool:
         """Not a Hopf point at a neutral saddle, where two real eigenvalues have the sum 0."""
+        if test != "Hopf":
+            return True
         values = self.eigenvalues(u)
-        turning = values[_critical_pair(values)[0]].imag != 0.0
-        return test != "Hopf" or bool(turning) or self.double_zero(u)
+        return bool(values[_critical_pair(values)[0]].imag != 0.0) or self.double_zero(u)
 
     def double_zero(self, u: Array) -> bool:
         sizes = np.sort(np.abs(self.eigenvalues(u)))
         # a double zero is known to the square root of rounding
-        return bool(sizes[1] < 1e-4 * max(1.0, sizes[-1]))
+        return sizes.size > 1 and bool(sizes[1] < 1e-4 * max(1.0, sizes[-1]))
 
     def hopf(self, u: Array) -> float:
         """Product of the sums of pairs of eigenvalues: zero at a Hopf point or neutral saddle."""

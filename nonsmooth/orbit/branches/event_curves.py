@@ -27,7 +27,7 @@ import numpy as np
 from ...flow.fixed import first_terms
 from ...model import Array, DegenerateError, NonsmoothError
 from ...model.derivatives.event_maps import surface_map
-from ...model.derivatives.variational import guarded_field, variational_field
+from ...model.derivatives.variational import guarded_field, states_at
 from ...solvers.continuation import Curve, Departure, Point, Secant, Zero
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import return_map
@@ -36,7 +36,7 @@ from ..runs.guards import CONDITIONS
 from ..runs.legs import Leg, integrate_leg
 from .branch import DIVIDE, BranchCurve
 from .conditions import Condition, minima, touching
-from .itinerary_changes import grown
+from .itinerary_changes import grown, soft_switch
 from .normal_forms import normal_form, torus_pair
 from .unfoldings import contact_at, contact_numbers
 
@@ -221,7 +221,9 @@ class EventCurve(Curve):
         field = guarded_field(self.base.system, leg.mode)
         assert self.condition is not None
         return np.asarray(
-            first_terms(field, y, p)[1][field.motion.guards.index(self.condition.guard)]
+            first_terms(field, states_at(self.base.system, leg.mode, y, p), p)[1][
+                field.motion.guards.index(self.condition.guard)
+            ]
         )
 
     def terms(self, u: Array) -> Array:
@@ -402,8 +404,8 @@ def _touches(
     others = [value for t, value in near if abs(t - touch) > _APART * duration]
     if others:
         found[SECOND] = min(others)
-    if guard.kind != "surface":
-        return found
+    if guard.kind != "surface" or soft_switch(problem, leg, guard.element):
+        return found  # nothing slides beyond
     y = integrate_leg(problem.system, leg, x, touch, p).end[: problem.dimension]
     try:
         _, other, _ = contact_at(problem, leg, guard.element, guard.side, y, p)
@@ -427,10 +429,10 @@ def _beginnings(
     i, guard, system = condition.leg, condition.guard, problem.system
     field = guarded_field(system, problem.legs[i].mode)
     k = field.motion.guards.index(guard)
-    y = variational_field(system, problem.legs[i].mode).states_at(at.starts[i], p)
+    y = states_at(system, problem.legs[i].mode, at.starts[i], p)
     order = 2 if problem.legs[i - 1].kind == "crossing" else 1
     before = at.events[i - 1]
-    rate = at.by_leg[i - 1].rate[: before.gradient.size]
+    rate = at.by_leg[i - 1].rate
     return {
         CUSP: float(first_terms(field, y, p)[1][k, order]),
         TWO_FOLD: float(before.gradient @ rate),

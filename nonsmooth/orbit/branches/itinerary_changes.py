@@ -25,7 +25,7 @@ import numpy as np
 
 from ...flow.fixed import first_terms
 from ...model import Array, Guard, NonsmoothError
-from ...model.derivatives.variational import guarded_field
+from ...model.derivatives.variational import guarded_field, states_at
 from ...solvers.continuation import Departure
 from ..periodic.boundary_value_problem import (
     TURNED,
@@ -155,8 +155,7 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     if test.what == "end":
         return "two-fold"
     if test.what == "transversality":
-        end = at.flows.end[i, : at.flows.sizes[i]]
-        if at_two_fold(problem.system, leg, end, p):
+        if at_two_fold(problem.system, leg, at.flows.end[i], p):
             return "two-fold"
         return {
             "impact": "impact grazing",
@@ -174,7 +173,7 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
         return "grazing-sliding" if came == left else "crossing-sliding"
     if before.kind == leg.kind == "crossing" and before.mode == after.mode:
         if surface_of(problem.system, before) == surface_of(problem.system, leg):
-            return _soft(problem, leg, surface_of(problem.system, leg)) or "corner"
+            return soft_switch(problem, leg, surface_of(problem.system, leg)) or "corner"
     if leg.kind == "entry" and before.kind == "exit":
         return "adding-sliding" if after.mode == before.mode or len(legs) == 2 else "corner"
     if leg.kind == "entry" and before.kind == "crossing":
@@ -213,7 +212,7 @@ def _grazed(
     )
     field = leg_between(problem.system, leg.mode, other).map(problem.system)
     assert field is not None
-    soft = _soft(problem, leg, guard.element)
+    soft = soft_switch(problem, leg, guard.element)
     if soft == SOFT:
         return soft
     gradient = field(y, p).gradient[: problem.dimension]
@@ -236,11 +235,11 @@ def _leads_away(problem: BoundaryProblem, mode: str, surface: int, y: Array, p: 
     """Whether the field beyond a surface, tangent to it too, bends away from it."""
     field = guarded_field(problem.system, mode)
     own = [g.kind == "surface" and g.element == surface for g in field.motion.guards].index(True)
-    states = Leg(mode).field(problem.system).states_at(y, p)
+    states = states_at(problem.system, mode, y, p)
     return float(first_terms(field, states, p)[1][own, 2]) > 0.0
 
 
-def _soft(problem: BoundaryProblem, leg: Leg, surface: int) -> str:
+def soft_switch(problem: BoundaryProblem, leg: Leg, surface: int) -> str:
     """The grazing of a surface on which nothing slides; empty where something may."""
     known = {i for i, letter in enumerate(leg.mode) if letter in "+-s"}
     mode = leg.mode[: len(problem.system.entries)] if len(known) == len(leg.mode) else None
@@ -313,7 +312,7 @@ def _inserted(editor: LegEditor, kind: str, i: int, p: Array) -> ChangedItinerar
     before = editor.legs[k]
     surface = surface_of(system, before)
     flow = integrate_leg(system, before, editor.starts[k], editor.durations[k], p)
-    start = before.at_end(system, flow.end, p).after
+    start = before.at_event(system, flow.end, p).after
     if kind == "crossing-sliding":
         editor.legs[k] = replace(before, kind="entry")
         slide = with_letter(before.mode, surface, "s")
@@ -345,7 +344,7 @@ def _added(
         return [leg_between(system, leg.mode, free), leg_between(system, free, leg.mode)], [y, y]
     if guard.kind in ("impact", "reset"):
         hit = Leg(leg.mode, guard.kind, guard.element, guard.side, discrete=leg.discrete)
-        after = hit.at_end(system, y, p).after
+        after = hit.at_event(system, y, p).after
         return ([hit], [after]) if _stays(y, after) else None
     return None
 
@@ -403,7 +402,7 @@ def _missed(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | No
     """An impact or reset that is only touched, left out; None where it moves the state."""
     leg, (starts, durations) = before.problem.legs[i], before.problem.split(before.u)
     flow = integrate_leg(before.problem.system, leg, starts[i], float(durations[i]), p)
-    if not _stays(flow.end, leg.at_end(before.problem.system, flow.end, p).after):
+    if not _stays(flow.end, leg.at_event(before.problem.system, flow.end, p).after):
         return None
     count = len(before.problem.legs)
     if before.problem.legs[(i + 1) % count].repeats:
@@ -535,7 +534,7 @@ def round_corner(editor: LegEditor, i: int, guard: Guard, p: Array) -> ChangedIt
     if guard.kind != "surface" or before.kind != "crossing":
         return None
     flow = integrate_leg(system, before, editor.starts[k], editor.durations[k], p)
-    start = before.at_end(system, flow.end, p).after
+    start = before.at_event(system, flow.end, p).after
     turned = before.mode[far].translate(TURNED)
     modes = [before.mode, with_letter(before.mode, far, turned)]
     modes += [with_letter(mode_after(before), far, turned), mode_after(before)]
@@ -606,16 +605,19 @@ def departures(curve: Any, u: Array, fresh: Sequence[int]) -> list[Departure]:
     """Ways to leave an event into the side where the itinerary holds, new legs growing from zero."""
     for size in _STARTS:
         ways: list[tuple[Array, Array]] = []
+        tangent = None
         try:
             tangent = np.linalg.svd(curve.scaled(u / curve.scale)[1])[2][-1]
         except (NonsmoothError, np.linalg.LinAlgError):  # no derivatives there
-            return []
+            if not fresh:
+                return []
         if fresh:
             problem, axis = curve.problem, np.zeros(u.size)
             axis[[problem.size - len(problem.legs) + i for i in fresh]] = len(fresh) ** -0.5
             by = size * float(curve.scale[problem.size - 1])
             ways.append((curve.grown(u, fresh, by), axis))
-        ways += [(u + s * size * tangent * curve.scale, tangent) for s in (1.0, -1.0)]
+        if tangent is not None:
+            ways += [(u + s * size * tangent * curve.scale, tangent) for s in (1.0, -1.0)]
         result = list[Departure]()
         for guess, axis in ways:
             found = curve.correct(guess, axis)

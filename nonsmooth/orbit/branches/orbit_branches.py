@@ -12,6 +12,7 @@ ch. 9.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import replace
 
@@ -77,6 +78,9 @@ class OrbitEquations(BranchCurve):
         self.known: dict[str, Condition] = {}
         self.rows = UserRows()
         self._found, self._last = dict[bytes, Evaluation](), b""  # of points, and the last untested
+        self.held: tuple[Array, Array, Array] | None = (
+            None  # of a family: rows, directions, a point
+        )
 
     # equations ----------------------------------------------------------------------------------
 
@@ -107,6 +111,32 @@ class OrbitEquations(BranchCurve):
         return self._found[key]
 
     def equations(self, u: Array) -> tuple[Array, Array]:
+        values, jacobian = self._own_equations(u)
+        if self.held is None:
+            return values, jacobian
+        push, ways, point = self.held
+        return values + push @ (
+            ways @ (u / self.scale - point)
+        ), jacobian + push @ ways / self.scale
+
+    def hold_family(self, u: Array) -> None:
+        """Where orbits form a neutral family at each value of the parameter, keep to a branch that does not move along it."""
+        # A combination of the equations that the family leaves without a meaning says that it does not move.
+        self.held = None
+        if self.problem.has_many or len(self.free) > 1:
+            return
+        jacobian = self.equations(u)[1] * self.scale
+        rows = np.linalg.norm(jacobian, axis=1)
+        sizes = np.where(rows > _FAMILY * rows.max(), rows, rows.max())[:, None]
+        left, values, right = np.linalg.svd(jacobian / sizes)
+        count = int(np.sum(values <= _FAMILY * values[0]))
+        null = right[len(values) - count :]
+        if not count or not np.linalg.norm(null[:, -1]) > _VERTICAL:
+            return
+        ways = np.linalg.svd(null[:, -1][None])[2][1:] @ null
+        self.held = left[:, len(values) - count :] * sizes, ways, u / self.scale
+
+    def _own_equations(self, u: Array) -> tuple[Array, Array]:
         at = self.evaluation(u)
         if not self.rows.constraints:
             return at.residual, at.whole
@@ -123,7 +153,7 @@ class OrbitEquations(BranchCurve):
         return value, np.append(np.zeros(self.problem.size - self.problem.whole.size), row)
 
     def values(self, u: Array) -> Array | None:
-        if self.rows.constraints:
+        if self.rows.constraints or self.held is not None:
             return None
         return self.problem.residual(u[: self.problem.size], self.parameters_at(u))
 
@@ -146,6 +176,9 @@ class OrbitEquations(BranchCurve):
         return eliminated(self.problem, matrix, np.zeros(len(matrix))).determinant()
 
 
+#: Relative singular value of the equations with the parameter below which they do not decide a direction.
+_FAMILY = 1e-10
+
 #: Relative growth of a long period, over a change of the parameter by its bounds, at which it diverges.
 _STEEP = 30.0
 
@@ -158,9 +191,6 @@ _REACHED = 1e-6
 
 #: The same that is rounding: the slide of a branch ends at the two-fold, as it tends to it exponentially.
 _ROUNDED = 1e-11
-
-#: Relative singular value of the equations with the parameter below which their solutions form a surface.
-_SURFACE = 1e-10
 
 #: Change of the parameter, over its bounds, per relative change of the period below which it is rounding, and part of
 #: the longest period from which this is computed.
@@ -215,6 +245,8 @@ class OrbitCurve(OrbitEquations):
         problem = self.problem.rephased(u[: self.problem.size], self.parameters_at(u))
         if problem is not self.problem:
             self.problem, self._found = problem, {}
+        with suppress(NonsmoothError, np.linalg.LinAlgError):
+            self.hold_family(u)
 
     @property
     def _on_plane(self) -> bool:
@@ -383,20 +415,8 @@ class OrbitCurve(OrbitEquations):
                 return True
         return False
 
-    def _of_surface(self, u: Array) -> bool:
-        """Whether the solutions form a surface at a point, to first order."""
-        jacobian = self.equations(u)[1] * self.scale
-        rows = np.linalg.norm(jacobian, axis=1)
-        values = np.linalg.svd(jacobian / np.where(rows > 0.0, rows, 1.0)[:, None])[1]
-        return bool(values[-1] <= _SURFACE * values[0])
-
     def unresolved(self, u: Array) -> str:
         p, k = self.parameters_at(u), self.problem.size
-        if self._of_surface(u):
-            return (
-                "The orbit is one of a neutral family at every value of the parameter (the multiplier 1 twice): the "
-                "orbits form a surface, on which no branch is distinguished."
-            )
         found = Multipliers(self.problem, self.problem.evaluate(u[:k], p), p)
         growth = np.zeros(0) if found.refusal else found.logarithms.real
         if not growth.size or growth[0] < _STEEPEST:
@@ -484,6 +504,10 @@ class OrbitCurve(OrbitEquations):
                 return later
         at, p = self.evaluation(u), self.parameters_at(u)
         kind = kind_of(self.problem, conditions[0], at, p)
+        if self.held is not None and kind == "grazing-sliding":
+            verdict = "the last orbit of a neutral family: orbits that slide come to it at once"
+            side = FarSide("", verdict)
+            return self._event(kind, self, zero.point, conditions[0].name, side)
         beyond = self._edited(kind, conditions, u, p)
         if beyond is None or not beyond.test:
             legs = () if beyond is None else beyond.problem.legs
@@ -622,7 +646,8 @@ class OrbitCurve(OrbitEquations):
         """The branch in the other itinerary."""
         if is_smooth(zero.name) or event.point is None or not isinstance(event.curve, OrbitCurve):
             return None
-        if event.kind == CENTRE:  # any linear orbit of the centre solves the equations beyond
+        family = self.held is not None and event.kind == "grazing-sliding"
+        if event.kind == CENTRE or family:  # any orbit of the centre solves the equations beyond
             return None
         curve, u = event.curve, event.point.u
         if curve is not self and curve.problem.legs == self.problem.legs:  # from another start
@@ -660,8 +685,8 @@ _VERDICTS = {
     "Neimark-Sacker": "an invariant torus is born",
 }
 
-#: Imaginary part below which a multiplier is real.
-_REAL = 1e-9
+#: Imaginary part below which a multiplier is real: that of a double one is the root of rounding.
+_REAL = 1e-6
 
 #: Distance of an angle from a strong resonance within which the normal form does not hold.
 _RESONANT = 1e-4

@@ -22,7 +22,7 @@ from ...model.derivatives.event_maps import surface_map
 from ...model.derivatives.mode_derivatives import contact_expansion, guard_rate_gradient
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import leg_maps, return_map
-from ..runs.legs import Leg, integrate_leg
+from ..runs.legs import Leg, integrate_leg, rate_at
 from .branch import FarSide
 from .conditions import Condition, touching
 from .itinerary_changes import FORCE, ChangedItinerary
@@ -152,11 +152,11 @@ def impact_numbers(
     # it decides the order of the bifurcations beyond
     numbers = {"leading multiplier": abs(leading), "its angle": float(np.angle(leading))}
     y = touched(problem, test, at, p)
-    own = leg.field(system).rate.copied(leg.field(system).states_at(y, p), p)[0][:n, 0]
+    own = rate_at(system, leg, y, p)[:n]
     if guard.kind == "surface":
         normal, rate, push = _visit(problem, leg, guard, y, p)
     else:
-        event = Leg(leg.mode, guard.kind, guard.element, guard.side).at_end(system, y, p)
+        event = Leg(leg.mode, guard.kind, guard.element, guard.side).at_event(system, y, p)
         size = 1 + np.abs(y).max()
         if y.size != event.gradient.size or np.abs(event.after - y).max() > 1e-6 * size:
             return numbers

@@ -156,7 +156,7 @@ class Loop(ABC):
                     jacobian[row + n, time + 1] = -1.0
                 row += n + 1
                 continue
-            at = leg.at_end(self.system, flow.end, p)
+            at = leg.at_event(self.system, flow.end, p)
             values[rows] = at.after - starts[i + 1]
             jacobian[rows, own] = at.after_state @ flow.by_start
             jacobian[rows, time] = at.after_state @ flow.rate

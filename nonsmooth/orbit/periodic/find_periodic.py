@@ -669,7 +669,7 @@ def at_two_fold(
     """Whether a slide on one surface ends where L_F1 h and L_F2 h both vanish."""
     if leg.kind != "exit" or system.coupled:
         return False
-    other = replace(leg, side=-leg.side).at_end(system, end, p)
+    other = replace(leg, side=-leg.side).at_event(system, end, p)
     size = float(np.linalg.norm(other.gradient) * np.linalg.norm(end)) or 1.0
     return abs(other.value) <= part * size
 
@@ -678,7 +678,7 @@ def require_simple(orbit: PeriodicOrbit) -> None:
     """Refuse orbits through two-folds, and grazing."""
     system, p, flows = orbit.system, orbit.parameter_vector, orbit.evaluation.flows
     for i, leg in enumerate(orbit.problem.legs):
-        end = flows.end[i, : flows.sizes[i]]
+        end = flows.end[i]
         if at_two_fold(system, leg, end, p):
             raise DegenerateError(
                 f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "

@@ -30,7 +30,7 @@ from ...model import (
     real_array,
 )
 from ...model.derivatives.forcing import Forcing, common_frequency, frequencies
-from ...model.derivatives.variational import plain_field
+from ...model.derivatives.variational import plain_field, states_at
 from ..runs.guards import march
 from ..runs.itinerary import Itinerary, lone_leg, word_legs
 from ..runs.legs import Leg, Stretch, integrate_leg, leg_name, rate_at, stretches
@@ -657,9 +657,9 @@ def _followed(
             )
         starts.append(x)
         durations.append(duration)
-        y = leg.field(system).states_at(x, p)
-        end = flow_for(plain_field(system, leg.mode), y, p, duration)
-        x = leg.at_end(system, end, p).after
+        y = states_at(system, leg.mode, x, p)
+        end = flow_for(plain_field(system, leg.mode), y, p, duration)[: len(x)]
+        x = leg.at_event(system, end, p).after
     return np.array(starts), np.array(durations)
 
 

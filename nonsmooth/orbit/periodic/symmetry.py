@@ -17,8 +17,8 @@ from ...flow.fixed import flow_for
 from ...flow.simulate import simulate
 from ...model import Array, FilippovSystem, NonsmoothError, OptionError, Surfaces, explain
 from ...model.checks import real_array
-from ...model.derivatives.variational import plain_field, variational_field
-from ..runs.legs import integrate_leg
+from ...model.derivatives.variational import plain_field, states_at
+from ..runs.legs import Leg, integrate_leg, rate_at
 from .boundary_value_problem import BoundaryProblem, mirrored
 from .orbit import PeriodicOrbit
 
@@ -231,9 +231,8 @@ def _fields_agree(orbit: PeriodicOrbit) -> bool:
     try:
         for mode, (i, other) in modes.items():
             x, image = _beside(orbit, i)
-            one, two = variational_field(system, mode), variational_field(system, other)
-            here = one.rate.copied(one.states_at(x, p), p)[0][:n, 0]
-            there = two.rate.copied(two.states_at(image, p), p)[0][:n, 0]
+            here = rate_at(system, Leg(mode), x, p)[:n]
+            there = rate_at(system, Leg(other), image, p)[:n]
             miss, rates = np.abs(there - wrap[:n, :n] @ here), np.abs(here) + np.abs(there)
             if not (miss <= 1e-10 * (rates + rates.max() * sizes[:n] / sizes[:n].max())).all():
                 return False
@@ -249,9 +248,7 @@ def _miss_of_legs(orbit: PeriodicOrbit) -> tuple[float, str]:
     units = problem.scales(orbit.unknowns)[:n]
     worst, where = 0.0, ""
     for i, leg in enumerate(orbit.legs[count:]):
-        field = variational_field(system, leg.mode)
-        start = system.extended_point(leg.start, leg.t)
-        y = field.states_at(start, p)
+        y = states_at(system, leg.mode, system.extended_point(leg.start, leg.t), p)
         end = flow_for(plain_field(system, leg.mode), y, p, leg.duration)[:n]
         flow = at.by_leg[i]
         grows = float(np.abs(flow.by_start[:n, :n] * (units / units[:, None])).max(initial=1.0))

@@ -18,10 +18,10 @@ from ...flow.names import described, guard_name
 from ...flow.variation import carry_legs, require_done
 from ...model import Array, FilippovSystem, Guard
 from ...model.derivatives.event_maps import is_due_at
-from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
+from ...model.derivatives.variational import GuardedField, guarded_field, states_at
 from .cell_field import CellField, Guarded, field_of
 from .cells import cells_of
-from .legs import Leg, integrate_leg, leg_name
+from .legs import Leg, integrate_leg, leg_name, rate_at
 
 #: Part of a leg's duration beside its ends that belongs to the ends, where guards are zero.
 _ENDS = 1e-6
@@ -96,7 +96,6 @@ class LegGuards:
         self._cells, cells = [f for f in self.fields if isinstance(f, CellField)], cells_of(system)
         self._system, self._legs = cells.system, [cells.leg(leg) for leg in legs]
         self._driven = [guarded_field(cells.system, leg.mode) for leg in self._legs]
-        self._plain = [variational_field(cells.system, leg.mode) for leg in self._legs]
         self._limits = [i for i, leg in enumerate(legs) if leg.repeats]
         self._watch = None if system.sets else LegsWatch(self._driven)
 
@@ -126,8 +125,8 @@ class LegGuards:
             legs = [_by_steps(self._system, leg, f, x, t, own) for leg, f, x, t, own in given]
             rows, begins, values = zip(*legs, strict=True)
             return [*rows], [*begins], [*values]
-        given_states = zip(self._plain, starts, p, strict=True)
-        states = [field.states_at(x, own) for field, x, own in given_states]
+        given_states = zip(self._legs, starts, p, strict=True)
+        states = [states_at(self._system, leg.mode, x, own) for leg, x, own in given_states]
         return self._watch(states, p, durations, _ENDS)
 
 
@@ -217,10 +216,9 @@ def change_fault(
     """Why a mode cannot follow a leg after its event; empty if it can."""
     if leg.timed:
         return ""
-    own, rate = leg.at_end(system, end, p), leg.field(system).rate.copied(end, p)[0][:, 0]
-    y = variational_field(system, following).states_at(after, p)
+    own, rate = leg.at_event(system, end, p), rate_at(system, leg, end, p)
     field = guarded_field(system, following)
-    begin = np.vstack(first_terms(field, y, p))
+    begin = np.vstack(first_terms(field, states_at(system, following, after, p), p))
     return _change_fault(
         leg, guarded_field(system, leg.mode), float(own.gradient @ rate), field, begin, p
     )
@@ -229,7 +227,7 @@ def change_fault(
 def begin_fault(system: FilippovSystem, leg: Leg, end: Array, p: Array) -> str:
     """A guard of a leg's mode that is negative where the leg ends; empty if there is none."""
     field = guarded_field(system, leg.mode)
-    values = np.vstack(first_terms(field, end, p, 0))
+    values = np.vstack(first_terms(field, states_at(system, leg.mode, end, p), p, 0))
     return _negative(field, values, p)
 
 
@@ -320,6 +318,6 @@ def march(system: FilippovSystem, leg: Leg, x: Array, p: Array, t_max: float) ->
     # A zero where the leg starts is not counted.
     field = guarded_field(system, leg.mode)
     row, direction = ending(system, leg)
-    y = variational_field(system, leg.mode).states_at(x, p)
+    y = states_at(system, leg.mode, x, p)
     size = float(np.linalg.norm(field.gradients.copied(y, p)[0][row])) * float(np.abs(y).max())
     return passing(field, row, y, p, t_max, direction=direction, still=1e-9 * size)

@@ -30,11 +30,11 @@ from ...model import (
     require_system,
 )
 from ...model.derivatives.event_maps import event_map, function_map
-from ...model.derivatives.variational import guarded_field, variational_field
+from ...model.derivatives.variational import guarded_field, states_at
 from ...model.laws.motion import motion
 from ...model.laws.switches import event_guards
 from .guards import change_fault
-from .legs import Leg, LegFlow, integrate_leg
+from .legs import Leg, LegFlow, integrate_leg, rate_at
 from .saltation import saltation
 
 #: An Euler step of this length leaves a power law's zero, where a field has no Taylor series; its
@@ -233,8 +233,7 @@ class FixedItinerary:
             t, x = float(run.t[-1]), run.x[-1]
             if not fault and leg is not None:
                 at = system.extended_point(x, t)
-                y = leg.field(system).states_at(at, p)
-                fault = change_fault(system, leg, self.modes[k + 1], y, at, p)
+                fault = change_fault(system, leg, self.modes[k + 1], at, at, p)
                 fault = f"{what}: {fault}" if fault else ""
             legs.append(leg or Leg(mode))
             starts.append(begin)
@@ -275,7 +274,7 @@ class FixedItinerary:
                 return f"{what}: {described(system, guard)} fails at t = {event.t:.6g}"
         middle = system.extended_point(run(0.5 * (start + end)), 0.5 * (start + end))
         p = system.parameter_vector(self.parameters)
-        y = variational_field(system, mode).states_at(middle, p)
+        y = states_at(system, mode, middle, p)
         values = first_terms(guarded_field(system, mode), y, p)[1][:, 0]
         for guard, value in zip(of_mode.guards, values, strict=True):
             if guard.kind in _NEAR and value <= 0.0:
@@ -348,10 +347,8 @@ class FixedItinerary:
             flow = integrate_leg(system, leg, arrival.starts[k], arrival.durations[k], p)
             dx = flow.by_start @ dx
             if k + 1 < len(arrival.legs):
-                at = leg.at_end(system, flow.end, p)
-                following = arrival.legs[k + 1].field(system)
-                y = following.states_at(at.after, p)
-                rate = following.rate.copied(y, p)[0][: system.extended_dimension, 0]
+                at = leg.at_event(system, flow.end, p)
+                rate = rate_at(system, arrival.legs[k + 1], at.after, p)
                 dx = saltation(at, flow.rate, rate, f"leg {k + 1} ({leg.mode})").matrix @ dx
         assert flow is not None
         return dx[:n, :n], self._on_event(arrival, flow, dx, p)[:n, :n]

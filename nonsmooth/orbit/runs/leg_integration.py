@@ -1,7 +1,7 @@
 """Integration of all legs of an orbit or run in one call, with derivatives of legs and events.
 
 The results of :func:`~nonsmooth.orbit.runs.legs.integrate_leg` and
-:meth:`~nonsmooth.orbit.runs.legs.Leg.at_end` are stacked, legs on the first axis.
+:meth:`~nonsmooth.orbit.runs.legs.Leg.at_event` are stacked, legs on the first axis.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ...flow.variation import Arc, carry_legs, require_done
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, surface_map
 from ...model.derivatives.variational import VariationalField, plain_field
-from .legs import Leg, LegFlow, integrate_leg, leg_name
+from .legs import Leg, LegFlow, leg_name
 from .limit_leg import limit_flow
 from .saltation import Ended
 
@@ -104,7 +104,6 @@ class LegIntegrator:
         self.system, self.legs, self.chosen = system, tuple(legs), chosen
         #: Whether parameters are given leg by leg, (L, np).
         self._by_leg = by_leg
-        self._limits = any(leg.repeats for leg in self.legs)
         # events at one instant follow from each other: composed in Python
         self._composed = [i for i, leg in enumerate(self.legs) if leg.further and not leg.timed]
         self._plain = [i for i, leg in enumerate(self.legs) if leg.timed]
@@ -117,15 +116,19 @@ class LegIntegrator:
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:
-        """States of each leg, with multipliers that are."""
-        if self.system.sets:
-            return tuple(self.system.extended_dimension + bool(leg.repeats) for leg in self.legs)
-        both = zip(self.fields, self.legs, strict=True)
-        return tuple(field.entries + bool(leg.repeats) for field, leg in both)
+        """States of each leg; those of infinitely many events have the time to their limit."""
+        return tuple(self.system.extended_dimension + bool(leg.repeats) for leg in self.legs)
 
     @property
     def _most(self) -> int:
         return max(self.sizes)
+
+    @cached_property
+    def _are_explicit(self) -> bool:
+        """Whether each leg is a flow of the states alone."""
+        if self.system.sets or any(leg.repeats for leg in self.legs):
+            return False
+        return all(field.entries == field.by_start for field in self.fields)
 
     @cached_property
     def _program(self) -> LegsProgram:
@@ -136,11 +139,9 @@ class LegIntegrator:
     @cached_property
     def _plain_program(self) -> LegsProgram | None:
         """Legs without derivatives, where each is a flow of the states to one event."""
-        if self._plain or self._composed or self._limits or self.system.sets:
+        if self._plain or self._composed or not self._are_explicit:
             return None
         maps = {leg: leg.map(self.system) for leg in set(self.legs)}
-        if any(field.entries > field.by_start for field in self.fields):
-            return None
         fields = {leg.mode: plain_field(self.system, leg.mode) for leg in set(self.legs)}
         events = [at.plain for leg in self.legs if (at := maps[leg]) is not None]
         of_legs = [fields[leg.mode] for leg in self.legs]
@@ -171,30 +172,24 @@ class LegIntegrator:
         self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE
     ) -> LegFlows:
         """Integrate all legs."""
-        if self.system.sets:
+        if not self._are_explicit:
             return self._by_modes(starts, durations, p)
-        if len(set(self.sizes)) > 1 or self._limits:
-            return self._one_by_one(starts, durations, p)
-        n, most = starts.shape[1], self._most
+        n = starts.shape[1]
         columns = 1 + n + len(self.chosen)
-        if most == n:
-            z = np.tile(np.eye(columns, n, -1), (len(starts), 1, 1))
-            z[:, 0], z[:, 1 + n :] = starts, 0.0
-        else:
-            own = zip(self.fields, starts, self._each(p), strict=True)
-            z = np.array([f.initial(x, q).T for f, x, q in own])
+        z = np.tile(np.eye(columns, n, -1), (len(starts), 1, 1))
+        z[:, 0], z[:, 1 + n :] = starts, 0.0
         flow = self._program(z, p, durations, tol, MOST_STEPS)
         if flow.failed >= 0:
             i = flow.failed
-            error = stuck(float(durations[i]), flow.left, flow.ends[i, : self.sizes[i]])
+            error = stuck(float(durations[i]), flow.left, flow.ends[i, :n])
             raise ConvergenceError(f"{self._named(i)}: {error}", point=error.point)
-        whole = flow.ends.reshape(len(starts), columns, most).swapaxes(1, 2)
+        whole = flow.ends.reshape(len(starts), columns, n).swapaxes(1, 2)
         end, x, by_p = whole[:, :, 0], whole[:, :, 1 : 1 + n], whole[:, :, 1 + n :]
         result = LegFlows(
             self.sizes,
             end,
-            flow.before[:, :most],
-            flow.after[:, :most],
+            flow.before[:, :n],
+            flow.after[:, :n],
             x,
             by_p,
             *self._events(flow.results, n, p.shape[-1]),
@@ -226,10 +221,7 @@ class LegIntegrator:
         if not self._plain and not self._composed:
             return flows
         for i in self._composed:
-            k = self.sizes[i]
-            self._fill(
-                flows, i, self.legs[i].at_end(self.system, flows.end[i, :k], self._each(p)[i])
-            )
+            self._fill(flows, i, self.legs[i].at_event(self.system, flows.end[i], self._each(p)[i]))
         return self._without_events(flows)
 
     def _without_events(self, flows: LegFlows) -> LegFlows:
@@ -297,7 +289,7 @@ class LegIntegrator:
             before[:] = after  # equal up to residuals: what is lost is so exactly
         flows.end[i], flows.rate[i] = part.end, part.rate
         flows.by_start[i], flows.by_parameters[i] = part.by_start, part.by_parameters
-        self._fill(flows, i, leg.at_end(self.system, part.end, p))
+        self._fill(flows, i, leg.at_event(self.system, part.end, p))
 
     def _reached(self, flows: LegFlows, found: CarriedLegs, i: int, p: Array) -> AtEvent:
         """The end of a leg at a set: the motion goes on over the whole duration as it reaches the set."""
@@ -308,25 +300,6 @@ class LegIntegrator:
         end += left * rate
         value = float(np.linalg.norm(h)) + left * float(gradient[:n] @ rate)
         return AtEvent.smooth_at(end, value, gradient[:n], gradient[n:])
-
-    def _one_by_one(self, starts: Array, durations: Array, p: Array) -> LegFlows:
-        n, every = starts.shape[1], self._each(p)
-        flows = self._empty(len(self.legs), n, len(self.chosen), p.shape[-1])
-        for i, field in enumerate(self.fields):
-            at = field.states_at(starts[i], every[i])
-            flows.before[i, : field.entries] = field.rate.copied(at, every[i])[0][:, 0]
-        for i, leg in enumerate(self.legs):
-            if leg.repeats:
-                self._to_limit(flows, i, starts[i], float(durations[i]), every[i])
-                continue
-            k, own = self.sizes[i], (self.system, leg, starts[i], float(durations[i]), every[i])
-            with self._naming(i):
-                part = integrate_leg(*own, self.chosen)
-            flows.end[i, :k], flows.rate[i, :k] = part.end, part.rate
-            flows.by_start[i, :k], flows.by_parameters[i, :k] = part.by_start, part.by_parameters
-            if not leg.timed:
-                self._fill(flows, i, leg.at_end(self.system, part.end, every[i]))
-        return self._completed(flows, p)
 
     @contextmanager
     def _naming(self, i: int) -> Iterator[None]:

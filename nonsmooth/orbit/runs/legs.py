@@ -137,21 +137,11 @@ class Leg:
             system, self.mode, self.kind, self.element, self.side, self.letters, self.atom
         )
 
-    def at_end(self, system: FilippovSystem, y: Array, p: Array) -> AtEvent:
-        """Event function and state after the event, with derivatives; further resets included."""
-        if self.repeats:
-            return _at_limit(y, p)
-        own = self.map(system)
-        assert own is not None
-        at = own(y, p)
-        for leg in self.further:
-            then = leg.map(system)
-            assert then is not None
-            at = _composed(at, then(at.after, p))
-        return at
-
     def at_event(self, system: FilippovSystem, x: Array, p: Array) -> AtEvent:
-        """The same as functions of the extended states (N,) alone: multipliers follow them."""
+        """Event function and state after the event by the extended states (N,), further resets included; of infinitely
+        many events by those with the time to their limit (N + 1,)."""
+        if self.repeats:
+            return _at_limit(x, p)
         at = self._own_event(system, x, p)
         for leg in self.further:
             at = _composed(at, leg._own_event(system, at.after, p))
@@ -166,7 +156,7 @@ class Leg:
             given = mode, self.kind, self.element, self.letters, self.atom
             at = instant_map(system, *given)(x, p)
             below = self.kind in ("crossing", "entry") and self.mode[self.element] == "-"
-            return at.negative if system.sets and below else at
+            return at.negative if below else at
         own, every = self.map(system), tuple(range(len(p)))
         assert own is not None
         if self.field(system).entries == len(x):
@@ -220,12 +210,12 @@ def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
 class LegFlow:
     """Flow of a leg from its start over its duration."""
 
-    #: (N + k,): State at the end, before the event, with multipliers that are states.
+    #: (N,): State at the end, before the event; of a leg of infinitely many events with the time to their limit.
     end: Array
-    #: by_start, by_parameters (N + k, N), (N + k, q): Derivatives of ``end``.
+    #: by_start, by_parameters (N, N), (N, q): Derivatives of ``end``.
     by_start: Array
     by_parameters: Array
-    #: (N + k,): The field there.
+    #: (N,): The field there.
     rate: Array
     #: Its event, where that is one of the law of the mode.
     at: AtEvent | None = None
@@ -254,14 +244,14 @@ def integrate_leg(
         from .limit_leg import limit_flow  # which needs this module
 
         return limit_flow(system, leg, x, duration, p, chosen)[0]
-    if system.sets:
+    field = None if system.sets else leg.field(system, chosen)
+    if field is None or field.entries > len(x):
         hit = leg.ends(system) if to_end and leg.reaches_set(system) else None
         arcs = [Arc(leg.mode, x, duration, hit, _still_left(system, leg, x, p))]
         carried = carry_legs(system, arcs, p, chosen)
         require_done(system, arcs, carried)
         return flows_of(carried)[0]
-    field = leg.field(system, chosen)
-    whole = field.matrix(flow_for(field, field.start(x, p), p, duration))
+    whole = field.matrix(flow_for(field, field.start(x), p, duration))
     n, end = field.by_start, whole[:, 0]
     return LegFlow(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], field.rate_at(end, p))
 
@@ -284,10 +274,8 @@ def carry_leg(
 ) -> LegFlow:
     """The same of a leg of a run, by the states alone; at times since its start, or recorded to be taken ``back``."""
     if not (system.sets or back or len(times)):  # one leg costs less by its own program
-        found, n = integrate_leg(system, leg, x, duration, p, chosen), len(x)
-        none = np.zeros((0, n, n + len(chosen)))
-        by = found.by_start[:n], found.by_parameters[:n]
-        return LegFlow(found.end[:n], *by, found.rate[:n], at_samples=none)
+        none = np.zeros((0, len(x), len(x) + len(chosen)))
+        return replace(integrate_leg(system, leg, x, duration, p, chosen), at_samples=none)
     arcs = [leg.arc(system, x, duration)]
     carried = carry_legs(system, arcs, p, chosen, times, back=back)
     require_done(system, arcs, carried)

@@ -7,11 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import Array, FilippovSystem, Parameters, PointError, require_system
+from ...model import (
+    Array,
+    DefinitionError,
+    FilippovSystem,
+    Parameters,
+    PointError,
+    require_system,
+)
 from ...model.derivatives.event_maps import AtEvent, surface_map
 from .guards import begin_fault, change_fault
 from .itinerary import leg_between
-from .legs import Leg
+from .legs import Leg, rate_at
 from .saltation import saltation
 
 #: Distance of a point from an event, relative to the largest state, within which it is on it.
@@ -77,29 +84,32 @@ def saltation_matrix(
     array([[ 1. , -1. ],
            [ 0. ,  0.5]])
     """
-    require_system(system, complementarity=True)
+    require_system(system, sets=True, complementarity=True)
+    if system.sets:
+        raise DefinitionError(
+            f"system: {system!r} has vector multipliers, of whose events a point does not determine the matrix: a motion "
+            "enters a set at a direction of its own. sensitivity(run).dx_dx0 of a run through the event has it, and "
+            "PeriodicOrbit.monodromy over a period."
+        )
     p, x = system.parameter_vector(parameters), system.extended_point(point, t)
     for mode in (before, after):
         system.parse_letters(mode)  # raises for an invalid mode
     leg = leg_between(system, before, after, event)
     name = leg.name(system)
-    field, following = leg.field(system), Leg(after).field(system)
-    y = field.initial(x, p)
-    at, size, n = leg.at_end(system, y[:, 0], p), system.extended_dimension, system.dimension
+    at, n = leg.at_event(system, x, p), system.dimension
     _require_near(system, leg, at, x, p)
-    start = following.states_at(at.after, p)
-    rates = field.rate.copied(y[:, 0], p)[0][:, 0], following.rate.copied(start, p)[0][:, 0]
-    matrix = saltation(at, rates[0], rates[1][:size], f"{name!r} at {x[:n].tolist()}").matrix
+    rates = rate_at(system, leg, x, p), rate_at(system, Leg(after), at.after, p)
+    matrix = saltation(at, *rates, f"{name!r} at {x[:n].tolist()}").matrix
     fault = ""
     if leg.kind != "reset":  # a reset may lead from any mode to any other
-        fault = begin_fault(system, leg, y[:, 0], p)
-        fault = fault or change_fault(system, leg, after, y[:, 0], at.after, p)
+        fault = begin_fault(system, leg, x, p)
+        fault = fault or change_fault(system, leg, after, x, at.after, p)
     if fault:
         raise PointError(
             f"point {x[:n].tolist()}: {name!r} does not lead from mode {before!r} to {after!r} there, "
             f"as {fault}. Change the point or the modes."
         )
-    return np.asarray((matrix @ y[:, 1 : 1 + size])[:n, :n])
+    return np.asarray(matrix[:n, :n])
 
 
 def _require_near(system: FilippovSystem, leg: Leg, at: AtEvent, x: Array, p: Array) -> None:

@@ -132,42 +132,6 @@ def test_random_circuits_are_those_of_their_exact_modes(draw, seed):
     assert abs(run.x[-1] - exact).max() < 1e-8 * (1 + abs(exact).max())
 
 
-def test_capacitors_that_are_joined_share_their_charge():
-    """2 at 3 V and 1 at 1 V: 7/3 V, an event named after the diode."""
-    u, v, i = (ca.SX.sym(name) for name in "uvi")
-    diode = ns.Complementarity(v - u, multiplier=i, name="diode")
-    system = ns.FilippovSystem([u, v], field=[-i / 2, i], complementarity=diode)
-    run = ns.simulate(system, [3.0, 1.0], t_end=1.0)
-    jump = run.events[0]
-    assert (jump.kind, jump.name, jump.t, jump.element, jump.side) == ("jump", "diode", 0, 0, 1)
-    assert (jump.mode_before, jump.mode_after) == ("o", "c")
-    assert jump.x.tolist() == [3.0, 1.0]
-    assert abs(jump.x_after - 7 / 3).max() < 1e-14
-    assert abs(run.x[-1] - 7 / 3).max() < 1e-14
-    assert run.itinerary == "c"
-
-
-def test_an_inconsistent_start_is_projected():
-    """From outside a disc to its nearest point, and from outside a corner to the corner."""
-    x, y, a, b = (ca.SX.sym(name) for name in "xyab")
-    disc = ns.FilippovSystem(
-        [x, y],
-        field=[1 - a * x, -a * y],
-        complementarity=ns.Complementarity((1 - x**2 - y**2) / 2, multiplier=a),
-    )
-    jump = ns.simulate(disc, [3.0, 4.0], t_end=1.0).events[0]
-    assert (jump.kind, jump.mode_after) == ("jump", "c")
-    assert abs(jump.x_after - [0.6, 0.8]).max() < 1e-12
-    corner = ns.FilippovSystem(
-        [x, y],
-        field=[a - 1, b - 1],
-        complementarity=[ns.Complementarity(x, multiplier=a), ns.Complementarity(y, multiplier=b)],
-    )
-    run = ns.simulate(corner, [-1.0, -2.0], t_end=1.0)
-    assert run.events[0].x_after.tolist() == [0, 0]
-    assert run.itinerary == "cc"
-
-
 def test_a_jump_from_outside_an_ellipse_is_to_its_nearest_point():
     """The direction of the multiplier is that of the normal where the jump ends."""
     x, y, lam = (ca.SX.sym(name) for name in ("x", "y", "lam"))

@@ -14,7 +14,9 @@ G = 9.81
 pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.flow.warn.DecisionWarning")
 
 
-def table(mu, feet, height=0.4, inertia=(0.1, 0.15, 0.2), e=0.0, pull=(0, 0), **others):
+def table(
+    mu, feet, height=0.4, inertia=(0.1, 0.15, 0.2), e=0.0, pull=(0, 0), law="newton", **others
+):
     """A rigid body of unit mass on feet, at small angles."""
     q, w, r = ca.SX.sym("q", 6), ca.SX.sym("w", 6), ca.SX.sym("r", len(feet))
     force, gaps, slips, multipliers = ca.SX.zeros(6), [], [], []
@@ -25,7 +27,7 @@ def table(mu, feet, height=0.4, inertia=(0.1, 0.15, 0.2), e=0.0, pull=(0, 0), **
         force[:3] += push
         force[3:] += ca.cross(p, push)
         gap = q[2] + q[3] * py - q[4] * px
-        gaps.append(ns.Impact(gap, reaction=r[i], restitution=e, name=f"foot{i}"))
+        gaps.append(ns.Impact(gap, reaction=r[i], restitution=e, law=law, name=f"foot{i}"))
         slips.append((w[:3] + ca.cross(w[3:], p))[:2])
         multipliers.append(lam)
     rates = ca.vertcat(force[:2], force[2] - G, force[3:] / ca.DM(inertia))
@@ -102,3 +104,33 @@ def test_components_with_different_loads_are_refused():
             multipliers=[lam],
             impacts=[ns.Impact(x, reaction=r, name="one"), ns.Impact(x, reaction=s, name="two")],
         )
+
+
+@pytest.mark.parametrize("side", [0.0, 0.5])
+@pytest.mark.parametrize(("angle", "mu"), [(0.7, 0.2), (0.7, 0.5), (1.0, 0.2), (1.0, 0.5)])
+def test_a_block_in_a_groove_holds_as_long_as_any_loads_can_hold_it(angle, mu, side):
+    """Friction across the groove presses it against both walls: the most that holds is 1/sqrt(1 - k^2) of what slides."""
+    t, q, w, n = ca.SX.sym("t"), ca.SX.sym("q", 3), ca.SX.sym("w", 3), ca.SX.sym("n", 2)
+    limit = mu * G / np.cos(angle)
+    force, gaps, slips, multipliers = ca.vertcat(limit * t, side, -G), [], [], []
+    for k, sign in enumerate((-1, 1)):
+        c, s, lam = np.cos(angle), sign * np.sin(angle), ca.SX.sym(f"lam{k}", 2)
+        gaps.append(ns.Impact(c * q[2] - s * q[1], reaction=n[k], name=f"wall{k}"))
+        slips.append(ca.vertcat(w[0], c * w[1] + s * w[2]))
+        multipliers.append(lam)
+        force += n[k] * ca.vertcat(-mu * lam[0], -s - mu * c * lam[1], c - mu * s * lam[1])
+    groove = ns.FilippovSystem(
+        [*ca.vertsplit(q), *ca.vertsplit(w)],
+        field=[*ca.vertsplit(w), *ca.vertsplit(force)],
+        surfaces=slips,
+        multipliers=multipliers,
+        impacts=gaps,
+        time=t,
+    )
+    run = ns.simulate(groove, [0] * 6, 2.0)
+    assert run.status is ns.Status.REACHED_END and run.itinerary == "sscc **cc"
+    release = 1 / np.sqrt(1 - (mu * np.tan(angle)) ** 2)
+    if side == 0:
+        assert abs(run.events[0].t - release) < 1e-7
+        speed = limit * (1 - (release - 1) ** 2) / 2
+        np.testing.assert_allclose(run.x[-1, 3:], [speed, 0, 0], atol=1e-6)

@@ -135,38 +135,11 @@ def test_a_noisy_spline_is_integrated_piece_by_piece():
     assert len(run.events) == len(inner) + 1
 
 
-def test_exact_times_in_a_table_of_the_time():
-    ts, ys = [0.0, 1.0, 2.5, 3.0, 7.0], [0.0, 2.0, -1.0, -1.0, 4.0]
-    run = ns.simulate(lifted([ns.table(t, ts, ys)], [x], time=t), [0.0], 9.0)
-    assert run.x[-1, 0] == pytest.approx(1.0 + 0.75 - 0.5 + 6.0 + 8.0, abs=1e-12)
-    assert [e.t for e in run.events[:-1]] == pytest.approx(ts[1:], abs=1e-14)
-
-
 def closed(argument=x, xs=(0.0, 1.0, 2.0)):
     return ns.table(argument, xs, [0.0, 1.0, 3.0], outside="error")
 
 
-def test_a_run_ends_where_the_argument_leaves_its_range():
-    run = ns.simulate(lifted([1 + closed()], [x]), [0.0], 9.0)
-    assert run.status is ns.Status.NOT_FINITE
-    # x' = 1 + x, then 1 + 2 x - 1
-    assert run.t[-1] == pytest.approx(np.log(2) + np.log(2) / 2, abs=1e-9)
-    assert run.x[-1, 0] == pytest.approx(2.0, abs=1e-12)
-    assert "x of a table left its range at t = 1.0397" in run.message
-    assert [e.name for e in run.events] == ["h0", "NOT_FINITE"]
-    low = ns.simulate(lifted([-1 - closed()], [x]), [0.5], 9.0)
-    assert low.x[-1, 0] == pytest.approx(0.0, abs=1e-12) and low.t[-1] == pytest.approx(np.log(1.5))
-    outside = ns.simulate(lifted([-1 - closed()], [x]), [2.5], 9.0)
-    assert outside.status is ns.Status.NOT_FINITE and outside.t[-1] == 0.0
-
-
-def test_ends_of_a_flat_table_and_of_one_of_parameters():
-    flat = ns.table(x, [0.0, 1.0], [2.0, 2.0], outside="error")
-    run = ns.simulate(lifted([flat], [x]), [0.5], 5.0)
-    assert run.status is ns.Status.NOT_FINITE and run.t[-1] == pytest.approx(0.25, abs=1e-12)
-    system = lifted([closed(q) - x], [x], parameters={q: 0.5})
-    assert ns.simulate(system, [0.0], 5.0).status is ns.Status.REACHED_END
-    assert ns.simulate(system, [0.0], 5.0, parameters={q: 2.5}).status is ns.Status.NOT_FINITE
+def test_a_table_has_no_value_beyond_its_ends():
     value = ca.Function("value", [x], [closed()])
     assert float(value(1.5)) == 2.0 and np.isnan(float(value(2.5))) and np.isnan(float(value(-0.5)))
 
@@ -182,26 +155,6 @@ def test_ends_of_a_flat_table_and_of_one_of_parameters():
 def test_ends_that_cannot_be_watched_are_refused(rhs, words):
     with pytest.raises(ns.DefinitionError, match=words):
         lifted([rhs()], [x])
-
-
-@pytest.mark.parametrize(("part", "status"), [(1 + 1e-5, "REACHED_END"), (1 - 1e-5, "NOT_FINITE")])
-def test_a_motion_that_turns_before_the_end_goes_on(part, status):
-    # v^2 / 2 + x is kept: the top is at 2
-    force = ns.table(x, [-9.0, 0.5, 2 * part], [1.0, 1.0, 1.0 + 1e-12], outside="error")
-    run = ns.simulate(lifted([v, -force]), [0.0, 2.0], 4.5, tol=1e-12)
-    assert str(run.status) == status
-
-
-def test_limits_hold_only_where_a_table_is_in_use():
-    table = closed(ca.fabs(v), (0.25, 1.0, 3.0))
-    system = lifted([v, -1 + 0 * x - 0.1 * table * v])
-    for start in (1.5, -1.5):
-        assert ns.simulate(system, [0.0, start], 0.2).status is ns.Status.REACHED_END
-    run = ns.simulate(system, [0.0, 1.5], 9.0)
-    assert run.status is ns.Status.NOT_FINITE and run.x[-1, 1] == pytest.approx(0.25, abs=1e-12)
-    jumps = lifted([v, -1 - 0.1 * table * v], resets=ns.Reset(v - 0.5, {v: -5 * v}, -1))
-    run = ns.simulate(jumps, [0.0, 1.5], 9.0)
-    assert run.status is ns.Status.NOT_FINITE and run.x[-1, 1] == pytest.approx(-3.0, abs=1e-12)
 
 
 def test_sections_ensembles_and_files(tmp_path):

@@ -100,13 +100,19 @@ def test_age_of_a_run_does_not_lengthen_what_is_replaced():
     clock = ns.Clock(20.0, map=[y, v + 5.0])
     impact = ns.Impact(y, restitution=_E)
     system = ns.FilippovSystem([y, v], field=[v, -_G], impacts=impact, clocks=clock)
-    run = ns.simulate(system, [0, 0, 0], 20.0 * 300 + 19, max_events=10**6)
+    run = ns.simulate(system, [0, 0, 0], 20.0 * 1000 + 19, max_events=10**6)
     impacts = np.array([event.t for event in run.events if event.kind == "impact"])
     contacts = np.array([event.t for event in run.events if event.kind == "contact"])
     last = impacts[np.searchsorted(impacts, contacts) - 1]
-    assert len(contacts) == 300 and (contacts - last).max() < 2e-5
-    since = contacts - 20.0 * np.arange(1, 301)
+    assert len(contacts) == 1000 and (contacts - last).max() < 2e-5
+    since = contacts - 20.0 * np.arange(1, 1001)
     np.testing.assert_allclose(since, 10 / _G / (1 - _E), rtol=0, atol=1e-9)
+    for kick in (1, 100, 1000):  # the ball rests there: every kick is as the first
+        at = last[kick - 1] + 0.3 * (contacts[kick - 1] - last[kick - 1])
+        time, speed = 20.0 * kick, 5.0
+        while time + 2 * speed / _G <= at:
+            time, speed = time + 2 * speed / _G, speed * _E
+        assert run(at)[1] == pytest.approx(speed - _G * (at - time), abs=2e-5)
 
 
 @pytest.mark.parametrize(("gravities", "restitution"), [(1.05, 0.8), (1.1, 0.7)])

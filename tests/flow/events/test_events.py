@@ -11,7 +11,6 @@ from tests.differences import require
 
 x, y, v, t, q, g, p = (ca.SX.sym(name) for name in ("x", "y", "v", "t", "q", "g", "p"))
 REACHED = ns.Status.REACHED_END
-LN3 = math.log(3.0)
 
 
 def thermostat():
@@ -171,12 +170,6 @@ def test_a_section_has_the_states_before_and_after_all_jumps_of_its_instant(many
     assert np.allclose(after, [[0, 0, 1], [0, 0, 2]], rtol=0, atol=1e-13)
 
 
-def test_a_section_is_met_by_the_motion_only():
-    system = ns.FilippovSystem([x], field=[1], resets=ns.Reset(x - 1, {x: 0}, 1))
-    run = ns.simulate(system, [0.0], 5.5, at=x - 0.5)
-    assert np.allclose(run.sample_t, np.arange(6) + 0.5, rtol=0, atol=1e-12)
-
-
 def test_events_know_what_they_led_to():
     """A ramp that a clock restarts, over a surface."""
     ramp = ns.FilippovSystem(
@@ -287,29 +280,6 @@ def test_phases_at_the_start_are_checked():
     assert len(ns.simulate(system, [0.0, 0.0], 1.9).events) == 1
 
 
-def test_a_jump_of_the_phase_beyond_the_period_ticks_at_once():
-    clock = ns.Clock(1.0)
-    forward = ns.Reset(x - 0.3, {clock.phase: 2.5}, 1, "forward")
-    system = ns.FilippovSystem([x], field=[1], resets=forward, clocks=clock)
-    run = ns.simulate(system, [0.0, 0.0], 1.0)
-    found = [(event.name, round(event.t, 12)) for event in run.events[:-1]]
-    assert found == [("forward", 0.3), ("clock", 0.3), ("clock", 0.3), ("clock", 0.8)]
-
-
-def test_a_clock_sets_a_latch_that_a_current_clears():
-    clock = ns.Clock(1.0, {q: 1})
-    system = ns.FilippovSystem(
-        [x],
-        discrete={q: (0, 1)},
-        field=[q - 0.5],
-        resets=ns.Reset(x - 0.6, {q: 0}, 1, "peak", level=True, when=q == 1),
-        clocks=clock,
-    )
-    run = ns.simulate(system, [0.25, 0.0, 1], 3.5)
-    assert fired(run) == ["peak", "clock", "peak", "clock", "peak", "clock", "peak"]
-    assert np.allclose([e.t for e in run.events[:3]], [0.7, 1.0, 1.3], rtol=0, atol=1e-12)
-
-
 # derivatives and orbits --------------------------------------------------------------------------
 
 
@@ -324,14 +294,6 @@ def test_derivatives_at_a_corner_are_refused():
     assert np.allclose(ns.sensitivity(ns.simulate(system, [0.0, 0.8], 1.5)).dx_dx0, np.eye(2))
     with pytest.raises(ns.DegenerateError, match="corner"):
         ns.sensitivity(ns.simulate(system, [0.0, 0.5], 1.5))
-
-
-def test_a_triple_zero_is_one_passage():
-    """A flat guard: its root is located to a millionth only, and the motion goes on."""
-    count = ns.Reset(y, {v: v + 1}, 0)
-    system = ns.FilippovSystem([x, y, v], field=[1, 3 * (x - 1) ** 2, 0], resets=count)
-    run = ns.simulate(system, [0.0, -1.0, 0.0], 2.0)
-    assert run.status is REACHED and run.x[-1, 2] == 1.0
 
 
 @pytest.mark.parametrize("value", [0, 1, -1, 0.3])

@@ -14,26 +14,6 @@ th, l1, l2, r1, r2 = (ca.SX.sym(name) for name in ("th", "l1", "l2", "r1", "r2")
 REACHED = ns.Status.REACHED_END
 
 
-GRAVITY, RESTITUTION = 9.81, 0.8
-
-
-@pytest.mark.parametrize("kick", [1, 100, 1000])
-def test_the_last_impacts_do_not_depend_on_the_age_of_a_run(kick):
-    clock = ns.Clock(20.0, map=[y, v + 5.0])
-    system = ns.FilippovSystem(
-        [y, v], field=[v, -GRAVITY], impacts=ns.Impact(y, restitution=RESTITUTION), clocks=clock
-    )
-    began = 20.0 * (kick - 1)  # the ball rests there: every kick is as the first
-    run = ns.simulate(system, [0, 0, 0], 20.0 * kick + 19, max_events=10**6)
-    impacts = [e.t for e in run.events if e.kind == "impact" and e.t > began + 20.0]
-    closed = [e.t for e in run.events if e.kind == "contact"][-1]
-    at, speed, last = impacts[-1] + 0.3 * (closed - impacts[-1]), 5.0, 20.0 * kick
-    while last + 2 * speed / GRAVITY <= at:
-        last, speed = last + 2 * speed / GRAVITY, speed * RESTITUTION
-    assert abs(run(at)[1] - (speed - GRAVITY * (at - last))) < 2e-5
-    assert abs(closed - 20.0 * kick - 2 * 5.0 / GRAVITY / (1 - RESTITUTION)) < 1e-9
-
-
 def losing_stability(start, **options):
     field = [0.2 - (l1 - 3 * l2), 0.1 - (3 * l1 - z * l2), 1]
     system = ns.FilippovSystem([x, y, z], field=field, surfaces=[x, y], multipliers=[l1, l2])
@@ -48,13 +28,6 @@ def test_sliding_on_two_surfaces_ends_where_the_layer_loses_stability():
     assert losing_stability(-0.5, max_step=0.3).status == ns.Status.INTERSECTION
 
 
-@pytest.mark.slow
-def test_a_clock_does_not_drift():
-    system = ns.FilippovSystem([x], field=[1], clocks=ns.Clock(0.1))
-    run = ns.simulate(system, [0, 0], 1e5 + 0.05, max_events=10**8, max_steps=10**8)
-    assert abs(run.x[-1, 1] - 0.05) < 1e-10
-
-
 @pytest.mark.parametrize("count", [5, 6, 24])
 def test_equal_blocks_that_leave_sticking_at_one_instant(count):
     velocities = [ca.SX.sym(f"v{i}") for i in range(count)]
@@ -66,22 +39,6 @@ def test_equal_blocks_that_leave_sticking_at_one_instant(count):
     run = ns.simulate(system, [0] * (count + 1), 2.0)
     assert (run.status, run.itinerary) == (REACHED, "s" * count + " " + "+" * count)
     assert np.allclose(run.x[-1, :count], 1.7**2 / 2, rtol=0, atol=1e-9)
-
-
-def test_osculating_surfaces():
-    """Both are negative near x = 1, for some 2e-5 each."""
-    second = y + (x - 1) ** 3
-    system = ns.FilippovSystem(
-        [x, y, w],
-        field=[1, 2 * (x - 1), 0.1 * (l1 + l2)],
-        surfaces=[y, second],
-        multipliers=[l1, l2],
-    )
-    run = ns.simulate(system, [0.5, 0.25 - 1e-10, 0], 1.5)
-    cubic = np.sort(np.roots([1, 1, 0, -1e-10]).real)[1:]
-    expected = 0.3 - 0.2 * (2e-5 + cubic[1] - cubic[0])
-    assert run.status == REACHED
-    assert abs(run.x[-1, 0] - 2) < 1e-9 and abs(run.x[-1, 2] - expected) < 1e-9
 
 
 def network(count, strength):

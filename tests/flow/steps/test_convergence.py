@@ -27,10 +27,8 @@ class Case:
 
 def dry_friction():
     """Problem 1: turning points -2.2, 1.4, -0.6 of an oscillator; it sticks at -0.2."""
-    y1, y2, lam = (ca.SX.sym(s) for s in ("y1", "y2", "lam"))
-    system = ns.FilippovSystem([y1, y2], surface=y2, multipliers=lam, field=[y2, -y1 - 0.4 * lam])
     return Case(
-        system,
+        ns.textbook.dry_friction().system,
         (3.0, 0.0),
         20.0,
         "- + - + s",
@@ -41,32 +39,20 @@ def dry_friction():
 
 def spiral():
     """Problem 2: a spiral that reverses on the unit circle at t = 1."""
-    x1, x2 = ca.SX.sym("x1"), ca.SX.sym("x2")
-    w = 2 * np.pi
-    system = ns.FilippovSystem(
-        [x1, x2],
-        surface=x1**2 + x2**2 - 1,
-        above=[x1 - w * x2, w * x1 + x2],
-        below=[x1 + w * x2, -w * x1 + x2],
-    )
     end = (-1.5974603774506981221, -0.76149362060601145276)
+    system = ns.textbook.spiral_oscillator().system
     return Case(system, (np.exp(-1.0), 0.0), np.pi / 2, "- +", (1.0, np.pi / 2), ((1.0, 0.0), end))
 
 
 def stick_slip():
     """Problem 3: friction 1/(1 + 3 |v_rel|); one period and a second landing."""
-    x, v = ca.SX.sym("x"), ca.SX.sym("v")
-    slip = v - 0.2
-    system = ns.FilippovSystem(
-        [x, v], surface=slip, above=[v, -x - 1 / (1 + 3 * slip)], below=[v, -x + 1 / (1 - 3 * slip)]
-    )
     slipping, period, landing = (
         4.2959995254801548834,
         12.001031294830578647,
         -0.54100635387008475271,
     )
     return Case(
-        system,
+        ns.textbook.leine_stick_slip().system,
         (1.0, 0.2),
         period + slipping + 2.0,
         "- s - s",
@@ -77,20 +63,9 @@ def stick_slip():
 
 def impact():
     """Problem 16: compliant impact with friction; slips, sticks, slips the other way, separates."""
-    x, u, y, v, spin, lam = (ca.SX.sym(s) for s in ("x", "u", "y", "v", "spin", "lam"))
-    d1, d2, eta, mu, weight = 0.3, 0.2, 0.3, 0.3, 0.01
-    load = -2 * d2 * v - y - weight
-    drag = -(2 * d1 * eta * u + eta**2 * x)
-    system = ns.FilippovSystem(
-        [x, u, y, v, spin],
-        surface=u + spin,
-        multipliers=lam,
-        field=[u, drag - lam * mu * load, v, load, -2.5 * lam * mu * load],
-        stops=[ns.Stop(load, direction=-1, name="separation")],
-    )
     nan = np.nan
     return Case(
-        system,
+        ns.textbook.kelvin_voigt_bounce().system,
         (0.0, 1.0, 0.0, -1.0, 0.0),
         10.0,
         "+ s -",

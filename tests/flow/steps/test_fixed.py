@@ -17,7 +17,7 @@ PENDULUM = ns.FilippovSystem([x, y], field=[y, -k * ca.sin(x)], parameters={k: 1
 def integrated(system, start, duration):
     """The matrix (x, X, P) after a duration."""
     field, p = variational_field(system, "", (0,)), system.parameter_vector()
-    end = fixed.flow_for(field, field.start(np.array(start), p), p, duration)
+    end = fixed.flow_for(field, field.start(np.array(start)), p, duration)
     return field.matrix(end)
 
 

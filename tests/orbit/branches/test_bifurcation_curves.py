@@ -200,6 +200,7 @@ def test_a_grazing_meets_a_two_fold():
     assert np.abs(curve.values[:, 0] - 1).max() < 1e-12
     (special,) = curve.special
     assert special.kind == "grazing-sliding with two-fold"
+    assert curve.ends == (BranchEnd.EVENT, BranchEnd.REACHED_BOUND)
     assert np.abs(special.values - [1, 0]).max() < 1e-11
 
 
@@ -221,6 +222,31 @@ def test_a_grazing_of_orbits_without_events_from_their_hopf_point():
     assert curve.values[-1] == pytest.approx([2.07020393, 2.5], abs=1e-8)
     assert curve.special[0].kind == "grazing-sliding with Hopf"
     assert curve.special[0].values == pytest.approx([20 / 13 * (1 - 7 / 27), 27 / 13], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("preload", "kind"),
+    [(0.0, "grazing of a soft switch"), (0.2, "grazing of a jumping force")],
+)
+def test_grazing_of_a_stop_that_gives_way(preload, kind):
+    """Free motion reaches x = 1 where F = hypot(1 - w^2, 0.1 w); no contact of it slides, so no test of one vanishes."""
+    x, v, t, force, w = symbols("x v t F w")
+    drive = force * ca.cos(w * t) - x - 0.1 * v
+    system = ns.FilippovSystem(
+        [x, v], surface=x - 1, above=[v, drive - 5 * (x - 1) - preload], below=[v, drive], time=t,
+        parameters={force: 0.3, w: 0.8},
+    )  # fmt: skip
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0, 0], 300.0))
+    event = ns.continue_orbit(orbit, "F", bounds=(0.3, 0.38)).events[0]
+    curve = ns.continue_bifurcation(event, ("F", "w"), bounds=[(0.05, 2), (0.7, 0.9)])
+    assert event.kind == kind and not curve.special
+    assert curve.ends == (BranchEnd.REACHED_BOUND,) * 2
+    assert (
+        np.abs(
+            curve.values[:, 0] - np.hypot(1 - curve.values[:, 1] ** 2, 0.1 * curve.values[:, 1])
+        ).max()
+        < 1e-13
+    )
 
 
 def test_grazing_of_relaxation_oscillations():

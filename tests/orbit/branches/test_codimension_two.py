@@ -210,3 +210,109 @@ def test_a_half_orbit_that_loses_its_stop() -> None:
     curve = ns.continue_bifurcation(event, ("f", "w"), bounds=[(0.1, 1.0), (0.3, 0.95)], step=0.1)
     assert_real(curve)
     assert np.abs(curve.special[0].values - [1 / 3, 1 / 2]).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_the_tongue_of_a_forced_neuron():
+    """TO1: two orbits of one spike a period meet on a fold in closed form; it ends where they touch the threshold before."""
+    v, amplitude, period = symbols("v A T")
+    values, current = CASES["TO1"], 1.2
+    system = ns.FilippovSystem(
+        [v], field=[current + amplitude * ca.cos(2 * ca.pi * t / period) - v], time=t,
+        resets=[ns.Reset(v - 1, [0 * v], 1)], parameters={amplitude: float(values["A used"]), period: 1.9},
+    )  # fmt: skip
+    branch = ns.continue_orbit(
+        ns.periodic_orbit(system, ns.simulate(system, [0.0], 60.0)), "A", bounds=(0.05, 0.3)
+    )
+    found = sorted(
+        (o.legs[0].t % 1.9, float(o.multipliers[0].real))
+        for o in branch.at(float(values["A used"]))
+    )
+    truth = [
+        [float(v) for v in row] for row in values["firing phases and multipliers (two orbits)"]
+    ]
+    assert np.abs(np.array(found) - truth).max() < 1e-11
+    (fold,) = (e for e in branch.events if e.kind == "fold")
+    assert fold.parameter == pytest.approx(float(values["A at the edge, T=1.9"]), abs=1e-14)
+    curve = ns.continue_bifurcation(fold, ("A", "T"), bounds=[(0.0, 2.0), (1.0, 3.0)])
+    a_edge, t_edge = curve.values.T
+    w = 2 * np.pi / t_edge
+    level = 1 / (1 - np.exp(-t_edge))
+    assert np.abs(a_edge - np.abs(level - current) * np.hypot(1, w)).max() < 1e-13
+    (point,) = curve.special
+    assert point.kind == "fold with grazing of a reset" and BranchEnd.EVENT in curve.ends
+    amplitude, period = point.values
+    w = 2 * np.pi / period
+    since = np.linspace(0.0, 0.98 * period, 20001)  # after a spike at the extremum of the drive
+    sign = np.sign(1 / (1 - np.exp(-period)) - current)
+    wave = sign * amplitude / np.hypot(1, w) * (np.cos(w * since) - np.exp(-since))
+    before = current * (1 - np.exp(-since)) + wave
+    inside = before[1:-1][(before[1:-1] > before[:-2]) & (before[1:-1] > before[2:])]
+    assert inside.max() == pytest.approx(1.0, abs=1e-8)
+
+
+@pytest.mark.slow
+def test_the_orbit_with_contact_doubles_and_folds_beside_a_grazing() -> None:
+    """x = u + s^2 slides for sigma = sqrt(-u), in which y grows by 5 sigma - 12.5 ln(1 + 0.4 sigma); a reset feeds it back."""
+    kept = x - 1 - a
+    reset = ns.Reset(s - 1, [1 + a + kept / 2 + b * y - y**3, 0 * y, -1.0], direction=1)
+    system = ns.FilippovSystem(
+        [x, y, s], surface=x, above=[2 * s, 0, 1], below=[5, 5, 1], parameters={a: 0.2, b: 0.5},
+        resets=[reset],
+    )  # fmt: skip
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [1.2, 0.0, -1.0], 60.0))
+    (event,) = ns.continue_orbit(orbit, "a", bounds=(-0.5, 0.5)).events
+    box = [(-0.5, 0.5), (-1.5, 1.2)]
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=box, step=0.1)
+    assert {p.kind: round(p.values[1], 9) for p in curve.special} == {
+        "grazing-sliding with fold with contact": -1.0,
+        "grazing-sliding with period doubling with contact": 1.0,
+    }
+    for point in curve.special:
+        (one,) = ns.continue_bifurcation(point, ("a", "b"), bounds=box, step=0.1)
+        assert_real(one)
+        sigma = 1 - np.array([one.solution(k).legs[0].duration for k in range(1, len(one))])
+        grown = 5 * sigma - 12.5 * np.log1p(0.4 * sigma)
+        sign = 1 if one.kind == "period doubling" else -1
+        b_true = sign * (1 + 0.4 * sigma) + 3 * grown**2
+        a_true = 2 * (grown**3 - sigma**2 - b_true * grown)
+        assert (
+            len(one) > 3 and np.abs(one.values[1:] - np.column_stack([a_true, b_true])).max() < 1e-9
+        )
+
+
+@pytest.mark.slow
+def test_a_double_crossing_sliding() -> None:
+    """Both landings of the symmetric orbit at their tangencies: A = sqrt(1 + (2.5 (1 - q)/(1 + q) + 1/2)^2)."""
+    q = np.exp(-np.pi / 2)
+    top = np.sqrt(1 + (2.5 * (1 - q) / (1 + q) + 0.5) ** 2)
+    system = forced(0.3, 3.0)
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0], 60.0))
+    first, *_ = (
+        e for e in ns.continue_orbit(orbit, "b", bounds=(2.4, 4)).events if e.parameter > 2.5
+    )
+    box = [(-1.0, 1.0), (2.0, 3.0)]
+    curve = ns.continue_bifurcation(first, ("a", "b"), bounds=box, step=0.1)
+    (point,) = curve.special
+    assert point.kind == "crossing-sliding with crossing-sliding" and BranchEnd.EVENT in curve.ends
+    assert point.values == pytest.approx([0.0, top], abs=1e-12)
+    found = ns.continue_bifurcation(point, ("a", "b"), bounds=box, step=0.1)
+    assert [one.kind for one in found] == ["crossing-sliding"] * 3
+    ends = sorted(one.values[-1].round(9).tolist() for one in (curve, *found))
+    assert len({tuple(np.abs(end)) for end in ends}) == 2  # mirror images in pairs
+    for one in found:
+        assert_real(one)
+
+
+def test_pseudo_saddle_nodes_have_no_pairs() -> None:
+    """The sliding flow of the plane has one eigenvalue."""
+    system = ns.FilippovSystem(
+        [x, y], surface=y - b, above=[x - a, x**2 - y], below=[1, 1], parameters={a: 1.2, b: 0.5}
+    )
+    branch = ns.continue_equilibrium(system, [1.2, 1.44], "a", bounds=(0.1, 2))
+    for event in branch.events:
+        curve = ns.continue_bifurcation(event, ("a", "b"), bounds=[(-2, 2), (-1, 3)])
+        if event.kind == "boundary equilibrium":
+            assert np.abs(curve.values[:, 1] - curve.values[:, 0] ** 2).max() < 1e-13
+        else:  # (x - a) = x^2 - b twice
+            assert np.abs(curve.values[:, 0] - curve.values[:, 1] - 0.25).max() < 1e-13

@@ -22,7 +22,7 @@ MASS = ns.FilippovSystem(
 
 def test_a_ball_on_a_table_has_the_orbit_of_the_closed_form() -> None:
     values = CASES["CH5"]["values"]
-    run = ns.simulate(TABLE, [0.45, 1.5], 6.0, t_start=0.2, tol=1e-12)
+    run = ns.simulate(TABLE, [0.45, 1.5], 6.0, t_start=0.2, tol=1e-13)
     orbit = ns.periodic_orbit(TABLE, run)
     assert orbit.itinerary == "c o o..." and orbit.stability == "superstable"
     assert orbit.period == pytest.approx(float(values["period"]), abs=1e-14)

@@ -163,6 +163,31 @@ def test_multiplicity_of_a_run_and_of_one_mode() -> None:
     assert ns.periodic_orbit(system, run, multiplicity=1).period == pytest.approx(4 * np.pi)
 
 
+def test_a_branch_goes_on_where_a_block_sticks_anywhere():
+    """One block slips under its force, the other one sticks wherever it is: the multiplier 1 of its position."""
+    x, v, y, w, t, force = symbols("x v y w t force")
+    one, two = ns.Friction(v, load=1, kinetic=0.2), ns.Friction(w, load=1, kinetic=0.6)
+    system = ns.FilippovSystem(
+        [x, v, y, w],
+        field=[
+            v,
+            one.force - x - 0.3 * (x - y) + force * ca.cos(1.7 * t),
+            w,
+            two.force - y - 0.3 * (y - x),
+        ],
+        surfaces=[one, two],
+        time=t,
+        parameters={force: 0.8},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3, 0.4, 0.1, 0.0], 300.0))
+    assert set(leg.mode[1] for leg in orbit.legs) == {"s"}
+    assert np.abs(orbit.multipliers - 1.0).min() < 1e-9
+    branch = ns.continue_orbit(orbit, "force", bounds=(0.7, 1.0))
+    assert not branch.events and [end.name for end in branch.ends] == ["REACHED_BOUND"] * 2
+    places = [node.start[2] for node in branch.orbits]
+    assert np.ptp(places) < 1e-9
+
+
 @pytest.mark.parametrize("law", ["relay", "friction"])
 @pytest.mark.parametrize("start", [1.0, 0.55])
 def test_orbits_of_a_neutral_family_are_named_as_such_also_where_it_touches_a_surface(law, start):
@@ -178,7 +203,14 @@ def test_orbits_of_a_neutral_family_are_named_as_such_also_where_it_touches_a_su
     assert np.abs(orbit.multipliers - 1.0).max() < 1e-9
     assert "neutral" in orbit.stability and "family" in str(orbit)
     branch = ns.continue_orbit(orbit, "b", bounds=(0.1, 0.9))
-    assert not branch.events and all("neutral family" in reason for reason in branch.reasons)
+    (event,) = branch.events  # those of one size, down to where they touch the belt's speed
+    assert (event.kind, event.far_side.itinerary) == ("grazing-sliding", "")
+    assert "neutral family" in event.far_side.verdict
+    size = float(np.hypot(orbit.start[0] - 0.4, orbit.start[1]))
+    assert event.parameter == pytest.approx(size, rel=1e-9)
+    for node in branch.orbits:
+        assert np.hypot(node.start[0] - 0.4, node.start[1]) == pytest.approx(size, rel=1e-6)
+    assert [end.name for end in branch.ends] == ["EVENT", "REACHED_BOUND"]
 
 
 @pytest.mark.parametrize("half", [0.3, 0.25, 0.24])

@@ -104,6 +104,20 @@ def test_a_coupling_that_jumps_is_refused():
     assert abs(found.multipliers[0, 0] - 1.0) < 1e-12
 
 
+def test_spikes_of_a_coupled_variable_make_synchrony_unstable():
+    """MS2: a pair that is pulled while one has fired parts by a factor that the single oscillator does not have."""
+    v, w, strength = *(ca.SX.sym(s) for s in "vw"), 0.1
+    field = [1.2 - v + strength * (w - v), 1.2 - w + strength * (v - w)]
+    fire = [ns.Reset(v - 1, [0 * v, w], 1), ns.Reset(w - 1, [v, 0 * w], 1)]
+    pair = ns.FilippovSystem([v, w], field=field, resets=fire)
+    with pytest.raises(ns.DegenerateError, match="at the same instant"):
+        ns.periodic_orbit(pair, [0.0, 0.0])
+    period, growth = (float(VALUES["MS2"][k]) for k in ("period", "transversal multiplier"))
+    times = 0.5 + period * np.arange(4)
+    apart = np.diff(ns.simulate(pair, [0.0, 1e-8], 8.0, t_eval=times, tol=1e-13).sample_x)[:, 0]
+    assert apart / apart[0] == pytest.approx(growth ** np.arange(4), rel=1e-5)
+
+
 def test_refusals():
     system = relay()
     x, v = ca.vertsplit(system.extended_states)

@@ -14,7 +14,7 @@ from nonsmooth.orbit.periodic.cyclic_qr import Factor, Product
 
 CASES = {
     case["id"]: case["values"]
-    for case in json.loads((Path(__file__).parents[2] / "data" / "orbits_2.json").read_text())
+    for case in json.loads((Path(__file__).parents[2] / "cases" / "orbits_2.json").read_text())
 }
 
 

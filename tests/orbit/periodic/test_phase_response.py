@@ -13,7 +13,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.orbit import phase_response
 
-_DATA = json.loads((Path(__file__).parents[2] / "data" / "orbits_2.json").read_text())
+_DATA = json.loads((Path(__file__).parents[2] / "cases" / "orbits_2.json").read_text())
 VALUES = {case["id"]: case["values"] for case in _DATA}
 
 

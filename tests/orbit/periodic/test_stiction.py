@@ -98,3 +98,30 @@ def test_two_blocks_that_stick_at_times_of_their_own():
         np.testing.assert_allclose(
             found[:, k], (ends[1] - ends[0]) / (2 * step), rtol=1e-5, atol=1e-6
         )
+
+
+def test_a_branch_sticks_where_the_force_at_a_stop_falls_below_the_static_friction():
+    """Not where it falls below the kinetic one, at which crossing alone would become sliding."""
+    y, w, t, push = (ca.SX.sym(name) for name in ("y", "w", "t", "push"))
+    dry = ns.Friction(w, load=1, kinetic=0.2, static=0.3)
+    system = ns.FilippovSystem(
+        [y, w],
+        field=[w, dry.force - y - 0.1 * w + push * ca.cos(0.6 * t)],
+        surfaces=[dry],
+        time=t,
+        parameters={push: 1.5},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3, 0.0], 200.0))
+    branch = ns.continue_orbit(orbit, "push", bounds=(0.4, 1.5))
+    (event,) = branch.events
+    assert orbit.itinerary.replace(" ", "") in ("+-", "-+") and event.kind == "crossing-sliding"
+    for leg in event.orbit.legs:  # where it stops, the force is the static one
+        force = abs(event.parameter * np.cos(0.6 * leg.t) - leg.start[0])
+        assert force == pytest.approx(0.3, abs=1e-9)
+    for value in np.linspace(0.9 * event.parameter, 1.1 * event.parameter, 6):
+        (at,) = branch.at(value)
+        x, begin = at.trajectory(at.legs[0].t + 0.4 * at.legs[0].duration), at.legs[0].t
+        begin += 0.4 * at.legs[0].duration
+        given = {"push": value}
+        run = ns.simulate(system, x, begin + at.period, t_start=begin, parameters=given, tol=1e-12)
+        assert np.abs(run.x[-1] - x).max() < 1e-8

@@ -7,6 +7,8 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.flow.engine import find_compiler
+from nonsmooth.flow.fixed import flow_for
+from nonsmooth.model.derivatives.variational import plain_field, states_at
 from nonsmooth.orbit.runs import leg_integration
 from nonsmooth.orbit.runs.guards import watch
 from nonsmooth.orbit.runs.leg_integration import LegIntegrator
@@ -36,30 +38,31 @@ HIDDEN = ns.FilippovSystem(
 MIXED = [Leg("-", "entry", 0, -1), Leg("s", "exit", 0, 1), Leg("+", "reset", 0, -1), Leg("-")]
 
 
-def together_and_apart(system, legs, starts, durations, chosen):
-    integrator = LegIntegrator(system, legs, chosen)
-    given = np.array(starts), np.array(durations), system.parameter_vector()
-    return integrator(*given), integrator._one_by_one(*given)
-
-
-@pytest.mark.parametrize(
-    ("system", "legs", "starts", "durations"),
-    [
-        (
-            BELT,
-            MIXED,
-            [[0.2, 0.1, 0.4], [0.4, 0.3, 0.5], [1, 0.4, 2], [0, -0.5, 1]],
-            [1, 0, -0.5, 2],
-        ),
-        (HIDDEN, [Leg("s"), Leg("s", "exit", 0, 1)], [[0.1, 0.0], [0.2, 0.0]], [0.3, 0.2]),
-        (HIDDEN, [Leg("s"), Leg("+", "entry", 0, 1)], [[0.1, 0.0], [0.2, 0.1]], [0.3, 0.2]),
-    ],
-)
-def test_legs_together_equal_legs_one_by_one(system, legs, starts, durations):
-    both = together_and_apart(system, legs, starts, durations, (0,))
+def test_legs_by_their_program_equal_those_by_their_modes():
+    integrator, p = LegIntegrator(BELT, MIXED, (0,)), BELT.parameter_vector()
+    starts = np.array([[0.2, 0.1, 0.4], [0.4, 0.3, 0.5], [1, 0.4, 2], [0, -0.5, 1]])
+    given = starts, np.array([1, 0, -0.5, 2]), p
+    both = integrator(*given), integrator._by_modes(*given)
     for name in leg_integration.LegFlows.__dataclass_fields__:
         one, two = (np.asarray(getattr(found, name)) for found in both)
         np.testing.assert_allclose(one, two, rtol=1e-12, atol=1e-13, err_msg=name)
+
+
+@pytest.mark.parametrize("leg", [Leg("s"), Leg("s", "exit", 0, 1), Leg("+", "entry", 0, 1)])
+def test_legs_of_hidden_dynamics(leg):
+    """Ends are those of the flow with its multipliers as states, derivatives those of differences."""
+    start, p = np.array([0.2, 0.0 if "s" in leg.mode else 0.1]), HIDDEN.parameter_vector()
+    found = LegIntegrator(HIDDEN, [leg], (0,))(start[None], np.array([0.2]), p)
+    field = plain_field(HIDDEN, leg.mode)
+
+    def end(x, q):
+        return flow_for(field, states_at(HIDDEN, leg.mode, x, q), q, 0.2)[:2]
+
+    np.testing.assert_allclose(found.end[0], end(start, p), rtol=1e-13, atol=1e-14)
+    by_x = (end(start + np.array([1e-6, 0]), p) - end(start - np.array([1e-6, 0]), p)) / 2e-6
+    by_p = (end(start, p + 1e-6) - end(start, p - 1e-6)) / 2e-6
+    np.testing.assert_allclose(found.by_start[0, :, 0], by_x, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.by_parameters[0, :, 0], by_p, rtol=0, atol=1e-9)
 
 
 def test_a_leg_that_fails_is_named():

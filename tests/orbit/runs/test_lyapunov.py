@@ -1,6 +1,8 @@
 """Lyapunov exponents are those of closed forms: chaotic maps in flows, forced friction, linear decay."""
 
+import json
 import math
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -11,6 +13,7 @@ from nonsmooth.orbit.runs import lyapunov
 from tests.orbit.interrupts import interrupt
 from tests.orbit.periodic_cases import CASES, PARAMETERS
 
+_MORE = Path(__file__).parents[2] / "cases" / "orbits_2.json"
 x, y, u, v, t, f, lam = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t", "f", "lam"))
 
 
@@ -33,6 +36,20 @@ def test_chebyshev_map_at_the_ticks_of_a_clock():
     found = ns.lyapunov_spectrum(system, [0.3, 0.0], t_end=1500.0, k=1)
     assert abs(found.exponents[0] - math.log(2)) < 4 * found.errors[0] < 0.1
     assert found.exponents.shape == (1,) and found.blocks.shape == (32, 1)
+
+
+def test_relay_oscillator_contracts_as_its_damping():
+    """LY3: saltation adds d to the divergence -2 d."""
+    system = ns.FilippovSystem(
+        [x, v], surface=v, above=[v, 1 - x - 0.2 * v], below=[v, -1 - x - 0.2 * v]
+    )
+    (case,) = (c for c in json.loads(_MORE.read_text()) if c["id"] == "LY3")
+    truth = [float(value) for value in case["values"]["exponents"]]
+    found = ns.lyapunov_spectrum(system, case["start"], t_end=1000.0)
+    assert np.all(np.abs(found.exponents - truth) < 4 * found.errors) and found.errors.max() < 1e-3
+    orbit = ns.periodic_orbit(system, case["start"])
+    exponents = np.log(np.abs(orbit.multipliers)) / orbit.period
+    assert np.allclose(exponents, truth, rtol=0, atol=1e-12)
 
 
 def test_sum_of_forced_friction_is_that_of_its_closed_form():

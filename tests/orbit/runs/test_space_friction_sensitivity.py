@@ -8,6 +8,7 @@ import pytest
 
 import nonsmooth as ns
 from tests.differences import require
+from tests.flow.elements.test_friction_on_contacts import THREE, table
 
 G = 9.81
 T, MU, A, E = (ca.SX.sym(name) for name in ("t", "mu", "a", "e"))
@@ -156,32 +157,6 @@ def test_an_impact_that_just_holds_has_no_derivative():
         ns.sensitivity(run)
 
 
-#: Feet of a table.
-FEET = [(0.5, 0.0), (-0.25, 0.4), (-0.25, -0.4)]
-
-
-def table(law, e, mu=0.3, height=0.4):
-    """A rigid body of unit mass on three feet, at small angles."""
-    q, w, r = ca.SX.sym("q", 6), ca.SX.sym("w", 6), ca.SX.sym("r", 3)
-    force, gaps, slips, multipliers = ca.SX.zeros(6), [], [], []
-    for i, (px, py) in enumerate(FEET):
-        lam, p = ca.SX.sym(f"lam{i}", 2), ca.vertcat(px, py, -height)
-        push = ca.vertcat(-mu * r[i] * lam, r[i])
-        force[:3] += push
-        force[3:] += ca.cross(p, push)
-        gap = q[2] + q[3] * py - q[4] * px
-        gaps.append(ns.Impact(gap, reaction=r[i], restitution=e, law=law, name=f"foot{i}"))
-        slips.append((w[:3] + ca.cross(w[3:], p))[:2])
-        multipliers.append(lam)
-    rates = ca.vertcat(force[:2], force[2] - G, force[3:] / ca.DM([0.1, 0.15, 0.2]))
-    every = {"surfaces": slips, "multipliers": multipliers, "impacts": gaps}
-    return ns.FilippovSystem(
-        [*ca.vertsplit(q), *ca.vertsplit(w)],
-        field=[*ca.vertsplit(w), *ca.vertsplit(rates)],
-        **every,
-    )
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "e", "way", "start", "end", "itinerary"),
@@ -193,7 +168,7 @@ def table(law, e, mu=0.3, height=0.4):
 )
 def test_a_table_on_three_feet_is_central_differences(law, e, way, start, end, itinerary):
     """One foot stops before the others; one falls while two slide, of which one may leave."""
-    tilt, system = start[0], table(law, e)
+    tilt, system = start[0], table(0.3, THREE, e=e, law=law)
     x = np.array([0, 0, -0.25 * tilt, 0, tilt, 0, *way[:2], 0, 0, 0, way[2]])
     free = (0, 1, 5, 6, 7, 11) if not tilt else (0, 1, 5, 11)
     require(system, x, end, itinerary, of=list(free), within=1e-9)

@@ -504,6 +504,60 @@ static int needs_no_bound(const Block *k, const double *nu) {
   return 1;
 }
 
+/* Gradient and Hessian by ``n`` variables of tau times the last, the slack s, less the logarithms of the distances from all
+ * bounds with it, at nu; 0 where one is not positive. Columns of z (n - 1, size) are what moves nu. */
+static int barrier_of(const Block *k, const double *nu, const double *z, int n, double s, double unit, double tau, double *grad,
+                      double *hess) {
+  int size = k->size;
+  double of[size + 1];
+  memset(hess, 0, sizeof(double) * n * n);
+  for (int l = 0; l < n; l++) grad[l] = l == n - 1 ? tau : 0;
+  for (int i = 0, own; i < size; i += own) {
+    own = span_of(k, i) > 0 ? k->span[i] : 1;
+    int is_contact = k->is_contact[i];
+    double b = (is_contact ? nu[i] : bound_of(k, i, nu)) + s * unit, phi = is_contact ? b : b * b - dot(nu + i, nu + i, own);
+    if (!(b > 0 && phi > 0)) return 0;
+    for (int l = 0; l < n; l++) {
+      const double *to = z + (int64_t)l * size;
+      double rate = l == n - 1 ? unit : is_contact ? to[i] : dot(k->share + (int64_t)i * size, to, size);
+      of[l] = is_contact ? rate : 2 * (b * rate - (l < n - 1 ? dot(nu + i, to + i, own) : 0));
+      grad[l] -= of[l] / phi;
+      for (int m = 0; m <= l; m++) {
+        const double *other = z + (int64_t)m * size;
+        double second = l == n - 1 ? unit : dot(k->share + (int64_t)i * size, to, size);
+        second *= m == n - 1 ? unit : dot(k->share + (int64_t)i * size, other, size);
+        if (l < n - 1) second -= dot(to + i, other + i, own);
+        hess[l * n + m] += of[l] * of[m] / (phi * phi) - (is_contact ? 0 : 2 * second / phi);
+      }
+    }
+  }
+  for (int l = 0; l < n; l++) for (int m = 0; m < l; m++) hess[m * n + l] = hess[l * n + m];
+  return 1;
+}
+
+/* Move a solution with w = 0 to where it is farthest from all bounds, by an interior-point method; whether it is inside. */
+static int move_into_cones(const Block *k, double *nu, double *work, int32_t *pivot) {
+  int size = k->size, n;
+  double *z = work, *trial = z + (int64_t)size * size, *grad = trial + size, *hess = grad + size + 1;
+  double *step = hess + (int64_t)(size + 1) * (size + 1), unit = 0, s = 0;
+  for (int i = 0; i < size; i++) unit = larger(unit, larger(fabs(nu[i]), k->is_contact[i] ? 0 : fabs(bound_of(k, i, nu))));
+  n = null_space(k->matrix, size, size, z, step, pivot) + 1;
+  if (n == 1 || n > size || !(unit > 0)) return 0;
+  for (double tau = 1; tau < 1 / TIED; tau *= 3)
+    for (int again = 0; again < 20; again++) {
+      while (again == 0 && tau == 1 && !barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) if ((s = 2 * s + 1) > 1 / MERGED) return 0;
+      if (!barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) return 0;
+      memcpy(step, grad, sizeof(double) * n);
+      if (!solve(hess, step, n)) return 0;
+      double decrement = sqrt(larger(dot(grad, step, n), 0)), part = 1 / (1 + decrement);
+      for (int l = 0; l < n - 1; l++) for (int i = 0; i < size; i++) nu[i] -= part * step[l] * z[(int64_t)l * size + i];
+      s -= part * step[n - 1];
+      if (s < -0.5) return 1;
+      if (decrement < WEAK) break;
+    }
+  return s < -TIED;
+}
+
 /* The solution of a block with vectors, symmetric but for loads, from the smallest nu with w = 0 on. Loads that are not
  * determined are shared in proportion to the bounds, in units of whose roots nu is the smallest. */
 static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
@@ -522,7 +576,12 @@ static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
     for (int i = 0; i < n; i++)
       unit[i] = sqrt(larger(k->is_contact[i] ? nu[i] : bound_of(k, i, nu), MERGED * (most > 0 ? most : 1)));
   }
-  return ((k->is_coupled || k->is_joined) && needs_no_bound(k, nu)) || relax_from(k, nu, most);
+  int is_kept = (k->is_coupled || k->is_joined) && needs_no_bound(k, nu), may_move = 1;
+  for (int i = 0; i < n; i++) may_move &= k->state[i] == UNDECIDED;
+  memcpy(last, nu, sizeof(double) * n);
+  if (may_move && k->span && move_into_cones(k, nu, last + n, pivot)) return 1;
+  memcpy(nu, last, sizeof(double) * n);
+  return is_kept || relax_from(k, nu, most);
 }
 
 /* Solutions of a block that is not of one element: one where a certificate or the size says so. */

@@ -79,11 +79,9 @@ def test_nothing_is_loaded_from_a_folder_that_others_can_write(open_to, cache, t
     assert not told.exists() and mode(cache) == open_to
 
 
-def test_nothing_is_loaded_from_a_folder_of_another_user(cache, tmp_path, monkeypatch):
-    cache.mkdir(mode=0o700)
-    _, told = plant(cache, tmp_path)
-    real = os.lstat
-    foreign = os.lstat(cache).st_ino
+def give_away(folder, monkeypatch):
+    """Let a folder belong to another user."""
+    real, foreign = os.lstat, os.lstat(folder).st_ino
 
     def lstat(path, **options):
         facts = real(path, **options)
@@ -92,6 +90,12 @@ def test_nothing_is_loaded_from_a_folder_of_another_user(cache, tmp_path, monkey
         return os.stat_result([*facts[:4], 12345, *facts[5:]])
 
     monkeypatch.setattr(os, "lstat", lstat)
+
+
+def test_nothing_is_loaded_from_a_folder_of_another_user(cache, tmp_path, monkeypatch):
+    cache.mkdir(mode=0o700)
+    _, told = plant(cache, tmp_path)
+    give_away(cache, monkeypatch)
     with pytest.warns(CompilerWarning, match="user 12345"):
         assert build(SOURCE).answer() == 42
     assert not told.exists()
@@ -295,15 +299,7 @@ def test_the_folder_of_a_mac_is_the_one_its_rules_name(monkeypatch, tmp_path):
 
 
 def test_a_folder_above_that_belongs_to_another_user_is_reported(cache, tmp_path, monkeypatch):
-    real, foreign = os.lstat, os.lstat(tmp_path).st_ino
-
-    def lstat(path, **options):
-        facts = real(path, **options)
-        if facts.st_ino != foreign:
-            return facts
-        return os.stat_result([*facts[:4], 12345, *facts[5:]])
-
-    monkeypatch.setattr(os, "lstat", lstat)
+    give_away(tmp_path, monkeypatch)
     with pytest.warns(CompilerWarning, match="above.*user 12345"):
         assert build(SOURCE).answer() == 42
 

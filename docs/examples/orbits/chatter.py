@@ -1,6 +1,6 @@
 """Infinitely many impacts, and where they end
 
-A force $F cos t$ lifts a mass off its stop once a period, at $cos t = 1/F$. The mass comes back with impacts that
+A force $F cos(t)$ lifts a mass off its stop once a period, at $cos(t) = 1/F$. The mass comes back with impacts that
 accumulate (**chatter**) and rests until the next lift. This orbit forgets its past: it is
 superstable. A stronger force leaves less time for the rest, and where the limit of the impacts meets the lift the
 branch ends: end of complete chatter. Beyond it orbits have finitely many impacts. A second branch comes down to the

@@ -98,7 +98,8 @@ DEPENDENT = 1e-24
 #: Part that the time of a slip may be off by.
 SLIP_ROOT = 1e-6
 
-#: Numbers beyond these are no sizes any more; of a quotient with such a value and divisor nothing is left.
+#: Numbers beyond these are no sizes any more; of a quotient with such a value and divisor nothing is left, and a state
+#: that begins with such a value, relative to what it becomes along a leg, begins with zero.
 SMALLEST, LARGEST = 1e-300, 1e300
 TINY = sys.float_info.min
 TINY_VALUE, HUGE_DIVISOR = 1e-100, 1e150

@@ -44,6 +44,16 @@ def test_derivatives_by_a_parameter_are_those_of_rescaled_time():
     np.testing.assert_allclose(whole[:, 3], [rate, 0.5 * rate - np.sin(angle)], rtol=0, atol=1e-13)
 
 
+@pytest.mark.parametrize("start", [[1e-265, 0.0], [0.0, -1e-300], [-1e-200, 1e-310]])
+def test_what_rounding_leaves_of_zeros_is_no_scale(start):
+    """x'' = t - 4 x from near rest at t = 0 has the motion t/4 - sin(2 t)/8 from rest."""
+    t = ca.SX.sym("t")
+    system = ns.FilippovSystem([x, y], field=[y, t - k * x], parameters={k: 4.0}, time=t)
+    end = integrated(system, [*start, 0.0], 3.0)[:2, 0]
+    exact = [3.0 / 4 - np.sin(6.0) / 8, (1 - np.cos(6.0)) / 4]
+    np.testing.assert_allclose(end, exact, rtol=0, atol=1e-14)
+
+
 def test_what_is_not_finite_is_refused():
     system = ns.FilippovSystem([x, y], field=[1, x**2 + y**2 + k], parameters={k: 0.0})
     with pytest.raises(ns.ConvergenceError, match="duration"):

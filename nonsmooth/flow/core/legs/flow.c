@@ -104,29 +104,38 @@ static int expand_flow(Flow *w, const double *z) {
   return zero == 0;
 }
 
-/* Step for which the last two terms of series with one scale stay below the tolerance. */
-static double scaled_step(const Flow *w, double size, double rate, double before, double final) {
-  double allowed = w->tol * larger(size, rate * w->whole), h = INFINITY;
+/* Step for which the last two terms of series with one scale stay below the tolerance. States that rounding keeps from
+ * zero, beside what their terms of second to fifth order, ``early``, make along the leg, have no scale, as zeros. */
+static double scaled_step(const Flow *w, double size, double rate, double early, double before, double final) {
+  double scale = larger(size, rate * w->whole), allowed = w->tol * scale, h = INFINITY;
   int order = w->field->order;
-  if (allowed == 0) return h;
+  if (allowed == 0 || scale < TINY_VALUE * early) return h;
   if (final > 0) h = pow(allowed / final, 1.0 / order);
   if (before > 0) h = smaller(pow(allowed / before, 1.0 / (order - 1)), h);
   return h;
 }
 
+/* What the terms of second to fifth order of a series make along a leg. */
+static double early_terms(const Flow *w, const double *own) {
+  double early = 0, power = w->whole;
+  for (int k = 2; k <= 5; k++) early = larger(fabs(own[k]) * (power *= w->whole), early);
+  return early;
+}
+
 /* Step for columns from one to another, of which what moves has one scale. */
 static double column_steps(const Flow *w, int from, int to) {
   int order = w->field->order;
-  double size = 0, rate = 0, before = 0, final = 0;
+  double size = 0, rate = 0, early = 0, before = 0, final = 0;
   for (int64_t i = (int64_t)from * w->field->n; i < (int64_t)to * w->field->n; i++) {
     const double *own = w->columns + i * (order + 1);
     if (w->terms[i] < 2) continue;
     size = larger(fabs(own[0]), size);
     rate = larger(fabs(own[1]), rate);
+    early = larger(early_terms(w, own), early);
     before = larger(fabs(own[order - 1]), before);
     final = larger(fabs(own[order]), final);
   }
-  return scaled_step(w, size, rate, before, final);
+  return scaled_step(w, size, rate, early, before, final);
 }
 
 /* Length of the next step; not above zero where it is too small. */
@@ -135,20 +144,21 @@ static double flow_step(const Flow *w) {
   int order = f->order;
   double h = INFINITY;
   for (int g = 0; g < f->groups; g++) {
-    double size = 0, rate = 0, before = 0, final = 0;
+    double size = 0, rate = 0, early = 0, before = 0, final = 0;
     for (int i = 0; i < f->n; i++) {
       const double *own = w->states + (int64_t)i * (order + 1);
       if (f->group[i] != g) continue;
       size = larger(fabs(own[0]), size);
       rate = larger(fabs(own[1]), rate);
+      early = larger(early_terms(w, own), early);
       before = larger(fabs(own[order - 1]), before);
       final = larger(fabs(own[order]), final);
     }
-    h = smaller(scaled_step(w, size, rate, before, final), h);
+    h = smaller(scaled_step(w, size, rate, early, before, final), h);
   }
   for (int j = 0; j < f->watched; j++) { /* a guard may vary where the states rest */
     const double *own = w->watched + (int64_t)j * (order + 1);
-    h = smaller(scaled_step(w, fabs(own[0]), fabs(own[1]), fabs(own[order - 1]), fabs(own[order])), h);
+    h = smaller(scaled_step(w, fabs(own[0]), fabs(own[1]), early_terms(w, own), fabs(own[order - 1]), fabs(own[order])), h);
   }
   h = smaller(column_steps(w, 0, f->starts), smaller(column_steps(w, f->starts, f->columns), h));
   if (!(h > FIXED_SHORTEST * w->whole)) return 0;

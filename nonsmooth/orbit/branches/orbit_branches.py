@@ -176,6 +176,9 @@ class OrbitEquations(BranchCurve):
         return eliminated(self.problem, matrix, np.zeros(len(matrix))).determinant()
 
 
+#: Distance along a curve, scaled, over which a fold changes the parameter by more than rounding of it.
+_BESIDE, _SAME_VALUE = 1e-3, 1e-12
+
 #: Relative singular value of the equations with the parameter below which they do not decide a direction.
 _FAMILY = 1e-10
 
@@ -483,6 +486,13 @@ class OrbitCurve(OrbitEquations):
         condition = self.known[test]
         return kind_of(self.problem, condition, self.evaluation(u), self.parameters_at(u))
 
+    def _turns(self, u: Array) -> bool:
+        """Whether the parameter changes beside a turning point, where not all orbits are at one value of it."""
+        tangent = np.linalg.svd(self.scaled(u / self.scale)[1])[2][-1]
+        ways = [self.correct(u + s * _BESIDE * tangent * self.scale, tangent) for s in (-1.0, 1.0)]
+        moved = [np.inf if v is None else abs(v[-1] - u[-1]) / self.scale[-1] for v in ways]
+        return bool(max(moved) > _SAME_VALUE)
+
     def occurs(self, test: str, u: Array) -> bool:
         """Not a Neimark-Sacker point at a neutral saddle, where two real multipliers have the product 1."""
         if test != "Neimark-Sacker":
@@ -573,6 +583,8 @@ class OrbitCurve(OrbitEquations):
         )
 
     def _smooth_event(self, zero: Zero) -> BranchEvent | None:
+        if zero.name == "fold" and not self._turns(zero.point.u):
+            return None
         if zero.name == "Hopf":
             return self._hopf(zero.point.u)
         at, p = self.evaluation(zero.point.u), self.parameters_at(zero.point.u)

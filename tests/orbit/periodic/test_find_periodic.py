@@ -233,3 +233,15 @@ def test_an_orbit_is_found_to_all_digits_where_a_state_is_almost_zero(half, simu
     run = ns.simulate(system, [0.5, 0.5], 600.0, parameters=values)
     orbit = ns.periodic_orbit(system, run if simulated else [0.5, 0.5], parameters=values)
     assert orbit.period == pytest.approx(np.diff(truth.t_events[0])[-1], rel=1e-11)
+
+
+def test_a_family_at_one_value_of_the_parameter_has_no_folds():
+    """A block on a belt with a damper that pushes: at no damping all circles up to the belt's speed are orbits."""
+    x, v, damping = symbols("x v damping")
+    friction = ns.Friction(v - 0.4, load=1, kinetic=0.5)
+    field = [v, friction.force - x - damping * v]
+    system = ns.FilippovSystem([x, v], field=field, surfaces=[friction], parameters={damping: -0.1})
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 0.4], 100.0))
+    branch = ns.continue_orbit(orbit, "damping", bounds=(-0.3, 0.6))
+    assert [event.kind for event in branch.events] == ["grazing-sliding", "Hopf"]
+    assert max(abs(event.parameter) for event in branch.events) < 1e-12

@@ -253,8 +253,12 @@ def package_words(system: Any, problem: Problem) -> Callable[[str], str]:
     heights = ca.Function("h", arguments, [ca.vertcat(*found)])
     size = system.extended_dimension
     given = [np.ravel(heights(x[:size], known)) for x in points]
-    alike = np.sum(np.sign(true)[:, :, None] * np.sign(given)[:, None, :], axis=0)  # or opposite
-    own, count = [(i, row[i]) for row in alike for i in [np.argmax(np.abs(row))]], len(found)
+    times = (
+        np.array(given)[:, None, :] / np.array(true)[:, :, None]
+    )  # the same one but for a factor
+    spread = np.ptp(times, axis=0) / np.max(np.abs(times), axis=0)
+    own, count = [(i, times[0, k, i]) for k, i in enumerate(spread.argmin(axis=1))], len(found)
+    assert spread.min(axis=1).max() < 1e-6, spread
     turned = str.maketrans("+-", "-+")
 
     def word(mode: str) -> str:

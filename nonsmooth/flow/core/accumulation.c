@@ -37,7 +37,7 @@ static int block_of(const Run *r, double *left, double *error) {
     double rest = change * change / (before - change);
     *error *= larger(*error, fabs(rest)) / *left;
     *left += rest;
-    return lag;
+    if (*left > 0) return lag; /* else what blocks change does not vanish with them */
   }
   return 0;
 }

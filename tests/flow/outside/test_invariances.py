@@ -260,6 +260,18 @@ def test_invariance(other, drawn):
         raise
 
 
+@pytest.mark.parametrize(
+    ("other", "drawn"),
+    [
+        (split, (79, 1247)),  # durations of blocks with a limit above zero accumulate nowhere
+        (linear_change, (145, 1226)),
+    ],
+)
+def test_an_invariance_of_a_system_that_was_drawn(other, drawn):
+    problem = varied(system_of(drawn[0]), drawn[1])
+    check(problem, other(problem, np.random.default_rng(drawn)))
+
+
 @cache
 def system_of(seed: int, more: bool = True) -> Problem:
     return draw(seed, more)[0]

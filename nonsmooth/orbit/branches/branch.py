@@ -514,6 +514,10 @@ class _Half:
             self.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT
 
 
+#: Ends of an arc behind which no other itinerary follows.
+_WHOLE = ("bound", "closed", "interrupted", "points")
+
+
 def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
     half, (low, high) = _Half(), options["bounds"]
     known: dict[int, BranchEvent | None] = {}  # by the identity of the zero, kept in its arc
@@ -558,9 +562,8 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
             half.end = BranchEnd.INTERRUPTED
             return None
 
-    whole = ("bound", "closed", "interrupted", "points")
     for departure, arc in pieces(
-        first, follow, following, last=lambda arc: arc.end in whole, apart=0.0, most=_PIECES
+        first, follow, following, last=lambda arc: arc.end in _WHOLE, apart=0.0, most=_PIECES
     ):
         at = departure.curve
         assert isinstance(at, BranchCurve)

@@ -258,7 +258,7 @@ def package_words(system: Any, problem: Problem) -> Callable[[str], str]:
     )  # the same one but for a factor
     spread = np.ptp(times, axis=0) / np.max(np.abs(times), axis=0)
     own, count = [(i, times[0, k, i]) for k, i in enumerate(spread.argmin(axis=1))], len(found)
-    assert spread.min(axis=1).max() < 1e-6, spread
+    assert (spread.min(axis=1) < 1e-6).all(), spread
     turned = str.maketrans("+-", "-+")
 
     def word(mode: str) -> str:

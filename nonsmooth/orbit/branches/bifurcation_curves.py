@@ -214,7 +214,14 @@ def _follow(departure: Departure, **options: Any) -> list[Piece]:
         last=lambda arc: arc.end in _WHOLE,
         apart=0.0,
     )
-    return [(cast("EventCurve | ConnectionCurve", at.curve), arc) for at, arc in found]
+    every = [(cast("EventCurve | ConnectionCurve", at.curve), arc) for at, arc in found]
+    curve, arc = every[-1]
+    if arc.end in _DIVISIBLE and isinstance(curve, EventCurve):
+        arc.end = curve.comes_to(arc.points[-1].u) or arc.end
+        if arc.end == "Hopf":
+            arc.zeros.append(Zero(arc.end, arc.points[-1], 0.0))
+            _drop_singular(arc)
+    return every
 
 
 def _traced(

@@ -60,6 +60,9 @@ OWN_ENDS = (
 #: Times of two touches of a leg differ by more than this part of its duration.
 _APART = 1e-6
 
+#: Speed at a touch, relative to the largest one, of an orbit that comes close to an equilibrium.
+_SLOW = 1e-2
+
 #: The end of a curve beyond which its solutions violate guards without a located zero of a test.
 VIRTUAL = "virtual"
 
@@ -290,6 +293,23 @@ class EventCurve(Curve):
         if self.base.is_to_divide(inner) and self.base.redivided(inner)[0] is not self.base:
             return DIVIDE
         return ""
+
+    def comes_to(self, u: Array) -> str:
+        """What a touch comes to where steps become short: an equilibrium to which the orbit shrinks, or by which it passes
+        ever more slowly; empty where it is neither."""
+        if not self.touches or self.base.system.time_dependent:
+            return ""
+        assert self.condition is not None
+        inner, n = self.without(u), self.base.system.dimension
+        if self.base.is_at_hopf(inner, self.condition.guard):  # type: ignore[attr-defined]
+            return "Hopf"
+        at = self.problem.evaluate(inner[: self.columns], self.base.parameters_at(inner))
+        leg, x, _, p = self._leg(inner)
+        slow = integrate_leg(self.base.system, leg, x, float(u[self.columns]), p).rate
+        fast = np.linalg.norm(
+            np.vstack([at.flows.rate, at.flows.before[: len(at.starts)]])[:, :n], axis=1
+        )
+        return "period diverges" if np.linalg.norm(slow[:n]) < _SLOW * fast.max() else ""
 
     def again(self, u: Array, tangent: Array) -> Departure | None:
         """The same curve with legs divided where derivatives grow along them; None where nothing changes."""

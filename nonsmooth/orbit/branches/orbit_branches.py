@@ -378,8 +378,7 @@ class OrbitCurve(OrbitEquations):
 
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
         """The point to which the orbit shrinks, the end of its chatter, or the homoclinic orbit at which its period diverges."""
-        size, first = self._sizes(u) if self._on_plane else (1.0, 1.0)
-        if size <= _SMALL * first and self.hopf(u) is not None:
+        if self.is_at_hopf(u):
             return self._hopf(u)
         shrunk = self._shrunk(u, _SMALL)
         if shrunk is not None:
@@ -611,6 +610,11 @@ class OrbitCurve(OrbitEquations):
         middle = 0.5 * (starts[0] + opposite[: self.problem.dimension])[: self.system.dimension]
         free = self.free if guard is not None else self.free[-1:]
         return hopf_point(self.system, leg.mode, middle, p, free, guard)
+
+    def is_at_hopf(self, u: Array, guard: Guard | None = None) -> bool:
+        """Whether the orbit has shrunk to an equilibrium, with two free parameters on the surface of a guard."""
+        size, first = self._sizes(u) if self._on_plane else (1.0, 1.0)
+        return size <= _SMALL * first and self.hopf(u, guard) is not None
 
     def _hopf(self, u: Array) -> BranchEvent:
         """The Hopf point of the equilibrium to which the orbit shrinks."""

@@ -289,3 +289,28 @@ def test_legs_are_divided_along_a_curve():
     curve = ns.continue_bifurcation(event, ("c", "d"), bounds=[(2, 20), (0.08, 0.2)], step=0.1)
     assert curve.ends == (BranchEnd.REACHED_BOUND,) * 2 and not curve.special
     assert np.abs(curve.values[:, 0] - [top(one) for one in curve.values[:, 1]]).max() < 1e-11
+
+
+@pytest.mark.parametrize(
+    ("tilt", "push", "kind"),
+    [(0.0, 0.0, "grazing of a jumping force"), (0.3, 0.4, "grazing-sliding")],
+)
+def test_a_grazing_curve_ends_at_the_hopf_point_and_at_the_saddle_on_the_surface(tilt, push, kind):
+    """x'' = x^2 - 1 + e (mu + x) x': cycles between the Hopf point at mu = 1 and the homoclinic orbit, mu = 5/7 + O(e^2)."""
+    x, y, mu, c = symbols("x y mu c")
+    force = x * x - 1 + 0.2 * (mu + x) * y
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=c - x - tilt * y,
+        above=[y, force],
+        below=[y - push, force - 0.5],
+        parameters={mu: 0.9, c: 0.5},
+    )
+    (hopf,) = ns.continue_equilibrium(system, [-1.0, 0.0], "mu", bounds=(0.5, 1.3)).events
+    branch = ns.continue_orbit(hopf, "mu", bounds=(0.5, 1.3))
+    event = next(event for event in branch.events if event.kind == kind)
+    curve = ns.continue_bifurcation(event, ("mu", "c"), bounds=[(0.5, 1.3), (-2, 2)])
+    assert curve.ends == (BranchEnd.EVENT, BranchEnd.PERIOD_DIVERGES)
+    (point,) = curve.special
+    assert point.kind == f"{kind} with Hopf" and np.abs(point.values - [1, -1]).max() < 1e-12
+    assert np.abs(curve.values[-1] - [5 / 7, 1]).max() < 2e-3

@@ -66,7 +66,8 @@ class Problem:
     def space(self) -> dict[str, Any]:
         """Names that the strings may use."""
         given, let = WORDS | self.data.get("numbers", {}), self.data.get("let", {})
-        texts = [*let.values(), *self.data.get("system", {}).values()]
+        parts = [let, *(self.data.get(part, {}) for part in ("system", "mechanism"))]
+        texts = [text for part in parts for text in part.values()]
         nodes = [node for text in texts for node in ast.walk(ast.parse(text, mode="eval"))]
         names = {node.id for node in nodes if isinstance(node, ast.Name)}
         unknown = sorted(names - let.keys() - given.keys() - {*dir(builtins)})

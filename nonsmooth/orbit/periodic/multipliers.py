@@ -58,7 +58,9 @@ class Multipliers:
             passages(self.at.flows.ended, *events_of(self.problem, self.at))
         except DegenerateError as error:
             return str(error)
-        finite = np.isfinite(self.at.flows.by_start).all()
+        finite = np.isfinite(self.at.flows.by_start).all() and all(
+            np.isfinite(factor.matrix).all() for factor in self._product.factors
+        )
         return "" if finite else "derivatives along the orbit are beyond the range of numbers"
 
     @cached_property

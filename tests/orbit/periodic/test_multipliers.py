@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.orbit.periodic import multipliers
 from nonsmooth.orbit.periodic.cyclic_qr import Factor, Product
 
 CASES = {
@@ -134,3 +135,13 @@ def test_multipliers_do_not_depend_on_the_unit_of_time(second):
     c = 2.5 * np.sqrt(1 - (np.pi / 5) ** 2)
     assert abs(orbit.multipliers[0] - ((c - 1) / (c + 1)) ** 2) < 1e-12
     assert orbit.stability == "asymptotically stable"
+
+
+def test_an_orbit_without_finite_derivatives_of_an_event_says_so(monkeypatch):
+    x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    clock = ns.FilippovSystem([x, v], surface=v, above=[v, 0.5 - x - v], below=[v, -0.5 - x - v])
+    orbit = ns.periodic_orbit(clock, ns.simulate(clock, [1.0, 0.0], 60.0))
+    known = multipliers.event_maps
+    monkeypatch.setattr(multipliers, "event_maps", lambda *given: np.nan * known(*given))
+    found = multipliers.Multipliers(orbit.problem, orbit.evaluation, orbit.parameter_vector)
+    assert "beyond the range" in found.stability and np.isnan(found.values).all()

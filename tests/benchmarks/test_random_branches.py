@@ -19,6 +19,7 @@ def test_nothing_is_wrong_on_a_random_branch(kind, capsys):
     [
         ("filippov", 20068, "infinite period at a boundary node"),
         ("filippov", 23076, "two-fold"),
+        ("filippov", 71332, "two-fold"),
         ("filippov", 50124, "homoclinic"),
     ],
 )

@@ -190,7 +190,7 @@ _STEEP = 30.0
 _TINY, _SMALL = 1e-4, 1e-2
 
 #: L of the other field where a slide ends, relative to its gradient and the state, at the last step to a two-fold.
-_REACHED = 1e-6
+_REACHED = 1e-5
 
 #: The same that is rounding: the slide of a branch ends at the two-fold, as it tends to it exponentially.
 _ROUNDED = 1e-11

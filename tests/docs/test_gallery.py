@@ -230,7 +230,7 @@ def test_buck_converter_doubles_where_its_closed_form_flows_say():
         )
         return run.sample_x[-1, :2]
 
-    step = 1e-7 * np.eye(2)
+    step = 1e-6 * np.eye(2)
     slope = np.column_stack([(after(d) - after(-d)) / 2e-6 for d in step])
     assert np.abs(np.linalg.eigvals(slope) + 1).min() < 1e-5
     assert len(found["doublings"]) == 3 and np.all(np.diff(found["doublings"]) > 0)

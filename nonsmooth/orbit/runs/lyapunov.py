@@ -31,10 +31,14 @@ from ...model import (
 )
 from .legs import Leg, LegFlow, Stretch, stretches
 from .limits import limits_of
+from .saltation import Saltation
 from .variation import beginning_of, carried, flows_over, passages_over, passages_to
 
 #: Relative size of a column of R at an event below which a direction is lost, as in an entry to sliding.
 _LOST = 1e-12
+
+#: Rounding of an entry of a saltation matrix, relative to its terms.
+_ROUNDED = 16.0 * float(np.finfo(float).eps)
 
 #: Largest ratio of the growths of two directions on a piece of a leg; beyond it rounding spoils the smaller one.
 _RATIO = 1e6
@@ -303,7 +307,7 @@ class _Frame:
             elif self.q.shape[1]:  # neighbours of a state on a set reach it at once
                 self._lose(one.flow.by_start[: self.n, : self.n], part, part.t)
             if one.event is not None and self.q.shape[1]:
-                self._lose(one.event.matrix[: self.n, : self.n], part, self.t)
+                self._lose(_cleaned(one.event)[: self.n, : self.n], part, self.t)
         if self.q.shape[1] == self.n:
             self._add_divergence(pieces)
 
@@ -443,6 +447,12 @@ def _spread(matrix: Array, q: Array) -> tuple[Array, Array] | None:
         return None
     turned = np.linalg.qr(np.where(large, forward, backward[:, ::-1]))[0]
     return turned[:, :m], np.exp(logs[:m])
+
+
+def _cleaned(event: Saltation) -> Array:
+    """The saltation matrix (N, N) with zeros where its terms cancel to rounding."""
+    terms = np.abs(event.after_state) + np.abs(np.outer(event.jump, event.time_by_state))
+    return np.where(np.abs(event.matrix) > _ROUNDED * terms, event.matrix, 0.0)
 
 
 def _regular(matrix: Array) -> bool:

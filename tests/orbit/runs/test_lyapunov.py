@@ -212,3 +212,12 @@ def test_sticking_in_the_plane_loses_the_velocities_and_keeps_the_passenger():
     assert (found.exponents[-2:] == -math.inf).all()
     assert found.exponents[2] == pytest.approx(-1.0, abs=0.05)
     assert (np.abs(found.exponents[:2]) < 0.1).all()
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_an_entry_to_sliding_loses_its_direction_in_any_unit(scale):
+    sides = [[-x - 2 * scale, -3 * v], [-x + 2 * scale, -3 * v]]
+    system = ns.FilippovSystem([x, v], surface=x, above=sides[0], below=sides[1])
+    found = ns.lyapunov_spectrum(system, [scale, scale], t_end=20.0, transient=10.0)
+    assert found.exponents[0] == pytest.approx(-3.0, rel=1e-12)
+    assert found.exponents[1] == -math.inf

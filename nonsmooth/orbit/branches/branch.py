@@ -19,6 +19,7 @@ from ...model import (
     Array,
     ConvergenceError,
     FilippovSystem,
+    Guard,
     NonsmoothError,
     OptionError,
     PointError,
@@ -362,6 +363,10 @@ class BranchCurve(Curve):
 
     def is_to_divide(self, u: Array) -> bool:
         """Whether derivatives grow too much on a leg of an orbit."""
+        return False
+
+    def is_at_hopf(self, u: Array, guard: Guard | None = None) -> bool:
+        """Whether an orbit has shrunk to an equilibrium, with two free parameters on the surface of a guard."""
         return False
 
     def redivided(self, u: Array) -> tuple[BranchCurve, Array]:

@@ -301,7 +301,7 @@ class EventCurve(Curve):
             return ""
         assert self.condition is not None
         inner, n = self.without(u), self.base.system.dimension
-        if self.base.is_at_hopf(inner, self.condition.guard):  # type: ignore[attr-defined]
+        if self.base.is_at_hopf(inner, self.condition.guard):
             return "Hopf"
         at = self.problem.evaluate(inner[: self.columns], self.base.parameters_at(inner))
         leg, x, _, p = self._leg(inner)

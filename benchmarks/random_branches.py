@@ -26,7 +26,7 @@ from .problems import Array
 
 Made = tuple[ns.FilippovSystem, Array, float]
 
-#: Seconds for a system; nodes that are simulated; relative errors of closure and of multipliers; growth of
+#: Processor seconds for a system; nodes that are simulated; relative errors of closure and of multipliers; growth of
 #: derivatives along an orbit beyond which rounding decides a simulation of it.
 LIMIT, NODES, CLOSURE, DIFFERENCE, LOST = 60, 10, 1e-7, 1e-4, 1e13
 
@@ -273,7 +273,7 @@ def branch_of(kind: str, seed: int) -> tuple[Branch | None, str]:
 
 def checked(kind: str, seed: int, counts: Counter[str]) -> Branch | None:
     """The branch of a seed, with what is wrong printed and counted."""
-    signal.alarm(LIMIT)
+    signal.setitimer(signal.ITIMER_PROF, LIMIT)
     try:
         branch, reason = branch_of(kind, seed)
         wrong = [] if branch is None else faults(branch)
@@ -283,7 +283,7 @@ def checked(kind: str, seed: int, counts: Counter[str]) -> Branch | None:
         branch, reason = None, f"raises {type(error).__name__}"
         wrong = [f"{reason}: {error}"]
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
     for text in wrong:
         print(kind, seed, text[:300], flush=True)
     counts["WRONG"] += len(wrong)
@@ -296,7 +296,7 @@ def main(numbers: Sequence[int] = (), classes: Sequence[str] = ()) -> Counter[st
     """Check equally many branches of each class, 200 from seed 0 on by default; counts of what was found."""
     counts, began, chosen = Counter[str](), time.perf_counter(), classes or tuple(CLASSES)
     count, first = [*numbers, *(200, 0)[len(numbers) :]]
-    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.signal(signal.SIGPROF, signal.default_int_handler)
     warnings.simplefilter("ignore")
     for kind in chosen:
         seed = first

@@ -539,7 +539,7 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
             departure.rows,
             departure.tangent,
             step=options["step"],
-            most=options["max_points"],
+            most=options["max_points"] - max(0, len(half.nodes) - 1),  # pieces share their ends
             bounds=[(len(departure.rows[-1]) - 1, low, high)],
             report=options["report"],
         )

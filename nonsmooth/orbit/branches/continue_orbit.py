@@ -99,7 +99,7 @@ def continue_orbit(
         Largest step where the branch bends, relative to the width of the bounds and to the size of
         the orbit.
     max_points : int, optional
-        Largest number of points of each piece.
+        Largest number of points on each side of the start.
     through : bool, optional
         Whether to change the itinerary and go on beyond events that end it.
     progress : bool, optional

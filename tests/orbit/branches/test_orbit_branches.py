@@ -76,6 +76,13 @@ def test_the_branch_can_stop_at_the_event():
     assert abs(branch.values[0] - number("F1", "A_crossing_sliding")) < 1e-12
 
 
+def test_points_are_counted_on_each_side_of_the_start_through_events(forced):
+    start = ns.periodic_orbit(forced.orbits[-1].system, [0.5])
+    branch = ns.continue_orbit(start, "A", bounds=(0.5, 3.0), step=0.01, max_points=30)
+    assert kinds(branch) == ["crossing-sliding"] and branch.values[29] == start.parameters["A"]
+    assert branch.ends[0] is ns.orbit.BranchEnd.TOO_MANY_POINTS
+
+
 @pytest.mark.parametrize("inside", [True, False])
 def test_grazing_sliding_of_a_circle_from_either_side(inside):
     """A_i = 0 in the plane: from a stable orbit always persistence."""

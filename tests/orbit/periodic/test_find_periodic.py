@@ -198,6 +198,8 @@ def test_orbits_of_a_neutral_family_are_named_as_such_also_where_it_touches_a_su
         friction = ns.Friction(v - b, load=1, kinetic=0.4)
         given = {"field": [v, friction.force - x], "surfaces": [friction]}
     system = ns.FilippovSystem([x, v], parameters={b: 0.3}, **given)
+    from_state = ns.periodic_orbit(system, [start, 0.0])
+    assert from_state.itinerary == "-" and from_state.period == pytest.approx(2 * np.pi, rel=1e-12)
     orbit = ns.periodic_orbit(system, ns.simulate(system, [start, 0.0], 100.0))
     assert orbit.itinerary == "-" and orbit.period == pytest.approx(2 * np.pi, rel=1e-12)
     assert np.abs(orbit.multipliers - 1.0).max() < 1e-9

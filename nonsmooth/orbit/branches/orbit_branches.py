@@ -42,7 +42,7 @@ from .chatter_end import chatter_end
 from .conditions import COST, USER, Condition, condition_row, conditions_of, is_smooth
 from .event_curves import OWN_ENDS, degenerate_tests
 from .family_ends import extent, hopf_point, node_end, surface_end
-from .homoclinic_curves import homoclinic_end
+from .homoclinic_curves import homoclinic_end, passed_saddle
 from .itinerary_changes import (
     CENTRE,
     CHATTER_END,
@@ -395,9 +395,13 @@ class OrbitCurve(OrbitEquations):
                 return self._event("two-fold", self, point, "", FarSide("", verdict))
         name, width = self.system.parameter_names[self.free[-1]], float(self.widths[-1])
         node = node_end(self.describe(u), name, width)
-        if node is not None or (end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u)):
+        long = end is BranchEnd.PERIOD_DIVERGES or self._steep(u) or self.diverges(u)
+        if node is not None or not long:
             return node
         return homoclinic_end(self.describe(u), name, width)
+
+    def diverges(self, u: Array) -> str:
+        return passed_saddle(self.describe(u), self._sizes(u)[0])
 
     def _at_two_fold(self, u: Array, part: float, inside: bool = False) -> bool:
         """Whether a slide ends at a two-fold, or comes to one ``inside`` its leg."""

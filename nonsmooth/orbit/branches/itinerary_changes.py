@@ -127,7 +127,7 @@ _TANGENT = 1e-7
 _BOTH = 1e-9
 
 SOFT, FORCE = "grazing of a soft switch", "grazing of a jumping force"
-CHATTER_END = "end of complete chatter"
+CHATTER_END, PLASTIC = "end of complete chatter", "plastic impact"
 
 #: Grazing of a soft switch by the orbits of a centre, at whose value of the parameter all of these exist.
 CENTRE = "focus-centre-limit cycle"

@@ -45,7 +45,6 @@ from .family_ends import extent, hopf_point, node_end, surface_end
 from .homoclinic_curves import homoclinic_end, passed_saddle
 from .itinerary_changes import (
     CENTRE,
-    CHATTER_END,
     SOFT,
     ChangedItinerary,
     changed_itinerary,
@@ -385,9 +384,10 @@ class OrbitCurve(OrbitEquations):
             return shrunk
         chatter = chatter_end(self.problem, u, self.scale, self.equations)
         if chatter is not None:
-            value, near = chatter
-            side = FarSide("", VERDICTS[CHATTER_END])
-            return BranchEvent(CHATTER_END, value, self.describe(near), side, curve=self)
+            kind, value, near = chatter
+            return BranchEvent(
+                kind, value, self.describe(near), FarSide("", VERDICTS[kind]), curve=self
+            )
         for verb in ("ends at", "passes"):
             if self._at_two_fold(u, _REACHED, inside=verb == "passes"):
                 verdict = f"a slide {verb} a two-fold, beyond which its future is not unique"

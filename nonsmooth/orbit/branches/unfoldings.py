@@ -42,6 +42,7 @@ VERDICTS = {
     "focus-centre-limit cycle": "the cycle is born from the largest orbit of a centre",
     "grazing of a jumping force": "the return map has a square root: stability is lost at once",
     "end of complete chatter": "the contact opens before impacts have accumulated: finitely many follow",
+    "plastic impact": "the impacts after the first vanish: beyond, the contact closes at once",
     "grazing, escaping": "the orbit leaves along the other field: nothing continues it",
     "two-fold": "the orbit passes a two-fold, where its future may not be unique",
     "corner": "two events at one time, {one} and {other}; the itinerary beyond is not known here: "

@@ -567,6 +567,11 @@ class OrbitCurve(OrbitEquations):
         # times.
         small = [self.known[zero.name]]
         small += [self.known[n] for n in zero.together if n != zero.name and not is_smooth(n)]
+        # An event without effect that is touched is so by the legs before and behind it too.
+        of, count = lambda c: (c.guard.kind, c.guard.element), len(self.problem.legs)
+        ends = [(c.leg, of(c)) for c in small if c.what == "transversality"]
+        ends += [((leg + 1) % count, guard) for leg, guard in ends]
+        small = [c for c in small if c.what != "interior" or (c.leg, of(c)) not in ends]
         first = min(small, key=lambda c: _PRIORITY.index(c.what))
         kin = [c for c in small if c.what == first.what and c is not first]
         return sorted([first, *kin], key=lambda c: -c.leg)
@@ -588,6 +593,8 @@ class OrbitCurve(OrbitEquations):
     def _smooth_event(self, zero: Zero) -> BranchEvent | None:
         if zero.name == "fold" and not self._turns(zero.point.u):
             return None
+        if zero.name == "branch point" and self._shrunk(zero.point.u, _SMALL) is not None:
+            return None  # all multipliers tend to 1
         if zero.name == "Hopf":
             return self._hopf(zero.point.u)
         at, p = self.evaluation(zero.point.u), self.parameters_at(zero.point.u)

@@ -168,3 +168,24 @@ def test_a_branch_lost_where_folds_accumulate_at_a_saddle_focus_ends_at_its_homo
     assert [event.kind for event in half.events] == ["homoclinic"] * located
     assert all(abs(event.parameter) < 1e-15 for event in half.events)
     assert located or "saddle [" in half.reason
+
+
+def test_no_branch_point_is_reported_where_orbits_shrink_to_a_two_fold():
+    """All multipliers of a relay's orbits tend to 1 at q = (2 b1 + c1)/p1, where L1 = L2."""
+    rows = [[-2.97, -0.07, 0.19, -0.72, -0.9], [0.43, -1.36, -1.13, -0.18, 0.23]]
+    rows += [[0.19, 0.03, -2.67, -1.19, -0.48], [1.17, -1.02, 0.28, -0.83, 0.81]]
+    rows += [[-1.0, -0.6, -0.63, 2.01, -0.72]]
+    b, c = ca.DM([-0.42, 0.54, 0.11, -1.04, 0.53]), ca.DM([-0.02, 0.02, -0.05, -0.09, -0.39])
+    states, push = ca.SX.sym("x", 5), ca.DM([-0.35, 0.14, 0.05, -0.25, 0.11])
+    field = ca.DM(rows) @ states
+    system = ns.FilippovSystem(
+        ca.vertsplit(states),
+        surface=states[0] - 0.2 * MU,
+        above=ca.vertsplit(field - b - c + MU * push),
+        below=ca.vertsplit(field + b),
+        parameters={MU: 1.0},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5] * 5, 150.0))
+    branch = ns.continue_orbit(orbit, "mu", bounds=(0.9, 3.0), step=0.02)
+    assert [event.kind for event in branch.events] == ["fold", "cycle from a two-fold"]
+    assert branch.events[1].parameter == pytest.approx(0.86 / 0.35, rel=1e-12)

@@ -70,10 +70,10 @@ def far_side(
             return FarSide(
                 itinerary, _verdict(numbers, "with and without sliding"), ReadOnly(numbers)
             )
-        of = "" if test.guard is None else test.guard.kind
-        if kind in _ROOTS and test.what == "interior" and of in ("impact", "reset", "surface"):
+        passed = "" if test.guard is None else test.guard.kind
+        if kind in _ROOTS and test.what == "interior" and passed in ("impact", "reset", "surface"):
             return _root(problem, kind, test, at, p, itinerary)
-        if kind == "corner" and beyond is not None and of == "reset":
+        if kind == "corner" and beyond is not None and passed == "reset":
             return FarSide(itinerary, _SMOOTH)  # a reset that happens again changes nothing
         if kind == "corner" and beyond is not None:
             numbers = _orders(problem, at, beyond, p)

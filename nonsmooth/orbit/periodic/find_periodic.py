@@ -277,7 +277,7 @@ def _closed_orbit(
         found = solver.solve(guess, most, damped)
         if not to_divide(problem, found[1]):
             return problem, *found, solver.iterations
-        parts, start = divided(problem, guess, p)
+        parts, start = divided(problem, found[0], p)
     except ConvergenceError:
         parts, start = divided(problem, guess, p) if damped else (problem, guess)
         if parts is problem:

@@ -247,3 +247,17 @@ def test_a_family_at_one_value_of_the_parameter_has_no_folds():
     branch = ns.continue_orbit(orbit, "damping", bounds=(-0.3, 0.6))
     assert [event.kind for event in branch.events] == ["grazing-sliding", "Hopf"]
     assert max(abs(event.parameter) for event in branch.events) < 1e-12
+
+
+def test_the_run_of_an_orbit_follows_it_where_derivatives_grow():
+    """A relay oscillator with a passenger, whose derivatives grow by exp(8 pi) along a leg."""
+    x, v, w = symbols("x v w")
+    rate = [v, ca.sign(v) - x - 0.2 * v, 8 * w + v]
+    system = ns.FilippovSystem.from_expression([x, v, w], rate)
+    q = np.exp(-0.1 * np.pi / np.sqrt(0.99))
+    far = (1 + q) / (1 - q)
+    orbit = ns.periodic_orbit(system, [-far, 0.0, -0.113], itinerary=["+", "-"])
+    ends = [event.x for event in orbit.trajectory.events]
+    assert orbit.start[0] == pytest.approx(-far, rel=1e-12)
+    assert np.abs(ends[0] - orbit.legs[1].start).max() < 1e-10
+    assert np.abs(ends[1] - orbit.start).max() < 1e-10

@@ -51,7 +51,9 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
             partial(_few_segments, system, run) if run.few else None,
         ),
         status=status,
-        message=f"{message_of(system, options, run)} {ADVICE[status]}{_unmet(system, run)}",
+        message=message_of(system, options, run)
+        + ("" if status.complete else f" {ADVICE[status]}")
+        + _unmet(system, run),
         accumulation_time=limit if status is Status.ACCUMULATION else None,
         steps=Steps(run.starts, run.coefficients, run.implicit),
         continuations=[

@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from ..model import OptionError
-from ..notebook import add_cards
+from ..tables import add_views
 from .control import abs_brake, drill_string, super_twisting, tank_cascade, twisting
 from .converters import boost_converter, diode_bridge, resonant_converter
 from .friction import dry_friction, leine_stick_slip, stick_slip_exponential
@@ -129,7 +129,7 @@ __all__ = [
     "woodpecker",
 ]
 
-add_cards(globals(), __all__)
+add_views(globals(), __all__)
 
 #: Every problem by name.
 PROBLEMS: Mapping[str, Callable[[], Problem]] = MappingProxyType(

@@ -75,7 +75,7 @@ SENTENCES = {
 }
 
 #: Said of an event whose condition was true from the start on.
-UNMET = (
+UNFIRED = (
     " {name!r} was true at the start and did not happen: events happen where they become true. "
     "initially=True lets it happen at the start, level=True while it is true, initially=False says no more of it."
 )

@@ -54,7 +54,7 @@ static int is_awaited(const Run *r, double time) {
 
 /* Whether one of the last events was that of a guard. */
 static int is_repeated(const Run *r, int block, int kind, int index) {
-  for (int k = 1; k <= block; k++) if (back(r, k)->met.kind == kind && back(r, k)->met.index == index) return 1;
+  for (int k = 1; k <= block; k++) if (back(r, k)->guard.kind == kind && back(r, k)->guard.index == index) return 1;
   return 0;
 }
 
@@ -330,10 +330,10 @@ static void rest_if_slow(Run *r) {
 
 /* Store an event among the last ones. */
 static void remember(Run *r, int kind, int guard, const double *x) {
-  int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->met.kind << 32) + (guard < 0 ? -1 : shown_index(r));
+  int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->guard.kind << 32) + (guard < 0 ? -1 : shown_index(r));
   double *jumped = r->jumped + (r->s->resets ? r->history % HISTORY * r->n : 0);
   for (int i = 0; r->s->resets && i < r->n; i++) jumped[i] = kind == RESET ? r->x[i] - x[i] : 0;
-  r->past[r->history++ % HISTORY] = (Happened){r->since, pattern, kind, r->met};
+  r->past[r->history++ % HISTORY] = (Happened){r->since, pattern, kind, r->guard};
   r->since = 0;
 }
 

@@ -110,7 +110,7 @@ static void strike_due(Run *r) {
 
 /* Find the mode of a state that was jumped to; whether complementarity conditions made it jump on. */
 static int settle_in(Run *r) {
-  Met met = r->met;
+  Guard guard = r->guard;
   int before = r->mode, jumped = become_consistent(r);
   find_cells(r);
   letters_of(r, r->start);
@@ -120,7 +120,7 @@ static int settle_in(Run *r) {
   turn_cells(r);
   strike_due(r);
   if (jumped) event(r, JUMP, before, 0, r->jumped_from);
-  r->met = met;
+  r->guard = guard;
   return jumped;
 }
 
@@ -316,7 +316,7 @@ static void serve_half_line(Run *r, int row) {
 
 static void serve(Run *r, int row) {
   int kind = r->now.kind[row], index = r->now.index[row], side = r->now.side[row];
-  r->met = (Met){kind, index, side};
+  r->guard = (Guard){kind, index, side};
   pass_cells(r, row);
   if (kind != BRANCH_GUARD) law_of(r, index)->serve(r, row);
   else if (side == OF_ONE || is_mixed(r, r->now.sliding, r->now.slides)) pass(r, row, 0, 0);
@@ -405,16 +405,16 @@ static int taylor_piece(Run *r, double left, Piece *q) {
   dt = row >= 0 ? smaller(dt, h) : last ? h : to_number(r, h);
   if (row >= 0 && is_before_fold(r, e, row, dt)) { dt = to_number(r, 0.5 * dt); row = -1; last = 0; }
   if (r->hold < dt) { dt = r->hold; row = -1; last = 0; } else r->hold = INFINITY;
-  double wanted = dt, safe = safe_length(r, e, by_series), good;
-  while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
+  double requested = dt, safe = safe_length(r, e, by_series), good;
+  while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == requested ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
   int grows = r->mode == r->length_mode && dt > r->length / STEADY;
-  int shrinks = dt <= wanted / FAR && !grows;
+  int shrinks = dt <= requested / FAR && !grows;
   r->shortened = larger(0, r->shortened + (shrinks ? 1 : -0.2));
   r->length_mode = r->mode;
-  r->length = dt == wanted ? h : dt;
-  int swallowed = dt < wanted && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
+  r->length = dt == requested ? h : dt;
+  int swallowed = dt < requested && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
   if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return 0; }
-  if (dt < wanted) row = -1, last = 0;
+  if (dt < requested) row = -1, last = 0;
   if (row < 0) watch_decay(r, e, by_series);
   if (r->wants_program) return 0;
   *q = (Piece){dt, row, last && dt == h};
@@ -472,7 +472,7 @@ static void step(Run *r) {
     }
   }
   else if (!q.last) {
-    if (r->s->sets) look_at_sets(r);
+    if (r->s->sets) check_sets(r);
     watch_two_fold(r);
   }
 }

@@ -139,7 +139,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->instant.running = 0;
   r->instant.tied = -1;
   memset(r->instant.passing, 0, s->rules.atoms);
-  memset(r->instant.unmet, 0, s->rules.triggers);
+  memset(r->instant.unfired, 0, s->rules.triggers);
   memset(&r->since, 0, offsetof(Run, past) - offsetof(Run, since));
   end_implicit(r);
   r->hold = INFINITY;
@@ -185,8 +185,8 @@ static int go_on(Run *r, int64_t *budget) {
 int run_continue(Run *r, int64_t budget) { return go_on(r, &budget); }
 
 /* The first stop or reset whose condition was true at the start and that has not happened; -1 if there is none. */
-static int unmet_event(const Run *r) {
-  for (int k = 0; k < r->s->rules.triggers; k++) if (r->instant.unmet[k]) return r->s->rules.trigger_event[k];
+static int unfired_event(const Run *r) {
+  for (int k = 0; k < r->s->rules.triggers; k++) if (r->instant.unfired[k]) return r->s->rules.trigger_event[k];
   return -1;
 }
 
@@ -198,7 +198,7 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
   numbers[3] = r->t_error;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
                     r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts,
-                    unmet_event(r), r->implicit_count};
+                    unfired_event(r), r->implicit_count};
   memcpy(counts, head, sizeof head);
   memcpy(active, r->active, sizeof(int32_t) * r->active_count);
   memcpy(several, r->several, sizeof(int32_t) * r->several_count);
@@ -294,8 +294,8 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   if (m->length > 0) r->length_mode = r->mode;
   for (int k = 0; k < HISTORY && k < m->history; k++) {
     int64_t pattern = m->past[k].pattern;
-    Met met = {(int)(pattern >> 32 & 255), (int)(int32_t)pattern, 0};
-    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(pattern >> 40), met};
+    Guard guard = {(int)(pattern >> 32 & 255), (int)(int32_t)pattern, 0};
+    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(pattern >> 40), guard};
   }
 }
 

@@ -30,7 +30,7 @@ static int passes_filter(const Run *r, int event, const int8_t *side) {
 
 /* Values of the atoms at a state, and which of them are zero to rounding; what was zero, and is not moved by more
  * than the error of its root, still is. */
-static void look(Run *r, const double *x) {
+static void evaluate_atoms(Run *r, const double *x) {
   const System *s = r->s;
   Instant *i = &r->instant;
   double *weight = r->vector;
@@ -154,7 +154,7 @@ static int has_values(const Run *r) {
 /* The state and the sides after a jump. */
 static void after_jump(Run *r, int event) {
   Instant *i = &r->instant;
-  look(r, r->x);
+  evaluate_atoms(r, r->x);
   for (int a = 0; a < r->s->rules.atoms; a++) {
     if (i->zero[a]) continue; /* both sides are kept until the motion decides */
     i->side[a] = i->view[a] = (int8_t)sign_of(i->value[a]);
@@ -227,9 +227,9 @@ static void serve_event(Run *r, int served) {
   for (int k = u->triggers - 1; k >= 0; k--)
     if (u->trigger_event[k] == served) {
       if (i->pending[k]) kept = k;
-      i->pending[k] = i->unmet[k] = 0;
+      i->pending[k] = i->unfired[k] = 0;
     }
-  r->met = (Met){r->now.kind[row], r->now.index[row], r->now.side[row]};
+  r->guard = (Guard){r->now.kind[row], r->now.index[row], r->now.side[row]};
   i->last = served;
   if (served < r->s->stops) {
     event(r, STOP, r->mode, row, r->x);
@@ -335,7 +335,7 @@ static void end_instant(Run *r) {
   if (r->event_count == i->counted) return;
   int before = r->mode;
   see_limit(r);
-  if (r->mode != before && r->status == RUNNING) { look(r, r->x); leave_zeros(r); }
+  if (r->mode != before && r->status == RUNNING) { evaluate_atoms(r, r->x); leave_zeros(r); }
   if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
 }
 
@@ -393,7 +393,7 @@ static void arrive(Run *r, const Expansion *e, double dt, int tied) {
       if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
       renote(r);
     }
-  look(r, r->x);
+  evaluate_atoms(r, r->x);
   for (int a = 0; a < u->atoms; a++) {
     double slope;
     if (i->zero[a] && !i->passing[a] && i->side[a] && u->way[a] != UNWATCHED) {
@@ -439,7 +439,7 @@ static void begin_events(Run *r, const double *motion) {
   memset(i->pending, 0, u->triggers);
   memset(i->passing, 0, u->atoms);
   for (int c = 0; c < u->clocks; c++) count_ticks(r, c);
-  look(r, r->x);
+  evaluate_atoms(r, r->x);
   if (motion) {
     read_motion(r, motion);
     if (i->running) { i->unsettled |= !i->settled; return; }
@@ -457,10 +457,10 @@ static void begin_events(Run *r, const double *motion) {
   for (int k = 0; k < u->triggers; k++) {
     int event = u->trigger_event[k], two = (k && u->trigger_event[k - 1] == event)
                                            || (k + 1 < u->triggers && u->trigger_event[k + 1] == event);
-    int arrived = triggers(r, k, i->side) && !triggers(r, k, i->now), wanted = u->initially[event];
-    if (wanted > 0 ? triggers(r, k, i->side) : wanted < 0 && event >= r->s->stops && arrived && !two) pend(r, k);
-    i->unmet[k] = wanted < 0 && !two && !(u->flags[event] & LEVEL) && !i->pending[k] && triggers(r, k, i->side);
-    if (two && wanted < 0 && event >= r->s->stops && arrived && i->zero[event]
+    int arrived = triggers(r, k, i->side) && !triggers(r, k, i->now), initial = u->initially[event];
+    if (initial > 0 ? triggers(r, k, i->side) : initial < 0 && event >= r->s->stops && arrived && !two) pend(r, k);
+    i->unfired[k] = initial < 0 && !two && !(u->flags[event] & LEVEL) && !i->pending[k] && triggers(r, k, i->side);
+    if (two && initial < 0 && event >= r->s->stops && arrived && i->zero[event]
         && turns_round(r, event, r->drop[r->now.atoms + event], i->side[event]))
       finish(r, NON_UNIQUE, TWO_SIDED, event - r->s->stops);
   }

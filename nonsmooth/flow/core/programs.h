@@ -1,6 +1,6 @@
 /* Programs as lists of instructions, and the interpreter that runs them: no system is compiled.
  *
- * The lists are written by nonsmooth/model/printing/tape.py; the operations and the Taylor rules have the
+ * The lists are written by nonsmooth/model/printing/instructions.py; the operations and the Taylor rules have the
  * numbers of its enumerations. What does not move (constants, parameters) is computed once a run.
  */
 

@@ -66,7 +66,7 @@ typedef struct {
   Rules rules;
   Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
   const Series *implicit; /* with those derivatives, for implicit steps, or none */
-  const int32_t *places; /* states in an order in which what is coupled is close, or none */
+  const int32_t *ordering; /* states in an order in which what is coupled is close, or none */
 } System;
 
 enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
@@ -82,7 +82,7 @@ typedef struct {
   int64_t jumps, counted, sampled;
 #define INSTANT_ARRAYS(OF) \
   OF(int8_t, side, atoms) OF(int8_t, view, atoms) OF(int8_t, now, atoms) OF(int8_t, passing, atoms) \
-  OF(int8_t, zero, atoms) OF(int8_t, pending, triggers) OF(int8_t, was, triggers) OF(int8_t, unmet, triggers) \
+  OF(int8_t, zero, atoms) OF(int8_t, pending, triggers) OF(int8_t, was, triggers) OF(int8_t, unfired, triggers) \
   OF(double, value, atoms) OF(double, noise, atoms) OF(double, residual, atoms) \
   OF(double, germ, GERM * atoms) /* first coefficients on arrival */ \
   OF(double, trigger_x, s->rules.keeps ? triggers * s->n : 0) OF(double, arrived, s->n) \
@@ -176,13 +176,13 @@ typedef struct {
 } Output;
 
 /* The guard that is served. */
-typedef struct { int kind, index, side; } Met;
+typedef struct { int kind, index, side; } Guard;
 
 /* Of a guard that ended the mode before so many coefficients vanish. */
 typedef struct { int kind, index, side, zeros; } Known;
 
 /* An event that may be one of many that accumulate: the time since the one before, and what was served. */
-typedef struct { double interval; int64_t pattern; int32_t kind; Met met; } Happened;
+typedef struct { double interval; int64_t pattern; int32_t kind; Guard guard; } Happened;
 
 typedef struct Implicit Implicit; /* implicit.c */
 
@@ -204,7 +204,7 @@ typedef struct {
   double since, length, shortened, held_length, t_error;
   int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history, hits, kept;
   int32_t where, repelling, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
-  Met met;
+  Guard guard;
   Happened past[HISTORY];
   int32_t several[SEVERAL];
   double size, time_size, hold; /* hold: the step's end before zeros of a guard that are not told apart */
@@ -252,7 +252,7 @@ typedef struct {
   OF(double, of_defect, rows) OF(int8_t, key, w + 8 * (s->rules.discrete + s->tables)) /* of_defect: errors of guards */ \
   OF(int32_t, cell, w) OF(double, levels, all + 1) /* of tables; values of functions onto which a state is put */ \
   OF(double, jumped, s->resets ? HISTORY * n : 0) /* by the last events, states where those are resets */ \
-  OF(double, met_at, rows) OF(double, hidden, rows) /* root of each guard in the step, or -1; what rounding hides of it */
+  OF(double, root_at, rows) OF(double, hidden, rows) /* root of each guard in the step, or -1; what rounding hides of it */
   RUN_ARRAYS(DECLARED)
 } Run;
 

@@ -465,7 +465,7 @@ static int rank_of(const Run *r, const Expansion *e, int row) {
 
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
-  double *time = r->met_at;
+  double *time = r->root_at;
   int first = -1, found = 0, rows = e->l.rows;
   r->hold = INFINITY;
   if (r->repelling) turn_exits(r, e);

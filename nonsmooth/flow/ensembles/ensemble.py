@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from ...model import FilippovSystem, OptionError, require_system
 from ..constants import KINDS
 from ..engine.building.compilers import ADVICE, CompilerError, find_compiler
+from ..engine.interpreter import interpreter_for, library
 from ..engine.lanes import lanes_for
-from ..engine.tape import library, tape_for
 from ..options import Options
 from ..other_names import hinted
 from ..results import Chunk, Collected, Ensemble
@@ -190,13 +190,13 @@ def _is_stiff(system: FilippovSystem, options: Options, starts: Starts) -> bool:
     """Whether some of the runs take implicit steps, which several in step do not."""
     if options.method != "auto":
         return options.method == "stiff"
-    tape = tape_for(system, options)
+    engine = interpreter_for(system, options)
     probed = (
         {starts.count // 2} if starts.count < _MANY else {0, starts.count // 2, starts.count - 1}
     )
     for first in sorted(probed):
         x, p = starts.part(first, first + 1)
-        if tape.is_stiff(x[0], p[0] if p.ndim > 1 else p, options):
+        if engine.is_stiff(x[0], p[0] if p.ndim > 1 else p, options):
             return True
     return False
 

@@ -276,8 +276,8 @@ INLINE void states_at(const Step *e, T at, int degree, T *x, T *slope) {
 
 #if ROWS + GUARDS > 0
 /* Lanes where field and guards at a time of the step, and states there, are not those of the polynomials. A surface or a
- * stop that is ``met`` has to be zero to the tolerance of a step: else its root is improved by the driver. */
-INLINE I disagrees(const Lanes *s, const Step *e, int mode, T at, int degree, I met, T *x, I *missed) {
+ * stop that is ``located`` has to be zero to the tolerance of a step: else its root is improved by the driver. */
+INLINE I disagrees(const Lanes *s, const Step *e, int mode, T at, int degree, I located, T *x, I *missed) {
   T f[ROWS + 1], guard[GUARDS + 1], slope[N], rate = rate_of(e, at);
   I wrong = {0};
   states_at(e, at, degree, x, slope);
@@ -290,7 +290,7 @@ INLINE I disagrees(const Lanes *s, const Step *e, int mode, T at, int degree, I 
     I counts = (M > 0 && j == 1) || j >= SLOTS ? has_second(s, mode) : ~NONE;
     wrong |= counts & ~(I)(ABS(guard[m] - series_at(e->g[j], at, degree)) <= WRONG * e->of_guards[j]);
     I height = j >= SLOTS ? NONE : j >= FIRST_STOP ? ~NONE : j == 0 ? ~has_second(s, mode) : NONE;
-    *missed |= height & (met == j + 1) & ~(I)(ABS(guard[m]) <= e->of_guards[j]);
+    *missed |= height & (located == j + 1) & ~(I)(ABS(guard[m]) <= e->of_guards[j]);
   }
   return wrong;
 }
@@ -405,7 +405,7 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   e->last &= time_of(e, e->dt) >= e->left;
   if (!SET || any(e->last)) e->dt = SELECT(e->last, place_of(e, e->left), e->dt);
   unclear |= e->last & (e->slot != 0) & (e->slot <= FIRST_STOP); /* a mode without a step */
-  T wanted = e->dt, end[N];
+  T requested = e->dt, end[N];
   unclear |= verify(s, e, mode, end);
   T passed = time_of(e, e->dt);
   keep_start(s, e);
@@ -413,7 +413,7 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   s->t += passed;
   s->since += passed;
   if (TIMED) s->x[N - 1] = s->t;
-  if (SET || ROWS + GUARDS > 0) s->length = SELECT(e->dt < wanted, passed, MIN(time_of(e, e->h), e->left));
+  if (SET || ROWS + GUARDS > 0) s->length = SELECT(e->dt < requested, passed, MIN(time_of(e, e->h), e->left));
   s->steps += 1;
   unclear |= ~finite_lanes(s);
   unclear |= land(s, w, e, mode, s->live & ~unclear);

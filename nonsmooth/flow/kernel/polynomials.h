@@ -207,12 +207,12 @@ static __attribute__((noinline)) double hard_root(const T *a, int l, int stop, i
   double c[P + 1], d = 0;
   for (int k = 0; k <= P; k++) c[k] = LANE(a[k], l);
   int direction = stop < 0 ? 0 : flipped ? -DIRECTION[stop] : DIRECTION[stop];
-  double s = c[0] > 0 ? first_root(c, P, 1) : 0, met = s;
+  double s = c[0] > 0 ? first_root(c, P, 1) : 0, at = s;
   if (hides && s != 0 && hides_roots(c, P, 1, s)) return NAN;
   /* What is positive and is to fall has its crossing there, and what stays positive has none. */
-  if (stop >= 0 && !(c[0] > 0 && (s < 0 || direction <= 0))) met = first_crossing(c, P, 1, direction);
-  for (int k = P; k > 0; k--) d = d * met + k * c[k];
+  if (stop >= 0 && !(c[0] > 0 && (s < 0 || direction <= 0))) at = first_crossing(c, P, 1, direction);
+  for (int k = P; k > 0; k--) d = d * at + k * c[k];
   *slope = d;
-  return stop >= 0 && s > 0 && met > s ? NAN : met;
+  return stop >= 0 && s > 0 && at > s ? NAN : at;
 }
 #endif

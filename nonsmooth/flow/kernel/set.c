@@ -181,8 +181,8 @@ OUTLINED I reach(Lanes *s, Work *w, I which, I *unclear) {
   double shortest = pow(OVERFLOW, -1.0 / P);
   I floor = (radius <= VANISHES * scale) | (I)(dt < MAX(BC(shortest), TENFOLD * SHORTEST * ABS(s->t)));
   *unclear |= which & ((~holds & (floor | (I)(radius <= PASSED * scale))) | ~(I)(radius > 0));
-  I met = which & holds & (dt > 0) & (dt < INFINITY);
-  *unclear |= which & floor & ~met;
+  I reached = which & holds & (dt > 0) & (dt < INFINITY);
+  *unclear |= which & floor & ~reached;
   UNROLL for (int i = 0; i < M; i++) { u[i] = h[i] / radius; b[i] = p.a[i] + h[i] / dt; }
   solve_block(p.m, b, mean);
   field_values(s->x, s->q, LAMBDA(mean), field);
@@ -215,18 +215,18 @@ OUTLINED I reach(Lanes *s, Work *w, I which, I *unclear) {
       close &= exact | (I)((turn[i] + ABS(field[i] - other[i])) * dt <= whole + EPSILON * (s->size + ABS(s->x[i])));
     }
   }
-  met &= close | floor;
-  *unclear |= met & ((I)(dt > o->t_end - s->t) | (floor & ~(I)(bend <= radius)));
-  if (!any(met)) return met;
-  UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(met, end[i], s->x[i]);
-  s->t = SELECT(met, s->t + dt, s->t);
-  s->since = SELECT(met, s->since + dt, s->since);
+  reached &= close | floor;
+  *unclear |= reached & ((I)(dt > o->t_end - s->t) | (floor & ~(I)(bend <= radius)));
+  if (!any(reached)) return reached;
+  UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(reached, end[i], s->x[i]);
+  s->t = SELECT(reached, s->t + dt, s->t);
+  s->since = SELECT(reached, s->since + dt, s->since);
   if (TIMED) s->x[N - 1] = s->t;
-  s->steps -= met;
-  *unclear |= project(s, met);
+  s->steps -= reached;
+  *unclear |= project(s, reached);
   find_pull(s, &later);
-  *unclear |= met & ~(later.definite & (length_of(later.y) < 1 - ROOM_TO_ROLL));
-  return met;
+  *unclear |= reached & ~(later.definite & (length_of(later.y) < 1 - ROOM_TO_ROLL));
+  return reached;
 }
 
 /* Lanes on the set at the end of friction's range leave it in the direction of friction; those where they are not. */
@@ -394,23 +394,23 @@ INLINE void polish_slip(Step *e) {
 /* The end of a step: lanes that go on in the next pool are ``gone``. Lanes where that is not clear. */
 OUTLINED I land(Lanes *s, Work *w, Step *e, int mode, I live) {
   T h[M], g[M][N], u[M];
-  I unclear = {0}, met = live & (e->slot == 1), goes_on = live & (e->slot == 0) & ~e->last;
+  I unclear = {0}, reached = live & (e->slot == 1), goes_on = live & (e->slot == 0) & ~e->last;
   if (mode == AWAY) {
     T scale = heights(s, h, g), radius = length_of(h);
     if (any(s->behind)) s->behind &= radius <= LEFT * scale;
     I small = (radius <= CLOSE * scale) | ((e->stretch > 0) & (radius * radius * radius <= SMALL * limits(w)->rtol * scale * scale * scale));
-    e->gone = met | (goes_on & small);
-    s->fell = met;
+    e->gone = reached | (goes_on & small);
+    s->fell = reached;
   } else if (mode == ON) {
     unclear |= project(s, s->live);
-    e->gone = met & ~unclear;
+    e->gone = reached & ~unclear;
     if (!any(e->gone)) return unclear;
     unclear |= e->gone & ~(I)(e->slope < -1e-10 * e->g[0][0]);
     unclear |= release(s, w, e->gone);
     unclear |= change_mode(s, w, e->gone & ~unclear, EXIT, SLIP_GUARD, 0);
     s->left_at = SELECT(e->gone & ~unclear, s->t, s->left_at);
   } else {
-    unclear |= met | (live & ~(I)(e->g[0][0] > 0));
+    unclear |= reached | (live & ~(I)(e->g[0][0] > 0));
     e->gone = goes_on;
     T distance = values_at(e->g[0], P, e->dt, e->dt * e->dt) * e->dt * e->dt;
     direction_at(e, e->dt, P, u);

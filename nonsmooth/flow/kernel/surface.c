@@ -134,9 +134,9 @@ INLINE I remember(Lanes *s, I which, I, I) {
 #endif
 
 #if M > 0
-/* Lanes that met the surface or an end of sliding change their mode; ``slope`` is that of the guard
+/* Lanes that reached the surface or an end of sliding change their mode; ``slope`` is that of the guard
  * over the step. Those that are not clear are returned, and have no event. */
-INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
+INLINE I change_modes(Lanes *s, Work *w, I reached, I up, I down, T slope) {
   T value[2], scale[2];
   lie(s, value, scale);
   I ends = up | down, was = s->slides, unclear = {0};
@@ -145,12 +145,12 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   I attracts = (up & (I)(value[1] > clear * scale[1])) | (down & (I)(value[0] < -clear * scale[0]));
   unclear |= ends & ~(steep & attracts);
   I was_above = s->above;
-  unclear |= decide(s, met, value, scale);
+  unclear |= decide(s, reached, value, scale);
   s->slides &= ~ends;
   s->above = (s->above & ~ends) | up;
   s->drop = (s->drop & ~ends) | (ends & 2);
   unclear |= s->events + 1 >= limits(w)->max_events;
-  I all = (met | ends) & ~unclear & (s->slides ^ was | s->above ^ was_above);
+  I all = (reached | ends) & ~unclear & (s->slides ^ was | s->above ^ was_above);
   I entered = all & s->slides & ~was, kind = (entered & ENTRY) | (ends & EXIT) | (~entered & ~ends & CROSSING);
   all &= ~remember(s, all, kind, ends & EXIT_GUARD);
   count(s, w, ENTRY, entered & all);
@@ -158,7 +158,7 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   count(s, w, CROSSING, all & ~ends & ~entered);
   set_lambda(s);
   note_modes(s, w, all, mode_of(s));
-  return (met | ends) & ~all;
+  return (reached | ends) & ~all;
 }
 
 /* Lanes that slide towards a two-fold where the sliding field is 0/0. */
@@ -174,15 +174,15 @@ INLINE I near_two_fold(const Lanes *s, double tolerance) {
 INLINE I land(Lanes *s, Work *w, Step *e, int mode, I live) {
   I unclear = {0};
 #if M > 0
-  I slides = live & s->slides, met = live & ~s->slides & (e->slot == 1), up = slides & (e->slot == 1), down = live & (e->slot == 2);
-  if (any(met | slides)) unclear |= project(s, met | s->slides);
+  I slides = live & s->slides, reached = live & ~s->slides & (e->slot == 1), up = slides & (e->slot == 1), down = live & (e->slot == 2);
+  if (any(reached | slides)) unclear |= project(s, reached | s->slides);
   I on = slides & (e->slot == 0) & ~e->last;
   if (!CANCELLED && any(on)) unclear |= on & near_two_fold(s, limits(w)->rtol);
-  met &= ~unclear;
+  reached &= ~unclear;
   up &= ~unclear;
   down &= ~unclear;
-  if (any(met | up | down)) unclear |= change_modes(s, w, met, up, down, e->slope);
-  s->length = SELECT(met | up | down, BC(0), s->length);
+  if (any(reached | up | down)) unclear |= change_modes(s, w, reached, up, down, e->slope);
+  s->length = SELECT(reached | up | down, BC(0), s->length);
 #endif
   return unclear;
 }

@@ -11,7 +11,7 @@ typedef struct Collocation Collocation;
 struct Collocation {
   const Radau *method;
   int32_t n, moving, is_fresh, rejected, band, *pivot;
-  const int32_t *places; /* states in an order in which what is coupled is close, or none */
+  const int32_t *ordering; /* states in an order in which what is coupled is close, or none */
   void *of;
   int (*rate_at)(void *of, int stage, const double *x, double *rate);
   int (*jacobian_at)(void *of, int stage, const double *x, double *jacobian);
@@ -36,16 +36,16 @@ static size_t place_collocation(Collocation *m, char *base, size_t used) {
 }
 
 /* The state in the place k of the matrices, in which what belongs together is close. */
-static int placed(const Collocation *m, int k) { return m->places ? m->places[k] : k; }
+static int state_at(const Collocation *m, int k) { return m->ordering ? m->ordering[k] : k; }
 
 /* Largest distance from the diagonal. */
 static int band_of(const Collocation *m, const double *jacobian) {
   int n = m->n, band = 0;
   for (int i = 0; i < n; i++) {
-    const double *row = jacobian + (int64_t)placed(m, i) * n;
+    const double *row = jacobian + (int64_t)state_at(m, i) * n;
     for (int j = 0; j < n; j++) {
       int far = i > j ? i - j : j - i;
-      if (far > band && row[placed(m, j)] != 0) band = far;
+      if (far > band && row[state_at(m, j)] != 0) band = far;
     }
   }
   return band;
@@ -58,7 +58,7 @@ static int factor_filter(Collocation *m, const double *jacobian, double h, doubl
   if (band > m->band) m->band = band;
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++)
-      factors[(int64_t)i * n + j] = (i == j ? shift : 0) - jacobian[(int64_t)placed(m, i) * n + placed(m, j)];
+      factors[(int64_t)i * n + j] = (i == j ? shift : 0) - jacobian[(int64_t)state_at(m, i) * n + state_at(m, j)];
   return factor_real(factors, n, m->band, pivot);
 }
 
@@ -70,7 +70,7 @@ static int factor_pairs(Collocation *m, double h) {
     for (int i = 0; i < n; i++)
       for (int j = 0; j < n; j++) {
         double *c = f + 2 * ((int64_t)i * n + j);
-        c[0] = (i == j ? eigenvalue[0] / h : 0) - m->jacobian[(int64_t)placed(m, i) * n + placed(m, j)];
+        c[0] = (i == j ? eigenvalue[0] / h : 0) - m->jacobian[(int64_t)state_at(m, i) * n + state_at(m, j)];
         c[1] = i == j ? eigenvalue[1] / h : 0;
       }
     if (!factor_complex(f, n, m->band, m->pivot + (q + 1) * n)) return 0;
@@ -81,9 +81,9 @@ static int factor_pairs(Collocation *m, double h) {
 /* (g/h - J)^-1 times a rate, in place. */
 static void filter(const Collocation *m, const double *factors, const int32_t *pivot, double *rate) {
   double *b = m->work;
-  for (int i = 0; i < m->n; i++) b[i] = rate[placed(m, i)];
+  for (int i = 0; i < m->n; i++) b[i] = rate[state_at(m, i)];
   solve_real(factors, m->n, m->band, pivot, b);
-  for (int i = 0; i < m->n; i++) rate[placed(m, i)] = b[i];
+  for (int i = 0; i < m->n; i++) rate[state_at(m, i)] = b[i];
 }
 
 /* In the weights. */
@@ -123,7 +123,7 @@ static double correct(Collocation *m) {
     memset(own, 0, sizeof(double) * 2 * n);
     for (int i = 0; i < s; i++)
       for (int k = 0; k < n; k++) {
-        double value = m->residual[i * n + placed(m, k)];
+        double value = m->residual[i * n + state_at(m, k)];
         if (q) { own[2 * k] += left[2 * i] * value; own[2 * k + 1] += left[2 * i + 1] * value; }
         else own[k] += left[2 * i] * value;
       }
@@ -131,7 +131,7 @@ static double correct(Collocation *m) {
     else solve_real(m->factors, n, m->band, m->pivot, own);
     for (int i = 0; i < s; i++)
       for (int k = 0; k < n; k++)
-        change[i * n + placed(m, k)] +=
+        change[i * n + state_at(m, k)] +=
             q ? 2 * (right[2 * i] * own[2 * k] - right[2 * i + 1] * own[2 * k + 1]) : right[2 * i] * own[k];
   }
   for (int i = 0; i < s; i++) {

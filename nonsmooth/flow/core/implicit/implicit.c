@@ -119,7 +119,7 @@ static int begin_implicit(Run *r) {
   if (!m) return 0;
   m->c = (Collocation){.method = RADAU + (r->o.rtol < SEVEN_STAGES && r->order >= 7), .n = r->n};
   m->c.moving = r->s->dimension;
-  m->c.places = r->s->places;
+  m->c.ordering = r->s->ordering;
   m->c.of = r;
   m->c.rtol = r->o.rtol;
   m->c.rate_at = rate_at_stage;

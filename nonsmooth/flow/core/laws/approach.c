@@ -85,7 +85,7 @@ static void jump(Run *r, const double *rate, double dt) {
 static double shortest(const Run *r) { return pow(OVERFLOW, -1.0 / r->order); }
 
 /* Whether the state is on a set, or as close as no series can begin; after surface_values. */
-static int is_met(Run *r, const int8_t *letter, int f, const double *h, const double *scales_of) {
+static int is_reached(Run *r, const int8_t *letter, int f, const double *h, const double *scales_of) {
   int k = size_of(r, f);
   int32_t own[3];
   double a[3], m[9], scale = scale_of_set(r, f, scales_of), radius = length_of(h + f, k), speed = 0;
@@ -112,7 +112,7 @@ static void near_set(Run *r, int row, int fell) {
   int f = r->now.index[row], k = size_of(r, f), n = r->n, before = r->mode;
   int32_t own[3];
   double h[3], a[3], m[9], u[3], b[3], mean[3], frozen[3], dt, c = 0;
-  r->met = (Met){NEAR_GUARD, f, 0};
+  r->guard = (Guard){NEAR_GUARD, f, 0};
   if (r->letter[f] == 0) return; /* friction's limit has fallen: the next step sees its digits */
   const double *height = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
   for (int i = 0; i < k; i++) {
@@ -244,7 +244,7 @@ static void find_idle(Run *r) {
 }
 
 /* After a step that ended with no guard: sets that are close may be reached to rounding. */
-static void look_at_sets(Run *r) {
+static void check_sets(Run *r) {
   for (int row = 0; row < r->now.rows; row++) {
     int f = r->now.index[row], k = size_of(r, f);
     if (r->now.kind[row] != NEAR_GUARD || r->letter[f] < OFF || r->drop[row]) continue;

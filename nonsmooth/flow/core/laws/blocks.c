@@ -161,7 +161,7 @@ static int place_unknowns(const Block *k, const int8_t *position, double *nu, do
 }
 
 /* The position that a vector takes next, from its first row on: inside ``room``, or w along nu. */
-static int wanted_of_vector(const Block *k, int i, int position, const double *nu, double zero, double room) {
+static int next_of_vector(const Block *k, int i, int position, const double *nu, double zero, double room) {
   double along = 0, terms;
   if (k->span[i] < 0 || !allows(k, i, position == HELD ? TOP : HELD)) return position;
   if (position == HELD) return length_of(nu + i, k->span[i]) > room ? TOP : HELD;
@@ -170,10 +170,10 @@ static int wanted_of_vector(const Block *k, int i, int position, const double *n
 }
 
 /* The position that an element takes next: its own where that is consistent. */
-static int wanted(const Block *k, int i, int position, const double *nu) {
+static int next_position(const Block *k, int i, int position, const double *nu) {
   double terms, w = rate_of(k, i, nu, &terms), zero = zero_of(k, i, terms), bound = bound_of(k, i, nu);
   double low = k->is_contact[i] ? 0 : -bound, room = room_zero(k, i, zero, bound);
-  if (span_of(k, i)) return wanted_of_vector(k, i, position, nu, zero * bound, bound + room);
+  if (span_of(k, i)) return next_of_vector(k, i, position, nu, zero * bound, bound + room);
   if (position == HELD) {
     if (allows(k, i, TOP) && nu[i] > bound + room) return TOP;
     if (allows(k, i, BOTTOM) && nu[i] < low - room) return BOTTOM;
@@ -192,13 +192,13 @@ static int pivot_block(const Block *k, int8_t *position, double *nu, int most, d
     if (!place_unknowns(k, position, nu, work, pivot)) return 0;
     int wrong = 0, first = -1, next = 0;
     for (int i = 0; i < k->size; i++) {
-      int want = wanted(k, i, position[i], nu);
-      if (want != position[i] && wrong++ == 0) { first = i; next = want; }
+      int other = next_position(k, i, position[i], nu);
+      if (other != position[i] && wrong++ == 0) { first = i; next = other; }
     }
     if (!wrong) return 1;
     if (wrong < best) { best = wrong; patience = 10; }
     if (--patience > 0) {
-      for (int i = 0; i < k->size; i++) pivot[i] = wanted(k, i, position[i], nu);
+      for (int i = 0; i < k->size; i++) pivot[i] = next_position(k, i, position[i], nu);
       for (int i = 0; i < k->size; i++) position[i] = (int8_t)pivot[i];
     } else position[first] = (int8_t)next;
   }
@@ -437,7 +437,7 @@ static int enumerate(const Block *k, double *found, double *work, int32_t *pivot
       const double *nu = each + (some - 1) * n;
       fits = 1;
       for (int i = 0; i < n && fits; i++) {
-        fits = wanted(k, i, position[i], nu) == position[i];
+        fits = next_position(k, i, position[i], nu) == position[i];
         double bound = bound_of(k, i, nu);
         fits = fits && (k->is_contact[i] || k->state[i] != UNDECIDED || bound >= -room_zero(k, i, k->floor[i], bound));
       }

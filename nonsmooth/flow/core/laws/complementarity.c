@@ -203,7 +203,7 @@ static int become_consistent(Run *r) {
   for (int i = 0; i < n; i++) if (p[i] > 0 && keeps_height(r, own[i])) closed[count++] = own[i];
   project(r, closed, count);
   for (int i = 0; i < n && !count; i++) if (p[i] > 0) closed[count++] = own[i];
-  r->met = (Met){SURFACE_GUARD, count ? closed[0] : own[0], 1};
+  r->guard = (Guard){SURFACE_GUARD, count ? closed[0] : own[0], 1};
   note(r);
   return 1;
 }

@@ -36,7 +36,7 @@ static int is_of_newton(const Block *k, const int8_t *position, const double *nu
   for (int i = 0; i < k->size; i++) {
     double terms, w = rate_of(k, i, nu, &terms);
     int is_open = k->is_contact[i] && position[i] == BOTTOM, is_free = is_open || (plastic && position[i] == HELD);
-    if (is_open ? w > slack[i] + zero_of(k, i, terms) : !is_free && wanted(k, i, position[i], nu) != position[i]) return 0;
+    if (is_open ? w > slack[i] + zero_of(k, i, terms) : !is_free && next_position(k, i, position[i], nu) != position[i]) return 0;
   }
   return 1;
 }

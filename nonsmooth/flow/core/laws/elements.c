@@ -235,14 +235,14 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
     if (gap < 0 && !(fabs(gap) <= ON_SURFACE * scale[r->m + j])) finish(r, INCONSISTENT, BEHIND, j);
   }
   require_joints(r, scale);
-  int met = 0;
+  int reached = 0;
   for (int i = 0; i < r->width; i++) {
     int rests = fabs(h[i]) <= ON_SURFACE * scale[i], s = set_of(r, i), sure = i == certain;
     if (has_law(r, i, RELAY_LAW) || has_law(r, i, JOINT_LAW) || has_law(r, i, TABLE_LAW)) continue; /* nothing is decided */
     rests |= !keeps_height(r, i); /* its function holds unknowns: it is decided with them */
     if (s >= 0) {
-      if (i == s) met = letter[s] <= OFF && !is_unloaded(r, letter, s, scale) && is_met(r, letter, s, h, scale);
-      rests = met;
+      if (i == s) reached = letter[s] <= OFF && !is_unloaded(r, letter, s, scale) && is_reached(r, letter, s, h, scale);
+      rests = reached;
       sure = certain >= s && certain < s + size_of(r, s);
     }
     if (letter[i] != 0 && passes_to(r, i, scale)) continue; /* its letter follows from a lower derivative */
@@ -338,10 +338,10 @@ static int8_t side_of_relay(const Run *r, int i, double h) {
 /* Relays whose times cannot be told apart switch together. */
 static void serve_relay(Run *r, int row) {
   int before = r->mode;
-  double last = r->met_at[row] + TIE * time_scale(r);
+  double last = r->root_at[row] + TIE * time_scale(r);
   for (int k = 0; k < r->now.atoms; k++) {
     int i = r->now.index[k];
-    if (has_law(r, i, RELAY_LAW) && r->met_at[k] >= 0 && r->met_at[k] <= last) r->letter[i] = (int8_t)-r->letter[i];
+    if (has_law(r, i, RELAY_LAW) && r->root_at[k] >= 0 && r->root_at[k] <= last) r->letter[i] = (int8_t)-r->letter[i];
   }
   settle_in(r);
   if (r->status == RUNNING) event(r, change_kind(r, before, r->mode), before, row, r->x);
@@ -452,12 +452,12 @@ static void turn_cells(Run *r) {
 
 /* Tables whose times cannot be told apart from that of a guard pass with it, as does its own. */
 static void pass_cells(Run *r, int row) {
-  double last = r->met_at[row] + TIE * time_scale(r);
+  double last = r->root_at[row] + TIE * time_scale(r);
   const double *h = r->s->tables ? surface_values(r, r->x) : 0;
   for (int k = 0; r->s->tables && k < r->now.atoms; k++) {
     int i = r->now.index[k], side = r->now.side[k];
     if (!has_law(r, i, TABLE_LAW)) continue;
-    int tied = r->met_at[k] >= 0 && r->met_at[k] <= last && is_at_level(r, i, side, h[i]);
+    int tied = r->root_at[k] >= 0 && r->root_at[k] <= last && is_at_level(r, i, side, h[i]);
     if (k == row) r->passed = breakpoint(r, i, side);
     if (k == row || tied) set_cell(r, i, r->cell[i] - side);
     if (k == row || tied) h = surface_values(r, r->x);
@@ -497,8 +497,8 @@ static void serve_table(Run *r, int row) {
 
 /* Number in results of the function whose guard was served. */
 static int shown_index(const Run *r) {
-  int i = r->met.index;
-  if (is_atom(r->met.kind)) return i;
+  int i = r->guard.index;
+  if (is_atom(r->guard.kind)) return i;
   return element(r, i)->shown + (has_law(r, i, TABLE_LAW) ? cells_of(r, i)->shown[r->passed] : 0);
 }
 

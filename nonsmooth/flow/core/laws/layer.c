@@ -379,12 +379,12 @@ static int find_unknowns(Run *r, const Layout *l) {
 
 /* Where the multiplier of the one active surface comes from, and which way it moves; 0 where that is not known. */
 static int way_in_layer(Run *r, const Layout *l, double *from) {
-  int own = r->active[0], kind = r->met.kind;
+  int own = r->active[0], kind = r->guard.kind;
   double g[P + 1];
-  if (r->active_count != 1 || (kind == BRANCH_GUARD ? r->folded : r->met.index) != own) return 0;
-  *from = r->met.side;
-  if (kind == SURFACE_GUARD) return -r->met.side;
-  if (kind == EXIT_GUARD) return r->met.side;
+  if (r->active_count != 1 || (kind == BRANCH_GUARD ? r->folded : r->guard.index) != own) return 0;
+  *from = r->guard.side;
+  if (kind == SURFACE_GUARD) return -r->guard.side;
+  if (kind == EXIT_GUARD) return r->guard.side;
   if (kind != BRANCH_GUARD) return 0;
   memcpy(r->tried, r->unknowns, sizeof(double) * r->width);
   rate_along(r, l, r->tried, own, g);
@@ -401,9 +401,9 @@ static void keep_others(const Run *r, const int8_t *letter, int own, double *unk
 /* The element whose guard or fold ended the mode, if all other active ones are held as before and no unknown acts on
  * both; else -1. */
 static int moves_alone(Run *r, const int8_t *letter) {
-  int own = r->met.kind == BRANCH_GUARD ? r->folded : r->met.index, w = r->width, is_active = 0;
-  if (r->met.kind != SURFACE_GUARD && r->met.kind != EXIT_GUARD && r->met.kind != BRANCH_GUARD) return -1;
-  if (r->met.kind != BRANCH_GUARD && !r->met.side) return -1;
+  int own = r->guard.kind == BRANCH_GUARD ? r->folded : r->guard.index, w = r->width, is_active = 0;
+  if (r->guard.kind != SURFACE_GUARD && r->guard.kind != EXIT_GUARD && r->guard.kind != BRANCH_GUARD) return -1;
+  if (r->guard.kind != BRANCH_GUARD && !r->guard.side) return -1;
   error_scales(r, r->x, held_of(r, r->letter), r->unknowns);
   for (int k = 0; k < r->active_count; k++) {
     int i = r->active[k];
@@ -427,7 +427,7 @@ static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int
   int way = way_in_layer(r, l, &from);
   if (!way) return 0;
   keep_others(r, trial, own, r->tried);
-  count = roots_along(r, l, r->tried, own, from, way, r->met.kind == BRANCH_GUARD ? 2 : 0, root);
+  count = roots_along(r, l, r->tried, own, from, way, r->guard.kind == BRANCH_GUARD ? 2 : 0, root);
   for (int k = 0; k <= count && r->status == RUNNING; k++) {
     trial[own] = k < count ? 0 : (int8_t)way;
     keep_others(r, trial, own, r->found.unknowns);
@@ -442,7 +442,7 @@ static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int
 /* Whether a solution is the one that has just ended in a fold. */
 static int is_folded(const Run *r, const int8_t *letter, const double *unknowns) {
   double apart = 0;
-  if (r->met.kind != BRANCH_GUARD || memcmp(letter, r->letter, r->width)) return 0;
+  if (r->guard.kind != BRANCH_GUARD || memcmp(letter, r->letter, r->width)) return 0;
   for (int i = 0; i < r->width; i++) apart = larger(fabs(unknowns[i] - r->unknowns[i]), apart);
   return apart <= FOLD_APART;
 }

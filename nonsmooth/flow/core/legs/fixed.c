@@ -26,13 +26,13 @@ void fixed_terms(const Field *f, const double *p, const double *z, double *terms
 /* Legs ----------------------------------------------------------------------------------------------------- */
 
 /* Move all states to the ends of their legs. The number of a leg that fails and what is left of it, or -1. */
-int64_t fly_legs(const Legs *l, double *a, double tol, int64_t most_steps, double *left) {
+int64_t run_legs(const Legs *l, double *a, double tol, int64_t most_steps, double *left) {
   return integrate_legs(l, a, tol, most_steps, left, run_whole_flow);
 }
 
 /* The same in extended precision (as ``long double`` has it), for residuals of equations whose solution is known to
  * rounding. Results come in two parts: rounded, and in ``rest`` (results for each leg) what that leaves. */
-int64_t fly_legs_extended(const Legs *l, double *a, double tol, int64_t most_steps, double *left, double *rest) {
+int64_t run_legs_extended(const Legs *l, double *a, double tol, int64_t most_steps, double *left, double *rest) {
   int64_t room = 0;
   for (int64_t i = 0; i < l->count; i++) {
     room = room < field_work(l->field[i]) ? field_work(l->field[i]) : room;

@@ -65,7 +65,7 @@ static const double *derivative_row(const Run *r, int q) {
 }
 
 /* Whether an output's derivative is needed: by the series, and at a point also surfaces, gaps and factors. */
-static int is_wanted(const Run *r, const Expansion *e, int row, int at_point) {
+static int is_needed(const Run *r, const Expansion *e, int row, int at_point) {
   if (row < r->n || row >= r->n + r->width) return row < r->n || at_point;
   int letter = e->l.letter[row - r->n];
   return letter == 0 || letter == LEAVING || letter == LEFT_BEHIND;
@@ -242,7 +242,7 @@ static void measure_slopes(Run *r, const Expansion *e, Slopes *g, int at_point) 
     for (int q = g->first[j]; counts && q < g->first[j + 1]; q++) {
       const double *own = derivative_row(r, q);
       if (own != row || most[q] != room) known = terms_of(row = own, room = most[q]);
-      g->terms[q] = is_wanted(r, e, r->s->derivatives.row[q], at_point) ? known : 0;
+      g->terms[q] = is_needed(r, e, r->s->derivatives.row[q], at_point) ? known : 0;
       if (g->terms[q] && j < size) g->active[g->count++] = q;
     }
   }

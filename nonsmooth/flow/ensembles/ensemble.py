@@ -137,7 +137,8 @@ def ensemble(
             "at is a section at events without a count, which an ensemble needs. Give "
             "at=nonsmooth.Section(..., count=100) to keep up to 100 states of each run."
         )
-    step = sampling.room is None and t_end > t_start and device is None
+    sampled = sampling.room is not None and (sampling.hits is not None or bool(system.sets))
+    step = not sampled and t_end > t_start and device is None
     chosen = engine_for(system, options, starts, step)
     job = Job(system, options, number, sampling.times, sampling.room, chosen)
     return _run(job, starts, work, device)

@@ -3,8 +3,8 @@
 #define MEMORY 256
 
 /* Of a trajectory, what only the driver needs: the last events, and up to which row of a log; halved steps, and up to
- * which step that is so. */
-typedef struct { Recent event[HISTORY]; int64_t count, row, steps; double shortened; } Past;
+ * which step that is so; samples. */
+typedef struct { Recent event[HISTORY]; int64_t count, row, steps, kept; double shortened; } Past;
 
 /* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
 static int may_accumulate(const Past *p) {

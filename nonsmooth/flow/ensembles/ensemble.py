@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from ...model import FilippovSystem, OptionError, require_system
 from ..constants import KINDS
 from ..engine.building.compilers import ADVICE, CompilerError, find_compiler
+from ..engine.interpreter import interpreter_for, library
 from ..engine.lanes import lanes_for
-from ..engine.tape import library, tape_for
 from ..options import Options
 from ..other_names import hinted
 from ..results import Chunk, Collected, Ensemble
@@ -192,11 +192,11 @@ def engine_for(system: FilippovSystem, options: Options, starts: Starts, step: b
 
 def _is_worth_lanes(system: FilippovSystem, options: Options, starts: Starts) -> bool:
     """Whether the runs take long one by one, and none implicit steps, which several in step do not."""
-    tape, last = tape_for(system, options), starts.count - 1
+    engine, last = interpreter_for(system, options), starts.count - 1
     probed, found = [last // 2] if last < _MANY else [0, last // 2, last], list[float]()
     for first in probed:
         x, p = starts.part(first, first + 1)
-        seconds = tape.seconds(x[0], p[0] if p.ndim > 1 else p, options)
+        seconds = engine.seconds(x[0], p[0] if p.ndim > 1 else p, options)
         if seconds is None:
             return False
         found.append(seconds)

@@ -1,4 +1,4 @@
-/* What lanes give to the driver and take back, on this processor; where their runs end. */
+/* Exchange of runs between lanes and driver on a CPU, and the ends of runs. */
 #if SET
 #define WAITING (4 * GROUPS * W)
 
@@ -9,7 +9,7 @@ typedef struct { int64_t word[WORDS]; } Traveller;
 #define WAITING (GROUPS * W)
 #endif
 
-/* A batch, and how far it is. */
+/* A batch and its progress. */
 struct Work {
   const Batch *b;
   const Options *o;
@@ -24,7 +24,7 @@ struct Work {
 #endif
 };
 
-/* A lane as the driver takes and gives it back. */
+/* A lane in the form of the driver. */
 typedef struct {
   Suspended m;
   double x[N], unknowns[LETTERS];
@@ -154,8 +154,8 @@ INLINE I by_chance(const Lanes *s, const Work *w) {
   return which;
 }
 
-/* Let the driver begin the run of a lane, or make its step: the pool where the run goes on, from this lane. Else, if
- * negative, the driver has stored where it ended. */
+/* The driver begins the run of a lane, or makes its step. Returns the pool where the run continues, from this lane; negative
+ * if the driver stored its end. */
 static __attribute__((noinline)) int driven(Lanes *s, Work *w, int l, int begun) {
   Packed a;
   point_to(&a, past_of(s, l));

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import find_compiler, lanes_for, tape_for
+from nonsmooth.flow.engine import find_compiler, interpreter_for, lanes_for
 from nonsmooth.flow.engine import lanes as engine
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
@@ -94,7 +94,7 @@ def test_steps_made_by_the_driver_at_random(width, name, monkeypatch):
     times[:, [0, 1, -2, -1]] = 0, 0, t_end, t_end
     start[5, 0] = np.nan
     rows = lambda: Chunk.empty(60, system, True, 30)
-    scalar = tape_for(system, options).run_many(start, p, options, at, rows(), times=times)
+    scalar = interpreter_for(system, options).run_many(start, p, options, at, rows(), times=times)
     assert np.isnan(scalar.sample_t[5]).all() and np.isfinite(scalar.sample_t[:, 0]).sum() == 59
     lanes = lanes_of(system, options.order, width, monkeypatch)
     same(lanes.run_many(start, p, options, at, rows(), times=times), scalar, 1e-7)
@@ -112,7 +112,7 @@ def test_runs_that_begin_late(monkeypatch):
     )
     options, p = Options(t_start=1e3, t_end=1e3 + 9, rtol=1e-9), system.parameter_vector()
     start = starts_of(system, 2.0, 40) + np.array([0, 0, 1e3])
-    scalar = tape_for(system, options).run_many(start, p, options, (1, 1))
+    scalar = interpreter_for(system, options).run_many(start, p, options, (1, 1))
     assert (scalar.status == ns.Status.REACHED_END).all()
     lanes = lanes_of(system, options.order, 4, monkeypatch)
     lanes.random = 5
@@ -127,7 +127,7 @@ def test_parameters_of_each_start(monkeypatch):
     p, start = np.linspace(0.1, 0.9, 40)[:, None], starts_of(system, 2.0, 40)
     lanes = lanes_of(system, options.order, 4, monkeypatch)
     lanes.random = 3
-    scalar = tape_for(system, options).run_many(start, p, options, (1, 1))
+    scalar = interpreter_for(system, options).run_many(start, p, options, (1, 1))
     same(lanes.run_many(start, p, options, (1, 1)), scalar, 1e-7)
 
 
@@ -146,7 +146,7 @@ def test_events_that_accumulate(base, monkeypatch):
     options, p = Options(t_end=2.0, rtol=1e-10, atol=1e-10), system.parameter_vector()
     start = starts_of(system, 1.0, 12) * [1, 0]
     start[:, 1] = np.linspace(0, 1 - 1e-6, 12)
-    scalar = tape_for(system, options).run_many(start, p, options, None)
+    scalar = interpreter_for(system, options).run_many(start, p, options, None)
     lanes = lanes_of(system, options.order, 4, monkeypatch)
     found = lanes.run_many(start, p, options, None)
     assert (found.status == ns.Status.ACCUMULATION).all()

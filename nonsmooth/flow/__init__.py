@@ -22,7 +22,7 @@ The contract of events (``tests/flow/test_runs.py`` and ``events/test_event_case
    ``max_jumps`` jumps at one instant end the run: ENDLESS_JUMPS.
 """
 
-from ..notebook import add_cards
+from ..tables import add_views
 from .ensembles.ensemble import ensemble
 from .ensembles.lazy_starts import Grid, RandomStarts
 from .ensembles.outcomes import Outcomes, outcomes
@@ -59,4 +59,4 @@ __all__ = [
     "simulate",
 ]
 
-add_cards(globals(), __all__)
+add_views(globals(), __all__)

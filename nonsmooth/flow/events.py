@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array
+from ..tables import Table
 from .saving import savable
 
 T = TypeVar("T")
@@ -318,6 +319,12 @@ class Events(LazySequence[Event]):
         kind = np.int64 if attribute in ("element", "side") else np.object_
         return np.array(values, kind)[self.codes]
 
+    def _tables(self) -> dict[str, Table]:
+        names = ("kind", "name", "element", "side", "mode_before", "mode_after")
+        columns = {"t": self.t, **{name: self.column(name) for name in names}}
+        states = {"x": self.x, "x_after": self.x_after}
+        return {"events": Table({"event": len(self)}, columns | states)}
+
     def _size(self) -> int:
         return len(self.t)
 
@@ -457,6 +464,11 @@ class Segments(LazySequence[Segment]):
         if objects is not None:
             return [ShownMode(s.mode, s.discrete) for s in objects[:most]]
         return [self.modes[k] for k in self.codes[:most].tolist()]
+
+    def _tables(self) -> dict[str, Table]:
+        names = ("t_start", "t_end", "first", "last")
+        columns = {"mode": [one.mode for one in self]} | {n: getattr(self, n) for n in names}
+        return {"segments": Table({"segment": len(self)}, columns)}
 
     def _size(self) -> int:
         return len(self.codes)

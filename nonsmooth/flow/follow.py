@@ -29,7 +29,7 @@ from ..model import (
 from . import messages
 from .engine.arrays import Run, guard_of
 from .engine.convert import message_of
-from .engine.tape import tape_for
+from .engine.interpreter import interpreter_for
 from .events import Event, Events, Segment, Segments
 from .names import guard_name
 from .options import Options
@@ -133,8 +133,8 @@ def follow(
     start = x[: system.dimension]
     if made.unknowns:
         start = np.concatenate([start, unknowns[0][list(made.unknowns)]])
-    tape = tape_for(made.system, options)
-    run = tape.run(made.system.extended_point(start, options.t_start), p, options)
+    engine = interpreter_for(made.system, options)
+    run = engine.run(made.system.extended_point(start, options.t_start), p, options)
     return _trajectory(system, mode, p, made, names, backward, options, run)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 SENTENCES = {
     # by the status
     "REACHED_END": "t_end = {t_end:g} reached.",
-    "STOPPED": "{stop!r} at t = {t:.10g}.",
+    "STOPPED": "Stop {stop!r} at t = {t:.10g}.",
     "ACCUMULATION": "After {events} events; estimated limit t = {limit:.12g}.",
     "ENDLESS_JUMPS": "At t = {t:.10g} jumps of {jumps} repeat without end.",
     "TOO_MANY_EVENTS": "{max_events} events.",
@@ -75,7 +75,7 @@ SENTENCES = {
 }
 
 #: Said of an event whose condition was true from the start on.
-UNMET = (
+UNFIRED = (
     " {name!r} was true at the start and did not happen: events happen where they become true. "
     "initially=True lets it happen at the start, level=True while it is true, initially=False says no more of it."
 )

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..model import Array
 from .engine.arrays import address
-from .engine.tape import library
+from .engine.interpreter import library
 
 #: What may be proved of -M, in the order of ``core/linear.h``.
 _UNIQUE, _UNIQUE_AND_STABLE = 2, 3

@@ -16,7 +16,7 @@ import numpy as np
 from ..model import Array, OptionError
 from .engine.arrays import address
 from .engine.building.core_source import MOST_ORDER
-from .engine.tape import library
+from .engine.interpreter import library
 
 
 def first_root(coefficients: Sequence[float], h: float) -> float | None:

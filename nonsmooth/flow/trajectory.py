@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..model import Array, FilippovSystem, OptionError, PointError, real_array
 from ..notebook import card, lines
-from . import tables
+from ..tables import Table
 from .events import Events, Segments, ShownMode
 from .names import shown_mode
 from .other_names import ATTRIBUTES
@@ -299,42 +299,20 @@ class Trajectory(
                 f"dense=False kept no polynomials of this run, which {what} needs. Simulate with dense=True."
             )
 
-    def to_pandas(self, what: str = "points") -> Any:
-        """Return a DataFrame: steps and events in time, a row each event, or the samples.
+    def _tables(self) -> dict[str, Table]:
+        labels = {"state": self.system.state_names}
+        events = self.events._tables()["events"]
+        tables = {
+            "points": Table({"t": self.t}, {"x": self.x}, labels),
+            "events": Table(events.index, events.columns, labels),
+        }
+        if self.sample_t is not None:
+            samples = {"sample": ("t", self.sample_t)}
+            tables["samples"] = Table(samples, {"x": self.sample_x}, labels)
+        return tables
 
-        Parameters
-        ----------
-        what : {"points", "events", "samples"}, optional
-            ``points`` and ``samples`` have the time as index and a column for each state; ``events``
-            has time, kind, name, element, side, modes, and the states before and after
-            (``x_after``, ...).
-
-        Returns
-        -------
-        pandas.DataFrame
-            With the names of the states as columns.
-
-        Raises
-        ------
-        OptionError
-            pandas is not installed; the run has no samples.
-        """
-        return tables.trajectory_table(self, what)
-
-    def to_xarray(self) -> Any:
-        """Return a Dataset with ``x`` (t, state), and ``sample_x`` (sample, state) if there are any.
-
-        Returns
-        -------
-        xarray.Dataset
-            With the names of the states as a coordinate.
-
-        Raises
-        ------
-        OptionError
-            xarray is not installed.
-        """
-        return tables.trajectory_set(self)
+    def _missing(self, what: str) -> str:
+        return "; simulate with t_eval= or at= for samples" if what == "samples" else ""
 
     def _repr_html_(self) -> str:
         """Notebook representation: status, itinerary, states over time."""

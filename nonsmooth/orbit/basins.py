@@ -44,6 +44,7 @@ from ..model import (
     require_system,
     whole,
 )
+from ..tables import Table, Tabular, joined
 from .periodic.find_periodic import periodic_orbit
 from .periodic.orbit import PeriodicOrbit
 
@@ -86,7 +87,7 @@ _STILL = 1e-8
 
 @savable(points="* n", period="nan", multipliers="*")
 @dataclass(frozen=True, eq=False, repr=False)
-class Attractor:
+class Attractor(Tabular):
     """An attractor, as points of it.
 
     Attributes
@@ -671,6 +672,16 @@ class Basins(Savable, labels="...", starts="... n nan", axes="*"):
     axes: dict[str, Array] = field(default_factory=dict)
     state_names: tuple[str, ...] = ()
     complete: bool = True
+
+    def _tables(self) -> dict[str, Table]:
+        named = bool(self.axes)
+        axes = self.axes if named else {f"start_{k}": m for k, m in enumerate(self.labels.shape)}
+        columns = {"label": self.labels} | ({} if named else {"x": self.starts})
+        kinds = [np.full(len(one.points), one.kind, object) for one in self.attractors]
+        parts = [{"kind": k, "x": a.points} for k, a in zip(kinds, self.attractors, strict=True)]
+        labels = {"state": self.state_names} if self.state_names else {}
+        attractors = joined("attractor", parts, self.state_names)
+        return {"starts": Table(axes, columns, labels), "attractors": attractors}
 
     @property
     def fractions(self) -> dict[int, float]:

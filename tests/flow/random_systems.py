@@ -253,7 +253,7 @@ def package_words(system: Any, problem: Problem) -> Callable[[str], str]:
     arguments = [system.extended_states, system.parameter_symbols]
     heights = ca.Function("h", arguments, [ca.vertcat(*found)])
     size = system.extended_dimension
-    given = [np.ravel(heights(x[:size], known)) for x in points]
+    given = [heights(x[:size], known).full().ravel() for x in points]
     times = (
         np.array(given)[:, None, :] / np.array(true)[:, :, None]
     )  # the same one but for a factor

@@ -36,7 +36,7 @@ class Run:
     rates: Array  # (k, n): rates of the states in them
     facts: int  # what was noted about the decisions, as bits
     t_error: float  # largest error of the time of an event that rounding hides; see ``Facts``
-    unmet: int  # a stop or reset that was true at the start and did not happen, or -1
+    unfired: int  # a stop or reset that was true at the start and did not happen, or -1
     implicit_steps: int  # how many steps were implicit
     t: Array  # (m,): start, steps and events; a reset appears twice
     x: Array  # (m, n)

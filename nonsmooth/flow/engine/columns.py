@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ...model import Array, FilippovSystem
 from ..constants import GUARDS
 from .arrays import address
+from .interpreter import Interpreter, library
 from .structures import structure
-from .tape import TapeEngine, library
 
 #: Why a leg does not reach its end.
 DONE, STUCK, NOT_UNIQUE = range(3)
@@ -170,7 +170,7 @@ class CarriedLegs:
             self.row[:] = np.nan
 
 
-class ColumnsEngine(TapeEngine):
+class ColumnsEngine(Interpreter):
     """The driver with one system and the series of its derivatives."""
 
     def __init__(self, system: FilippovSystem, order: int):

@@ -51,7 +51,9 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
             partial(_few_segments, system, run) if run.few else None,
         ),
         status=status,
-        message=f"{message_of(system, options, run)} {ADVICE[status]}{_unmet(system, run)}",
+        message=message_of(system, options, run)
+        + ("" if status.complete else f" {ADVICE[status]}")
+        + _unfired(system, run),
         accumulation_time=limit if status is Status.ACCUMULATION else None,
         steps=Steps(run.starts, run.coefficients, run.implicit),
         continuations=[
@@ -178,10 +180,10 @@ def _segments(system: FilippovSystem, run: Run) -> Segments:
     return Segments(times[:-1], times[1:], first, last, codes, modes)
 
 
-def _unmet(system: FilippovSystem, run: Run) -> str:
+def _unfired(system: FilippovSystem, run: Run) -> str:
     """What is said of an event that was true at the start and silent."""
     names = [name for name, *_ in (*system.stops, *system.resets)]
-    return "" if run.unmet < 0 else messages.UNMET.format(name=names[run.unmet])
+    return "" if run.unfired < 0 else messages.UNFIRED.format(name=names[run.unfired])
 
 
 def message_of(system: FilippovSystem, options: Options, run: Run) -> str:

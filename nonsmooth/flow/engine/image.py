@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from .interpreter import Interpreter
 from .structures import structure
-from .tape import TapeEngine
 
 #: An address there.
 _ADDRESS = ctypes.c_uint32
@@ -38,15 +38,15 @@ class Image:
     ----------
     bytes : bytearray
         The structure ``System`` of ``core/state.c``, then what it points to.
-    places : list of int
+    addresses : list of int
         Offsets of its addresses.
     """
 
     bytes: bytearray = field(default_factory=bytearray)
-    places: list[int] = field(default_factory=list)
+    addresses: list[int] = field(default_factory=list)
 
 
-def image_of(engine: TapeEngine) -> Image:
+def image_of(engine: Interpreter) -> Image:
     """Write a system as an image."""
     system, blocks = engine.blocks()
     image, known = Image(), dict[int, int]()
@@ -81,7 +81,7 @@ def image_of(engine: TapeEngine) -> Image:
             if isinstance(value, ctypes.Structure):
                 value = narrow(value, at)
             elif kind is ctypes.c_void_p and value:
-                image.places.append(at)
+                image.addresses.append(at)
                 value = placed(value)
             setattr(made, name, value or 0)
         return made

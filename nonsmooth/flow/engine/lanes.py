@@ -17,9 +17,9 @@ from .arrays import BURST
 from .building.build import build
 from .building.codegen import lanes_source, supports_lanes
 from .building.compilers import lane_width
+from .interpreter import interpreter_for
+from .interpreter import library as core_library
 from .structures import declare, structure
-from .tape import library as core_library
-from .tape import tape_for
 
 #: Lanes are compiled for this processor, and have no bits in common with the driver: sums of products may be fused.
 FLAGS = ("-march=native", "-ffp-contract=fast")
@@ -53,11 +53,12 @@ class Lanes:
         at: tuple[int, int] | None,
         out: Chunk | None = None,
         stop: Callable[[], bool] = lambda: False,
+        times: Array | None = None,
     ) -> Chunk:
         """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
         # The driver takes steps that are not clear.
-        return tape_for(self.system, options).run_many(
-            x, p, options, at, out, stop, None, self._calls
+        return interpreter_for(self.system, options).run_many(
+            x, p, options, at, out, stop, times, self._calls
         )
 
     def _calls(self, run: int, batch: Any, options: Any) -> Callable[[], int]:

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array
-from ...model.printing.tape import Entries, Series, Values
+from ...model.printing.instructions import Entries, Series, Values
 from .arrays import address
+from .interpreter import library, series_structure, values_structure
 from .structures import structure
-from .tape import library, series_structure, values_structure
 
 #: Rows of what is watched that are looked for at first.
 _ROOM = 64
@@ -142,7 +142,7 @@ class LegsProgram:
         """Fly all legs from states (L, width)."""
         memory, _ = self._given(z, p, durations)
         left = ctypes.c_double()
-        failed = library().fly_legs(
+        failed = library().run_legs(
             self._pointer, memory.ctypes.data, tol, most_steps, ctypes.byref(left)
         )
         at, count = self._places, self._count
@@ -166,7 +166,7 @@ class LegsProgram:
         """Results (L, results) in extended precision, rounded, and what that leaves."""
         memory, parts = self._given(z, p, durations)
         left, rest = ctypes.c_double(), np.empty(len(parts[5]))
-        failed = library().fly_legs_extended(
+        failed = library().run_legs_extended(
             self._pointer,
             memory.ctypes.data,
             tol,

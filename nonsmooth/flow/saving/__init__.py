@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ...model import FilippovSystem, NonsmoothError, OptionError, instruction_form
 from ...model.schema import CLASSES, Validator, savable
+from ...tables import Tabular
 from ..status import Status
 from . import archive, files
 
@@ -29,7 +30,7 @@ _FORMAT = 4
 _LONGEST = 1 << 48
 
 
-class Savable:
+class Savable(Tabular):
     """A result that can be written to a file; :func:`load` reads it."""
 
     def __init_subclass__(cls, **schema: Any) -> None:

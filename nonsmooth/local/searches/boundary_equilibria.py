@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
+from ...tables import Tabular
 from ..checks import (
     MARGIN,
     parameter_index,
@@ -50,7 +51,7 @@ from .search import search
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryEquilibrium:
+class BoundaryEquilibrium(Tabular):
     """An equilibrium of one field on the surface, and the bifurcation that it is.
 
     Attributes
@@ -106,7 +107,7 @@ class BoundaryEquilibrium:
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryBifurcation:
+class BoundaryBifurcation(Tabular):
     """The value of a parameter at which an equilibrium of one field is on the surface.
 
     Attributes

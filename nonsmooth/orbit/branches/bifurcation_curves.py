@@ -24,6 +24,7 @@ from ...model import (
 )
 from ...model.checks import positive
 from ...solvers.continuation import Arc, Curve, Departure, Zero, directions, pieces, trace
+from ...tables import Table, Tabular, stacked
 from ..homoclinic.homoclinic_orbits import Connection
 from .branch import DIVIDE, BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of
 from .codimension_two import CodimensionTwo, leaving, special_point
@@ -48,7 +49,7 @@ Piece = tuple[EventCurve | ConnectionCurve, Arc]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BifurcationCurve:
+class BifurcationCurve(Tabular):
     """A curve of bifurcations in the plane of two parameters.
 
     Attributes
@@ -73,6 +74,14 @@ class BifurcationCurve:
     special: tuple[CodimensionTwo, ...]
     ends: tuple[BranchEnd, BranchEnd]
     nodes: tuple[Node, ...]
+
+    def _tables(self) -> dict[str, Table]:
+        columns = dict(zip(self.parameters, self.values.T, strict=True))
+        special = {"special": len(self.special)}
+        return {
+            "points": Table({"point": len(self.values)}, columns),
+            "special": stacked(self.special, special),
+        }
 
     def solution(self, k: int) -> Any:
         """Return the equilibrium or orbit at a point of the curve.

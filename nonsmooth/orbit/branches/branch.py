@@ -36,6 +36,7 @@ from ...solvers.continuation import (
     pieces,
     trace,
 )
+from ...tables import Table, Tabular, stacked
 
 
 class BranchEnd(Enum):
@@ -101,7 +102,7 @@ class FarSide:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BranchEvent:
+class BranchEvent(Tabular):
     """A bifurcation on a branch.
 
     Attributes
@@ -153,7 +154,7 @@ def _beside(choices: Sequence[tuple[Any, Point]], wanted: float) -> list[Any]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branch:
+class Branch(Tabular):
     """Solutions as a parameter varies.
 
     Attributes
@@ -181,6 +182,18 @@ class Branch:
     ends: tuple[BranchEnd, BranchEnd]
     reasons: tuple[str, str] = ("", "")
     nodes: tuple[tuple[Any, Point], ...] = ()
+
+    def _tables(self) -> dict[str, Table]:
+        names = self.nodes[0][0].system.state_names if self.nodes else ()
+        found = [e.parameter for e in self.events]
+        events = {
+            "kind": [e.kind for e in self.events],
+            "far_side": [str(e.far_side) for e in self.events],
+        }
+        return {
+            "points": stacked(self.solutions, {self.parameter: self.values}, names),
+            "events": Table({"event": len(found)}, {self.parameter: found, **events}),
+        }
 
     @property
     def orbits(self) -> tuple[Any, ...]:

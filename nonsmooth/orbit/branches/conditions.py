@@ -26,7 +26,7 @@ from ...model.derivatives.variational import guarded_field, states_at
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import Multipliers, finite_return_map
 from ..runs.cell_field import Guarded, field_of
-from ..runs.guards import CONDITIONS, LegGuards, is_met, watch
+from ..runs.guards import CONDITIONS, LegGuards, is_active, watch
 from ..runs.legs import Leg, surface_of
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
@@ -292,7 +292,7 @@ def _interior(
         number, _, value, bend = row[:4].tolist()
         k = int(number)
         guard = guards[k][1]
-        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_met(field, row, p):
+        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_active(field, row, p):
             value = _signed(guard, value)
             least[k] = min(value, least.get(k, np.inf))
     return [(guards[k][0], value) for k, value in least.items()]

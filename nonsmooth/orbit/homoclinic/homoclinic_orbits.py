@@ -33,6 +33,7 @@ from ...model import (
     require_system,
 )
 from ...solvers.newton import Equations, converge, solve
+from ...tables import Table, Tabular, stacked
 from ..periodic.orbit import OrbitLeg, named
 from ..periodic.orbit_run import orbit_run
 from ..runs.legs import Leg, Stretch, stretches
@@ -279,7 +280,7 @@ _ENOUGH = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Connection:
+class Connection(Tabular):
     """A homoclinic orbit to a saddle, a pseudo-saddle or a saddle-focus.
 
     Attributes
@@ -322,6 +323,9 @@ class Connection:
     loop: Loop
     unknowns: Array
     complete: bool = True
+
+    def _tables(self) -> dict[str, Table]:
+        return {"legs": stacked(self.legs, {"leg": len(self.legs)}, self.system.state_names)}
 
     @property
     def itinerary(self) -> str:

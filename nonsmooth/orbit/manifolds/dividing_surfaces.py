@@ -50,6 +50,7 @@ from ...solvers.continuation import (
     pieces,
     trace,
 )
+from ...tables import Table, joined
 from ..runs.guards import change_fault
 from ..runs.itinerary import Arrival, FixedItinerary, leg_between, read_word
 from .two_fold_sheet import Meeting, TwoFoldSheet
@@ -787,6 +788,11 @@ class DividingCurves(Savable, point="n"):
     point: Array
     curves: list[list[DividingArc]]
     complete: bool = True
+
+    def _tables(self) -> dict[str, Table]:
+        names = ("points", "entry", "t", "decided")
+        parts = [{name: getattr(arc, name) for name in names} for arc in self.arcs]
+        return {"points": joined("arc", parts)}
 
     @property
     def arcs(self) -> list[DividingArc]:

@@ -37,6 +37,7 @@ from ...model import (
     reversed_system,
     whole,
 )
+from ...tables import Table, joined
 from ..periodic.multipliers import leg_maps
 from ..periodic.orbit import PeriodicOrbit
 from ..runs.legs import integrate_leg
@@ -418,6 +419,14 @@ class Manifold(Savable, point="n", points="k n | 0 0", triangles="q 3 <points"):
     points: Array = field(default_factory=lambda: np.zeros((0, 0)))
     triangles: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     complete: bool = True
+
+    def _tables(self) -> dict[str, Table]:
+        tables = {"points": joined("arc", [{"t": arc.t, "x": arc.points} for arc in self.arcs])}
+        if len(self.triangles):
+            tables["vertices"] = Table({"vertex": len(self.points)}, {"x": self.points})
+            corners = {"vertex": ("corner", self.triangles)}
+            tables["triangles"] = Table({"triangle": len(self.triangles)}, corners)
+        return tables
 
     def __repr__(self) -> str:
         what = "stable" if self.stable else "unstable"

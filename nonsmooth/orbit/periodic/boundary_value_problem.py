@@ -29,6 +29,7 @@ from ...flow.fixed import TOLERANCE
 from ...model import Array, ConvergenceError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, EventMap, kept_maps
 from ...model.derivatives.forcing import Forcing
+from ...solvers import linear_equations
 from ..runs.cell_legs import CellLegs
 from ..runs.leg_integration import LegFlows, LegIntegrator
 from ..runs.legs import Leg, LegFlow, integrate_leg, rate_at, surface_of
@@ -360,7 +361,7 @@ class BoundaryProblem:
         """Solve these equations, with rows of a border below; by elimination where legs are many."""
         if self.has_many:
             return eliminated(self, matrix, right).solution()
-        return np.asarray(np.linalg.solve(matrix, right), float)
+        return linear_equations.solve(matrix, right)
 
     def scales(self, u: Array, p: Array | None = None) -> Array:
         """Sizes of the unknowns: states by their range over the legs, times by the duration."""

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, ConvergenceError, DegenerateError, OptionError
 from ...model.derivatives.given_functions import Coupling
+from ...tables import Table, Tabular
 from ..runs.legs import integrate_leg
 from ..runs.saltation import saltations
 from .multipliers import events_of
@@ -49,7 +50,7 @@ _JUMPS = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MasterStability:
+class MasterStability(Tabular):
     """Growth of perturbations across synchrony.
 
     Attributes
@@ -69,6 +70,11 @@ class MasterStability:
     multipliers: NDArray[np.complex128]
     exponents: Array
     period: float
+
+    def _tables(self) -> dict[str, Table]:
+        columns = {"kappa": self.kappa, "exponent": self.exponents}
+        columns["multipliers"] = ("multiplier", self.multipliers)  # type: ignore[assignment]
+        return {"nodes": Table({"node": len(self.kappa)}, columns)}
 
     @property
     def stable(self) -> NDArray[np.bool_]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
 from ...model import Array, FilippovSystem, ParameterError, Surfaces
 from ...notebook import card, circle
+from ...tables import Table, Tabular, stacked
 from ..runs.guards import faults_along, watch
 from ..runs.legs import Leg, integrate_leg, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation, mirrored
@@ -68,7 +69,7 @@ class OrbitDerivative(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PeriodicOrbit:
+class PeriodicOrbit(Tabular):
     """A periodic orbit with a fixed itinerary.
 
     Attributes
@@ -96,6 +97,14 @@ class PeriodicOrbit:
     evaluation: Evaluation
     iterations: int
     faults: tuple[str, ...] = ()
+
+    row: ClassVar[tuple[str, ...]] = ("period", "start", "itinerary", "stability", "multipliers")
+
+    def _tables(self) -> dict[str, Table]:
+        names = self.system.state_names
+        legs = stacked(self.legs, {"leg": len(self.legs)}, names)
+        multipliers = Table({"multiplier": len(self.multipliers)}, {"value": self.multipliers})
+        return {**self.trajectory._tables(), "legs": legs, "multipliers": multipliers}
 
     # properties ---------------------------------------------------------------------------------
 

@@ -20,6 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from ...model import Array, DegenerateError, OptionError, PointError
+from ...tables import Table, Tabular
 from ..runs.legs import integrate_leg
 from ..runs.saltation import saltations
 from ..runs.saltation_matrix import saltation_matrix
@@ -37,7 +38,7 @@ _PARTS = 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PhaseResponse:
+class PhaseResponse(Tabular):
     """Phase response of a periodic orbit.
 
     Attributes
@@ -63,6 +64,10 @@ class PhaseResponse:
     z: Array
     leg: Array
     error: float
+
+    def _tables(self) -> dict[str, Table]:
+        columns = {"x": self.x, "z": self.z, "leg": self.leg}
+        return {"points": Table({"t": self.t}, columns, {"state": self.orbit.system.state_names})}
 
     def __call__(self, t: float) -> Array:
         """Phase response (n,) at a time, of any size; at an event that after it.

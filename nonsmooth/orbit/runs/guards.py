@@ -67,7 +67,7 @@ def watch(system: FilippovSystem, leg: Leg, x: Array, duration: float, p: Array)
     return Watch(_approaches(field, rows, p), _violations_along(field, rows, p))
 
 
-def is_met(field: Guarded, row: Array, p: Array) -> bool:
+def is_active(field: Guarded, row: Array, p: Array) -> bool:
     """Whether something happens where the guard of a row of ``LegsWatch`` passes zero."""
     guard, system = field.motion.guards[int(row[0])], field.motion.system
     if guard.kind not in CONDITIONS:
@@ -80,7 +80,7 @@ def _approaches(field: Guarded, rows: Array, p: Array) -> list[Approach]:
     guards, found = field.motion.guards, list[Approach]()
     for row in rows:
         guard, (t, value, bend) = guards[int(row[0])], row[1:4].tolist()
-        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_met(field, row, p):
+        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_active(field, row, p):
             slope = field.gradients.copied(row[4:], p)[0][int(row[0])]
             size = math.sqrt(float(slope @ slope))
             if size > 0.0:

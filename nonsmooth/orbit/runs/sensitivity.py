@@ -23,6 +23,7 @@ from ...model import (
     require_system,
 )
 from ...model.derivatives.given_functions import cost_over
+from ...tables import Tabular
 from .legs import parameters_of
 from .one_sided import Side, one_sided
 from .variation import (
@@ -128,7 +129,7 @@ def _beside(run: Trajectory, side: Side, names: tuple[str, ...]) -> Sensitivity:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Gradient:
+class Gradient(Tabular):
     """Gradient of a cost at the end of a run.
 
     Attributes

@@ -28,7 +28,7 @@ def _is_plain(system: FilippovSystem) -> bool:
     return not (others or system.written.tables) and system.definition.plain
 
 
-def tape_order(system: FilippovSystem, options: Options) -> int:
+def interpreter_order(system: FilippovSystem, options: Options) -> int:
     """Order of the series of one trajectory: a third more where all is linear."""
     order = options.order
     if system.coupled or not coupled_of(system).linearity.everywhere:

@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ....model.expressions.float_arithmetic import BINARY
-from ....model.numbering import OPERATIONS, TAPE_RULES, operation_in_c
+from ....model.numbering import OPERATIONS, TAYLOR_RULES, operation_in_c
 from ... import constants
 from ...status import Status
 
@@ -48,7 +48,7 @@ def driver_text(name: str) -> str:
 def run_source() -> str:
     """C of runs: the driver without derivatives and flows of known durations."""
     # UNFUSED: the same bits on every processor.
-    enumerations = [("OP", OPERATIONS), ("RULE", TAPE_RULES)]
+    enumerations = [("OP", OPERATIONS), ("RULE", TAYLOR_RULES)]
     head = "".join(
         f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
         for prefix, names in enumerations

@@ -80,12 +80,12 @@ class Bins:
     low: Array
     high: Array
 
-    def places(self, k: int, values: Array) -> NDArray[np.int64]:
-        """Numbers of the bins that some values of column k lie in; those that lie in one."""
+    def indices(self, k: int, values: Array) -> NDArray[np.int64]:
+        """Bin indices of values of column k; values outside all bins are dropped."""
         low, high = self.low[k], self.high[k]
-        place = (values - low) * (self.count / (high - low))
-        place = np.where(values == high, self.count - 1, place)
-        return place[(place >= 0) & (place < self.count)].astype(np.int64)
+        index = (values - low) * (self.count / (high - low))
+        index = np.where(values == high, self.count - 1, index)
+        return index[(index >= 0) & (index < self.count)].astype(np.int64)
 
 
 @dataclass(frozen=True)

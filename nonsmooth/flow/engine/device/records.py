@@ -15,7 +15,7 @@ from ...constants import HAND_OVER, NEEDS_PROGRAM, SIMPLE_KINDS
 from ...options import Options
 from ...results import Chunk, Stopped
 from ..arrays import BURST, address, batch_of, options_of
-from ..tape import TapeEngine, library, tape_for
+from ..interpreter import Interpreter, interpreter_for, library
 
 #: An array of :func:`record_type`.
 Records = NDArray[np.void]
@@ -75,7 +75,7 @@ def continued(
     """
     count = len(records)
     size = max(_LEAST, -(-count // max(workers, 1)))
-    engine, stop = tape_for(system, options), threading.Event()
+    engine, stop = interpreter_for(system, options), threading.Event()
     assert engine is not None
 
     def part(first: int) -> tuple[slice, Chunk]:
@@ -99,7 +99,7 @@ def continued(
 
 
 def _continue(
-    engine: TapeEngine,
+    engine: Interpreter,
     records: Records,
     p: Array,
     options: Options,

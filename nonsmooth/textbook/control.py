@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..model import FilippovSystem, Stop
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def twisting() -> Problem:
@@ -30,7 +30,18 @@ def twisting() -> Problem:
     """
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     system = FilippovSystem.from_expression([x, v], [v, -3 * ca.sign(x) - ca.sign(v)])
-    return problem(twisting, system)
+    return problem(
+        twisting,
+        system,
+        (0.0, 1.0),
+        3.0,
+        stated("first switch", "time of the first event", "0.25"),
+        stated(
+            "speed ratio", "of two speeds at x = 0, one after the other", "0.70710678118654752440"
+        ),
+        stated("limit", "time at which the switches accumulate", "2.0606601717798212866"),
+        title="Twisting controller",
+    )
 
 
 def super_twisting() -> Problem:
@@ -55,7 +66,12 @@ def super_twisting() -> Problem:
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     root = 1.5 * ca.sign(x) * ca.sqrt(ca.fabs(x))
     return problem(
-        super_twisting, FilippovSystem.from_expression([x, v], [v - root, -1.1 * ca.sign(x)])
+        super_twisting,
+        FilippovSystem.from_expression([x, v], [v - root, -1.1 * ca.sign(x)]),
+        (1.0, 0.0),
+        3.0,
+        stated("limit", "time at which it comes to rest", "1.7416627251264"),
+        title="Super-twisting controller",
     )
 
 
@@ -89,7 +105,15 @@ def abs_brake() -> Problem:
         field=[-9.81 * grip, 30 / v * (0.4 - 0.8 * lam - grip / 2)],
         stops=[Stop(v - 1, -1, "slow")],
     )
-    return problem(abs_brake, system)
+    return problem(
+        abs_brake,
+        system,
+        (30.0, 0.2),
+        5.0,
+        stated("braking time", "time of the stop", "3.6952089704383282365"),
+        stated("mean of the relay", "lambda while sliding", "0"),
+        title="Anti-lock brake",
+    )
 
 
 def drill_string() -> Problem:
@@ -122,7 +146,15 @@ def drill_string() -> Problem:
         below=[speed - v, ca.substitute(x + c * (speed - v) - torque, lam, -1)],
         parameters={speed: 1.0, c: 0.08},
     )
-    return problem(drill_string, system)
+    return problem(
+        drill_string,
+        system,
+        (0.0, 0.0),
+        60.0,
+        stated("critical speed", "W at the Hopf point of steady drilling", "4"),
+        stated("break-away", "x + c W where the bit starts", "3"),
+        title="Drill string that sticks and slips",
+    )
 
 
 def tank_cascade() -> Problem:
@@ -147,4 +179,11 @@ def tank_cascade() -> Problem:
     """
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     first, second = ca.sqrt(ca.fmax(x, 0)), ca.sqrt(ca.fmax(y, 0))
-    return problem(tank_cascade, FilippovSystem.from_expression([x, y], [-first, first - second]))
+    return problem(
+        tank_cascade,
+        FilippovSystem.from_expression([x, y], [-first, first - second]),
+        (1.0, 1.0),
+        4.0,
+        stated("empty", "times at which they are empty", "2", "3.0925860317472027549"),
+        title="Tanks in cascade",
+    )

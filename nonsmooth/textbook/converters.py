@@ -6,7 +6,7 @@ import casadi as ca
 
 from ..model import Clock, FilippovSystem
 from ..model.definition.elements import Complementarity
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def diode_bridge() -> Problem:
@@ -42,7 +42,16 @@ def diode_bridge() -> Problem:
         ],
         parameters={load: 1e3, coil: 1e-2, capacity: 1e-6},
     )
-    return problem(diode_bridge, system)
+    return problem(
+        diode_bridge,
+        system,
+        (10.0, 0.0),
+        5e-3,
+        stated("first change", "time at which v = 0", "1.5226800110860625411e-4"),
+        stated("interval", "time between two changes", "3.1455270228880017137e-4"),
+        stated("end", "state at t_end", "0.79032281964435576567", "-0.0026478501600952450155"),
+        title="Diode bridge",
+    )
 
 
 def boost_converter() -> Problem:
@@ -78,7 +87,19 @@ def boost_converter() -> Problem:
         clocks=clock,
         parameters={load: 20.0, duty: 0.3},
     )
-    return problem(boost_converter, system)
+    return problem(
+        boost_converter,
+        system,
+        (0.0, 1.0, 0.0),
+        12.0,
+        stated("end", "state at t_end", "0", "3.2140208123474236465", "0"),
+        stated("voltage", "v at the ticks of the orbit", "3.5122925905757211918"),
+        stated(
+            "conduction", "time in which the diode conducts, a period", "0.11684696806758321095"
+        ),
+        stated("multiplier", "of the orbit, the one that is not 0", "0.88690327967341458803"),
+        title="Boost converter in discontinuous conduction",
+    )
 
 
 def resonant_converter() -> Problem:
@@ -110,4 +131,13 @@ def resonant_converter() -> Problem:
         below=[-source - v - load * i, i],
         parameters={source: 1.0, load: 0.5},
     )
-    return problem(resonant_converter, system)
+    return problem(
+        resonant_converter,
+        system,
+        (0.0, -1.5),
+        60.0,
+        stated("period", "of its orbit", "6.4892458815577790351"),
+        stated("amplitude", "largest voltage on the orbit", "2.59935069570455208"),
+        stated("multiplier", "of its orbit, next to 1", "0.19744179036948955834"),
+        title="Series resonant converter",
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..model import FilippovSystem
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def dry_friction() -> Problem:
@@ -33,7 +33,22 @@ def dry_friction() -> Problem:
     system = FilippovSystem(
         [y1, y2], surface=y2, multipliers=lam, field=[y2, -y1 - c * lam], parameters={c: 0.4}
     )
-    return problem(dry_friction, system)
+    how = "state and time of crossing number {}"
+    return problem(
+        dry_friction,
+        system,
+        (3.0, 0.0),
+        20.0,
+        stated("turn 1 (y1, t)", how.format(1), "-2.2", "3.14159265358979323846"),
+        stated("turn 2 (y1, t)", how.format(2), "1.4", "6.28318530717958647693"),
+        stated("turn 3 (y1, t)", how.format(3), "-0.6", "9.42477796076937971539"),
+        stated("rest (y1, t)", "state and time of the entry", "-0.2", "12.5663706143591729539"),
+        stated("end y1", "y1 at t_end, stuck", "-0.2"),
+        title="Dry friction brings an oscillator to rest",
+    )
+
+
+_SLIP_STICK = "simulate; length of a {} segment of the periodic orbit"
 
 
 def leine_stick_slip() -> Problem:
@@ -66,7 +81,27 @@ def leine_stick_slip() -> Problem:
         below=[v, -x + 1 / (1 - delta * slip)],
         parameters={w: 0.2, delta: 3.0},
     )
-    return problem(leine_stick_slip, system)
+    return problem(
+        leine_stick_slip,
+        system,
+        (1.0, 0.2),
+        50.0,
+        stated("slip time", _SLIP_STICK.format("slip ('-')"), "4.2959995254801548834"),
+        stated("stick time", _SLIP_STICK.format("stick ('s')"), "7.7050317693504237635"),
+        stated("x at re-stick", "x at an entry", "-0.54100635387008475271"),
+        stated(
+            "period",
+            "simulate; time between successive exits from sticking",
+            "12.001031294830578647",
+        ),
+        stated(
+            "multipliers",
+            "eigenvalues of the monodromy matrix: smooth flow, saltation at entry and exit",
+            "1",
+            "0",
+        ),
+        title="Stick-slip with friction that weakens with velocity",
+    )
 
 
 def stick_slip_exponential() -> Problem:
@@ -96,4 +131,15 @@ def stick_slip_exponential() -> Problem:
         above=[x2, -x1 - 1 / (0.8 + x2)],
         below=[x2, -x1 + 1 / (1.2 - x2)],
     )
-    return problem(stick_slip_exponential, system)
+    return problem(
+        stick_slip_exponential,
+        system,
+        (1.0, 0.2),
+        50.0,
+        stated("exit (x1, x2)", "state at an exit", "1", "0.2"),
+        stated("slip time", _SLIP_STICK.format("slip ('-')"), "4.703364997942"),
+        stated("landing x1", "x1 at an entry", "0.0945189079719"),
+        stated("period", "time between successive exits", "9.230770458083"),
+        stated("multipliers", "eigenvalues of the monodromy matrix", "1", "0"),
+        title="Periodic stick-slip",
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..model import FilippovSystem, Reset
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def thermostat() -> Problem:
@@ -39,7 +39,15 @@ def thermostat() -> Problem:
         ],
         parameters={a: 30.0},
     )
-    return problem(thermostat, system)
+    return problem(
+        thermostat,
+        system,
+        (20.0, 0.0),
+        5.0,
+        stated("period", "time between two events 'on'", "0.60613580357031554325"),
+        stated("slope of the period", "its derivative by a", "-0.041666666666666666667"),
+        title="Thermostat: a relay with hysteresis",
+    )
 
 
 def gearbox() -> Problem:
@@ -73,7 +81,17 @@ def gearbox() -> Problem:
         ],
         parameters={u: 4.0},
     )
-    return problem(gearbox, system)
+    return problem(
+        gearbox,
+        system,
+        (0.0, 1.0),
+        10.0,
+        stated(
+            "shifts", "times of both events 'up'", "0.47000362924573555365", "1.4916548767777169201"
+        ),
+        stated("slowest eigenvalue", "of the equilibrium in gear 3", "-0.33333333333333333333"),
+        title="Gearbox with three gears",
+    )
 
 
 def glacial_cycles() -> Problem:
@@ -106,7 +124,15 @@ def glacial_cycles() -> Problem:
             Reset(v - 0.2, {q: 1}, -1, "glaciation", level=True, when=q == 0),
         ],
     )
-    return problem(glacial_cycles, system)
+    return problem(
+        glacial_cycles,
+        system,
+        (0.2, 1.0),
+        400.0,
+        stated("period", "time between two events 'glaciation'", "83.17766166719343713"),
+        title="Glacial cycles by two thresholds",
+        note="parameters quoted from memory",
+    )
 
 
 def integrate_and_fire() -> Problem:
@@ -136,7 +162,15 @@ def integrate_and_fire() -> Problem:
         resets=Reset(v - 1, [0], 1, "spike"),
         parameters={current: 1.3},
     )
-    return problem(integrate_and_fire, system)
+    return problem(
+        integrate_and_fire,
+        system,
+        (0.0,),
+        10.0,
+        stated("period", "time between two spikes", "1.4663370687934270447"),
+        stated("slope of the period", "its derivative by I", "-2.5641025641025641026"),
+        title="Integrate-and-fire neuron",
+    )
 
 
 def integrate_and_fire_pair() -> Problem:
@@ -169,7 +203,15 @@ def integrate_and_fire_pair() -> Problem:
         ],
         parameters={current: 1.3, k: 0.1},
     )
-    return problem(integrate_and_fire_pair, system)
+    return problem(
+        integrate_and_fire_pair,
+        system,
+        (0.0, 0.4),
+        30.0,
+        stated("period", "of the orbit on which they fire in turn", "1.6262946371279090707"),
+        stated("multiplier", "of that orbit", "0.72621066311466411726"),
+        title="Two neurons that inhibit each other",
+    )
 
 
 def integrate_and_fire_network() -> Problem:
@@ -206,6 +248,22 @@ def integrate_and_fire_network() -> Problem:
     return problem(
         integrate_and_fire_network,
         FilippovSystem(v, field=[current - one for one in v], resets=spikes),
+        (0.9, 0.6, 0.35, 0.1),
+        3.7,
+        stated(
+            "spikes of the first neuron",
+            "times of its events",
+            "0.40546510810816438198",
+            "1.6990500711237875072",
+            "3.009311531680371847",
+        ),
+        stated(
+            "spikes of the others together",
+            "times at which three neurons fire at one instant",
+            "2.1233836635363346914",
+            "3.689367616193437654",
+        ),
+        title="Network of neurons that excite one another",
     )
 
 
@@ -239,4 +297,17 @@ def rocking_block() -> Problem:
         resets=Reset(x, {v: e * v}, 0, "other corner"),
         parameters={e: 0.9},
     )
-    return problem(rocking_block, system)
+    return problem(
+        rocking_block,
+        system,
+        (0.8, 0.0),
+        30.0,
+        stated(
+            "upright",
+            "times of the first two events",
+            "2.2924316695611776878",
+            "5.0601842489786014798",
+        ),
+        stated("standing time", "limit of the times", "22.666568319209938749"),
+        title="Rocking block",
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..model import FilippovSystem, Reset, Stop
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def bouncing_ball() -> Problem:
@@ -36,7 +36,15 @@ def bouncing_ball() -> Problem:
         resets=[Reset(y, [0, -r * v], direction=-1, name="impact")],
         parameters={g: 9.81, r: 0.9},
     )
-    return problem(bouncing_ball, system)
+    return problem(
+        bouncing_ball,
+        system,
+        (1.0, 0.0),
+        10.0,
+        stated("first impact", "time of the first reset", "0.45152364098573090445"),
+        stated("Zeno time", "Trajectory.accumulation_time", "8.5789491787288871846"),
+        title="Bouncing ball",
+    )
 
 
 def impact_oscillator() -> Problem:
@@ -72,7 +80,19 @@ def impact_oscillator() -> Problem:
         resets=[Reset(x - 1, [1, -r * v], direction=1, name="wall")],
         parameters={amplitude: 0.35, c: 0.1, w: 0.8, r: 0.8, phase: 3.3602615994637352},
     )
-    return problem(impact_oscillator, system)
+    return problem(
+        impact_oscillator,
+        system,
+        (-1.0, 0.0),
+        7.853981633974483,
+        stated(
+            "grazing amplitude",
+            "A at which the periodic motion without impacts touches x = 1: "
+            "sqrt((1 - w^2)^2 + (c w)^2)",
+            "0.3687817782917154924",
+        ),
+        title="Impact oscillator at grazing",
+    )
 
 
 def kelvin_voigt_bounce() -> Problem:
@@ -110,4 +130,25 @@ def kelvin_voigt_bounce() -> Problem:
         stops=[Stop(load, direction=-1, name="separation")],
         parameters={d1: 0.3, d2: 0.2, eta: 0.3, mu: 0.3, weight: 0.01},
     )
-    return problem(kelvin_voigt_bounce, system)
+    slips = {"Xdot": 1.0, "Omega": 2.0}
+    return problem(
+        kelvin_voigt_bounce,
+        system,
+        (0.0, 1.0, 0.0, -1.0, 0.0),
+        10.0,
+        stated("separation time", "time of the stop", "2.8053741589056785987"),
+        stated("Y' at separation", "Ydot at the stop", "0.56948169195034287377"),
+        stated("sticking time", "time of the entry", "1.10002359853743845"),
+        stated("slip restarts", "time of the exit, to mode '-'", "2.47845549499308424"),
+        stated("slip at separation", "Xdot + Omega at the stop", "-0.0340870447107"),
+        stated(
+            "slip at separation, fast spin", "Xdot + Omega at the stop", "0.883480608935", at=slips
+        ),
+        stated(
+            "critical spin",
+            "Omega at the start for which A = 0 where N = 0 on the rolling motion",
+            "0.5212841137471098897507",
+            at={"Xdot": 0.2},
+        ),
+        title="Kelvin-Voigt bounce with friction",
+    )

@@ -8,6 +8,8 @@ from ..model import FilippovSystem, Impact
 from ..model.definition.friction import Friction
 from .problem import Problem, problem, stated
 
+_EVENT_BY_EVENT = "state at t_end; integrated from event to event with scipy's DOP853"
+
 
 def painleve_rod() -> Problem:
     """Rod that slides on its tip, and Painleve's paradox.
@@ -40,7 +42,21 @@ def painleve_rod() -> Problem:
         impacts=Impact(y - ca.sin(a) / 2, restitution=0, reaction=r, name="tip"),
         parameters={mu: 1.0},
     )
-    return problem(painleve_rod, system)
+    return problem(
+        painleve_rod,
+        system,
+        (0.0, 0.42073549240394825, 1.0, -1.0, 0.0, 0.0),
+        0.5,
+        stated("paradox", "mu from which the start has no motion", "1.3752593961307416808"),
+        stated(
+            "least friction",
+            "mu from which this start has no motion",
+            "1.3333333333333333333",
+            at={"a": 1.1071487177940904, "y": 0.4472135954999579},
+        ),
+        stated("sticks (t, a)", "at the entry", "0.27999696936093218117", "1.1484037208067484930"),
+        title="Sliding rod of Painleve",
+    )
 
 
 def woodpecker() -> Problem:
@@ -96,7 +112,19 @@ def woodpecker() -> Problem:
         ],
         parameters={mu: 0.3},
     )
-    return problem(woodpecker, system)
+    return problem(
+        woodpecker,
+        system,
+        (0.0, -0.0006 / 0.0058, -0.2788, -0.3411, 0.0, -7.4583),
+        0.3,
+        stated(
+            "end",
+            _EVENT_BY_EVENT,
+            *("-0.0413274161", "-0.1034482759", "-0.342373855"),
+            *("-0.259184923", "0", "-8.34282414"),
+        ),
+        title="Woodpecker toy",
+    )
 
 
 def slider_crank(friction: bool = True) -> Problem:
@@ -152,8 +180,9 @@ def slider_crank(friction: bool = True) -> Problem:
                 frictions.append(Friction(slip, load=r, kinetic=mu))
                 force += frictions[-1].force * ca.gradient(slip, rates)
     det = m11 * m22 - m12**2
-    how = "state at t_end; integrated from event to event with scipy's DOP853"
-    without = ["18.1742133", "0.31447231", "0", "77.578085", "-31.064448", "0"]
+    known = ("18.0811240", "0.35351474", "0", "70.772736", "-28.584654", "0")
+    if not friction:
+        known = ("18.1742133", "0.31447231", "0", "77.578085", "-31.064448", "0")
     system = FilippovSystem(
         [a, b, c, u, v, w],
         field=[
@@ -166,4 +195,11 @@ def slider_crank(friction: bool = True) -> Problem:
         impacts=impacts,
         parameters={mu: 0.01} if friction else {},
     )
-    return problem(slider_crank, system, *(() if friction else [stated("end", how, without)]))
+    return problem(
+        slider_crank,
+        system,
+        (0.0, 0.0, 0.0, 150.0, -75.0, -0.01),
+        0.2,
+        stated("end", _EVENT_BY_EVENT, *known),
+        title="Slider-crank mechanism with clearance",
+    )

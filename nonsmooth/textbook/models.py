@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..model import FilippovSystem
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def harvested_prey_predator() -> Problem:
@@ -43,7 +43,24 @@ def harvested_prey_predator() -> Problem:
         below=[prey, (psi - d) * x2],
         parameters={a: 0.3556, d: 0.0444, effort: 0.2067, b: 0.3, alpha: 0.9},
     )
-    return problem(harvested_prey_predator, system)
+    zero = "alpha for which the equilibrium of the field {} is on the surface"
+    return problem(
+        harvested_prey_predator,
+        system,
+        (0.5, 0.5),
+        100.0,
+        stated("fold of F2", "x1 where L2 = 0 on the surface", "0.04280205655526992"),
+        stated("fold of F1", "x1 where L1 = 0 on the surface", "0.7208612440191388"),
+        stated("boundary focus", zero.format("below"), "0.9227486601330945"),
+        stated("boundary node", zero.format("above"), "0.8013552803278313"),
+        stated(
+            "pseudo-saddle-node",
+            "alpha for which the sliding field has a double zero, (1 + b)^2/(4 a)",
+            "1.188132733408324",
+        ),
+        title="Harvested prey-predator model",
+        note="parameters from memory",
+    )
 
 
 def welander_box() -> Problem:
@@ -76,7 +93,38 @@ def welander_box() -> Problem:
         below=[1 - temperature, b * (1 - salt)],
         parameters={a: 0.8, b: 0.5, k: 5.0, eps: -0.01},
     )
-    return problem(welander_box, system)
+    return problem(
+        welander_box,
+        system,
+        (0.5, 0.3),
+        30.0,
+        stated("boundary equilibrium, k = 0", "eps with F2 = 0 on the surface", "0.2"),
+        stated(
+            "boundary equilibrium, k = 5",
+            "eps with F1 = 0 on the surface, -7/165",
+            "-0.042424242424242424242",
+        ),
+        stated(
+            "period",
+            "time of one return of the cycle",
+            "1.573348798772239528671",
+            at={"eps": -0.01},
+        ),
+        stated(
+            "multiplier",
+            "slope of the return map of the cycle",
+            "0.0794560287002",
+            at={"eps": -0.01},
+        ),
+        stated(
+            "pseudo-equilibrium T",
+            "where a run slides to; zero of the sliding field",
+            "0.836866682439359",
+            at={"eps": 0.05},
+        ),
+        title="Welander's ocean box",
+        note="parameters from memory",
+    )
 
 
 def state_dependent_jump() -> Problem:
@@ -110,4 +158,18 @@ def state_dependent_jump() -> Problem:
         time=t,
         parameters={p: 5.437},
     )
-    return problem(state_dependent_jump, system)
+    how = "derivative of x(20), through the saltation at both switches"
+    return problem(
+        state_dependent_jump,
+        system,
+        (1.0, 0.0),
+        20.0,
+        stated(
+            "switch times", "times of the two crossings", "11.000275475194824", "11.270040323650827"
+        ),
+        stated("x(20)", "simulate to t = 20", "49.2550674190591", "1.34882424228"),
+        stated("dx1(20)/dx0", how, "6.20409075", "16.74159857"),
+        stated("dx2(20)/dx0", how, "0.06665833", "0.34105997"),
+        stated("dx(20)/dp", how, "-5.20409072", "-0.06665833"),
+        title="State-dependent jump with a parameter",
+    )

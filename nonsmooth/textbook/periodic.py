@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import casadi as ca
 
 from ..model import FilippovSystem, Reset
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
+
+_FROM_RUN = "periodic_orbit from a run; {}"
+_FROM_STATE = "periodic_orbit with the itinerary of one reset, from the start; {}"
 
 
 def multi_sliding_relay() -> Problem:
@@ -40,7 +45,19 @@ def multi_sliding_relay() -> Problem:
         below=[linear[0] + 1, linear[1] - 2, linear[2] + 1],
         parameters={w: 25.0},
     )
-    return problem(multi_sliding_relay, system)
+    return problem(
+        multi_sliding_relay,
+        system,
+        (0.0, -0.001, -0.02),
+        40.0,
+        stated("period", _FROM_RUN.format("its period"), "5.961836942613702773842"),
+        stated(
+            "multiplier",
+            _FROM_RUN.format("the one that is not structural"),
+            "0.001805112240591306036108",
+        ),
+        title="Relay feedback with a multi-sliding orbit",
+    )
 
 
 def forced_dry_friction() -> Problem:
@@ -73,7 +90,33 @@ def forced_dry_friction() -> Problem:
         parameters={f: 0.2, W: 0.6},
         time=t,
     )
-    return problem(forced_dry_friction, system)
+    sticks = {"f": 0.6}
+    return problem(
+        forced_dry_friction,
+        system,
+        (1.5, 0.0),
+        100.0,
+        stated("turning point", _FROM_RUN.format("largest x"), "1.550602854686835330206"),
+        stated(
+            "multiplier (re, im)",
+            _FROM_RUN.format("of the pair, im > 0"),
+            "-0.2014342020122446992105",
+            "0.4273523322033219195279",
+        ),
+        stated(
+            "stick time",
+            _FROM_RUN.format("duration of a sliding leg"),
+            "0.3031679627151890008652",
+            at=sticks,
+        ),
+        stated(
+            "multiplier",
+            _FROM_RUN.format("the one that is not zero"),
+            "0.04780783649795189025117",
+            at=sticks,
+        ),
+        title="Forced oscillator with dry friction",
+    )
 
 
 def belt_oscillator() -> Problem:
@@ -111,7 +154,19 @@ def belt_oscillator() -> Problem:
         parameters={nu: 1.707799714885060333284, F: 0.1, a0: 1.5, a1: 1.5, a2: 0.45},
         time=t,
     )
-    return problem(belt_oscillator, system)
+    return problem(
+        belt_oscillator,
+        system,
+        (2.193338910366844980359, -0.4233606899180944085419),
+        14.7,
+        stated(
+            "multipliers",
+            "periodic_orbit from the start",
+            "0.8407253925431134112291",
+            "0.007192336124639061603273",
+        ),
+        title="Friction oscillator at its grazing-sliding",
+    )
 
 
 def simplest_walker() -> Problem:
@@ -151,7 +206,29 @@ def simplest_walker() -> Problem:
     system = FilippovSystem(
         [th, rate, ph, swing], field=field, parameters={g: 0.009}, resets=strike
     )
-    return problem(simplest_walker, system)
+    angle, speed = 0.2003109005442470893602, -0.1998324730049523545376
+    short = {"th": 0.194, "thdot": -0.204, "ph": 0.388, "phdot": -0.204 * (1 - math.cos(0.388))}
+    return problem(
+        simplest_walker,
+        system,
+        (angle, speed, 2 * angle, (1 - math.cos(2 * angle)) * speed),
+        3.8,
+        stated("long step", _FROM_STATE.format("its period"), "3.88246375285137413757"),
+        stated(
+            "multiplier (re, im)",
+            _FROM_STATE.format("of the pair, im > 0"),
+            "-0.1900998410658881460666",
+            "0.5575987766820682687652",
+        ),
+        stated("short step", _FROM_STATE.format("its period"), "3.096105868078163699902", at=short),
+        stated(
+            "multiplier of short steps",
+            _FROM_STATE.format("the largest"),
+            "4.003864358929707178753",
+            at=short,
+        ),
+        title="Simplest walking model",
+    )
 
 
 def buck_converter() -> Problem:
@@ -190,4 +267,22 @@ def buck_converter() -> Problem:
         parameters={E: 22.0},
         resets=Reset(c - 4e-4, [v, i, 0], 1, "clock"),
     )
-    return problem(buck_converter, system)
+    return problem(
+        buck_converter,
+        system,
+        (12.0, 0.55, 0.0),
+        0.02,
+        stated(
+            "multiplier (re, im)",
+            _FROM_RUN.format("of the pair, im > 0"),
+            "-0.7527983687386007668290",
+            "0.3353945246294842963954",
+        ),
+        stated(
+            "multiplier at the period doubling",
+            _FROM_RUN.format("the larger one in modulus"),
+            "-1.0",
+            at={"E": 24.51657282856337870174},
+        ),
+        title="Buck converter up to its first period doubling",
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..model import FilippovSystem
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def spiral_oscillator() -> Problem:
@@ -37,7 +37,21 @@ def spiral_oscillator() -> Problem:
         below=[x1 + w * x2, -w * x1 + x2],
         parameters={w: 6.283185307179586},
     )
-    return problem(spiral_oscillator, system)
+    return problem(
+        spiral_oscillator,
+        system,
+        (0.36787944117144233, 0.0),
+        1.5707963267948966,
+        stated("crossing time", "time of the crossing", "1"),
+        stated("crossing state", "state at the crossing", "1", "0"),
+        stated(
+            "state at pi/2",
+            "simulate to t = pi/2",
+            "-1.5974603774506981221",
+            "-0.76149362060601145276",
+        ),
+        title="Spiral oscillator",
+    )
 
 
 def scalar_sliding() -> Problem:
@@ -60,7 +74,16 @@ def scalar_sliding() -> Problem:
     '- s'
     """
     x = ca.SX.sym("x")
-    return problem(scalar_sliding, FilippovSystem([x], surface=x, above=[-1], below=[3]))
+    return problem(
+        scalar_sliding,
+        FilippovSystem([x], surface=x, above=[-1], below=[3]),
+        (-1.0,),
+        1.0,
+        stated("switch time", "time of the entry", "0.33333333333333333333"),
+        stated("end", "x at t_end, sliding", "0"),
+        stated("alpha", "weight of the field below while sliding", "0.25"),
+        title="Scalar system that slides at 0",
+    )
 
 
 def scalar_repelling() -> Problem:
@@ -83,7 +106,16 @@ def scalar_repelling() -> Problem:
     'NON_UNIQUE'
     """
     x = ca.SX.sym("x")
-    return problem(scalar_repelling, FilippovSystem([x], surface=x, above=[1], below=[-1]))
+    return problem(
+        scalar_repelling,
+        FilippovSystem([x], surface=x, above=[1], below=[-1]),
+        (0.0,),
+        1.0,
+        stated("time of the status", "t of the run that ends with NON_UNIQUE", "0"),
+        stated("x(1) leaving up", "simulate with start_mode='+'", "1"),
+        stated("x(1) leaving down", "simulate with start_mode='-'", "-1"),
+        title="Repelling start",
+    )
 
 
 def planar_relay() -> Problem:
@@ -110,7 +142,18 @@ def planar_relay() -> Problem:
     system = FilippovSystem(
         [x, y], surface=x + y, multipliers=lam, field=[-x + y, 3 * y - 10 * lam]
     )
-    return problem(planar_relay, system)
+    return problem(
+        planar_relay,
+        system,
+        (1.5, -1.5),
+        2.0,
+        stated("fold of F1", "x where L1 = 0 on the surface", "-2"),
+        stated("fold of F2", "x where L2 = 0 on the surface", "2"),
+        stated("x(2)", "slide from (1.5, -1.5): 1.5 exp(-4)", "0.027473458333101270441"),
+        stated("pseudo-node", "zero of the sliding field", "0", "0"),
+        stated("slope of the sliding field", "along x at the pseudo-node", "-2"),
+        title="Planar relay system",
+    )
 
 
 def pseudo_hopf() -> Problem:
@@ -141,7 +184,17 @@ def pseudo_hopf() -> Problem:
     system = FilippovSystem(
         [x, y], surface=y, above=[1, -x], below=[-1, -u - r * u**2], parameters={al: -0.03, r: -1.0}
     )
-    return problem(pseudo_hopf, system)
+    return problem(
+        pseudo_hopf,
+        system,
+        (-0.3, 0.0),
+        20.0,
+        stated("x0", "fixed point of the return map x -> x on y = 0", "0.29546573405388314165"),
+        stated("period", "time of one return, 4 x0", "1.1818629362155325666"),
+        stated("multiplier", "slope of the return map at x0", "0.65350727586702943"),
+        stated("pseudo-node", "x where the sliding field is zero", "-0.01488578017961046"),
+        title="Pseudo-Hopf bifurcation of a fused focus",
+    )
 
 
 def piecewise_cycle() -> Problem:
@@ -175,4 +228,13 @@ def piecewise_cycle() -> Problem:
         below=[(1 - r) * x - y, (1 - r) * y + x],
         parameters={al: 1.0, be: 1.0, ga: 1.5},
     )
-    return problem(piecewise_cycle, system)
+    return problem(
+        piecewise_cycle,
+        system,
+        (0.5, 0.0),
+        20.0,
+        stated("radius", "abs(x) on the cycle", "1"),
+        stated("period", "time of one return, 5 pi/3", "5.2359877559829887308"),
+        stated("multiplier", "slope of the return map, exp(-5 pi/3)", "0.0053215654788005829731"),
+        title="Piecewise-smooth planar cycle",
+    )

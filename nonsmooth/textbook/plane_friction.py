@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 
 from ..model import FilippovSystem
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def _symbols(*names: str) -> list[Any]:
@@ -45,7 +45,15 @@ def block_on_incline() -> Problem:
         multipliers=[lam],
         parameters={slope: 0.4, mu: 0.7},
     )
-    return problem(block_on_incline, system)
+    return problem(
+        block_on_incline,
+        system,
+        (0.0, 0.0, 0.5, 1.2),
+        6.0,
+        stated("rest (t)", "time of the entry", "3.9117151021004261582"),
+        stated("rest (x1, x2)", "x1, x2 at t_end", "1.5088602745103876547", "1.4858114548629446"),
+        title="A block slides across an incline and stops",
+    )
 
 
 def block_on_belt() -> Problem:
@@ -78,7 +86,16 @@ def block_on_belt() -> Problem:
         multipliers=[lam],
         parameters={belt: 1.2, mu_g: 0.5},
     )
-    return problem(block_on_belt, system)
+    return problem(
+        block_on_belt,
+        system,
+        (0.0, 0.0, 0.0, 1.6),
+        5.0,
+        stated("carried away (x1, x2, t)", "state and time of the entry", "2.4", "3.2", "4"),
+        stated("halfway (x1, x2)", "x1, x2 at t = 2", "0.6", "2.4"),
+        stated("end (x1, x2)", "x1, x2 at t_end", "3.6", "3.2"),
+        title="A block on a moving belt: a parabola, then a ride",
+    )
 
 
 def block_on_disc() -> Problem:
@@ -110,7 +127,18 @@ def block_on_disc() -> Problem:
         multipliers=[lam],
         parameters={spin: 1.0, mu: 0.5},
     )
-    return problem(block_on_disc, system)
+    return problem(
+        block_on_disc,
+        system,
+        (0.1, 0.0, 0.1, 0.3),
+        4.0,
+        stated("sticks (t)", "time of the entry", "0.59032684814857328464"),
+        stated(
+            "end (x1, x2)", "x1, x2 at t_end", "-0.068615334375328191576", "-0.13580414257916187"
+        ),
+        stated("friction on the disc", "smallest abs(x) that slides off, spin 1", "0.5"),
+        title="A block rides on a disc or slides off",
+    )
 
 
 def cue_ball() -> Problem:
@@ -143,7 +171,18 @@ def cue_ball() -> Problem:
         multipliers=[lam],
         parameters={mu: 0.2, g: 9.81},
     )
-    return problem(cue_ball, system)
+    return problem(
+        cue_ball,
+        system,
+        (0.0, 0.0, 3.0, 0.0, 1.0, 2.0),
+        1.0,
+        stated("rolls (t)", "time of the entry", "0.65125032110085618069"),
+        stated(
+            "rolls (x1, x2)", "x1, x2 at the entry", "1.581607922673507867", "-0.1860715203145303"
+        ),
+        stated("rolls (v1, v2)", "v1, v2 at t_end", "1.857142857142857142", "-0.5714285714285714"),
+        title="A cue ball curves, then rolls",
+    )
 
 
 def turntable() -> Problem:
@@ -175,7 +214,20 @@ def turntable() -> Problem:
         multipliers=[lam],
         parameters={spin: 1.3, mu: 2.0},
     )
-    return problem(turntable, system)
+    return problem(
+        turntable,
+        system,
+        (0.4, 0.2, 0.3, -0.5, -0.56, 1.02),
+        20.0,
+        stated("period", "time of a circle", "16.916268134714271284"),
+        stated(
+            "opposite point (x1, x2)",
+            "x1, x2 after half a period",
+            "3.0923076923076923077",
+            "1.8153846153846154",
+        ),
+        title="A sphere rolls in circles on a turntable",
+    )
 
 
 def pivoting_disc() -> Problem:
@@ -210,7 +262,21 @@ def pivoting_disc() -> Problem:
         multipliers=[lam],
         parameters={mu: 0.3, radius: 0.6},
     )
-    return problem(pivoting_disc, system)
+    return problem(
+        pivoting_disc,
+        system,
+        (0.0, 0.0, 0.0, 0.5, 0.2, 1.3),
+        6.0,
+        stated("rest (t)", "time of the entry", "4.0610305700787107825"),
+        stated(
+            "rest (x1, x2, phi)",
+            "x1, x2, phi at t_end",
+            "0.88077702581641480342",
+            "0.35231081032656592",
+            "2.7183921471252567",
+        ),
+        title="A disc stops sliding and spinning at once",
+    )
 
 
 def shaken_block() -> Problem:
@@ -245,4 +311,13 @@ def shaken_block() -> Problem:
         parameters={shake: 1.0, omega: 2.0, mu_g: 1.2},
         time=t,
     )
-    return problem(shaken_block, system)
+    return problem(
+        shaken_block,
+        system,
+        (0.0, 0.0, 0.0, 0.0),
+        30.0,
+        stated("speed in the end", "abs(v) at t_end", "0.6"),
+        stated("slip in the end", "abs(h) at t_end", "0.8"),
+        stated("least friction that holds", "largest mu_g that slides for ever", "2"),
+        title="A block on a plate that is shaken in circles",
+    )

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
-from functools import cache
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -95,7 +92,7 @@ class Reference:
 
 
 def stated(
-    quantity: str, how: str, digits: Sequence[str], at: Mapping[str, float] | None = None
+    quantity: str, how: str, *digits: str, at: Mapping[str, float] | None = None
 ) -> Reference:
     """Reference from decimal digits; the tolerance is 1e-9, or wider for few digits."""
     numbers = [Decimal(d) for d in digits]
@@ -210,35 +207,21 @@ class Problem:
         return "\n".join(lines + [f"  - {r}" for r in self.references])
 
 
-@cache
-def catalogue() -> dict[str, Any]:
-    """Titles, starts and reference values of all problems, by the names of their functions."""
-    entries: dict[str, Any] = json.loads(
-        Path(__file__).with_name("catalogue.json").read_text("utf-8")
-    )
-    return entries
-
-
 def problem(
     function: Callable[..., Problem],
     system: FilippovSystem,
+    start: tuple[float, ...],
+    t_end: float,
     *references: Reference,
-    title: str = "",
+    title: str,
+    note: str = "",
 ) -> Problem:
-    """Build the problem of a function, whose docstring has the source, from its entry of the catalogue."""
-    entry = catalogue()[function.__name__]
+    """Build the problem of a function, whose docstring has the source; parameters are the system's."""
     source = " ".join(
         (function.__doc__ or "").partition("Source: ")[2].partition("\n\n")[0].split()
     )
     values = system.parameter_vector().tolist()
+    parameters = MappingProxyType(dict(zip(system.parameter_names, values, strict=True)))
     return Problem(
-        function.__name__,
-        title or entry["title"],
-        source,
-        system,
-        MappingProxyType(dict(zip(system.parameter_names, values, strict=True))),
-        tuple(entry["start"]),
-        entry["t_end"],
-        references or tuple(stated(**reference) for reference in entry["references"]),
-        entry.get("note", ""),
+        function.__name__, title, source, system, parameters, start, t_end, references, note
     )

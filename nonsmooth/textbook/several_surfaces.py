@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..model import FilippovSystem
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def two_relay_spiral() -> Problem:
@@ -33,7 +33,22 @@ def two_relay_spiral() -> Problem:
     system = FilippovSystem(
         [x1, x2], surfaces=[x1, x2], multipliers=[s1, s2], field=[-s1 + 2 * s2, -2 * s1 - s2]
     )
-    return problem(two_relay_spiral, system)
+    return problem(
+        two_relay_spiral,
+        system,
+        (1.0, 0.5),
+        2.0,
+        stated(
+            "switch times 1 to 4",
+            "times of the first four crossings: 1/6, 5/9, 37/54, 59/81",
+            "0.16666666666666666667",
+            "0.55555555555555555556",
+            "0.68518518518518518519",
+            "0.72839506172839506173",
+        ),
+        stated("time of rest", "time of the event 'rest'", "0.75"),
+        title="Filippov's spiral of two relays",
+    )
 
 
 def glass_loop() -> Problem:
@@ -72,7 +87,26 @@ def glass_loop() -> Problem:
         multipliers=[a, b],
         field=[(1 + b) / 2 - x, (1 - a) / 2 - y],
     )
-    return problem(glass_loop, system)
+    return problem(
+        glass_loop,
+        system,
+        (0.75, 0.75),
+        3.0,
+        stated(
+            "crossing times 1 to 4",
+            "times of the first four crossings: log(3/2), log(5/2), log(7/2), log(9/2)",
+            "0.40546510810816438198",
+            "0.91629073187415506518",
+            "1.25276296849536799569",
+            "1.50407739677627407337",
+        ),
+        stated(
+            "distance at crossing 4",
+            "abs(x - 1/2) + abs(y - 1/2) there: 1/9",
+            "0.11111111111111111111",
+        ),
+        title="A negative loop of two genes",
+    )
 
 
 def ambiguous_exit() -> Problem:
@@ -106,7 +140,25 @@ def ambiguous_exit() -> Problem:
         multipliers=[s1, s2],
         field=[-s1 + x3 / 2, -s2 + x3 / 4, 1 + s1 * s2 / 2],
     )
-    return problem(ambiguous_exit, system)
+    return problem(
+        ambiguous_exit,
+        system,
+        (0.0, 0.0, 0.0),
+        3.0,
+        stated(
+            "exit time, bilinear",
+            "time at which x1 = 0 is left: 4 atan(1/2)",
+            "1.85459043600322446",
+        ),
+        stated(
+            "exit times allowed",
+            "over the convex hull: 8 log(6/5) and (8/3) log(5/2)",
+            "1.45857245435163701",
+            "2.44344195166441351",
+        ),
+        title="Exit of codimension two that is ambiguous",
+        note="a run takes the bilinear law; the convex hull leaves the exit open",
+    )
 
 
 def hidden_dynamics(*, nonlinear: bool = True) -> Problem:
@@ -149,4 +201,13 @@ def hidden_dynamics(*, nonlinear: bool = True) -> Problem:
         system = FilippovSystem(
             [x1, x2], surface=x1, above=[b - 1, 1], below=[b + 1, 1], parameters={b: 0.2}
         )
-    return problem(hidden_dynamics, system)
+    return problem(
+        hidden_dynamics,
+        system,
+        (0.0, 0.0),
+        1.0,
+        stated("x2' off the surface", "second component of either field", "1"),
+        stated("x2' sliding, nonlinear", "x2(1) of a run; 2 lam^2 - 1 at lam = b", "-0.92"),
+        stated("x2' sliding, linear", "x2(1) of a run with nonlinear=False", "1"),
+        title="Hidden dynamics",
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..model import FilippovSystem
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def soft_stop() -> Problem:
@@ -34,7 +34,17 @@ def soft_stop() -> Problem:
     system = FilippovSystem.from_expression(
         [x, v], [v, push - 5 * ca.fmax(x - 1, 0)], time=t, parameters={force: 0.3}
     )
-    return problem(soft_stop, system)
+    return problem(
+        soft_stop,
+        system,
+        (0.0, 0.0),
+        100.0,
+        stated("touch", "F at which the orbit touches the spring", "0.3687817782917154924"),
+        stated(
+            "modulus", "of the multipliers of the orbit without contact", "0.67523190665577721703"
+        ),
+        title="Soft stop behind a gap",
+    )
 
 
 def bilinear_oscillator() -> Problem:
@@ -59,7 +69,13 @@ def bilinear_oscillator() -> Problem:
     """
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     return problem(
-        bilinear_oscillator, FilippovSystem([x, v], surface=x, above=[v, -4 * x], below=[v, -x])
+        bilinear_oscillator,
+        FilippovSystem([x, v], surface=x, above=[v, -4 * x], below=[v, -x]),
+        (-1.0, 0.0),
+        10.0,
+        stated("period", "time between two crossings to the right", "4.7123889803846898577"),
+        stated("amplitude to the right", "largest x", "0.5"),
+        title="Bilinear oscillator",
     )
 
 
@@ -85,7 +101,15 @@ def backlash() -> Problem:
     """
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     force = -ca.fmax(x - 1, 0) - ca.fmin(x + 1, 0)
-    return problem(backlash, FilippovSystem.from_expression([x, v], [v, force]))
+    return problem(
+        backlash,
+        FilippovSystem.from_expression([x, v], [v, force]),
+        (0.0, 0.5),
+        14.0,
+        stated("period", "time after which (0, 1/2) returns", "14.283185307179586477"),
+        stated("amplitude", "largest x", "1.5"),
+        title="Mass with backlash",
+    )
 
 
 def chua_circuit() -> Problem:
@@ -115,7 +139,22 @@ def chua_circuit() -> Problem:
     system = FilippovSystem.from_expression(
         [x, y, z], [9 * (y - x - resistor), x - y + z, -100 / 7 * y]
     )
-    return problem(chua_circuit, system)
+    return problem(
+        chua_circuit,
+        system,
+        (0.1, 0.0, 0.0),
+        50.0,
+        stated("outer equilibrium", "its coordinates", "1.5", "0", "-1.5"),
+        stated(
+            "eigenvalues there",
+            "the real one, then real and imaginary part of the pair",
+            "-3.9421288953993572135",
+            "0.18535016198539289249",
+            "3.0469881248954652573",
+        ),
+        stated("unstable eigenvalue at 0", "the real one", "2.2173950459597073145"),
+        title="Chua's circuit",
+    )
 
 
 def mckean_neuron() -> Problem:
@@ -145,4 +184,13 @@ def mckean_neuron() -> Problem:
     system = FilippovSystem.from_expression(
         [v, w], [shape - w + current, 0.1 * (v - w / 2)], parameters={current: 0.5}
     )
-    return problem(mckean_neuron, system)
+    return problem(
+        mckean_neuron,
+        system,
+        (0.0, 0.0),
+        100.0,
+        stated("corner", "I at which the equilibrium is at v = a/2", "0.375"),
+        stated("equilibrium", "v, w for I = 0.5", "0.25", "0.5"),
+        stated("trace there", "sum of its eigenvalues", "0.95"),
+        title="McKean's piecewise linear neuron",
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from ..model import FilippovSystem
-from .problem import Problem, problem
+from .problem import Problem, problem, stated
 
 
 def threshold_harvesting() -> Problem:
@@ -36,7 +36,16 @@ def threshold_harvesting() -> Problem:
         below=[x * (1 - x)],
         parameters={h: 1.0, threshold: 0.6},
     )
-    return problem(threshold_harvesting, system)
+    return problem(
+        threshold_harvesting,
+        system,
+        (0.1,),
+        5.0,
+        stated("threshold time", "time of the entry", "2.6026896854443837648"),
+        stated("effort", "part (1 + lambda)/2 of the time in which fish are caught", "0.4"),
+        stated("least h", "at which the threshold can be kept", "0.4"),
+        title="Harvesting above a threshold",
+    )
 
 
 def sir_threshold() -> Problem:
@@ -64,7 +73,16 @@ def sir_threshold() -> Problem:
     system = FilippovSystem(
         [s, i], surface=i - 0.05, multipliers=lam, field=[-contacts, contacts - i]
     )
-    return problem(sir_threshold, system)
+    return problem(
+        sir_threshold,
+        system,
+        (0.999, 0.001),
+        80.0,
+        stated("susceptibles at the entry", "S where sliding begins", "0.89507809817505603018"),
+        stated("duration of the policy", "of the slide", "7.9015619635011206036"),
+        stated("final size", "S at the end", "0.30840841589585258262"),
+        title="Epidemic with a threshold policy",
+    )
 
 
 def stommel_box() -> Problem:
@@ -92,4 +110,12 @@ def stommel_box() -> Problem:
     system = FilippovSystem.from_expression(
         [t, s], [3 - t * (1 + flow), e - s * (0.3 + flow)], parameters={e: 1.0}
     )
-    return problem(stommel_box, system)
+    return problem(
+        stommel_box,
+        system,
+        (2.0, 1.0),
+        50.0,
+        stated("nonsmooth fold", "e of the boundary equilibrium at T = S", "0.9"),
+        stated("smooth fold", "largest e with an equilibrium with T > S", "1.2201153171955243011"),
+        title="Stommel's box model",
+    )

@@ -95,7 +95,14 @@ def two_fold(
         Reference(quantity, float(value), RELATIVE, f"of the sliding matrix: {how}")
         for quantity, (value, how) in values.items()
     )
-    return problem(two_fold, system, *references, title=f"Normal form of the two-fold, {name}")
+    return problem(
+        two_fold,
+        system,
+        (0.0, 1.0, 0.6),
+        2.0,
+        *references,
+        title=f"Normal form of the two-fold, {name}",
+    )
 
 
 def _by_label(

@@ -7,7 +7,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth import textbook
-from nonsmooth.textbook.problem import catalogue, stated
+from nonsmooth.textbook.problem import stated
 
 
 @pytest.mark.parametrize("name", textbook.PROBLEMS)
@@ -37,7 +37,6 @@ def test_parameters_from_memory_are_marked(name):
 
 
 def test_problems_are_frozen():
-    assert set(catalogue()) == set(textbook.PROBLEMS)
     problem = textbook.dry_friction()
     with pytest.raises(dataclasses.FrozenInstanceError):
         problem.t_end = 1.0
@@ -48,10 +47,10 @@ def test_problems_are_frozen():
 
 
 def test_tolerance_is_nine_digits_or_the_digits_given():
-    assert stated("a", "", ["12.001031294830578647"]).tolerance == 1e-9
-    assert stated("b", "", [".34105997"]).tolerance == pytest.approx(5e-9 / 0.34105997)
-    assert stated("c", "", ["-2.2"]).tolerance == 1e-9
-    reference = stated("d", "", ["2", "0"])
+    assert stated("a", "", "12.001031294830578647").tolerance == 1e-9
+    assert stated("b", "", ".34105997").tolerance == pytest.approx(5e-9 / 0.34105997)
+    assert stated("c", "", "-2.2").tolerance == 1e-9
+    reference = stated("d", "", "2", "0")
     assert reference.error([2.002, 1e-3]) == pytest.approx(1e-3)
     assert reference.agrees([2.0, 0.0]) and not reference.agrees([2.0, math.nan])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cached_property, lru_cache
@@ -26,6 +27,7 @@ from ..constants import FULL, IMPACT_LAWS, LAWS, NEEDS_PROGRAM, REASONS, RUNNING
 from ..names import shown_mode
 from ..options import Options
 from ..results import Chunk, Stopped
+from ..status import Status
 from .arrays import (
     BURST,
     Run,
@@ -52,6 +54,9 @@ Calls = Callable[[int, Any, Any], Callable[[], int]]
 
 #: Steps of a test for stiffness.
 _PROBED = 400
+
+#: Seconds of a step, and of each rule and each term of a sum in it: measured on an EPYC at tolerances from 1e-6 to 1e-12.
+_OF_STEP, _OF_TERM = 4e-7, 2.5e-8
 
 #: Modes whose letters are kept.
 _KNOWN = 4096
@@ -385,10 +390,18 @@ class Interpreter:
                 self.add_implicit()
         return int(status)
 
-    def is_stiff(self, x: Array, p: Array, options: Options) -> bool:
-        """Whether a run takes implicit steps soon."""
+    def seconds(self, x: Array, p: Array, options: Options) -> float | None:
+        """About how long a run takes, from its first steps; None if it takes implicit ones soon."""
+        # By what a step has to do, not by the clock: what is decided by it has to be the same again.
         few = replace(options, max_steps=min(options.max_steps, _PROBED), hits=None)
-        return bool(np.isfinite(x).all()) and self.run(x, p, few, dense=False).implicit_steps > 0
+        if not np.isfinite(x).all():
+            return math.inf
+        run, series = self.run(x, p, few, dense=False), self._c.series
+        if run.implicit_steps:
+            return None
+        done = (float(run.t[-1]) - options.t_start) / (options.t_end - options.t_start)
+        steps = len(run.t) / (max(done, 1e-9) if run.status == Status.TOO_MANY_STEPS else 1.0)
+        return steps * (_OF_STEP + _OF_TERM * (series.size + series.terms))
 
     def _checked(self, motion: Array) -> Array:
         """Data of a run or event for a restart, if it is of this system."""

@@ -53,11 +53,12 @@ class Lanes:
         at: tuple[int, int] | None,
         out: Chunk | None = None,
         stop: Callable[[], bool] = lambda: False,
+        times: Array | None = None,
     ) -> Chunk:
         """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
         # The driver makes steps that the lanes cannot decide.
         return interpreter_for(self.system, options).run_many(
-            x, p, options, at, out, stop, None, self._calls
+            x, p, options, at, out, stop, times, self._calls
         )
 
     def _calls(self, run: int, batch: Any, options: Any) -> Callable[[], int]:

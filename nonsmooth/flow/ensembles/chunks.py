@@ -76,7 +76,7 @@ def _run_compiled(
     if job.engine == "lanes":
         lanes = lanes_for(system, job.options)
         assert lanes is not None
-        lanes.run_many(x, p, job.options, job.at, out, stop)
+        lanes.run_many(x, p, job.options, job.at, out, stop, times)
     else:
         engine = interpreter_for(system, job.options)
         engine.run_many(x, p, job.options, job.at, out, stop, times)

@@ -424,6 +424,10 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
     s->steps += unclear;
   }
   I live = s->live & ~unclear, stopped = live & (e->slot > FIRST_STOP);
+#if RARE_CASES_HERE && !SET
+  I due = live & (s->due < e->t + e->dt);
+  if (any(due)) keep_samples(s, w, e, due);
+#endif
 #if STOPS > 0
   for (int j = 0; j < STOPS; j++)
     s->above_stop[j] = (s->above_stop[j] & ~live) | ((I)(e->g[FIRST_STOP + j][0] > 0) & live);

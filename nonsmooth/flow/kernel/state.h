@@ -71,6 +71,7 @@ typedef struct {
   Log *log; /* of a surface's events */
   int64_t row; /* next one of the log */
   int pool;
+  T due; /* the time of each lane's next sample */
 #else
   T shortest;
   I shrinking;
@@ -105,6 +106,9 @@ static void shorten_codes(Lanes *s, Work *w);
 static void begin_elsewhere(Lanes *s, Work *w, I which);
 INLINE I by_chance(const Lanes *s, const Work *w);
 INLINE void count(Lanes *s, Work *w, int kind, I which);
+#if RARE_CASES_HERE
+static void keep_samples(Lanes *s, Work *w, const Step *e, I which);
+#endif
 
 static void note_modes(Lanes *s, Work *w, I which, I mode) {
   s->code = (s->code & ~which) | (((s->code << 2) + mode + 1) & which);

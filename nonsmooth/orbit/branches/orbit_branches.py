@@ -26,7 +26,7 @@ from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, elimi
 from ..periodic.divided_legs import divided, to_divide
 from ..periodic.find_periodic import at_two_fold
 from ..periodic.multipliers import Multipliers, return_map
-from ..periodic.orbit import PeriodicOrbit, faults_of, named
+from ..periodic.orbit import PeriodicOrbit, named, violations_of
 from ..periodic.orbit_functions import OrbitFunction, UserRows
 from ..periodic.symmetry import halves, prime_period, require_symmetric
 from ..runs.guards import watch
@@ -322,7 +322,7 @@ class OrbitCurve(OrbitEquations):
                 f"{found.start.tolist()}. Continue with a smaller step."
             )
         p = found.parameter_vector
-        return replace(found, faults=tuple(faults_of(found.problem, found.evaluation, p)))
+        return replace(found, faults=tuple(violations_of(found.problem, found.evaluation, p)))
 
     def out(self, u: Array) -> str:
         """``"period diverges"`` where it is long and grows at a constant parameter; else empty."""
@@ -448,7 +448,7 @@ class OrbitCurve(OrbitEquations):
 
     def faults(self, u: Array) -> list[str]:
         """Violated guards."""
-        return faults_of(self.problem, self.evaluation(u), self.parameters_at(u))
+        return violations_of(self.problem, self.evaluation(u), self.parameters_at(u))
 
     def admissible(self, u: Array) -> bool:
         return not self.faults(u)

@@ -180,8 +180,8 @@ class Loop(ABC):
             if duration <= 0.0:
                 faults.append(f"{name} has the duration {duration:.3g}")
             else:
-                seen = watch(self.system, leg, x, duration, p).faults
-                faults += [f"{name}: {fault}" for fault in seen]
+                seen = watch(self.system, leg, x, duration, p).violations
+                faults += [f"{name}: {one}" for one in seen]
         return tuple(legs), tuple(faults)
 
     def pieces(self, u: Array) -> tuple[OrbitLeg, ...]:

@@ -51,7 +51,7 @@ from ...solvers.continuation import (
     trace,
 )
 from ...tables import Table, joined
-from ..runs.guards import change_fault
+from ..runs.guards import change_violation
 from ..runs.itinerary import Arrival, FixedItinerary, leg_between, read_word
 from .two_fold_sheet import Meeting, TwoFoldSheet
 
@@ -681,7 +681,7 @@ class _TwoFoldPassages:
             arrival = fixed.arrive(x)
             by_start = fixed.derivative(arrival)[1] @ slope
             x, entry = arrival.x, arrival.t
-            fault = arrival.fault or self._entry_fault(itinerary, x)
+            fault = arrival.fault or self._entry_violation(itinerary, x)
         met = self.sheet.meet(x, self._met.get(itinerary))
         self._met[itinerary] = met
         return Passage(
@@ -694,9 +694,9 @@ class _TwoFoldPassages:
             (met.slope @ by_start)[None, :],
         )
 
-    def _entry_fault(self, itinerary: str, x: Array) -> str:
+    def _entry_violation(self, itinerary: str, x: Array) -> str:
         leg, p = leg_between(self.system, itinerary[-2], "s"), self.sheet.parameters
-        return change_fault(self.system, leg, "s", x, x, p)
+        return change_violation(self.system, leg, "s", x, x, p)
 
     def _grazes(self, u: Array, itinerary: str) -> Passage:
         """The passage of an orbit whose last leg turns back from the surface: h is least there."""

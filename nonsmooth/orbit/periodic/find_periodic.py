@@ -31,7 +31,7 @@ from ..runs.legs import Leg, integrate_leg, leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
 from .divided_legs import divided, to_divide
 from .guess import Start, about_of, equations_of, is_about, starts_of
-from .orbit import PeriodicOrbit, faults_of, named
+from .orbit import PeriodicOrbit, named, violations_of
 from .symmetry import prime_period, require_symmetric, symmetry_matrix
 
 #: No leg may grow to so many times the guess of the whole orbit.
@@ -224,7 +224,7 @@ def _solved(
     require_motion(problem, at, start)
     require_duration(problem, at, about_of(system, period, start.p))
     _require_multiplicity(problem, multiplicity)
-    faults = tuple(faults_of(problem, at, start.p))
+    faults = tuple(violations_of(problem, at, start.p))
     orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, iterations, faults)
     orbit = _of_neutral_family(orbit, most, budget) or orbit
     require_simple(orbit)
@@ -253,7 +253,7 @@ def _of_neutral_family(orbit: PeriodicOrbit, most: int, budget: _Budget) -> Peri
             problem, u, at, count = _closed_orbit(begun.problem, begun.unknowns, p, most, budget)
         except (ConvergenceError, DegenerateError):
             continue
-        faults = tuple(faults_of(problem, at, p))
+        faults = tuple(violations_of(problem, at, p))
         found = PeriodicOrbit(system, orbit.parameters, problem, u, at, count, faults)
         if found.floquet.repeats and not faults:
             return found
@@ -545,7 +545,7 @@ class _Solver:
         ]
         if not backward and at is not None:
             try:
-                backward = faults_of(self.problem, at, self.p)
+                backward = violations_of(self.problem, at, self.p)
             except NonsmoothError:
                 backward = []
         why = f" {reason}" if reason else ""

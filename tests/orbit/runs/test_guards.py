@@ -7,7 +7,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.flow.names import described
 from nonsmooth.model import Guard
-from nonsmooth.orbit.runs.guards import change_fault, faults_along, watch
+from nonsmooth.orbit.runs.guards import change_violation, violations_of_legs, watch
 from nonsmooth.orbit.runs.legs import Leg, integrate_leg, leg_name
 
 
@@ -69,10 +69,10 @@ def test_legs_are_judged_together_as_one_by_one():
             continue
         found = watch(system, leg, starts[i], durations[i], p).faults
         j = (i + 1) % len(legs)
-        fault = change_fault(system, leg, legs[j].mode, ends[i].end, starts[j], p)
+        fault = change_violation(system, leg, legs[j].mode, ends[i].end, starts[j], p)
         found += [fault] if fault else []
         expected += [f"leg {i + 1} {leg_name(system, leg)}: {fault}" for fault in found]
-    together = faults_along(system, legs, starts, durations, speeds, p, True)
+    together = violations_of_legs(system, legs, starts, durations, speeds, p, True)
     assert together == expected and len(together) >= 5
     assert sum("is violated" in fault for fault in together) >= 1
     assert sum("begins after it" in fault for fault in together) >= 1

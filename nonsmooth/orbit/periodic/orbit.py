@@ -191,7 +191,7 @@ class PeriodicOrbit(Tabular):
     def half_multipliers(self) -> NDArray[np.complex128]:
         """Multipliers of the map of the legs that were solved for.
 
-        Of an orbit with a symmetry these are those of half the orbit, mirrored back; otherwise
+        Of an orbit with a symmetry these are those of half the orbit, mapped back by it; otherwise
         ``multipliers``.
         """
         return self.floquet.of_map
@@ -223,7 +223,7 @@ class PeriodicOrbit(Tabular):
 
     @property
     def residual(self) -> float:
-        """Largest entry that is left of the equations that were solved."""
+        """Largest residual of the equations that were solved."""
         return float(np.abs(self.evaluation.residual).max())
 
     # derivatives and margins ---------------------------------------------------------------------------------

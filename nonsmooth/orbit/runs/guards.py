@@ -32,7 +32,7 @@ _CONSTANT = 1e-13
 #: Newton steps to an extremum between two steps of the driver.
 _REFINED = 4
 
-#: The same beside sets, where the direction of h turns ever faster.
+#: Newton steps beside sets, where the direction of h turns ever faster.
 _NEAR_SETS = 1e-4
 
 #: Guards that are functions of conditions of events.
@@ -68,7 +68,7 @@ def watch(system: FilippovSystem, leg: Leg, x: Array, duration: float, p: Array)
 
 
 def is_active(field: Guarded, row: Array, p: Array) -> bool:
-    """Whether something happens where the guard of a row of ``LegsWatch`` passes zero."""
+    """Whether an event is due where the guard of a row of ``LegsWatch`` passes zero."""
     guard, system = field.motion.guards[int(row[0])], field.motion.system
     if guard.kind not in CONDITIONS:
         return True
@@ -242,7 +242,7 @@ def _change_violation(
         return _following_violation(field, begin, p)
     if guard.kind in ("surface", "exit", "impact", "release") and speed > 0.0:
         condition, name = described(system, guard), leg.name(system)
-        return f"at its end {condition} starts to hold instead of failing ({name})"
+        return f"at its end {condition} becomes true instead of false ({name})"
     if guard.kind in ("stop", "reset") and guard.side * speed < 0.0:
         return f"{guard.kind} {leg.name(system)!r} reaches zero from the wrong side at its end"
     return _following_violation(field, begin, p)

@@ -70,7 +70,7 @@ def super_twisting() -> Problem:
         FilippovSystem.from_expression([x, v], [v - root, -1.1 * ca.sign(x)]),
         (1.0, 0.0),
         3.0,
-        stated("limit", "time at which it comes to rest", "1.7416627251264"),
+        stated("limit", "time at which it comes to rest", "1.74166272512746531"),
         title="Super-twisting controller",
     )
 

@@ -346,10 +346,15 @@ static void see_limit(Run *r) {
   if (has_kind(r, block, IMPACT) && !has_kind(r, block, RESET)) close_contacts(r, block, left, error); else end_at_limit(r, block, left, error);
 }
 
-/* Whether events accumulate at a point where no series exists: the run ends there. */
+/* Whether events accumulate at a point where no series exists: a surface with a root rests there, else the run ends. */
 static int ends_at_singular(Run *r) {
-  double left, error;
-  if (!block_of(r, &left, &error)) return 0;
+  double left, error, *near = r->before;
+  int block = block_of(r, &left, &error);
+  if (!block) return 0;
+  left = larger(left - r->since, 0);
+  for (int i = 0; i < r->n; i++) near[i] = left * fabs(r->e.states[(int64_t)i * r->stride + 1]);
+  r->e.finite = 0; /* the first terms alone say how far guards are */
+  if (r->has_roots && is_quiet(r, &r->e, r->drop, near, left, block) && come_to_rest(r, left, near, block)) return 1;
   r->limit = r->t + left;
   finish(r, ACCUMULATION, NO_REASON, 0);
   return 1;

@@ -411,7 +411,10 @@ static int taylor_piece(Run *r, double left, Piece *q) {
   r->length_mode = r->mode;
   r->length = dt == requested ? h : dt;
   int swallowed = dt < requested && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
-  if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return 0; }
+  if (r->shortened >= SHORTENED || swallowed) {
+    if (!(r->has_roots && ends_at_singular(r))) finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0);
+    return 0;
+  }
   if (dt < requested) row = -1, last = 0;
   if (row < 0) watch_decay(r, e, by_series);
   if (r->wants_program) return 0;

@@ -309,6 +309,19 @@ static int leading(Run *r, Expansion *e, int row, int zeros, double *value) {
   return r->order + 1;
 }
 
+/* What the distance from a bound is zero to where several elements slide: the law there is decided by what follows. */
+static double tie_of_bound(Run *r, Expansion *e, int row) {
+  int i = e->l.index[row], w = r->width;
+  double most = 0;
+  weigh_again(r, e);
+  for (int k = i; k < i + size_of(r, i); k++) {
+    double terms = 0, own = fabs(r->slope[k * w + k]);
+    for (int j = 0; j < e->l.slides; j++) terms += fabs(r->slope[k * w + e->l.sliding[j]] * factor_of(r, e->l.sliding[j]));
+    most = larger(most, own > 0 ? 2 * TIED * terms / own : 0);
+  }
+  return e->l.kind[row] == SLIP_GUARD ? 2 * fabs(factor_of(r, i)) * most : most;
+}
+
 static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   const double *g = e->guards + (int64_t)row * r->stride, *c = g + drop;
   int kind = e->l.kind[row];
@@ -316,7 +329,8 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   if (is_atom(kind)) return sure_crossing(r, e, row, drop, h, e->l.side[row]);
   if (c[0] <= 0) {
     double value;
-    drop = leading(r, e, row, drop, &value);
+    int is_tied = !drop && e->l.slides > 1 && (kind == SLIP_GUARD || kind == EXIT_GUARD) && -c[0] <= tie_of_bound(r, e, row);
+    drop = leading(r, e, row, drop + is_tied, &value);
     if (value == 0) return -1;
     c = g + drop;
   }

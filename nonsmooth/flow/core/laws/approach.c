@@ -81,8 +81,11 @@ static void jump(Run *r, const double *rate, double dt) {
   note(r);
 }
 
-/* Time to a set below which coefficients of series overflow. */
+/* Time to a point without a series below which coefficients of series overflow. */
 static double shortest(const Run *r) { return pow(OVERFLOW, -1.0 / r->order); }
+
+/* The shortest time in which a run comes close to such a point: shorter ones are rounding, or have no series. */
+static double least_time(const Run *r) { return larger(shortest(r), TENFOLD * SHORTEST * time_scale(r)); }
 
 /* Whether the state is on a set, or too close to it for a series; after surface_values. */
 static int is_reached(Run *r, const int8_t *letter, int f, const double *h, const double *scales_of) {
@@ -140,7 +143,7 @@ static void near_set(Run *r, int row, int fell) {
     square += a[i] * a[i];
   }
   dt = hits && same ? (c * radius + along) / (c * c - square) : rate < 0 ? radius / -rate : INFINITY;
-  at_floor |= dt < larger(shortest(r), TENFOLD * SHORTEST * time_scale(r));
+  at_floor |= dt < least_time(r);
   if (!hits && !at_floor) return;
   if (!(dt > 0 && dt < INFINITY)) {
     if (!(at_floor && (hits || fell))) return;

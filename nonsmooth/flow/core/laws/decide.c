@@ -548,8 +548,10 @@ static int is_positive_stable(double *a, int n, double *work) {
  * the same motion, except where nu does not act. */
 static int final_state(const Decision *d, int i, int orders) {
   int state = d->state[orders * d->count + i];
+  int first = first_row(d->span, i), end = first + (d->span[first] > 1 ? d->span[first] : 1), matters = d->is_contact[i] || d->is_idle[i];
   if (state >= INSIDE) return state;
-  if (d->is_contact[i] || d->is_idle[i] || d->matrix[i * (d->count + 1)] != 0) return INSIDE;
+  for (int j = first; j < end; j++) matters |= d->matrix[j * (d->count + 1)] != 0;
+  if (matters) return INSIDE;
   return state == AT_TOP ? ABOVE : state == AT_BOTTOM ? BELOW : INSIDE;
 }
 

@@ -138,7 +138,8 @@ static int approach_root(Run *r, int i, double h, double level, double left) {
   }
   if (h * side <= 0) return 1;
   if (!(own * h < 0) || bare * h > 0) return 0;
-  if (fabs(own - bare) <= ROOT_SHARE * fabs(bare)) share = 1 / (1 + p); /* the root is a power p of the time */
+  double part = fabs(h) <= least_time(r) * fabs(own) ? FALL : ROOT_SHARE; /* rounding in the time hides its square */
+  if (fabs(own - bare) <= part * fabs(bare)) share = 1 / (1 + p); /* the root is a power p of the time */
   else if (fabs(bare) <= ROOT_SHARE * fabs(own)) share = 1 - p; /* h' = -k h^p */
   else if (fabs(h) <= level && degree_of(r, i) == 1) share = 1;
   if (share == 0) return 0;
@@ -155,9 +156,9 @@ static int leave_root(Run *r, int i, double near, double level, double left) {
   double p = element(r, i)->power, *bare = r->before, *mean = r->at_root, *x = mean + r->n, *with = x + r->n;
   double rate = field_at_root(r, i, r->x, 0, bare), dt = near / fabs(rate);
   if (!(rate * r->letter[i] > 0)) return grow_off_root(r, i, rate, bare, level, left);
-  for (int count = 0; count < DEPTH; count++, dt *= FALL) { /* the root changes the rate by a small part */
+  for (double least = least_time(r) / FALL; ; dt *= FALL) { /* the root changes the rate by a small part */
     for (int k = 0; k < r->n; k++) x[k] = r->x[k] + dt * bare[k];
-    if (fabs(field_at_root(r, i, x, 1, with) - rate) <= ROOT_SHARE * fabs(rate)) break;
+    if (fabs(field_at_root(r, i, x, 1, with) - rate) <= ROOT_SHARE * fabs(rate) || !(dt >= least)) break;
   }
   if (degree_of(r, i) == 1 && dt * fabs(rate) < level) {
     if (grow_off_root(r, i, rate, bare, level, left)) return 1;
@@ -225,11 +226,17 @@ static int leaves_by_root(Run *r) {
   return 0;
 }
 
+/* How near a surface with a root a run may come: where |h| is at most ``near``, or no series can begin. */
+static double least_of_root(Run *r, int i, double h, double near) {
+  if (fabs(h) > larger(near, CLOSE * surface_scales(r, r->x)[i])) return near;
+  return larger(near, least_time(r) * fabs(field_at_root(r, i, r->x, 1, r->at_root)));
+}
+
 /* Pass a surface with a root, where no series converges; whether the run has moved. */
 static int pass_root(Run *r, double left) {
   for (int i = 0; i < r->m; i++) {
     if (element(r, i)->power == 0 || r->letter[i] == 0) continue;
-    double h = surface_values(r, r->x)[i], near = near_root(r, i);
+    double h = surface_values(r, r->x)[i], near = least_of_root(r, i, h, near_root(r, i));
     if (!(fabs(h) <= near)) continue;
     if (rest_near_root(r, i)) return 1;
     double rounding = ON_SURFACE * surface_scales(r, r->x)[i], level = larger(ROOT_SHARE * ROOT_SHARE * near, rounding);

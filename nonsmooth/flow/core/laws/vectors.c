@@ -26,9 +26,12 @@ static int solve_vector(const double *m, int k, double shift, const double *b, d
 }
 
 /* The direction u with (M + s) u = a, |u| = 1 and the largest s >= 0: Newton's method from the left, where it is monotone
- * (1/|(M + s)^-1 a| is concave). M is symmetric positive definite. */
+ * (1/|(M + s)^-1 a| is concave). M is symmetric, and positive definite but for directions in which a is zero. */
 static int leaving_direction(const double *a, const double *m, int k, double *u) {
-  double d[3], w[3], s = larger(0, length_of(a, k) - sqrt(dot(m, m, k * k)));
+  double d[3], w[3], s, along = 0, square = dot(a, a, k);
+  for (int i = 0; i < k; i++) along += a[i] * dot(m + i * k, a, k);
+  s = larger(sqrt(square) - along / square, 0); /* |(M + s)^-1 a| is at least |a|^3 / (a (M + s) a) */
+  if (s == 0 && !solve_vector(m, k, s, a, d)) s = SINGULAR * sqrt(dot(m, m, k * k));
   for (int again = 0; again < 100; again++) {
     if (!solve_vector(m, k, s, a, d) || !solve_vector(m, k, s, d, w)) return 0;
     double n = length_of(d, k);

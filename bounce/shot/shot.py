@@ -82,6 +82,9 @@ class Shot(Generic[Model, Along]):
     approach: ns.Trajectory | None
     tol: float
 
+    def _tables(self) -> dict[str, ns.tables.Table]:
+        return self.trajectory._tables()
+
     @property
     def slip(self) -> Along:
         """Slip ``xdot + omega`` at lift-off: below zero is reverse slip; in 3-D a vector (2,)."""

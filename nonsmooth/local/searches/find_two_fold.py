@@ -27,6 +27,7 @@ from ...model import (
 from ...model.checks import positive
 from ...notebook import card, quadrants
 from ...solvers.newton import solve_many
+from ...tables import Tabular
 from ..checks import require_generic
 from ..discrete_states import with_discrete_states_held
 from ..point.regions import coincide
@@ -37,7 +38,7 @@ from .search import Found, search, unknowns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TwoFold:
+class TwoFold(Tabular):
     """A generic two-fold, its normal form and its class.
 
     ``print(fold)`` says what it means. Coordinates $(z1, z2, z3)$, times and the matrix are those of

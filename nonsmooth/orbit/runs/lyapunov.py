@@ -29,6 +29,7 @@ from ...model import (
     require_system,
     whole,
 )
+from ...tables import Table
 from .legs import Leg, LegFlow, Stretch, stretches
 from .limits import limits_of
 from .saltation import Saltation
@@ -93,6 +94,14 @@ class LyapunovSpectrum(
     t: float
     sum_check: float
     complete: bool = True
+
+    def _tables(self) -> dict[str, Table]:
+        columns = {"exponent": self.exponents, "error": self.errors}
+        blocks = {"exponent": ("direction", self.blocks)}
+        return {
+            "directions": Table({"direction": len(self.exponents)}, columns),
+            "blocks": Table({"block": len(self.blocks)}, blocks),
+        }
 
     @property
     def dimension(self) -> float:

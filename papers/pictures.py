@@ -121,7 +121,7 @@ def sampled(
 PAGE, SMALLEST, LISTED = 7.0, 8.0, 6
 
 
-def faults(figure: Figure) -> list[str]:
+def illegible(figure: Figure) -> list[str]:
     """Sentences on what is not legible in print: width, small, cut or overlapping texts, long legends."""
     width, found = figure.get_figwidth(), list[str]()
     if width > PAGE:

@@ -13,7 +13,7 @@ import pytest
 from papers import __main__ as program
 from papers import pictures
 from papers.claims import Check, failures
-from papers.pictures import faults
+from papers.pictures import illegible
 
 FOLDER = Path(__file__).parent
 NAMES = [name for name in program.NAMES if name != "biber_2022"]  # it has tests of its own
@@ -64,7 +64,7 @@ def test_figures_are_fit_for_print(picture):
     assert any(t.get_text() for t in texts)
     assert picture.caption
     with pictures.settings():
-        assert faults(figure) == []
+        assert illegible(figure) == []
 
 
 def test_what_is_not_legible_is_found():
@@ -80,7 +80,7 @@ def test_what_is_not_legible_is_found():
         axes.text(0.6, 1.0, "beside", rotation=40)
         axes.text(5.0, 0.5, "outside", clip_on=True)
         figure.text(0.9, 0.5, "a text that leaves the figure on its right side")
-        assert faults(figure) == [
+        assert illegible(figure) == [
             "it is 7.5 inches wide, more than the 7 of a page.",
             "a legend has 7 entries: label the things themselves.",
             "'one text' is on 'another'.",

@@ -1,7 +1,6 @@
 """The smooth flow of one mode, forward or backward in time, with its event functions.
 
-Manifolds and dividing surfaces are computed with it. The mode never changes, so the backward flow is a smooth
-problem too.
+Used by manifolds and dividing surfaces. The mode never changes, so the backward flow is a smooth problem too.
 """
 
 from __future__ import annotations
@@ -157,7 +156,7 @@ def _finished(
     message: str,
     steps: Steps,
 ) -> Trajectory:
-    """A run in one mode, with its events; its end is one of them unless a stop is the last."""
+    """A run in one mode, with its events, of which the last is its end or a stop."""
     end = float(t[-1])
     if status is not Status.STOPPED:
         events = [*events, Event("end", end, x[-1].copy(), mode, mode, str(status))]

@@ -16,7 +16,7 @@ from papers.biber_2022.errata_general import fold_of
 from papers.biber_2022.exact import evaluate, identical
 from papers.biber_2022.model import LAWS, linear
 from papers.claims import failures
-from papers.pictures import faults
+from papers.pictures import illegible
 from papers.record import Done
 
 
@@ -130,7 +130,7 @@ def test_figures_are_fit_for_print(picture):
     assert any(t.get_text() for t in texts)
     assert picture.caption
     with pictures.settings():
-        assert faults(figure) == []
+        assert illegible(figure) == []
 
 
 # The record --------------------------------------------------------------------------------------

@@ -414,7 +414,7 @@ static void step_left(Run *r, const Batch *b, const Options *o, int64_t i, Left 
   left->drop = m.drop;
   left->begun = 1;
   if (!(left->code & FROZEN)) left->code = code_of(&r->table->tree, m.itinerary);
-  b->status[i] = HAND_OVER;
+  b->status[i] = FALL_BACK;
 }
 
 /* Run a batch for at most ``budget`` steps, from records of ``width`` words that a GPU left or from none; 0, or the reason
@@ -445,7 +445,7 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
   return run_all(r, next, b, o, start_mode, 0, 0, budget);
 }
 
-/* Continue the runs that a GPU left: for one step, after which runs with the status HAND_OVER continue from their records,
+/* Continue the runs that a GPU left: for one step, after which runs with the status FALL_BACK continue from their records,
  * or to their ends. */
 int run_left(Run *r, int64_t *next, const Batch *b, const Options *o, int64_t *records, int64_t width, int to_end,
              int64_t budget) {

@@ -1,8 +1,8 @@
 """Python around the driver in C (``flow/core``) and the lanes in C (``flow/kernel``).
 
 ``interpreter`` gives the driver a system as data, ``arrays`` its options and arrays; ``convert`` makes a Trajectory of a
-run. ``lanes`` and ``device`` run many trajectories; ``building`` compiles and keeps libraries. Which file of
-``core`` decides a question is in ``docs/decisions/one_driver.md``.
+run. ``lanes`` and ``device`` run many trajectories; ``building`` compiles and stores libraries.
+``docs/decisions/one_driver.md`` lists the files of ``core`` by task.
 """
 
 from .arrays import Run

@@ -39,7 +39,7 @@ _ALONG_DP = -2
 
 
 class EndOfLeg(NamedTuple):
-    """What ends a leg by the law of its mode: a set that is reached, or a guard of sliding or of a contact."""
+    """End of a leg by the law of its mode: a set that is reached, or a guard of sliding or of a contact."""
 
     hit: int = -1
     guard: str = "stop"
@@ -126,7 +126,7 @@ class CarriedLegs:
         return made
 
     def carry(self, direction: Array, dp: Array | None, steps: Array) -> int:
-        """Carry them; the number of steps, of which as many as there is room for are recorded."""
+        """Integrate them and return the number of steps, which are recorded as far as there is room."""
         self._c["direction"], self._c["dp"] = direction.ctypes.data, address(dp) or 0
         self._c["steps"][0], self._c["step_room"][0] = address(steps) or 0, len(steps)
         self._steps = steps
@@ -138,7 +138,7 @@ class CarriedLegs:
 
     @property
     def left(self) -> Array:
-        """What is left of durations (L,) where legs end: at a set that is reached before, or where they are stuck."""
+        """Remaining durations (L,) of legs that end early: at a set, or where integration fails."""
         return np.asarray(self._c["left"])
 
     def steps_of(self, leg: int) -> tuple[Array, Array]:
@@ -157,7 +157,7 @@ class CarriedLegs:
         return [(times[i:j], matrices[i:j]) for i, j in pairwise(first)]
 
     def set_columns(self, first: Array) -> None:
-        """Let the first column (n,) of all legs be one, and others zero."""
+        """Set the first column (n,) of all legs, and the others to zero."""
         self._y[:] = 0.0
         self._y[:, 0] = first
 
@@ -173,7 +173,7 @@ class CarriedLegs:
 
     @contextmanager
     def pulling(self, by_parameters: Array, rows: Array) -> Iterator[None]:
-        """Let ``pull`` add what the row gives by all parameters; ``rows`` (K, n) join it at samples."""
+        """Let ``pull`` add the row's derivatives by all parameters; ``rows`` (K, n) are added at samples."""
         c, width = self._c, 8 * rows.shape[1]
         c["row"], c["by_parameters"] = self.row.ctypes.data, by_parameters.ctypes.data
         c["at_samples"] = rows.ctypes.data + width * self.given.first[:-1]
@@ -197,7 +197,7 @@ class ColumnsEngine(Interpreter):
 
     @contextmanager
     def state(self) -> Iterator[int]:
-        """A run of the driver, which goes on to the next call."""
+        """A run of the driver, kept for the next call."""
         try:
             state = self._idle.pop()
         except IndexError:
@@ -211,15 +211,15 @@ class ColumnsEngine(Interpreter):
             self._idle.append(state)
 
     def carry(self, given: GivenLegs, chosen: Sequence[int]) -> CarriedLegs:
-        """Carry states and their derivatives by the starts and by chosen parameters over legs."""
+        """Integrate states and their derivatives by the starts and by chosen parameters over legs."""
         n = given.starts.shape[1]
         found = CarriedLegs(self, given, n + len(chosen), n)
         found.carry(np.array([-1] * n + list(chosen), np.int32), None, _NO_STEPS)
         return found
 
     def record(self, given: GivenLegs) -> CarriedLegs:
-        """Carry states over legs by steps that rows can take back: short enough for two columns; implicit ones end at
-        samples."""
+        """Integrate states over legs by steps along which rows can be pulled back: short enough for two columns; implicit
+        ones end at samples."""
         (legs, n), q = given.starts.shape, given.p.shape[-1]
         some = 1.0 + 0.5 * np.cos(np.arange(max(n, q)))
         room = _ROOM + _STEPS * legs

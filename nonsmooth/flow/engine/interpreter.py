@@ -46,13 +46,13 @@ _VALUES = ("point", "surfaces", "maps", "atoms", "choices", "restitution", "colu
 _ENTRIES = tuple(field.name for field in fields(Instructions) if field.type == "Entries")
 
 
-#: What an address of the driver's structures points to.
+#: Targets of the addresses in the driver's structures.
 Block = NDArray[Any] | ctypes.Structure | ctypes.Array[Any]
 
-#: Makes what goes on with a batch, from a run of the driver, the batch and its options: 0 where it is done.
+#: Makes a function that continues a batch, from a run of the driver, the batch and its options; it returns 0 at the end.
 Calls = Callable[[int, Any, Any], Callable[[], int]]
 
-#: Steps by which a run is known to be stiff.
+#: Steps of a test for stiffness.
 _PROBED = 400
 
 #: Seconds of a step, and of each rule and each term of a sum in it: measured on an EPYC at tolerances from 1e-6 to 1e-12.
@@ -115,12 +115,12 @@ def values_structure(v: Values, kept: list[NDArray[Any]]) -> ctypes.Structure:
     return structure("Values")(*sizes, *[a.ctypes.data for a in arrays])
 
 
-#: What a run says at its end.
+#: Numbers of a run at its end.
 _Numbers, _Counts = ctypes.c_double * 4, ctypes.c_int64 * 15
 
 
 class _Held:
-    """Something of C's that is freed when a block ends."""
+    """Memory of C that is freed at the end of a block."""
 
     def __init__(self, pointer: int, free: Callable[[int], Any]):
         self.pointer, self.free = pointer, free
@@ -133,7 +133,7 @@ class _Held:
 
 
 def _ordering(entries: Entries, n: int) -> NDArray[np.int32]:
-    """States in an order in which those that are coupled are close: reverse Cuthill-McKee."""
+    """Order of the states that reduces the bandwidth: reverse Cuthill-McKee."""
     from scipy.sparse import coo_array  # slow to import
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -144,7 +144,7 @@ def _ordering(entries: Entries, n: int) -> NDArray[np.int32]:
 
 
 def _ends(parts: Sequence[Sequence[Any]]) -> list[int]:
-    """Where parts of a row begin, and the end of the last."""
+    """Offsets of the parts of a row, and the end of the last."""
     return [0, *np.cumsum([len(part) for part in parts], dtype=int).tolist()]
 
 
@@ -299,7 +299,7 @@ class Interpreter:
 
     @property
     def atoms(self) -> int:
-        """Functions of which stops and resets are made."""
+        """Number of functions in the conditions of stops and resets."""
         return int(self._c.rules.atoms)
 
     @property
@@ -308,7 +308,7 @@ class Interpreter:
         return int(self._c.rules.width)
 
     def blocks(self) -> tuple[ctypes.Structure, dict[int, Block]]:
-        """The system as C reads it, with what implicit steps need, and what its addresses point to."""
+        """The system as C reads it, with the parts for implicit steps, and the targets of its addresses."""
         if not self._c.implicit:
             self.add_implicit()
         found = dict[int, Block]()
@@ -384,7 +384,7 @@ class Interpreter:
         )
 
     def _continued(self, state: int) -> int:
-        """Go on until a run ends or its arrays are full; Python hears Ctrl-C between the calls."""
+        """Continue until a run ends or its arrays are full; Python handles Ctrl-C between the calls."""
         while (status := library().run_continue(state, BURST)) in (RUNNING, NEEDS_PROGRAM):
             if status == NEEDS_PROGRAM:
                 self.add_implicit()
@@ -404,7 +404,7 @@ class Interpreter:
         return steps * (_OF_STEP + _OF_TERM * (series.size + series.terms))
 
     def _checked(self, motion: Array) -> Array:
-        """What a run or event keeps for a restart, if it is of this system."""
+        """Data of a run or event for a restart, if it is of this system."""
         rules, d = self._c.rules, self.system.definition
         sides = motion[6 : 6 + 3 * rules.atoms]
         fits = len(motion) == rules.width and bool(np.isfinite(motion).all())
@@ -447,18 +447,18 @@ class Interpreter:
         return numbers[:], counts[:], known, found, rates[: len(found)]
 
     def words(self, table: int, nodes: list[int]) -> Mapping[int, str]:
-        """Itineraries of some nodes of the tree of the modes that were met."""
+        """Itineraries of some nodes of the tree of modes."""
         size = library().table_size(table)
         parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
         library().table_read(table, address(parent), address(mode), None)
-        # Chunks of an ensemble meet the same modes.
+        # Chunks of an ensemble have the same modes.
         met, known = self._met(table).tobytes(), self._last_spelled
         if known[0] != met:
             self._last_spelled = known = met, self._all_spelled(table)
         return words_of(parent, mode, known[1], nodes)
 
     def _all_spelled(self, table: int) -> list[str]:
-        """Modes that were met as itineraries show them."""
+        """Modes of a table, as itineraries show them."""
         spelled = [self.shown.system.spelled(letters) for letters in self._modes(table)]
         rows = self._labels(table)
         if not rows:
@@ -466,7 +466,7 @@ class Interpreter:
         return [shown_mode(self.system, one, row) for one, row in zip(spelled, rows, strict=True)]
 
     def _modes(self, table: int) -> list[str]:
-        """Modes that were met, by number."""
+        """Modes of a table, by number."""
         met, width, known = self._met(table).tobytes(), self._width, self._known_modes
         rows = [met[k : k + width] for k in range(0, len(met), width)] if width else [b""]
         if len(known) > _KNOWN:
@@ -474,7 +474,7 @@ class Interpreter:
         return [known.get(row) or known.setdefault(row, self._letters_of(row)) for row in rows]
 
     def _letters_of(self, row: bytes) -> str:
-        """Letters of a mode, of which all bytes are given."""
+        """Letters of a mode from its bytes."""
         width = self.system.surface_count + len(self.system.impacts)
         letters = self._spelled(np.frombuffer(row[:width], np.int8).tolist())
         return self.shown.widened(
@@ -482,7 +482,7 @@ class Interpreter:
         )
 
     def _met(self, table: int) -> NDArray[np.int8]:
-        """Modes that were met, as bytes."""
+        """Modes of a table, as bytes."""
         width, count = self._width, library().table_modes(table)
         met = np.empty(count * width + 1, np.int8)
         library().table_read(table, None, None, address(met))

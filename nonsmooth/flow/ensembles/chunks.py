@@ -31,7 +31,7 @@ class Job:
 
 
 def shipped(job: Job) -> Job:
-    """Return the job with its system pickled, which every other process reads once."""
+    """Return the job with its system pickled, which each other process reads once."""
     return job if isinstance(job.system, bytes) else replace(job, system=pickle.dumps(job.system))
 
 

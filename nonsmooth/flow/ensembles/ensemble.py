@@ -69,7 +69,7 @@ def ensemble(
     system : FilippovSystem
         As for :func:`simulate`.
     x0 : array_like (..., n), Grid or RandomStarts
-        Starts. Those that are not finite get the status NOT_FINITE; the others go on.
+        Starts. Those that are not finite get the status NOT_FINITE; the others run.
     t_end : float
         Time at which every run ends, unless something ends it before.
     t_start : float, optional
@@ -77,7 +77,7 @@ def ensemble(
     parameters : mapping, optional
         Values that replace defaults: numbers, or arrays that broadcast with the starts.
     tol, rtol, atol, start_mode, max_step, max_steps, max_events, max_jumps, rest_below, method : optional
-        As in :func:`simulate`; a start with another side than ``start_mode`` says gets the status
+        As in :func:`simulate`; a start on another side than that of ``start_mode`` gets the status
         NON_UNIQUE.
     at_event : (kind, k), optional
         Keep the state at the k-th event (from 1) of a kind, e.g. ``("crossing", 1)``.
@@ -88,7 +88,7 @@ def ensemble(
     work : Work, optional
         Threads or an executor, size of a chunk, progress bar, store; see :class:`Work`.
     device : {None, "cuda"}, optional
-        ``"cuda"`` runs on an NVIDIA card; steps that are not clear fall back to the processor. It needs the
+        ``"cuda"`` runs on an NVIDIA card; steps that it cannot decide fall back to the CPU. It needs the
         packages of ``nonsmooth-dynamics[cuda]``, and a system of at most one surface without resets and contacts.
 
     Returns
@@ -175,7 +175,7 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
 
 
 def engine_for(system: FilippovSystem, options: Options, starts: Starts, step: bool) -> str:
-    """Return what runs all chunks, compiled here so that all use the same: lanes or core."""
+    """Return the engine of all chunks, ``lanes`` or ``core``, compiled here so that all use the same."""
     lanes = lanes_for(system, options) if step else None
     enough = starts.count >= (_FEW_WITH_SETS if system.sets else _FEW)
     if lanes is not None and enough and _is_worth_lanes(system, options, starts):
@@ -191,7 +191,7 @@ def engine_for(system: FilippovSystem, options: Options, starts: Starts, step: b
 
 
 def _is_worth_lanes(system: FilippovSystem, options: Options, starts: Starts) -> bool:
-    """Whether the runs take long one by one, and none implicit steps, which several in step do not."""
+    """Whether the runs take long one by one, and none takes implicit steps, which lanes do not have."""
     engine, last = interpreter_for(system, options), starts.count - 1
     probed, found = [last // 2] if last < _MANY else [0, last // 2, last], list[float]()
     for first in probed:

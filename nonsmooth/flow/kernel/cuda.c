@@ -27,7 +27,7 @@ struct Results {
   int32_t *kinds, *steps;
   int64_t *code;
   double *at_x, *at_t;
-  int64_t *left; /* records of the runs with the status HAND_OVER */
+  int64_t *left; /* records of the runs with the status FALL_BACK */
   Count *left_count;
 };
 
@@ -121,7 +121,7 @@ static inline void read_record(Lanes *s, const Work *w, const int64_t *record, i
 /* Leave the run to the driver. */
 OUTLINED void leave(Lanes *s, Work *w, int begun) {
   write_record(s, begun, w->out.left + (int64_t)atomicAdd(w->out.left_count, 1ULL) * WORDS);
-  w->out.status[s->index.v] = HAND_OVER;
+  w->out.status[s->index.v] = FALL_BACK;
   w->alive = 0;
   s->live = NONE;
 }
@@ -265,7 +265,7 @@ KERNEL numbered(int64_t count, const int8_t *status, const int32_t *kinds, const
   int64_t stride = (int64_t)gridDim.x * blockDim.x, all_steps = 0, all_events = 0;
   for (int64_t i = (int64_t)blockIdx.x * blockDim.x + threadIdx.x; i < count; i += stride) {
     place[i] = 0;
-    if (status[i] == HAND_OVER) continue;
+    if (status[i] == FALL_BACK) continue;
     place[i] = (int32_t)place_of(code[i], size, keys);
     all_steps += steps[i];
     for (int k = 0; k < LAST_KIND; k++) all_events += kinds[i * SIMPLE_KINDS + k];
@@ -282,7 +282,7 @@ KERNEL outcomes(int64_t count, const double *x, const double *t, const int8_t *s
   int64_t thread = (int64_t)blockIdx.x * blockDim.x + threadIdx.x, stride = (int64_t)gridDim.x * blockDim.x;
   double *own = sums + thread * 2 * (ND + 1);
   for (int64_t i = thread; i < count; i += stride) {
-    if (status[i] == HAND_OVER) continue;
+    if (status[i] == FALL_BACK) continue;
     int64_t place = place_of(code[i], size, keys);
     if (place < 0) {
       rest[atomicAdd(rest_count, 1ULL)] = i;

@@ -77,7 +77,7 @@ static double next_step(Flow *w, const double *z, int64_t step) {
   double h = m && m->is_used ? implicit_flow_step(w, z) : 0;
   if (h > 0) return h;
   h = expand_flow(w, z) ? flow_step(w) : 0;
-  if (step % LOOK_AGAIN < LOOK_AGAIN - 1 || !(w->left > FAR_AWAY * h) || w->sign < 0 || !is_whole) return h;
+  if (step % CHECK_AGAIN < CHECK_AGAIN - 1 || !(w->left > FAR_AWAY * h) || w->sign < 0 || !is_whole) return h;
   if (RADAU[1].s * f->n > MOST_STATES / 2 || !(m || begin_flow(w))) return h;
   m = w->implicit;
   enter_flow(w, z);

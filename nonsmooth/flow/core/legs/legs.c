@@ -160,7 +160,7 @@ static int carry(Run *r, Leg *l, Slopes *g) {
     } else {
       h = make_taylor_step(r, l, g, begun, &sample);
       if (!(h > 0)) return LEG_STUCK;
-      is_implicit = step % LOOK_AGAIN == LOOK_AGAIN - 1 && is_step_held(r, l, h);
+      is_implicit = step % CHECK_AGAIN == CHECK_AGAIN - 1 && is_step_held(r, l, h);
     }
     l->left = h == l->left ? 0 : l->left - h;
     divide(r, l);

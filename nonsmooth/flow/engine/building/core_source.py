@@ -60,7 +60,7 @@ def run_source() -> str:
     driver = [driver_text(f"core/{name}") for name in _FILES]
     at = _FILES.index("state.c") + 1
     texts = [*driver[:at], _declarations(driver[at:]), *driver[at:]]
-    return "".join([facts_header(), sizes, head, driver_text("core/common.h"), *texts])
+    return "".join([constants_header(), sizes, head, driver_text("core/common.h"), *texts])
 
 
 def _declarations(texts: Sequence[str]) -> str:
@@ -98,7 +98,7 @@ def _extended(*files: str) -> str:
 
 
 @lru_cache(maxsize=1)
-def facts_header() -> str:
+def constants_header() -> str:
     """C of ``flow/constants.py`` and of the statuses: constants, enumerations, priorities."""
     numbers = {
         n: v for n, v in vars(constants).items() if n.isupper() and isinstance(v, (int, float))

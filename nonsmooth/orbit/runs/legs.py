@@ -226,6 +226,14 @@ class LegFlow:
     #: The legs of which it is one, with its number, along which rows are pulled back if they were recorded.
     carried: tuple[CarriedLegs, int] | None = None
 
+    @property
+    def parts(self) -> tuple[Array, Array]:
+        """Times since the start (k,) at which derivatives begin anew, and those before (k, N, N)."""
+        if self.carried is None:
+            return NONE, np.zeros((0, 0, 0))
+        found, leg = self.carried
+        return found.parts[leg]
+
 
 def integrate_leg(
     system: FilippovSystem,

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..flow import Trajectory, simulate
+from ..local.read_only import ReadOnly
 from ..model import Array, FilippovSystem, OptionError
 
 #: Values are compared to nine digits, or to their own if they have fewer.
@@ -19,7 +19,7 @@ RELATIVE = 1e-9
 
 
 def _nothing() -> Mapping[str, float]:
-    return MappingProxyType({})
+    return ReadOnly({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ def stated(
         values[0] if len(values) == 1 else values,
         tolerance,
         how,
-        MappingProxyType(dict(at or {})),
+        ReadOnly(dict(at or {})),
     )
 
 
@@ -219,5 +219,5 @@ def problem(
 ) -> Problem:
     """Build a problem whose parameters are the defaults of its system."""
     values = system.parameter_vector().tolist()
-    parameters = MappingProxyType(dict(zip(system.parameter_names, values, strict=True)))
+    parameters = ReadOnly(dict(zip(system.parameter_names, values, strict=True)))
     return Problem(name, title, source, system, parameters, start, t_end, references, note)

@@ -163,7 +163,7 @@ class Event:
         the one to which it goes; of a stop or reset its direction; of an impact, or a condition that closes, 1;
         otherwise 0.
     motion : ndarray or None
-        Sides of all conditions and what else is due then, for ``simulate(system, start=event)``.
+        Sides of all conditions and due events, for ``simulate(system, start=event)``.
     """
 
     kind: str
@@ -196,7 +196,7 @@ class Event:
 @savable()
 @dataclass(frozen=True)
 class Label:
-    """What many events of a run have in common: all but their times and states."""
+    """Common data of many events of a run: all but their times and states."""
 
     kind: str
     mode_before: str
@@ -252,7 +252,7 @@ class Events(LazySequence[Event]):
     codes : ndarray (e,)
         Positions in ``labels``.
     labels : tuple
-        What events have in common: kind, modes, name, element and side.
+        Common data of events: kind, modes, name, element and side.
     motions : ndarray (m, w)
         Motions of the last m events.
 

@@ -44,10 +44,10 @@ def carry_legs(
     first: Sequence[int] = (),
     back: bool = False,
 ) -> CarriedLegs:
-    """Carry states over legs, with derivatives of the ends, and at samples, by the starts and by chosen parameters.
+    """Integrate states over legs, with derivatives of the ends, and at samples, by the starts and by chosen parameters.
 
-    ``times`` are those of samples since the starts of their legs, which begin at ``first``. With ``back`` steps along
-    which rows can be pulled back are recorded in place of derivatives.
+    ``times`` are those of samples since the starts of their legs, which begin at ``first``. With ``back`` steps are
+    recorded, along which rows can be pulled back, instead of derivatives.
     """
     engine: ColumnsEngine = system.cached("columns", lambda: ColumnsEngine(system, ORDER))
     words = {mode: list(system.parse_letters(mode)) for mode in {leg.mode for leg in legs}}

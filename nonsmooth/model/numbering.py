@@ -52,7 +52,7 @@ def operation_in_c(op: str, args: Sequence[str]) -> str:
 #: Rules by number, then those by which later coefficients follow: of sums with a kind of terms; of quotients of which one
 #: argument does not move; of integrals over what is affine in the time, as in cos(omega t); of a sine with its cosine;
 #: of what is chosen by a factor that does not move.
-TAPE_RULES = tuple(
+TAYLOR_RULES = tuple(
     "constant input apply sum div sqrt power integral quotient atan2 chosen "
     "linear1 linear2 linear3 linear4 linear over under turn pair turns gated".split()
 )

@@ -14,7 +14,7 @@ True
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from ..model import OptionError
@@ -132,69 +132,10 @@ __all__ = [
 
 add_views(globals(), __all__)
 
-_FUNCTIONS: tuple[Callable[[], Problem], ...] = (
-    dry_friction,
-    spiral_oscillator,
-    leine_stick_slip,
-    scalar_sliding,
-    scalar_repelling,
-    two_relay_spiral,
-    glass_loop,
-    bouncing_ball,
-    harvested_prey_predator,
-    welander_box,
-    planar_relay,
-    pseudo_hopf,
-    stick_slip_exponential,
-    state_dependent_jump,
-    impact_oscillator,
-    ambiguous_exit,
-    hidden_dynamics,
-    kelvin_voigt_bounce,
-    piecewise_cycle,
-    two_fold,
-    multi_sliding_relay,
-    forced_dry_friction,
-    belt_oscillator,
-    simplest_walker,
-    buck_converter,
-    block_on_incline,
-    block_on_belt,
-    block_on_disc,
-    cue_ball,
-    turntable,
-    pivoting_disc,
-    shaken_block,
-    soft_stop,
-    bilinear_oscillator,
-    backlash,
-    chua_circuit,
-    mckean_neuron,
-    thermostat,
-    gearbox,
-    glacial_cycles,
-    integrate_and_fire,
-    integrate_and_fire_pair,
-    integrate_and_fire_network,
-    rocking_block,
-    twisting,
-    super_twisting,
-    abs_brake,
-    drill_string,
-    resonant_converter,
-    diode_bridge,
-    boost_converter,
-    tank_cascade,
-    painleve_rod,
-    woodpecker,
-    slider_crank,
-    threshold_harvesting,
-    sir_threshold,
-    stommel_box,
+#: Every problem by name.
+PROBLEMS: Mapping[str, Callable[[], Problem]] = MappingProxyType(
+    {name: globals()[name] for name in __all__ if name.islower() and name != "by_name"}
 )
-
-#: Every problem by name, in the order of the catalogue.
-PROBLEMS = MappingProxyType({f.__name__: f for f in _FUNCTIONS})
 
 
 def by_name(name: str) -> Problem:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
@@ -208,16 +208,20 @@ class Problem:
 
 
 def problem(
-    name: str,
+    function: Callable[..., Problem],
     system: FilippovSystem,
     start: tuple[float, ...],
     t_end: float,
     *references: Reference,
     title: str,
-    source: str,
     note: str = "",
 ) -> Problem:
-    """Build a problem whose parameters are the defaults of its system."""
+    """Build the problem of a function, whose docstring has the source; parameters are the system's."""
+    source = " ".join(
+        (function.__doc__ or "").partition("Source: ")[2].partition("\n\n")[0].split()
+    )
     values = system.parameter_vector().tolist()
     parameters = ReadOnly(dict(zip(system.parameter_names, values, strict=True)))
-    return Problem(name, title, source, system, parameters, start, t_end, references, note)
+    return Problem(
+        function.__name__, title, source, system, parameters, start, t_end, references, note
+    )

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ...model import Array, FilippovSystem
 from ..constants import GUARDS
 from .arrays import address
+from .interpreter import Interpreter, library
 from .structures import structure
-from .tape import TapeEngine, library
 
 #: Why a leg does not reach its end.
 DONE, STUCK, NOT_UNIQUE = range(3)
@@ -35,7 +35,7 @@ _ALONG_DP = -2
 
 
 class EndOfLeg(NamedTuple):
-    """What ends a leg by the law of its mode: a set that is reached, or a guard of sliding or of a contact."""
+    """End of a leg by the law of its mode: a set that is reached, or a guard of sliding or of a contact."""
 
     hit: int = -1
     guard: str = "stop"
@@ -116,7 +116,7 @@ class CarriedLegs:
         return made
 
     def carry(self, direction: Array, dp: Array | None, steps: Array) -> int:
-        """Carry them; the number of steps, of which as many as there is room for are recorded."""
+        """Integrate them and return the number of steps, which are recorded as far as there is room."""
         self._c["direction"], self._c["dp"] = direction.ctypes.data, address(dp) or 0
         self._c["steps"][0], self._c["step_room"][0] = address(steps) or 0, len(steps)
         self._steps = steps
@@ -128,7 +128,7 @@ class CarriedLegs:
 
     @property
     def left(self) -> Array:
-        """What is left of durations (L,) where legs end: at a set that is reached before, or where they are stuck."""
+        """Remaining durations (L,) of legs that end early: at a set, or where integration fails."""
         return np.asarray(self._c["left"])
 
     def steps_of(self, leg: int) -> tuple[Array, Array]:
@@ -140,7 +140,7 @@ class CarriedLegs:
         return rows[:, 1], rows[:, 3 : 3 + n]
 
     def set_columns(self, first: Array) -> None:
-        """Let the first column (n,) of all legs be one, and others zero."""
+        """Set the first column (n,) of all legs, and the others to zero."""
         self._y[:] = 0.0
         self._y[:, 0] = first
 
@@ -156,7 +156,7 @@ class CarriedLegs:
 
     @contextmanager
     def pulling(self, by_parameters: Array, rows: Array) -> Iterator[None]:
-        """Let ``pull`` add what the row gives by all parameters; ``rows`` (K, n) join it at samples."""
+        """Let ``pull`` add the row's derivatives by all parameters; ``rows`` (K, n) are added at samples."""
         c, width = self._c, 8 * rows.shape[1]
         c["row"], c["by_parameters"] = self.row.ctypes.data, by_parameters.ctypes.data
         c["at_samples"] = rows.ctypes.data + width * self.given.first[:-1]
@@ -170,7 +170,7 @@ class CarriedLegs:
             self.row[:] = np.nan
 
 
-class ColumnsEngine(TapeEngine):
+class ColumnsEngine(Interpreter):
     """The driver with one system and the series of its derivatives."""
 
     def __init__(self, system: FilippovSystem, order: int):
@@ -180,7 +180,7 @@ class ColumnsEngine(TapeEngine):
 
     @contextmanager
     def state(self) -> Iterator[int]:
-        """A run of the driver, which goes on to the next call."""
+        """A run of the driver, kept for the next call."""
         try:
             state = self._idle.pop()
         except IndexError:
@@ -194,15 +194,15 @@ class ColumnsEngine(TapeEngine):
             self._idle.append(state)
 
     def carry(self, given: GivenLegs, chosen: Sequence[int]) -> CarriedLegs:
-        """Carry states and their derivatives by the starts and by chosen parameters over legs."""
+        """Integrate states and their derivatives by the starts and by chosen parameters over legs."""
         n = given.starts.shape[1]
         found = CarriedLegs(self, given, n + len(chosen), n)
         found.carry(np.array([-1] * n + list(chosen), np.int32), None, _NO_STEPS)
         return found
 
     def record(self, given: GivenLegs) -> CarriedLegs:
-        """Carry states over legs by steps that rows can take back: short enough for two columns; implicit ones end at
-        samples."""
+        """Integrate states over legs by steps along which rows can be pulled back: short enough for two columns; implicit
+        ones end at samples."""
         (legs, n), q = given.starts.shape, given.p.shape[-1]
         some = 1.0 + 0.5 * np.cos(np.arange(max(n, q)))
         room = _ROOM + _STEPS * legs

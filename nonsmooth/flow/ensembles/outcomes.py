@@ -94,7 +94,7 @@ class _Sums:
         done = (chunk.status == Status.REACHED_END) | (chunk.status == Status.STOPPED)
         for k, v in enumerate([*chunk.x[done].T, chunk.t[done]]):
             self.sums[k] += v.sum(), (v * v).sum()
-            self.histogram[k] += np.bincount(self.bins.places(k, v), minlength=self.bins.count)
+            self.histogram[k] += np.bincount(self.bins.indices(k, v), minlength=self.bins.count)
 
     def add(self, found: Reduced) -> None:
         """Add sums from a device."""

@@ -222,7 +222,7 @@ class _Reader:
         self.systems: list[FilippovSystem] = []
 
     def value(self, tree: Any) -> Any:
-        """Return what a part of the tree stands for."""
+        """Return the value of a part of the tree."""
         if isinstance(tree, list):
             return [self.value(part) for part in tree]
         if not isinstance(tree, dict):

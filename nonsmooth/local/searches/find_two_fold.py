@@ -645,7 +645,7 @@ def find_two_fold(
       eigenvalues -2.61803, -0.381966 with slopes z3/z2 = -1.61803, 0.618034
       canards (Da -> s -> Dr): infinitely many; faux canards (Dr -> s -> Da): none
       Determinism breaks on an open set (Teixeira singularity): every orbit of Da reaches s in
-      finite time, and from s every orbit of Dr is a possible future (infinitely many canards), as
+      finite time, and from s every orbit of Dr is a possible continuation (infinitely many canards), as
       are spirals of flights along the diabolo.
       Found 0.141 from the start in 1 iteration, residual 0.
     """

@@ -685,9 +685,9 @@ def _check_impact(d: Definition, j: int) -> None:
         )
     effect = ca.mtimes(ca.jacobian(rate, d.states), ca.jacobian(d.field, d.reactions[j]))
     if effect.is_zero() or not ca.is_linear(d.field, d.reactions[j]):
-        fault = "does not change the gap's rate" if effect.is_zero() else "enters nonlinearly"
+        problem = "does not change the gap's rate" if effect.is_zero() else "enters nonlinearly"
         raise DefinitionError(
-            f"reaction of {d.impacts[j]!r}: {d.reactions[j]} {fault}. Write the force that opens the "
+            f"reaction of {d.impacts[j]!r}: {d.reactions[j]} {problem}. Write the force that opens the "
             "contact as reaction times its direction. A diode, or a bound on a state whose own rate is changed, is "
             "Complementarity(y, multiplier=...)."
         )

@@ -1,7 +1,7 @@
 """Regularisation: each multiplier becomes a steep smooth function of its switching function.
 
 lambda_i = phi(h_i / eps) with phi from -1 to +1 (Sotomayor & Teixeira 1996). As eps -> 0 the smooth
-system tends to the Filippov system where the latter's future is unique: attracting sliding becomes
+system tends to the Filippov system where the latter's solution is unique: attracting sliding becomes
 a slow manifold h = eps phi^-1(lambda), and what Filippov's convention leaves open (repelling
 sliding, two-folds) is decided by the layer, differently for each phi and eps.
 

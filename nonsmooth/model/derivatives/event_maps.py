@@ -23,7 +23,7 @@ from ..laws.evaluators import Evaluator, evaluator
 from ..laws.motion import motion, solved
 from ..laws.switches import Guard
 from ..numbering import UNWATCHED
-from ..printing.tape import Values, values_of
+from ..printing.instructions import Values, values_of
 from ..values import Array
 
 

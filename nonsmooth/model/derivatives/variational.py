@@ -18,7 +18,7 @@ from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator, evaluator
 from ..laws.motion import Motion, motion, solved
 from ..laws.multipliers import sliding_multipliers
-from ..printing.tape import Entries, Series, series_of, sparse_entries
+from ..printing.instructions import Entries, Series, series_of, sparse_entries
 from ..values import Array
 
 #: Order of the series of a leg: for the rounding of doubles about -ln(eps)/2 + 2 (Jorba & Zou 2005).

@@ -1,4 +1,4 @@
-"""The functions of a system that the lanes call, printed from the tape of its modes.
+"""The functions of a system that the lanes call, printed from instructions of its modes.
 
 Lanes of a vector may be in different modes of one surface. All are expanded together: the multiplier is +1 or -1
 in lanes that do not slide, and in those that do it keeps the layer's rate at zero order by order, as in the driver.
@@ -20,7 +20,7 @@ from ..expressions.simplification import simplified
 from ..laws.coupled import Coupled, coupled_of
 from .ccode import Program
 from .jets import Expansion
-from .terms import OfTape, Term, Terms
+from .terms import OfInstructions, Term, Terms
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def lanes_program(system: FilippovSystem, order: int) -> tuple[str, Shape]:
     return program.text(), shape
 
 
-class _Writer(OfTape):
+class _Writer(OfInstructions):
     """The modes of a system with one surface or none."""
 
     def __init__(self, coupled: Coupled):

@@ -17,7 +17,7 @@ import casadi as ca
 from ..laws.coupled import Coupled
 from .ccode import Program
 from .programs import Shape
-from .terms import Graph, OfTape, Term, Terms
+from .terms import Graph, OfInstructions, Term, Terms
 
 Rows = list[list["Term | None"]]
 
@@ -27,7 +27,7 @@ def set_program(coupled: Coupled, order: int) -> tuple[str, Shape]:
     return _Writer(coupled, order).program()
 
 
-class _Writer(OfTape):
+class _Writer(OfInstructions):
     """Its modes in terms."""
 
     def __init__(self, coupled: Coupled, order: int):

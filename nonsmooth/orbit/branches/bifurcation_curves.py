@@ -205,7 +205,7 @@ def continue_bifurcation(
 
 
 def _follow(departure: Departure, **options: Any) -> list[Piece]:
-    """Follow a curve from where it departs, in pieces between which legs of orbits are divided."""
+    """Follow a curve from its start, in pieces between which legs of orbits are divided."""
 
     def following(at: Departure, arc: Arc) -> Departure | None:
         last = arc.points[-1]
@@ -310,7 +310,7 @@ def _occurs(curve: EventCurve | ConnectionCurve, zero: Zero) -> bool:
 
 
 def _merged(points: Sequence[CodimensionTwo]) -> list[CodimensionTwo]:
-    """Points in their order, those at one place once."""
+    """Points in their order, without repeated ones."""
     found = list[CodimensionTwo]()
     for point in points:
         near = [one for one in found if np.abs(one.values - point.values).max() <= _MERGED]
@@ -320,7 +320,7 @@ def _merged(points: Sequence[CodimensionTwo]) -> list[CodimensionTwo]:
 
 
 def _like(one: CodimensionTwo, other: CodimensionTwo) -> bool:
-    """Whether two points at the same parameters are one: of the same equations and unknowns."""
+    """Whether two points at the same parameters have the same equations and unknowns."""
     a, b = one.meeting, other.meeting
     if a is None or b is None or a.u.size != b.u.size:
         return one.kind == other.kind

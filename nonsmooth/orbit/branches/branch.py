@@ -1,7 +1,7 @@
 """Branches of solutions as one parameter varies, and their continuation.
 
-Each piece is continued by :mod:`nonsmooth.continuation` with equations of its own; where one ends at an
-event the next one begins among the solutions beyond.
+Each piece is continued by :mod:`nonsmooth.continuation` with its own equations; where one ends at an
+event the next one begins with the solutions beyond it.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class BranchEnd(Enum):
     REACHED_BOUND: the parameter reached a bound. CLOSED: the branch is a closed curve. EVENT: nothing
     continues it beyond an event. PERIOD_DIVERGES: the period grows without bound. STEP_TOO_SMALL: no
     solution was found at the shortest step. TOO_MANY_POINTS: it has ``max_points`` points. FAILED: an
-    error was raised, whose words are in ``Branch.reasons``. INTERRUPTED: Ctrl-C.
+    error was raised, with its message in ``Branch.reasons``. INTERRUPTED: Ctrl-C.
     """
 
     REACHED_BOUND = "bound"
@@ -80,14 +80,14 @@ _ADVICE = {
 
 @dataclass(frozen=True, eq=False)
 class FarSide:
-    """What is beyond an event.
+    """Unfolding of an event: the solutions beyond it.
 
     Attributes
     ----------
     itinerary : str
         Or the kind of solution; empty if nothing continues the branch.
     verdict : str
-        What becomes of the solutions there.
+        The fate of the solutions there, in words.
     numbers : mapping of str to float
         The numbers that decide the verdict.
     """
@@ -313,14 +313,14 @@ class BranchCurve(Curve):
         return None
 
     def restart(self, u: Array) -> None:
-        """Prepare to be followed from a point of it."""
+        """Prepare a continuation from a point of the curve."""
 
     def admissible(self, u: Array) -> bool:
-        """Whether the motion has the solution at a point."""
+        """Whether the solution at a point is admissible."""
         return getattr(self.describe(u), "status", "") != "virtual"
 
     def turned(self, u: Array, tangent: Array) -> Array | None:
-        """Change the equations at a point, if need be; the tangent of the new ones."""
+        """Change the equations at a point, if necessary; returns the tangent of the new ones."""
         return None
 
     def renewed(self, point: Point) -> Point | None:
@@ -510,7 +510,7 @@ def _off_events(
 
 @dataclass
 class _Half:
-    """One way along a branch."""
+    """One direction along a branch."""
 
     nodes: list[tuple[BranchCurve, Point]] = field(default_factory=list)
     events: list[BranchEvent] = field(default_factory=list)
@@ -518,7 +518,7 @@ class _Half:
     reason: str = ""
 
     def name_end(self) -> None:
-        """The event at the last point of a curve that could not be followed."""
+        """The event at the last point of a curve whose continuation failed."""
         curve, point = self.nodes[-1]
         try:
             last = curve.ending(point.u, self.end)

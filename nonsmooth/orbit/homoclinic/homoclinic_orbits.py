@@ -415,13 +415,13 @@ def find_homoclinic(
         Name of the parameter that is varied.
     guess : float, optional
         Its value to start from; by default that of ``parameters``. There an orbit of the unstable
-        manifold should come back to within half of its size.
+        manifold should return to within half of its size.
     parameters : mapping, optional
         Values that replace defaults.
     max_iterations : int, optional
         Newton's method gives up after this many steps.
     progress : bool, optional
-        Show on a terminal how close to the saddle the orbit comes.
+        Whether to show on a terminal the distance of the orbit from the saddle.
 
     Returns
     -------
@@ -512,7 +512,7 @@ def _by_projections(
     max_iterations: int,
     progress: bool,
 ) -> Connection:
-    """Solve for the orbit that ends where the guess does, then move its end to the saddle."""
+    """Solve for the orbit with the end of the guess, then move its end to the saddle."""
     far, near = start.miss, float(np.linalg.norm(start.starts[0] - start.saddle))
     parameter = system.parameter_names[index]
     loop = SaddleLoop(system, start.legs, (index,), p, mode, start.saddle, near, far, start.held)

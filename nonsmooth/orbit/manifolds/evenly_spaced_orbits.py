@@ -1,9 +1,9 @@
 """Evenly spaced orbits in a box, for portraits.
 
 Source: Jobard & Lefer 1997, "Creating evenly-spaced streamlines of arbitrary density", with cells of a
-grid for distances. Their streamlines end where they come close to another. Here an orbit goes on until it
-touches the other or comes to rest, so that it ends at the equilibrium or surface where both meet. Where it
-would stay beside the other for too long it ends with a tapered line, as theirs do.
+grid for distances. Their streamlines end close to another one. Here an orbit continues until it touches
+another or comes to rest, so that it ends at the equilibrium or surface where both meet. An orbit that stays
+close to another for too long ends with a tapered line, as theirs do.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Phase response of a periodic orbit: how much a kick of the state shifts its phase.
+"""Phase response of a periodic orbit: the shift of phase by a kick of the state.
 
-The phase of a state near a stable orbit is that of the point of the orbit with which it meets in the end,
-in the unit of time. Its gradient Z along the orbit solves
+The asymptotic phase of a state near a stable orbit is that of the point of the orbit to which it converges, in
+the unit of time. Its gradient Z along the orbit solves
 
     Z' = -Df^T Z  on legs,    Z- = S^T Z+  at events,    Z . f = 1,
 
@@ -27,10 +27,10 @@ from ..runs.saltation_matrix import saltation_matrix
 from .multipliers import events_of, monodromy
 from .orbit import PeriodicOrbit
 
-#: Singular values of the equations of Z below this part of the largest: there is more than one Z.
+#: Relative singular value of the equations of Z below which Z is not unique.
 _FAMILY = 1e-8
 
-#: A leg in parts ends where the whole leg ends, to this part of the size of the states.
+#: Largest distance of the ends of a divided and of the whole leg, relative to the size of the states.
 _SAME_END = 1e-8
 
 #: Parts of each leg at the least: derivatives over a part stay moderate.

@@ -41,10 +41,10 @@ from .cells import cells_of
 #: Errors of located events, relative to the size of the states.
 _LOCATED = 1e-7
 
-#: Switching functions of a set that was held are zero at this part of what they are made of.
+#: Switching functions of a set on which the mode was are zero to this part of their terms.
 _ON_SET = 1e-14
 
-#: Between impacts at speeds that are lost in rounding is less than this part of the time between those before.
+#: Ratio of consecutive times between impacts below which their speeds are lost in rounding.
 _LOST = 1e-6
 
 #: Impulses and bounds that are negative by this part of the error of a location are zero.
@@ -130,7 +130,7 @@ class Leg:
         return system.laws[self.element] in ("surface", "table") and not any(system.nonlinear)
 
     def map(self, system: FilippovSystem) -> EventMap | None:
-        """The event's function and what it does to the state; None where a time ends the leg."""
+        """The event's function and its map of the state; None where a time ends the leg."""
         if self.timed:
             return None
         return event_map(
@@ -410,7 +410,7 @@ def _extended(system: FilippovSystem, x: Array, t: float) -> Array:
 
 
 def held_before(system: FilippovSystem, leg: Leg) -> str:
-    """The mode of a leg, where friction in space holds if it did so at the impact that ends the leg."""
+    """The mode of a leg, in which friction in space sticks if it did so at the impact that ends the leg."""
     if leg.kind != "impact":
         return leg.mode
     contact = leg.element - len(system.entries)
@@ -574,7 +574,7 @@ def _require_one_surface(system: FilippovSystem, event: Event, p: Array) -> None
     changed = [k for k, (a, b) in enumerate(letters) if a != b and a in "+-*"]
     if event.kind == "crossing" and len(system.entries[event.element]) > 1:
         raise DegenerateError(
-            f"run: expected hits of sets and ends of sliding only, received {event.kind!r} at "
+            f"run: expected entries to sets and ends of sliding only, received {event.kind!r} at "
             f"t = {event.t:.10g}. A set that is crossed exactly is a corner: perturb the start."
         )
     others = [k for k in changed if k != event.element]

@@ -280,8 +280,8 @@ class Passage:
         return dx - np.multiply.outer(s.jump, t_x), dp - np.multiply.outer(s.jump, t_p)
 
     def backward(self, row: Array, rows: Array, by_parameters: Array) -> Array:
-        """Pull a row (N,) at the end of the flow, and rows (K, N) at the samples of the run, back to the start, and add to
-        what they give by the parameters that were chosen, or by all where the legs were recorded."""
+        """Pull a row (N,) at the end of the flow, and rows (K, N) at the samples of the run, back to the start, and add
+        their derivatives by the chosen parameters, or by all where the legs were recorded."""
         flow, n = self.flow, len(row)
         if self.back and flow.carried is not None:
             carried, leg = flow.carried

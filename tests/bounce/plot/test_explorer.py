@@ -188,7 +188,7 @@ def test_any_model_has_its_page(browser, tmp_path, name):
         assert not fault and itinerary == of_many == shot.itinerary
         wanted = [shot.time, *(getattr(shot.lift_off, n) for n in lift_off)]
         assert [time, *lift_off.values()] == pytest.approx(wanted, abs=1e-9)
-    assert browser.faults() == {} and browser.unnamed() == []
+    assert browser.errors() == {} and browser.unnamed() == []
 
 
 def mirrored(model):
@@ -319,7 +319,7 @@ def test_page_fits_complains_of_nothing_and_names_every_control(browser, page, w
     assert (seen["cone"], seen["slip"], seen["end"]) == (3, 3, 1)  # its last slip is enlarged
     browser.run(FINE)
     assert {"S+", "S−", "S+ R S−"} <= set(browser.run(SHOWN)["names"])
-    assert browser.faults() == {} and browser.unnamed() == []
+    assert browser.errors() == {} and browser.unnamed() == []
 
 
 INSIDE = """
@@ -401,7 +401,7 @@ def test_keys_and_fields_move_everything(browser, page):
     assert "load=net" in browser.run(SHOWN)["hash"]
     browser.driver.find_element(By.ID, "reset").click()
     assert browser.run(SHOWN)["verdict"] == "S+ R S−"
-    assert browser.faults() == {}
+    assert browser.errors() == {}
 
 
 @pytest.mark.slow
@@ -409,7 +409,7 @@ def test_keys_and_fields_move_everything(browser, page):
 def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
     for words in ("mu=abc&eta=&xdot=NaN", "load=toString&inertia=7", "%E0%A4%A&=&"):
         browser.open(page, hash=words)
-        assert browser.run(SHOWN)["verdict"] == "S+ R S−" and browser.faults() == {}
+        assert browser.run(SHOWN)["verdict"] == "S+ R S−" and browser.errors() == {}
     browser.open(page, hash="mu=0&eta=0&xdot=1e9&omega=-1e9&ydot=5")  # as far as the sliders go
     assert browser.run(SHOWN)["say"] == "speed 3, spin −6"
 
@@ -424,7 +424,7 @@ def test_a_ball_that_stays_is_said_in_words(browser, page):
         values = {n: START[n] for n in ("mu", "eta", "d1")}
         bounce.simulate(bounce.KelvinVoigt(**values, d2=1.0, G=0.5), 0.6, -0.1, 0.9)
     browser.run(FINE)
-    assert browser.faults() == {}
+    assert browser.errors() == {}
 
 
 def test_every_itinerary_of_the_start_has_its_colour():

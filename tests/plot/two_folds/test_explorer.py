@@ -182,7 +182,7 @@ def shown(browser):
 def test_page_fits_complains_of_nothing_and_names_every_control(browser, page, folds, width):
     browser.open(page, width, hash=f"folds={folds}&nu=-1.5,1.25")
     seen = shown(browser)
-    assert browser.faults() == {} and browser.unnamed() == []
+    assert browser.errors() == {} and browser.unnamed() == []
     found = two_folds.classify_two_fold(SIGMA[folds], (-1.5, 1.25))
     assert seen["label"] == f"Class {found.label}" and seen["sentence"] == in_letters(
         found.determinism
@@ -223,7 +223,7 @@ def test_keys_move_the_point_and_everything_follows(browser, page):
         browser.run("return document.getElementById('nu2').getAttribute('aria-invalid')") == "true"
     )
     assert shown(browser)["hash"] == "#folds=VI&nu=-3,2"
-    assert browser.faults() == {}
+    assert browser.errors() == {}
 
 
 @pytest.mark.browser
@@ -253,7 +253,7 @@ def test_classes_have_the_colours_of_the_atlas_and_boundaries_of_many_are_listed
 def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
     for words in ("folds=toString&nu=a,b", "folds=XX&nu=1", "nu=NaN,1", "%E0%A4%A"):
         browser.open(page, hash=words)
-        assert shown(browser)["label"] == "Class II-C" and browser.faults() == {}
+        assert shown(browser)["label"] == "Class II-C" and browser.errors() == {}
     browser.open(page, hash="folds=II&nu=1e9,-1e9")  # as far as the map goes
     assert shown(browser)["say"] == "ν₁ = 3, ν₂ = −3"
 

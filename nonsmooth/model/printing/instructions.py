@@ -1,6 +1,6 @@
 """A system as lists of instructions, which the interpreter in C runs without compilation.
 
-``Values`` is a graph node by node, ``Series`` one by its Taylor rules, ``Tape`` all functions of a system
+``Values`` is a graph node by node, ``Series`` one by its Taylor rules, ``Instructions`` all functions of a system
 that a driver calls, in any mode (``model.coupled``).
 """
 
@@ -19,7 +19,7 @@ from ..expressions.simplification import simplified
 from ..expressions.sums import summed
 from ..expressions.taylor_rules import Rule, entered, lower
 from ..laws.coupled import Coupled
-from ..numbering import OPERATIONS, TAPE_RULES
+from ..numbering import OPERATIONS, TAYLOR_RULES
 from ..values import Array
 
 Integers = NDArray[np.int32]
@@ -73,7 +73,7 @@ class Entries:
 
 
 @dataclass(frozen=True)
-class Tape:
+class Instructions:
     """What the driver in C reads of a system; see ``System`` in ``flow/core/state.c``."""
 
     series: Series
@@ -100,8 +100,8 @@ class Tape:
     slope_outputs: int
 
 
-def tape_of(coupled: Coupled) -> Tape:
-    """Write a system as a tape."""
+def instructions_of(coupled: Coupled) -> Instructions:
+    """Write a system as lists of instructions."""
     system, d = coupled.system, coupled.system.definition
     x, p = system.extended_states, system.parameter_symbols
     slope, gradients = sparse_entries(coupled.slope), [_by_rows(g) for g in coupled.gradients]
@@ -118,7 +118,7 @@ def tape_of(coupled: Coupled) -> Tape:
     point = [coupled.layer, coupled.factors, *[nonzeros for nonzeros, _ in matrices]]
     series, free = _series_of_modes(coupled, slopes)
     time = _time_of(coupled)
-    return Tape(
+    return Instructions(
         series=series,
         free=free,
         point=values_of([coupled.moving, every], coupled.awake(point), (4, 5), time),
@@ -334,7 +334,7 @@ def _written(
 ) -> tuple[NDArray[np.void], set[int]]:
     """Rules by number, and which of them are written with the one before: a sine and its cosine."""
     operations = {op: k for k, op in enumerate(OPERATIONS)}
-    numbers_of = {name: k for k, name in enumerate(TAPE_RULES)}
+    numbers_of = {name: k for k, name in enumerate(TAYLOR_RULES)}
     made, begin, second = [], 0, set[int]()
     for j, rule in enumerate(rules):
         name, args, numbers = rule.rule, rule.args, rule.numbers

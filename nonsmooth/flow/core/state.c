@@ -202,7 +202,7 @@ typedef struct {
    * decisions; t_error is the largest ``hidden`` of events that move a state by more than the tolerance. */
   double since, length, shortened, held_length, t_error;
   int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history, hits, kept;
-  int32_t where, repelling, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
+  int32_t where, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
   Guard guard;
   Happened past[HISTORY];
   int32_t several[SEVERAL];

@@ -309,12 +309,12 @@ def test_lanes_are_compiled_where_that_pays(monkeypatch):
 def test_sections_in_lanes_are_those_of_the_driver(section, monkeypatch):
     starts = np.random.default_rng(2).normal(size=(100, 2))
     starts[7] = np.nan
-    run = lambda: ensemble(make_system(), starts, 30.0, parameters={"friction": 0.05}, at=section)
+    run = lambda: ensemble(make_system(), starts, 30.0, at=section)
     lanes = run()
     monkeypatch.setattr("nonsmooth.flow.ensembles.ensemble._WORTH", math.inf)
     core = run()
     assert (lanes.engine, core.engine) == ("lanes", "core")
-    assert np.isfinite(core.sample_t).sum() > 50
+    assert np.isfinite(core.sample_t).sum() > 5
     assert np.array_equal(lanes.status, core.status)
     assert lanes.itinerary.tolist() == core.itinerary.tolist()
     for name in ("sample_t", "sample_x", "x", "t"):

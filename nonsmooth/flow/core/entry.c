@@ -32,7 +32,7 @@ static size_t place_run(Run *to, char *base) {
   const System *s = to->s;
   size_t n = to->n, m = to->m, w = to->width, c = to->c, all = to->kept_rows, rows = to->guards, stride = to->stride;
   size_t used = 0, jumping = 0, q = s->combined, tried = m < MOST_ENUMERATED ? m : MOST_ENUMERATED, sums = tried * (tried - (tried > 0)) / 2;
-  size_t most = s->point.size > s->columns.size ? s->point.size : s->columns.size;
+  size_t most = larger(larger(s->point.size, s->columns.size), larger(s->surfaces.size, s->atoms.size));
   size_t atoms = s->rules.atoms, triggers = s->rules.triggers, clocks = s->rules.clocks;
   Run *r = to;
   for (size_t i = 0; i < m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;

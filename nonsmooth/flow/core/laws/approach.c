@@ -209,6 +209,7 @@ static void after_step(Run *r) {
   if (carried) project_to(r, r->involved, carried, level);
   if (!changed) return;
   enter_mode(r);
+  improve(r, &r->now, r->x, r->unknowns, 2); /* the direction is that of the state again */
 }
 
 /* Nodes of a program that are zero whatever moves, from the values of those that do not. */

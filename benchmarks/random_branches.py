@@ -194,8 +194,8 @@ def _events(orbit: PeriodicOrbit) -> Counter[str]:
     return _kinds([leg.kind for leg in orbit.legs])
 
 
-def faults(branch: Branch) -> list[str]:
-    """What is wrong on a branch."""
+def errors_on(branch: Branch) -> list[str]:
+    """Errors on a branch, as sentences."""
     found, count = list[str](), len(branch)
     events = {event.parameter for event in branch.events}
     beside = [event.parameter for event in branch.events if event.kind in BESIDE]
@@ -276,7 +276,7 @@ def checked(kind: str, seed: int, counts: Counter[str]) -> Branch | None:
     signal.alarm(LIMIT)
     try:
         branch, reason = branch_of(kind, seed)
-        wrong = [] if branch is None else faults(branch)
+        wrong = [] if branch is None else errors_on(branch)
     except KeyboardInterrupt:
         branch, reason, wrong = None, f"longer than {LIMIT} s", [f"takes longer than {LIMIT} s"]
     except ns.NonsmoothError as error:

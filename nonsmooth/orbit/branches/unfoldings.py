@@ -43,7 +43,7 @@ VERDICTS = {
     "grazing of a jumping force": "the return map has a square root: stability is lost at once",
     "end of complete chatter": "the contact opens before impacts have accumulated: finitely many follow",
     "grazing, escaping": "the orbit leaves along the other field: nothing continues it",
-    "two-fold": "the orbit passes a two-fold, where its future may not be unique",
+    "two-fold": "the orbit passes a two-fold, where its continuation may not be unique",
     "corner": "two events at one time, {one} and {other}; the itinerary beyond is not known here: "
     "simulate there and continue what is found",
 }

@@ -29,6 +29,7 @@ from nonsmooth.model import (
     Stop,
 )
 
+WORTH = sys.modules[ensemble.__wrapped__.__module__]._WORTH
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 
@@ -275,3 +276,16 @@ def test_events_that_cannot_happen_are_none(engine, count):
     saw = ensemble(FilippovSystem([x], field=[1], resets=Reset(x - 5, [x - 1], 1)), starts, 9.7)
     assert np.array_equal(saw.events["reset"], np.floor(5.7 + starts[:, 0]))
     assert np.all(saw.events["end"] == 1) and not saw.events["stop"].any()
+
+
+@needs_compiler
+def test_lanes_are_compiled_where_that_pays(monkeypatch):
+    """A hundred starts of an oscillator wait for a compiler where the runs take as long one by one."""
+    monkeypatch.setattr("nonsmooth.flow.ensembles.ensemble._WORTH", WORTH)
+    x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    system = FilippovSystem([x, v], surface=x, above=[v, -1 - x], below=[v, 1 - x])
+    starts = np.random.default_rng(0).normal(size=(100, 2))
+    engines = [ensemble(system, starts, t_end).engine for t_end in (10.0, 9000.0)]
+    assert engines == ["core", "lanes"]
+    starts[49] = np.nan  # of which nothing is known
+    assert ensemble(system, starts, 10.0).engine == "lanes"

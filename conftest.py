@@ -16,8 +16,8 @@ from pathlib import Path
 
 import pytest
 
+from nonsmooth.flow.engine import interpreter
 from nonsmooth.flow.engine import lanes as engine
-from nonsmooth.flow.engine import tape
 from nonsmooth.flow.engine.building.build import CompilerError
 
 os.environ["MPLBACKEND"] = "Agg"
@@ -55,7 +55,7 @@ def pytest_sessionstart() -> None:
 
     with open(__file__, "rb") as file, contextlib.suppress(CompilerError):
         fcntl.flock(file, fcntl.LOCK_EX)
-        tape.library()
+        interpreter.library()
 
 
 def pytest_collectstart(collector: pytest.Collector) -> None:

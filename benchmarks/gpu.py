@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.flow.constants import HAND_OVER
+from nonsmooth.flow.constants import FALL_BACK
 from nonsmooth.flow.engine import find_compiler
 from nonsmooth.flow.engine.device import card as cards
 from nonsmooth.flow.engine.device.card import Card, card
@@ -106,7 +106,7 @@ def bits(quick: bool) -> dict[str, Any]:
         x = starts_of(name, count).at(np.arange(count))
         a, b = (ends(name, x, machine) for machine in (card(False), Shim(fused=False)))
         same = (a.t == b.t) & np.all(a.x == b.x, axis=1) & (a.status == b.status)
-        done = a.status != HAND_OVER
+        done = a.status != FALL_BACK
         words = [np.array([*c.words, ""], object)[c.itinerary] for c in (a, b)]
         found[name] = {
             "runs": count,

@@ -212,8 +212,8 @@ def _near(orbit: PeriodicOrbit) -> float:
     return min((abs(margin.relative) for margin in orbit.margins), default=1.0)
 
 
-def faults(branch: Branch, counts: Counter[str]) -> list[str]:
-    """What is wrong on a branch."""
+def errors_on(branch: Branch, counts: Counter[str]) -> list[str]:
+    """Errors on a branch, as sentences."""
     found, size = list[str](), len(branch)
     events = {event.parameter for event in branch.events}
     beside = [event.parameter for event in branch.events if event.kind in BESIDE]
@@ -324,7 +324,7 @@ def checked(kind: str, seed: int, counts: Counter[str]) -> Branch | None:
     signal.setitimer(signal.ITIMER_PROF, LIMIT)
     try:
         branch, reason = branch_of(kind, seed)
-        wrong = [] if branch is None else faults(branch, counts)
+        wrong = [] if branch is None else errors_on(branch, counts)
     except KeyboardInterrupt:
         branch, reason, wrong = None, f"longer than {LIMIT} s", [f"takes longer than {LIMIT} s"]
     except ns.NonsmoothError as error:

@@ -6,6 +6,7 @@ import math
 from fractions import Fraction
 from typing import Any
 
+from forcing import forcing_period
 from intervals import CheckError, Iv, number, whole
 from mean_value_forms import States, covers, span, tube
 from modes import Modes
@@ -85,6 +86,13 @@ class Orbit:
     def _parameters(self, values: list[Any]) -> list[Any]:
         own = dict(zip(self.moving, values[self.n + 1 :], strict=True))
         return [own.get(k, v) for k, v in enumerate(self.given)]
+
+    def forcing_period(self) -> Iv:
+        """The period of the system, which depends on time."""
+        if self.time is None:
+            raise CheckError("no state is the time")
+        c: list[Coefficients] = [[v] for v in self.states.values]
+        return forcing_period(self.graph, self.time, self._values(c, [0] * self.modes.count))
 
     # fields and guards ---------------------------------------------------------------------------
 
@@ -198,7 +206,7 @@ class Orbit:
             if h <= 0:
                 break
             try:
-                candidate = self._try(guards, h)
+                candidate = self._try(c, guards, h)
             except UnsureError as unsure:
                 if unsure.since < natural // 50:
                     raise
@@ -219,10 +227,15 @@ class Orbit:
             return (candidate[0] if candidate else None), last and candidate is None
         raise CheckError(f"no step at t = {self.t.a / UNIT:.9g}")
 
-    def _try(self, guards: list[Guard], h: int) -> tuple[Guard, Iv] | None:
-        n = self.order
-        tops = motion(self.rates, self._tube(h), n + 1)
+    def _try(self, c: list[Coefficients], guards: list[Guard], h: int) -> tuple[Guard, Iv] | None:
+        n, t = self.order, Iv(0, h)
+        box = self._tube([value(v[:n], t) for v in c])
+        tops = motion(self.rates, box, n + 1)
         self._top = [v[n] for v in tops]
+        # An orbit that is in the box as long as its remainder is over the box does not leave it (Corliss and Rihm 1996).
+        for b, v, top in zip(box, c, self._top, strict=True):
+            if not covers(b, value([*v[:n], top], t)):
+                raise CheckError("no enclosure of the motion")
         scale = (h / UNIT) ** n
         if _size(self._top) * scale > 100 * self.tolerance:
             raise CheckError("the remainder is large")
@@ -256,18 +269,13 @@ class Orbit:
         passes = g.kind in ("stop", "reset", "impact")
         return not passes or g.direction * -self.signs[g.index] >= 0
 
-    def _tube(self, h: int) -> list[Iv]:
-        """A box in which every orbit stays for a time h; with derivatives by the set, if they are enclosed."""
-        t, values = Iv(0, h), self.states.values
-        x = values if self.smooth else [span(v) for v in values]
-        box = [tube(v) for v in x]
-        for _ in range(12):
-            rates = self.rates([[v] for v in box])
-            new = [v + t * f[0] for v, f in zip(x, rates, strict=True)]
-            if all(covers(b, v) for b, v in zip(box, new, strict=True)):
-                return box
-            box = [tube(v, 8) for v in new]
-        raise CheckError("no enclosure of the motion")
+    def _tube(self, x: list[Iv]) -> list[Iv]:
+        """A box around ranges of Taylor polynomials; with derivatives by the set, if they are enclosed."""
+        margin = Iv.of(200 * self.tolerance).b
+        if not self.smooth:
+            return [tube(span(v), margin) for v in x]
+        slope = max(max(abs(s.a), abs(s.b)) for v in x for s in getattr(v, "g", [])) >> 10
+        return [tube(v, margin, slope + 1) for v in x]
 
     # events --------------------------------------------------------------------------------------
 

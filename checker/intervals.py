@@ -77,7 +77,8 @@ class Iv:
     def __truediv__(self, o: Iv) -> Iv:
         if o.a <= 0 <= o.b:
             raise CheckError("a division by an interval that contains zero")
-        p = [(n << BITS, d) for n in (self.a, self.b) for d in (o.a, o.b)]
+        ends = (o.a, o.b) if o.a < o.b else (o.a,)
+        p = [(n << BITS, d) for n in (self.a, self.b) for d in ends]
         low, high = min(n // d for n, d in p), max(-(-n // d) for n, d in p)
         if low < -_LIMIT or high > _LIMIT:
             raise CheckError(f"a number is larger than 2^{_LARGE}")

@@ -104,15 +104,12 @@ def middle(v: Any) -> Iv:
     return v if type(v) is Iv else v.m
 
 
-def tube(v: Iv, share: int = 0) -> Iv:
-    """A function that may be anywhere in a range, with its derivatives; both wider by one of so many parts."""
-    own = _wider(span(v), share)
-    return own if type(v) is Iv else Form(own, [_wider(s, share) for s in v.g], v.r, own)
-
-
-def _wider(v: Iv, share: int) -> Iv:
-    more = (v.b - v.a) // share + 1 if share else 0
-    return v if v is ZERO else Iv(v.a - more, v.b + more)
+def tube(v: Iv, more: int, slopes: int = 0) -> Iv:
+    """A function that may be anywhere in a range, with its derivatives; both wider by so much."""
+    own = Iv(v.a - more, v.b + more)
+    if type(v) is Iv:
+        return own
+    return Form(own, [Iv(s.a - slopes, s.b + slopes) for s in v.g], v.r, own)
 
 
 def covers(b: Iv, v: Iv) -> bool:

@@ -142,6 +142,7 @@ def require_periodic(record: dict[str, Any]) -> None:
     require_orbit(record | {"start": record["graph"]["field"]})
     n, sections = len(record["graph"]["field"]), record["sections"]
     require_index(len(sections) - 1, _STATES, "the number of planes less one")
+    require_index(record.get("multiplicity", 0), _MOST, "the multiplicity")
     sizes = [len(record[key]) for key in ("box", "point", "matrix")]
     sizes += [len(row) for row in record["matrix"]]
     events = record["claims"]["events"]

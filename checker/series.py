@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 from intervals import PI, CheckError, Iv, atan, cos, erf, exp, log, sin, sqrt, whole
@@ -296,12 +297,16 @@ def _atan2(y: Dual, x: Dual) -> Dual:
     return _linear(quarter, _apply("atan", [_apply("div", [x, y])]), minus)
 
 
+#: Constants of graphs, each read once.
+_number = lru_cache(100_000)(Iv.of)
+
+
 def evaluate(graph: dict[str, Any], inputs: list[list[Dual]]) -> list[Dual]:
     """Series of all nodes."""
     values: list[Dual] = []
     for op, *rest in graph["nodes"]:
         if op == "const":
-            values.append(Dual(constant(Iv.of(rest[0]))))
+            values.append(Dual(constant(_number(rest[0]))))
         elif op == "input":
             values.append(inputs[rest[0]][rest[1]])
         elif op == "power":

@@ -1,13 +1,13 @@
 """HTML representations of results for notebooks: a title, rows, and a small picture as SVG.
 
-Results without a representation of their own show their fields (:func:`add_cards`). All text is escaped. Pictures need no other package.
+Results without a representation of their own show their fields (:func:`shown_fields`). All text is escaped. Pictures need no other package.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import html
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,16 +38,7 @@ class Markup(str):
     """HTML that a card shows as it is."""
 
 
-def add_cards(names: Mapping[str, object], exported: Iterable[str]) -> None:
-    """Let exported results that have no notebook representation show their fields."""
-    for name in exported:
-        kind = names.get(name)
-        if isinstance(kind, type) and dataclasses.is_dataclass(kind):
-            if not hasattr(kind, "_repr_html_"):
-                kind._repr_html_ = _fields  # type: ignore[attr-defined]
-
-
-def _fields(result: Any) -> str:
+def shown_fields(result: Any) -> str:
     """The card of a result: its public fields."""
     shown = [field.name for field in dataclasses.fields(result) if not field.name.startswith("_")]
     return card(type(result).__name__, [(name, _short(getattr(result, name))) for name in shown])
@@ -58,8 +49,8 @@ def _short(value: Any) -> object:
     if callable(value) or value is None:
         return ""
     if isinstance(value, (bool, str, int)) or not isinstance(value, (float, complex, np.ndarray)):
-        own = getattr(type(value), "_repr_html_", _fields)
-        if own is not _fields:
+        own = getattr(type(value), "_repr_html_", shown_fields)
+        if own is not shown_fields:
             return Markup(own(value))
         if isinstance(value, (list, tuple, dict)) and len(value) > _MANY:
             return f"{len(value)} entries"

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Protocol
-
-AGREES = "agrees"
-HOLDS = "holds"  # a statement known from memory, which cannot agree with a text that was not read
-CORRECTED = "corrected"
-NOT_CHECKABLE = "not checkable"
-ADDED = "added here"  # not stated by the paper, as far as recalled
-
-#: How the place of a statement begins if it was not read in the paper.
-MEMORY, HERE = "known from memory", "computed here"
+from functools import partial, wraps
+from pathlib import Path
+from typing import Any, Protocol
 
 
 @dataclass(frozen=True)
@@ -56,24 +49,64 @@ def failures(row: Row) -> list[str]:
     return [str(check) for check in row.checks if not check.holds]
 
 
-def corrects(verdict: str, errata: Sequence[int]) -> str:
-    """A verdict with the errata that apply."""
-    return f"{verdict} (erratum {', '.join(map(str, errata))})" if errata else verdict
+#: What a row is computed to: checks; of a claim the value and how it was computed before them.
+Checks = Iterable[Check]
+Found = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement of a paper; ``place`` may begin with MEMORY or HERE, ``value`` is what was computed."""
+    """A statement of a paper with its verdict as in the README, and what computing it gave."""
 
     name: str
     place: str
     statement: str
-    value: str
-    verdict: str
-    how: str
-    checks: tuple[Check, ...]
-    errata: tuple[int, ...] = ()
+    said: str
+    found: Found
+
+    @property
+    def verdict(self) -> str:
+        return self.said.partition(" (")[0]
+
+    @property
+    def value(self) -> str:
+        return self.found[0]
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        return self.found[2:]
 
     def cells(self) -> list[str]:
-        verdict = corrects(self.verdict, self.errata)
-        return [self.name, self.place, self.statement, self.value, verdict, self.how]
+        return [self.name, self.place, self.statement, self.value, self.said, self.found[1]]
+
+
+class Statements:
+    """The rows of a Markdown table of what a paper states, each with the function that computes it.
+
+    ``row`` makes a row of the record from the cells and from what the function returns.
+    """
+
+    def __init__(self, path: Path, row: Callable[..., Row] = Claim):
+        text = path.read_text(encoding="utf-8").rpartition("<!-- claims")[2]
+        lines = [line for line in text.splitlines() if line.startswith("| ")][2:]
+        rows = [line[2:-2].split(" | ") for line in lines]
+        self.cells = {row[0]: [cell.replace(r"\|", "|") for cell in row[1:]] for row in rows}
+        self.row, self.computed = row, dict[str, Callable[[], Row]]()
+
+    def __call__(self, *names: str) -> Callable[[Callable[[], Any]], Callable[[], Row]]:
+        """Register a function for the rows with these first cells."""
+
+        def register(compute: Callable[[], Any]) -> Callable[[], Row]:
+            def make(name: str) -> Row:
+                return self.row(name, *self.cells[name], tuple(compute()))
+
+            for name in names:
+                self.computed[name] = wraps(compute)(partial(make, name))
+            return self.computed[names[-1]]
+
+        return register
+
+    @property
+    def rows(self) -> tuple[Callable[[], Row], ...]:
+        """The functions in the order of the table; every row has one."""
+        return tuple(self.computed[name] for name in self.cells)

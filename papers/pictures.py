@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,27 @@ class Picture:
         figure = self.draw()
         figure.savefig(folder / f"{self.name}.png", dpi=150)
         figure.savefig(folder / f"{self.name}.pdf", dpi=150, metadata={"CreationDate": None})
+
+
+class Pictures(list[Picture]):
+    """The figures of a paper, each drawn by a function, whose docstring is the caption."""
+
+    def __call__(
+        self, label: str, name: str = "", caption: str = ""
+    ) -> Callable[[Callable[[], Figure]], Callable[[], Figure]]:
+        """Register a function, which draws with the settings of print."""
+
+        def register(draw: Callable[[], Figure]) -> Callable[[], Figure]:
+            @wraps(draw)
+            def drawn() -> Figure:
+                with settings():
+                    return draw()
+
+            words = caption or " ".join((draw.__doc__ or "").split())
+            self.append(Picture(name or draw.__name__, label, words, drawn))
+            return drawn
+
+        return register
 
 
 @contextmanager
@@ -99,7 +121,7 @@ def sampled(
 PAGE, SMALLEST, LISTED = 7.0, 8.0, 6
 
 
-def faults(figure: Figure) -> list[str]:
+def illegible(figure: Figure) -> list[str]:
     """Sentences on what is not legible in print: width, small, cut or overlapping texts, long legends."""
     width, found = figure.get_figwidth(), list[str]()
     if width > PAGE:

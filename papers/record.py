@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from .claims import Claim, Row
+from .claims import Row, Statements
 from .pictures import Picture
 
 CLAIMS = ("claim", "where", "statement", "computed here", "verdict", "how")
@@ -41,10 +41,10 @@ class Paper:
     opening: Callable[[], Sequence[tuple[str, Sequence[str]]]] = tuple
 
 
-def claims(rows: tuple[Callable[[], Claim], ...]) -> Table:
+def claims(statements: Statements) -> Table:
     """The table of the claims of a paper."""
     introduction = "What is stated and what computing it gives. A claim holds if all its checks do."
-    return Table("Claims", introduction, CLAIMS, rows)
+    return Table("Claims", introduction, CLAIMS, statements.rows)
 
 
 @dataclass
@@ -90,10 +90,3 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Lay out a Markdown table."""
     lines = [header, ["---"] * len(header), *([c.replace("|", r"\|") for c in row] for row in rows)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def readme_table(found: Sequence[Claim]) -> str:
-    """The claims in README.md: the columns in which nothing depends on rounding."""
-    kept = [k for k, name in enumerate(CLAIMS) if name not in ("computed here", "how")]
-    rows = [[claim.cells()[k] for k in kept] for claim in found]
-    return markdown_table([CLAIMS[k] for k in kept], rows)

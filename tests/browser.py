@@ -111,8 +111,8 @@ class Browser:
         assert "error" not in answer, answer["error"]
         return answer.get("value")
 
-    def faults(self) -> dict[str, list[str]]:
-        """What is wrong with the page as it is now, by kind; empty if nothing."""
+    def errors(self) -> dict[str, list[str]]:
+        """Errors of the present page, by kind."""
         self._drain()
         elsewhere = [
             u for u in self.requests if not u.startswith(("file:", "data:", "about:", "blob:"))

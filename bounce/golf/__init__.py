@@ -69,4 +69,4 @@ __all__ = [
     "tour_differences",
 ]
 
-ns.notebook.add_cards(globals(), __all__)
+ns.tables.add_views(globals(), __all__)

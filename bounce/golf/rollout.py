@@ -139,6 +139,13 @@ class Run(Generic[S]):
     cautions: tuple[str, ...] = ()
     side: float = 0.0
 
+    def _tables(self) -> dict[str, ns.tables.Table]:
+        bounces, glides = {"bounce": len(self.bounces)}, {"glide": len(self.glides)}
+        return {
+            "bounces": ns.tables.stacked(self.bounces, bounces),
+            "glides": ns.tables.stacked(self.glides, glides),
+        }
+
     @property
     def first_height(self) -> float:
         """Height of the first hop, m (0 if there is none)."""

@@ -26,4 +26,4 @@ __all__ = [
     "winding_number",
 ]
 
-ns.notebook.add_cards(globals(), __all__)
+ns.tables.add_views(globals(), __all__)

@@ -74,7 +74,7 @@ class Arc:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DividingCurve:
+class DividingCurve(ns.tables.Tabular):
     """Landings ``(xdot, omega)`` that lift off without slip, at one normal speed.
 
     Attributes
@@ -99,6 +99,18 @@ class DividingCurve:
     reverse: tuple[Arc, ...]
     mirrored: bool
     tol: float
+
+    def _tables(self) -> dict[str, ns.tables.Table]:
+        parts = [
+            {
+                "kind": np.full(len(arc.points), arc.kind, object),
+                "xdot": arc.points[:, 0],
+                "ydot": np.full(len(arc.points), self.ydot),
+                "omega": arc.points[:, 1],
+            }
+            for arc in (*self.arcs, *self.reverse)
+        ]
+        return {"points": ns.tables.joined("arc", parts)}
 
     @property
     def two_fold(self) -> Array:
@@ -303,7 +315,7 @@ def dividing_curve(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DividingSurface:
+class DividingSurface(ns.tables.Tabular):
     """$H_F = 0$ in the space of landings (xdot, ydot, $omega$), as curves at several normal speeds.
 
     Attributes
@@ -313,6 +325,10 @@ class DividingSurface:
     """
 
     curves: tuple[DividingCurve, ...]
+
+    def _tables(self) -> dict[str, ns.tables.Table]:
+        parts = [curve._tables()["points"].columns for curve in self.curves]
+        return {"points": ns.tables.joined("curve", parts)}
 
     @property
     def ydot(self) -> Array:

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OutcomeMap:
+class OutcomeMap(ns.tables.Tabular):
     """Outcomes over a rectangle of two inputs or parameters.
 
     The first name varies along the last axis (horizontal in a picture), the second along the first.
@@ -52,6 +52,10 @@ class OutcomeMap:
     lift_offs: LiftOffs
     spin: Array
     extrapolated: NDArray[np.bool_] | None = None
+
+    def _tables(self) -> dict[str, ns.tables.Table]:
+        axes = dict(zip(reversed(self.names), reversed(self.axes), strict=True))
+        return {"lift_offs": self.lift_offs._over(axes)}
 
     @property
     def regions(self) -> tuple[str, ...]:

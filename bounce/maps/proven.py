@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import nonsmooth as ns
+
 from ..contact.model import ContactModel
 from ..errors import LandingError
 from ..shot.certify import certify
@@ -19,7 +21,7 @@ _Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class ProvenMap:
+class ProvenMap(ns.tables.Tabular):
     """Boxes of landings with what is proven about all bounces from each.
 
     Attributes
@@ -44,6 +46,15 @@ class ProvenMap:
     outcome: NDArray[np.int64]
     itinerary: tuple[str, ...]
     interrupted: bool = False
+
+    def _tables(self) -> dict[str, ns.tables.Table]:
+        sides = ("xdot_low", "xdot_high", "omega_low", "omega_high")
+        columns: dict[str, Any] = dict(zip(sides, self.boxes.T, strict=True))
+        columns |= {
+            "outcome": np.array(OUTCOMES, object)[self.outcome],
+            "itinerary": self.itinerary,
+        }
+        return {"boxes": ns.tables.Table({"box": len(self.boxes)}, columns)}
 
     @property
     def area(self) -> dict[str, float]:

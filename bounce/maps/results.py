@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+import nonsmooth as ns
 
 from ..shot.state import AlongTheGround
 
@@ -48,7 +52,7 @@ _ADVICE = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LiftOffs(AlongTheGround):
+class LiftOffs(AlongTheGround, ns.tables.Tabular):
     """Lift-offs, each array of the broadcast shape ``(...)`` of the landings.
 
     In 3-D ``xdot``, ``omega``, ``x`` and ``slip`` are arrays (..., 2), forward and to the right, as in
@@ -80,6 +84,18 @@ class LiftOffs(AlongTheGround):
     itineraries: tuple[str, ...]
     itinerary_code: NDArray[np.int32]
     slip: Array = None  # type: ignore[assignment]
+
+    def _tables(self) -> dict[str, ns.tables.Table]:
+        axes = {f"landing_{k}": size for k, size in enumerate(self.time.shape)}
+        return {"lift_offs": self._over(axes)}
+
+    def _over(self, axes: Mapping[str, Any]) -> ns.tables.Table:
+        """The lift-offs as a table over the axes of the landings."""
+        names = ("xdot", "ydot", "omega", "x", "y", "time", "slip")
+        columns = {name: ("direction", getattr(self, name)) for name in names}
+        status = np.array([str(s) for s in sorted(BounceStatus)], dtype=object)[self.status]
+        plain = {"status": status, "itinerary": self.itinerary}
+        return ns.tables.Table(axes, columns | plain, {"direction": ("forward", "right")})
 
     def __post_init__(self) -> None:
         if self.slip is None:

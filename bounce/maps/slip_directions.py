@@ -51,7 +51,7 @@ class Vortex(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SlipMap:
+class SlipMap(ns.tables.Tabular):
     """Slip at lift-off over a rectangle of spins, ``omega[0]`` along the last axis.
 
     Attributes
@@ -74,6 +74,11 @@ class SlipMap:
     ydot: float
     omega: tuple[Array, Array]
     lift_offs: LiftOffs
+
+    def _tables(self) -> dict[str, ns.tables.Table]:
+        return {
+            "lift_offs": self.lift_offs._over({"omega_1": self.omega[1], "omega_0": self.omega[0]})
+        }
 
     @property
     def angle(self) -> Array:

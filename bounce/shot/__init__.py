@@ -9,4 +9,4 @@ from .state import State
 
 __all__ = ["BounceProof", "Forces", "Phase", "Sensitivity", "State"]
 
-ns.notebook.add_cards(globals(), __all__)
+ns.tables.add_views(globals(), __all__)

@@ -179,7 +179,9 @@ def _module_names() -> set[str]:
 
 
 #: The class that a reader sees has the methods of what it is built on.
-_OPTIONS = {"FilippovSystem": "    options:\n      inherited_members: true\n"}
+_OPTIONS = dict.fromkeys(
+    ("Ensemble", "FilippovSystem", "Trajectory"), "    options:\n      inherited_members: true\n"
+)
 
 
 def documented(thing: object) -> bool:

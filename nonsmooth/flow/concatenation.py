@@ -15,7 +15,7 @@ from .trajectory import Steps, Trajectory
 
 
 def forward(run: Trajectory) -> Trajectory:
-    """Reverse a trajectory that was followed backward in time; of its events only the end is kept."""
+    """Reverse a trajectory that was integrated backward in time; only its end event is kept."""
     mode, count = run.segments[0].mode, len(run.steps)
     starts, coefficients = np.zeros(count), []
     for k, (begin, c) in enumerate(zip(run.steps.starts, run.steps.coefficients, strict=True)):

@@ -20,7 +20,7 @@ SAFETY = 0.05
 #: roots that the guard does not have.
 RESOLVED = 1e-3
 
-#: Defects above this many local tolerances are no truncation errors.
+#: Defects above this many local tolerances cannot be truncation errors.
 WRONG = 200.0
 
 #: A step is checked in every octave below it, down to a safe length, if it is more than GROWTH times the
@@ -30,7 +30,7 @@ GROWTH = 2.0
 FAR = 10.0
 FIRST = 0.01
 
-#: The two terms before the last two may be this much larger within a step; else a series has a gap.
+#: Largest ratio of the two terms before the last two to these within a step; above it a series has a gap.
 GAP = 1e3
 
 #: Points inside a step at which the defect is checked besides the end, and in each such octave.
@@ -51,33 +51,31 @@ BEFORE_EVENT = 0.99
 #: Events closer than this, relative to the time, and than the rounding of their roots, are simultaneous.
 TIE = 8 * EPSILON
 
-#: Close to a surface on which a field has a root the root changes the rate of h by this part, or it is all but
-#: this part of it.
+#: Near a surface with a root in the field: the root's share of the rate of h is below this part, or above one less it.
 ROOT_SHARE = 1e-3
 
 #: Terms of the series of a power of the time differ by this part from those of the first ones.
 SHARE_SPREAD = 0.05
 
-#: Close to rest on a surface with a root steps are shorter than flights by the inverse of this, and below rounding.
+#: Near rest on a surface with a root, ratio of a step below rounding to the time between two zeros.
 ROOT_REST = 1e-7
 
-#: Steps of Newton's method to where complementarity conditions jump, and part of a state by which it is differenced.
+#: Newton steps of a jump by complementarity conditions, and relative increment of its finite differences.
 JUMP_STEPS, DIFFERENCED = 60, 1e-7
 
-#: Impulses through conditions of degree zero are those of multipliers that act for this part of the time in which they
-#: would move the states as fast, or for longer ones by the step.
+#: Impulses through conditions of degree zero: multipliers act for this part of their own time scale, enlarged by the step.
 IMPULSIVE, IMPULSIVE_STEP = 1e-9, 100.0
 
-#: Part of the time in which the states change by their size over which a rate is differenced.
+#: Increment of a finite difference of a rate, relative to the time scale of the states.
 REACH = 1e-6
 
-#: An event this much after the end of a run, relative to the time, is at its end.
+#: An event this close to the end of a run, relative to the time, is at the end.
 AT_END = 64 * EPSILON
 
 #: Lanes leave events closer than this, relative to the time, to the scalar driver.
 NEAR = 1e-13
 
-#: Newton's steps that improve a root on the guard itself; one is the last below this part of the time.
+#: Newton steps that improve a root by the guard itself; a step below this part of the time is the last.
 POLISHED = 3
 CLOSE = 1e-8
 
@@ -86,20 +84,20 @@ STEEP = 1e-9
 #: Lanes decide an exit where its guard falls at more than this part of the rates' scale.
 STEEP_EXIT = 1e-10
 
-#: Iterations are over where they change a value of order 1 by this much; multipliers by that.
+#: Iterations end when they change a value of order 1 by this much; those for multipliers by that.
 SOLVED = 4e-16
 IMPROVED = 1e-16
 
-#: Matrices are symmetric, and multiples of the identity, to this part of their entries; the squared
-#: rest of a gradient below DEPENDENT of its square depends on others.
+#: Relative tolerance of symmetry and isotropy of matrices; a gradient is dependent on others if the squared norm of its
+#: remainder is below DEPENDENT of its own.
 SYMMETRIC = 1e-12
 DEPENDENT = 1e-24
 
-#: Part that the time of a slip may be off by.
+#: Relative error of the time of a slip.
 SLIP_ROOT = 1e-6
 
-#: Numbers beyond these are no sizes any more; of a quotient with such a value and divisor nothing is left, and a state
-#: that begins with such a value, relative to what it becomes along a leg, begins with zero.
+#: Range of sizes; a quotient with a divisor above HUGE_DIVISOR and a value below TINY_VALUE vanishes, as does the start of
+#: a state below TINY_VALUE of its later values on a leg.
 SMALLEST, LARGEST = 1e-300, 1e300
 TINY = sys.float_info.min
 TINY_VALUE, HUGE_DIVISOR = 1e-100, 1e150
@@ -110,7 +108,7 @@ FIXED_SHORTEST = 1e-14
 #: Rounding of a polynomial's value, relative to the sum of the magnitudes of its terms.
 ROUNDING = 4 * EPSILON
 
-#: The same for the location of a root.
+#: Rounding of the location of a root.
 ROOT_ROUNDING = 16 * EPSILON
 
 #: A point is on a surface where h is zero to this much of its terms.
@@ -122,50 +120,55 @@ CONSISTENT = 1e-8
 #: A coefficient of a guard below this part of its terms is zero by rounding.
 VANISHES = 64 * EPSILON
 
-#: The same where a law is solved: rates and distances from a bound below this part of their terms are zero.
+#: The guard of a stop or reset is zero below this part of sum |dg/dx_i| (|x_i| + atol/rtol). A run that ends there leaves
+#: that much, as its time is rounded: of 1,795 plain restarts from a stop, 14 percent would stop again at once with 16 of
+#: sum |dg/dx_i x_i|, none with this.
+ON_GUARD = 64 * EPSILON
+
+#: Rates and distances from a bound below this part of their terms are zero in the solution of a law.
 TIED = 1e-10
 
-#: In an element whose guard ended a mode they are zero to this many relative tolerances: its root has that error.
+#: For an element whose guard ended a mode they are zero to this many relative tolerances, the error of its root.
 KNOWN_TO = 100.0
 
-#: A second surface is reached too if Newton's step onto both changes no state by more than this part of it.
+#: A second surface is reached too if the Newton step onto both changes no state by more than this part of it.
 PARALLEL = 1e-13
 
-#: Solutions and motions that differ by this part are one; pivots below this part are zero.
+#: Solutions and motions are equal to this relative tolerance; pivots below this part are zero.
 MERGED, SINGULAR = 1e-8, 1e-12
 
-#: Rounding in an unknown is not that of its own row of the law where its slope there is below this part of others.
+#: An own slope in the law below this part of the others does not determine the rounding of an unknown.
 WEAK = 1e-3
 
-#: The slope of a complementarity condition by a multiplier is none where it delays the motion by this part of its time:
-#: the multiplier is below rounding then, and its part in the condition below this.
+#: The slope of a complementarity condition by a multiplier is dropped where it delays the motion by less than this part of
+#: its time scale.
 UNDELAYED = 1e-8
 
 #: Orders of the law that are solved; terms of the series by which motions are compared.
 ORDERS, COMPARED = 9, 4
 
-#: Elements of a block of which all solutions are tried, and those of which all minors are.
+#: Largest blocks whose solutions are enumerated, and whose minors are all computed.
 MOST_ENUMERATED, MOST_MINORS = 8, 10
 
-#: Both fields are tangent where they are at this angle to the surface.
+#: Both fields are tangent below this angle to the surface.
 TANGENT = 2e-14
 
-#: Shortest step, relative to the time and to that of the run, that rounding does not cancel.
+#: Shortest step above rounding, relative to the time and to the duration of the run.
 SHORTEST = 4 * EPSILON
 
-#: Where a guard's zero changes nothing, by rounding, a step of this many times that length goes on without it.
+#: Length in units of SHORTEST of a step over a guard's zero whose event, by rounding, changes nothing.
 OVER = 256.0
 
-#: A guard is low where it is below this many roundings of its terms. Before zeros that are not told apart a step ends
-#: where it is above this many times as much, unless that is no progress: this part of the way to them, and closer
-#: than SEPARATE, relative to the time. A root is exact to LOCATED of the time.
+#: A guard is low below LOW roundings of its terms. Before unresolved zeros a step ends where the guard is FAR_FROM_LOW
+#: times higher, or at the part NEARER of the remaining way; zeros closer than SEPARATE, relative to the time, are one.
+#: A root is exact to LOCATED of the time.
 LOW = 8.0
 FAR_FROM_LOW = 64.0
 NEARER = 0.1
 SEPARATE = 1e-13
 LOCATED = 1e-12
 
-#: Halvings of an interval before two roots count as a touch without crossing.
+#: Bisections of an interval before two roots count as a touch without crossing.
 DEPTH = 52
 
 # Accumulation of events: lengths of patterns (an impact 1, a crossing pair 2, a relay pair 4), blocks of
@@ -174,58 +177,57 @@ LAGS = (1, 2, 3, 4, 6)
 BLOCKS = 4
 SPREAD = 0.02
 SHRINKS = 0.9999
-#: Lanes let the driver see to events that may accumulate where the time left is this part of the last interval or more.
+#: The driver treats accumulating events of lanes if the time left is at least this part of the last interval.
 SHRINKS_TO = 1e-4
 AT_ONCE = 40  # events at one instant
 
 #: A set h = 0 is reached in one step where the remaining rotation of friction is below this part of the
-#: local tolerance. One that was left is far where |h| is above this part of its terms.
+#: local tolerance. A set is far after leaving it where |h| is above this part of its terms.
 REACHED = 0.1
 LEFT = 1e-6
 
-#: A set is reached where at most this many of the shortest steps are left to it.
+#: A set is reached at a distance of at most this many shortest steps.
 TENFOLD = 20.0
 
-#: Coefficients of a series grow as the inverse time to a set to their order: the set is reached before
-#: they are larger than this.
+#: Bound of series coefficients near a set: they grow as powers of the inverse time to it.
 OVERFLOW = 1e280
 
-#: Derivatives have reached a set where |h| is this part of what it was on the way.
+#: Integration of derivatives reaches a set where |h| is this part of its largest value.
 ARRIVED = 1e-13
 
-#: Motions that can continue from a point, at most so many are kept.
+#: Largest number of admissible motions kept at a point.
 SEVERAL = 16
 
 #: Roots of a rate along a multiplier that enters nonlinearly: coefficients below this part of all terms vanish;
-#: the pieces of the way are at most so many and so long; its ends are this much beyond the bounds.
+#: number and length of the pieces are limited; the ends are this much beyond the bounds.
 LAYER_ROUNDING, LAYER_BEYOND = 1e-13, 1e-9
 LAYER_PIECES, LAYER_LONGEST = 4000, 0.25
 
-#: Solutions for several such multipliers: two are apart by this; residuals of one are this part of their terms.
+#: Solutions for several such multipliers: least distance of two; relative residual of one.
 LAYER_APART, LAYER_RESIDUAL = 1e-7, 1e-10
 
-#: Halvings of each side of a box before Newton's method, its steps, and the grid of its starts and their number
-#: where functions are not linear in each multiplier.
+#: Bisections of each side of a box before Newton's method, its steps, and the grid and number of its starts where
+#: functions are not linear in each multiplier.
 LAYER_HALVINGS, LAYER_NEWTON, LAYER_GRID, LAYER_STARTS = 10, 30, 9, 729
 
-#: Orbits round an intersection are closed to first (second) order where their ratio (bend) is this close to 1 (0).
+#: Orbits around an intersection are closed to first (second) order where their ratio (bend) is this close to 1 (0).
 TURN_ROUNDING = 1e-12
 
-#: A step from a point where high derivatives do not exist: its longest and shortest length, the part by which it
-#: is shortened, and how exact the rates of guards that leave zero have to be.
+#: A step from a point where high derivatives do not exist: its longest and shortest length, the factor by which it
+#: is shortened, and the tolerance of the rates of guards that leave zero.
 SINGULAR_LONGEST, SINGULAR_SHORTEST = 1e-3, 1e-15
 SINGULAR_SHORTER, SINGULAR_RATE = 0.25, 0.1
 
-#: Sliding may end in a fold where its slope would vanish within this many steps.
+#: Sliding may end in a fold if its slope, extrapolated, vanishes within this many steps.
 FOLD_AHEAD = 10.0
 
-#: A fold is served at a root of the slope's series where it is this close, relative to the time.
+#: A fold is located at a root of the slope's series this close, relative to the time.
 FOLD_NEAR = 1e-11
 
 #: Multipliers that are this close to those at a fold are the solution that ended there.
 FOLD_APART = 1e-5
 
-#: What a run notes about its decisions, as bits.
+#: Flags of a run's decisions, as bits.
 DEPENDS_ON_WIDTHS, UNPROVED = 1, 2
 
 #: Kinds of events, by number in ensembles and in C.
@@ -235,7 +237,7 @@ KINDS = (
     "end",
 )
 
-#: The first and the last of these, as many, can happen without resets and impacts.
+#: Number of kinds, with the last one, that occur without resets and impacts.
 SIMPLE_KINDS = 5
 
 #: Kinds of guards, by number in C, and their priority among simultaneous ones (0 first).
@@ -271,14 +273,13 @@ REASONS = (
 #: Flag of the mode of an implicit step, as it is recorded.
 IMPLICIT_STEP = 1 << 30
 
-#: Steps that a run may take: what costs least, or one kind.
+#: Methods of integration: the cheapest steps, or one kind.
 METHODS = ("auto", "taylor", "stiff")
 
-#: Implicit steps have seven stages in place of five below this relative tolerance. Newton's method ends at this part
-#: of it, or where it changes nothing but rounding, between two bounds. They are tried where a decay rate allows Taylor
-#: steps hardly longer (this part) in so many of them, of each fourth, first with so many times their length, and given
-#: up after so many in a row that Taylor steps would have made at less cost. Matrices are dense: systems of more states
-#: than these have none.
+#: Implicit steps have seven stages instead of five below the relative tolerance SEVEN_STAGES. Newton's method ends at the
+#: part NEWTON of it, bounded by LEAST_CHANGE and MOST_CHANGE. Implicit steps are tried, EIGHTFOLD as long, once a decay rate
+#: has limited HELD_STEPS Taylor steps, each EVERY_STEP-th checked, to HELD_PART; they are given up after IDLE_STEPS
+#: consecutive ones that cost more. Matrices are dense: systems of more than MOST_STATES states have no implicit steps.
 SEVEN_STAGES = 3e-9
 NEWTON = 0.01
 LEAST_CHANGE, MOST_CHANGE = 1e-7, 1e-2
@@ -288,11 +289,11 @@ EIGHTFOLD = 8.0
 IDLE_STEPS = 5
 MOST_STATES = 1500
 
-#: The same of flows of known durations: the relative tolerance; after so many steps, and if there are so many times as
-#: long ahead, a decay rate is looked for.
+#: Flows of known durations: the relative tolerance; a decay rate is estimated after each CHECK_AGAIN steps, if the remaining
+#: time is FAR_AWAY steps or more.
 IMPLICIT_FLOW = 1e-13
-LOOK_AGAIN, FAR_AWAY = 16, 64.0
+CHECK_AGAIN, FAR_AWAY = 16, 64.0
 
-#: Not a status: the run continues in the next call, after its arrays were emptied, in another driver, or once the
+#: Not a status: the run continues in the next call, after its arrays were emptied, in the driver, or once the
 #: program of its derivatives is given.
-RUNNING, FULL, HAND_OVER, NEEDS_PROGRAM = -1, -2, -3, -4
+RUNNING, FULL, FALL_BACK, NEEDS_PROGRAM = -1, -2, -3, -4

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array
+from ..tables import Table
 from .saving import savable
 
 T = TypeVar("T")
@@ -162,7 +163,7 @@ class Event:
         the one to which it goes; of a stop or reset its direction; of an impact, or a condition that closes, 1;
         otherwise 0.
     motion : ndarray or None
-        Sides of all conditions and what else is due then, for ``simulate(system, start=event)``.
+        Sides of all conditions and due events, for ``simulate(system, start=event)``.
     """
 
     kind: str
@@ -195,7 +196,7 @@ class Event:
 @savable()
 @dataclass(frozen=True)
 class Label:
-    """What many events of a run have in common: all but their times and states."""
+    """Common data of many events of a run: all but their times and states."""
 
     kind: str
     mode_before: str
@@ -251,7 +252,7 @@ class Events(LazySequence[Event]):
     codes : ndarray (e,)
         Positions in ``labels``.
     labels : tuple
-        What events have in common: kind, modes, name, element and side.
+        Common data of events: kind, modes, name, element and side.
     motions : ndarray (m, w)
         Motions of the last m events.
 
@@ -317,6 +318,12 @@ class Events(LazySequence[Event]):
         values = [getattr(label, attribute) for label in self.labels]
         kind = np.int64 if attribute in ("element", "side") else np.object_
         return np.array(values, kind)[self.codes]
+
+    def _tables(self) -> dict[str, Table]:
+        names = ("kind", "name", "element", "side", "mode_before", "mode_after")
+        columns = {"t": self.t, **{name: self.column(name) for name in names}}
+        states = {"x": self.x, "x_after": self.x_after}
+        return {"events": Table({"event": len(self)}, columns | states)}
 
     def _size(self) -> int:
         return len(self.t)
@@ -457,6 +464,11 @@ class Segments(LazySequence[Segment]):
         if objects is not None:
             return [ShownMode(s.mode, s.discrete) for s in objects[:most]]
         return [self.modes[k] for k in self.codes[:most].tolist()]
+
+    def _tables(self) -> dict[str, Table]:
+        names = ("t_start", "t_end", "first", "last")
+        columns = {"mode": [one.mode for one in self]} | {n: getattr(self, n) for n in names}
+        return {"segments": Table({"segment": len(self)}, columns)}
 
     def _size(self) -> int:
         return len(self.codes)

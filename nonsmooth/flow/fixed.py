@@ -87,7 +87,7 @@ def values_program(event: EventMap | PlainMap) -> ValuesProgram:
 
 
 def stuck(duration: float, left: float, z: Array) -> ConvergenceError:
-    """Error for a flow that does not reach the end of its duration."""
+    """Error of a flow that does not reach the end of its duration."""
     return ConvergenceError(
         f"The flow of a leg of duration {duration:.6g} is not finite, or needs too small steps, "
         f"{left:.6g} before the end, near {np.array2string(z[:6], precision=6)}. The itinerary, the "

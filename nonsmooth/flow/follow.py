@@ -1,7 +1,6 @@
 """The smooth flow of one mode, forward or backward in time, with its event functions.
 
-Manifolds and dividing surfaces are computed with it. The mode never changes, so the backward flow is a smooth
-problem too.
+Used by manifolds and dividing surfaces. The mode never changes, so the backward flow is a smooth problem too.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from ..model import (
 from . import messages
 from .engine.arrays import Run, guard_of
 from .engine.convert import message_of
-from .engine.tape import tape_for
+from .engine.interpreter import interpreter_for
 from .events import Event, Events, Segment, Segments
 from .names import guard_name
 from .options import Options
@@ -133,8 +132,8 @@ def follow(
     start = x[: system.dimension]
     if made.unknowns:
         start = np.concatenate([start, unknowns[0][list(made.unknowns)]])
-    tape = tape_for(made.system, options)
-    run = tape.run(made.system.extended_point(start, options.t_start), p, options)
+    engine = interpreter_for(made.system, options)
+    run = engine.run(made.system.extended_point(start, options.t_start), p, options)
     return _trajectory(system, mode, p, made, names, backward, options, run)
 
 
@@ -157,7 +156,7 @@ def _finished(
     message: str,
     steps: Steps,
 ) -> Trajectory:
-    """A run in one mode, with its events; its end is one of them unless a stop is the last."""
+    """A run in one mode, with its events, of which the last is its end or a stop."""
     end = float(t[-1])
     if status is not Status.STOPPED:
         events = [*events, Event("end", end, x[-1].copy(), mode, mode, str(status))]

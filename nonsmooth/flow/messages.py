@@ -10,7 +10,7 @@ from collections.abc import Sequence
 SENTENCES = {
     # by the status
     "REACHED_END": "t_end = {t_end:g} reached.",
-    "STOPPED": "{stop!r} at t = {t:.10g}.",
+    "STOPPED": "Stop {stop!r} at t = {t:.10g}.",
     "ACCUMULATION": "After {events} events; estimated limit t = {limit:.12g}.",
     "ENDLESS_JUMPS": "At t = {t:.10g} jumps of {jumps} repeat without end.",
     "TOO_MANY_EVENTS": "{max_events} events.",
@@ -29,21 +29,21 @@ SENTENCES = {
     "layers: an eigenvalue of dh/dx df/dlambda, or a pair, reaches the imaginary axis.",
     "multiple_zero": "The gradient of h{entry} vanishes where h{entry} does: a multiple zero, which cannot be "
     "located to rounding. Write the surface with a simple zero, x - 1 instead of (x - 1)**3.",
-    "indefinite": "On {surface} = 0 the matrix M = -dh/dx df/dlambda has a negative direction: an indefinite "
-    "friction matrix (Painleve's paradox, or a negative load), for which several motions can follow.",
+    "indefinite": "On {surface} = 0 the friction matrix M = -dh/dx df/dlambda is indefinite (Painleve's paradox, or a "
+    "negative load): several motions can follow.",
     "undetermined": "On {sets} = 0 the multiplier is not unique: the matrix M = -dh/dx df/dlambda is singular "
     "there, or close to it (friction that does not act in some direction).",
     "several_directions": "The set h = 0 can be left in {where} directions: M is far from symmetric.",
     "no_stable_motion": "No mode leaves or slides stably along {entries} = 0.",
-    "possibly_several": "On {entries} = 0 more than one set of multipliers may hold: the matrix dh/dx df/dlambda "
-    "is not known to be a P-matrix, for which there is one.",
+    "possibly_several": "On {entries} = 0 the multipliers may not be unique: the matrix dh/dx df/dlambda "
+    "is not known to be a P-matrix, for which they are.",
     "high_degree": "Rest on h{entry} = 0 is one of many motions: the multiplier enters the third derivative of "
-    "h{entry} or a later one, and motions leave such a point by infinitely many switchings. "
+    "h{entry} or a higher one, and motions leave such a point by infinitely many switchings. "
     "start_mode='s' chooses rest.",
     "spiral_out": "Rest on h{entry} = 0 is one of many motions: a multiplier drives the rate of h{entry} away from zero, "
-    "and motions leave such a point in turns of growing size, infinitely many. start_mode= chooses rest.",
+    "and motions leave such a point in infinitely many growing turns. start_mode= chooses rest.",
     "wrong_start": "start_mode {start_mode!r} is not admissible at the start, where the mode is {actual!r}.",
-    "impossible_start": "start_mode {start_mode!r} cannot continue from the start: its field points elsewhere.",
+    "impossible_start": "start_mode {start_mode!r} cannot continue from the start: its field leads out of the mode.",
     "start_solutions": "start_mode {start_mode!r} has {where} sliding solutions here.",
     "field": "The field of mode {mode!r} at ({state}).",
     "state": "The state after a step from t = {t:.10g}.",
@@ -61,33 +61,32 @@ SENTENCES = {
     "no_impulse": "No impulse fits the impact {impact!r} at t = {t:.10g}.",
     "restitution": "The restitution of {impact!r} is not from 0 to 1 at t = {t:.10g}.",
     "no_jump": "y of {surface!r} is negative at t = {t:.10g}, and no impulses of the multipliers lead to y >= 0.",
-    "no_reaction": "At {contacts} neither the closed contact nor an open one holds.{equations}",
-    "pressed": "Reset {reset!r} leaves the motion pressed against its zero at t = {t:.10g}: it rests there. "
+    "no_reaction": "At {contacts} neither a closed nor an open contact is admissible.{equations}",
+    "pressed": "After reset {reset!r} at t = {t:.10g} the field leads back into its zero: the motion rests there. "
     "Declare nonsmooth.Impact for a contact that lasts.",
-    "two_sided": "The run is on the zero of reset {reset!r}, which has no direction and would turn the motion "
-    "round: it may be a floor or a ceiling. Give it a direction: -1 where its function falls to "
-    "zero, 1 where it rises.",
-    "branch_point": "The field stops being smooth just after t = {t:.8g}: a root or a power of something that "
-    "reaches zero there. Make that a surface, surface= with above= and below=: a run passes the root of a switching "
+    "two_sided": "The run is on the zero of reset {reset!r}, which has no direction and would reverse the motion: "
+    "it may be a floor or a ceiling. Give it a direction: -1 where its function falls to zero, 1 where it rises.",
+    "branch_point": "The field is not smooth just after t = {t:.8g}: the argument of a root or a power reaches zero "
+    "there. Make that argument a surface, surface= with above= and below=: a run passes the root of a switching "
     "function. Or end the run before, with a Stop at a small positive value of it.",
-    "decay": "The steps are held near {step:.1e} at t = {t:.6g} by a decay rate of about {decay:.0e}, much faster "
-    "than the motion: the system is stiff there. {implicit}",
+    "decay": "A decay rate of about {decay:.0e}, much faster than the motion, limits the steps to {step:.1e} near "
+    "t = {t:.6g}: the system is stiff there. {implicit}",
 }
 
-#: Said of an event whose condition was true from the start on.
-UNMET = (
-    " {name!r} was true at the start and did not happen: events happen where they become true. "
-    "initially=True lets it happen at the start, level=True while it is true, initially=False says no more of it."
+#: Note on an event whose condition was true from the start on.
+UNFIRED = (
+    " {name!r} was true at the start and did not fire: events fire where they become true. "
+    "initially=True fires it at the start, level=True while it is true; initially=False drops this note."
 )
 
 #: Where several modes can continue, in one surface or in more, and when.
 PLACES = ("repelling sliding or a fold of both fields", "an intersection")
 DELAYS = (", at once or after sliding for a while", "")
 
-#: Said of diodes and other conditions without a solution, and of steps that a decay rate holds.
+#: Notes on diodes and other conditions without a solution, and on steps that a decay rate limits.
 EQUATIONS = (
-    " No multipliers keep y >= 0: a sign is wrong, or a source forces a current through diodes that block or a voltage "
-    "on diodes that conduct. Give it a resistance."
+    " No multipliers keep y >= 0: a sign is wrong, or a source forces a current through blocking diodes or a voltage "
+    "on conducting ones. Give it a resistance."
 )
 IMPLICIT = "method='auto' takes implicit steps."
 NO_IMPLICIT = "Systems with vector multipliers have no implicit steps."

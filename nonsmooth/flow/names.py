@@ -1,4 +1,4 @@
-"""Names and kinds of events as users see them: made here only, compared whole, never taken apart."""
+"""Names and kinds of events in results: made here only, compared whole, never parsed."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def event_name(system: FilippovSystem, mode: str, kind: str, element: int, side:
 
 
 def change(before: str, after: str) -> str:
-    """Kind of the event by which one mode follows another."""
+    """Kind of the event between two modes."""
     closed = after.count("c") - before.count("c")
     if closed:
         return "contact" if closed > 0 else "release"

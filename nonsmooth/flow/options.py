@@ -21,7 +21,7 @@ class Tolerances(NamedTuple):
 
 
 def tolerances(tol: float, rtol: float | None = None, atol: float | None = None) -> Tolerances:
-    """Both are ``tol`` unless given apart."""
+    """Relative and absolute tolerance, ``tol`` unless given separately."""
     return Tolerances(tol if rtol is None else rtol, tol if atol is None else atol)
 
 

@@ -37,7 +37,7 @@ ATTRIBUTES = {
 
 
 def hinted(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Refuse arguments of other tools with a hint, and a span where the end of a run is a number."""
+    """Refuse arguments of other tools with a hint, and a time span in place of the end of a run."""
 
     @wraps(function)
     def run(*args: _P.args, **given: _P.kwargs) -> _R:

@@ -1,10 +1,10 @@
-"""First root of a polynomial on an interval, with no root overlooked, and shifts of polynomials.
+"""First root of a polynomial on an interval, without missing a root, and shifts of polynomials.
 
-In Bernstein form on [0, h] a polynomial has at most as many roots as its coefficients change sign: none
-excludes, one isolates, more are resolved by halving the interval (``first_root`` of ``core/common.h``).
+In Bernstein form on [0, h] a polynomial has at most as many roots as its coefficients change sign: no change
+excludes a root, one isolates it, more require bisection of the interval (``first_root`` of ``core/common.h``).
 
 Source: Lane & Riesenfeld 1981, "Bounds on a polynomial"; Mourrain & Pavone 2009. Declined: companion-matrix
-eigenvalues (all roots where one is wanted) and Sturm sequences (unstable).
+eigenvalues (they give all roots) and Sturm sequences (unstable).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from ..model import Array, OptionError
 from .engine.arrays import address
 from .engine.building.core_source import MOST_ORDER
-from .engine.tape import library
+from .engine.interpreter import library
 
 
 def first_root(coefficients: Sequence[float], h: float) -> float | None:
@@ -96,7 +96,7 @@ def _floats(coefficients: Sequence[float]) -> Array:
 
 
 def _time(found: float) -> float | None:
-    """What the library found; it returns -1 where there is no root."""
+    """The root, or None for -1, which the library returns without one."""
     return None if found < 0.0 else found
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..model import Array, FilippovSystem
 from ..notebook import card
-from . import tables
+from ..tables import Table
 from .constants import KINDS, SIMPLE_KINDS
 from .saving import Savable
 from .status import Status
@@ -202,28 +202,27 @@ class Ensemble(
         """Whether each run reached its end or a stop."""
         return (self.status == Status.REACHED_END) | (self.status == Status.STOPPED)
 
-    def to_pandas(self) -> Any:
-        """Return a DataFrame with a row for each trajectory, in the order of the arrays.
+    def _tables(self) -> dict[str, Table]:
+        axes: dict[str, Any] = {f"start_{k}": size for k, size in enumerate(self.t.shape)}
+        labels = {"state": self.state_names} if self.state_names else {}
+        columns = {
+            "t": self.t,
+            "x": self.x,
+            "status": self._named_status(),
+            "itinerary": self.itinerary,
+        }
+        counts = {f"{kind}_count": number for kind, number in self.events.items()}
+        tables = {"ends": Table(axes, columns | counts, labels)}
+        if self.event_x is not None:
+            tables["events"] = Table(axes, {"t": self.event_t, "x": self.event_x}, labels)
+        if self.sample_t is not None:
+            samples = axes | {"sample": self.sample_t.shape[-1]}
+            tables["samples"] = Table(samples, {"t": self.sample_t, "x": self.sample_x}, labels)
+        return tables
 
-        Columns: ``t``, the states, status, itinerary, and the number of events of each kind
-        (``crossing_count``, ...). The index has the axes ``start_0``, ... if there are several.
-
-        Raises
-        ------
-        OptionError
-            pandas is not installed.
-        """
-        return tables.ensemble_table(self)
-
-    def to_xarray(self) -> Any:
-        """Return a Dataset of all arrays, with the axes ``start_0``, ..., ``sample`` and ``state``.
-
-        Raises
-        ------
-        OptionError
-            xarray is not installed.
-        """
-        return tables.ensemble_set(self)
+    def _named_status(self) -> NDArray[np.object_]:
+        """Names of the statuses (...)."""
+        return np.array([str(s) for s in sorted(Status)], dtype=object)[self.status]
 
     def _repr_html_(self) -> str:
         """Notebook representation: number of runs and their ends."""

@@ -1,4 +1,4 @@
-"""Sections and sample times: which states of a run, or of many, ``t_eval=`` and ``at=`` keep."""
+"""Sections and sample times: the states that ``t_eval=`` and ``at=`` keep of runs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ KINDS_OF_SECTIONS = KINDS[:-1]
 @savable()
 @dataclass(frozen=True)
 class Section:
-    """Where a run is sampled, for Poincare maps, stroboscopic pictures and bifurcation diagrams.
+    """Section at which a run is sampled, for Poincare maps, stroboscopic pictures and bifurcation diagrams.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, OptionError, Parameters, require_system
 from .engine.convert import trajectory
-from .engine.tape import tape_for
+from .engine.interpreter import interpreter_for
 from .ensembles.starts import require_start, require_start_mode
 from .events import Event
 from .options import Options
@@ -112,7 +112,7 @@ def simulate(
 
     Notes
     -----
-    Every run ends in a status: see :class:`Status`. Where the future is not unique the run stops
+    Every run ends in a status: see :class:`Status`. Where the solution is not unique the run stops
     with ``NON_UNIQUE`` and never guesses.
 
     Examples
@@ -150,7 +150,7 @@ def simulate(
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
     read_at = None if times is None else times.of(p)
-    run = tape_for(system, options).run(x, p, options, read_at, motion, mode, dense)
+    run = interpreter_for(system, options).run(x, p, options, read_at, motion, mode, dense)
     return _with_samples(trajectory(system, p, options, run), options, read_at, run.sample_x)
 
 

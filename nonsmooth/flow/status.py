@@ -11,9 +11,9 @@ class Status(IntEnum):
     It reached its end (REACHED_END) or a stop (STOPPED); the motion is not unique (NON_UNIQUE); events
     accumulate (ACCUMULATION); several surfaces meet where no motion is stable (INTERSECTION); steps
     became too short (STEP_TOO_SMALL); a value is not finite (NOT_FINITE); a limit on events or steps was
-    reached (TOO_MANY_EVENTS, TOO_MANY_STEPS); a constraint cannot hold (INCONSISTENT); jumps at one instant
-    do not end (ENDLESS_JUMPS). The message of a
-    run says more. The values are stable: ensembles store them in arrays and files.
+    reached (TOO_MANY_EVENTS, TOO_MANY_STEPS); a constraint cannot be satisfied (INCONSISTENT); jumps at one
+    instant do not end (ENDLESS_JUMPS). The message of a run has details. The values are stable: ensembles store
+    them in arrays and files.
     """
 
     REACHED_END = 0
@@ -41,9 +41,9 @@ ADVICE: dict[Status, str] = {
     Status.REACHED_END: "The run reached t_end.",
     Status.STOPPED: "The run reached a stop or the last event of its section.",
     Status.NON_UNIQUE: "The motion is not unique from here; continue from the last state with "
-    "start_mode= and the mode that you want.",
+    "start_mode= and one of the modes.",
     Status.ACCUMULATION: "Events accumulate in finite time (Zeno); continue from the limit with "
-    "the motion that holds there.",
+    "the mode that is admissible there.",
     Status.INTERSECTION: "At this intersection of surfaces Filippov's convention with independent "
     "multipliers has no stable motion; check the fields around the last state.",
     Status.INCONSISTENT: "A constraint cannot hold here: the state is behind it, or no reaction (or "

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..model import Array, FilippovSystem, OptionError, PointError, real_array
 from ..notebook import card, lines
-from . import tables
+from ..tables import Table
 from .events import Events, Segments, ShownMode
 from .names import shown_mode
 from .other_names import ATTRIBUTES
@@ -117,7 +117,7 @@ class Continuation:
 @savable()
 @dataclass(frozen=True)
 class Facts:
-    """What the decisions of a run rest on.
+    """Assumptions and errors of the decisions of a run.
 
     Attributes
     ----------
@@ -125,12 +125,11 @@ class Facts:
         Whether sliding on several surfaces is stable, or not, only for some ratios of the widths of their
         layers. It was decided for the ``layer_widths`` of the system.
     unproved : bool
-        One solution was found for more than eight elements that act on one another, and no test shows that it
-        is the only one.
+        One solution was found for more than eight coupled elements, and no test proves that it is unique.
     rested_below : tuple of str
-        Names of what ``rest_below=`` put to rest: the run is off by its speed there.
+        Names of surfaces that ``rest_below=`` put to rest, with an error of its speed there.
     implicit_steps : int
-        How many steps were implicit, because a decay rate held explicit ones.
+        Number of implicit steps, taken where a decay rate limits explicit ones.
     t_error : float
         Largest error of the time of an event that rounding of its switching function hides, as near a multiple zero:
         0 where none of them moves a state by more than the tolerance.
@@ -168,7 +167,7 @@ class Trajectory(
     t, x : ndarray (m,), (m, n)
         Accepted steps and events, both ends included; a reset appears twice at its time.
     events : Events
-        What happened, in order of time: a sequence of Event. The last one is the end.
+        A sequence of Event in order of time. The last one is the end.
     itinerary : str
         Modes in order, separated by blanks.
     segments : Segments
@@ -176,7 +175,7 @@ class Trajectory(
     status : Status
         Why the run ended.
     message : str
-        What happened, in words.
+        The status in words, with details.
     accumulation_time : float or None
         Estimated limit of the event times when the status is ACCUMULATION.
     steps : Steps
@@ -187,7 +186,7 @@ class Trajectory(
         The motions that can continue from the last point, up to 16, when the status is NON_UNIQUE and they are
         known.
     facts : Facts
-        What the decisions of the run rest on.
+        Assumptions and errors of the decisions of the run.
     dense : bool
         Whether the polynomials were kept, so that the run can be read between its points.
     sampled_events : bool
@@ -299,42 +298,20 @@ class Trajectory(
                 f"dense=False kept no polynomials of this run, which {what} needs. Simulate with dense=True."
             )
 
-    def to_pandas(self, what: str = "points") -> Any:
-        """Return a DataFrame: steps and events in time, a row each event, or the samples.
+    def _tables(self) -> dict[str, Table]:
+        labels = {"state": self.system.state_names}
+        events = self.events._tables()["events"]
+        tables = {
+            "points": Table({"t": self.t}, {"x": self.x}, labels),
+            "events": Table(events.index, events.columns, labels),
+        }
+        if self.sample_t is not None:
+            samples = {"sample": ("t", self.sample_t)}
+            tables["samples"] = Table(samples, {"x": self.sample_x}, labels)
+        return tables
 
-        Parameters
-        ----------
-        what : {"points", "events", "samples"}, optional
-            ``points`` and ``samples`` have the time as index and a column for each state; ``events``
-            has time, kind, name, element, side, modes, and the states before and after
-            (``x_after``, ...).
-
-        Returns
-        -------
-        pandas.DataFrame
-            With the names of the states as columns.
-
-        Raises
-        ------
-        OptionError
-            pandas is not installed; the run has no samples.
-        """
-        return tables.trajectory_table(self, what)
-
-    def to_xarray(self) -> Any:
-        """Return a Dataset with ``x`` (t, state), and ``sample_x`` (sample, state) if there are any.
-
-        Returns
-        -------
-        xarray.Dataset
-            With the names of the states as a coordinate.
-
-        Raises
-        ------
-        OptionError
-            xarray is not installed.
-        """
-        return tables.trajectory_set(self)
+    def _missing(self, what: str) -> str:
+        return "; simulate with t_eval= or at= for samples" if what == "samples" else ""
 
     def _repr_html_(self) -> str:
         """Notebook representation: status, itinerary, states over time."""

@@ -15,11 +15,11 @@ class CompilerWarning(UserWarning):
 
 
 class DecisionWarning(UserWarning):
-    """A decision of a run rests on a convention, or is not proved."""
+    """A decision of a run depends on a convention, or is not proved."""
 
 
 def warn_of_facts(depends_on_widths: bool, unproved: bool, t_error: float) -> None:
-    """Warn of what the decisions of a run rest on."""
+    """Warn of assumptions and errors of the decisions of a run."""
     if depends_on_widths:
         warn_once(
             "Whether sliding on several surfaces is stable depends here on the widths of their layers, which are "
@@ -28,14 +28,14 @@ def warn_of_facts(depends_on_widths: bool, unproved: bool, t_error: float) -> No
         )
     if unproved:
         warn_once(
-            "One motion was found for more than eight elements that act on one another; no test shows that it is "
-            "the only one (run.facts.unproved).",
+            "One motion was found for more than eight coupled elements; no test proves that it is unique "
+            "(run.facts.unproved).",
             DecisionWarning,
         )
     if t_error > 0.0:
         warn_once(
-            "Rounding of a switching function hides when it passes zero, by more than the tolerance (run.facts.t_error "
-            "says how long). Write it with a simple zero, x - 1 instead of an expanded (x - 1)**3.",
+            "Rounding of a switching function makes the time of its zero uncertain by more than the tolerance "
+            "(run.facts.t_error). Write it with a simple zero, x - 1 instead of an expanded (x - 1)**3.",
             DecisionWarning,
         )
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..flow.tables import library
 from ..model import FilippovSystem
+from ..tables import library
 from .runs import Runs, parameters_of
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import Any
 
 import casadi as ca
 
-from ..flow.tables import library
 from ..model import DefinitionError, FilippovSystem
+from ..tables import library
 
 __all__ = ["expression", "system"]
 

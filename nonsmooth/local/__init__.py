@@ -1,7 +1,7 @@
 """Analysis at points of surfaces, without time stepping: regions, folds, two-folds, equilibria."""
 
 from ..model import mode_field
-from ..notebook import add_cards
+from ..tables import add_views
 from . import two_folds
 from .classify import LocalObject, classify
 from .point.higher_codimension import LimitDirection, limit_directions
@@ -59,4 +59,4 @@ __all__ = [
     "two_folds",
 ]
 
-add_cards(globals(), __all__)
+add_views(globals(), __all__)

@@ -26,6 +26,7 @@ from ..model import (
     require_system,
 )
 from ..model.checks import positive
+from ..tables import Tabular
 from .checks import MARGIN, require_linear
 from .discrete_states import with_discrete_states_held
 from .point.elements_at import acts
@@ -52,7 +53,7 @@ from .two_folds import classify_two_fold
 
 
 @dataclass(frozen=True, eq=False)
-class LocalObject:
+class LocalObject(Tabular):
     """The class of a point, with its distance from other classes.
 
     Attributes

@@ -52,7 +52,7 @@ def operation_in_c(op: str, args: Sequence[str]) -> str:
 #: Rules by number, then those by which later coefficients follow: of sums with a kind of terms; of quotients of which one
 #: argument does not move; of integrals over what is affine in the time, as in cos(omega t); of a sine with its cosine;
 #: of what is chosen by a factor that does not move.
-TAPE_RULES = tuple(
+TAYLOR_RULES = tuple(
     "constant input apply sum div sqrt power integral quotient atan2 chosen "
     "linear1 linear2 linear3 linear4 linear over under turn pair turns gated".split()
 )
@@ -63,11 +63,11 @@ LAWS = ("surface", "contact", "set", "relay", "joint", "complementarity", "table
 #: Laws of impacts, by number in C.
 IMPACT_LAWS = ("newton", "moreau", "poisson")
 
-#: Most numbers in a condition of an event, and how a function in it is located that is not watched.
+#: Most numbers in a condition of an event, and the direction of a function in it that is not located.
 MOST_CODES, UNWATCHED = 256, 2
 
-#: A step ends where |h| has fallen to this part: towards h = 0 a series may go on as -|h|.
+#: A step ends where |h| has fallen to this part: towards h = 0 a series may continue as -|h|.
 FALL = 0.1
 
-#: The same for friction's limit on the set, whose square is compared with that of what is needed.
+#: The same for friction's limit on the set, whose square is compared with that of the required friction.
 LIMIT_FALL = 1e-3

@@ -44,13 +44,14 @@ from ..model import (
     require_system,
     whole,
 )
+from ..tables import Table, Tabular, joined
 from .periodic.find_periodic import periodic_orbit
 from .periodic.orbit import PeriodicOrbit
 
-#: Labels of starts that go to no attractor.
+#: Labels of starts without an attractor.
 UNDECIDED, NON_UNIQUE, ACCUMULATION, STOPPED, FAILED, INFINITY = 0, -1, -2, -3, -4, -5
 
-#: Number of starts that are followed over all returns first, to find attractors.
+#: Number of starts that are first integrated over all returns, to find attractors.
 _SEEDS = 48
 
 #: Factor by which their samples are denser where they are taken at times: there a cycle is a curve.
@@ -62,10 +63,13 @@ _FURTHER = 4
 #: Starts that are compared with an attractor in one call, during which Ctrl-C waits.
 _ROWS = 4096
 
+#: States at rest that are compared with what is known in one call.
+_TOGETHER = 256
+
 #: Numbers that samples may hold in one call.
 _HELD = 2**24
 
-#: Largest number of returns in a cycle that is recognised before it has been followed to the end.
+#: Largest number of returns in a cycle that is recognised before the end of the run.
 _LONGEST = 8
 
 #: Distance of neighbours that must converge to a point of rest, in units of ``near``.
@@ -86,7 +90,7 @@ _STILL = 1e-8
 
 @savable(points="* n", period="nan", multipliers="*")
 @dataclass(frozen=True, eq=False, repr=False)
-class Attractor:
+class Attractor(Tabular):
     """An attractor, as points of it.
 
     Attributes
@@ -264,7 +268,7 @@ class Search:
         return self.section is not None and self.period is None
 
     def _compare(self, left: NDArray[np.intp], late: Array) -> None:
-        """Label runs that come back near what they passed before, over the whole time."""
+        """Label runs that return near their earlier samples, over the whole time."""
         dense = _DENSE if self.section is None else 1
         for _ in range(_FURTHER):
             if not len(left):
@@ -284,7 +288,7 @@ class Search:
                 return
 
     def _longest(self, rows: NDArray[np.intp]) -> int:
-        """Returns that runs have at most in the whole time, or the most that are kept."""
+        """Largest number of returns of a run in the whole time, or of kept ones."""
         count = self.samples
         most = max(self.samples, _HELD // (len(rows) * self.x0.shape[1]))
         while count < most:
@@ -384,7 +388,7 @@ class Search:
                 )
                 comes = (now <= self._radius(k)) & ((now < before) | (now <= _EQUAL))
                 labels[left[comes]] = k + 1
-            if attractor.kind == "point":  # to which all runs from so near go
+            if attractor.kind == "point":  # that attracts all runs this near
                 left = np.flatnonzero(labels == UNDECIDED)
                 labels[left[self._away(k, at.end[left]) <= _ISOLATED * self.near]] = k + 1
         left = np.flatnonzero((labels == UNDECIDED) & (at.number >= self.samples))
@@ -420,7 +424,7 @@ class Search:
     # cycles -------------------------------------------------------------------------------------
 
     def _of_cycle(self, at: _Returns, i: int, row: int, p: int) -> int:
-        """Label of the cycle that a run comes to, new or known; 0 if Newton's method finds none there."""
+        """Label of the cycle that a run approaches, new or known; 0 if Newton's method finds none there."""
         last = int(at.number[i]) - 1
         period = float(at.t[i, last] - at.t[i, last - p])
         found = None
@@ -463,7 +467,7 @@ class Search:
         return bool(np.abs(np.ptp(run.x, axis=0) / self.scale).max() > _EQUAL)
 
     def _polished(self, at: _Returns, i: int, row: int, p: int, period: float) -> Attractor | None:
-        """The stable cycle to which a run comes, with its points on the section."""
+        """The stable cycle that a run approaches, with its points on the section."""
         given: dict[str, Any] = {"parameters": self.parameters}
         section, count = self.section, int(at.number[i])
         assert section is not None
@@ -488,7 +492,7 @@ class Search:
         return Attractor(points, "cycle", period, orbit.multipliers ** round(period / orbit.period))
 
     def _orbit(self, run: Any, period: float) -> PeriodicOrbit:
-        """The orbit to which a run comes, of which a period of returns may hold some turns."""
+        """The orbit that a run approaches; a period of returns may contain several turns of it."""
         assert self.section is not None
         given: dict[str, Any] = {"parameters": self.parameters}
         every = self.section.every
@@ -534,10 +538,18 @@ class Search:
         self, labels: NDArray[np.int32], rows: NDArray[np.intp], at: _Returns
     ) -> None:
         """Label runs that come to rest."""
-        if len(rows):
-            end, still = self._settled(at.end[rows])
-            for i in np.flatnonzero(still).tolist():
-                labels[rows[i]] = self._at_rest(end[i])
+        if not len(rows):
+            return
+        ends, still = self._settled(at.end[rows])
+        rows, ends = rows[still], ends[still]
+        while len(rows):  # up to the next one that changes what is known
+            known = self._at_known_rest(ends[:_TOGETHER])
+            new = np.flatnonzero(known == UNDECIDED)[:1]
+            if len(new):
+                known = known[: new[0] + 1]
+                known[-1] = self._at_rest(ends[new[0]])
+            labels[rows[: len(known)]] = known
+            rows, ends = rows[len(known) :], ends[len(known) :]
 
     def _settled(self, x: Array) -> tuple[Array, NDArray[np.bool_]]:
         """States (m, n) after the whole time again, and whether they rest there."""
@@ -546,24 +558,26 @@ class Search:
         two = self._ensemble(one, self.t_start + span / 16, "rest").x
         return one, self._distance(one, two) <= _STILL
 
+    def _at_known_rest(self, x: Array) -> NDArray[np.int32]:
+        """Labels of the known points or sets at which states (m, n) rest, or 0."""
+        label = self._near(x[:, None])
+        for k, attractor in enumerate(self.found):
+            if attractor.kind in ("point", "rest"):
+                left = np.flatnonzero(label == UNDECIDED)
+                least = self._radius(k) if attractor.kind == "point" else self.near / 8
+                label[left[self._away(k, x[left]) <= least]] = k + 1
+        return label
+
     def _at_rest(self, x: Array) -> int:
-        """Label of the point or set at which a state (n,) rests."""
-        given = int(self._near(x[None, None])[0])
-        if given:
-            return given
-        resting = [k for k, a in enumerate(self.found) if a.kind in ("point", "rest")]
-        for k in resting:
-            least = self._radius(k) if self.found[k].kind == "point" else self.near / 8
-            if self._away(k, x[None])[0] <= least:
-                return k + 1
+        """Label of another point or a larger set, at which a state (n,) rests."""
         step = _ISOLATED * self.near * self.scale
         around = np.vstack([x + step * e for e in (*np.eye(len(x)), *-np.eye(len(x)))])
         back, still = self._settled(around)
         if np.all(self._distance(back, x) <= 1e-3 * self.near) and still.all():
             return self.known(Attractor(x[None], "point"))
-        for k in resting:
-            if self.found[k].kind == "rest":
-                points = _thinned(np.vstack([self.found[k].points, x]), self.scale, self.near / 8)
+        for k, attractor in enumerate(self.found):
+            if attractor.kind == "rest":
+                points = _thinned(np.vstack([attractor.points, x]), self.scale, self.near / 8)
                 self.found[k] = Attractor(points, "rest")
                 self._trees[k] = _tree(points / self.scale)
                 return k + 1
@@ -645,7 +659,7 @@ _NAMES = {
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Basins(Savable, labels="...", starts="... n nan", axes="*"):
-    """Which attractor each start goes to.
+    """Basins of attraction: the attractor of each start.
 
     Attributes
     ----------
@@ -662,7 +676,7 @@ class Basins(Savable, labels="...", starts="... n nan", axes="*"):
     state_names : tuple of str
         Names of the states, in their order on the last axis.
     complete : bool
-        False if the computation was interrupted; what was not decided by then has the label 0.
+        False if the computation was interrupted; undecided starts then have the label 0.
     """
 
     labels: NDArray[np.int32]
@@ -671,6 +685,16 @@ class Basins(Savable, labels="...", starts="... n nan", axes="*"):
     axes: dict[str, Array] = field(default_factory=dict)
     state_names: tuple[str, ...] = ()
     complete: bool = True
+
+    def _tables(self) -> dict[str, Table]:
+        named = bool(self.axes)
+        axes = self.axes if named else {f"start_{k}": m for k, m in enumerate(self.labels.shape)}
+        columns = {"label": self.labels} | ({} if named else {"x": self.starts})
+        kinds = [np.full(len(one.points), one.kind, object) for one in self.attractors]
+        parts = [{"kind": k, "x": a.points} for k, a in zip(kinds, self.attractors, strict=True)]
+        labels = {"state": self.state_names} if self.state_names else {}
+        attractors = joined("attractor", parts, self.state_names)
+        return {"starts": Table(axes, columns, labels), "attractors": attractors}
 
     @property
     def fractions(self) -> dict[int, float]:
@@ -686,7 +710,7 @@ class Basins(Savable, labels="...", starts="... n nan", axes="*"):
         return {k: float(np.sqrt(p * (1 - p) / size)) for k, p in self.fractions.items()}
 
     def name(self, label: int) -> str:
-        """Say what a label means.
+        """Return a label in words.
 
         Parameters
         ----------
@@ -734,7 +758,7 @@ def basins(
     grid : mapping or array_like (..., n)
         Starts; or for each state, by name, a number or the values (k,) of an axis.
     t_end : float
-        Time in which a run has to come to its attractor. Those that are there earlier end earlier.
+        Time in which a run has to reach its attractor. Runs that reach it earlier end earlier.
     section : Section, str, number or expression, optional
         Where runs are sampled: an event, a surface of your own, a period (needed where the system
         depends on time). Without it they are sampled at equal time steps.
@@ -753,12 +777,12 @@ def basins(
         As in :func:`simulate`; parameters are numbers.
     work : Work, optional
         Threads or executor, progress bars, and a store: after an interruption the same call
-        goes on from there.
+        continues from there.
 
     Returns
     -------
     Basins
-        Ctrl-C ends with what was decided.
+        After Ctrl-C it has the labels that were decided.
 
     Raises
     ------
@@ -825,15 +849,15 @@ def attractors(
     Parameters
     ----------
     system, starts, t_end
-        As in :func:`basins`, of which ``starts`` are the grid; about fifty are enough to look around.
+        As in :func:`basins`, of which ``starts`` are the grid; about fifty are enough for an overview.
     **options
         As in :func:`basins`: ``section``, ``near``, ``samples``, ``t_start``, ``parameters``, ``tol``, ``work``, ...
 
     Returns
     -------
     list of Attractor
-        Cycles with their periods and multipliers, points and sets of rest, and what recurs, such as chaos; those with
-        more of the starts first.
+        Cycles with their periods and multipliers, points and sets of rest, and recurrent attractors, such as chaotic
+        ones; those with more of the starts first.
 
     Raises
     ------

@@ -12,8 +12,8 @@ from ..flow.constants import FULL, GUARDS, IMPLICIT_STEP, KINDS
 from ..flow.engine.building.build import CompilerError
 from ..flow.engine.building.webassembly import MODULE, has_module_key
 from ..flow.engine.image import exchanged, image_of
+from ..flow.engine.interpreter import interpreter_for
 from ..flow.engine.recording import written_arrays
-from ..flow.engine.tape import tape_for
 from ..flow.options import Options
 from ..model import FilippovSystem
 
@@ -31,7 +31,7 @@ def module() -> str:
 def described(system: FilippovSystem, tol: float = 1e-10) -> dict[str, Any]:
     """A system for ``Engine`` of engine.js: its image, its sizes, and how its modes are spelled."""
     system = system.of_breakpoints
-    engine = tape_for(system, Options(t_end=1.0, rtol=tol, atol=tol))
+    engine = interpreter_for(system, Options(t_end=1.0, rtol=tol, atol=tol))
     image = image_of(engine)
     layouts = exchanged()
     machine = dict(
@@ -52,7 +52,7 @@ def described(system: FilippovSystem, tol: float = 1e-10) -> dict[str, Any]:
     return dict(
         machine=machine,
         image=base64.b64encode(gzip.compress(bytes(image.bytes), 9, mtime=0)).decode(),
-        places=image.places,
+        addresses=image.addresses,
         tol=tol,
         order=engine.order,
         states=list(names),

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..model.errors import MissingError
-from ..notebook import add_cards
+from ..tables import add_views
 from .arithmetic.enclosure import Enclosure
 from .orbits.orbit_proof import OrbitProof, ProvenEvent
 from .points.census import Census, Undecided
@@ -42,4 +42,4 @@ __all__ = [
     "prove_all",
 ]
 
-add_cards(globals(), __all__)
+add_views(globals(), __all__)

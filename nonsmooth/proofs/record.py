@@ -66,23 +66,18 @@ def motion_of(system: FilippovSystem, numbers: Numbers, modes: Iterable[str]) ->
     """A system as instructions: surfaces, field, guards, maps, gaps and restitutions."""
     # Inputs of vector 3 are multipliers, of vector 4 reactions. For sliding modes, where
     # F1 - F2 = g G has a common factor g, its node and those of G are named.
-    system_graph, d = SystemGraph(system), system.definition
-    graph = system_graph.graph
-    lam = [graph.symbol(3, i) for i in range(d.multipliers.numel())]
-    reactions = [graph.symbol(4, i) for i in range(d.reactions.numel())]
-    field = system_graph.field(lam, reactions)
-    one = lambda e: system_graph.insert([e])[0] if e.numel() else []
-    maps = [one(d.maps[:, k]) for k in range(len(system.resets))]
-    rows = [one(d.surfaces), field, one(d.guards), one(d.gaps), one(d.restitutions), *maps]
+    system_graph = SystemGraph(system)
+    rows = motion_rows(system_graph)
     sliding = {w: _factored(system_graph, w, numbers) for w in modes if "s" in w}
     rows += [[d.factor, *d.direction] for d in sliding.values()]
-    program = Program(graph, rows)
+    program = Program(system_graph.graph, rows)
     names = ("surfaces", "field", "guards", "gaps", "restitutions")
-    found, maps = program.rows[:5], program.rows[5 : 5 + len(maps)]
+    count = 5 + len(system.resets)
+    found, maps = program.rows[:5], program.rows[5:count]
     data: dict[str, Any] = dict(zip(names, found, strict=True)) | {"maps": maps}
     data["sliding"] = {
         w: {"factor": row[0], "direction": row[1:]}
-        for w, row in zip(sliding, program.rows[5 + len(maps) :], strict=True)
+        for w, row in zip(sliding, program.rows[count:], strict=True)
     }
     return {
         "format": "nonsmooth orbit 1",
@@ -91,6 +86,17 @@ def motion_of(system: FilippovSystem, numbers: Numbers, modes: Iterable[str]) ->
         "resets": [list(r) for r in system.resets],
         "impacts": list(system.impacts),
     }
+
+
+def motion_rows(system_graph: SystemGraph) -> list[list[int]]:
+    """Nodes of surfaces, field, guards, gaps, restitutions, and then of the map of each reset."""
+    graph, d = system_graph.graph, system_graph.system.definition
+    lam = [graph.symbol(3, i) for i in range(d.multipliers.numel())]
+    reactions = [graph.symbol(4, i) for i in range(d.reactions.numel())]
+    field = system_graph.field(lam, reactions)
+    one = lambda e: system_graph.insert([e])[0] if e.numel() else []
+    maps = [one(d.maps[:, k]) for k in range(len(system_graph.system.resets))]
+    return [one(d.surfaces), field, one(d.guards), one(d.gaps), one(d.restitutions), *maps]
 
 
 def _factored(system_graph: SystemGraph, mode: str, numbers: Numbers) -> Difference:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..model import Array, ConvergenceError, DefinitionError, OptionError, PointError, real_array
 from ..model.checks import positive
+from . import linear_equations
 
 Equations = Callable[[Array], tuple[Array, Array]]
 Values = Callable[[Array], Array]
@@ -258,15 +259,11 @@ def converge(
         )
     start = real_array(start, "start")
     carried = isinstance(equations, Secant) and equations.jacobian is not None
-    given = tol, scale, max_iterations, linear or _dense, noise, values
+    given = tol, scale, max_iterations, linear or linear_equations.solve, noise, values
     root = _full_steps(equations, start, *given)
     if root is None and carried and isinstance(equations, Secant) and equations.forget():
         root = _full_steps(equations, start, *given)
     return root
-
-
-def _dense(matrix: Array, right: Array) -> Array:
-    return np.asarray(np.linalg.solve(matrix, right), float)
 
 
 def _full_steps(

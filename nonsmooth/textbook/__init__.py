@@ -13,11 +13,12 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import difflib
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from ..model import OptionError
-from ..notebook import add_cards
+from ..tables import add_views
 from .control import abs_brake, drill_string, super_twisting, tank_cascade, twisting
 from .converters import boost_converter, diode_bridge, resonant_converter
 from .friction import dry_friction, leine_stick_slip, stick_slip_exponential
@@ -129,71 +130,12 @@ __all__ = [
     "woodpecker",
 ]
 
-add_cards(globals(), __all__)
+add_views(globals(), __all__)
 
-_FUNCTIONS: tuple[Callable[[], Problem], ...] = (
-    dry_friction,
-    spiral_oscillator,
-    leine_stick_slip,
-    scalar_sliding,
-    scalar_repelling,
-    two_relay_spiral,
-    glass_loop,
-    bouncing_ball,
-    harvested_prey_predator,
-    welander_box,
-    planar_relay,
-    pseudo_hopf,
-    stick_slip_exponential,
-    state_dependent_jump,
-    impact_oscillator,
-    ambiguous_exit,
-    hidden_dynamics,
-    kelvin_voigt_bounce,
-    piecewise_cycle,
-    two_fold,
-    multi_sliding_relay,
-    forced_dry_friction,
-    belt_oscillator,
-    simplest_walker,
-    buck_converter,
-    block_on_incline,
-    block_on_belt,
-    block_on_disc,
-    cue_ball,
-    turntable,
-    pivoting_disc,
-    shaken_block,
-    soft_stop,
-    bilinear_oscillator,
-    backlash,
-    chua_circuit,
-    mckean_neuron,
-    thermostat,
-    gearbox,
-    glacial_cycles,
-    integrate_and_fire,
-    integrate_and_fire_pair,
-    integrate_and_fire_network,
-    rocking_block,
-    twisting,
-    super_twisting,
-    abs_brake,
-    drill_string,
-    resonant_converter,
-    diode_bridge,
-    boost_converter,
-    tank_cascade,
-    painleve_rod,
-    woodpecker,
-    slider_crank,
-    threshold_harvesting,
-    sir_threshold,
-    stommel_box,
+#: Every problem by name.
+PROBLEMS: Mapping[str, Callable[[], Problem]] = MappingProxyType(
+    {name: globals()[name] for name in __all__ if name.islower() and name != "by_name"}
 )
-
-#: Every problem by name, in the order of the catalogue.
-PROBLEMS = MappingProxyType({f.__name__: f for f in _FUNCTIONS})
 
 
 def by_name(name: str) -> Problem:
@@ -212,7 +154,7 @@ def by_name(name: str) -> Problem:
     Raises
     ------
     OptionError
-        No problem of that name; the message lists them.
+        No problem of that name.
 
     Examples
     --------
@@ -220,8 +162,10 @@ def by_name(name: str) -> Problem:
     (3.0, 0.0)
     """
     if name not in PROBLEMS:
+        near = difflib.get_close_matches(str(name), PROBLEMS, 3, 0.5)
+        alike = f" Near it are {', '.join(near)}." if near else ""
         raise OptionError(
-            f"name: expected one of {', '.join(PROBLEMS)}, received {name!r}. `python -m "
-            "nonsmooth list` prints them with their titles."
+            f"name: no problem is called {name!r}.{alike} `python -m nonsmooth list` prints all, and "
+            "nonsmooth.textbook.PROBLEMS has them."
         )
     return PROBLEMS[name]()

@@ -31,7 +31,7 @@ def twisting() -> Problem:
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     system = FilippovSystem.from_expression([x, v], [v, -3 * ca.sign(x) - ca.sign(v)])
     return problem(
-        "twisting",
+        twisting,
         system,
         (0.0, 1.0),
         3.0,
@@ -41,7 +41,6 @@ def twisting() -> Problem:
         ),
         stated("limit", "time at which the switches accumulate", "2.0606601717798212866"),
         title="Twisting controller",
-        source="Levant 1993; closed form",
     )
 
 
@@ -67,13 +66,12 @@ def super_twisting() -> Problem:
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     root = 1.5 * ca.sign(x) * ca.sqrt(ca.fabs(x))
     return problem(
-        "super_twisting",
+        super_twisting,
         FilippovSystem.from_expression([x, v], [v - root, -1.1 * ca.sign(x)]),
         (1.0, 0.0),
         3.0,
-        stated("limit", "time at which it comes to rest", "1.7416627251264"),
+        stated("limit", "time at which it comes to rest", "1.74166272512746531"),
         title="Super-twisting controller",
-        source="Levant 1993",
     )
 
 
@@ -108,14 +106,13 @@ def abs_brake() -> Problem:
         stops=[Stop(v - 1, -1, "slow")],
     )
     return problem(
-        "abs_brake",
+        abs_brake,
         system,
         (30.0, 0.2),
         5.0,
         stated("braking time", "time of the stop", "3.6952089704383282365"),
         stated("mean of the relay", "lambda while sliding", "0"),
         title="Anti-lock brake",
-        source="after Drakunov, Ozguner, Dix & Ashrafi 1995; closed form",
     )
 
 
@@ -150,14 +147,13 @@ def drill_string() -> Problem:
         parameters={speed: 1.0, c: 0.08},
     )
     return problem(
-        "drill_string",
+        drill_string,
         system,
         (0.0, 0.0),
         60.0,
         stated("critical speed", "W at the Hopf point of steady drilling", "4"),
         stated("break-away", "x + c W where the bit starts", "3"),
         title="Drill string that sticks and slips",
-        source="after Leine, van Campen & Keultjes 2002; closed form",
     )
 
 
@@ -184,11 +180,10 @@ def tank_cascade() -> Problem:
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     first, second = ca.sqrt(ca.fmax(x, 0)), ca.sqrt(ca.fmax(y, 0))
     return problem(
-        "tank_cascade",
+        tank_cascade,
         FilippovSystem.from_expression([x, y], [-first, first - second]),
         (1.0, 1.0),
         4.0,
         stated("empty", "times at which they are empty", "2", "3.0925860317472027549"),
         title="Tanks in cascade",
-        source="Torricelli's law",
     )

@@ -43,7 +43,7 @@ def diode_bridge() -> Problem:
         parameters={load: 1e3, coil: 1e-2, capacity: 1e-6},
     )
     return problem(
-        "diode_bridge",
+        diode_bridge,
         system,
         (10.0, 0.0),
         5e-3,
@@ -51,7 +51,6 @@ def diode_bridge() -> Problem:
         stated("interval", "time between two changes", "3.1455270228880017137e-4"),
         stated("end", "state at t_end", "0.79032281964435576567", "-0.0026478501600952450155"),
         title="Diode bridge",
-        source="Acary & Brogliato 2008; numbers of Siconos; closed form",
     )
 
 
@@ -89,7 +88,7 @@ def boost_converter() -> Problem:
         parameters={load: 20.0, duty: 0.3},
     )
     return problem(
-        "boost_converter",
+        boost_converter,
         system,
         (0.0, 1.0, 0.0),
         12.0,
@@ -100,7 +99,6 @@ def boost_converter() -> Problem:
         ),
         stated("multiplier", "of the orbit, the one that is not 0", "0.88690327967341458803"),
         title="Boost converter in discontinuous conduction",
-        source="Erickson & Maksimovic 2001; matrix exponentials",
     )
 
 
@@ -134,7 +132,7 @@ def resonant_converter() -> Problem:
         parameters={source: 1.0, load: 0.5},
     )
     return problem(
-        "resonant_converter",
+        resonant_converter,
         system,
         (0.0, -1.5),
         60.0,
@@ -142,5 +140,4 @@ def resonant_converter() -> Problem:
         stated("amplitude", "largest voltage on the orbit", "2.59935069570455208"),
         stated("multiplier", "of its orbit, next to 1", "0.19744179036948955834"),
         title="Series resonant converter",
-        source="classical; closed form",
     )

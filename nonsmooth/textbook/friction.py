@@ -35,7 +35,7 @@ def dry_friction() -> Problem:
     )
     how = "state and time of crossing number {}"
     return problem(
-        "dry_friction",
+        dry_friction,
         system,
         (3.0, 0.0),
         20.0,
@@ -45,7 +45,6 @@ def dry_friction() -> Problem:
         stated("rest (y1, t)", "state and time of the entry", "-0.2", "12.5663706143591729539"),
         stated("end y1", "y1 at t_end, stuck", "-0.2"),
         title="Dry friction brings an oscillator to rest",
-        source="classical; closed form",
     )
 
 
@@ -83,7 +82,7 @@ def leine_stick_slip() -> Problem:
         parameters={w: 0.2, delta: 3.0},
     )
     return problem(
-        "leine_stick_slip",
+        leine_stick_slip,
         system,
         (1.0, 0.2),
         50.0,
@@ -102,7 +101,6 @@ def leine_stick_slip() -> Problem:
             "0",
         ),
         title="Stick-slip with friction that weakens with velocity",
-        source="Leine, van Campen, de Kraker & van den Steen 1998",
     )
 
 
@@ -134,7 +132,7 @@ def stick_slip_exponential() -> Problem:
         below=[x2, -x1 + 1 / (1.2 - x2)],
     )
     return problem(
-        "stick_slip_exponential",
+        stick_slip_exponential,
         system,
         (1.0, 0.2),
         50.0,
@@ -144,5 +142,4 @@ def stick_slip_exponential() -> Problem:
         stated("period", "time between successive exits", "9.230770458083"),
         stated("multipliers", "eigenvalues of the monodromy matrix", "1", "0"),
         title="Periodic stick-slip",
-        source="nosnoc_py, example periodic_stick_slip",
     )

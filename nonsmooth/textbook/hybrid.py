@@ -40,14 +40,13 @@ def thermostat() -> Problem:
         parameters={a: 30.0},
     )
     return problem(
-        "thermostat",
+        thermostat,
         system,
         (20.0, 0.0),
         5.0,
         stated("period", "time between two events 'on'", "0.60613580357031554325"),
         stated("slope of the period", "its derivative by a", "-0.041666666666666666667"),
         title="Thermostat: a relay with hysteresis",
-        source="Lunze & Lamnabhi-Lagarrigue 2009; closed form",
     )
 
 
@@ -83,7 +82,7 @@ def gearbox() -> Problem:
         parameters={u: 4.0},
     )
     return problem(
-        "gearbox",
+        gearbox,
         system,
         (0.0, 1.0),
         10.0,
@@ -92,7 +91,6 @@ def gearbox() -> Problem:
         ),
         stated("slowest eigenvalue", "of the equilibrium in gear 3", "-0.33333333333333333333"),
         title="Gearbox with three gears",
-        source="after Hedlund & Rantzer 1999; closed form",
     )
 
 
@@ -127,13 +125,12 @@ def glacial_cycles() -> Problem:
         ],
     )
     return problem(
-        "glacial_cycles",
+        glacial_cycles,
         system,
         (0.2, 1.0),
         400.0,
         stated("period", "time between two events 'glaciation'", "83.17766166719343713"),
         title="Glacial cycles by two thresholds",
-        source="after Paillard 1998; closed form",
         note="parameters quoted from memory",
     )
 
@@ -166,14 +163,13 @@ def integrate_and_fire() -> Problem:
         parameters={current: 1.3},
     )
     return problem(
-        "integrate_and_fire",
+        integrate_and_fire,
         system,
         (0.0,),
         10.0,
         stated("period", "time between two spikes", "1.4663370687934270447"),
         stated("slope of the period", "its derivative by I", "-2.5641025641025641026"),
         title="Integrate-and-fire neuron",
-        source="Lapicque 1907; closed form",
     )
 
 
@@ -208,14 +204,13 @@ def integrate_and_fire_pair() -> Problem:
         parameters={current: 1.3, k: 0.1},
     )
     return problem(
-        "integrate_and_fire_pair",
+        integrate_and_fire_pair,
         system,
         (0.0, 0.4),
         30.0,
         stated("period", "of the orbit on which they fire in turn", "1.6262946371279090707"),
         stated("multiplier", "of that orbit", "0.72621066311466411726"),
         title="Two neurons that inhibit each other",
-        source="after Mirollo & Strogatz 1990; closed form",
     )
 
 
@@ -251,7 +246,7 @@ def integrate_and_fire_network() -> Problem:
         for i, one in enumerate(v)
     ]
     return problem(
-        "integrate_and_fire_network",
+        integrate_and_fire_network,
         FilippovSystem(v, field=[current - one for one in v], resets=spikes),
         (0.9, 0.6, 0.35, 0.1),
         3.7,
@@ -269,7 +264,6 @@ def integrate_and_fire_network() -> Problem:
             "3.689367616193437654",
         ),
         title="Network of neurons that excite one another",
-        source="after Mirollo & Strogatz 1990; closed form",
     )
 
 
@@ -304,7 +298,7 @@ def rocking_block() -> Problem:
         parameters={e: 0.9},
     )
     return problem(
-        "rocking_block",
+        rocking_block,
         system,
         (0.8, 0.0),
         30.0,
@@ -316,5 +310,4 @@ def rocking_block() -> Problem:
         ),
         stated("standing time", "limit of the times", "22.666568319209938749"),
         title="Rocking block",
-        source="Housner 1963; closed form",
     )

@@ -37,14 +37,13 @@ def bouncing_ball() -> Problem:
         parameters={g: 9.81, r: 0.9},
     )
     return problem(
-        "bouncing_ball",
+        bouncing_ball,
         system,
         (1.0, 0.0),
         10.0,
         stated("first impact", "time of the first reset", "0.45152364098573090445"),
         stated("Zeno time", "Trajectory.accumulation_time", "8.5789491787288871846"),
         title="Bouncing ball",
-        source="classical; closed form",
     )
 
 
@@ -82,7 +81,7 @@ def impact_oscillator() -> Problem:
         parameters={amplitude: 0.35, c: 0.1, w: 0.8, r: 0.8, phase: 3.3602615994637352},
     )
     return problem(
-        "impact_oscillator",
+        impact_oscillator,
         system,
         (-1.0, 0.0),
         7.853981633974483,
@@ -93,7 +92,6 @@ def impact_oscillator() -> Problem:
             "0.3687817782917154924",
         ),
         title="Impact oscillator at grazing",
-        source="Nordmark 1991 (equations); numbers derived for this library",
     )
 
 
@@ -134,7 +132,7 @@ def kelvin_voigt_bounce() -> Problem:
     )
     slips = {"Xdot": 1.0, "Omega": 2.0}
     return problem(
-        "kelvin_voigt_bounce",
+        kelvin_voigt_bounce,
         system,
         (0.0, 1.0, 0.0, -1.0, 0.0),
         10.0,
@@ -153,5 +151,4 @@ def kelvin_voigt_bounce() -> Problem:
             at={"Xdot": 0.2},
         ),
         title="Kelvin-Voigt bounce with friction",
-        source="Biber, Champneys & Szalai 2022 (corrected equations)",
     )

@@ -43,7 +43,7 @@ def painleve_rod() -> Problem:
         parameters={mu: 1.0},
     )
     return problem(
-        "painleve_rod",
+        painleve_rod,
         system,
         (0.0, 0.42073549240394825, 1.0, -1.0, 0.0, 0.0),
         0.5,
@@ -56,7 +56,6 @@ def painleve_rod() -> Problem:
         ),
         stated("sticks (t, a)", "at the entry", "0.27999696936093218117", "1.1484037208067484930"),
         title="Sliding rod of Painleve",
-        source="Painleve 1895; Genot & Brogliato 1999; closed form",
     )
 
 
@@ -114,7 +113,7 @@ def woodpecker() -> Problem:
         parameters={mu: 0.3},
     )
     return problem(
-        "woodpecker",
+        woodpecker,
         system,
         (0.0, -0.0006 / 0.0058, -0.2788, -0.3411, 0.0, -7.4583),
         0.3,
@@ -125,7 +124,6 @@ def woodpecker() -> Problem:
             *("-0.259184923", "0", "-8.34282414"),
         ),
         title="Woodpecker toy",
-        source="Glocker & Studer 2005; numbers of Siconos",
     )
 
 
@@ -198,11 +196,10 @@ def slider_crank(friction: bool = True) -> Problem:
         parameters={mu: 0.01} if friction else {},
     )
     return problem(
-        "slider_crank",
+        slider_crank,
         system,
         (0.0, 0.0, 0.0, 150.0, -75.0, -0.01),
         0.2,
         stated("end", _EVENT_BY_EVENT, *known),
         title="Slider-crank mechanism with clearance",
-        source="Flores, Leine & Glocker 2010; numbers of Siconos",
     )

@@ -45,7 +45,7 @@ def harvested_prey_predator() -> Problem:
     )
     zero = "alpha for which the equilibrium of the field {} is on the surface"
     return problem(
-        "harvested_prey_predator",
+        harvested_prey_predator,
         system,
         (0.5, 0.5),
         100.0,
@@ -59,7 +59,6 @@ def harvested_prey_predator() -> Problem:
             "1.188132733408324",
         ),
         title="Harvested prey-predator model",
-        source="Kuznetsov, Rinaldi & Gragnani 2003",
         note="parameters from memory",
     )
 
@@ -95,7 +94,7 @@ def welander_box() -> Problem:
         parameters={a: 0.8, b: 0.5, k: 5.0, eps: -0.01},
     )
     return problem(
-        "welander_box",
+        welander_box,
         system,
         (0.5, 0.3),
         30.0,
@@ -124,7 +123,6 @@ def welander_box() -> Problem:
             at={"eps": 0.05},
         ),
         title="Welander's ocean box",
-        source="Welander 1982, nonsmooth form",
         note="parameters from memory",
     )
 
@@ -162,7 +160,7 @@ def state_dependent_jump() -> Problem:
     )
     how = "derivative of x(20), through the saltation at both switches"
     return problem(
-        "state_dependent_jump",
+        state_dependent_jump,
         system,
         (1.0, 0.0),
         20.0,
@@ -174,5 +172,4 @@ def state_dependent_jump() -> Problem:
         stated("dx2(20)/dx0", how, "0.06665833", "0.34105997"),
         stated("dx(20)/dp", how, "-5.20409072", "-0.06665833"),
         title="State-dependent jump with a parameter",
-        source="IFDIFF (Heidelberg), canonical example",
     )

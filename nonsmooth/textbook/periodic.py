@@ -46,7 +46,7 @@ def multi_sliding_relay() -> Problem:
         parameters={w: 25.0},
     )
     return problem(
-        "multi_sliding_relay",
+        multi_sliding_relay,
         system,
         (0.0, -0.001, -0.02),
         40.0,
@@ -57,7 +57,6 @@ def multi_sliding_relay() -> Problem:
             "0.001805112240591306036108",
         ),
         title="Relay feedback with a multi-sliding orbit",
-        source="di Bernardo, Johansson & Vasca 2001; parameters of the nosnoc library",
     )
 
 
@@ -93,7 +92,7 @@ def forced_dry_friction() -> Problem:
     )
     sticks = {"f": 0.6}
     return problem(
-        "forced_dry_friction",
+        forced_dry_friction,
         system,
         (1.5, 0.0),
         100.0,
@@ -117,7 +116,6 @@ def forced_dry_friction() -> Problem:
             at=sticks,
         ),
         title="Forced oscillator with dry friction",
-        source="Den Hartog 1931; Shaw 1986; numbers derived for this library",
     )
 
 
@@ -157,7 +155,7 @@ def belt_oscillator() -> Problem:
         time=t,
     )
     return problem(
-        "belt_oscillator",
+        belt_oscillator,
         system,
         (2.193338910366844980359, -0.4233606899180944085419),
         14.7,
@@ -168,7 +166,6 @@ def belt_oscillator() -> Problem:
             "0.007192336124639061603273",
         ),
         title="Friction oscillator at its grazing-sliding",
-        source="Kowalczyk & di Bernardo 2005; digits derived for this library",
     )
 
 
@@ -212,7 +209,7 @@ def simplest_walker() -> Problem:
     angle, speed = 0.2003109005442470893602, -0.1998324730049523545376
     short = {"th": 0.194, "thdot": -0.204, "ph": 0.388, "phdot": -0.204 * (1 - math.cos(0.388))}
     return problem(
-        "simplest_walker",
+        simplest_walker,
         system,
         (angle, speed, 2 * angle, (1 - math.cos(2 * angle)) * speed),
         3.8,
@@ -231,7 +228,6 @@ def simplest_walker() -> Problem:
             at=short,
         ),
         title="Simplest walking model",
-        source="Garcia, Chatterjee, Ruina & Coleman 1998; digits derived for this library",
     )
 
 
@@ -272,7 +268,7 @@ def buck_converter() -> Problem:
         resets=Reset(c - 4e-4, [v, i, 0], 1, "clock"),
     )
     return problem(
-        "buck_converter",
+        buck_converter,
         system,
         (12.0, 0.55, 0.0),
         0.02,
@@ -289,5 +285,4 @@ def buck_converter() -> Problem:
             at={"E": 24.51657282856337870174},
         ),
         title="Buck converter up to its first period doubling",
-        source="Fossas & Olivar 1996; digits from closed-form flows, derived for this library",
     )

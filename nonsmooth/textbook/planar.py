@@ -38,7 +38,7 @@ def spiral_oscillator() -> Problem:
         parameters={w: 6.283185307179586},
     )
     return problem(
-        "spiral_oscillator",
+        spiral_oscillator,
         system,
         (0.36787944117144233, 0.0),
         1.5707963267948966,
@@ -51,7 +51,6 @@ def spiral_oscillator() -> Problem:
             "-0.76149362060601145276",
         ),
         title="Spiral oscillator",
-        source="Nurkanovic, Sperl, Albrecht & Diehl 2024",
     )
 
 
@@ -76,7 +75,7 @@ def scalar_sliding() -> Problem:
     """
     x = ca.SX.sym("x")
     return problem(
-        "scalar_sliding",
+        scalar_sliding,
         FilippovSystem([x], surface=x, above=[-1], below=[3]),
         (-1.0,),
         1.0,
@@ -84,12 +83,11 @@ def scalar_sliding() -> Problem:
         stated("end", "x at t_end, sliding", "0"),
         stated("alpha", "weight of the field below while sliding", "0.25"),
         title="Scalar system that slides at 0",
-        source="classical; closed form",
     )
 
 
 def scalar_repelling() -> Problem:
-    """One state that can leave to either side, or stay: the future is not unique.
+    """One state that can leave to either side, or stay: the continuation is not unique.
 
     $x' = sgn x$ from 0. A run must stop with NON_UNIQUE at once; with ``start_mode`` it goes on.
 
@@ -109,7 +107,7 @@ def scalar_repelling() -> Problem:
     """
     x = ca.SX.sym("x")
     return problem(
-        "scalar_repelling",
+        scalar_repelling,
         FilippovSystem([x], surface=x, above=[1], below=[-1]),
         (0.0,),
         1.0,
@@ -117,7 +115,6 @@ def scalar_repelling() -> Problem:
         stated("x(1) leaving up", "simulate with start_mode='+'", "1"),
         stated("x(1) leaving down", "simulate with start_mode='-'", "-1"),
         title="Repelling start",
-        source="classical; closed form",
     )
 
 
@@ -146,7 +143,7 @@ def planar_relay() -> Problem:
         [x, y], surface=x + y, multipliers=lam, field=[-x + y, 3 * y - 10 * lam]
     )
     return problem(
-        "planar_relay",
+        planar_relay,
         system,
         (1.5, -1.5),
         2.0,
@@ -156,7 +153,6 @@ def planar_relay() -> Problem:
         stated("pseudo-node", "zero of the sliding field", "0", "0"),
         stated("slope of the sliding field", "along x at the pseudo-node", "-2"),
         title="Planar relay system",
-        source="derived for this library; closed form",
     )
 
 
@@ -189,7 +185,7 @@ def pseudo_hopf() -> Problem:
         [x, y], surface=y, above=[1, -x], below=[-1, -u - r * u**2], parameters={al: -0.03, r: -1.0}
     )
     return problem(
-        "pseudo_hopf",
+        pseudo_hopf,
         system,
         (-0.3, 0.0),
         20.0,
@@ -198,7 +194,6 @@ def pseudo_hopf() -> Problem:
         stated("multiplier", "slope of the return map at x0", "0.65350727586702943"),
         stated("pseudo-node", "x where the sliding field is zero", "-0.01488578017961046"),
         title="Pseudo-Hopf bifurcation of a fused focus",
-        source="after Filippov 1988 and Kuznetsov, Rinaldi & Gragnani 2003",
     )
 
 
@@ -234,7 +229,7 @@ def piecewise_cycle() -> Problem:
         parameters={al: 1.0, be: 1.0, ga: 1.5},
     )
     return problem(
-        "piecewise_cycle",
+        piecewise_cycle,
         system,
         (0.5, 0.0),
         20.0,
@@ -242,5 +237,4 @@ def piecewise_cycle() -> Problem:
         stated("period", "time of one return, 5 pi/3", "5.2359877559829887308"),
         stated("multiplier", "slope of the return map, exp(-5 pi/3)", "0.0053215654788005829731"),
         title="Piecewise-smooth planar cycle",
-        source="Dankowicz & Schilder 2013 (COCO)",
     )

@@ -46,14 +46,13 @@ def block_on_incline() -> Problem:
         parameters={slope: 0.4, mu: 0.7},
     )
     return problem(
-        "block_on_incline",
+        block_on_incline,
         system,
         (0.0, 0.0, 0.5, 1.2),
         6.0,
         stated("rest (t)", "time of the entry", "3.9117151021004261582"),
         stated("rest (x1, x2)", "x1, x2 at t_end", "1.5088602745103876547", "1.4858114548629446"),
         title="A block slides across an incline and stops",
-        source="classical; closed form",
     )
 
 
@@ -88,7 +87,7 @@ def block_on_belt() -> Problem:
         parameters={belt: 1.2, mu_g: 0.5},
     )
     return problem(
-        "block_on_belt",
+        block_on_belt,
         system,
         (0.0, 0.0, 0.0, 1.6),
         5.0,
@@ -96,7 +95,6 @@ def block_on_belt() -> Problem:
         stated("halfway (x1, x2)", "x1, x2 at t = 2", "0.6", "2.4"),
         stated("end (x1, x2)", "x1, x2 at t_end", "3.6", "3.2"),
         title="A block on a moving belt: a parabola, then a ride",
-        source="classical; closed form",
     )
 
 
@@ -130,7 +128,7 @@ def block_on_disc() -> Problem:
         parameters={spin: 1.0, mu: 0.5},
     )
     return problem(
-        "block_on_disc",
+        block_on_disc,
         system,
         (0.1, 0.0, 0.1, 0.3),
         4.0,
@@ -140,7 +138,6 @@ def block_on_disc() -> Problem:
         ),
         stated("friction on the disc", "smallest abs(x) that slides off, spin 1", "0.5"),
         title="A block rides on a disc or slides off",
-        source="classical; 66 digits",
     )
 
 
@@ -175,7 +172,7 @@ def cue_ball() -> Problem:
         parameters={mu: 0.2, g: 9.81},
     )
     return problem(
-        "cue_ball",
+        cue_ball,
         system,
         (0.0, 0.0, 3.0, 0.0, 1.0, 2.0),
         1.0,
@@ -185,7 +182,6 @@ def cue_ball() -> Problem:
         ),
         stated("rolls (v1, v2)", "v1, v2 at t_end", "1.857142857142857142", "-0.5714285714285714"),
         title="A cue ball curves, then rolls",
-        source="Coriolis 1835; closed form",
     )
 
 
@@ -219,7 +215,7 @@ def turntable() -> Problem:
         parameters={spin: 1.3, mu: 2.0},
     )
     return problem(
-        "turntable",
+        turntable,
         system,
         (0.4, 0.2, 0.3, -0.5, -0.56, 1.02),
         20.0,
@@ -231,7 +227,6 @@ def turntable() -> Problem:
             "1.8153846153846154",
         ),
         title="A sphere rolls in circles on a turntable",
-        source="Earnshaw 1844; closed form",
     )
 
 
@@ -268,7 +263,7 @@ def pivoting_disc() -> Problem:
         parameters={mu: 0.3, radius: 0.6},
     )
     return problem(
-        "pivoting_disc",
+        pivoting_disc,
         system,
         (0.0, 0.0, 0.0, 0.5, 0.2, 1.3),
         6.0,
@@ -281,7 +276,6 @@ def pivoting_disc() -> Problem:
             "2.7183921471252567",
         ),
         title="A disc stops sliding and spinning at once",
-        source="Farkas, Bartels, Unger & Wolf 2003; quadrature",
     )
 
 
@@ -318,7 +312,7 @@ def shaken_block() -> Problem:
         time=t,
     )
     return problem(
-        "shaken_block",
+        shaken_block,
         system,
         (0.0, 0.0, 0.0, 0.0),
         30.0,
@@ -326,5 +320,4 @@ def shaken_block() -> Problem:
         stated("slip in the end", "abs(h) at t_end", "0.8"),
         stated("least friction that holds", "largest mu_g that slides for ever", "2"),
         title="A block on a plate that is shaken in circles",
-        source="classical; closed form",
     )

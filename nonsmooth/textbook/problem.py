@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..flow import Trajectory, simulate
+from ..local.read_only import ReadOnly
 from ..model import Array, FilippovSystem, OptionError
 
 #: Values are compared to nine digits, or to their own if they have fewer.
@@ -19,7 +19,7 @@ RELATIVE = 1e-9
 
 
 def _nothing() -> Mapping[str, float]:
-    return MappingProxyType({})
+    return ReadOnly({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ def stated(
         values[0] if len(values) == 1 else values,
         tolerance,
         how,
-        MappingProxyType(dict(at or {})),
+        ReadOnly(dict(at or {})),
     )
 
 
@@ -208,16 +208,20 @@ class Problem:
 
 
 def problem(
-    name: str,
+    function: Callable[..., Problem],
     system: FilippovSystem,
     start: tuple[float, ...],
     t_end: float,
     *references: Reference,
     title: str,
-    source: str,
     note: str = "",
 ) -> Problem:
-    """Build a problem whose parameters are the defaults of its system."""
+    """Build the problem of a function, whose docstring has the source; parameters are the system's."""
+    source = " ".join(
+        (function.__doc__ or "").partition("Source: ")[2].partition("\n\n")[0].split()
+    )
     values = system.parameter_vector().tolist()
-    parameters = MappingProxyType(dict(zip(system.parameter_names, values, strict=True)))
-    return Problem(name, title, source, system, parameters, start, t_end, references, note)
+    parameters = ReadOnly(dict(zip(system.parameter_names, values, strict=True)))
+    return Problem(
+        function.__name__, title, source, system, parameters, start, t_end, references, note
+    )

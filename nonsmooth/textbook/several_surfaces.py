@@ -34,7 +34,7 @@ def two_relay_spiral() -> Problem:
         [x1, x2], surfaces=[x1, x2], multipliers=[s1, s2], field=[-s1 + 2 * s2, -2 * s1 - s2]
     )
     return problem(
-        "two_relay_spiral",
+        two_relay_spiral,
         system,
         (1.0, 0.5),
         2.0,
@@ -48,7 +48,6 @@ def two_relay_spiral() -> Problem:
         ),
         stated("time of rest", "time of the event 'rest'", "0.75"),
         title="Filippov's spiral of two relays",
-        source="Filippov 1988; closed form",
     )
 
 
@@ -89,7 +88,7 @@ def glass_loop() -> Problem:
         field=[(1 + b) / 2 - x, (1 - a) / 2 - y],
     )
     return problem(
-        "glass_loop",
+        glass_loop,
         system,
         (0.75, 0.75),
         3.0,
@@ -107,7 +106,6 @@ def glass_loop() -> Problem:
             "0.11111111111111111111",
         ),
         title="A negative loop of two genes",
-        source="Glass & Pasternack 1978; closed form",
     )
 
 
@@ -143,7 +141,7 @@ def ambiguous_exit() -> Problem:
         field=[-s1 + x3 / 2, -s2 + x3 / 4, 1 + s1 * s2 / 2],
     )
     return problem(
-        "ambiguous_exit",
+        ambiguous_exit,
         system,
         (0.0, 0.0, 0.0),
         3.0,
@@ -159,7 +157,6 @@ def ambiguous_exit() -> Problem:
             "2.44344195166441351",
         ),
         title="Exit of codimension two that is ambiguous",
-        source="derived for this library; bilinear law after Jeffrey 2014",
         note="a run takes the bilinear law; the convex hull leaves the exit open",
     )
 
@@ -205,7 +202,7 @@ def hidden_dynamics(*, nonlinear: bool = True) -> Problem:
             [x1, x2], surface=x1, above=[b - 1, 1], below=[b + 1, 1], parameters={b: 0.2}
         )
     return problem(
-        "hidden_dynamics",
+        hidden_dynamics,
         system,
         (0.0, 0.0),
         1.0,
@@ -213,5 +210,4 @@ def hidden_dynamics(*, nonlinear: bool = True) -> Problem:
         stated("x2' sliding, nonlinear", "x2(1) of a run; 2 lam^2 - 1 at lam = b", "-0.92"),
         stated("x2' sliding, linear", "x2(1) of a run with nonlinear=False", "1"),
         title="Hidden dynamics",
-        source="Jeffrey 2018",
     )

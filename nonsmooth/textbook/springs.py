@@ -35,7 +35,7 @@ def soft_stop() -> Problem:
         [x, v], [v, push - 5 * ca.fmax(x - 1, 0)], time=t, parameters={force: 0.3}
     )
     return problem(
-        "soft_stop",
+        soft_stop,
         system,
         (0.0, 0.0),
         100.0,
@@ -44,7 +44,6 @@ def soft_stop() -> Problem:
             "modulus", "of the multipliers of the orbit without contact", "0.67523190665577721703"
         ),
         title="Soft stop behind a gap",
-        source="after Ing, Pavlovskaia, Wiercigroch & Banerjee 2008; closed form",
     )
 
 
@@ -70,14 +69,13 @@ def bilinear_oscillator() -> Problem:
     """
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     return problem(
-        "bilinear_oscillator",
+        bilinear_oscillator,
         FilippovSystem([x, v], surface=x, above=[v, -4 * x], below=[v, -x]),
         (-1.0, 0.0),
         10.0,
         stated("period", "time between two crossings to the right", "4.7123889803846898577"),
         stated("amplitude to the right", "largest x", "0.5"),
         title="Bilinear oscillator",
-        source="Shaw & Holmes 1983; closed form",
     )
 
 
@@ -104,14 +102,13 @@ def backlash() -> Problem:
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     force = -ca.fmax(x - 1, 0) - ca.fmin(x + 1, 0)
     return problem(
-        "backlash",
+        backlash,
         FilippovSystem.from_expression([x, v], [v, force]),
         (0.0, 0.5),
         14.0,
         stated("period", "time after which (0, 1/2) returns", "14.283185307179586477"),
         stated("amplitude", "largest x", "1.5"),
         title="Mass with backlash",
-        source="after Kahraman & Singh 1990; closed form",
     )
 
 
@@ -143,7 +140,7 @@ def chua_circuit() -> Problem:
         [x, y, z], [9 * (y - x - resistor), x - y + z, -100 / 7 * y]
     )
     return problem(
-        "chua_circuit",
+        chua_circuit,
         system,
         (0.1, 0.0, 0.0),
         50.0,
@@ -157,7 +154,6 @@ def chua_circuit() -> Problem:
         ),
         stated("unstable eigenvalue at 0", "the real one", "2.2173950459597073145"),
         title="Chua's circuit",
-        source="Chua, Komuro & Matsumoto 1986",
     )
 
 
@@ -189,7 +185,7 @@ def mckean_neuron() -> Problem:
         [v, w], [shape - w + current, 0.1 * (v - w / 2)], parameters={current: 0.5}
     )
     return problem(
-        "mckean_neuron",
+        mckean_neuron,
         system,
         (0.0, 0.0),
         100.0,
@@ -197,5 +193,4 @@ def mckean_neuron() -> Problem:
         stated("equilibrium", "v, w for I = 0.5", "0.25", "0.5"),
         stated("trace there", "sum of its eigenvalues", "0.95"),
         title="McKean's piecewise linear neuron",
-        source="McKean 1970; closed form",
     )

@@ -37,7 +37,7 @@ def threshold_harvesting() -> Problem:
         parameters={h: 1.0, threshold: 0.6},
     )
     return problem(
-        "threshold_harvesting",
+        threshold_harvesting,
         system,
         (0.1,),
         5.0,
@@ -45,7 +45,6 @@ def threshold_harvesting() -> Problem:
         stated("effort", "part (1 + lambda)/2 of the time in which fish are caught", "0.4"),
         stated("least h", "at which the threshold can be kept", "0.4"),
         title="Harvesting above a threshold",
-        source="after Meza, Costa, Bhaya & Kaszkurewicz 2005; closed form",
     )
 
 
@@ -75,7 +74,7 @@ def sir_threshold() -> Problem:
         [s, i], surface=i - 0.05, multipliers=lam, field=[-contacts, contacts - i]
     )
     return problem(
-        "sir_threshold",
+        sir_threshold,
         system,
         (0.999, 0.001),
         80.0,
@@ -83,7 +82,6 @@ def sir_threshold() -> Problem:
         stated("duration of the policy", "of the slide", "7.9015619635011206036"),
         stated("final size", "S at the end", "0.30840841589585258262"),
         title="Epidemic with a threshold policy",
-        source="after Xiao, Xu & Tang 2012; closed form",
     )
 
 
@@ -113,12 +111,11 @@ def stommel_box() -> Problem:
         [t, s], [3 - t * (1 + flow), e - s * (0.3 + flow)], parameters={e: 1.0}
     )
     return problem(
-        "stommel_box",
+        stommel_box,
         system,
         (2.0, 1.0),
         50.0,
         stated("nonsmooth fold", "e of the boundary equilibrium at T = S", "0.9"),
         stated("smooth fold", "largest e with an equilibrium with T > S", "1.2201153171955243011"),
         title="Stommel's box model",
-        source="Stommel 1961; closed form",
     )

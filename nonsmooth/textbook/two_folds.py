@@ -96,13 +96,12 @@ def two_fold(
         for quantity, (value, how) in values.items()
     )
     return problem(
-        "two_fold",
+        two_fold,
         system,
         (0.0, 1.0, 0.6),
         2.0,
         *references,
         title=f"Normal form of the two-fold, {name}",
-        source="Filippov 1988; Teixeira 1990; Colombo & Jeffrey 2011",
     )
 
 

@@ -5,45 +5,10 @@ Numbers 1 to 24 were known before this reproduction; 25 on were found by it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache, partial
 
-from . import errata_further as further
-from . import errata_general as general
-from . import errata_linear as linear
-from .records import Erratum
-
-ALL: tuple[Callable[[], Erratum], ...] = (
-    linear.contact_velocity,
-    linear.restitution,
-    linear.overdamped,
-    linear.gravity_twice,
-    linear.which_is_soft,
-    linear.force_scale,
-    linear.spin_scale,
-    linear.rolling_inequality,
-    linear.alpha,
-    linear.two_conditions,
-    linear.second_lie,
-    linear.roll_to_slip_in_compression,
-    linear.which_compliance,
-    linear.isotropic,
-    general.normal_scale,
-    general.friction_coefficient,
-    general.second_lie_first_line,
-    general.nu_product,
-    general.visible_condition,
-    general.topspin,
-    general.normal_form_slips,
-    general.slope_variable,
-    general.table,
-    general.rigid_limit,
-    further.gravity_in_impact,
-    further.sign_condition,
-    further.force_slope,
-    further.both_positive,
-    further.limit_of_compliance,
-)
+from . import errata_further, errata_general, errata_linear  # noqa: F401, they register their errata
+from .records import ERRATA, Erratum
 
 #: Errata that change what the paper states in words, with what a reader should take instead.
 CONCLUSIONS = {
@@ -71,15 +36,14 @@ SLIPS = (1, 5, 8, 16, 22, 25, 26, 27, 29)
 
 
 @cache
-def erratum(number: int) -> Erratum:
-    """Derive one erratum, from 1 (computed once)."""
-    result = ALL[number - 1]()
-    if result.number != number:
-        raise ValueError(f"erratum {number}: the function in its place derives {result.number}.")
+def erratum(number: str) -> Erratum:
+    """Derive one erratum (computed once)."""
+    result = ERRATA.computed[number]()
+    assert isinstance(result, Erratum)
     return result
 
 
-ROWS = tuple(partial(erratum, number) for number in range(1, len(ALL) + 1))
+ROWS = tuple(partial(erratum, number) for number in ERRATA.cells)
 
 #: What of the paper holds as it is.
 STANDS = (

@@ -21,6 +21,7 @@ from nonsmooth.plot import style as look
 from .. import pictures
 from .errata_general import fold_of
 from .model import Array
+from .records import picture
 
 ATTRACTING, REPELLING, CROSSING = "#DCEBF5", "#F3D9A8", "#F6F6F6"
 AZIMUTH, ELEVATION, STRETCH = np.radians(80.0), np.radians(36.0), 1.6
@@ -85,10 +86,10 @@ class Scene:
             self.region([(0, 0), corner, near], CROSSING, SURFACE)
         self.region([(0, 0), (a, 0), (a, a), (0, a)], ATTRACTING, SURFACE)
 
-    def lift_off_plane(self, height: float = 0.95) -> None:
+    def lift_off_plane(self) -> None:
         """The plane Lambda_N = 0, through both crossing regions."""
-        a = self.size
-        corners = np.array([[-height, a, -a], [-height, -a, a], [height, -a, a], [height, a, -a]])
+        a, b = self.size, 0.45
+        corners = np.array([[-b, a, -a], [-b, -a, a], [b, -a, a], [b, a, -a]])
         self.axes.add_patch(
             Polygon(project(corners), facecolor="0.72", alpha=0.55, edgecolor="0.3", zorder=PLANE)
         )
@@ -182,46 +183,53 @@ class Scene:
         self.lift_off(z[-1])
 
 
-def geometries() -> Figure:
-    """Figure 9: what a bounce can do, in the ball's own normal form."""
-    with pictures.settings():
-        figure, axes = pictures.canvas(7.0, 5.4)
-        scene = Scene(axes, 1.25)
-        axes.set(xlim=(-1.95, 1.75), ylim=(-1.32, 1.22))
-        scene.surface()
-        scene.lift_off_plane(0.45)
-        scene.folds()
-        for name, start, offset in (
-            ("(a)", (0.33, 0.5, 1.15), (-0.05, 0.09)),
-            ("(b)", (-0.33, 1.15, 0.3), (-0.11, 0.0)),
-            ("(c)", (0.3, 1.2, 0.75), (-0.02, 0.1)),
-            ("(d)", (-0.3, 0.62, 1.2), (0.1, -0.08)),
-        ):
-            scene.run(start)
-            foot = project(np.array([[0.0, *start[1:]], start])).T
-            axes.plot(*foot, color=look.GREY, linewidth=0.9, linestyle=look.DOTS, zorder=TEXT - 0.1)
-            axes.plot(*foot[:, 0], "+", color=look.GREY, markersize=5, zorder=TEXT - 0.1)
-            x, y = project(np.array(start))
-            axes.plot(x, y, "o", color="black", markersize=5, zorder=TEXT)
-            axes.text(
-                x + offset[0],
-                y + offset[1],
-                name,
-                ha="center",
-                va="center",
-                zorder=TEXT,
-                path_effects=look.halo(),
-            )
-        _axis_of_slip(axes, scene, 0.85)
-        _ball_labels(axes, scene)
-    return figure
-
-
-def _axis_of_slip(axes: Axes, scene: Scene, top: float) -> None:
-    look.arrow(axes, project(np.zeros(3)), project(np.array([top, 0, 0])), zorder=PLANE + 0.5)
-    scene.text([top + 0.06, 0, 0], "$H$")
+def _ball(height: float) -> tuple[Figure, Axes, Scene]:
+    """The surface H = 0 with its folds, the lift-off plane and the axis of slip."""
+    figure, axes = pictures.canvas(7.0, height)
+    scene = Scene(axes, 1.25)
+    axes.set(xlim=(-1.95, 1.75), ylim=(-1.32, 1.22))
+    scene.surface()
+    scene.lift_off_plane()
+    scene.folds()
+    look.arrow(axes, project(np.zeros(3)), project(np.array([0.85, 0, 0])), zorder=PLANE + 0.5)
+    scene.text([0.91, 0, 0], "$H$")
     axes.plot(0, 0, "o", color="black", markersize=6, zorder=TEXT)
     scene.text([-0.06, -0.04, 0.02], "$s$")
+    return figure, axes, scene
+
+
+@picture("Fig. 9")
+def geometries() -> Figure:
+    """What a bounce can do near lift-off, computed with the normal form of the linear ball's
+    two-fold (mu = 0.3, d1 = d2 = 0.1, eta = 0.5, G = 1e-4): (a) forward slip throughout, (b)
+    reverse slip throughout, (c, d) slip, roll, and slip again through a fold. Diamonds:
+    lift-off. Dotted: from a start straight to the surface, at a cross. Pale: behind or below a
+    surface.
+    """
+    figure, axes, scene = _ball(5.4)
+    for name, start, offset in (
+        ("(a)", (0.33, 0.5, 1.15), (-0.05, 0.09)),
+        ("(b)", (-0.33, 1.15, 0.3), (-0.11, 0.0)),
+        ("(c)", (0.3, 1.2, 0.75), (-0.02, 0.1)),
+        ("(d)", (-0.3, 0.62, 1.2), (0.1, -0.08)),
+    ):
+        scene.run(start)
+        foot = project(np.array([[0.0, *start[1:]], start])).T
+        axes.plot(*foot, color=look.GREY, linewidth=0.9, linestyle=look.DOTS, zorder=TEXT - 0.1)
+        axes.plot(*foot[:, 0], "+", color=look.GREY, markersize=5, zorder=TEXT - 0.1)
+        x, y = project(np.array(start))
+        axes.plot(x, y, "o", color="black", markersize=5, zorder=TEXT)
+        axes.text(
+            x + offset[0],
+            y + offset[1],
+            name,
+            ha="center",
+            va="center",
+            zorder=TEXT,
+            path_effects=look.halo(),
+        )
+    _ball_labels(axes, scene)
+    return figure
 
 
 def _ball_labels(axes: Axes, scene: Scene) -> None:
@@ -246,29 +254,26 @@ def _ball_labels(axes: Axes, scene: Scene) -> None:
     axes.text(-1.9, -1.22, "$H<0$: reverse slip, $F_2$", color=look.BELOW)
 
 
+@picture("Fig. 12 (a)", name="two_fold_a")
 def two_fold_visible() -> Figure:
-    """Figure 12 (a): the ball's visible two-fold with the lift-off surface."""
+    """The ball's visible two-fold with the lift-off surface. Thick: the only rolling orbit that
+    reaches s. Orange: H > 0; blue, dashed: H < 0; black: rolling. Diamonds: lift-off, where
+    every orbit but that one ends. Pale: behind or below a surface.
+    """
     flow = fold_of("linear")
-    with pictures.settings():
-        figure, axes = pictures.canvas(7.0, 5.3)
-        scene = Scene(axes, 1.25)
-        axes.set(xlim=(-1.95, 1.75), ylim=(-1.32, 1.22))
-        scene.surface()
-        scene.lift_off_plane(0.45)
-        scene.folds()
-        slope = flow.slopes[0]
-        canard = np.array([[0, 1, slope], [0, 0, 0], [0, -1, -slope]])
-        canard *= scene.size / max(1.0, slope)  # to the edges of the surface
-        scene.curve(canard[:2], look.CANARD, SURFACE + 1.6, width=3.0, at=(0.5,))
-        scene.curve(canard[1:], look.CANARD, BEHIND + 0.6, width=3.0, at=(0.6,))
-        for start in ((0, 1.25, 0.55), (0, 1.25, 0.9), (0, 0.55, 1.25), (0, 0.9, 1.25)):
-            scene.run(start, width=1.4)
-        for centre in (0.42, 0.85):
-            scene.grazing("+", centre)
-            scene.grazing("-", centre)
-        _axis_of_slip(axes, scene, 0.85)
-        _region_labels(scene)
-        scene.text([-0.3, -0.92, 0.92], r"lift-off, $\Lambda_N=0$", fontsize=9.5)
+    figure, _, scene = _ball(5.3)
+    slope = flow.slopes[0]
+    canard = np.array([[0, 1, slope], [0, 0, 0], [0, -1, -slope]])
+    canard *= scene.size / max(1.0, slope)  # to the edges of the surface
+    scene.curve(canard[:2], look.CANARD, SURFACE + 1.6, width=3.0, at=(0.5,))
+    scene.curve(canard[1:], look.CANARD, BEHIND + 0.6, width=3.0, at=(0.6,))
+    for start in ((0, 1.25, 0.55), (0, 1.25, 0.9), (0, 0.55, 1.25), (0, 0.9, 1.25)):
+        scene.run(start, width=1.4)
+    for centre in (0.42, 0.85):
+        scene.grazing("+", centre)
+        scene.grazing("-", centre)
+    _region_labels(scene)
+    scene.text([-0.3, -0.92, 0.92], r"lift-off, $\Lambda_N=0$", fontsize=9.5)
     return figure
 
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
-from ..claims import Check, corrects
+from ..claims import Check, Statements
+from ..pictures import Pictures
+
+FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
 class Erratum:
     """A misprint or error, what is correct, and the checks that show both."""
 
-    number: int
+    number: str
     place: str
     printed: str
     correct: str
@@ -30,19 +34,22 @@ class Erratum:
         return f"{self.place}: {self.correct}"
 
     def cells(self) -> list[str]:
-        return [str(self.number), self.place, self.printed, self.correct, self.verdict]
+        return [self.number, self.place, self.printed, self.correct, self.verdict]
 
 
 @dataclass(frozen=True)
 class Equation:
     """A displayed equation; its verdict is agrees, corrected, definition or assumption."""
 
-    number: int
+    number: str
     label: str
     content: str
-    verdict: str
-    checks: tuple[Check, ...] = ()
-    errata: tuple[int, ...] = ()
+    said: str
+    checks: tuple[Check, ...]
+
+    @property
+    def verdict(self) -> str:
+        return self.said.partition(" (")[0]
 
     @property
     def name(self) -> str:
@@ -53,5 +60,11 @@ class Equation:
         return f"{self.label}: {self.content}"
 
     def cells(self) -> list[str]:
-        verdict = corrects(self.verdict, self.errata)
-        return [str(self.number), self.label, self.content, verdict]
+        return [self.number, self.label, self.content, self.said]
+
+
+#: What the paper prints, with the functions that derive it again.
+ERRATA = Statements(FOLDER / "errata.md", Erratum)
+EQUATIONS = Statements(FOLDER / "equations.md", Equation)
+
+picture = Pictures()

@@ -5,71 +5,29 @@ from __future__ import annotations
 import itertools
 import json
 from fractions import Fraction
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from papers import pictures
-from papers.biber_2022 import PAPER, equations, errata, figures, results, table, theorems
+from papers.biber_2022 import PAPER, equations, errata, figures, results, table
 from papers.biber_2022.errata_general import fold_of
 from papers.biber_2022.exact import evaluate, identical
 from papers.biber_2022.model import LAWS, linear
 from papers.claims import failures
-from papers.pictures import faults
-from papers.record import Done, readme_table
-
-FOLDER = Path(__file__).parent
-
-VERDICTS = {
-    "table-ics": "corrected",
-    "slip-classes": "not checkable",
-    "rigid-cases": "agrees",
-    "restitution": "corrected",
-    "ball-equations": "agrees",
-    "alpha": "corrected",
-    "switching": "agrees",
-    "second-lie-linear": "corrected",
-    "roll-to-slip": "corrected",
-    "rolling-lift-off-conditions": "corrected",
-    "kv-pert-parameters": "not checkable",
-    "kv-pert": "agrees",
-    "slip-reversal": "agrees",
-    "dividing-surface": "agrees",
-    "which-compliance": "corrected",
-    "no-rolling-lift-off": "agrees",
-    "second-lie-general": "corrected",
-    "sigma": "agrees",
-    "visible-condition": "corrected",
-    "nu-product": "corrected",
-    "singular-matrix": "corrected",
-    "one-canard": "agrees",
-    "rigid-limit": "agrees",
-    "topspin-or-slip": "corrected",
-    "proven-nu-product": "corrected",
-    "proven-class": "agrees",
-    "proven-slip-reversal": "agrees",
-    "proven-canard": "agrees",
-}
-
-
-@pytest.fixture(scope="module")
-def claims():
-    return [compute() for compute in (*results.ALL, *theorems.ALL)]
+from papers.record import Done
 
 
 @pytest.mark.slow_cases("8")
-@pytest.mark.parametrize("number", range(1, len(errata.ALL) + 1))
+@pytest.mark.parametrize("number", [str(n) for n in range(1, 30)])
 def test_erratum_is_confirmed_by_computation(number):
     found = errata.erratum(number)
     assert found.checks
     assert [str(c) for c in found.checks if not c.holds] == []
 
 
-def test_claims_hold_with_these_verdicts(claims):
-    assert {c.name: c.verdict for c in claims} == VERDICTS
-    assert [c.name for c in claims if failures(c)] == []
+def test_claims_hold():
+    assert [c.name for c in (compute() for compute in PAPER.tables[0].rows) if failures(c)] == []
 
 
 def test_every_equation_check_holds():
@@ -77,13 +35,7 @@ def test_every_equation_check_holds():
     assert len(rows) == 60
     assert [e.label for e in rows if e.verdict in ("agrees", "corrected") and not e.checks] == []
     assert [e.label for e in rows if failures(e)] == []
-    assert [e.number for e in rows] == list(range(1, len(rows) + 1))
-
-
-def test_readme_shows_the_computed_claims(claims):
-    text = (FOLDER / "README.md").read_text(encoding="utf-8")
-    shown = text.split("in the tests -->\n")[1].split("\n<!-- end of claims -->")[0]
-    assert shown == readme_table(claims)
+    assert [e.number for e in rows] == [str(n) for n in range(1, 61)]
 
 
 # Numbers against values that this code did not make ------------------------------------------
@@ -165,20 +117,6 @@ def test_exact_evaluation_refuses_roots():
         evaluate(ca.sqrt(x), {"x": Fraction(4)})
 
 
-# Figures --------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow_cases("trajectories", "two_fold_b", "two_fold_c", "visible_fp1", "visible_fp2")
-@pytest.mark.parametrize("picture", figures.PICTURES, ids=lambda p: p.name)
-def test_figures_are_fit_for_print(picture):
-    figure = picture.draw()
-    texts = [t for axes in figure.axes for t in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
-    assert any(t.get_text() for t in texts)
-    assert picture.caption
-    with pictures.settings():
-        assert faults(figure) == []
-
-
 # The record --------------------------------------------------------------------------------------
 
 
@@ -195,7 +133,7 @@ def test_numbers_of_equations_are_in_the_order_of_the_paper():
 
 def test_every_erratum_is_of_one_weight():
     weights = [*errata.CONCLUSIONS, *errata.FORMULAS, *errata.SLIPS]
-    assert sorted(weights) == list(range(1, len(errata.ALL) + 1))
+    assert sorted(weights) == list(range(1, len(errata.ROWS) + 1))
 
 
 def test_the_record_opens_with_what_changes_and_shows_evidence_once():
@@ -209,7 +147,7 @@ def test_the_record_opens_with_what_changes_and_shows_evidence_once():
         "Errata that change a formula or a number",
         "Slips of print",
     ]
-    assert sum(len(items) for _, items in opening[1:]) == len(errata.ALL)
+    assert sum(len(items) for _, items in opening[1:]) == len(errata.ROWS)
     checks = [str(c) for part in rows.values() for row in part for c in row.checks]
     assert len(set(checks)) < len(checks)
     assert all(text.count(c.replace("|", r"\|")) == 1 for c in checks if len(c) > 60)

@@ -13,8 +13,9 @@ import casadi as ca
 import bounce
 import nonsmooth as ns
 
-from ..claims import AGREES, Check, Claim
-from .results import corrected, kv_pert_data, paper_ball
+from ..claims import Check, Found
+from .errata import erratum
+from .results import claim, kv_pert_data, paper_ball
 
 #: Ranges around the paper's parameters and of the state at lift-off, for which the theorem is.
 PARAMETERS = {
@@ -52,50 +53,41 @@ def _everywhere(proof: ns.proofs.Proof, word: str) -> bool:
     return proof.proven and all(word in p.statement for p in pieces)
 
 
-def nu_product() -> Claim:
+@claim("proven-nu-product")
+def nu_product() -> Found:
     """nu1 nu2 = 1 and F1 = F2, for all parameters of a box."""
     proof = two_fold_proof()
     pieces = proof.pieces or (proof,)
     zero = all(p.values["Delta"].low == p.values["Delta"].high == "0" for p in pieces)
     negative = proof.values["nu1"].ends[1] < 0 and proof.values["nu2"].ends[1] < 0
-    claim = corrected(
-        "proven-nu-product",
-        "eq. (54)",
-        "nu1 nu2 = 1 + O(eps^3) < 1 at the two-fold of the ball",
+    return (
         "theorem: for all mu in [0.2, 0.4], d1 in [0.08, 0.12], d2 in [0.05, 0.15], eta in [0.4, 0.6], G in "
         "[0, 0.001], inertia in [0.38, 0.42], ground inclined by up to 0.01, Y' in [0.6, 1], Omega in "
         "[-0.6, 0.6] there is exactly one two-fold (in a named box), F1 = F2 there and nu1 nu2 = 1 "
         "exactly, nu1, nu2 < 0",
-        18,
         "ns.certify: Krawczyk's operator for existence and uniqueness, exact common factor of F1 - F2",
-    )
-    checks = (
+        *erratum("18").checks,
         Check("one two-fold for all parameters of the box", proof.exists),
         Check("F1 = F2 there by algebra, Delta = 0", zero and _everywhere(proof, "F1 = F2 there")),
         Check("nu1 and nu2 are negative", negative),
     )
-    return Claim(**{**vars(claim), "checks": (*claim.checks, *checks)})
 
 
-def two_fold_class() -> Claim:
+@claim("proven-class")
+def two_fold_class() -> Found:
     """The class, for all parameters of the box."""
     proof = two_fold_proof()
-    return Claim(
-        "proven-class",
-        "Sec. 4, after eq. (54)",
-        "the two-fold is visible and one orbit, a canard, lifts off rolling",
+    return (
         "theorem: class VV-C1, one canard and no faux canard, for all parameters and lift-off speeds "
         "of the same box",
-        AGREES,
         "ns.certify: signs of L11, L22, T and Delta in enclosures",
-        (
-            Check("visible on both sides and VV-C1 everywhere", proof.label == "VV-C1"),
-            Check("one canard", _everywhere(proof, "Canards (Da -> s -> Dr): one")),
-        ),
+        Check("visible on both sides and VV-C1 everywhere", proof.label == "VV-C1"),
+        Check("one canard", _everywhere(proof, "Canards (Da -> s -> Dr): one")),
     )
 
 
-def slip_reversal() -> Claim:
+@claim("proven-slip-reversal")
+def slip_reversal() -> Found:
     """The neighbours of Fig. 10 lift off to both sides."""
     data = kv_pert_data()["trajectories"]
     checks = []
@@ -110,15 +102,11 @@ def slip_reversal() -> Claim:
             for value, v in zip(proof.end.values(), row["p_F"], strict=True)
         )
         checks.append(Check(f"{name} ends at the reference", near))
-    return Claim(
-        "proven-slip-reversal",
-        "Fig. 10",
-        "trajectories on both sides of the canard lift off in forward and in reverse slip",
+    return (
         "theorem: from the printed p0 with X'(0) lowered by 0.02 (B) the ball rolls, then lifts off in "
         "forward slip; raised by 0.02 (C), in reverse",
-        AGREES,
         "ns.certify_orbit: validated Taylor steps, events by interval Newton, decimals as written",
-        tuple(checks),
+        *checks,
     )
 
 
@@ -200,32 +188,24 @@ def canard_orbit() -> ns.proofs.OrbitProof:
     )
 
 
-def canard() -> Claim:
+@claim("proven-canard")
+def canard() -> Found:
     """One trajectory between B and C lifts off rolling."""
     found, orbit = canard_speed(), canard_orbit()
     reference = kv_pert_data()["trajectories"]["A_exact"]["p0"][1]
     speed = found.zeros[0].point["V"] if found.zeros else None
     near = speed is not None and abs(speed.ends[0] - Fraction(reference)) < Fraction(1, 10**30)
     followed = orbit.proven and orbit.status == "end" and not orbit.events
-    return Claim(
-        "proven-canard",
-        "Sec. 4.2, Fig. 10",
-        "a single trajectory of the rolling region reaches s",
+    return (
         "theorem: for X'(0) from B's to C's there is exactly one at which load and tangential force of "
         f"the rolling ball vanish together before t = 0.1, X'(0) = {speed}; until 1e-9 before, that ball "
         "is inside the friction cone",
-        AGREES,
         "ns.prove_all on the closed form of rolling; ns.certify_orbit with the cone's edges as stops",
-        (
-            Check("exactly one speed and time, and the list is complete", _only(found)),
-            Check("it is the canard's speed computed to 40 digits", near),
-            Check("the ball rolls inside the cone until 1e-9 before", followed),
-        ),
+        Check("exactly one speed and time, and the list is complete", _only(found)),
+        Check("it is the canard's speed computed to 40 digits", near),
+        Check("the ball rolls inside the cone until 1e-9 before", followed),
     )
 
 
 def _only(found: ns.proofs.Census) -> bool:
     return found.complete and len(found.zeros) == 1
-
-
-ALL = (nu_product, two_fold_class, slip_reversal, canard)

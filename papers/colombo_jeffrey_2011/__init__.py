@@ -15,6 +15,6 @@ PAPER = Paper(
     source="A. Colombo and M. R. Jeffrey, Nondeterministic chaos, and the two-fold singularity in "
     "piecewise smooth flows, SIAM J. Appl. Dyn. Syst. 10 (2011) 423-451. "
     f"{FROM_MEMORY} The recurrent system is an example of our own.",
-    tables=(claims(results.ALL),),
-    pictures=figures.PICTURES,
+    tables=(claims(results.claim),),
+    pictures=figures.picture,
 )

@@ -24,17 +24,8 @@ import nonsmooth as ns
 Array = NDArray[np.float64]
 Numbers = tuple[tuple[int, int], tuple[float, float]]
 
-#: One two-fold of each class, by kind, as in the project's theory notes.
-CLASSES: dict[str, Numbers] = {
-    "VV-C1": ((1, -1), (-2.0, -1.0)),
-    "VV-F": ((1, -1), (2.0, 1.0)),
-    "II-F": ((-1, 1), (-0.5, -0.5)),
-    "II-C": ((-1, 1), (-2.0, -1.0)),
-    "mix-0": ((1, 1), (0.0, 0.5)),
-    "mix-S": ((1, 1), (-1.5, 1.5)),
-    "mix-C": ((1, 1), (-3.0, -0.5)),
-    "mix-F": ((1, 1), (0.5, 3.0)),
-}
+#: One two-fold of each class.
+CLASSES = ns.textbook.TWO_FOLDS
 RING = 120
 #: nu1 = nu2 of the recurrent system, on both sides of the bifurcation at nu1 nu2 = 1.
 RECURRENT, CALM, BEND = -1.1, -0.9, 1.0

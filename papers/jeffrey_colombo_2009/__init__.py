@@ -14,6 +14,6 @@ PAPER = Paper(
     title="After Jeffrey & Colombo (2009): the invisible two-fold",
     source="M. R. Jeffrey and A. Colombo, The two-fold singularity of discontinuous vector fields, "
     f"SIAM J. Appl. Dyn. Syst. 8 (2009) 624-640. {FROM_MEMORY}",
-    tables=(claims(results.ALL),),
-    pictures=figures.PICTURES,
+    tables=(claims(results.claim),),
+    pictures=figures.picture,
 )

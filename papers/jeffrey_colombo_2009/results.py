@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 import nonsmooth as ns
 
-from ..claims import HOLDS, Check, Claim, close
+from ..claims import Check, Found, Statements, close
 from .model import (
     AFTER,
     AT,
@@ -28,6 +29,8 @@ from .model import (
     simulated_return_matrix,
     system,
 )
+
+claim = Statements(Path(__file__).with_name("README.md"))
 
 #: V+, V- and the flights expected, from the table of the project's theory notes.
 COUNTS: tuple[tuple[V, int], ...] = (
@@ -51,7 +54,8 @@ def reached(v: V) -> int:
     return sum(r.status is ns.Status.NON_UNIQUE for r in sliding_runs(v))
 
 
-def normal_form() -> Claim:
+@claim("normal-form")
+def normal_form() -> Found:
     """The general two-fold and the normal form have the same numbers."""
     fold = ns.find_two_fold(system(), [0.0, 0.1, 0.1])
     checks = (
@@ -64,18 +68,15 @@ def normal_form() -> Claim:
         ),
         Check("both folds are invisible", fold.kind == "invisible"),
     )
-    return Claim(
-        "normal-form",
-        "known from memory: the normal form",
-        "near a generic invisible two-fold the flow is (-y, 1, V+) for x > 0 and (z, V-, 1) for x < 0",
+    return (
         "nonsmooth's normal form with sigma = (-1, +1), nu = (V+, V-)",
-        HOLDS,
         "find_two_fold on the normal form: nu comes from second Lie derivatives",
-        checks,
+        *checks,
     )
 
 
-def return_map() -> Claim:
+@claim("return-map")
+def return_map() -> Found:
     """One flight above and one below is a linear map with determinant 1."""
     checks = []
     for v in (BEFORE, AFTER, (-0.9, -1.0)):
@@ -91,55 +92,41 @@ def return_map() -> Claim:
         values = np.linalg.eigvals(matrix)
         gap = max(np.min(np.abs(values - e)) for e in expected)
         checks.append(close("error of the eigenvalues", gap, 0, 1e-8))
-    return Claim(
-        "return-map",
-        "known from memory: crossing orbits",
-        "successive crossings are a composition of two involutions, linear in the normal form",
+    return (
         "[[4 V+ V- - 1, -2 V-], [2 V+, -1]]: determinant 1, eigenvalues "
         "(sqrt(V+ V-) +- sqrt(V+ V- - 1))^2, on the unit circle exactly if 0 <= V+ V- <= 1",
-        HOLDS,
         "two simulated orbits give the matrix; formula for matrix and eigenvalues",
-        tuple(checks),
+        *checks,
     )
 
 
-def single_quantity() -> Claim:
+@claim("single-quantity")
+def single_quantity() -> Found:
     """Only the product V+ V- and the signs matter."""
     alike = [(-0.9, -1.0), (-1.8, -0.5), (-0.3, -3.0)]
     counts = [most_flights(v) for v in alike]
     reach = [reached(v) for v in ((-2.0, -1.0), (-0.5, -4.0))]
     positive = reached((2.0, 1.0))
-    return Claim(
-        "single-quantity",
-        "known from memory: abstract",
-        "the local dynamics depends on a single quantity, the jump in direction of the field "
-        "through the singularity",
+    return (
         "the product V+ V- decides, together with the signs: V+ V- = 0.9 gives "
         f"{counts[0]} flights for three pairs of negative V; V+ V- = 2 lets all sliding orbits reach "
         f"the two-fold if V < 0 and {positive} of {RING} if V > 0",
-        HOLDS,
         "simulation of fans of crossing orbits and rings of sliding orbits",
-        (
-            Check(f"most flights {counts} at V+ V- = 0.9", counts == [9, 9, 9]),
-            Check(f"{reach} of {RING} reach at V+ V- = 2, V < 0", reach == [RING, RING]),
-            Check(f"{positive} reach at V+ V- = 2, V > 0", positive == 0),
-        ),
+        Check(f"most flights {counts} at V+ V- = 0.9", counts == [9, 9, 9]),
+        Check(f"{reach} of {RING} reach at V+ V- = 2, V < 0", reach == [RING, RING]),
+        Check(f"{positive} reach at V+ V- = 2, V > 0", positive == 0),
     )
 
 
-def crossings() -> Claim:
+@claim("number-of-crossings")
+def crossings() -> Found:
     """How many times an orbit crosses before it slides."""
     found = [(v, most_flights(v), expected) for v, expected in COUNTS]
     text = ", ".join(f"{v[0] * v[1]:.2f}: {n}" for v, n, _ in found)
-    return Claim(
-        "number-of-crossings",
-        "known from memory: the case V+ V- < 1",
-        "for V+, V- < 0 and V+ V- < 1 every orbit crosses a finite number of times, without bound as "
-        "V+ V- -> 1, and then slides",
+    return (
         f"at most ceil(pi/arccos sqrt(V+ V-)) - 1 flights; V+ V- and flights: {text}",
-        HOLDS,
         "18 orbits for each pair, over eight decades of starting slopes",
-        tuple(
+        *(
             Check(
                 f"V = {v}: {n} flights (formula {formula_for_flights(v[0] * v[1])})",
                 n == expected == formula_for_flights(v[0] * v[1]),
@@ -149,26 +136,22 @@ def crossings() -> Claim:
     )
 
 
-def repelling_before() -> Claim:
+@claim("initially-repelling")
+def repelling_before() -> Found:
     """Below the bifurcation no orbit of the ring reaches the singularity."""
     counts = [reached(v) for v in (BEFORE, (-0.9, -1.0))]
     label = ns.two_folds.classify_two_fold(SIGMA, BEFORE)
-    return Claim(
-        "initially-repelling",
-        "known from memory: abstract",
-        "the singularity is initially repelling",
+    return (
         f"for V+ V- < 1 none of {RING} sliding orbits reaches it; exactly one leaves it into the "
         f"attracting region (class {label.label})",
-        HOLDS,
         "ring of sliding orbits; class by the decision table",
-        (
-            Check(f"{counts} reach it", counts == [0, 0]),
-            Check(f"class {label.label}", label.label == "II-F" and label.faux_canards == 1),
-        ),
+        Check(f"{counts} reach it", counts == [0, 0]),
+        Check(f"class {label.label}", label.label == "II-F" and label.faux_canards == 1),
     )
 
 
-def bifurcation() -> Claim:
+@claim("diabolo-bifurcation")
+def bifurcation() -> Found:
     """Where invariant lines of the return map appear."""
     none = []
     for v in (BEFORE, (-0.99, -1.0)):
@@ -184,27 +167,22 @@ def bifurcation() -> Claim:
     ratios = [float(-image[1] / image[0]) for image in images]
     shrink, grow = (float(-image[0]) for image in reversed(images))
     label = ns.two_folds.classify_two_fold(SIGMA, AT).label
-    return Claim(
-        "diabolo-bifurcation",
-        "known from memory: abstract",
-        "at a bifurcation the singularity becomes the apex of a pair of parabolic invariant surfaces",
+    return (
         "at V+ V- = 1 for V+, V- < 0: invariant lines abs(z/y) = abs(V+) (1 -+ sqrt(1 - 1/(V+ V-))) of "
         f"the return map; at V = {AFTER}: {low:.6f} (orbits grow, factor {grow:.6f}) and {high:.6f} "
         f"(shrink, factor {shrink:.6f}). x is quadratic in (y, z) on the arcs through them",
-        HOLDS,
         "the lines from the formula put through both flights",
-        (
-            Check(f"no lines at {none}", len(none) == 2),
-            close("slope after a return on the first", ratios[0], 2 - math.sqrt(2), 1e-12),
-            close("slope after a return on the second", ratios[1], 2 + math.sqrt(2), 1e-12),
-            close("growth times shrinking", grow * shrink, 1, 1e-12),
-            close("growth", grow, 3 + 2 * math.sqrt(2), 1e-12),
-            Check(f"class at V+ V- = 1: {label}", label.endswith("II-C|II-F")),
-        ),
+        Check(f"no lines at {none}", len(none) == 2),
+        close("slope after a return on the first", ratios[0], 2 - math.sqrt(2), 1e-12),
+        close("slope after a return on the second", ratios[1], 2 + math.sqrt(2), 1e-12),
+        close("growth times shrinking", grow * shrink, 1, 1e-12),
+        close("growth", grow, 3 + 2 * math.sqrt(2), 1e-12),
+        Check(f"class at V+ V- = 1: {label}", label.endswith("II-C|II-F")),
     )
 
 
-def parabolic() -> Claim:
+@claim("smooth-but-for-an-edge")
+def parabolic() -> Found:
     """The invariant surfaces are parabolic and have an edge on the discontinuity surface."""
     _, high = ns.two_folds.diabolo_slopes(AFTER)
     heights = []
@@ -213,23 +191,18 @@ def parabolic() -> Claim:
         heights.append(float(r(size)[0]) / size**2)
     y, z = landings(run(AFTER, (-1.0, high), 3.0))[1]
     jump = (-float(y), float(z))  # x' on arriving from above and on leaving downwards
-    return Claim(
-        "smooth-but-for-an-edge",
-        "known from memory: abstract",
-        "the surfaces are smooth except where they intersect the discontinuity surface",
+    return (
         f"height of the arc over (-r, {high:.4f} r): {heights[0]:.6f} r^2 for r = 1, 0.1, 0.01; at the "
         f"edge x' jumps from {jump[0]:.4f} to {jump[1]:.4f} and (y', z') from (1, {AFTER[0]:g}) to "
         f"({AFTER[1]:g}, 1)",
-        HOLDS,
         "simulation of three arcs; both fields at the landing",
-        (
-            Check(f"heights over r^2: {heights}", max(abs(h - 0.5) for h in heights) < 1e-9),
-            Check("the fields at the edge are not parallel", abs(jump[0] - jump[1]) > 0.1),
-        ),
+        Check(f"heights over r^2: {heights}", max(abs(h - 0.5) for h in heights) < 1e-9),
+        Check("the fields at the edge are not parallel", abs(jump[0] - jump[1]) > 0.1),
     )
 
 
-def attraction() -> Claim:
+@claim("attraction-and-repulsion")
+def attraction() -> Found:
     """The surfaces divide attraction from repulsion."""
     low, high = ns.two_folds.diabolo_slopes(AFTER)
     inside = [high * f for f in (1.001, 1.1, 2.0, 10.0)]
@@ -239,25 +212,20 @@ def attraction() -> Claim:
     ends = [r.status is ns.Status.NON_UNIQUE for r in attracted]
     away = [float(np.abs(r.x[-1, 1:]).max()) for r in repelled]
     count = reached(AFTER)
-    return Claim(
-        "attraction-and-repulsion",
-        "known from memory: abstract",
-        "they divide local space into regions of attraction to, and repulsion from, the singularity",
+    return (
         f"crossing orbits with abs(z/y) > {high:.4f} make 1 to {max(map(flights, attracted))} flights, "
         "slide, and reach the singularity in finite time; the others cross ever further away. All "
         f"{count} of {RING} sliding orbits reach it",
-        HOLDS,
         "simulation on both sides of the line, and of a ring of sliding orbits",
-        (
-            Check(f"{sum(ends)} of {len(ends)} inside end at the singularity", all(ends)),
-            Check(f"outside, max(abs(y), abs(z)) at the end: {min(away):.3g}", min(away) > 5),
-            Check("none outside slides", all("s" not in r.itinerary for r in repelled)),
-            Check(f"{count} of {RING} sliding orbits", count == RING),
-        ),
+        Check(f"{sum(ends)} of {len(ends)} inside end at the singularity", all(ends)),
+        Check(f"outside, max(abs(y), abs(z)) at the end: {min(away):.3g}", min(away) > 5),
+        Check("none outside slides", all("s" not in r.itinerary for r in repelled)),
+        Check(f"{count} of {RING} sliding orbits", count == RING),
     )
 
 
-def accumulation() -> Claim:
+@claim("accumulation-time")
+def accumulation() -> Found:
     """On the line itself infinitely many crossings happen in finite time."""
     _, high = ns.two_folds.diabolo_slopes(AFTER)
     r = run(AFTER, (-1.0, high), 10.0, tol=1e-5)  # rounding keeps a run 1e-8 from the two-fold
@@ -265,24 +233,19 @@ def accumulation() -> Claim:
     estimate = float("nan") if r.accumulation_time is None else r.accumulation_time
     times = np.diff([0.0, *(e.t for e in r.events if e.kind == "crossing")])[:8]
     ratios = times[2:] / times[:-2]
-    return Claim(
-        "accumulation-time",
-        "known from memory: orbits on the surfaces",
-        "orbits on the inner surface cross infinitely often while they fall into the singularity",
+    return (
         f"from (0, -1, {high:.4f}) they end at t = {estimate:.9f}; formula "
         f"2 (1 + 2 abs(V+) - r+)/(1 - 1/mu) = {formula:.12f}",
-        HOLDS,
         "simulation, which stops with ACCUMULATION and the estimated limit; geometric series",
-        (
-            Check(f"status {r.status.name}", r.status is ns.Status.ACCUMULATION),
-            close("formula", formula, 3.828427124746, 1e-12),
-            close("estimate of the run", estimate, 3.828427124746, 1e-8),
-            close("ratio of flight times", ratios.mean(), 3 - 2 * math.sqrt(2), 1e-6),
-        ),
+        Check(f"status {r.status.name}", r.status is ns.Status.ACCUMULATION),
+        close("formula", formula, 3.828427124746, 1e-12),
+        close("estimate of the run", estimate, 3.828427124746, 1e-8),
+        close("ratio of flight times", ratios.mean(), 3 - 2 * math.sqrt(2), 1e-6),
     )
 
 
-def determinacy() -> Claim:
+@claim("determinacy-breaking")
+def determinacy() -> Found:
     """Orbits arrive in finite time, and what follows is not determined."""
     runs = sliding_runs(AFTER)
     fold = ns.find_two_fold(system(), [0.0, 0.1, 0.1])
@@ -292,35 +255,14 @@ def determinacy() -> Claim:
     onward = ns.orbit.funnel(system(), [0.0, 0.0, 0.0], 0.5)
     sides = "".join(sorted({d.side for d in onward.departures}))
     spread = float(np.linalg.norm(np.ptp(onward(0.5), axis=0)))
-    return Claim(
-        "determinacy-breaking",
-        "known from memory: discussion",
-        "orbits of an open set reach the singularity in finite time, and their evolution after it is "
-        "not determined by the vector field",
+    return (
         f"{stopped} of {RING} arrive, at times that agree with -(1, 1) M^-1 z to {worst:.0e}; from "
         f"there canards slide into repelling sliding and leave it up or down at any time: a funnel of "
         f"{len(onward.trajectories)} of them is {spread:.2f} wide at t = 0.5. The abstract of 2009 "
         "states attraction; the loss of determinacy is the point of the paper of 2011",
-        HOLDS,
         "ring of sliding orbits; funnel of the continuations",
-        (
-            Check(f"{stopped} of {RING} stop as NON_UNIQUE", stopped == RING),
-            close("largest error of the time", worst, 0, 1e-9),
-            Check(f"continuations leave to the sides {sides}", sides == "+-s"),
-            Check(f"they are {spread:.2f} apart", spread > 0.3),
-        ),
+        Check(f"{stopped} of {RING} stop as NON_UNIQUE", stopped == RING),
+        close("largest error of the time", worst, 0, 1e-9),
+        Check(f"continuations leave to the sides {sides}", sides == "+-s"),
+        Check(f"they are {spread:.2f} apart", spread > 0.3),
     )
-
-
-ALL = (
-    normal_form,
-    return_map,
-    single_quantity,
-    crossings,
-    repelling_before,
-    bifurcation,
-    parabolic,
-    attraction,
-    accumulation,
-    determinacy,
-)

@@ -13,6 +13,6 @@ PAPER = Paper(
     title="After Kuznetsov, Rinaldi & Gragnani (2003): a harvested predator",
     source="Yu. A. Kuznetsov, S. Rinaldi and A. Gragnani, One-parameter bifurcations in planar Filippov "
     f"systems, Int. J. Bifurcation Chaos 13 (2003) 2157-2188. {FROM_MEMORY}",
-    tables=(claims(results.ALL),),
-    pictures=figures.PICTURES,
+    tables=(claims(results.claim),),
+    pictures=figures.picture,
 )

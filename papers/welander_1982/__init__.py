@@ -13,6 +13,6 @@ PAPER = Paper(
     title="After Welander (1982): the ocean box",
     source="P. Welander, A simple heat-salt oscillator, Dyn. Atmos. Oceans 6 (1982) 233-242, in the "
     f"nonsmooth form of the later literature (J. Leifeld, 2016). {FROM_MEMORY}",
-    tables=(claims(results.ALL),),
-    pictures=figures.PICTURES,
+    tables=(claims(results.claim),),
+    pictures=figures.picture,
 )

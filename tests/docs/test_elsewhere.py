@@ -2,7 +2,7 @@
 
 from docs.tools import architecture, elsewhere
 from papers.__main__ import NAMES
-from papers.pictures import faults
+from papers.pictures import illegible
 
 
 def test_every_paper_has_a_page():
@@ -31,4 +31,4 @@ def test_the_record_takes_the_place_of_the_table_of_claims(monkeypatch, tmp_path
 
 
 def test_the_picture_of_the_architecture_is_legible():
-    assert faults(architecture.figure()) == []
+    assert illegible(architecture.figure()) == []

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 import nonsmooth as ns
 from docs.tools import generate
-from papers.pictures import faults
+from papers.pictures import illegible
 
 #: The period of docs/examples/friction/stick_slip.py: both fields are linear, so the slip ends at a root of
 #: a sum of exponentials, found here to 30 digits with mpmath.
@@ -53,7 +53,7 @@ def test_picture_is_legible_on_a_page(name):
     """It fits one: as wide as a page at most, text of 8 points, nothing cut off."""
     for figure in generate.drawn(name, ran(name)).values():
         assert isinstance(figure, Figure)
-        assert faults(figure) == []
+        assert illegible(figure) == []
         assert figure.get_figheight() <= 9.0
 
 
@@ -103,8 +103,8 @@ def test_funnel_begins_where_the_canard_meets_the_two_fold():
     golden = (1 + math.sqrt(5)) / 2  # slope of the canard for nu = (-2, -1)
     assert found["slope"] == pytest.approx(golden, abs=1e-12)
     # on an eigenline t = (z2 + z3)/|lambda|, with lambda = -(1 + slope)
-    assert found["futures"].t == pytest.approx(0.5, abs=1e-9)
-    assert {d.side for d in found["futures"].departures} == {"+", "-", "s"}
+    assert found["funnel"].t == pytest.approx(0.5, abs=1e-9)
+    assert {d.side for d in found["funnel"].departures} == {"+", "-", "s"}
 
 
 @pytest.mark.slow

@@ -188,8 +188,8 @@ def test_every_page_fits_the_window_and_complains_of_nothing(browser, site, widt
     } <= {page.relative_to(site).as_posix() for page in pages}
     for page in pages:
         browser.open(page, width)
-        if faults := browser.faults():
-            wrong[page.relative_to(site).as_posix()] = faults
+        if errors := browser.errors():
+            wrong[page.relative_to(site).as_posix()] = errors
     assert wrong == {}
 
 
@@ -210,4 +210,4 @@ return found();
 def test_search_works_from_files(browser, site):
     browser.open(site / "index.html")
     assert any("two_folds" in href for href in browser.run(SEARCH))
-    assert browser.faults() == {}
+    assert browser.errors() == {}

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 
-from nonsmooth.flow.engine import find_compiler, library, tape
+from nonsmooth.flow.engine import find_compiler, interpreter, library
 from nonsmooth.flow.engine.building import core_source
 
 ROOT = Path(__file__).parents[2]
@@ -82,7 +82,7 @@ def use(folder: Path) -> None:
     loaded = ctypes.CDLL(str(folder / "core.so"))
     library._PACKAGED = folder / "none"
     library.build = lambda source: loaded
-    tape.library.cache_clear()
+    interpreter.library.cache_clear()
 
 
 def uncovered(folder: Path, names: list[str]) -> dict[str, list[int]]:

@@ -1,12 +1,13 @@
 """Random systems with every kind of event, compared with an integrator that shares no code with the package.
 
-``python -m tests.flow.random_systems 2000 [first seed]`` compares so many and prints counts by kind and status,
-and each system that differs. A system that the integrator cannot decide in doubles is counted as undecided.
+``python -m tests.flow.random_systems 2000 [first seed]`` compares so many and prints counts by kind and status
+(also when it is interrupted), and each system that differs. A system that the integrator cannot decide in doubles is counted as undecided.
 """
 
 from __future__ import annotations
 
 import collections
+import signal
 import sys
 import time
 from collections.abc import Callable
@@ -252,7 +253,7 @@ def package_words(system: Any, problem: Problem) -> Callable[[str], str]:
     arguments = [system.extended_states, system.parameter_symbols]
     heights = ca.Function("h", arguments, [ca.vertcat(*found)])
     size = system.extended_dimension
-    given = [np.ravel(heights(x[:size], known)) for x in points]
+    given = [heights(x[:size], known).full().ravel() for x in points]
     times = (
         np.array(given)[:, None, :] / np.array(true)[:, :, None]
     )  # the same one but for a factor
@@ -362,23 +363,26 @@ def main(count: int, first: int = 0) -> None:
     statuses: collections.Counter[str] = collections.Counter()
     reasons: collections.Counter[str] = collections.Counter()
     began = time.perf_counter()
-    for seed in range(first, first + count):
-        verdict, status, kinds = compare(seed)
-        short = verdict.split(":")[0]
-        verdicts[short] += 1
-        if short == "undecided":
-            reasons[verdict[11:]] += 1
-        elif short != "right":
-            print(f"seed {seed} {verdict[:300]} [{', '.join(sorted(kinds))}]", flush=True)
-        statuses[f"{status or 'undecided'} {short}"] += 1
-        for kind in kinds:
-            by_kind[kind][short] += 1
-    print(dict(verdicts), f"in {time.perf_counter() - began:.0f} s")
-    print("by status:", dict(statuses.most_common()))
-    for kind, counts in sorted(by_kind.items()):
-        print(f"  {kind:10s}", dict(counts.most_common()))
-    print("undecided:", dict(reasons.most_common()))
+    try:
+        for seed in range(first, first + count):
+            verdict, status, kinds = compare(seed)
+            short = verdict.split(":")[0]
+            verdicts[short] += 1
+            if short == "undecided":
+                reasons[verdict[11:]] += 1
+            elif short != "right":
+                print(f"seed {seed} {verdict[:300]} [{', '.join(sorted(kinds))}]", flush=True)
+            statuses[f"{status or 'undecided'} {short}"] += 1
+            for kind in kinds:
+                by_kind[kind][short] += 1
+    finally:  # also where it is interrupted
+        print(dict(verdicts), f"in {time.perf_counter() - began:.0f} s")
+        print("by status:", dict(statuses.most_common()))
+        for kind, counts in sorted(by_kind.items()):
+            print(f"  {kind:10s}", dict(counts.most_common()))
+        print("undecided:", dict(reasons.most_common()), flush=True)
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     main(*[int(value) for value in sys.argv[1:]])

@@ -11,7 +11,6 @@ import nonsmooth as ns
 V, I, U, R, A, B, T, X, Y = (
     ca.SX.sym(name) for name in ("v", "i", "u", "R", "a", "b", "t", "x", "y")
 )
-FOUR = [ca.SX.sym(f"l{k}") for k in range(4)]
 
 
 def condition(y, multiplier, name):

@@ -218,7 +218,7 @@ def test_page_fits_and_shows_the_run_of_python(browser, page, width):
         "visible fold",
         "unstable focus",
     }
-    assert browser.faults() == {} and browser.unnamed() == []
+    assert browser.errors() == {} and browser.unnamed() == []
 
 
 @pytest.mark.slow
@@ -244,7 +244,7 @@ def test_keys_sliders_and_the_address(browser, page):
     assert seen["word"] == run.itinerary and state_of(seen) == pytest.approx(run.x[-1], abs=1e-6)
     browser.driver.find_element(By.ID, "reset").click()
     assert "p=0.3,0.4&x=0,0&t=30" in browser.run(READY)["hash"]
-    assert browser.faults() == {}
+    assert browser.errors() == {}
 
 
 @pytest.mark.slow
@@ -307,7 +307,7 @@ def test_a_sweep_shows_the_states_of_python(browser, page):
         entries = [event.x[0] for event in run.events if event.kind == "entry"]
         own = points[points[:, 0] == value, 1]
         assert own == pytest.approx(entries[-1], abs=1e-6)
-    assert browser.faults() == {}
+    assert browser.errors() == {}
 
 
 @pytest.mark.browser
@@ -329,14 +329,14 @@ def test_a_system_in_space_is_turned_and_its_start_moved(browser, space):
     dot = browser.driver.find_element(By.CSS_SELECTOR, "#plane .handle .dot")
     ActionChains(browser.driver).click_and_hold(dot).move_by_offset(25, 0).release().perform()
     assert browser.run(READY)["say"] != turned["say"]
-    assert browser.faults() == {} and browser.unnamed() == []
+    assert browser.errors() == {} and browser.unnamed() == []
 
 
 @pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", [*ns.textbook.PROBLEMS][::6])
-def test_pages_of_textbook_problems_have_no_faults(browser, tmp_path, name):
+def test_pages_of_textbook_problems_have_no_errors(browser, tmp_path, name):
     problem = ns.textbook.PROBLEMS[name]()
     run = problem.run()
     t_end = max(float(run.t[-1]), 1e-3)
@@ -345,7 +345,7 @@ def test_pages_of_textbook_problems_have_no_faults(browser, tmp_path, name):
     ns.explore(problem.system, start=run.x[0], t_end=t_end, parameters=values, path=path)
     browser.open(path, 390)
     browser.run(READY)
-    assert browser.faults() == {} and browser.unnamed() == []
+    assert browser.errors() == {} and browser.unnamed() == []
 
 
 @pytest.mark.slow
@@ -354,4 +354,4 @@ def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
     for words in ("p=a,b&x=1&t=-3", "box=1,0,0,0&turn=1", "flow=toString", "%E0%A4%A"):
         browser.open(page, hash=words)
         seen = browser.run(READY)
-        assert seen["say"] == "x 0, v 0" and browser.faults() == {}
+        assert seen["say"] == "x 0, v 0" and browser.errors() == {}

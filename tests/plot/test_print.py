@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 import nonsmooth as ns
 from nonsmooth.plot.style import PrintFigure
-from papers.pictures import faults
+from papers.pictures import illegible
 from tests.plot.examples import EXAMPLES, basins, cut, harvest, run
 
 
@@ -38,7 +38,7 @@ def test_picture_is_fit_for_print(name, example):
     drawn = example.draw(name)
     figure = drawn[-1] if isinstance(drawn, list) else drawn
     assert isinstance(figure, PrintFigure)  # whose fonts are TrueType (test_palette.py)
-    assert faults(figure) == []
+    assert illegible(figure) == []
 
 
 COLUMN = (3.4, 4.4)
@@ -81,13 +81,13 @@ COLUMN = (3.4, 4.4)
 def test_picture_as_wide_as_a_column_is_fit_for_print_too(draw):
     """The legend is below the picture there, which fills the column."""
     figure = draw()
-    assert faults(figure) == []
+    assert illegible(figure) == []
     assert max(ax.bbox.width for ax in figure.axes) > 0.3 * figure.bbox.width  # two side by side
 
 
 @pytest.mark.parametrize("name", ["boost_converter", "diode_bridge"])
 def test_a_long_itinerary_is_not_cut(name):
-    assert faults(ns.plot.trajectory(ns.textbook.by_name(name).run())) == []
+    assert illegible(ns.plot.trajectory(ns.textbook.by_name(name).run())) == []
 
 
 @pytest.mark.slow
@@ -111,7 +111,7 @@ def test_names_of_24_letters_do_not_meet(count, size):
     above, below = ([f - s * (k == 1) for k, f in enumerate(field)] for s in (100, -100))
     system = ns.FilippovSystem(states, surface=states[1] - 0.7, above=above, below=below)
     figure = ns.plot.trajectory(ns.simulate(system, np.ones(count), 0.5), size=size)
-    assert faults(figure) == []
+    assert illegible(figure) == []
 
 
 def test_names_of_narrow_basins_are_about_their_middles():

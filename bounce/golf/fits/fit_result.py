@@ -27,7 +27,7 @@ class IdentifiabilityWarning(UserWarning):
 
 
 @dataclass(frozen=True, repr=False)
-class FitResult:
+class FitResult(ns.tables.Tabular):
     """Fitted parameters and what they leave.
 
     Attributes
@@ -74,6 +74,16 @@ class FitResult:
     message: str
     narrow: tuple[str, ...] = ()
     search: Profile | None = field(default=None, compare=False)
+
+    def _tables(self) -> dict[str, ns.tables.Table]:
+        low, high = zip(*self.interval().values(), strict=True)
+        columns = {"value": [*self.values.values()], "error": [*self.errors.values()]}
+        fitted = {"parameter": [*self.values]}
+        rows = {"row": self.measurements.rows}
+        return {
+            "parameters": ns.tables.Table(fitted, columns | {"low": low, "high": high}),
+            "residuals": ns.tables.Table(rows, self.residuals),
+        }
 
     @property
     def undetermined(self) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ _KINDS = {**_KIND, **{_PREFIX + name: kind for name, kind in _KIND.items()}}
 
 
 @dataclass(frozen=True)
-class Measurements:
+class Measurements(ns.tables.Tabular):
     """Bounces as speeds: spins are surface speeds (spin times radius).
 
     Attributes
@@ -54,6 +54,11 @@ class Measurements:
     rows: NDArray[np.int_]
     si: bool
     left_out: tuple[tuple[int, str], ...]
+
+    def _tables(self) -> dict[str, ns.tables.Table]:
+        landing = dict(zip(("xdot", "ydot", "omega"), self.landing.T, strict=True))
+        lift_off = {f"lift_off_{name}": values for name, values in self.lift_off.items()}
+        return {"rows": ns.tables.Table({"row": self.rows}, landing | lift_off)}
 
     def keep(self, rows: NDArray[np.bool_], reasons: Mapping[int, str]) -> Measurements:
         """Return a part of the rows.

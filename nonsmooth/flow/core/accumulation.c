@@ -6,9 +6,9 @@
 
 static const Happened *back(const Run *r, int64_t k) { return &r->past[(r->history - k) % HISTORY]; }
 
-/* Number of the last events whose times decrease like a geometric series, as one block of a pattern that is
- * repeated, or 0; the time left to the limit, and its error. The ratio itself converges, at least as fast as the times
- * do: what blocks change in the estimate is summed too (Aitken). */
+/* Length of a repeated block of events whose intervals decrease like a geometric series, or 0; the time left to the limit,
+ * and its error. The ratio converges at least as fast as the intervals: its changes from block to block are summed too
+ * (Aitken). */
 static int block_of(const Run *r, double *left, double *error) {
   int at_once = r->history > AT_ONCE;
   for (int k = 1; at_once && k <= AT_ONCE; k++) at_once = back(r, k)->interval == 0 && back(r, k)->kind != RESET;
@@ -18,7 +18,7 @@ static int block_of(const Run *r, double *left, double *error) {
     int lag = LAGS[l], need = BLOCKS * lag, same = 1;
     double block[BLOCKS], ratio = 0, change = 0, before = 0;
     if (r->history < need + lag) return 0;
-    for (int b = 0; b < BLOCKS && same; b++) { /* most events do not accumulate: the last blocks say so */
+    for (int b = 0; b < BLOCKS && same; b++) { /* most events do not accumulate, as the last blocks show */
       block[b] = 0;
       for (int k = 1; k <= lag; k++) block[b] += back(r, b * lag + k)->interval;
       same = b == 0 || block[b - 1] < SHRINKS * block[b];
@@ -37,12 +37,12 @@ static int block_of(const Run *r, double *left, double *error) {
     double rest = change * change / (before - change);
     *error *= larger(*error, fabs(rest)) / *left;
     *left += rest;
-    if (*left > 0) return lag; /* else what blocks change does not vanish with them */
+    if (*left > 0) return lag; /* else the changes do not vanish with the blocks */
   }
   return 0;
 }
 
-/* Whether the run is read, or ends, within a time from now. */
+/* Whether the run is sampled, or ends, within a time from now. */
 static int is_awaited(const Run *r, double time) {
   int64_t low = 0, high = r->read_count;
   while (low < high) {
@@ -54,7 +54,7 @@ static int is_awaited(const Run *r, double time) {
 
 /* Whether one of the last events was that of a guard. */
 static int is_repeated(const Run *r, int block, int kind, int index) {
-  for (int k = 1; k <= block; k++) if (back(r, k)->met.kind == kind && back(r, k)->met.index == index) return 1;
+  for (int k = 1; k <= block; k++) if (back(r, k)->guard.kind == kind && back(r, k)->guard.index == index) return 1;
   return 0;
 }
 
@@ -71,7 +71,7 @@ static void forget_repeated(const Run *r, Expansion *e, int block) {
       memset(e->guards + (int64_t)row * r->stride, 0, sizeof(double) * r->stride);
 }
 
-/* Whether no guard of a mode has a root within a time, also if the states are off by ``near``. */
+/* Whether no guard of a mode has a root within a time, for states with errors up to ``near``. */
 static int is_quiet(Run *r, Expansion *e, const int32_t *drop, const double *near, double time, int block) {
   double *noise = r->work;
   int order = r->order;
@@ -92,8 +92,7 @@ static int is_quiet(Run *r, Expansion *e, const int32_t *drop, const double *nea
   return 1;
 }
 
-/* Contacts that impacts have brought together: those of the last block, to the tolerance; the largest speed
- * among them. */
+/* Contacts of the last block that impacts have closed to the tolerance; their largest speed. */
 static int gathered(Run *r, int block, int32_t *which, double *speed) {
   const double *gap = gaps(r, r->x), *rate = gap + r->c;
   int count = 0;
@@ -106,7 +105,7 @@ static int gathered(Run *r, int block, int32_t *which, double *speed) {
   return count;
 }
 
-/* The motion at a point where some elements come to rest, whatever rounding says, as r->chosen; 0 if there is none. */
+/* Choose the motion at a point where some elements come to rest up to rounding, as r->chosen; 0 if there is none. */
 static int decide_among(Run *r, const int32_t *which, int count) {
   letters_of(r, r->start);
   active_surfaces(r, -1, r->start);
@@ -121,7 +120,7 @@ static int decide_among(Run *r, const int32_t *which, int count) {
   return r->status == RUNNING && decide(r, r->start, 0, 0) && rests_unstably(r, r->chosen.letter) < 0;
 }
 
-/* Put the state where some elements rest. */
+/* Project the state onto the zeros of some elements. */
 static void put_at_rest(Run *r, const int32_t *element, int count) {
   int32_t *which = r->involved + r->width;
   int kept = count;
@@ -130,7 +129,7 @@ static void put_at_rest(Run *r, const int32_t *element, int count) {
   project(r, which, with_joints(r, which, kept));
 }
 
-/* The mode of closed contacts, and of surfaces whose events accumulate with theirs, as r->chosen, and the state in it as
+/* Choose the mode of closed contacts, and of surfaces whose events accumulate with theirs, as r->chosen, with its state as
  * r->x; 0 if there is none. */
 static int choose_closed(Run *r, const int32_t *contact, int count, const int32_t *surface, int surfaces) {
   int32_t *which = r->involved + r->width;
@@ -147,7 +146,7 @@ static int is_instant(const Run *r, double time) {
   return time <= SHORTEST * time_scale(r);
 }
 
-/* Move on to the limit in the mode that holds from there. */
+/* Move to the limit, in the mode that is admissible there. */
 static void go_to_limit(Run *r, double left, int kind, int before) {
   r->history = 0;
   if (!advance(r, &r->e, smaller(left, r->o.t_end - r->t - r->t_low))) return;
@@ -178,7 +177,7 @@ static int vanishing(Run *r, const double *near, int32_t *which) {
   return count;
 }
 
-/* Close the contacts of impacts that accumulate, unless further impacts are to be served. */
+/* Close the contacts of impacts that accumulate, unless further impacts must be processed. */
 static void close_contacts(Run *r, int block, double left, double error) {
   double speed, *near = r->before, *x = r->saved;
   int count = gathered(r, block, r->involved, &speed), before = r->mode, at_once = is_instant(r, left), switches = 0, open = 0;
@@ -207,8 +206,8 @@ static void close_contacts(Run *r, int block, double left, double error) {
   if (closed && r->e.finite) go_to_limit(r, left, change_kind(r, before, r->mode), before);
 }
 
-/* Put the state where some surfaces rest, as r->x, and the motion from there as r->chosen; 0 with the old state where
- * there is none, or where that is farther than ``near`` allows. */
+/* Project the state onto some surfaces, as r->x, and choose the motion there as r->chosen; 0 with the old state where there
+ * is none, or where the projection moves it by more than ``near``. */
 static int choose_rest(Run *r, const int32_t *element, int count, const double *near) {
   double *x = r->saved;
   int close = 1, status = r->status;
@@ -234,7 +233,7 @@ static int leaves_jumps(Run *r, Expansion *e, int block) {
   return value != 0;
 }
 
-/* What further resets up to the limit would add to states that come to no rest, as a geometric series. */
+/* Add the jumps of all resets up to the limit, as a geometric series, to states that do not come to rest. */
 static void add_jumps(Run *r, int block) {
   for (int i = 0; r->s->resets && r->history > 2 * block && i < r->s->dimension; i++) {
     double last = 0, before = 0;
@@ -244,7 +243,7 @@ static void add_jumps(Run *r, int block) {
   }
 }
 
-/* Rest where crossings and resets accumulate; 0 where no motion follows from there. */
+/* Come to rest where crossings and resets accumulate; 0 where no motion continues. */
 static int come_to_rest(Run *r, double left, const double *near, int block) {
   int before = r->mode, count = vanishing(r, near, r->involved);
   if (!count || !choose_rest(r, r->involved, count, near)) return 0;
@@ -260,8 +259,8 @@ static int come_to_rest(Run *r, double left, const double *near, int block) {
   return 1;
 }
 
-/* Rest that rounding has let begin a little before the limit of events that accumulate: go on to the limit. 0 where that
- * is no such event. */
+/* Go to the limit of accumulating events where rounding made rest begin slightly before it; 0 where the event is no such
+ * one. */
 static int rest_at_limit(Run *r, int before) {
   const int8_t *letter = r->table->letter + (int64_t)before * r->table->width;
   double left, error, *near = r->before;
@@ -289,8 +288,8 @@ static int is_lost(Run *r, double time, int block) {
   return repeated && r->e.finite;
 }
 
-/* Go to the limit of events that accumulate, where the motion rests or the run ends, unless further ones are to be
- * served. */
+/* Go to the limit of events that accumulate, where the motion rests or the run ends, unless further events must be
+ * processed. */
 static void end_at_limit(Run *r, int block, double left, double error) {
   double *near = r->before, time = left + error;
   int at_once = is_instant(r, left), is_short = r->has_roots && is_instant(r, ROOT_REST * time);
@@ -307,7 +306,7 @@ static void end_at_limit(Run *r, int block, double left, double error) {
   finish(r, ACCUMULATION, NO_REASON, 0);
 }
 
-/* Rest of a surface of relative degree two whose speeds at two zeros in turn are below ``rest_below`` and fall. */
+/* Rest on a surface of relative degree two whose speeds at two consecutive zeros decrease and are below ``rest_below``. */
 static void rest_if_slow(Run *r) {
   int before = r->mode;
   for (int i = 0; i < r->m && r->status == RUNNING; i++) {
@@ -330,10 +329,10 @@ static void rest_if_slow(Run *r) {
 
 /* Store an event among the last ones. */
 static void remember(Run *r, int kind, int guard, const double *x) {
-  int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->met.kind << 32) + (guard < 0 ? -1 : shown_index(r));
+  int64_t pattern = ((int64_t)kind << 40) + ((int64_t)r->guard.kind << 32) + (guard < 0 ? -1 : shown_index(r));
   double *jumped = r->jumped + (r->s->resets ? r->history % HISTORY * r->n : 0);
   for (int i = 0; r->s->resets && i < r->n; i++) jumped[i] = kind == RESET ? r->x[i] - x[i] : 0;
-  r->past[r->history++ % HISTORY] = (Happened){r->since, pattern, kind, r->met};
+  r->past[r->history++ % HISTORY] = (Happened){r->since, pattern, kind, r->guard};
   r->since = 0;
 }
 
@@ -347,10 +346,15 @@ static void see_limit(Run *r) {
   if (has_kind(r, block, IMPACT) && !has_kind(r, block, RESET)) close_contacts(r, block, left, error); else end_at_limit(r, block, left, error);
 }
 
-/* Whether events accumulate at a point where no series exists: the run ends there. */
+/* Whether events accumulate at a point where no series exists: a surface with a root rests there, else the run ends. */
 static int ends_at_singular(Run *r) {
-  double left, error;
-  if (!block_of(r, &left, &error)) return 0;
+  double left, error, *near = r->before;
+  int block = block_of(r, &left, &error);
+  if (!block) return 0;
+  left = larger(left - r->since, 0);
+  for (int i = 0; i < r->n; i++) near[i] = left * fabs(r->e.states[(int64_t)i * r->stride + 1]);
+  r->e.finite = 0; /* the first terms alone say how far guards are */
+  if (r->has_roots && is_quiet(r, &r->e, r->drop, near, left, block) && come_to_rest(r, left, near, block)) return 1;
   r->limit = r->t + left;
   finish(r, ACCUMULATION, NO_REASON, 0);
   return 1;

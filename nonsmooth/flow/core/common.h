@@ -1,8 +1,7 @@
-/* What the driver and the lanes share: limits, operations on double, first root of a polynomial.
+/* Shared by the driver and the lanes: limits, operations on double, first root of a polynomial.
  *
- * The generated text defines before this file: the facts of nonsmooth/flow/constants.py under their names in
- * capitals (EPSILON, SAFETY, ..., the enumerations of statuses, kinds of events and guards, reasons); P the
- * order or more.
+ * The generated text defines before this file the constants of nonsmooth/flow/constants.py (EPSILON, SAFETY, ..., the
+ * enumerations of statuses, kinds of events and guards, reasons), and P, which is the order or more.
  */
 #ifndef ON_DEVICE
 #include <math.h>
@@ -23,7 +22,7 @@ typedef struct {
   const int8_t *passed; /* stops that do not end the run, or NULL */
 } Options;
 
-/* Letters of a set: off it, h carried along after that, its first step away from it, and one without friction. */
+/* Letters of a set: off it, off it with h integrated, first step away from it, and without friction. */
 enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5, IDLE = 6 };
 
 /* Trajectories of a call; where results go. */
@@ -48,7 +47,7 @@ typedef struct {
 /* An event: the time since the one before; kinds of event and guard, and its index, as a number. */
 typedef struct { double interval; int64_t pattern; } Recent;
 
-/* Whether times, the last one first, shrink like a geometric series. */
+/* Whether intervals, the last one first, decrease like a geometric series. */
 static inline int shrink_alike(const double *block) {
   double low = INFINITY, high = 0;
   for (int b = 0; b < BLOCKS - 1; b++) {
@@ -59,28 +58,28 @@ static inline int shrink_alike(const double *block) {
   return high < SHRINKS && high - low <= SPREAD * (1 - block[0] / block[1]);
 }
 
-/* What a run is between two steps: lanes give it to the driver for a step that is not clear, and take it back. */
+/* The data of a run between two steps: lanes pass it to the driver for a step that they cannot decide. */
 typedef struct {
   double t, since, length, shortened; /* since: the last event; length of the step before in this mode, or 0 */
-  int64_t steps, events, segment_steps, history;
+  int64_t steps, events, segment_steps, history, hits, kept; /* hits: of the section; kept: samples */
   int64_t *kinds;
   double *x;
   double *unknowns; /* of a set that is left: its direction, then h; not given back */
   int8_t *letter, *side; /* side: of stops */
   Recent *past;
   int32_t drop, itinerary, status; /* drop: first coefficients of the first guard that vanish */
-  int32_t near; /* 1 close to a set, 2 if its guard fell: the set is seen to instead of a step */
+  int32_t near; /* 1 close to a set, 2 if its guard fell: the set is treated instead of a step */
 } Suspended;
 
-/* The driver as lanes call it: a run, and what begins one or makes a step of it. */
+/* The driver as lanes call it: a run, and functions that begin it or make a step. */
 typedef struct {
   void *run;
   void (*begin)(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m);
   void (*step)(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m);
-  int64_t random; /* not 0: every other step is given to the driver, at random, which changes no result */
+  int64_t random; /* not 0: the driver makes every other step, at random, which changes no result */
 } Core;
 
-/* What a run is between two steps of a card, as words of 64 bits: ``begun`` is 0 where its start is not clear. The
+/* The data of a run between two steps of a GPU, as words of 64 bits: ``begun`` is 0 where its start is undecided. The
  * states follow, with time, then the sides of stops. */
 typedef struct {
   int64_t index;
@@ -88,13 +87,12 @@ typedef struct {
   int64_t steps, events, entered, shrinking, code, letter, drop, begun, kinds[SIMPLE_KINDS - 1];
 } Left;
 
-/* Itineraries of a card are numbers in base 4, digits from 1, the last mode lowest; one whose further modes have no
- * room is FROZEN too. */
+/* Itineraries on a GPU are numbers in base 4, digits from 1, the last mode lowest; FROZEN is set where modes overflow. */
 #define MOST_MODES 30
 #define FROZEN (1LL << 62)
 
-/* a * b + c, in lanes rounded once where the processor does that at once. The driver is compiled without
- * contraction and UNFUSED, so that it gives the same bits on every processor. */
+/* a * b + c, in lanes with one rounding where the processor has a fused operation. The driver is compiled without
+ * contraction and UNFUSED, so that its results are the same bits on every processor. */
 #if defined(UNFUSED)
 #define MULADD(a, b, c) ((a) * (b) + (c))
 #elif defined(__FMA__) || defined(__ARM_FEATURE_FMA) || defined(__FP_FAST_FMA)
@@ -103,10 +101,10 @@ typedef struct {
 #define MULADD(a, b, c) ((a) * (b) + (c))
 #endif
 
-/* Functions that compilers do not look into. */
+/* Functions that compilers neither inline nor clone. */
 #define OUTSIDE __attribute__((noinline, noclone, const))
 
-/* As fmax and fmin where b is a number, without the calls. */
+/* fmax and fmin for a number b, without the calls. */
 static inline double larger(double a, double b) { return a > b ? a : b; }
 static inline double smaller(double a, double b) { return a < b ? a : b; }
 static inline double ns_sign(double a) { return (a > 0) - (a < 0); }
@@ -147,7 +145,7 @@ static inline double value_at(const double *c, int n, double x) {
   return MULADD(x, odd, even);
 }
 
-/* Newton's steps near a root that rounding in Bernstein form has put a little late. */
+/* Newton steps near a root that rounding in Bernstein form placed slightly late. */
 static double polish_late(const double *c, int n, double x, double h) {
   double d, f = horner(c, n, x, &d);
   for (int it = 0; it < 4 && d != 0; it++) {
@@ -239,8 +237,8 @@ static double largest_root(const double *c, int n) {
   return 2.5 * most;
 }
 
-/* Whether a polynomial of which a step needs no more stays positive on [0, h]: the Bernstein coefficients of its
- * first terms are above the sum of the magnitudes of the rest. A tenth of the work of all coefficients. */
+/* Whether a polynomial stays positive on [0, h]: the Bernstein coefficients of its first terms exceed the sum of the
+ * magnitudes of the rest. A tenth of the work of all coefficients. */
 #define FIRST_TERMS 8
 static inline int stays_positive(const double *c, int n, double h) {
   double b[FIRST_TERMS + 1], power = 1, binomial = 1, rest = 0;
@@ -264,8 +262,8 @@ static inline int is_far(const double *c, int n, double h) {
   return c[0] > rest || (rest < LARGEST && stays_positive(c, n, h));
 }
 
-/* Bernstein coefficients of a polynomial that is not far from zero on [0, h], where h is shortened to what matters;
- * how often their sign changes. */
+/* Bernstein coefficients of a polynomial that is not far from zero on [0, h], and the number of their sign changes; h is
+ * shortened to the range of possible roots. */
 static int isolate(const double *c, int n, double *h, double *b) {
   double power = 1;
   int changes = 0;
@@ -273,7 +271,7 @@ static int isolate(const double *c, int n, double *h, double *b) {
   if (!(rest_of(c, n, *h) < ldexp(c[0], DEPTH))) *h = smaller(*h, largest_root(c, n));
   b[0] = c[0];
   for (int k = 1; k <= n; k++) { power *= *h; b[k] = c[k] * power; }
-  /* A touch that reaches zero by rounding is no root; rounding at t is ROUNDING sum |c_k| t^k. */
+  /* A minimum that reaches zero only by rounding, ROUNDING sum |c_k| t^k, is no root. */
   for (int k = 0; k <= n; k++) b[k] += ROUNDING * fabs(b[k]);
   bernstein(b, n);
   for (int k = 0; k < n; k++) changes += (b[k] > 0) != (b[k + 1] > 0);
@@ -296,7 +294,7 @@ static double first_low(const double *c, int n, double h, double errors, double 
   return first_root(b, n, h);
 }
 
-/* Whether a polynomial passes zero once near a root that is not hidden by its errors, which is where it is low. */
+/* Whether a polynomial passes zero exactly once near a root, despite its errors. */
 static int passes_once(const double *c, int n, double root, double low, double floor, double exact) {
   double d[P + 1], noise = fabs(c[n]), spread = 0, width;
   memcpy(d, c, sizeof(double) * (n + 1));
@@ -334,7 +332,7 @@ static int side_before(const double *c, int n, double t, double rounding) {
   return fabs(slope) * t > rounding ? (slope > 0 ? -1 : 1) : 0;
 }
 
-/* Whether a function that was on a side just before has passed zero at once, in a direction. */
+/* Whether a function leaves a side through zero in a direction, by its first nonzero coefficient. */
 static int passed(const double *c, int n, int side, int direction) {
   if (side * direction > 0) return 0;
   for (int k = 0; k <= n; k++) if (c[k] != 0) return c[k] * side < 0;
@@ -348,7 +346,7 @@ static inline int finite_all(const double *a, int n) {
 }
 
 #ifndef ON_DEVICE
-/* Modes met, as a tree: a node is an itinerary, its parent the itinerary without the last mode. */
+/* Itineraries as a tree: the parent of a node is its itinerary without the last mode. */
 typedef struct { int32_t parent, mode, child, sibling; } Node;
 typedef struct { Node *node; int32_t size, room; } Tree;
 

@@ -1,4 +1,4 @@
-/* The loop: expand, locate, check, advance, serve ------------------------------------------------------- */
+/* The loop: expand, locate, check, advance, process events ----------------------------------------------- */
 
 static int change_kind(const Run *r, int before, int after) {
   const int8_t *one = r->table->letter + (int64_t)before * r->table->width;
@@ -11,7 +11,7 @@ static int change_kind(const Run *r, int before, int after) {
   return slides > 0 ? ENTRY : slides < 0 ? EXIT : CROSSING;
 }
 
-/* Whether another mode is shown as the present one: close to a set or far from it is the same. */
+/* Whether results show another mode as the present one: near a set and far from it are the same. */
 static int is_alike(const Run *r, const int8_t *letter) {
   if (!r->s->sets) return 0;
   for (int i = 0; i < r->width; i++)
@@ -26,7 +26,6 @@ static void adopt(Run *r, const Continuation *c) {
   memcpy(r->drop, c->drop, sizeof(int32_t) * r->guards);
   memcpy(r->unknowns, c->unknowns, sizeof(double) * r->width);
   enter_mode(r);
-  r->repelling = 0;
   if (alike) return;
   int shown = shown_number(r, r->letter);
   if (r->s->sets && shown == r->shown) { /* a set is passed again: another stretch, of the same letters */
@@ -46,8 +45,8 @@ static int rests_unstably(const Run *r, const int8_t *letter) {
   return -1;
 }
 
-/* A surface that would come to rest beside one whose multiplier drives its rate away, and enters its second derivative
- * in the same way: motions leave such a point in turns of growing size, infinitely many. -1 if there is none. */
+/* A surface that would come to rest beside one whose multiplier has the same destabilising sign in its rate and its second
+ * derivative: motions leave such a point in infinitely many growing turns. -1 if there is none. */
 static int spirals_out(Run *r, const int8_t *letter) {
   int w = r->width, is_read = 0;
   for (int i = 0; i < r->m; i++)
@@ -64,7 +63,7 @@ static int spirals_out(Run *r, const int8_t *letter) {
   return -1;
 }
 
-/* Adopt the mode that continues; 0 where there is none or more than one. */
+/* Enter the only mode that can continue; 0 where there is none or more than one. */
 static int choose(Run *r, const int8_t *letter, const Known *known, int known_count) {
   if (r->active_count) {
     if (!decide(r, letter, known, known_count)) return 0;
@@ -95,7 +94,7 @@ static int letters_of(Run *r, int8_t *letter) {
   return finite;
 }
 
-/* A closed gap that is closing further is struck at once; one that opens has a known zero. */
+/* Apply an impact at a closed gap with negative rate; a gap that opens has a known zero. */
 static void strike_due(Run *r) {
   if (!r->c || r->status != RUNNING) return;
   const double *gap = gaps(r, r->x), *rate = gap + r->c;
@@ -108,9 +107,9 @@ static void strike_due(Run *r) {
   }
 }
 
-/* Find the mode of a state that was jumped to; whether complementarity conditions made it jump on. */
+/* Find the mode of a state after a jump; whether complementarity conditions made it jump again. */
 static int settle_in(Run *r) {
-  Met met = r->met;
+  Guard guard = r->guard;
   int before = r->mode, jumped = become_consistent(r);
   find_cells(r);
   letters_of(r, r->start);
@@ -120,16 +119,14 @@ static int settle_in(Run *r) {
   turn_cells(r);
   strike_due(r);
   if (jumped) event(r, JUMP, before, 0, r->jumped_from);
-  r->met = met;
+  r->guard = guard;
   return jumped;
 }
 
-/* Guards of the active elements in the mode that a run starts in: whether it can. Sliding from which both sides lead
- * away is kept. */
+/* Whether a run can start in a mode, by the guards of its active elements. Repelling sliding is accepted. */
 static int can_start(Run *r) {
   Expansion *e = &r->e;
-  int exits = 0, holds = 1;
-  double most = -INFINITY, least = INFINITY;
+  int holds = 1;
   expand(r, r->letter, r->x, r->unknowns, e);
   r->turned_mode = r->mode;
   for (int row = 0; row < e->l.rows; row++) {
@@ -141,13 +138,9 @@ static int can_start(Run *r) {
     if (!is_active(r, index)) continue;
     double value;
     r->drop[row] = leading(r, e, row, kind == SURFACE_GUARD || kind == NEAR_GUARD, &value);
-    if (kind != EXIT_GUARD) { holds &= value >= 0; continue; }
-    exits = 1;
-    most = larger(value, most);
-    least = smaller(value, least);
+    holds &= value >= 0; /* of sliding from which both sides lead away, too */
   }
-  r->repelling = exits && most <= 0 && least < 0;
-  return holds && (!exits || r->repelling || least >= 0);
+  return holds;
 }
 
 static void start_in(Run *r, const int8_t *asked) {
@@ -167,7 +160,7 @@ static void start_in(Run *r, const int8_t *asked) {
   if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
 }
 
-/* The size of the time: in it the states change by theirs, at the rates of the start. */
+/* The time scale: in it the states change by their own size at the rates of the start. */
 static void measure_time(Run *r) {
   double unit = r->o.t_end - r->t;
   r->time_size = r->size;
@@ -207,8 +200,7 @@ static void begin(Run *r, const int8_t *start_mode, const double *motion) {
   begin_events(r, motion);
 }
 
-/* Functions that are kept, and gaps that are negative by no more than the tolerance: by what the root's error
- * moves a neighbour. */
+/* Functions that are kept at zero, and gaps that the error of the root made negative, by no more than the tolerance. */
 static int with_touched(Run *r, int32_t *onto, int kept) {
   int all = kept;
   surface_values(r, r->x);
@@ -221,7 +213,7 @@ static int with_touched(Run *r, int32_t *onto, int kept) {
   return all;
 }
 
-/* Rates of contacts that an impact leaves at zero are so to the rounding of the state before it, not of that after. */
+/* Set rates of contacts to zero that are so after an impact to the rounding of the state before it. */
 static void keep_rates_zero(Run *r, const double *before, int32_t *involved, int count) {
   double *scale = r->small;
   int n = 0;
@@ -233,7 +225,7 @@ static void keep_rates_zero(Run *r, const double *before, int32_t *involved, int
   project(r, involved, n);
 }
 
-/* The impulses of a gap that closes, and of the contacts that are closed there. */
+/* Apply the impulses of a gap that closes and of the contacts that are closed. */
 static void impact(Run *r, int row) {
   int before = r->mode, contact = r->now.index[row] - r->m, count = 0;
   int32_t *involved = r->involved, *onto = involved, kept = kept_by(r, r->letter, onto);
@@ -279,7 +271,7 @@ static void watch_two_fold(Run *r) {
   if (s >= 0 && !(r->has_roots && nears_root(r)) && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
 }
 
-/* The motion from a guard of a surface or set, where the first coefficients of some guards are known to vanish. */
+/* Continue from a guard of a surface or set, where the first coefficients of some guards are known to vanish. */
 static void pass(Run *r, int row, const Known *known, int known_count) {
   int kind = r->now.kind[row], index = r->now.index[row], before = r->mode;
   active_surfaces(r, index, r->letter);
@@ -316,7 +308,7 @@ static void serve_half_line(Run *r, int row) {
 
 static void serve(Run *r, int row) {
   int kind = r->now.kind[row], index = r->now.index[row], side = r->now.side[row];
-  r->met = (Met){kind, index, side};
+  r->guard = (Guard){kind, index, side};
   pass_cells(r, row);
   if (kind != BRANCH_GUARD) law_of(r, index)->serve(r, row);
   else if (side == OF_ONE || is_mixed(r, r->now.sliding, r->now.slides)) pass(r, row, 0, 0);
@@ -326,7 +318,7 @@ static void serve(Run *r, int row) {
   }
 }
 
-/* 0 where the state after the step is not finite; the run then ends before it. */
+/* Advance by a step; 0 where the state after it is not finite: the run then ends before the step. */
 static int advance(Run *r, const Expansion *e, double dt) {
   int stride = r->stride, kept = 0;
   double *x = r->at_work;
@@ -376,21 +368,23 @@ static void leave_singular(Run *r, Expansion *e, double left) {
     if (!r->instant.side[a]) r->instant.side[a] = (int8_t)ns_sign(e->guards[(int64_t)(e->l.atoms + a) * r->stride]);
 }
 
-/* What a step is to do: its length, the guard at its end or -1, whether it reaches the end of the run. */
+/* A step: its length, the guard at its end or -1, whether it reaches the end of the run. */
 typedef struct { double dt; int row, last; } Piece;
 
-/* A Taylor step; 0 where nothing is left to do. */
+/* Plan a Taylor step; 0 where the run has ended. */
 static int taylor_piece(Run *r, double left, Piece *q) {
   Expansion *e = &r->e;
   double dt = 0;
   expand(r, r->letter, r->x, r->unknowns, e);
   if (!e->finite) { leave_singular(r, e, left); return 0; }
-  double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
+  double by_series = step_size(r, e), far = e->l.bent_count ? leave_out_far(r, e, left, by_series) : 0;
+  if (far > 0) by_series = smaller(step_size(r, e), far);
+  double h = smaller(by_series, r->o.max_step);
   if (h <= SHORTEST * time_scale(r) && h < left) {
     if (!ends_at_singular(r)) finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
     return 0;
   }
-  if (r->over) h = smaller(h, OVER * SHORTEST * time_scale(r)); /* a guard that changed nothing is passed over */
+  if (r->over) h = smaller(h, OVER * SHORTEST * time_scale(r)); /* step over a guard whose event changed nothing */
   r->over = 0;
   if (is_fold_ahead(r, e, by_series)) {
     int fold = reach_fold(r, e, left);
@@ -399,22 +393,25 @@ static int taylor_piece(Run *r, double left, Piece *q) {
   }
   int last = h >= left;
   if (last) h = left;
-  /* What happens at the end, to rounding, happens. */
+  /* Events at the end of the run, to rounding, are included. */
   double after = AT_END * (time_scale(r) + h);
   int row = first_hit(r, e, last ? h + after : h, &dt);
   dt = row >= 0 ? smaller(dt, h) : last ? h : to_number(r, h);
   if (row >= 0 && is_before_fold(r, e, row, dt)) { dt = to_number(r, 0.5 * dt); row = -1; last = 0; }
   if (r->hold < dt) { dt = r->hold; row = -1; last = 0; } else r->hold = INFINITY;
-  double wanted = dt, safe = safe_length(r, e, by_series), good;
-  while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
+  double requested = dt, safe = safe_length(r, e, by_series), good;
+  while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == requested ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
   int grows = r->mode == r->length_mode && dt > r->length / STEADY;
-  int shrinks = dt <= wanted / FAR && !grows;
+  int shrinks = dt <= requested / FAR && !grows;
   r->shortened = larger(0, r->shortened + (shrinks ? 1 : -0.2));
   r->length_mode = r->mode;
-  r->length = dt == wanted ? h : dt;
-  int swallowed = dt < wanted && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
-  if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return 0; }
-  if (dt < wanted) row = -1, last = 0;
+  r->length = dt == requested ? h : dt;
+  int swallowed = dt < requested && dt <= SHORTEST * time_scale(r); /* close to t = 0 steps may be tiny */
+  if (r->shortened >= SHORTENED || swallowed) {
+    if (!(r->has_roots && ends_at_singular(r))) finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0);
+    return 0;
+  }
+  if (dt < requested) row = -1, last = 0;
   if (row < 0) watch_decay(r, e, by_series);
   if (r->wants_program) return 0;
   *q = (Piece){dt, row, last && dt == h};
@@ -464,7 +461,7 @@ static void step(Run *r) {
   else if (q.row >= 0) {
     int64_t events = r->event_count;
     serve_between(r, q.row);
-    if (r->event_count == events && q.dt <= SHORTEST * time_scale(r)) { /* back where it was */
+    if (r->event_count == events && q.dt <= SHORTEST * time_scale(r)) { /* no progress */
       r->shortened++;
       int is_exit = r->now.kind[q.row] == EXIT_GUARD && has_law(r, r->now.index[q.row], SURFACE_LAW);
       r->over = r->status == RUNNING && is_exit;
@@ -472,7 +469,7 @@ static void step(Run *r) {
     }
   }
   else if (!q.last) {
-    if (r->s->sets) look_at_sets(r);
+    if (r->s->sets) check_sets(r);
     watch_two_fold(r);
   }
 }

@@ -32,7 +32,7 @@ static size_t place_run(Run *to, char *base) {
   const System *s = to->s;
   size_t n = to->n, m = to->m, w = to->width, c = to->c, all = to->kept_rows, rows = to->guards, stride = to->stride;
   size_t used = 0, jumping = 0, q = s->combined, tried = m < MOST_ENUMERATED ? m : MOST_ENUMERATED, sums = tried * (tried - (tried > 0)) / 2;
-  size_t most = s->point.size > s->columns.size ? s->point.size : s->columns.size;
+  size_t most = larger(larger(s->point.size, s->columns.size), larger(s->surfaces.size, s->atoms.size));
   size_t atoms = s->rules.atoms, triggers = s->rules.triggers, clocks = s->rules.clocks;
   Run *r = to;
   for (size_t i = 0; i < m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;
@@ -54,7 +54,7 @@ double polynomial_crossing(const double *c, int32_t n, double h, int32_t directi
   return first_crossing(c, n, h, direction);
 }
 
-/* What is proved of -dw/dnu of surfaces, of n rows. */
+/* Certificate of -dw/dnu of surfaces, of n rows. */
 int32_t law_certificate(const double *m, int32_t n) {
   double *work = malloc(sizeof(double) * (4 * (size_t)n * n + 4 * n) + sizeof(int32_t) * n);
   int32_t found = work ? certificate(m, n, 0, work, (int32_t *)(work + 4 * (int64_t)n * n + 4 * n)) : NOTHING;
@@ -62,7 +62,7 @@ int32_t law_certificate(const double *m, int32_t n) {
   return found;
 }
 
-/* The multipliers in [-1, 1] of surfaces with the rates a - m nu, where that is unique; whether it is found. */
+/* Find the unique multipliers in [-1, 1] of surfaces with the rates a - m nu; whether they were found. */
 int32_t law_solution(const double *a, const double *m, int32_t n, double *nu) {
   size_t square = (size_t)n * n, doubles = 60 * square + 100 * (size_t)n;
   double *work = calloc(doubles, sizeof(double));
@@ -102,13 +102,13 @@ Run *run_new(const System *s, Table *table) {
 }
 void run_free(Run *r) { end_implicit(r); free(r->arena); free(r); }
 
-/* Times at which the run is read: no approximation of the motion may span one of them. */
+/* Sample times: no approximation of the motion spans one of them. */
 void run_read_at(Run *r, const double *times, int64_t count) { r->read_at = times; r->read_count = count; }
 
-/* Letters from which elements with hysteresis go on, or none. */
+/* Initial letters of elements with hysteresis, or none. */
 void run_remember(Run *r, const int8_t *letter) { r->remembered = letter; }
 
-/* What follows from the parameters, in all programs. */
+/* Evaluate the parts of all programs that depend on parameters only. */
 static void prepare(Run *r) {
   const System *s = r->s;
   const Values *program[] = {&s->point, &s->surfaces, &s->maps, &s->restitution, &s->columns, &s->atoms, &s->choices};
@@ -139,7 +139,7 @@ static void clear(Run *r, const Options *o, Pair t) {
   r->instant.running = 0;
   r->instant.tied = -1;
   memset(r->instant.passing, 0, s->rules.atoms);
-  memset(r->instant.unmet, 0, s->rules.triggers);
+  memset(r->instant.unfired, 0, s->rules.triggers);
   memset(&r->since, 0, offsetof(Run, past) - offsetof(Run, since));
   end_implicit(r);
   r->hold = INFINITY;
@@ -184,9 +184,9 @@ static int go_on(Run *r, int64_t *budget) {
 
 int run_continue(Run *r, int64_t budget) { return go_on(r, &budget); }
 
-/* The first stop or reset whose condition was true at the start and that has not happened; -1 if there is none. */
-static int unmet_event(const Run *r) {
-  for (int k = 0; k < r->s->rules.triggers; k++) if (r->instant.unmet[k]) return r->s->rules.trigger_event[k];
+/* The first stop or reset whose condition was true at the start and that has not fired; -1 if there is none. */
+static int unfired_event(const Run *r) {
+  for (int k = 0; k < r->s->rules.triggers; k++) if (r->instant.unfired[k]) return r->s->rules.trigger_event[k];
   return -1;
 }
 
@@ -198,14 +198,14 @@ void run_read(const Run *r, double *numbers, int64_t *counts, int32_t *active, i
   numbers[3] = r->t_error;
   int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count, r->event_count,
                     r->out.steps, r->out.points, r->out.events, r->active_count, r->several_count, r->facts,
-                    unmet_event(r), r->implicit_count};
+                    unfired_event(r), r->implicit_count};
   memcpy(counts, head, sizeof head);
   memcpy(active, r->active, sizeof(int32_t) * r->active_count);
   memcpy(several, r->several, sizeof(int32_t) * r->several_count);
   memcpy(rates, r->rates_of_several, sizeof(double) * r->several_count * r->n);
 }
 
-/* What a restart needs, besides the state. */
+/* The data of a restart, besides the state. */
 void run_motion(const Run *r, double *to) { write_motion(r, to); }
 
 /* Go on with larger arrays of the same content. */
@@ -235,9 +235,9 @@ static void keep(Run *r, const Batch *b, int64_t i) {
   b->totals[1] += r->event_count;
 }
 
-/* Steps of runs that are lanes' between them ------------------------------------------------------- */
+/* Single steps of runs of the lanes ------------------------------------------------------------------ */
 
-/* Whether a set is reached, or far and has been so for a step. */
+/* Whether the state is on a set, or has been far from it for a step. */
 static int is_apart(Run *r, int f) {
   int k = size_of(r, f);
   if (r->letter[f] == 0 || r->letter[f] > OFF) return r->letter[f] == 0;
@@ -245,8 +245,7 @@ static int is_apart(Run *r, int f) {
   return length_of(h + f, k) > CLOSE * scale_of_set(r, f, scales_of);
 }
 
-/* Whether lanes can go on from here: nothing is to be served or told apart, and only a surface's guard has
- * known zeros. */
+/* Whether lanes can continue: no event is due, no zeros coincide, and only a surface's guard has known zeros. */
 static int is_plain(Run *r) {
   if (r->instant.running || r->due_impact >= 0 || r->hold < INFINITY) return 0;
   for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m || r->s->sets ? 0 : 2)) return 0;
@@ -255,10 +254,10 @@ static int is_plain(Run *r) {
   return 1;
 }
 
-/* What a run is between two steps, here and as lanes have it. */
+/* The data of a run between two steps, here and in lanes. */
 #define GOES_ON(OF) \
   OF(t, t) OF(since, since) OF(shortened, shortened) OF(step_count, steps) OF(event_count, events) \
-  OF(segment_steps, segment_steps) OF(itinerary, itinerary) OF(history, history)
+  OF(segment_steps, segment_steps) OF(itinerary, itinerary) OF(history, history) OF(hits, hits) OF(kept, kept)
 #define TAKEN(here, there) r->here = m->there;
 #define GIVEN(here, there) m->there = r->here;
 
@@ -267,6 +266,7 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   static const Output none;
   clear(r, o, (Pair){b->t0, 0});
   r->out = none;
+  sample_into(r, b, i);
   if (b->p_stride || !r->prepared) {
     set_parameters(r, b->p + i * b->p_stride);
     find_idle(r);
@@ -294,12 +294,12 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   if (m->length > 0) r->length_mode = r->mode;
   for (int k = 0; k < HISTORY && k < m->history; k++) {
     int64_t pattern = m->past[k].pattern;
-    Met met = {(int)(pattern >> 32 & 255), (int)(int32_t)pattern, 0};
-    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(pattern >> 40), met};
+    Guard guard = {(int)(pattern >> 32 & 255), (int)(int32_t)pattern, 0};
+    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(pattern >> 40), guard};
   }
 }
 
-/* Give a run back, or store it where it ended. */
+/* Return a run to the lanes, or store its end. */
 static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
   int64_t first = m->history > r->history - HISTORY ? m->history : r->history - HISTORY;
   m->status = r->status;
@@ -321,27 +321,28 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
 }
 
 static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Suspended *m) {
-  while (r->status == RUNNING && (r->t >= r->o.t_end || !is_plain(r))) step(r); /* lanes give the end no mode */
+  while (r->status == RUNNING && (r->t >= r->o.t_end || !is_plain(r))) step(r); /* lanes do not decide a mode at the end */
   give(r, b, i, m);
 }
 
-/* Begin a run whose start is not clear to lanes. */
+/* Begin a run whose start the lanes cannot decide. */
 void core_begin(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m) {
   static const Output none;
   Run *r = run;
-  m->history = 0;
+  m->history = m->hits = m->kept = 0;
+  sample_into(r, b, i);
   run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, 0, b->t0, 0);
   go_on_until_plain(r, b, i, m);
 }
 
-/* The event that is kept, if it has happened. */
+/* Read the kept event, if it has occurred. */
 static void read_kept(Run *r, const Batch *b, int64_t i) {
   if (!b->at_x) return;
   r->at_t = b->at_t[i];
   memcpy(r->at_x, b->at_x + i * r->s->dimension, sizeof(double) * r->s->dimension);
 }
 
-/* Make the step that is not clear to lanes. */
+/* Make the step that the lanes cannot decide. */
 void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m) {
   Run *r = run;
   take(r, b, o, i, m);
@@ -363,7 +364,7 @@ Tree *lanes_tree(Run *r) {
   return &r->table->tree;
 }
 
-/* Runs that a card leaves -------------------------------------------------------------------------- */
+/* Runs that a GPU leaves to the driver --------------------------------------------------------------- */
 
 static int32_t node_of(Tree *tree, int64_t code) {
   int32_t node = 0;
@@ -382,7 +383,7 @@ static int64_t code_of(const Tree *tree, int32_t node) {
   return code;
 }
 
-/* A run of a card as the driver takes it over; ``past``, ``letter`` and ``side`` have room for it. */
+/* A run of a GPU as the driver continues it, in ``past``, ``letter`` and ``side``. */
 static Suspended suspended_of(Run *r, Left *left, Recent *past, int8_t *letter, int8_t *side) {
   double *x = (double *)(left + 1);
   const int64_t *above = (const int64_t *)(x + r->n);
@@ -394,7 +395,7 @@ static Suspended suspended_of(Run *r, Left *left, Recent *past, int8_t *letter, 
       .past = past, .drop = (int32_t)left->drop, .itinerary = node_of(&r->table->tree, left->code)};
 }
 
-/* Make the step that is not clear on a card: the record is that of its end, or the status is where the run ended. */
+/* Make the step that the GPU cannot decide: the record is that of its end, or the status that of the run's end. */
 static void step_left(Run *r, const Batch *b, const Options *o, int64_t i, Left *left) {
   Recent past[HISTORY];
   int8_t letter, side[r->s->stops + 1];
@@ -413,12 +414,11 @@ static void step_left(Run *r, const Batch *b, const Options *o, int64_t i, Left 
   left->drop = m.drop;
   left->begun = 1;
   if (!(left->code & FROZEN)) left->code = code_of(&r->table->tree, m.itinerary);
-  b->status[i] = HAND_OVER;
+  b->status[i] = FALL_BACK;
 }
 
-/* Run a batch, ``budget`` steps of it at most, from records of ``width`` words that a card left, where they have begun, or
- * none; 0, or why something is left for another call. ``next`` is zero before the first, twice the number of runs done
- * after it, and one more within a run. */
+/* Run a batch for at most ``budget`` steps, from records of ``width`` words that a GPU left or from none; 0, or the reason
+ * for another call. ``next`` is zero before the first call, then twice the number of runs done, plus one within a run. */
 static int run_all(Run *r, int64_t *next, const Batch *b, const Options *o, const int8_t *start_mode, int64_t *records,
                    int64_t width, int64_t budget) {
   static const Output none;
@@ -445,8 +445,8 @@ int run_many(Run *r, int64_t *next, const Batch *b, const Options *o, const int8
   return run_all(r, next, b, o, start_mode, 0, 0, budget);
 }
 
-/* Continue the runs that a card left: for a step, so that those with the status HAND_OVER go on from their records, or to
- * their ends. */
+/* Continue the runs that a GPU left: for one step, after which runs with the status FALL_BACK continue from their records,
+ * or to their ends. */
 int run_left(Run *r, int64_t *next, const Batch *b, const Options *o, int64_t *records, int64_t width, int to_end,
              int64_t budget) {
   if (to_end) return run_all(r, next, b, o, 0, records, width, budget);

@@ -1,9 +1,9 @@
-/* The instant: what happens at one time, one jump after another ------------------------------------------
+/* Events at one instant, one jump after another ---------------------------------------------------------
  *
- * Events have conditions: trees over sides of atoms, the guards of stops and resets and the further functions of
- * relations. A side is kept, and changes only where the motion passes the atom's zero, where a jump leads clearly
- * to the other side, and where the motion leaves the zero at the end of an instant. ``view`` has the sides as the
- * jumps so far have made them. The law is the contract of events, sections 3 and 4.
+ * Conditions of events are trees over sides of atoms: the guards of stops and resets and the further functions of
+ * relations. A side changes only where the motion passes the atom's zero, where a jump leads clearly to the other side,
+ * and where the motion leaves the zero at the end of an instant. ``view`` has the sides after the jumps so far. The law
+ * is the contract of events, sections 3 and 4.
  */
 enum { LEVEL = 1, BY_JUMPS = 2, PERSISTENT = 4, AT_TRIGGER = 8 };
 
@@ -28,9 +28,9 @@ static int passes_filter(const Run *r, int event, const int8_t *side) {
   return is_true(u->filter + u->filter_at[event], u->filter_at[event + 1] - u->filter_at[event], side);
 }
 
-/* Values of the atoms at a state, and which of them are zero to rounding; what was zero, and is not moved by more
- * than the error of its root, still is. */
-static void look(Run *r, const double *x) {
+/* Values of the atoms at a state, and which of them are zero to rounding. An atom stays zero unless a jump moves it by more
+ * than the error of its root. */
+static void evaluate_atoms(Run *r, const double *x) {
   const System *s = r->s;
   Instant *i = &r->instant;
   double *weight = r->vector;
@@ -39,7 +39,7 @@ static void look(Run *r, const double *x) {
   gradient_sums(r, &s->atoms, r->atom_work, s->rules.atoms, &s->atom_gradient, s->rules.atoms, weight, 1, i->noise);
   for (int a = 0; a < s->rules.atoms; a++) {
     i->value[a] = out_of(&s->atoms, r->atom_work, a);
-    i->zero[a] = fabs(i->value[a]) <= VANISHES * i->noise[a] + 2 * i->residual[a];
+    i->zero[a] = fabs(i->value[a]) <= ON_GUARD * i->noise[a] + 2 * i->residual[a];
   }
 }
 
@@ -51,13 +51,13 @@ static void pend(Run *r, int k) {
   if (r->s->rules.keeps) memcpy(i->trigger_x + (int64_t)k * r->n, r->x, sizeof(double) * r->n);
 }
 
-/* Which conditions hold, before a change of the sides. */
+/* Store the truth values of the conditions before a change of sides. */
 static void keep_truths(Run *r) {
   Instant *i = &r->instant;
   for (int k = 0; k < r->s->rules.triggers; k++) i->was[k] = triggers(r, k, i->side) || triggers(r, k, i->view);
 }
 
-/* What has become true since, unless the event that jumped made it so. */
+/* Mark conditions that have become true since as pending, except those of the event that jumped. */
 static void pend_new(Run *r, int jumped) {
   const Rules *u = &r->s->rules;
   for (int k = 0; k < u->triggers; k++) {
@@ -72,8 +72,8 @@ static int is_filtered(Run *r, int event) {
   return out_of(&r->s->choices, r->choice_work, event) != 0;
 }
 
-/* Whether a level event is due: while its condition and its filter hold in view. One with an atom at zero waits
- * for the motion that follows, except before the first jump, where view decides. */
+/* Whether a level event is due: its condition and filter are true in view. One with an atom at zero waits for the motion
+ * that follows, except before the first jump. */
 static int is_level_due(const Run *r, int event) {
   const Rules *u = &r->s->rules;
   const Instant *i = &r->instant;
@@ -89,7 +89,7 @@ static int is_level_due(const Run *r, int event) {
   return 1;
 }
 
-/* The event that is served next, -1 if none is due: stops, then resets by priority, then in their order. */
+/* The next due event, or -1: stops, then resets by priority, then in their order. */
 static int next_event(Run *r) {
   const Rules *u = &r->s->rules;
   Instant *i = &r->instant;
@@ -111,7 +111,7 @@ static int next_event(Run *r) {
   return best;
 }
 
-/* The state after a reset; the time is kept. */
+/* The state after a reset, at the same time. */
 static void reset_map(Run *r, int index, const double *x, double *after) {
   int nd = r->s->dimension;
   values_at(&r->s->maps, x, r->p, r->maps);
@@ -119,7 +119,7 @@ static void reset_map(Run *r, int index, const double *x, double *after) {
   if (r->s->timed) after[nd] = x[nd];
 }
 
-/* The ticks of a clock are counted from its next one, a time of two numbers. */
+/* Count the ticks of a clock from its next one, whose time is two numbers. */
 static void count_ticks(Run *r, int c) {
   double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
   double left = period - r->x[r->s->rules.clock_state[c]], sum = r->t + left, moved = sum - r->t;
@@ -128,7 +128,7 @@ static void count_ticks(Run *r, int c) {
   r->instant.count[c] = 0;
 }
 
-/* Clocks after a jump of an event: their ticks are counted, and counted anew where a jump moved the phase. */
+/* Count the ticks of clocks after a jump, from zero where the jump moved the phase. */
 static void set_clocks(Run *r, int event, const double *before) {
   const Rules *u = &r->s->rules;
   Instant *i = &r->instant;
@@ -139,7 +139,7 @@ static void set_clocks(Run *r, int event, const double *before) {
   }
 }
 
-/* Whether discrete states have their values; those without a list may have any. */
+/* Whether discrete states have values of their lists, if they have one. */
 static int has_values(const Run *r) {
   const Rules *u = &r->s->rules;
   for (int d = 0; d < u->discrete; d++) {
@@ -154,7 +154,7 @@ static int has_values(const Run *r) {
 /* The state and the sides after a jump. */
 static void after_jump(Run *r, int event) {
   Instant *i = &r->instant;
-  look(r, r->x);
+  evaluate_atoms(r, r->x);
   for (int a = 0; a < r->s->rules.atoms; a++) {
     if (i->zero[a]) continue; /* both sides are kept until the motion decides */
     i->side[a] = i->view[a] = (int8_t)sign_of(i->value[a]);
@@ -165,7 +165,7 @@ static void after_jump(Run *r, int event) {
   i->first = i->settled = 0;
 }
 
-/* An instant begins here: ``tied`` is a guard of the mode that is due at its end, or -1. */
+/* Begin an instant: ``tied`` is a guard of the mode that is due at its end, or -1. */
 static void begin_instant(Run *r, int tied) {
   Instant *i = &r->instant;
   i->running = i->first = 1;
@@ -178,7 +178,7 @@ static void begin_instant(Run *r, int tied) {
   memcpy(i->arrived, r->x, sizeof(double) * r->n);
 }
 
-/* All that a run is besides its state: what a restart needs, also amid an instant. */
+/* Write the data of a restart besides the state, also within an instant. */
 static void write_motion(const Run *r, double *to) {
   const Rules *u = &r->s->rules;
   const Instant *i = &r->instant;
@@ -218,7 +218,7 @@ static void read_motion(Run *r, const double *from) {
   for (int k = 0; u->keeps && r->s->timed && k < u->triggers; k++) i->trigger_x[(k + 1) * r->n - 1] = 0; /* this time */
 }
 
-/* Serve an event: one jump, or the end of the run. */
+/* Process an event: one jump, or the end of the run. */
 static void serve_event(Run *r, int served) {
   const Rules *u = &r->s->rules;
   Instant *i = &r->instant;
@@ -227,9 +227,9 @@ static void serve_event(Run *r, int served) {
   for (int k = u->triggers - 1; k >= 0; k--)
     if (u->trigger_event[k] == served) {
       if (i->pending[k]) kept = k;
-      i->pending[k] = i->unmet[k] = 0;
+      i->pending[k] = i->unfired[k] = 0;
     }
-  r->met = (Met){r->now.kind[row], r->now.index[row], r->now.side[row]};
+  r->guard = (Guard){r->now.kind[row], r->now.index[row], r->now.side[row]};
   i->last = served;
   if (served < r->s->stops) {
     event(r, STOP, r->mode, row, r->x);
@@ -257,7 +257,7 @@ static void serve_event(Run *r, int served) {
   event(r, RESET, r->mode, row, x);
 }
 
-/* Whether the own map of an event leaves the motion pressed against its zero: a reset has no contact. */
+/* Whether an event's own map leaves the motion directed into its zero: a reset has no contact force. */
 static int is_pressed(Run *r, int atom, int zeros, int sign) {
   const Rules *u = &r->s->rules;
   int event = r->instant.last, before = r->instant.side[atom];
@@ -277,7 +277,7 @@ static void keep_germ(const Run *r, const double *g, double dt, double *germ) {
   memcpy(germ, c + 1, sizeof(double) * GERM);
 }
 
-/* Whether an atom that is passed goes on as it arrived: what a multiple zero leaves is then no motion that turns. */
+/* Whether an atom that passed zero continues as it arrived: rounding at a multiple zero is then no reversal. */
 static int goes_on(const Run *r, int atom) {
   const double *germ = r->instant.germ + GERM * atom;
   const double *g = r->e.guards + (int64_t)(r->now.atoms + atom) * r->stride;
@@ -288,7 +288,7 @@ static int goes_on(const Run *r, int atom) {
   return 1;
 }
 
-/* Sides of the atoms at zero by the first coefficient of the motion that follows that is not zero. */
+/* Set sides of the atoms at zero by the first nonzero coefficient of the motion that follows. */
 static void leave_zeros(Run *r) {
   Instant *i = &r->instant;
   int any = 0, atoms = r->s->rules.atoms;
@@ -313,7 +313,7 @@ static void leave_zeros(Run *r) {
   }
 }
 
-/* The events of an instant have their mode once the last one is served; where the run is sampled, too. */
+/* Set the mode of an instant's events and samples after the last event. */
 static void end_instant(Run *r) {
   Instant *i = &r->instant;
   i->running = 0;
@@ -335,12 +335,11 @@ static void end_instant(Run *r) {
   if (r->event_count == i->counted) return;
   int before = r->mode;
   see_limit(r);
-  if (r->mode != before && r->status == RUNNING) { look(r, r->x); leave_zeros(r); }
+  if (r->mode != before && r->status == RUNNING) { evaluate_atoms(r, r->x); leave_zeros(r); }
   if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
 }
 
-/* Nothing more is due before the mode is chosen: what else happens at this instant, the mode, and the sides of the
- * motion that follows. */
+/* Finish an instant without due events: the tied guard, the mode, and the sides of the motion that follows. */
 static void settle_instant(Run *r) {
   Instant *i = &r->instant;
   int row = i->tied, kind = row < 0 ? -1 : r->now.kind[row], jumped = i->unsettled;
@@ -380,7 +379,7 @@ static void instant_next(Run *r) {
   serve_event(r, event);
 }
 
-/* Atoms are passed at the end of a step; those that were not located, as nothing is due by them, too. */
+/* Pass atoms at the end of a step, also those that were not located because no event depends on them. */
 static void arrive(Run *r, const Expansion *e, double dt, int tied) {
   const Rules *u = &r->s->rules;
   Instant *i = &r->instant;
@@ -393,7 +392,7 @@ static void arrive(Run *r, const Expansion *e, double dt, int tied) {
       if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
       renote(r);
     }
-  look(r, r->x);
+  evaluate_atoms(r, r->x);
   for (int a = 0; a < u->atoms; a++) {
     double slope;
     if (i->zero[a] && !i->passing[a] && i->side[a] && u->way[a] != UNWATCHED) {
@@ -409,7 +408,7 @@ static void arrive(Run *r, const Expansion *e, double dt, int tied) {
   for (int k = 0; k < u->triggers; k++) if (!triggers(r, k, i->side) && triggers(r, k, i->view)) pend(r, k);
 }
 
-/* A guard of the mode is served; it may be a jump, and the motion may leave the zeros of atoms. */
+/* Process a guard of the mode; it may be a jump, and the motion may leave the zeros of atoms. */
 static void serve_between(Run *r, int row) {
   if (!r->s->rules.atoms) { serve(r, row); return; }
   begin_instant(r, -1);
@@ -419,7 +418,7 @@ static void serve_between(Run *r, int row) {
   if (r->status == RUNNING) after_jump(r, -1);
 }
 
-/* Whether the own map of a reset without a direction would turn the motion round at a start on its zero. */
+/* Whether a reset without a direction would reverse the motion at a start on its zero. */
 static int turns_round(Run *r, int event, int zeros, double value) {
   double *after = r->at_work, back;
   int row = r->now.atoms + event;
@@ -429,7 +428,8 @@ static int turns_round(Run *r, int event, int zeros, double value) {
   return again > 0 && (back * value <= 0 || (again < zeros ? again : zeros) > 1);
 }
 
-/* What is due at the start: on its zero a reset, if the motion goes in; level events and those that say so. */
+/* Find the events that are due at the start: resets on whose zero the motion enters, level events, events with
+ * ``initially``. */
 static void begin_events(Run *r, const double *motion) {
   const Rules *u = &r->s->rules;
   Instant *i = &r->instant;
@@ -439,7 +439,7 @@ static void begin_events(Run *r, const double *motion) {
   memset(i->pending, 0, u->triggers);
   memset(i->passing, 0, u->atoms);
   for (int c = 0; c < u->clocks; c++) count_ticks(r, c);
-  look(r, r->x);
+  evaluate_atoms(r, r->x);
   if (motion) {
     read_motion(r, motion);
     if (i->running) { i->unsettled |= !i->settled; return; }
@@ -457,10 +457,10 @@ static void begin_events(Run *r, const double *motion) {
   for (int k = 0; k < u->triggers; k++) {
     int event = u->trigger_event[k], two = (k && u->trigger_event[k - 1] == event)
                                            || (k + 1 < u->triggers && u->trigger_event[k + 1] == event);
-    int arrived = triggers(r, k, i->side) && !triggers(r, k, i->now), wanted = u->initially[event];
-    if (wanted > 0 ? triggers(r, k, i->side) : wanted < 0 && event >= r->s->stops && arrived && !two) pend(r, k);
-    i->unmet[k] = wanted < 0 && !two && !(u->flags[event] & LEVEL) && !i->pending[k] && triggers(r, k, i->side);
-    if (two && wanted < 0 && event >= r->s->stops && arrived && i->zero[event]
+    int arrived = triggers(r, k, i->side) && !triggers(r, k, i->now), initial = u->initially[event];
+    if (initial > 0 ? triggers(r, k, i->side) : initial < 0 && event >= r->s->stops && arrived && !two) pend(r, k);
+    i->unfired[k] = initial < 0 && !two && !(u->flags[event] & LEVEL) && !i->pending[k] && triggers(r, k, i->side);
+    if (two && initial < 0 && event >= r->s->stops && arrived && i->zero[event]
         && turns_round(r, event, r->drop[r->now.atoms + event], i->side[event]))
       finish(r, NON_UNIQUE, TWO_SIDED, event - r->s->stops);
   }

@@ -10,7 +10,7 @@ static const double *slope_row(const Run *r, int i, int j) {
   return output < 0 ? zero : row_of(r, r->n + 3 * r->width + r->s->rules.atoms + output);
 }
 
-/* Guards from the series (or, with count 1, values) of what they are made of. */
+/* Guards from the series (or, with count 1, values) of their functions. */
 static void guard_rows(Run *r, const Layout *l, const double *series, int count, double *guards) {
   for (int row = 0; row < l->rows; row++) {
     double *g = guards + (int64_t)row * r->stride;
@@ -20,7 +20,7 @@ static void guard_rows(Run *r, const Layout *l, const double *series, int count,
   }
 }
 
-/* Coefficients k of the multipliers that slide keep those of the layer's rates at zero. */
+/* Coefficients k of sliding multipliers, which keep those of the layer's rates at zero. */
 static void follow_layer(Run *r, Expansion *e, int k, const int32_t *start) {
   int slides = e->l.slides;
   for (int i = 0; i < slides; i++) {
@@ -46,7 +46,7 @@ static void inputs_of(Run *r, const Expansion *e, int k) {
   set_inputs(r, x, held, lam);
 }
 
-/* The state that alone a surface is a function of, or -1. */
+/* The only state on which a surface depends, or -1. */
 static int only_state(const Run *r, int surface) {
   const Entries *g = &r->s->surface_gradient;
   int found = -1;
@@ -58,7 +58,7 @@ static int only_state(const Run *r, int surface) {
   return found;
 }
 
-/* States of which a root is taken do not move at all where that is zero. */
+/* States under a root do not move where the root is zero. */
 static void next_states(Run *r, Expansion *e, int k) {
   for (int i = 0; i < r->n; i++) e->states[(int64_t)i * r->stride + k + 1] = row_of(r, i)[k] * PART[k + 1];
   for (int j = 0; r->has_roots && j < e->l.slides; j++) {
@@ -67,7 +67,7 @@ static void next_states(Run *r, Expansion *e, int k) {
   }
 }
 
-/* Coefficients k of all that is known without unknowns of that order, directions of sets with them. */
+/* Coefficients k of all rules that do not depend on unknowns of order k, and of directions of sets. */
 static void open_order(Run *r, Expansion *e, int k) {
   const Series *t = r->s->sets && e->l.is_free ? &r->s->free : &r->s->series;
   inputs_of(r, e, k);
@@ -79,15 +79,15 @@ static void open_order(Run *r, Expansion *e, int k) {
   series_at(t, &t->late, k, r->stride, r->input, r->series);
 }
 
-/* What the unknowns of order k add. */
+/* Coefficients k of the rules that depend on unknowns of order k. */
 static void close_order(Run *r, Expansion *e, int k) {
   const Series *t = r->s->sets && e->l.is_free ? &r->s->free : &r->s->series;
   inputs_of(r, e, k);
   series_at(t, k ? &t->late : &t->moving, k, r->stride, r->input, r->series);
 }
 
-/* Rounding in the multipliers leaves functions that are kept at zero a rate, which a state at rest would follow for as
- * long as it rests: the field's part along their gradients is taken away. */
+/* Remove the field's component along the gradients of functions that are kept at zero: rounding in the multipliers leaves
+ * it, and a state at rest would drift. */
 static void keep_rates(Run *r, Expansion *e) {
   const Entries *g = &r->s->height_gradient;
   int first = 2 * r->width + r->s->slope.count + r->s->layer_gradient.count, stride = r->stride;
@@ -109,7 +109,7 @@ static void keep_rates(Run *r, Expansion *e) {
   }
 }
 
-/* Coefficients of all that a mode with sets needs; ``start`` are places in the inverse. */
+/* All coefficients of a mode with sets; ``start`` are offsets in the inverse. */
 static void set_series(Run *r, Expansion *e, const int32_t *start) {
   int leaving = 0;
   EACH_LEAVING(r, e, f) leaving = 1;
@@ -130,7 +130,7 @@ static void set_series(Run *r, Expansion *e, const int32_t *start) {
   }
 }
 
-/* The same without sets: states' coefficients go from the field's rows to those of the inputs. */
+/* All coefficients of a mode without sets: those of the field give the next ones of the states. */
 static void mode_series(Run *r, Expansion *e, const int32_t *start) {
   const Series *t = e->l.is_free ? &r->s->free : &r->s->series;
   int order = r->order, stride = r->stride, slides = e->l.slides;
@@ -168,7 +168,7 @@ static void mode_series(Run *r, Expansion *e, const int32_t *start) {
   series_rules(t, &t->after, 1, order, stride, s);
 }
 
-/* First coefficients, values of the outputs, from r->input. */
+/* Values of the outputs at r->input. */
 static void first_values(Run *r, int is_free) {
   const Series *t = is_free ? &r->s->free : &r->s->series;
   series_at(t, &t->values, 0, r->stride, r->input, r->series);
@@ -204,8 +204,8 @@ static void jets(Run *r, Expansion *e) {
   guard_rows(r, &e->l, e->series, r->order + 1, e->guards);
 }
 
-/* A coefficient that is not finite makes all later ones so, or is the first: the field, which is not used
- * again where a logarithm's argument is negative. */
+/* Whether all coefficients are finite: one that is not makes all later ones so, except in the field itself, which is not
+ * used again where a logarithm's argument is negative. */
 static int is_finite(const Run *r, const Expansion *e) {
   int order = r->order, stride = r->stride;
   double one = 0, two = 0, three = 0;
@@ -220,12 +220,12 @@ static int is_finite(const Run *r, const Expansion *e) {
   return one + two + three == 0;
 }
 
-/* Whether a mode's unknowns may be such that some make no difference. */
+/* Whether a mode's layer slope may be singular. */
 static int may_be_singular(const Run *r, const Layout *l) {
   return l->slides > 1 || (l->slides && is_half_line(r, l->sliding[0]));
 }
 
-/* Entries of the inverse of m that rounding has left: what does not act on an unknown leaves it zero. */
+/* Set entries of the inverse of m to zero that only rounding made nonzero, by the sparsity of m. */
 static void clean_inverse(const double *m, int n, double *inverse) {
   for (int i = 0; i < n; i++) {
     double most = 0;
@@ -239,8 +239,8 @@ static void clean_inverse(const double *m, int n, double *inverse) {
   }
 }
 
-/* Inverse of the layer's slope in a mode. Where it has none, as for two contacts whose slips are one function, one
- * with which the unknowns change as little as can be, in units of their bounds; the motion does not depend on it. */
+/* Inverse of the layer's slope in a mode. If it is singular, as for two contacts with the same slip, the generalised inverse
+ * of least change of the unknowns in units of their bounds; the motion does not depend on the choice. */
 static int invert_layer(Run *r, const Layout *l, const double *unknowns, double *inverse) {
   int n = l->slides, w = r->width, is_regular = 1;
   double *a = r->work, *m = a + n * n, *size = m + n * n, most = 0;
@@ -262,7 +262,7 @@ static int invert_layer(Run *r, const Layout *l, const double *unknowns, double 
   return invert_any(m, n, size, inverse, size + n, r->pending) && 0;
 }
 
-/* Close to a surface a root makes of an error in h one that is larger by far: h has a relative tolerance there. */
+/* Near a surface with a root h has a relative tolerance: the root magnifies errors of h. */
 static void allow_for_roots(Run *r, Expansion *e) {
   const Entries *g = &r->s->surface_gradient;
   double *state = r->vector;
@@ -277,7 +277,7 @@ static void allow_for_roots(Run *r, Expansion *e) {
   }
 }
 
-/* Jets of a mode at x, with the multipliers of what slides; inverses of the layer's slope. */
+/* Jets of a mode at x, with sliding multipliers; inverses of the layer's slope. */
 static void expand(Run *r, const int8_t *letter, const double *x, const double *unknowns, Expansion *e) {
   int w = r->width, stride = r->stride;
   e->end = 0;
@@ -304,31 +304,32 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
   e->finite = is_finite(r, e);
 }
 
-/* The step of Newton's method where the layer's slope has no inverse; 0 where there is none. */
+/* The step of Newton's method with a singular layer slope; 0 where the equations are inconsistent. */
 static int step_dependent(Run *r, const Layout *l, const double *unknowns, double *b) {
   int n = l->slides, w = r->width;
   double *rates = r->small + w;
   if (!may_be_singular(r, l)) return 0;
   invert_layer(r, l, unknowns, r->matrix);
-  for (int i = 0; i < n; i++) rates[i] = layer_of(r, l->sliding[i]);
-  for (int i = 0; i < n; i++) {
-    b[i] = 0;
-    for (int j = 0; j < n; j++) b[i] += r->matrix[i * n + j] * rates[j];
-  }
-  for (int i = 0; i < n; i++) {
-    double rest = rates[i], terms = fabs(rest);
-    for (int j = 0; j < n; j++) {
-      double term = r->slope[l->sliding[i] * w + l->sliding[j]] * b[j];
-      rest -= term;
-      terms += fabs(term);
+  memset(b, 0, sizeof(double) * n);
+  for (int pass = 0; pass < 3; pass++) { /* joints make the inverse inexact */
+    int fits = 1;
+    for (int i = 0; i < n; i++) {
+      double terms = fabs(rates[i] = layer_of(r, l->sliding[i]));
+      for (int j = 0; j < n; j++) {
+        double slope = r->slope[l->sliding[i] * w + l->sliding[j]];
+        rates[i] -= slope * b[j];
+        terms += fabs(slope * b[j]) + VANISHES / MERGED * fabs(slope * unknowns[l->sliding[j]]);
+      }
+      fits &= fabs(rates[i]) <= MERGED * terms;
     }
-    if (!(fabs(rest) <= MERGED * terms)) return 0;
+    if (pass && fits) return 1;
+    for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) b[i] += r->matrix[i * n + j] * rates[j];
   }
-  return 1;
+  return 0;
 }
 
-/* Multipliers that keep the sliding surfaces of a mode: one step of Newton's method, since they enter
- * linearly, and one against rounding. 0 where there are none. */
+/* Multipliers that keep the state on the sliding surfaces: one Newton step, as they enter linearly, and one against
+ * rounding. 0 where there are none. */
 static int improve(Run *r, const Layout *l, const double *x, double *unknowns, int steps) {
   int w = r->width, slides = l->slides;
   for (int iteration = 0; slides && iteration < steps; iteration++) {

@@ -1,6 +1,6 @@
 /* Small dense systems of linear equations, and complementarity.
  *
- * Matrices are row by row. What is zero is skipped, so that separate blocks cost what they cost alone.
+ * Matrices are stored by rows. Zeros are skipped, so that the cost of separate blocks adds up.
  */
 
 static inline double dot(const double *a, const double *b, int n) {
@@ -28,7 +28,7 @@ static inline void apply(const double *a, const double *x, int n, double *produc
   for (int i = 0; i < n; i++) product[i] = dot(a + (int64_t)i * n, x, n);
 }
 
-/* Inverse by Gauss and Jordan with the largest pivots; 0 and NaN where there is none. ``a`` is lost. */
+/* Inverse by Gauss-Jordan elimination with partial pivoting; 0 and NaN where a is singular. ``a`` is overwritten. */
 static int invert(double *a, int n, double *inverse) {
   memset(inverse, 0, sizeof(double) * n * n);
   for (int i = 0; i < n; i++) inverse[i * n + i] = 1;
@@ -58,8 +58,8 @@ static int invert(double *a, int n, double *inverse) {
   return 1;
 }
 
-/* Gauss's elimination with the largest pivots, in place, with one right side or none: the sign of the exchange of rows,
- * 0 where a is singular. */
+/* Gaussian elimination with partial pivoting, in place, with one right side or none: the sign of the row permutation, 0
+ * where a is singular. */
 static inline int triangle(double *a, double *b, int n) {
   int sign = 1;
   for (int k = 0; k < n; k++) {
@@ -81,7 +81,7 @@ static inline int triangle(double *a, double *b, int n) {
   return sign;
 }
 
-/* Solve a x = b in place of b; 0 where a is singular. ``a`` is lost. */
+/* Solve a x = b in place of b; 0 where a is singular. ``a`` is overwritten. */
 static int solve(double *a, double *b, int n) {
   if (!triangle(a, b, n)) return 0;
   for (int k = n - 1; k >= 0; k--) {
@@ -93,7 +93,7 @@ static int solve(double *a, double *b, int n) {
 
 /* Linear equations that may be singular ------------------------------------------------------------ */
 
-/* Rows, and the ``right`` side, over their largest elements, then columns over theirs, which are ``unit``. */
+/* Divide rows, with the ``right`` side, by their largest elements, then columns by theirs, ``unit``. */
 static void equilibrate(double *a, int rows, int columns, int width, double *right, double *unit) {
   for (int i = 0; i < rows; i++) {
     double *row = a + (int64_t)i * width, most = largest_of(row, columns);
@@ -109,8 +109,8 @@ static void equilibrate(double *a, int rows, int columns, int width, double *rig
   }
 }
 
-/* Gauss and Jordan with full pivoting on (rows, columns) with ``more`` right sides behind, after scaling of rows and
- * columns; the rank is returned, the column of each pivot's row in ``pivot``, columns' scales in ``unit``. */
+/* Gauss-Jordan elimination with full pivoting on (rows, columns) and ``more`` right sides, after scaling. Returns the rank;
+ * ``pivot`` has the column of each pivot's row, ``unit`` the columns' scales. */
 static int eliminate(double *a, int rows, int columns, int more, int32_t *pivot, double *unit) {
   int width = columns + more, rank = 0;
   equilibrate(a, rows, columns, width, 0, unit);
@@ -138,8 +138,8 @@ static int eliminate(double *a, int rows, int columns, int more, int32_t *pivot,
   return rank;
 }
 
-/* Solve a x = b, in place of b, unknowns that are not determined being zero; 0 where rows that depend on others differ
- * from them by more than the part ``tie``. */
+/* Solve a x = b in place of b, with undetermined unknowns zero; 0 where dependent rows are inconsistent by more than the
+ * relative tolerance ``tie``. */
 static int solve_any(double *a, double *b, int n, double tie, double *work, int32_t *pivot) {
   double *unit = work, *all = work + n, most = 0, rest = 0;
   if (n == 1) {
@@ -162,7 +162,7 @@ static int solve_any(double *a, double *b, int n, double tie, double *work, int3
   return !(rest > tie * most) && finite_all(b, n);
 }
 
-/* The vector that an elimination leaves free in a column, in units of the unknowns' sizes or of 1; 0 where none is. */
+/* The null vector of a free column after elimination, in units of the unknowns' sizes or of 1; 0 where there is none. */
 static int free_vector(const double *a, int width, int columns, int rank, const int32_t *pivot, const double *unit,
                        const double *size, int column, double *own) {
   for (int i = 0; i < rank; i++) if (pivot[i] == column) return 0;
@@ -173,7 +173,7 @@ static int free_vector(const double *a, int width, int columns, int rank, const 
   return 1;
 }
 
-/* Vectors z with E z = 0 for E (rows, columns), one after the other; their number. */
+/* Basis z of the null space of E (rows, columns); its dimension. */
 static int null_space(const double *e, int rows, int columns, double *z, double *work, int32_t *pivot) {
   double *unit = work, *a = work + columns;
   memcpy(a, e, sizeof(double) * rows * columns);
@@ -183,7 +183,7 @@ static int null_space(const double *e, int rows, int columns, double *z, double 
   return count;
 }
 
-/* Make a vector orthogonal to ``count`` unit vectors of ``z``, and of length 1; 0 where nothing of it is left. */
+/* Make a vector orthogonal to ``count`` unit vectors of ``z``, and of length 1; 0 where it is dependent on them. */
 static int orthonormal(double *own, const double *z, int count, int n, int passes) {
   for (int pass = 0; pass < passes; pass++)
     for (int l = 0; l < count; l++) {
@@ -196,8 +196,8 @@ static int orthonormal(double *own, const double *z, int count, int n, int passe
   return 1;
 }
 
-/* A matrix G with M G M = M: the unknowns M G b solve what can be solved of M x = b, with the least sum of the squares
- * of x over ``size``. ``work`` has room for 3 n^2 + n. */
+/* A generalised inverse G, M G M = M: x = G b solves M x = b where possible, with the least sum of squares of x over
+ * ``size``. ``work`` has room for 3 n^2 + n. */
 static int invert_any(const double *m, int n, const double *size, double *inverse, double *work, int32_t *pivot) {
   double *unit = work, *a = unit + n, *z = a + 2 * (int64_t)n * n;
   for (int i = 0; i < n; i++) {
@@ -209,7 +209,7 @@ static int invert_any(const double *m, int n, const double *size, double *invers
   memset(inverse, 0, sizeof(double) * n * n);
   for (int i = 0; i < rank; i++)
     for (int j = 0; j < n; j++) inverse[pivot[i] * n + j] = a[2 * (int64_t)i * n + n + j] / unit[pivot[i]];
-  for (int j = 0; j < n; j++) { /* directions that make no difference, orthogonal one after the other */
+  for (int j = 0; j < n; j++) { /* orthonormal null vectors */
     double *own = z + (int64_t)count * n;
     if (free_vector(a, 2 * n, n, rank, pivot, unit, size, j, own)) count += orthonormal(own, z, count, n, 2);
   }
@@ -224,8 +224,8 @@ static int invert_any(const double *m, int n, const double *size, double *invers
   return finite_all(inverse, n * n);
 }
 
-/* Whether a symmetric matrix is positive definite by a margin, or nearly semidefinite (a negative one): Cholesky.
- * ``a`` is lost. */
+/* Whether a symmetric matrix is positive definite by a margin, or nearly semidefinite (negative margin): Cholesky. ``a`` is
+ * overwritten. */
 static int is_definite(double *a, int n, double margin) {
   for (int k = 0; k < n; k++) a[k * n + k] -= margin;
   for (int k = 0; k < n; k++) {
@@ -278,8 +278,8 @@ static int symmetrised(const double *a, int n, const int8_t *span, double *d, do
   return 1;
 }
 
-/* What is proved of a matrix: nothing, that w of a linear complementarity problem is unique, that its solution is,
- * and that it is stable after multiplication of its rows by any positive numbers. */
+/* Certificates of a matrix: none; w of a linear complementarity problem is unique; its solution is unique; also stable
+ * after multiplication of rows by any positive numbers. */
 enum { NOTHING, SEMIDEFINITE, UNIQUE, UNIQUE_AND_STABLE };
 
 /* Whether the comparison matrix, of unit diagonal, is an M-matrix. ``work`` has room for n^2 + n. */
@@ -305,7 +305,7 @@ static int has_positive_minors(const double *a, int n) {
   return 1;
 }
 
-/* Of a matrix, with vectors if there is a ``span``. ``work`` has room for 3 n^2 + 3 n, ``pending`` for n. */
+/* Certificate of a matrix, with vectors if there is a ``span``. ``work`` has room for 3 n^2 + 3 n, ``pending`` for n. */
 static int certificate(const double *m, int n, const int8_t *span, double *work, int32_t *pending) {
   double *a = work, *b = work + n * n, *d = b + n * n, *scale = d + n, *rest = scale + n;
   int is_positive = 1, is_symmetric;

@@ -20,8 +20,8 @@ static int set_of(const Run *r, int i) { return element(r, i)->law == SET_LAW ? 
   for (int set = 0; set < ((run)->s->sets ? (run)->m : 0); set++) if (set_of(run, set) == set)
 #define EACH_LEAVING(run, e, set) EACH_SET(run, set) if ((e)->l.letter[set] == LEAVING)
 
-/* Whether friction has no load: all contacts that carry it are open, here also those that may close. After
- * surface_values, with ``scale``; without it by the letters alone. */
+/* Whether friction has no load: all contacts that carry it are open, and with ``scale`` (after surface_values) none of them is
+ * at rest on zero. */
 static int is_unloaded(const Run *r, const int8_t *letter, int i, const double *scale) {
   int carried = 0;
   for (int j = 0; j < r->c; j++) {
@@ -34,18 +34,18 @@ static int is_unloaded(const Run *r, const int8_t *letter, int i, const double *
   return carried;
 }
 
-/* Whether a multiplier makes no difference: on its surface, or where all contacts are open that carry it. */
+/* Whether a multiplier does not act: on its surface, or where all contacts that carry it are open. */
 static int is_idle(const Run *r, const int8_t *letter, int i) {
   return i < r->m && (element(r, i)->flags & CONTINUOUS || is_unloaded(r, letter, i, 0));
 }
 
-/* Whether an element is one of those that the state is on. */
+/* Whether an element is among the active ones. */
 static int is_active(const Run *r, int i) {
   for (int j = 0; j < r->active_count; j++) if (r->active[j] == i) return 1;
   return 0;
 }
 
-/* Make one group of those of two elements, unless one has none; it has the lower number. */
+/* Merge the groups of two elements into the one of lower number, unless an element has none. */
 static void join_groups(int32_t *group, int count, int i, int j) {
   int a = group[i], b = group[j];
   for (int q = 0; q < count && a >= 0 && b >= 0 && a != b; q++) if (group[q] == (a > b ? a : b)) group[q] = a < b ? a : b;
@@ -59,7 +59,7 @@ static int add_row(Layout *l, int kind, int index, int side) {
 
 static int is_atom(int kind) { return kind == STOP_GUARD || kind == RESET_GUARD || kind == ATOM_GUARD; }
 
-/* Whether a guard is more than an affine function of the states, whose polynomial needs no check. */
+/* Whether a guard is not affine in the states: the polynomial of an affine one needs no check. */
 static int is_bent(const Run *r, int kind, int index) {
   const int32_t *bent = r->s->bent_guards;
   if (kind == SURFACE_GUARD || kind == IMPACT_GUARD) return bent[index];
@@ -69,7 +69,7 @@ static int is_bent(const Run *r, int kind, int index) {
   return kind != BRANCH_GUARD;
 }
 
-/* Number of a mode, with values of the discrete states (or none) and cells of tables, as results show it. */
+/* Number of a mode in results, with values of the discrete states (or none) and cells of tables. */
 static int32_t numbered(const Run *r, const int8_t *letter, const double *values) {
   int count = r->s->rules.discrete, tables = r->s->tables;
   if (!count && !tables) return mode_number(r->table, letter);
@@ -113,29 +113,29 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
   for (int k = 0; k < l->rows; k++) if (is_bent(r, l->kind[k], l->index[k])) l->bent[l->bent_count++] = k;
 }
 
-/* The present letters are those of the mode. */
+/* Enter the mode of the present letters. */
 static void enter_mode(Run *r) {
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
 }
 
-/* Letters as the multipliers that are known: +1 and -1, 0 for what slides, open and closed contacts. */
+/* Letters as known multipliers: +1 and -1, 0 for sliding functions and contacts. */
 static const double *held_of(Run *r, const int8_t *letter) {
   for (int i = 0; i < r->width; i++) r->held[i] = is_half_line(r, i) ? 0 : letter[i] > 1 ? r->direction[i] : letter[i];
   return r->held;
 }
 
-/* Whether a switching function is of a set off which the mode is. */
+/* Whether a switching function belongs to a set that the mode is off. */
 static int is_moving(const Run *r, int i) { return r->s->sets && r->moving[i]; } /* a contact never is */
 
-/* Their number: states, unknowns, those of scaled elements once more. */
+/* Number of moving inputs: states, unknowns, those of scaled elements again. */
 static int moving_size(const Run *r) {
   int size = r->n + r->width;
   for (int i = 0; i < r->m; i++) size += is_scaled(r, i) != 0;
   return size;
 }
 
-/* The unknown of an entry of what moves, after the states; -1 where the mode has it not. */
+/* The unknown of a moving input after the states; -1 where the mode does not have it. */
 static int unknown_at(const Run *r, int column) {
   int i = column - r->n, nu = i - r->width;
   if (nu < 0) return i >= r->m || is_moving(r, i) || !is_scaled(r, i) ? i : -1;
@@ -168,8 +168,8 @@ static void error_scales(Run *r, const double *x, const double *held, const doub
 static double layer_of(const Run *r, int i) { return out_of(&r->s->point, r->point, i); }
 static double factor_of(const Run *r, int i) { return out_of(&r->s->point, r->point, r->width + i); }
 
-/* Sums over the states of |gradient| times a vector, for each row; infinite slopes, those of a square root
- * at zero, are left out with ``finite_only``, and those of no value, of higher powers there, always. */
+/* Sums over the states of |gradient| times a vector, for each row. ``finite_only`` omits infinite slopes, as of a square
+ * root at zero; NaN, as of higher powers there, is always omitted. */
 static void gradient_sums(const Run *r, const Values *t, const double *w, int first, const Entries *g, int rows,
                           const double *vector, int finite_only, double *sum) {
   for (int i = 0; i < rows; i++) sum[i] = 0;
@@ -188,7 +188,7 @@ static void kept_sums(const Run *r, const double *vector, double *sum) {
   gradient_sums(r, &r->s->surfaces, r->heights, r->kept_rows, &r->s->surface_gradient, r->kept_rows, vector, 1, sum);
 }
 
-/* What rounding in a state is weighed with; times epsilon, rounding in the rows of the layer at it. */
+/* Sizes of the states for rounding, ``near``; rounding in the rows of the layer, in units of epsilon. */
 static void weigh_state(const Run *r, const double *x, double *near) {
   for (int i = 0; i < r->n; i++) near[i] = size_of_state(r, i) + fabs(x[i]);
 }
@@ -224,7 +224,7 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
   Sums of = {layer, height, stop, factor};
   point_sums(r, l->is_free, vector, finite_only, &of);
   if (!l->is_free) {
-    for (int again = 0; again < (r->s->combined ? 2 : 1); again++) { /* rows may hold unknowns alone, that others bring */
+    for (int again = 0; again < (r->s->combined ? 2 : 1); again++) { /* rows may depend on unknowns only */
       for (int j = 0; j < slides && again; j++)
         for (int k = 0; k < slides; k++) layer[l->sliding[j]] += fabs(r->slope[l->sliding[j] * w + l->sliding[k]]) * through[k];
       for (int i = 0; i < slides; i++) {
@@ -249,7 +249,7 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
   }
 }
 
-/* The values that an expansion's error scales are made of; its sets are aimed at. */
+/* Evaluate the values of an expansion's error scales, with the multipliers of its sets. */
 static void weigh_point(Run *r, Expansion *e, const double *x, const double *unknowns) {
   if (e->l.is_free) {
     const double *held = held_of(r, e->l.letter);
@@ -262,7 +262,7 @@ static void weigh_point(Run *r, Expansion *e, const double *x, const double *unk
   e->stamp = r->stamp;
 }
 
-/* The state and the unknowns of an expansion, if other values have been computed since. */
+/* Evaluate at the state and the unknowns of an expansion again, if other values have been computed since. */
 static void weigh_again(Run *r, Expansion *e) {
   double *x = r->vector, *unknowns = x + r->n;
   if (e->stamp == r->stamp) return;
@@ -280,7 +280,7 @@ static double speed_of(const Run *r, const Expansion *e, int k) {
   return speed;
 }
 
-/* Sums for the guards with what rounding in the states is weighed with, or with units of states, once. */
+/* Sums for the guards with the sizes of the states for rounding, or with units of states; computed once. */
 static const double *sums_once(Run *r, Expansion *e, int by_units, int *is_known, double *sums) {
   if (*is_known) return sums;
   weigh_again(r, e);
@@ -291,6 +291,6 @@ static const double *sums_once(Run *r, Expansion *e, int by_units, int *is_known
   return sums;
 }
 
-/* Rounding in the guards is these times epsilon; sums of the magnitudes of their slopes, all by units of states. */
+/* Rounding in the guards in units of epsilon; sums of the magnitudes of their slopes in units of states. */
 static const double *scales(Run *r, Expansion *e) { return sums_once(r, e, 0, &e->scaled, e->scale); }
 static const double *steepness(Run *r, Expansion *e) { return sums_once(r, e, 1, &e->steepened, e->steep); }

@@ -1,8 +1,8 @@
 /* Zeros of guards that are close together -------------------------------------------------------------
  *
  * Rounding and truncation of a guard's polynomial hide whether it touches zero, passes once or passes several times
- * near a point. Coefficients at a point that is closer have smaller terms, and errors as much smaller. So a step ends
- * before such a point, as often as that helps: what is then left is rounding of the guard's own formula.
+ * near a point. Coefficients at a closer point have smaller terms and smaller errors. So steps end before such a point
+ * while that helps: only rounding of the guard's own formula remains.
  */
 
 /* Rounding of a guard at a time of the step: of the states, and of its own formula. */
@@ -14,16 +14,15 @@ static double guard_noise(Run *r, const Expansion *e, int row, double time) {
   return guard_rounding(r, e, row);
 }
 
-/* Terms before those of a polynomial, which are known to be zero: what errors have left of them. */
+/* Errors of the leading terms of a polynomial that are known to be zero. */
 static double left_out(const double *c, int count, double time) {
   double sum = 0;
   for (int k = -1; k >= -count; k--) sum = sum * time + fabs(c[k]);
   return sum;
 }
 
-/* First root of c, positive at 0, within h. The guard is c, times powers of the time since ``from`` that have left
- * ``drop`` terms before c, times ``known`` powers of the time. Where errors hide whether it is the first, r->hold is
- * a time before it. */
+/* First root of c, positive at 0, within h. The guard is (t - from)^drop t^known c. Where errors hide whether the root is the
+ * first, r->hold is a time before it. */
 static double sure_root(Run *r, const Expansion *e, int row, const double *c, int n, double h, double from, int drop,
                         int known) {
   if (!(c[0] > 0)) return 0;
@@ -40,7 +39,7 @@ static double sure_root(Run *r, const Expansion *e, int row, const double *c, in
   double low = first_low(c, n, end, LOW, 0);
   if (low > 0) {
     noise = guard_noise(r, e, row, from + low);
-    if (from > 0) /* of the shift by ``from``, and of what was known to be zero before it */
+    if (from > 0) /* of the shift by ``from``, and of the terms known to be zero before it */
       noise += ROUNDING * (fabs(g[0]) + rest_of(g, r->order, from + low)) + left_out(g + known, known, from + low);
     noise = noise / pow(from + low, known) + left_out(c, drop, low);
     floor = noise / pow(low, drop);
@@ -53,7 +52,7 @@ static double sure_root(Run *r, const Expansion *e, int row, const double *c, in
     r->hold = smaller(r->hold, from + before);
     return -1;
   }
-  if (floor > 0) { /* a touch that reaches zero by rounding is no root */
+  if (floor > 0) { /* a minimum that reaches zero only by rounding is no root */
     memset(b, 0, sizeof(double) * drop);
     memcpy(b + drop, c, sizeof(double) * (n + 1));
     b[0] += LOW * noise;

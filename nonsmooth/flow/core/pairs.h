@@ -1,8 +1,8 @@
-/* Programs where the run does not begin at time zero: what follows from the time by arithmetic is two numbers.
+/* Double-double arithmetic with the time, for runs that do not begin at time zero.
  *
- * The time of a state is that since the start. A formula's time is the sum with the start's, which is no number of its
- * own where that is large: 1.7e9 has an error of 1e-7, and so has the argument of cos(omega t). Nodes that are
- * ``paired`` are evaluated in two numbers, up to the first function that has one.
+ * The time state counts from the start. The time in a formula is its sum with the start, whose rounding is too large for a
+ * large start: 1e-7 at 1.7e9, also in the argument of cos(omega t). ``paired`` nodes are evaluated in two numbers, up to
+ * the first function with one.
  */
 typedef struct { double high, low; } Pair;
 
@@ -25,7 +25,7 @@ static Pair pair_quotient(Pair u, Pair v) {
   return pair_of(quotient, (fma(-quotient, v.high, u.high) + (u.low - quotient * v.low)) / v.high);
 }
 
-/* Of a pair whose first number is one: the largest integer below it. */
+/* The largest integer not above a pair whose first number is an integer. */
 static double pair_floor(Pair u) {
   double low = floor(u.high);
   return low == u.high && u.low < 0 ? low - 1 : low;
@@ -69,7 +69,7 @@ static Pair pair_operate(int op, Pair u, Pair v) {
   return (Pair){operate(op, u.high, v.high), 0};
 }
 
-/* After the values of all nodes come their second numbers, then the time of the start. */
+/* The values of all nodes are followed by their second numbers, then the time of the start. */
 static size_t pair_room(int32_t size, int stride) { return (size_t)size * (stride + 1) + 2; }
 static void pairs_begin(int32_t size, int stride, Pair start, double *w) {
   w += (int64_t)size * (stride + 1);
@@ -94,7 +94,7 @@ static void values_pairs(const Values *t, const int32_t *which, int32_t count, c
   }
 }
 
-/* Values of a program at a point of a run, and those that suffice where nothing slides. */
+/* Values of a program at a point of a run, and the part that suffices without sliding. */
 static void values_at(const Values *t, const double *x, const double *p, double *w) {
   if (has_pairs(t->timed, t->size, 1, w)) values_pairs(t, t->moving, t->moving_count, x, p, w);
   else values_run(t, x, p, w);

@@ -1,44 +1,42 @@
 /* Programs as lists of instructions, and the interpreter that runs them: no system is compiled.
  *
- * The lists are written by nonsmooth/model/printing/tape.py; the operations and the Taylor rules have the
- * numbers of its enumerations. What does not move (constants, parameters) is computed once a run.
+ * nonsmooth/model/printing/instructions.py writes the lists; operations and Taylor rules have the numbers of its
+ * enumerations. Nodes of constants and parameters are computed once a run.
  */
 
-/* Values of a graph: node j is op[j] of nodes a[j] and b[j]; inputs have a vector and a position there.
- * ``free`` suffice where nothing slides; ``paired`` are two numbers if the time is (pairs.h). */
+/* Values of a graph: node j is op[j] of nodes a[j] and b[j]; inputs have a vector and an index.
+ * ``free`` suffice without sliding; ``paired`` are two numbers if the time is (pairs.h). */
 typedef struct {
   int32_t size, still_count, moving_count, free_count, output_count, timed;
   const int32_t *op, *a, *b, *still, *moving, *free, *output, *paired;
   const double *constant;
 } Values;
 
-/* A rule (nonsmooth/model/expressions/taylor_rules.py): its value, how later coefficients follow, its own row and those
- * of its arguments, as places of their first coefficients; the operation of its value; whether that is two numbers if
- * the time is (pairs.h). A sum has terms from ``begin`` to ``end``, of which those from ``from`` to ``to`` have later
- * coefficients: a factor times the product of rows a and b, by their kind: neither moves, a alone does, both do, both
- * are one. */
+/* A rule (nonsmooth/model/expressions/taylor_rules.py): kinds of its value and of later coefficients; offsets of its own row
+ * and those of its arguments; the operation of its value; whether that is two numbers if the time is (pairs.h). A sum has
+ * terms ``begin`` to ``end``, of which ``from`` to ``to`` have later coefficients: a factor times the product of rows a and
+ * b, sorted by kind: constant, only a moves, both move, a square. */
 typedef struct { int32_t rule, later, op, w, a, b, c, paired, begin, from, to, end; double first, second; } Rule;
 typedef struct { double factor; int32_t a, b, kind, pad; } Term;
 enum { AT_REST, LINEAR, PRODUCT, SQUARE };
 
-/* Rules that are evaluated one after the other. */
+/* Rules in order of evaluation. */
 typedef struct { int32_t count, pad; const int32_t *rule; } List;
 
-/* Power series by rules, order by order. Inputs of the vector that moves are given; ``still`` are known once the
- * parameters are, ``moving`` have a coefficient zero, of which ``values`` suffice for those of the outputs, ``later``
- * further ones; ``late`` are those of them that unknown multipliers enter, which follow from the equations of the
- * same order, ``early`` the others. Of ``later``, the field and the layer follow from ``loop``, of which multipliers
- * enter ``loop_late``; ``before`` depend on the time alone, and ``after`` can wait until all orders of these are known. */
+/* Power series by rules, order by order, with given moving inputs. ``still`` depend on parameters only; ``moving`` have a
+ * coefficient zero, of which ``values`` suffice for the outputs, and ``later`` further ones. Unknown multipliers enter
+ * ``late``, which follow from the equations of the same order, but not ``early``. Of ``later``, the field and the layer
+ * follow from ``loop``, whose ``loop_late`` contain multipliers; ``before`` depend on the time alone, and ``after`` are
+ * evaluated once all orders of these are known. */
 typedef struct {
   int32_t size, terms, inputs, states, outputs, timed; /* states: inputs that are states, the first ones */
   const Rule *rule;
   const Term *term;
-  const int32_t *input, *place, *output; /* rows of inputs, and their places in the vector */
+  const int32_t *input, *place, *output; /* rows of inputs, and their indices in the vector */
   List still, values, moving, later, late, early, loop, loop_late, before, after;
 } Series;
 
-/* Not inlined: the same code whoever calls, which no compiler replaces by other arithmetic. The cases are written from
- * model/numbering.py. */
+/* Not inlined, so that the arithmetic is the same for all callers. The cases are written from model/numbering.py. */
 OUTSIDE double operate(int op, double x, double y) {
   switch (op) {
     OPERATIONS_OF(x, y)
@@ -46,7 +44,7 @@ OUTSIDE double operate(int op, double x, double y) {
   return NAN;
 }
 
-/* Aligned: where its jumps lie makes a tenth of a run's time. */
+/* Aligned: the addresses of its jumps change a run's time by a tenth. */
 static void values_nodes(const Values *t, const int32_t *which, int32_t count, const double *x, const double *p,
                          double *w) __attribute__((aligned(64)));
 static void values_nodes(const Values *t, const int32_t *which, int32_t count, const double *x, const double *p,
@@ -81,7 +79,7 @@ static const double PART[] = {0, SIXTEEN(1), SIXTEEN(17), SIXTEEN(33)};
 #undef FOUR
 #undef SIXTEEN
 
-/* Sum of u_i v_(k-i), i from first to last, in four chains: the ends, which are known last, are added last. */
+/* Sum of u_i v_(k-i), i from first to last, in four chains; the ends, which are computed last, are added last. */
 static inline double convolve(const double *u, const double *v, int k, int first, int last) {
   int count = last - first, i = 1;
   if (count < 0) return 0;
@@ -108,7 +106,7 @@ static inline int terms_of(const double *c, int count) {
   return count;
 }
 
-/* Coefficient k of a product of series of which so many terms are not zero. */
+/* Coefficient k of a product of series with given numbers of nonzero terms. */
 static inline double product_of(const double *u, int u_terms, const double *v, int v_terms, int k) {
   int first = k < v_terms ? 0 : k + 1 - v_terms, last = u_terms <= k ? u_terms - 1 : k;
   if (first < last) return convolve(u, v, k, first, last);
@@ -140,22 +138,21 @@ static inline double weigh(const double *u, const double *v, int k, int last) {
   return weigh_both(u, v, v, k, last, &other);
 }
 
-/* A coefficient that is zero stays so, whatever it is divided by: a square root of zero at rest. */
+/* a / b, and 0 where a = 0 for every b: as of a square root of zero at rest. */
 static inline double over(double a, double b) { return a == 0 ? 0 : a * (1.0 / b); }
 
-/* The same with the reciprocal of b. */
+/* over(a, b) with the reciprocal of b. */
 static inline double divided(double a, double reciprocal) { return a == 0 ? 0 : a * reciprocal; }
 
-/* The value of a quotient: 0/0 is none, though all further coefficients that are zero stay so. */
+/* The value of a quotient: 0/0 is NaN. */
 static inline double ratio(double a, double b) { return a == 0 && b == 0 ? NAN : over(a, b); }
 
-/* A later coefficient of a quotient: nothing is left of one that is no number because the divisor's overflow,
- * as in 1/(1 + exp(1000)). */
+/* A later coefficient of a quotient: 0 where it is NaN because the divisor overflows, as in 1/(1 + exp(1000)). */
 static inline double settled(double coefficient, double value, double divisor) {
   return isfinite(coefficient) || !(fabs(value) < TINY_VALUE && fabs(divisor) > HUGE_DIVISOR) ? coefficient : 0;
 }
 
-/* Of a power of what is zero: t^(i exponent) where t^i is the first term of ``u``, without further derivatives. */
+/* Coefficient of a power of a series without constant term: t^(i exponent), where t^i is the first term of ``u``. */
 static double power_at_zero(const double *u, double exponent, int k) {
   int i = 1;
   while (i <= k && u[i] == 0) i++;
@@ -169,7 +166,7 @@ static double power_coefficient(const double *u, const double *w, double exponen
   return settled(over(sum, u[0]) * PART[k], w[0], u[0]);
 }
 
-/* After the rows come second numbers, then the time of the start (pairs.h), then coefficients of terms. */
+/* The rows are followed by second numbers, the time of the start (pairs.h), and coefficients of terms. */
 static size_t series_room(const Series *t, int stride) { return (size_t)t->size * (stride + 1) + 2 + t->terms; }
 #define COEFFICIENTS(t, stride, s) ((s) + (int64_t)(t)->size * ((stride) + 1) + 2)
 
@@ -250,7 +247,7 @@ static void series_rules(const Series *t, const List *list, int first, int last,
         double top = weigh(u, v, k, k) - weigh(v, u, k, k) - weigh(w, r, k, k - 1);
         w[k] = over(top, r[0]) * PART[k];
       } break;
-      /* A term that the mode leaves out has a factor that is zero; its other factors are not evaluated. */
+      /* A term without effect in the mode has a zero factor; its other factors are not evaluated. */
       case RULE_gated: EACH w[k] = u[0] != 0 ? v[k] : 0; break;
       case RULE_chosen: EACH {
         int i = 0;
@@ -272,9 +269,9 @@ static void series_inputs(const Series *t, int k, const double *x, double *s) {
 /* Functions of an argument of two numbers (pairs.h). */
 static int has_pair_rule(int op) { return op == OP_sin || op == OP_cos || op == OP_tan; }
 
-/* Rounding of the values of all rules that move, in units of EPSILON, from that of their inputs, of the ``size`` that
- * these have at least, or of that of the input ``time``: 0 for none. Each stands where the coefficient of order zero of
- * its row would. In a run that begins at ``start`` arithmetic with the time has two numbers (pairs.h), and no rounding. */
+/* Rounding of the values of all moving rules, in units of EPSILON, from that of their inputs of at least ``size``, or of the
+ * input ``time`` alone; 0 for none. It is stored as the coefficient of order zero. In a run that begins at ``start``
+ * arithmetic with the time has two numbers (pairs.h) and no rounding. */
 static void series_rounding(const Series *t, double size, int32_t time, double time_size, double start, const double *s,
                             double *error) {
   for (int32_t l = 0; l < t->inputs; l++) {
@@ -312,7 +309,7 @@ static void series_rounding(const Series *t, double size, int32_t time, double t
   }
 }
 
-/* What does not move: constants, parameters and operations of them; later coefficients stay zero. */
+/* Evaluate constants, parameters and operations on them; their later coefficients stay zero. */
 static void series_prepare(const Series *t, const double *p, double *s) {
   for (int32_t l = 0; l < t->still.count; l++) {
     const Rule *q = t->rule + t->still.rule[l];

@@ -7,11 +7,11 @@ static void note(Run *r) {
   memcpy(r->out.point_x + k * r->n, r->x, sizeof(double) * r->n);
 }
 
-/* The mode in which a step is shown. */
+/* The mode of a step in results. */
 static int shown_mode(const Run *r) { return r->s->sets || r->s->rules.discrete ? r->shown : r->mode; }
 
-/* Write a step whose polynomials are in powers of the time since its start. Where that start is no number the
- * polynomials are moved to the number that it is rounded to. */
+/* Write a step with polynomials in powers of the time since its start. Where the start is two numbers the polynomials are
+ * moved to its rounded value. */
 static void note_step(Run *r, const Expansion *e) {
   if (!r->o.dense) return;
   int64_t k = r->out.steps++, stride = r->stride;
@@ -59,7 +59,7 @@ static void sample_step(Run *r, const Expansion *e, double dt) {
 static void count_hit(Run *r, int kind, int guard, int index, int side, const double *x) {
   const Options *o = &r->o;
   if (!(o->hit_kinds >> kind & 1) || !o->hit_named[guard * o->hit_width + index]) return;
-  if ((o->hit_side && side != o->hit_side) || r->t <= r->begun.high) return; /* the start is no hit */
+  if ((o->hit_side && side != o->hit_side) || r->t <= r->begun.high) return; /* the start does not count */
   r->hits++;
   if (r->hits <= o->hit_skip || (r->hits - o->hit_skip) % o->hit_every) return;
   /* Before the jumps of the instant, or after them. */
@@ -70,7 +70,7 @@ static void count_hit(Run *r, int kind, int guard, int index, int side, const do
   else if (is_last) finish(r, STOPPED, SAMPLED, (int)o->hit_count);
 }
 
-/* ``x`` is the state at the event, the present one unless the event changed it; ``guard`` a row of the mode
+/* Record an event. ``x`` is the state at it, the present one unless the event changed it; ``guard`` a row of the mode
  * before, or -1. */
 static void event(Run *r, int kind, int before, int guard, const double *x) {
   r->kinds[kind]++;
@@ -87,10 +87,10 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
     memcpy(r->out.event_after_x + k * r->n, r->x, sizeof(double) * r->n);
     r->out.event_before[k] = before;
     r->out.event_after[k] = r->mode;
-    r->out.event_guard[k] = guard < 0 ? -1 : ((shown_index(r) << 2) + r->met.side + 1) * 16 + r->met.kind;
+    r->out.event_guard[k] = guard < 0 ? -1 : ((shown_index(r) << 2) + r->guard.side + 1) * 16 + r->guard.kind;
     write_motion(r, r->out.event_motion + k * r->s->rules.width);
   }
-  if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, shown_index(r), r->met.side, x);
+  if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->guard.kind, shown_index(r), r->guard.side, x);
   if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, element(r, r->m)->shown, 0, x); /* impacts that accumulated */
   if (kind == END || kind == STOP) return;
   remember(r, kind, guard, x);

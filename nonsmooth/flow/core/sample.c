@@ -1,7 +1,7 @@
 /* Values at many states: nonsmooth/plot/web/engine.js ---------------------------------------------------- */
 
-/* Of ``count`` states with given multipliers: rates of the n states, then of surfaces and gaps what their laws set to
- * zero where they slide, then their functions, then those of stops and resets: n + 2 width + atoms numbers each. */
+/* Values at ``count`` states with given multipliers: rates of the n states; of surfaces and gaps the rows that vanish in
+ * sliding, then their functions; functions of stops and resets: n + 2 width + atoms numbers each. */
 void run_sample(Run *r, const double *p, const double *x, int64_t count, const double *held, double *out) {
   int n = r->n, w = r->width, atoms = r->s->rules.atoms;
   r->begun = (Pair){0, 0};

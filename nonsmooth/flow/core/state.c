@@ -1,14 +1,14 @@
-/* The driver: all that a run is. The system is data, not code.
+/* Data structures of the driver: systems, runs and decisions. The system is data, not code.
  *
  * Read in the order of core_source.py: programs.h, pairs.h, linear.h, state.c (here), modes.c, jets.c, stepper.c,
- * near_zeros.c, elements.c, vectors.c, blocks.c, decide.c, events.c, driver.c; sets.c and approach.c are how sets of
- * codimension two and more move and are met.
+ * near_zeros.c, elements.c, vectors.c, blocks.c, decide.c, events.c, driver.c; sets.c and approach.c treat sets of
+ * codimension two and more.
  */
 
 /* Entries of a sparse matrix in the order of a program's outputs. */
 typedef struct { int32_t count, pad; const int32_t *row, *column; } Entries;
 
-/* Conditions of stops and resets; ``trigger_at``, ``filter_at`` and ``value_at`` say where each begins. */
+/* Conditions of stops and resets; ``trigger_at``, ``filter_at`` and ``value_at`` are their offsets. */
 typedef struct {
   int32_t atoms, triggers, clocks, discrete, keeps, width; /* keeps: states when due are kept; width: of a motion */
   const int32_t *way; /* how each atom is located: falling, either way, rising, UNWATCHED */
@@ -17,25 +17,25 @@ typedef struct {
   const double *value; /* of discrete states */
 } Rules;
 
-/* An element: k functions that stand side by side from ``first``, with a multiplier each, and the law between them
- * (elements.c); each function has the entry of its element. The multiplier enters derivative ``degree`` of h; those
- * between are rows from ``lower`` on of what is kept: all functions, then these. With hysteresis h is that of the
- * multiplier +1, and the row ``lower`` that of -1. */
+/* An element: k functions from ``first`` on, with a multiplier each, and their law (elements.c); each function has the entry
+ * of its element. The multiplier enters derivative ``degree`` of h; lower derivatives are rows from ``lower`` on of the
+ * functions kept at zero: all functions, then these. With hysteresis h is that of the multiplier +1, and the row ``lower``
+ * that of -1. */
 typedef struct {
   int32_t law, first, k, degree, lower, flags, shown, pad; /* shown: the number of the function in results */
   double width, power; /* of the layer; the smallest power of h in the field, or 0 */
 } Element;
 
-/* A table: ``count`` breakpoints of its function, and for each of the cells between them the values of ``size``
- * parameters from ``first`` on. Each breakpoint's number among those that are shown, or -1. Of each limit the first and
- * the last cell, and surfaces with the sides on which it holds, after their number. */
+/* A table: ``count`` breakpoints of its function, and for each cell between them the values of ``size`` parameters from
+ * ``first`` on. The number of each breakpoint in results, or -1. Of each limit the first and the last cell, and the number
+ * of surfaces with the sides on which it applies. */
 typedef struct {
   int32_t count, size, first, limits;
   const double *level, *value;
   const int32_t *shown, *limit;
 } Cells;
 
-/* Flags: the multiplier makes no difference on h = 0; its unknown is a product with a factor. */
+/* Flags: the multiplier does not act on h = 0; its unknown is a product with a factor. */
 enum { CONTINUOUS = 1, SCALED = 2 };
 
 typedef struct {
@@ -66,23 +66,23 @@ typedef struct {
   Rules rules;
   Entries derivatives; /* of field, layer, surfaces and gaps, factors by what moves and parameters; see variation.c */
   const Series *implicit; /* with those derivatives, for implicit steps, or none */
-  const int32_t *places; /* states in an order in which what is coupled is close, or none */
+  const int32_t *ordering; /* states in an order in which what is coupled is close, or none */
 } System;
 
-enum { GERM = 3 }; /* coefficients by which a motion is seen to go on as it arrived */
+enum { GERM = 3 }; /* coefficients that show whether a motion continues as it arrived */
 
-/* Arrays of a structure: one list declares them, with the numbers of their entries, and places them (entry.c). */
+/* Arrays of a structure: one list declares them with their sizes, and allocates them (entry.c). */
 #define DECLARED(type, name, count) type *name;
 
-/* What happens at one time (events.c). Of atoms: sides, as the jumps have made them, as evaluated now; those that are
- * passed or zero; values, rounding in them, errors of their roots. Of conditions: whether due, whether true before,
- * whether true at the start and not met since. */
+/* Events at one time (events.c). Of atoms: sides, after the jumps and as evaluated now; whether passed or zero; values,
+ * rounding in them, errors of their roots. Of conditions: whether due, whether true before, whether true at the start and
+ * not fired since. */
 typedef struct {
   int32_t running, first, settled, unsettled, last, tied, is_last;
   int64_t jumps, counted, sampled;
 #define INSTANT_ARRAYS(OF) \
   OF(int8_t, side, atoms) OF(int8_t, view, atoms) OF(int8_t, now, atoms) OF(int8_t, passing, atoms) \
-  OF(int8_t, zero, atoms) OF(int8_t, pending, triggers) OF(int8_t, was, triggers) OF(int8_t, unmet, triggers) \
+  OF(int8_t, zero, atoms) OF(int8_t, pending, triggers) OF(int8_t, was, triggers) OF(int8_t, unfired, triggers) \
   OF(double, value, atoms) OF(double, noise, atoms) OF(double, residual, atoms) \
   OF(double, germ, GERM * atoms) /* first coefficients on arrival */ \
   OF(double, trigger_x, s->rules.keeps ? triggers * s->n : 0) OF(double, arrived, s->n) \
@@ -90,7 +90,7 @@ typedef struct {
   INSTANT_ARRAYS(DECLARED)
 } Instant;
 
-/* The guards of a mode, and what slides in it. */
+/* The guards of a mode, and its sliding functions. */
 typedef struct {
   int32_t rows, atoms, slides, mode, branches, is_free; /* atoms: first row of stops and resets; free: no letter is 0 */
   int32_t bent_count;
@@ -117,24 +117,24 @@ typedef struct {
   const double *end; /* the state at the end of an implicit step, or none */
 } Expansion;
 
-/* A mode that can continue, and the zeros of its guards. */
+/* An admissible mode, and the zeros of its guards. */
 typedef struct {
   int32_t strict;
 #define CONTINUATION_ARRAYS(OF) OF(int8_t, letter, w) OF(int32_t, drop, rows) OF(double, unknowns, w)
   CONTINUATION_ARRAYS(DECLARED)
 } Continuation;
 
-/* A motion that can continue from a point: states of the active elements, the orders at which they were decided, the
- * states before, the unknowns; first terms of the states' series. */
+/* An admissible motion from a point: states of the active elements, the orders that decided them, the states before, the
+ * unknowns; first terms of the states' series. */
 typedef struct { int8_t *state, *order, *before; int32_t terms; double *nu, *series; } Motion;
 
-/* The law of the active elements at a point; see decide.c. Matrices are (count, count), what has orders is
- * (orders, count). */
+/* The law of the active elements at a point; see decide.c. Matrices are (count, count), arrays with orders (orders, count). */
 typedef struct {
   int32_t count, blocks, motions, branches, unstable, last; /* last: order that growth decides instead of coefficients */
   int32_t is_imposed; /* whether states are given: those of a mode */
+  int32_t ending, ended; /* a block (from 1) that holds up to this instant, and the last whose limit was found */
   const int8_t *letter;
-#define DECISION_ARRAYS(OF) /* Lemke's method on a block of all takes most of them */ \
+#define DECISION_ARRAYS(OF) /* Lemke's method on one block of all elements needs most of them */ \
   OF(int32_t, own, w) OF(int32_t, order, w) OF(int32_t, first, w + 1) OF(int32_t, mark, 4 * w) \
   OF(int32_t, pivot, 8 * w + 8) OF(int32_t, proved, w) \
   OF(int8_t, is_contact, w) OF(int8_t, is_idle, w) OF(int8_t, is_touched, w) OF(int8_t, is_known, w) \
@@ -153,9 +153,9 @@ typedef struct {
   Motion motion[SEVERAL];
 } Decision;
 
-/* Equations of the states alone that closed conditions leave (hidden.c): letters of the mode for which rows are
- * combined, and what for; how many of those that are closed depend on others; numbers of the rows that are combined;
- * slopes of all conditions by the unknowns, gradients of their functions, the part by which dropped slopes are off. */
+/* Equations of the states alone from closed conditions (hidden.c): letters of the mode of the combined rows, and their kind;
+ * the number of dependent closed conditions; numbers of the combined rows; slopes of all conditions by the unknowns,
+ * gradients of their functions, the relative error of dropped slopes. */
 typedef struct {
   int32_t kind, is_raw, is_known, dependent, count;
   double off;
@@ -165,24 +165,24 @@ typedef struct {
   EQUATION_ARRAYS(DECLARED)
 } Equations;
 
-/* Modes met, by number: their letters. */
+/* Letters of modes, by number. */
 typedef struct { Tree tree, leaves; int32_t width, count, room; int8_t *letter; } Table;
 
-/* What a run writes, when dense: steps, points and events, into arrays that the caller makes larger when full. */
+/* Dense output of a run: steps, points and events, in arrays that the caller enlarges when full. */
 typedef struct {
   int64_t steps, points, events, step_room, point_room, event_room;
   double *start, *coefficients, *point_t, *point_x, *event_t, *event_x, *event_after_x, *event_motion;
   int32_t *step_mode, *event_kind, *event_before, *event_after, *event_guard;
 } Output;
 
-/* The guard that is served. */
-typedef struct { int kind, index, side; } Met;
+/* The guard of the present event. */
+typedef struct { int kind, index, side; } Guard;
 
-/* Of a guard that ended the mode before so many coefficients vanish. */
+/* A guard that ended the previous mode, and the number of its vanishing coefficients. */
 typedef struct { int kind, index, side, zeros; } Known;
 
-/* An event that may be one of many that accumulate: the time since the one before, and what was served. */
-typedef struct { double interval; int64_t pattern; int32_t kind; Met met; } Happened;
+/* An event for the detection of accumulation: the time since the one before, and its guard. */
+typedef struct { double interval; int64_t pattern; int32_t kind; Guard guard; } Happened;
 
 typedef struct Implicit Implicit; /* implicit.c */
 
@@ -191,23 +191,23 @@ typedef struct {
   const System *s;
   Table *table;
   int32_t n, m, c, width, order, stride, guards, kept_rows; /* the last: surfaces, gaps, their rates, lower derivatives */
-  /* The time is t + t_low: that of an event is no number of its own where times are large. */
+  /* The time is t + t_low: double-double, as events need for large times. */
   Pair begun;
   double t, t_low, limit, at_t;
-  const int8_t *remembered; /* letters from which elements with hysteresis go on, or none */
+  const int8_t *remembered; /* initial letters of elements with hysteresis, or none */
   Layout now; /* of the present mode */
   Instant instant;
   int32_t mode, status, reason, due_impact, falls, folded, passed; /* passed: the breakpoint */
   int32_t segment_mode, length_mode, prepared; /* prepared: whether the parameters are known, in lanes */
-  /* Zero where a run begins, up to ``past``: held_steps are those in a row that a decay rate held; facts are about the
-   * decisions; t_error is the largest of what is ``hidden`` of events that move a state by more than the tolerance. */
+  /* Zero where a run begins, up to ``past``: held_steps counts consecutive steps that a decay rate limited; facts describe the
+   * decisions; t_error is the largest ``hidden`` of events that move a state by more than the tolerance. */
   double since, length, shortened, held_length, t_error;
   int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history, hits, kept;
-  int32_t where, repelling, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
-  Met met;
+  int32_t where, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
+  Guard guard;
   Happened past[HISTORY];
   int32_t several[SEVERAL];
-  double size, time_size, hold; /* hold: the step's end before zeros of a guard that are not told apart */
+  double size, time_size, hold; /* hold: the step's end before unresolved zeros of a guard */
   Expansion e, trial;
   Continuation chosen, found;
   Decision *decision;
@@ -215,7 +215,7 @@ typedef struct {
   int32_t turned_mode; /* the mode of start_mode, whose guards of stability begin with the signs ``turned`` */
   Output out;
   int64_t stamp, room; /* of the section, and samples kept: in the row of the results */
-  const double *times, *read_at; /* times of samples in the row; times at which any run is read */
+  const double *times, *read_at; /* times of samples in the row; sample times of any run */
   int64_t read_count;
   double *sample_t, *sample_x;
   Equations equations;
@@ -224,7 +224,7 @@ typedef struct {
   const Expansion *expansion;
   void *arena;
 #define RUN_ARRAYS(OF) \
-  OF(int8_t, letter, w) OF(int8_t, start, w) /* present letters, and those that a choice is made from */ \
+  OF(int8_t, letter, w) OF(int8_t, start, w) /* present letters, and those at the start of a decision */ \
   OF(double, x, n) OF(double, at_x, n) OF(double, before, n) OF(double, saved, n) /* saved: to return to */ \
   OF(double, jumped_from, n) /* the state before the last jump of complementarity conditions */ \
   OF(double, jump_work, jumping ? n * (2 * n + jumping + 1) : 0) \
@@ -249,22 +249,23 @@ typedef struct {
   OF(int8_t, moving, w) OF(int8_t, turned, rows) OF(double, rates_of_several, SEVERAL * n) \
   OF(double, layer_series, s->slope_outputs ? (tried * tried + sums * sums) * stride : 0) \
   OF(int8_t, idle, m) OF(int8_t, vanishes, most) /* sets without friction; nodes of a program that are zero */ \
+  OF(double, spread, most) /* what nodes of a program may differ by in a step */ \
   OF(double, of_defect, rows) OF(int8_t, key, w + 8 * (s->rules.discrete + s->tables)) /* of_defect: errors of guards */ \
-  OF(int32_t, cell, w) OF(double, levels, all + 1) /* of tables; values of functions onto which a state is put */ \
+  OF(int32_t, cell, w) OF(double, levels, all + 1) /* of tables; target values of a projection */ \
   OF(double, jumped, s->resets ? HISTORY * n : 0) /* by the last events, states where those are resets */ \
-  OF(double, met_at, rows) OF(double, hidden, rows) /* root of each guard in the step, or -1; what rounding hides of it */
+  OF(double, root_at, rows) OF(double, hidden, rows) /* root of each guard in the step, or -1; its uncertainty by rounding */
   RUN_ARRAYS(DECLARED)
 } Run;
 
-/* What a state has at least where rounding is weighed: of one, and of the time. */
+/* Least size of a state, or of the time, for rounding. */
 static double size_of_state(const Run *r, int i) { return i < r->s->dimension ? r->size : r->time_size; }
 static double unit_of_state(const Run *r, int i) { return i < r->s->dimension ? 1 : r->time_size / r->size; }
 
-/* Sums over the states of |gradient| times a vector: of layer, surfaces and gaps, stops and resets, factors; of
- * surfaces, gaps, stops and resets only where nothing slides. */
+/* Sums over the states of |gradient| times a vector: of layer, surfaces and gaps, stops and resets, factors; without sliding
+ * only of surfaces, gaps, stops and resets. */
 typedef struct { double *layer, *height, *stop, *factor; } Sums;
 
-/* What a law says of its elements. ``i`` is the first function of an element, rows are those of its own guards. */
+/* Functions of a law. ``i`` is the first function of an element, rows are those of its own guards. */
 typedef struct {
   void (*lay_out)(const Run *r, Layout *l, int i); /* guards of a mode */
   void (*guard)(Run *r, const Layout *l, int row, const double *series, int count, double *g); /* their series */
@@ -277,7 +278,7 @@ static void finish(Run *r, int status, int reason, int where) {
   if (r->status == RUNNING) { r->status = status; r->reason = reason; r->where = where; }
 }
 
-/* Where ``count`` objects of a size begin; with no base, how far one has come. */
+/* Allocate ``count`` objects of a size; without a base only count the bytes. */
 static void *place(char *base, size_t *used, size_t size, size_t count) {
   *used = (*used + 15) & ~(size_t)15;
   void *at = base ? base + *used : 0;
@@ -290,7 +291,7 @@ static void *place(char *base, size_t *used, size_t size, size_t count) {
 
 /* Modes by number ------------------------------------------------------------------------------ */
 
-/* Letters, four at a time, lead from the root of a tree to a leaf, whose child is one more than the number of the mode. */
+/* Groups of four letters lead from the root of a tree to a leaf, whose child is the number of the mode plus one. */
 static int32_t mode_number(Table *t, const int8_t *letter) {
   int32_t at = 0;
   for (int i = 0, four = 0; i < t->width; i += 4, four = 0) {

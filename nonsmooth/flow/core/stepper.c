@@ -18,7 +18,7 @@ static inline double rough_exp2(double a) {
   return u.d * MULADD(z, high, 1 + f);
 }
 
-/* The longest step for a term of an order, given as part of what is allowed at length 1. */
+/* The longest step for a term of an order, given relative to the tolerance at length 1. */
 static double bound_at(double part, int order) {
   return part > SMALLEST ? rough_exp2(rough_log2(smaller(part, LARGEST)) * (-1.0 / order)) : INFINITY;
 }
@@ -28,7 +28,7 @@ static void set_time_state(Run *r) {
   if (r->s->timed) r->x[r->n - 1] = (r->t - r->begun.high) + (r->t_low - r->begun.low);
 }
 
-/* Move the time on, in two numbers; it is kept to the rounding of the steps, not of their sum. */
+/* Advance the time, in two numbers: its error is the rounding of the steps, not of their sum. */
 static void pass_time(Run *r, double dt) {
   Pair t = pair_sum((Pair){r->t, r->t_low}, (Pair){dt, 0});
   r->t = t.high;
@@ -36,14 +36,14 @@ static void pass_time(Run *r, double dt) {
   set_time_state(r);
 }
 
-/* A step's length in a run that begins late, changed so little that the time after it is one number. */
+/* Round a step's length in a run that begins late, so that the time after it is one number. */
 static double to_number(const Run *r, double dt) {
   if (fabs(r->t) <= FAR * (r->o.t_end - r->begun.high)) return dt;
   double to = (r->t + dt) - r->t - r->t_low;
   return fabs(to - dt) <= RESOLVED * dt ? to : dt;
 }
 
-/* Rounding of times is relative to this, how long the run is. */
+/* The duration so far, to which rounding of times is relative. */
 static double time_scale(const Run *r) { return fabs(r->t - r->begun.high); }
 
 /* Shorten a step until a guard's series converges within it. */
@@ -59,7 +59,7 @@ static double resolve(const double *g, int order, double h) {
   return h;
 }
 
-/* Whether a guard is a function of states and time, and one that its polynomial only comes near. */
+/* Whether a guard is a function of states and time, approximated by its polynomial. */
 static int has_height(int kind) {
   return kind == SURFACE_GUARD || kind == IMPACT_GUARD || is_atom(kind);
 }
@@ -73,8 +73,8 @@ static int is_scaled_exit(const Run *r, const Layout *l, int row) {
   return l->kind[row] == EXIT_GUARD && is_scaled(r, l->index[row]) && !is_idle(r, l->letter, l->index[row]);
 }
 
-/* The longest step in which term k of a guard is below ``allowed``, or below the tolerance's part of one of its
- * first terms: a guard of time alone that begins at zero has nothing else. */
+/* The longest step in which term k of a guard is below ``allowed``, or below the relative tolerance of one of its first
+ * terms: a guard of time alone that begins at zero has no other scale. */
 static double reach(const double *g, int k, double allowed, double rtol, int by_terms) {
   double h = allowed > 0 ? bound_at(fabs(g[k]) / allowed, k) : 0;
   for (int j = 1, found = 0; by_terms && j < k && found < 2; j++) {
@@ -85,8 +85,7 @@ static double reach(const double *g, int k, double allowed, double rtol, int by_
   return h > 0 ? h : INFINITY;
 }
 
-/* The longest step for a series whose last terms are zero: where they are only too small for numbers, the last one that
- * is not takes their place. */
+/* The longest step for a series whose last terms are zero; if these underflow, by the last nonzero one. */
 static double reach_of_held(const double *c, int order, double allowed) {
   int k = order;
   if (fabs(c[k]) > SMALLEST || fabs(c[k - 1]) > SMALLEST) return INFINITY;
@@ -94,7 +93,7 @@ static double reach_of_held(const double *c, int order, double allowed) {
   return k == 1 || fabs(c[k]) * fabs(c[k] / c[k - 1]) > SMALLEST ? INFINITY : bound_at(fabs(c[k]) / allowed, k);
 }
 
-/* Shorten a step until the last two terms of each guard that are not zero, of the last four, are small. */
+/* Shorten a step until the last two nonzero terms of each guard, of the last four, are small. */
 static double reach_of_guards(const Run *r, const Expansion *e, double h) {
   int order = r->order, stride = r->stride;
   double power = 1;
@@ -115,8 +114,8 @@ static double reach_of_guards(const Run *r, const Expansion *e, double h) {
   return h;
 }
 
-/* The step h that the last two terms allow, parts of what is allowed at length 1, shortened where those before them are
- * far larger: a series may have gaps, as that of sin t - cos t + exp(-t). */
+/* Shorten the step h of the last two terms, relative to the tolerance at length 1, where earlier ones are far larger: a
+ * series may have gaps, as that of sin t - cos t + exp(-t). */
 static double with_gaps(int order, double h, double last, double before, double third, double fourth) {
   double least = h < INFINITY ? larger(last * h, before) * h : 0;
   if (!(third <= GAP * least)) h = smaller(h, bound_at(third / GAP, order - 2));
@@ -153,10 +152,55 @@ static double step_size(const Run *r, const Expansion *e) {
   return h;
 }
 
+/* By how much the nodes of a program may differ from their values w where inputs differ by ``off``. */
+static void spread_of(const Values *t, const double *w, const double *off, double *spread) {
+  for (int32_t k = 0; k < t->still_count; k++) spread[t->still[k]] = 0;
+  for (int32_t k = 0; k < t->moving_count; k++) {
+    int32_t j = t->moving[k], one = t->a[j], two = t->b[j];
+    if (t->op[j] == OP_input) { spread[j] = off[two]; continue; }
+    double a = spread[one], b = spread[two];
+    switch (t->op[j]) {
+      case OP_add: case OP_sub: spread[j] = a + b; break;
+      case OP_mul: spread[j] = fabs(w[one]) * b + (fabs(w[two]) + b) * a; break;
+      case OP_sq: spread[j] = (2 * fabs(w[one]) + a) * a; break;
+      case OP_twice: spread[j] = 2 * a; break;
+      case OP_neg: case OP_assign: case OP_fabs: spread[j] = a; break;
+      case OP_fmin: case OP_fmax: spread[j] = larger(a, b); break;
+      case OP_sin: case OP_cos: case OP_tanh: spread[j] = smaller(a, 1 + fabs(w[j])); break;
+      default: spread[j] = a == 0 && b == 0 ? 0 : INFINITY;
+    }
+  }
+}
+
+/* Leave curved guards out of a step that cannot vanish in it, as h = x + sin x where x is large, though their series reach
+ * far less than those of the states; the length in which that is so, or 0. */
+static double leave_out_far(Run *r, Expansion *e, double left, double by_guards) {
+  const Values *t[] = {&r->s->surfaces, &r->s->atoms};
+  double *w[] = {r->heights, r->atom_work}, *off = r->vector;
+  double longest = 0, h = by_guards < left ? smaller(state_step(r, e), left) : 0;
+  for (; h > FAR * by_guards && longest == 0; h *= FALL) {
+    for (int i = 0; i < r->n; i++) off[i] = 2 * rest_of(e->states + (int64_t)i * r->stride, r->order, h);
+    for (int q = 0; q < 2; q++) {
+      if (!(q ? r->s->rules.atoms : r->m)) continue;
+      values_at(t[q], r->x, r->p, w[q]);
+      spread_of(t[q], w[q], off, r->spread);
+      for (int row = 0; row < e->l.rows; row++) {
+        int i = q ? row - e->l.atoms : e->l.index[row], node = t[q]->output[is_atom(e->l.kind[row]) == q ? i : 0];
+        int is_own = q ? is_atom(e->l.kind[row]) : e->l.kind[row] == SURFACE_GUARD && has_law(r, i, SURFACE_LAW);
+        if (!is_own || !is_curved(r, &e->l, row) || !(fabs(w[q][node]) > r->spread[node])) continue;
+        memset(e->guards + (int64_t)row * r->stride + 1, 0, sizeof(double) * r->order);
+        e->of_guards[row] = INFINITY;
+        longest = h;
+      }
+    }
+  }
+  return longest;
+}
+
 /* Whether field and guards are affine, so that no step needs to be checked. */
 static int is_linear(const Run *r, const Expansion *e) { return e->l.is_free ? r->s->linear_free : r->s->linear; }
 
-/* A length beyond which the step h that the series allows may not see what comes. */
+/* A length beyond which the series may miss what follows, within the step h that it allows. */
 static double safe_length(const Run *r, const Expansion *e, double h) {
   if (is_linear(r, e)) return INFINITY;
   if (e->l.mode == r->length_mode) return h > GROWTH * r->length ? r->length : INFINITY;
@@ -176,7 +220,7 @@ static void at_time(const Run *r, const Expansion *e, double time, double *x, do
     lam[i] = moves ? value_at(e->series + (int64_t)i * r->stride, r->order, time) : 0;
 }
 
-/* What a mode's series are made of, at a state and multipliers. */
+/* Evaluate the functions of a mode's series at a state and multipliers. */
 static void evaluate(Run *r, const Expansion *e, const double *x, const double *lam) {
   aim(r, e->l.letter, x, lam);
   r->expansion = e;
@@ -209,13 +253,13 @@ static void sampled(Run *r, const Expansion *e, const double *x, const double *l
   for (int q = 0; q < e->l.bent_count; q++) *found++ = g[(int64_t)e->l.bent[q] * r->stride];
 }
 
-/* Rounding of an output, after its value; none where it has no bound. */
+/* Rounding of an output, after its value; zero where it has no bound. */
 static double output_rounding(const Run *r, int output) {
   double error = EPSILON * r->rounding[r->s->series.output[output]];
   return error < INFINITY ? error : 0;
 }
 
-/* The same of a guard: of its terms where it is a distance from a bound. */
+/* Rounding of a guard, or of its terms where it is a distance from a bound. */
 static double guard_rounding(const Run *r, const Expansion *e, int row) {
   int kind = e->l.kind[row], i = e->l.index[row];
   const double *lam = r->vector + r->n + i;
@@ -226,7 +270,7 @@ static double guard_rounding(const Run *r, const Expansion *e, int row) {
   return output_rounding(r, r->n + (is_atom(kind) ? 3 * r->width + row - e->l.atoms : r->width + e->l.index[row]));
 }
 
-/* Rounding of what is ``sampled``. */
+/* Rounding of the values of ``sampled``. */
 static void rounding_of(Run *r, const Expansion *e, double *noise) {
   int slides = e->l.slides;
   weigh_rounding(r, e->l.is_free, 0);
@@ -235,7 +279,7 @@ static void rounding_of(Run *r, const Expansion *e, double *noise) {
   for (int q = 0; q < e->l.bent_count; q++) *noise++ = guard_rounding(r, e, e->l.bent[q]);
 }
 
-/* Whether field and guards at a time of the step are those of the polynomials. */
+/* Whether field and guards at a time of the step agree with the polynomials. */
 static int agrees(Run *r, const Expansion *e, double time, double dt) {
   int n = r->n, order = r->order, stride = r->stride, slides = e->l.slides;
   int guards = e->l.bent_count, all = n + slides + guards;
@@ -264,7 +308,7 @@ static int agrees(Run *r, const Expansion *e, double time, double dt) {
       near = miss <= WRONG * of_guard + VANISHES * e->scale[j] + (again ? noise[n + slides + q] : 0);
     }
     if (near) return 1;
-    /* What rounding in the states, and in the time, makes of it: far from zero more than a tolerance. */
+    /* Rounding in the states and in the time may exceed the tolerance far from zero. */
     if (!again) rounding_of(r, e, noise);
     for (int k = 0; k < n && !again; k++) {
       double kept = x[k];
@@ -310,6 +354,19 @@ static int leading(Run *r, Expansion *e, int row, int zeros, double *value) {
   return r->order + 1;
 }
 
+/* What the distance from a bound is zero to where several elements slide: the law there is decided by what follows. */
+static double tie_of_bound(Run *r, Expansion *e, int row) {
+  int i = e->l.index[row], w = r->width;
+  double most = 0;
+  weigh_again(r, e);
+  for (int k = i; k < i + size_of(r, i); k++) {
+    double terms = 0, own = fabs(r->slope[k * w + k]);
+    for (int j = 0; j < e->l.slides; j++) terms += fabs(r->slope[k * w + e->l.sliding[j]] * factor_of(r, e->l.sliding[j]));
+    most = larger(most, own > 0 ? 2 * TIED * terms / own : 0);
+  }
+  return e->l.kind[row] == SLIP_GUARD ? 2 * fabs(factor_of(r, i)) * most : most;
+}
+
 static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   const double *g = e->guards + (int64_t)row * r->stride, *c = g + drop;
   int kind = e->l.kind[row];
@@ -317,18 +374,19 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
   if (is_atom(kind)) return sure_crossing(r, e, row, drop, h, e->l.side[row]);
   if (c[0] <= 0) {
     double value;
-    drop = leading(r, e, row, drop, &value);
+    int is_tied = !drop && e->l.slides > 1 && (kind == SLIP_GUARD || kind == EXIT_GUARD) && -c[0] <= tie_of_bound(r, e, row);
+    drop = leading(r, e, row, drop + is_tied, &value);
     if (value == 0) return -1;
     c = g + drop;
   }
-  /* Most guards have no root, and all their terms: that is seen here, with the length known. */
+  /* Most guards have all their terms and no root: test that first. */
   if (!drop && c[0] > rest_of(c, r->order, h)) return -1;
   if (has_height(kind)) return sure_root(r, e, row, c, r->order - drop, h, 0, drop, 0);
   double dt = first_root(c, r->order - drop, h);
   return kind == SLIP_GUARD && dt > 0 ? slip_root(r, e, row, dt, h) : dt; /* squares lose digits */
 }
 
-/* How far rounding in a guard moves its root; nothing where it has no slope. */
+/* How far rounding in a guard moves its root; 0 where it has no slope. */
 static double blur(const double *c, int order, double dt) {
   double slope, noise = ROOT_ROUNDING * (fabs(c[0]) + rest_of(c, order, dt));
   horner(c, order, dt, &slope);
@@ -336,12 +394,12 @@ static double blur(const double *c, int order, double dt) {
   return noise < STEEP * dt * slope ? noise / slope : 0;
 }
 
-/* Whether a guard passes its root with a slope that is no rounding. */
+/* Whether a guard passes its root with a slope above rounding. */
 static int is_steep(const Run *r, const Expansion *e, int row, double dt) {
   return blur(e->guards + (int64_t)row * r->stride, r->order, dt) > 0;
 }
 
-/* The time of a clock's next tick, in two numbers: its ticks are counted. */
+/* The time of a clock's next tick, in two numbers, from the number of its ticks. */
 static double tick_of(const Run *r, int c, double *low) {
   double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
   double first = r->instant.tick[2 * c], count = (double)r->instant.count[c], since = count * period;
@@ -350,8 +408,8 @@ static double tick_of(const Run *r, int c, double *low) {
   return sum;
 }
 
-/* The root of a guard's polynomial improved on the guard itself along the motion; as it is where its slope is
- * rounding, or where the guard is not seen to pass zero near it. */
+/* Improve the root of a guard's polynomial by the guard itself along the motion, unless its slope is rounding or the guard
+ * does not pass zero near it. */
 static double polished(Run *r, const Expansion *e, int row, double root) {
   const double *c = e->guards + (int64_t)row * r->stride;
   double *x = r->vector, *lam = x + r->n, slope, time = root;
@@ -375,7 +433,7 @@ static int clock_of(const Run *r, int atom) {
   return -1;
 }
 
-/* Sides at the end of a step of the atoms that are located in one direction only. */
+/* Set sides at the end of a step for atoms that are located in one direction only. */
 static void note_sides(Run *r, Expansion *e, double dt) {
   Instant *i = &r->instant;
   for (int a = 0; a < r->s->rules.atoms; a++) {
@@ -386,10 +444,9 @@ static void note_sides(Run *r, Expansion *e, double dt) {
   }
 }
 
-/* Length of a short step from a point where high derivatives do not exist (a power law at zero), or 0. Each series
- * keeps the coefficients before its first that is no number; the step is shortened until the defect of the equation
- * at its end is below the tolerance. Guards are not located within it: none may fall in it, and what leaves zero at
- * a rate must do so at that rate. */
+/* Length of a short step from a point where high derivatives do not exist (a power law at zero), or 0. Each series ends
+ * before its first nonfinite coefficient; the step is shortened until the defect at its end is below the tolerance. Guards
+ * are not located within it: none may fall, and one that leaves zero must do so at its rate. */
 static double singular_step(Run *r, Expansion *e, double most) {
   int n = r->n, order = r->order, stride = r->stride, rests = 0;
   Expansion *there = &r->trial;
@@ -428,17 +485,7 @@ static double singular_step(Run *r, Expansion *e, double most) {
   return 0;
 }
 
-/* Sliding from which both sides lead away, as a run may start, ends where its exits rise through zero. */
-static void turn_exits(const Run *r, Expansion *e) {
-  for (int j = 0; j < e->l.rows; j++)
-    for (int k = 0; k <= r->order && e->l.kind[j] == EXIT_GUARD; k++) {
-      double *c = e->guards + (int64_t)j * r->stride + k;
-      *c = -*c;
-    }
-}
-
-/* Time to the zero of an atom, at which its side changes in the direction in which it is located; -1 if there is none
- * within h. */
+/* Time within h to the zero of an atom in a direction in which it is located; -1 if there is none. */
 static double atom_root(Run *r, Expansion *e, int atom, double h) {
   int row = e->l.atoms + atom, side = r->instant.side[atom], clock = clock_of(r, atom);
   const double *g = e->guards + (int64_t)row * r->stride;
@@ -451,7 +498,7 @@ static double atom_root(Run *r, Expansion *e, int atom, double h) {
   return guard_root(r, e, row, r->drop[row], h);
 }
 
-/* Keep for the facts how uncertain the time of an event is, where that moves a state by more than the tolerance. */
+/* Record the uncertainty of an event's time, if it moves a state by more than the tolerance. */
 static void note_hidden(Run *r, const Expansion *e, int row) {
   for (int i = 0; r->hidden[row] > r->t_error && i < r->s->dimension; i++)
     if (r->hidden[row] * fabs(e->states[(int64_t)i * r->stride + 1]) > e->allowed[i] / SAFETY) r->t_error = r->hidden[row];
@@ -465,10 +512,9 @@ static int rank_of(const Run *r, const Expansion *e, int row) {
 
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
 static int first_hit(Run *r, Expansion *e, double h, double *dt) {
-  double *time = r->met_at;
+  double *time = r->root_at;
   int first = -1, found = 0, rows = e->l.rows;
   r->hold = INFINITY;
-  if (r->repelling) turn_exits(r, e);
   memset(r->hidden, 0, sizeof(double) * rows);
   for (int j = 0; j < rows; j++) {
     time[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);
@@ -476,13 +522,13 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
     found++;
     if (first < 0 || time[j] < time[first]) first = j;
   }
-  if (first < 0) { if (r->repelling) turn_exits(r, e); return -1; }
+  if (first < 0) return -1;
   double latest = time[first] + RESOLVED * h;
   for (int j = 0; j < rows; j++)
     if (time[j] > 0 && time[j] <= latest && (is_curved(r, &e->l, j) || (found > 1 && is_scaled_exit(r, &e->l, j))))
       time[j] = polished(r, e, j, time[j]);
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
-  /* Guards whose times cannot be told apart: atoms are passed together, at the first time; others one by one. */
+  /* Atoms whose times coincide to rounding pass together, at the first time; other guards pass one by one. */
   int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;
   double near = time[first] + TIE * (time_scale(r) + time[first])
                 + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
@@ -496,7 +542,6 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
     int rank = rank_of(r, e, j), best_rank = best < 0 ? rank + 1 : rank_of(r, e, best);
     if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
   }
-  if (r->repelling) turn_exits(r, e);
   r->instant.tied = atom < 0 ? -1 : best;
   if (atom >= 0) best = atom;
   if (best < 0) best = first;

@@ -1,4 +1,4 @@
-"""What Python and the drivers in C share: options and batches, a run as arrays."""
+"""Data that Python and the drivers in C share: options and batches, a run as arrays."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..results import Chunk
 from ..section import Hits
 from .structures import structure
 
-#: Steps of one call of C; between calls Python hears Ctrl-C and requests to stop.
+#: Steps of one call of C; between calls Python handles Ctrl-C and requests to stop.
 BURST = 4096
 
 
@@ -36,7 +36,7 @@ class Run:
     rates: Array  # (k, n): rates of the states in them
     facts: int  # what was noted about the decisions, as bits
     t_error: float  # largest error of the time of an event that rounding hides; see ``Facts``
-    unmet: int  # a stop or reset that was true at the start and did not happen, or -1
+    unfired: int  # a stop or reset that was true at the start and did not happen, or -1
     implicit_steps: int  # how many steps were implicit
     t: Array  # (m,): start, steps and events; a reset appears twice
     x: Array  # (m, n)
@@ -118,7 +118,7 @@ def options_of(
 
 
 def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
-    """Whether the guards of each kind have a name that is looked for."""
+    """Whether the guards of each kind have the name of the section."""
     own = [name if i in system.half_lines else "" for i, name in enumerate(system.surface_names)]
     half_lines = [*own, *system.impacts]
     names = {

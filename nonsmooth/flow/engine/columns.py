@@ -6,7 +6,8 @@ import ctypes
 import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,8 +16,8 @@ from numpy.typing import NDArray
 from ...model import Array, FilippovSystem
 from ..constants import GUARDS
 from .arrays import address
+from .interpreter import Interpreter, library
 from .structures import structure
-from .tape import TapeEngine, library
 
 #: Why a leg does not reach its end.
 DONE, STUCK, NOT_UNIQUE = range(3)
@@ -28,6 +29,9 @@ LEAVING = 4
 #: Steps for which there is room at first, and those of each leg.
 _ROOM, _STEPS = 32, 6
 
+#: Parts of each leg for which there is room, and most numbers of them all.
+_PARTS, _MOST_PARTS = 64, 2**22
+
 _NO_STEPS = np.zeros((0, 0))
 
 #: Direction of a column along given parameters (``variation.c``).
@@ -35,7 +39,7 @@ _ALONG_DP = -2
 
 
 class EndOfLeg(NamedTuple):
-    """What ends a leg by the law of its mode: a set that is reached, or a guard of sliding or of a contact."""
+    """End of a leg by the law of its mode: a set that is reached, or a guard of sliding or of a contact."""
 
     hit: int = -1
     guard: str = "stop"
@@ -45,7 +49,8 @@ class EndOfLeg(NamedTuple):
 
 class GivenLegs(NamedTuple):
     """Legs: letters of their modes (L, w), starts (L, n), durations (L,), ends; parameters (np,) or (L, np), error, most steps of a leg;
-    times of samples since the starts (K,), and where those of each leg begin (L + 1,)."""
+    times of samples since the starts (K,), and where those of each leg begin (L + 1,); the condition of derivatives by the
+    start beyond which others begin, or 0."""
 
     letters: NDArray[np.int8]
     starts: Array
@@ -56,6 +61,7 @@ class GivenLegs(NamedTuple):
     most_steps: int
     times: Array
     first: NDArray[np.intp]
+    ratio: float = 0.0
 
 
 @cache
@@ -84,6 +90,8 @@ class CarriedLegs:
         ]
         self.failed, self.status = -1, DONE
         self.row = np.zeros(n)
+        room = min(_PARTS * legs, _MOST_PARTS // (1 + n * n)) if given.ratio > 0.0 else 0
+        self._parts = np.empty((1 + room, 1 + n * n))
         self._c = self._structures(count, starts)
 
     def _structures(self, count: int, starts: int) -> NDArray[np.void]:
@@ -112,11 +120,13 @@ class CarriedLegs:
         made["sample_t"] = times.ctypes.data + 8 * given.first[:-1]
         made["at_samples"] = self._samples.ctypes.data + 8 * n * count * given.first[:-1]
         gradients = self.gradients.ctypes.data + np.arange(legs) * 8 * self.gradients.shape[1]
+        made["ratio"], made["parts"] = given.ratio, self._parts.ctypes.data
+        made["part_room"][0] = len(self._parts) - 1
         made["gradient"] = np.where([e is not None for e in given.ends], gradients, 0)
         return made
 
     def carry(self, direction: Array, dp: Array | None, steps: Array) -> int:
-        """Carry them; the number of steps, of which as many as there is room for are recorded."""
+        """Integrate them and return the number of steps, which are recorded as far as there is room."""
         self._c["direction"], self._c["dp"] = direction.ctypes.data, address(dp) or 0
         self._c["steps"][0], self._c["step_room"][0] = address(steps) or 0, len(steps)
         self._steps = steps
@@ -128,7 +138,7 @@ class CarriedLegs:
 
     @property
     def left(self) -> Array:
-        """What is left of durations (L,) where legs end: at a set that is reached before, or where they are stuck."""
+        """Remaining durations (L,) of legs that end early: at a set, or where integration fails."""
         return np.asarray(self._c["left"])
 
     def steps_of(self, leg: int) -> tuple[Array, Array]:
@@ -139,8 +149,15 @@ class CarriedLegs:
         rows = rows[rows[:, 2] >= 0.0]  # without stages
         return rows[:, 1], rows[:, 3 : 3 + n]
 
+    @cached_property
+    def parts(self) -> list[tuple[Array, Array]]:
+        """Of each leg times since its start (k,) at which other derivatives begin, and what those are that end there (k, n, n)."""
+        n, first = self.ends.shape[1], [0, *np.cumsum(self._c["part_count"]).tolist()]
+        times, matrices = self._parts[:, 0], self._parts[:, 1:].reshape(-1, n, n).swapaxes(1, 2)
+        return [(times[i:j], matrices[i:j]) for i, j in pairwise(first)]
+
     def set_columns(self, first: Array) -> None:
-        """Let the first column (n,) of all legs be one, and others zero."""
+        """Set the first column (n,) of all legs, and the others to zero."""
         self._y[:] = 0.0
         self._y[:, 0] = first
 
@@ -156,7 +173,7 @@ class CarriedLegs:
 
     @contextmanager
     def pulling(self, by_parameters: Array, rows: Array) -> Iterator[None]:
-        """Let ``pull`` add what the row gives by all parameters; ``rows`` (K, n) join it at samples."""
+        """Let ``pull`` add the row's derivatives by all parameters; ``rows`` (K, n) are added at samples."""
         c, width = self._c, 8 * rows.shape[1]
         c["row"], c["by_parameters"] = self.row.ctypes.data, by_parameters.ctypes.data
         c["at_samples"] = rows.ctypes.data + width * self.given.first[:-1]
@@ -170,7 +187,7 @@ class CarriedLegs:
             self.row[:] = np.nan
 
 
-class ColumnsEngine(TapeEngine):
+class ColumnsEngine(Interpreter):
     """The driver with one system and the series of its derivatives."""
 
     def __init__(self, system: FilippovSystem, order: int):
@@ -180,7 +197,7 @@ class ColumnsEngine(TapeEngine):
 
     @contextmanager
     def state(self) -> Iterator[int]:
-        """A run of the driver, which goes on to the next call."""
+        """A run of the driver, kept for the next call."""
         try:
             state = self._idle.pop()
         except IndexError:
@@ -194,15 +211,15 @@ class ColumnsEngine(TapeEngine):
             self._idle.append(state)
 
     def carry(self, given: GivenLegs, chosen: Sequence[int]) -> CarriedLegs:
-        """Carry states and their derivatives by the starts and by chosen parameters over legs."""
+        """Integrate states and their derivatives by the starts and by chosen parameters over legs."""
         n = given.starts.shape[1]
         found = CarriedLegs(self, given, n + len(chosen), n)
         found.carry(np.array([-1] * n + list(chosen), np.int32), None, _NO_STEPS)
         return found
 
     def record(self, given: GivenLegs) -> CarriedLegs:
-        """Carry states over legs by steps that rows can take back: short enough for two columns; implicit ones end at
-        samples."""
+        """Integrate states over legs by steps along which rows can be pulled back: short enough for two columns; implicit
+        ones end at samples."""
         (legs, n), q = given.starts.shape, given.p.shape[-1]
         some = 1.0 + 0.5 * np.cos(np.arange(max(n, q)))
         room = _ROOM + _STEPS * legs

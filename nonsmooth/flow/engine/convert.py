@@ -51,7 +51,9 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
             partial(_few_segments, system, run) if run.few else None,
         ),
         status=status,
-        message=f"{message_of(system, options, run)} {ADVICE[status]}{_unmet(system, run)}",
+        message=message_of(system, options, run)
+        + ("" if status.complete else f" {ADVICE[status]}")
+        + _unfired(system, run),
         accumulation_time=limit if status is Status.ACCUMULATION else None,
         steps=Steps(run.starts, run.coefficients, run.implicit),
         continuations=[
@@ -178,22 +180,22 @@ def _segments(system: FilippovSystem, run: Run) -> Segments:
     return Segments(times[:-1], times[1:], first, last, codes, modes)
 
 
-def _unmet(system: FilippovSystem, run: Run) -> str:
-    """What is said of an event that was true at the start and silent."""
+def _unfired(system: FilippovSystem, run: Run) -> str:
+    """Note on an event whose condition was true at the start and that did not fire."""
     names = [name for name, *_ in (*system.stops, *system.resets)]
-    return "" if run.unmet < 0 else messages.UNMET.format(name=names[run.unmet])
+    return "" if run.unfired < 0 else messages.UNFIRED.format(name=names[run.unfired])
 
 
 def message_of(system: FilippovSystem, options: Options, run: Run) -> str:
     """The message of the end of a run."""
     found = messages.SENTENCES.get(REASONS[run.reason])
     return (found or messages.SENTENCES[str(Status(run.status))]).format_map(
-        _Said(system, options, run)
+        _Fields(system, options, run)
     )
 
 
-class _Said(dict[str, Any]):
-    """What a message says of the end of a run, made where it is read."""
+class _Fields(dict[str, Any]):
+    """Fields of the message of a run's end, computed on access."""
 
     def __init__(self, system: FilippovSystem, options: Options, run: Run):
         self._of = system, options, run
@@ -209,7 +211,7 @@ def _at_once(system: FilippovSystem, options: Options, run: Run) -> str:
 
 
 def _differing(system: FilippovSystem, run: Run) -> list[str]:
-    """Names of what the modes that can continue differ in."""
+    """Names of the elements in which the admissible modes differ."""
     names = [system.surface_names[members[0]] for members in system.entries]
     letters = zip(*map(system.spelled, run.several), strict=True)
     pairs = zip([*names, *system.impacts], letters, strict=True)

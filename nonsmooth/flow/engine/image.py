@@ -1,7 +1,7 @@
-"""A system as one block of bytes, with the addresses of a machine of 32 bits: what a page gives the driver.
+"""A system as one block of bytes with 32-bit addresses, which a page passes to the driver.
 
-WebAssembly has addresses of 4 bytes. They count from the first byte of the image; who copies it into the
-module's memory adds where it is.
+WebAssembly has addresses of 4 bytes. They count from the first byte of the image; the code that copies it into the
+module's memory adds its address.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from .interpreter import Interpreter
 from .structures import structure
-from .tape import TapeEngine
 
 #: An address there.
 _ADDRESS = ctypes.c_uint32
 
 
 def exchanged() -> dict[str, dict[str, Any]]:
-    """Sizes of what a page writes for the driver, and of each field the offset and the kind, for JSON."""
+    """Sizes of the structures that a page writes for the driver, with offset and kind of each field, for JSON."""
     found = dict[str, dict[str, Any]]()
     for name in ("Options", "Batch", "Output"):
         own: Any = structure(name, _ADDRESS)
@@ -38,15 +38,15 @@ class Image:
     ----------
     bytes : bytearray
         The structure ``System`` of ``core/state.c``, then what it points to.
-    places : list of int
+    addresses : list of int
         Offsets of its addresses.
     """
 
     bytes: bytearray = field(default_factory=bytearray)
-    places: list[int] = field(default_factory=list)
+    addresses: list[int] = field(default_factory=list)
 
 
-def image_of(engine: TapeEngine) -> Image:
+def image_of(engine: Interpreter) -> Image:
     """Write a system as an image."""
     system, blocks = engine.blocks()
     image, known = Image(), dict[int, int]()
@@ -70,7 +70,7 @@ def image_of(engine: TapeEngine) -> Image:
                     put(bytes(narrow(one, known[address] + k * size)), known[address] + k * size)
             else:
                 content = np.ascontiguousarray(block).tobytes()
-                known[address] = room(len(content) + 8)  # an empty array has a place too
+                known[address] = room(len(content) + 8)  # an empty array has an address too
                 put(content, known[address])
         return known[address]
 
@@ -81,7 +81,7 @@ def image_of(engine: TapeEngine) -> Image:
             if isinstance(value, ctypes.Structure):
                 value = narrow(value, at)
             elif kind is ctypes.c_void_p and value:
-                image.places.append(at)
+                image.addresses.append(at)
                 value = placed(value)
             setattr(made, name, value or 0)
         return made

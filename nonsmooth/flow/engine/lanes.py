@@ -1,4 +1,4 @@
-"""Several trajectories in step, from Python: one system of at most one surface, one order."""
+"""Several trajectories together, from Python: one system of at most one surface, one order."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ import numpy as np
 from ...model import Array, FilippovSystem
 from ..options import Options
 from ..results import Chunk
+from ..section import Hits
 from .arrays import BURST
 from .building.build import build
 from .building.codegen import lanes_source, supports_lanes
 from .building.compilers import lane_width
+from .interpreter import interpreter_for
+from .interpreter import library as core_library
 from .structures import declare, structure
-from .tape import library as core_library
-from .tape import tape_for
 
-#: Lanes are compiled for this processor, and have no bits in common with the driver: sums of products may be fused.
+#: Lanes are compiled for this processor with fused products: their bits differ from those of the driver.
 FLAGS = ("-march=native", "-ffp-contract=fast")
 
 
 class Lanes:
-    """The library that runs a system's trajectories in step, built when first needed."""
+    """The library that runs a system's trajectories together, built when first needed."""
 
     #: Not 0: every other step, at random, is made by the driver, which changes no result.
     random = 0
@@ -53,11 +54,12 @@ class Lanes:
         at: tuple[int, int] | None,
         out: Chunk | None = None,
         stop: Callable[[], bool] = lambda: False,
+        times: Array | None = None,
     ) -> Chunk:
         """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
-        # The driver takes steps that are not clear.
-        return tape_for(self.system, options).run_many(
-            x, p, options, at, out, stop, None, self._calls
+        # The driver makes steps that the lanes cannot decide.
+        return interpreter_for(self.system, options).run_many(
+            x, p, options, at, out, stop, times, self._calls
         )
 
     def _calls(self, run: int, batch: Any, options: Any) -> Callable[[], int]:
@@ -76,7 +78,7 @@ class Lanes:
 
 
 def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
-    """Return what runs a system's trajectories in step, or None where the driver has to run them."""
+    """Return the lanes of a system, or None where the driver has to run it."""
     if options.start_mode is not None or options.rest_below is not None or options.begins_late:
         return None
     if not supports_lanes(system):
@@ -85,6 +87,15 @@ def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
     return system.cached(("lanes", order), lambda: Lanes(system, order))
 
 
+def can_sample(system: FilippovSystem, hits: Hits | None) -> bool:
+    """Whether lanes keep samples: at times, or at events of a surface."""
+    stops = {name for name, _ in system.stops}
+    if system.sets or hits is None or hits.after:
+        return not system.sets and hits is None
+    named = hits.names is not None and not stops.intersection(hits.names)
+    return named or not stops or "stop" not in hits.kinds
+
+
 def _order_with_sets(options: Options) -> int:
-    """Where directions of slip are expanded the work of the series counts most."""
+    """Order for systems with sets, where the series cost most."""
     return max(6, math.ceil(options.order / 1.2))

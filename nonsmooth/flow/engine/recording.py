@@ -1,4 +1,4 @@
-"""What a run writes: points, steps and events, from the memory that the driver fills to compact arrays."""
+"""Output of a run: points, steps and events, from the memory that the driver fills to compact arrays."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..trajectory import Steps
 from .arrays import address
 from .structures import structure
 
-#: Arrays in the order of C's pointers: type, and what there is one of for each entry; those of floats first.
+#: Arrays in the order of C's pointers: type, and the counter of their entries; those of floats first.
 _ARRAYS: dict[str, tuple[type, int]] = {
     "start": (float, STEP := 0),
     "coefficients": (float, STEP),
@@ -38,14 +38,14 @@ _ARRAYS: dict[str, tuple[type, int]] = {
 Rooms = tuple[int, int, int]
 #: Room for them at first; the block of a larger run grows from there.
 _FIRST: Rooms = (64, 128, 64)
-#: The same where steps are not kept.
+#: Room at first where steps are not kept.
 LOOSE: Rooms = (1024, 128, 64)
-#: What C needs to be free before a step.
+#: Free room that C needs before a step.
 _NEEDED: Rooms = (2, 4, 4)
 
-#: Most bytes of polynomials that are given to a run since an earlier one needed them, most bytes that grow much.
+#: Most bytes of polynomials reserved because an earlier run needed them; most bytes that grow by the large factor.
 _GIVEN, _LARGEST = 1 << 26, 1 << 18
-#: How arrays grow: pages that are not written cost nothing; and those that are large, by a part.
+#: Growth of arrays, as unwritten pages cost nothing; of large arrays by a part.
 _MUCH, _PART = 16, 8
 
 #: Events and points that are read one by one.
@@ -53,7 +53,7 @@ _FEW = 200
 
 
 def written_arrays() -> dict[str, tuple[int, str]]:
-    """Bytes of a number of each array that the driver writes, and what there is one of for each entry."""
+    """Bytes of a number of each array that the driver writes, and the counter of its entries."""
     return {
         name: (np.dtype(dtype).itemsize, ("step", "point", "event")[kind])
         for name, (dtype, kind) in _ARRAYS.items()
@@ -64,7 +64,7 @@ def written_arrays() -> dict[str, tuple[int, str]]:
 def _layout(
     n: int, order: int, motion: int, rooms: Rooms
 ) -> tuple[dict[str, tuple[int, type, tuple[int, ...], int]], list[int], int]:
-    """Of each array what it is of, type, shape of an entry and place in a block; the places; the block's bytes."""
+    """Counter, type, shape of an entry and offset of each array in a block; the offsets; the block's bytes."""
     shapes: dict[str, tuple[int, ...]] = {
         "coefficients": (n, order + 1),
         **dict.fromkeys(("point_x", "event_x", "event_after_x"), (n,)),
@@ -98,7 +98,7 @@ class Output:
         self.pointer = ctypes.byref(structure("Output")(*counts, *self._rooms, *places))
 
     def written(self, counts: Sequence[int]) -> Arrays:
-        """What was written; a copy where nearly all of a large block would be kept for nothing."""
+        """The written arrays; a copy where most of a large block would be unused."""
         if self._grown:
             return {name: self._grown[name][: counts[kind]] for name, (_, kind) in _ARRAYS.items()}
         found = Written(self._block, self._arrays, counts)
@@ -112,7 +112,7 @@ class Output:
         return found
 
     def grow(self, counts: Sequence[int]) -> None:
-        """Go on with this content and with more room for what has none for another step."""
+        """Keep this content and enlarge the arrays that have no room for another step."""
         own, grown = self.written(counts), self._grown
         size = sum(own[name].nbytes for name in _ARRAYS)
         steps, points, events = (
@@ -229,8 +229,8 @@ def changes_of(modes: NDArray[np.int32]) -> NDArray[np.int64]:
 
 
 def states_of_events(own: Arrays, x: Array) -> tuple[Array, NDArray[np.int64], NDArray[np.bool_]]:
-    """Points of a run with the states of events that are none behind them, rows of the events' states, and whether the
-    state after each is the next row."""
+    """Points of a run followed by states of events that are not points, rows of the events' states, and whether the state
+    after each is the next row."""
     t, before, after = (own[f"event_{name}"] for name in ("t", "x", "after_x"))
     before, after = before[:, : x.shape[1]], after[:, : x.shape[1]]
     jumps = _differ(before, after)

@@ -18,7 +18,7 @@ _OF_FUNCTIONS = (
 
 
 class Shown:
-    """What results show of the system that is driven: that with a surface for each breakpoint."""
+    """Conversion between the modes of the driver and those of results, with a surface for each breakpoint."""
 
     def __init__(self, system: FilippovSystem):
         self.system, self.driven, self.tables = system, system.of_pieces, system.written.tables

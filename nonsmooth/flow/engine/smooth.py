@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array
-from ...model.printing.tape import Entries, Series, Values
+from ...model.printing.instructions import Entries, Series, Values
 from .arrays import address
+from .interpreter import library, series_structure, values_structure
 from .structures import structure
-from .tape import library, series_structure, values_structure
 
-#: Rows of what is watched that are looked for at first.
+#: Initial room for rows of monitored functions.
 _ROOM = 64
 
 
 class SmoothProgram:
-    """A smooth field with columns of derivatives, or functions that are watched along it."""
+    """A smooth field with columns of derivatives, or with functions monitored along it."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class SmoothProgram:
         self.work = int(library().field_work(self.pointer))
 
     def _given(self, z: Array, p: Array) -> tuple[Array, int, int, int]:
-        """Parameters, state and room for work in one array, and where they are."""
+        """Parameters, state and work in one array, and their addresses."""
         memory = np.empty(len(p) + 1 + self.size + self.work)
         memory[: len(p)] = p
         memory[len(p) + 1 : len(p) + 1 + self.size] = z
@@ -55,7 +55,7 @@ class SmoothProgram:
     def flow(
         self, z: Array, p: Array, duration: float, tol: float, most_steps: int
     ) -> tuple[Array, float]:
-        """State after a duration of either sign, and the time that is left where it fails, else 0."""
+        """State after a duration of either sign, and the remaining time if it fails, else 0."""
         memory, at, state, work = self._given(z, p)
         left = library().fixed_flow(self.pointer, at, state, duration, tol, most_steps, work)
         return memory[len(p) + 1 : len(p) + 1 + self.size], left
@@ -139,14 +139,14 @@ class LegsProgram:
     def __call__(
         self, z: Array, p: Array, durations: Array, tol: float, most_steps: int
     ) -> IntegratedLegs:
-        """Fly all legs from states (L, width)."""
+        """Integrate all legs from states (L, width)."""
         memory, _ = self._given(z, p, durations)
         left = ctypes.c_double()
-        failed = library().fly_legs(
+        failed = library().run_legs(
             self._pointer, memory.ctypes.data, tol, most_steps, ctypes.byref(left)
         )
         at, count = self._places, self._count
-        kept = memory[at[1] : at[6]].copy()  # the room for work is many times as large
+        kept = memory[at[1] : at[6]].copy()  # the work array is many times as large
         ends, before, after, results = (
             kept[at[k] - at[1] : at[k + 1] - at[1]].reshape(count, -1) for k in (1, 3, 4, 5)
         )
@@ -163,10 +163,10 @@ class LegsProgram:
     def extended(
         self, z: Array, p: Array, durations: Array, tol: float, most_steps: int
     ) -> tuple[Array, Array] | None:
-        """Results (L, results) in extended precision, rounded, and what that leaves."""
+        """Results (L, results) in extended precision: rounded, and the remainders."""
         memory, parts = self._given(z, p, durations)
         left, rest = ctypes.c_double(), np.empty(len(parts[5]))
-        failed = library().fly_legs_extended(
+        failed = library().run_legs_extended(
             self._pointer,
             memory.ctypes.data,
             tol,
@@ -190,7 +190,7 @@ class WatchedLegs(NamedTuple):
 
 
 class WatchProgram:
-    """Flows of which functions are watched, all in one call."""
+    """Flows with monitored functions, all in one call."""
 
     def __init__(self, fields: Sequence[SmoothProgram]):
         self._fields, self._count = list(fields), len(fields)
@@ -209,7 +209,7 @@ class WatchProgram:
         most_steps: int,
         ends: float,
     ) -> WatchedLegs:
-        """Watch them, with parameters (np,) or (L, np); those of no positive duration have their starts alone."""
+        """Integrate them with parameters (np,) or (L, np); flows without a positive duration have their starts only."""
         parameters = p.shape[1] if p.ndim > 1 else 0
         legs, width, begin, room = self._count, self._width, self._begin, _ROOM + 16 * self._count
         counts, left = np.empty(legs, np.int64), ctypes.c_double()

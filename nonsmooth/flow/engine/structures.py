@@ -28,7 +28,7 @@ def _plain(name: str) -> str:
 
 @cache
 def bodies() -> Mapping[str, str]:
-    """Return what stands in the braces of each structure, in the order of the sources."""
+    """Return the declarations in each structure, in the order of the sources."""
     text = "".join(_plain(f"core/{name}") for name in _STRUCTURES)
     return {name: body for body, name in re.findall(r"typedef struct \{([^}]*)\} (\w+);", text)}
 
@@ -46,7 +46,7 @@ def _structure(name: str, address: type) -> type[ctypes.Structure]:
 
 
 def _fields(declaration: str, address: type) -> Iterator[tuple[str, type]]:
-    """Names and types of what one declaration declares."""
+    """Names and types of the fields of one declaration."""
     if function := re.search(r"\(\*(\w+)\)\(", declaration):
         yield function[1], address
     elif declaration:

@@ -10,8 +10,8 @@ from functools import lru_cache
 import numpy as np
 
 from ...model import Array, FilippovSystem
+from ..engine.interpreter import interpreter_for
 from ..engine.lanes import lanes_for
-from ..engine.tape import tape_for
 from ..options import Options
 from ..results import Chunk
 from ..section import Times
@@ -31,7 +31,7 @@ class Job:
 
 
 def shipped(job: Job) -> Job:
-    """Return the job with its system pickled, which every other process reads once."""
+    """Return the job with its system pickled, which each other process reads once."""
     return job if isinstance(job.system, bytes) else replace(job, system=pickle.dumps(job.system))
 
 
@@ -76,7 +76,7 @@ def _run_compiled(
     if job.engine == "lanes":
         lanes = lanes_for(system, job.options)
         assert lanes is not None
-        lanes.run_many(x, p, job.options, job.at, out, stop)
+        lanes.run_many(x, p, job.options, job.at, out, stop, times)
     else:
-        tape = tape_for(system, job.options)
-        tape.run_many(x, p, job.options, job.at, out, stop, times)
+        engine = interpreter_for(system, job.options)
+        engine.run_many(x, p, job.options, job.at, out, stop, times)

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from ...model import FilippovSystem, OptionError, require_system
 from ..constants import KINDS
 from ..engine.building.compilers import ADVICE, CompilerError, find_compiler
-from ..engine.lanes import lanes_for
-from ..engine.tape import library, tape_for
+from ..engine.interpreter import interpreter_for, library
+from ..engine.lanes import can_sample, lanes_for
 from ..options import Options
 from ..other_names import hinted
 from ..results import Chunk, Collected, Ensemble
@@ -31,7 +31,10 @@ from .work import Work, checked_work, run_all, size_of_chunk
 #: systems with a set, which take longer to compile.
 _FEW, _FEW_WITH_SETS = 64, 4000
 
-#: Ensembles of at least this many trajectories are tested for stiffness on three of them, smaller ones on one.
+#: Seconds that all trajectories must take one by one for that compilation, of some seconds, to be worth its time.
+_WORTH = 0.25
+
+#: The work of at least this many trajectories is estimated from three of them, of fewer from one.
 _MANY = 100_000
 
 
@@ -66,7 +69,7 @@ def ensemble(
     system : FilippovSystem
         As for :func:`simulate`.
     x0 : array_like (..., n), Grid or RandomStarts
-        Starts. Those that are not finite get the status NOT_FINITE; the others go on.
+        Starts. Those that are not finite get the status NOT_FINITE; the others run.
     t_end : float
         Time at which every run ends, unless something ends it before.
     t_start : float, optional
@@ -74,7 +77,7 @@ def ensemble(
     parameters : mapping, optional
         Values that replace defaults: numbers, or arrays that broadcast with the starts.
     tol, rtol, atol, start_mode, max_step, max_steps, max_events, max_jumps, rest_below, method : optional
-        As in :func:`simulate`; a start with another side than ``start_mode`` says gets the status
+        As in :func:`simulate`; a start on another side than that of ``start_mode`` gets the status
         NON_UNIQUE.
     at_event : (kind, k), optional
         Keep the state at the k-th event (from 1) of a kind, e.g. ``("crossing", 1)``.
@@ -85,7 +88,7 @@ def ensemble(
     work : Work, optional
         Threads or an executor, size of a chunk, progress bar, store; see :class:`Work`.
     device : {None, "cuda"}, optional
-        ``"cuda"`` runs on an NVIDIA card; steps that are not clear fall back to the processor. It needs the
+        ``"cuda"`` runs on an NVIDIA card; steps that it cannot decide fall back to the CPU. It needs the
         packages of ``nonsmooth-dynamics[cuda]``, and a system of at most one surface without resets and contacts.
 
     Returns
@@ -137,7 +140,8 @@ def ensemble(
             "at is a section at events without a count, which an ensemble needs. Give "
             "at=nonsmooth.Section(..., count=100) to keep up to 100 states of each run."
         )
-    step = sampling.room is None and t_end > t_start and device is None
+    step = sampling.room is None or can_sample(system, sampling.hits)
+    step = step and t_end > t_start and device is None
     chosen = engine_for(system, options, starts, step)
     job = Job(system, options, number, sampling.times, sampling.room, chosen)
     return _run(job, starts, work, device)
@@ -171,10 +175,10 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
 
 
 def engine_for(system: FilippovSystem, options: Options, starts: Starts, step: bool) -> str:
-    """Return what runs all chunks, compiled here so that all use the same: lanes or core."""
+    """Return the engine of all chunks, ``lanes`` or ``core``, compiled here so that all use the same."""
     lanes = lanes_for(system, options) if step else None
     enough = starts.count >= (_FEW_WITH_SETS if system.sets else _FEW)
-    if lanes is not None and enough and not _is_stiff(system, options, starts):
+    if lanes is not None and enough and _is_worth_lanes(system, options, starts):
         try:
             if find_compiler() is not None and lanes.library:
                 return "lanes"
@@ -186,19 +190,17 @@ def engine_for(system: FilippovSystem, options: Options, starts: Starts, step: b
     return "core"
 
 
-def _is_stiff(system: FilippovSystem, options: Options, starts: Starts) -> bool:
-    """Whether some of the runs take implicit steps, which several in step do not."""
-    if options.method != "auto":
-        return options.method == "stiff"
-    tape = tape_for(system, options)
-    probed = (
-        {starts.count // 2} if starts.count < _MANY else {0, starts.count // 2, starts.count - 1}
-    )
-    for first in sorted(probed):
+def _is_worth_lanes(system: FilippovSystem, options: Options, starts: Starts) -> bool:
+    """Whether the runs take long one by one, and none takes implicit steps, which lanes do not have."""
+    engine, last = interpreter_for(system, options), starts.count - 1
+    probed, found = [last // 2] if last < _MANY else [0, last // 2, last], list[float]()
+    for first in probed:
         x, p = starts.part(first, first + 1)
-        if tape.is_stiff(x[0], p[0] if p.ndim > 1 else p, options):
-            return True
-    return False
+        seconds = engine.seconds(x[0], p[0] if p.ndim > 1 else p, options)
+        if seconds is None:
+            return False
+        found.append(seconds)
+    return starts.count * max(found) >= _WORTH
 
 
 def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:

@@ -1,4 +1,4 @@
-"""Ensembles on a GPU: its starts, and the steps for which runs fall back to this processor."""
+"""Ensembles on a GPU: starts, and steps that fall back to the CPU."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ CHUNK, _MEMORY = 1 << 22, 1 << 31
 #: half as many runs with a step of the driver.
 _ORDER = 0.48
 
-#: How often a run returns to the card after a step that was not clear, before the driver completes it.
+#: How often a run returns to the GPU after a step of the driver, before the driver completes it.
 _TURNS = 8
 
-#: Records of runs that wait for the driver while a card goes on.
+#: Records of runs that wait for the driver while the GPU continues.
 _WAITING = 1 << 19
 
 
@@ -91,7 +91,7 @@ def device_order(options: Options) -> int:
 def run_on_device(
     job: Job, device: str, starts: Starts, first: int, out: Chunk, workers: int
 ) -> Chunk:
-    """Run the trajectories of the rows of ``out``; the driver makes the steps that are not clear."""
+    """Run the trajectories of the rows of ``out``; the driver makes the steps that the GPU cannot decide."""
     kernel, count = _kernel(job, device), len(out.t)
     given, x = _given(starts, first, count, job.options)
     left = kernel.run(given, job.at, out)
@@ -169,7 +169,7 @@ def _carry_on(
 
 
 def _with_events(chunk: Chunk, events: tuple[Array, Array] | None) -> Chunk:
-    """A chunk with events that happened before it began."""
+    """A chunk with events from before it began."""
     if events is not None and chunk.at_x is not None and chunk.at_t is not None:
         before = np.isfinite(events[1])
         chunk.at_x[before], chunk.at_t[before] = (array[before] for array in events)

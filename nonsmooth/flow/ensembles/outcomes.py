@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, require_system, whole
+from ...tables import Table, Tabular
 from ..engine.device.kernel import Bins, Reduced
 from ..options import Options
 from ..results import Chunk
@@ -25,7 +26,7 @@ from .work import Work, checked_work, run_all, size_of_chunk
 
 
 @dataclass(frozen=True)
-class Outcomes:
+class Outcomes(Tabular):
     """Counts, means and histograms of the ends of many runs.
 
     Attributes
@@ -50,6 +51,19 @@ class Outcomes:
     std: dict[str, float]
     edges: dict[str, Array]
     histogram: dict[str, NDArray[np.int64]]
+
+    def _tables(self) -> dict[str, Table]:
+        counted = lambda found: {"count": list(found.values())}
+        states = {"mean": list(self.mean.values()), "std": list(self.std.values())}
+        tables = {
+            "states": Table({"state": list(self.mean)}, states),
+            "status": Table({"status": [str(s) for s in self.status]}, counted(self.status)),
+            "itineraries": Table({"itinerary": list(self.itineraries)}, counted(self.itineraries)),
+        }
+        for name, edges in self.edges.items():
+            columns = {"low": edges[:-1], "high": edges[1:], "count": self.histogram[name]}
+            tables[name] = Table({f"{name}_bin": len(edges) - 1}, columns)
+        return tables
 
 
 @dataclass
@@ -80,7 +94,7 @@ class _Sums:
         done = (chunk.status == Status.REACHED_END) | (chunk.status == Status.STOPPED)
         for k, v in enumerate([*chunk.x[done].T, chunk.t[done]]):
             self.sums[k] += v.sum(), (v * v).sum()
-            self.histogram[k] += np.bincount(self.bins.places(k, v), minlength=self.bins.count)
+            self.histogram[k] += np.bincount(self.bins.indices(k, v), minlength=self.bins.count)
 
     def add(self, found: Reduced) -> None:
         """Add sums from a device."""

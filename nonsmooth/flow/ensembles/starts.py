@@ -20,7 +20,7 @@ from .lazy_starts import Index, LazyStarts, part_of
 
 @dataclass(frozen=True)
 class Cut:
-    """Starts and parameters of some trajectories, sent to another process as a rule where there is one."""
+    """Starts and parameters of some trajectories; lazy starts are sent to another process as their rule."""
 
     p: Array
     x: Array | None = None

@@ -1,4 +1,4 @@
-"""Results of an ensemble in a folder, mapped into memory, so that an interrupted sweep can go on.
+"""Results of an ensemble in a folder, mapped into memory, so that an interrupted sweep can continue.
 
 ``problem.json`` holds a hash of system, starts, parameters and options, and the size of a chunk. Each
 array of results is a NumPy file (``x.npy``, ``t.npy``, ...), filled row by row. A note for each finished

@@ -1,5 +1,5 @@
 /* Batches on this processor: groups of W lanes in pools, refilled; itineraries as nodes of a tree. After lanes.c. */
-#define OFTEN 16 /* starts for each lane from which on there are several groups */
+#define OFTEN 16 /* starts per lane above which there are several groups */
 
 INLINE const Options *limits(const Work *w) { return w->o; }
 
@@ -25,8 +25,7 @@ static void store(Lanes *s, Work *w, int l, int status) {
   keep_end(s, w, l, status);
 }
 
-/* Put the next start into a lane; 0 if there is none. Vectors are written whole: what is written in parts
- * cannot be read soon. */
+/* Put the next start into a lane; 0 if there is none. Vectors are written whole: partial writes delay the next read. */
 static int load(Lanes *s, Work *w, int l, I mine) {
   const Batch *b = w->b;
   if (w->next >= b->count) return 0;
@@ -43,7 +42,8 @@ static int load(Lanes *s, Work *w, int l, I mine) {
   LANE_I(s->own, l) = w->spare[--w->spares];
 #endif
   Past *past = past_of(s, l);
-  past->count = past->steps = 0;
+  past->count = past->steps = past->hits = past->kept = 0;
+  await_sample(s, w, l);
   past->row = s->row;
   past->shortened = 0;
   w->alive[AWAY]++;
@@ -121,8 +121,8 @@ typedef struct { Lanes lanes[POOLS][GROUPS]; Step steps[GROUPS]; Log log[SET ? 1
 
 int64_t many_size(void) { return sizeof(Many); }
 
-/* The parts of a step one after the other for all groups: a part's text is read once for them all, and what
- * one group waits for another one's work fills. */
+/* Each part of a step for all groups in turn: its instructions are loaded once, and one group computes while another
+ * waits. */
 #define PART(NAME, CALL) \
   static __attribute__((noinline)) void NAME(Lanes *groups, Work *w, Step *e, int n) { \
     for (int i = 0; i < n; i++) { Lanes *s = &groups[i]; (void)w; if (any(s->live)) { CALL; } } \
@@ -170,7 +170,7 @@ static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree, 
   many->begun = 1;
 }
 
-/* The pool whose lanes take a step: the last one of a run that has enough of them. */
+/* The pool whose lanes make a step: the last one with enough lanes. */
 static int chosen(const Work *w) {
   for (int pool = POOLS - 1; pool >= AWAY; pool--) if (w->alive[pool] + w->waiting[pool] >= w->groups * W) return pool;
   if (w->next < w->b->count) return AWAY;
@@ -178,8 +178,8 @@ static int chosen(const Work *w) {
   return -1;
 }
 
-/* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``many``
- * is zero before the first, and aligned like a vector. */
+/* Run a batch for at most ``budget`` steps; whether another call is needed. ``many`` is zero before the first call, and
+ * aligned like a vector. */
 int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, const Core *core, int64_t budget) {
   Work *w = &many->work;
   Step *e = many->steps;

@@ -1,9 +1,9 @@
-/* The lanes' side of a GPU: each thread makes or reads starts, runs them one after the other, and writes their ends.
- * After lanes.c. Numbers are counted from 0 over the whole call; arrays hold those from ``first`` on.
+/* Lanes on a GPU: each thread makes or reads starts, runs them one after the other, and writes their ends.
+ * After lanes.c. Numbers count from 0 over the whole call; arrays begin with number ``first``.
  */
 
-/* Where starts come from: rows; axes whose last runs fastest, of a length or 0 for a single number; a box; records of
- * runs that go on. */
+/* Sources of starts: rows; axes, the last one fastest, with their lengths or 0 for a single number; a box; records of runs
+ * to be continued. */
 enum { ROWS_OF_STATES, GRID, BOX, RECORDS };
 
 /* Words of a record: Left, the states, the sides of stops. */
@@ -27,7 +27,7 @@ struct Results {
   int32_t *kinds, *steps;
   int64_t *code;
   double *at_x, *at_t;
-  int64_t *left; /* records of the runs with the status HAND_OVER */
+  int64_t *left; /* records of the runs with the status FALL_BACK */
   Count *left_count;
 };
 
@@ -78,12 +78,12 @@ static inline void store(Lanes *s, Work *w, int, int status) {
   out->steps[i] = (int32_t)s->steps.v;
 }
 
-/* The first modes are kept: a further one moves FROZEN out, and is taken away again. */
+/* Keep the first modes only: drop a mode that would shift FROZEN out. */
 static inline void shorten_codes(Lanes *s, Work *) {
   if (!(s->code.v & FROZEN)) s->code = (s->code >> 2) | FROZEN;
 }
 
-/* What a record has as numbers and as counts; lanes have them by the same names. */
+/* Fields of a record, numbers and counts, with the names of those of lanes. */
 #define RECORDED(F, G) F(t) F(since) F(length) F(shortest) G(steps) G(events) G(entered) G(shrinking) G(code) G(drop)
 
 static inline void write_record(const Lanes *s, int begun, int64_t *record) {
@@ -118,10 +118,10 @@ static inline void read_record(Lanes *s, const Work *w, const int64_t *record, i
   s->live = I(-1);
 }
 
-/* The driver takes the run from here. */
+/* Leave the run to the driver. */
 OUTLINED void leave(Lanes *s, Work *w, int begun) {
   write_record(s, begun, w->out.left + (int64_t)atomicAdd(w->out.left_count, 1ULL) * WORDS);
-  w->out.status[s->index.v] = HAND_OVER;
+  w->out.status[s->index.v] = FALL_BACK;
   w->alive = 0;
   s->live = NONE;
 }
@@ -130,7 +130,7 @@ static inline void begin_elsewhere(Lanes *s, Work *w, I which) {
   if (any(which)) leave(s, w, 0);
 }
 
-/* Tests leave runs at random. */
+/* Leave runs at random, for tests. */
 INLINE I by_chance(const Lanes *s, const Work *) {
   return RANDOM ? I(-(int64_t)(split_mix(RANDOM, (uint64_t)(bits_of(s->x[0].v) ^ bits_of(s->t.v) ^ s->steps.v)) >> 63)) : NONE;
 }
@@ -192,8 +192,8 @@ static inline void step(Lanes *s, Work *w) {
   if (any(take_step(s, w, &e, AWAY))) leave(s, w, 1);
 }
 
-/* A thread whose run has ended takes its next start at once: its neighbours wait for that, and all make their step
- * together. What is left of ``budget`` steps of a launch goes on in the next one, from ``own``. */
+/* A thread whose run has ended takes its next start at once, while its neighbours wait, so that all make their steps
+ * together. A run that exceeds the ``budget`` of a launch continues in the next one, from ``own``. */
 static inline void run_all(Work *w, int64_t budget, int64_t *own, Count *running) {
   Lanes s;
   s.size = w->o.atol / w->o.rtol;
@@ -214,9 +214,8 @@ static inline void run_all(Work *w, int64_t budget, int64_t *own, Count *running
   if (w->alive || w->next < w->given.count) atomicAdd(running, 1ULL);
 }
 
-/* Numbers are of 64 bits each, so that what launches this needs no structure. ``own``: a record and two more words for
- * each thread, which are read unless this launch is the first; ``counts``: records that are left, and threads that go
- * on in a further launch. */
+/* All arguments have 64 bits, so that the launch needs no structure. ``own``: a record and two more words for each thread,
+ * read unless this launch is the first; ``counts``: records left, and threads that continue in a further launch. */
 KERNEL BOUNDS trajectories(
     int64_t count, int64_t first, int64_t kind, int64_t seed, const double *values, const int64_t *lengths,
     const double *q, int64_t q_stride, double t0, double t_end, double rtol, double atol, double max_step,
@@ -240,16 +239,16 @@ KERNEL BOUNDS trajectories(
   run_all(&w, budget, own + thread * (WORDS + 2), counts + 1);
 }
 
-/* What the parameters alone decide, for each row of them. */
+/* Evaluate the nodes of parameters only, for each row of parameters. */
 KERNEL parameters(int64_t count, int64_t size, const double *p, double *q) {
   int64_t stride = (int64_t)gridDim.x * blockDim.x;
   for (int64_t i = (int64_t)blockIdx.x * blockDim.x + threadIdx.x; i < count; i += stride)
     prepare(p + i * size, q + i * NQ);
 }
 
-/* Results reduced where they are ------------------------------------------------------------------ */
+/* Reductions on the device ------------------------------------------------------------------------ */
 
-/* Where a code is in a table of a power of two places, 0 for an empty one; -1 if there is no room. */
+/* Index of a code in a hash table of a power of two entries, 0 for an empty one; -1 if there is no room. */
 static inline int64_t place_of(int64_t code, int64_t size, Count *keys) {
   Count key = (Count)code + 1, at = key * 0x9e3779b97f4a7c15ULL >> 20;
   for (int64_t tried = 0; tried < size && tried < LONGEST_SEARCH; tried++, at++) {
@@ -260,13 +259,13 @@ static inline int64_t place_of(int64_t code, int64_t size, Count *keys) {
   return -1;
 }
 
-/* Itineraries as places in a table; the steps and the events of runs that have ended here. */
+/* Replace itineraries by indices of the table; count steps and events of runs that ended on the device. */
 KERNEL numbered(int64_t count, const int8_t *status, const int32_t *kinds, const int32_t *steps, const int64_t *code,
                 int64_t size, Count *keys, int32_t *place, Count *totals) {
   int64_t stride = (int64_t)gridDim.x * blockDim.x, all_steps = 0, all_events = 0;
   for (int64_t i = (int64_t)blockIdx.x * blockDim.x + threadIdx.x; i < count; i += stride) {
     place[i] = 0;
-    if (status[i] == HAND_OVER) continue;
+    if (status[i] == FALL_BACK) continue;
     place[i] = (int32_t)place_of(code[i], size, keys);
     all_steps += steps[i];
     for (int k = 0; k < LAST_KIND; k++) all_events += kinds[i * SIMPLE_KINDS + k];
@@ -275,16 +274,15 @@ KERNEL numbered(int64_t count, const int8_t *status, const int32_t *kinds, const
   atomicAdd(totals + 1, (Count)all_events);
 }
 
-/* Statuses and itineraries counted; states and times of runs that are complete summed, their squares too, by each
- * thread for itself, and put into bins. Runs whose itinerary has no room in the table are listed in ``rest``, of which
- * there are ``rest_count``. */
+/* Count statuses and itineraries; each thread sums states and times of complete runs and their squares, and bins them. Runs
+ * whose itinerary has no room in the table are listed in ``rest``, ``rest_count`` of them. */
 KERNEL outcomes(int64_t count, const double *x, const double *t, const int8_t *status, const int64_t *code,
                 int64_t bins, const double *low, const double *high, Count *histogram, double *sums, int64_t size,
                 Count *keys, Count *counts, Count *statuses, Count *rest_count, int64_t *rest) {
   int64_t thread = (int64_t)blockIdx.x * blockDim.x + threadIdx.x, stride = (int64_t)gridDim.x * blockDim.x;
   double *own = sums + thread * 2 * (ND + 1);
   for (int64_t i = thread; i < count; i += stride) {
-    if (status[i] == HAND_OVER) continue;
+    if (status[i] == FALL_BACK) continue;
     int64_t place = place_of(code[i], size, keys);
     if (place < 0) {
       rest[atomicAdd(rest_count, 1ULL)] = i;

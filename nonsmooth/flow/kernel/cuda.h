@@ -1,7 +1,7 @@
-/* What NVRTC has no headers for, and what a compiler of C++ has no words for. */
+/* Declarations that NVRTC has no headers for, and C names missing in C++. */
 #define ON_DEVICE 1
 #define restrict __restrict__
-#define LONGEST_SEARCH 64 /* places of a table that are tried */
+#define LONGEST_SEARCH 64 /* entries of a hash table that are tried */
 #ifdef __CUDACC_RTC__
 typedef signed char int8_t;
 typedef int int32_t;
@@ -13,13 +13,13 @@ typedef unsigned long long uint64_t;
 #define INT64_MIN (-0x7fffffffffffffffLL - 1)
 #define KERNEL extern "C" __global__ void
 #define BOUNDS __launch_bounds__(THREADS, RESIDENT)
-/* Whether one thread of a warp is; all wait for each other there, or they drift apart and a step is made once for each. */
+/* Whether the condition is true in a thread of the warp; synchronises the warp, which else would diverge. */
 #define ANY_OF_GROUP(one) __any_sync(0xffffffffu, one)
 #define INLINE_MEMBER
 #define UNROLL _Pragma("unroll")
 static inline int64_t bits_of(double a) { return __double_as_longlong(a); }
 static inline double of_bits(int64_t a) { return __longlong_as_double(a); }
-/* Rounded each: what is drawn has the same bits everywhere. */
+/* Each operation is rounded, so that random numbers have the same bits everywhere. */
 static inline double sum(double a, double b) { return __dadd_rn(a, b); }
 static inline double product(double a, double b) { return __dmul_rn(a, b); }
 #else

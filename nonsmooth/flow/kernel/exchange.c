@@ -1,4 +1,4 @@
-/* What lanes give to the driver and take back, on this processor; where their runs end. */
+/* Exchange of runs between lanes and driver on a CPU, and the ends of runs. */
 #if SET
 #define WAITING (4 * GROUPS * W)
 
@@ -9,7 +9,7 @@ typedef struct { int64_t word[WORDS]; } Traveller;
 #define WAITING (GROUPS * W)
 #endif
 
-/* A batch, and how far it is. */
+/* A batch and its progress. */
 struct Work {
   const Batch *b;
   const Options *o;
@@ -24,7 +24,7 @@ struct Work {
 #endif
 };
 
-/* A lane as the driver takes and gives it back. */
+/* A lane in the form of the driver. */
 typedef struct {
   Suspended m;
   double x[N], unknowns[LETTERS];
@@ -42,6 +42,55 @@ static void point_to(Packed *a, Past *past) {
   a->m.near = a->m.drop = 0;
 }
 
+/* A surface's runs may be sampled at times. */
+static void await_sample(Lanes *s, const Work *w, int l) {
+  const Batch *b = w->b;
+  int64_t kept = past_of(s, l)->kept;
+  LANE(s->due, l) = b->times && kept < b->room ? b->times[LANE_I(s->index, l) * b->times_stride + kept] : INFINITY;
+}
+
+/* The sample that is due, at a time of a step with these series of degree P, or 0 of those of the states alone. */
+static void keep_sample(Lanes *s, Work *w, int l, const T *series, int degree, double at) {
+  int64_t row = LANE_I(s->index, l) * w->b->room + past_of(s, l)->kept++;
+  w->b->sample_t[row] = LANE(s->due, l);
+  for (int i = 0; i < ND; i++, series += degree + 1) {
+    double x = LANE(series[degree], l);
+    for (int k = degree - 1; k >= 0; k--) x = x * at + LANE(series[k], l);
+    w->b->sample_x[row * ND + i] = x;
+  }
+  await_sample(s, w, l);
+}
+
+/* Samples at the times from the start of a step to less than its end. */
+static __attribute__((noinline)) void keep_samples(Lanes *s, Work *w, const Step *e, I which) {
+  T end = e->t + e->dt;
+  for EACH(l, which)
+    while (LANE(s->due, l) < LANE(end, l)) keep_sample(s, w, l, e->c[0], P, LANE(s->due, l) - LANE(e->t, l));
+}
+
+#if !SET
+/* Lanes whose next event may be the last that is sampled: the driver ends their runs. */
+static I ends_sampling(const Lanes *s, const Work *w, I which) {
+  const Options *o = w->o;
+  if (!o->hit_count) return NONE;
+  for EACH(l, which) if (past_of(s, l)->hits + 1 < o->hit_skip + o->hit_every * o->hit_count) LANE_I(which, l) = 0;
+  return which;
+}
+
+/* Samples of the lanes whose event is at the section; ``above``: the side from which they came. As count_hit. */
+static void keep_hits(Lanes *s, Work *w, int kind, int guard, I which, I above) {
+  const Options *o = w->o;
+  if (!(o->hit_kinds >> kind & 1) || !o->hit_named[guard * o->hit_width]) return;
+  for EACH(l, which) {
+    Past *past = past_of(s, l);
+    if ((o->hit_side && (LANE_I(above, l) ? 1 : -1) != o->hit_side) || LANE(s->t, l) <= w->b->t0) continue;
+    if (++past->hits <= o->hit_skip || (past->hits - o->hit_skip) % o->hit_every || past->kept >= w->b->room) continue;
+    LANE(s->due, l) = LANE(s->t, l);
+    keep_sample(s, w, l, s->x, 0, 0);
+  }
+}
+#endif
+
 static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   Suspended *m = &a->m;
   const Past *past = past_of(s, l);
@@ -57,11 +106,13 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   m->events = LANE_I(s->events, l);
   m->segment_steps = m->steps - LANE_I(s->entered, l);
   m->history = past->count;
+  m->hits = past->hits;
+  m->kept = past->kept;
   m->itinerary = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
 }
 
 /* Returns the pool where a lane goes on. */
-static int unpack(Lanes *s, int l, const Packed *a) {
+static int unpack(Lanes *s, const Work *w, int l, const Packed *a) {
   const Suspended *m = &a->m;
   Past *past = past_of(s, l);
   UNROLL for (int i = 0; i < N; i++) LANE(s->x[i], l) = a->x[i];
@@ -75,13 +126,17 @@ static int unpack(Lanes *s, int l, const Packed *a) {
   LANE_I(s->events, l) = m->events;
   LANE_I(s->entered, l) = m->steps - m->segment_steps;
   past->count = m->history;
+  past->hits = m->hits;
+  past->kept = m->kept;
+  await_sample(s, w, l);
   LANE_I(s->base, l) = m->itinerary;
   LANE_I(s->code, l) = 0;
   return read_mode(s, l, m);
 }
 
-static void keep_end(const Lanes *s, Work *w, int l, int status) {
+static void keep_end(Lanes *s, Work *w, int l, int status) {
   const Batch *b = w->b;
+  while (!SET && LANE(s->due, l) <= LANE(s->t, l)) keep_sample(s, w, l, s->x, 0, 0);
   int64_t i = LANE_I(s->index, l);
   b->totals[0] += LANE_I(s->steps, l);
   b->totals[1] += LANE_I(s->events, l);
@@ -124,13 +179,13 @@ INLINE I by_chance(const Lanes *s, const Work *w) {
   return which;
 }
 
-/* Let the driver begin the run of a lane, or make its step: the pool where the run goes on, from this lane. Else, if
- * negative, the driver has stored where it ended. */
+/* The driver begins the run of a lane, or makes its step. Returns the pool where the run continues, from this lane; negative
+ * if the driver stored its end. */
 static __attribute__((noinline)) int driven(Lanes *s, Work *w, int l, int begun) {
   Packed a;
   point_to(&a, past_of(s, l));
   if (begun) pack(s, w, l, &a);
   (begun ? w->core->step : w->core->begin)(w->core->run, w->b, w->o, LANE_I(s->index, l), &a.m);
   w->b->totals[2]++;
-  return a.m.status == RUNNING ? unpack(s, l, &a) : -1;
+  return a.m.status == RUNNING ? unpack(s, w, l, &a) : -1;
 }

@@ -30,10 +30,10 @@ INLINE T QUICK_ROOT(T a) { return SQRT_(a); }
 #endif
 
 /* Sine and cosine of W numbers at once, to less than 1 ulp: the reduction and the polynomials of fdlibm (Sun
- * Microsystems 1993), for all lanes alike. */
+ * Microsystems 1993), without branches. */
 #define LARGEST_ANGLE 1e6 /* below, a multiple of half of pi has few enough digits that its products are exact */
 
-/* The angle less the nearest multiple of half of pi, as a sum of two; the multiple. */
+/* The angle less the nearest multiple of pi/2, as a sum of two numbers; the multiple. */
 INLINE I reduced(T a, T *high, T *low) {
   const double parts[] = {1.57079632673412561417e+00, 6.07710050630396597660e-11, 2.02226624879595063154e-21};
   T shifted = a * 6.36619772367581382433e-01 + 6755399441055744.0, k = shifted - 6755399441055744.0;
@@ -58,7 +58,7 @@ INLINE T cosine_near(T x, T y) {
   return w + (((1.0 - w) - half) + (z * r - x * y));
 }
 
-/* The sine of an angle and of so many quarters of a turn more. */
+/* sin(a + quarters pi/2). */
 INLINE T sine_of(T a, int quarters) {
   T x, y;
   I n = reduced(a, &x, &y) + quarters, odd = ~((n & 1) - 1), negative = (n & 2) << 62;

@@ -1,6 +1,6 @@
-/* One lane for each thread: the types and operations of vector.h, for the same text. A mask is all ones or zeros.
+/* One lane per thread: the types and operations of vector.h, for the same sources. A mask is all ones or zeros.
  *
- * As CUDA C++ by NVRTC, or as C++ by any compiler: tests then go through blocks and threads one by one.
+ * CUDA C++ for NVRTC, or C++ for any compiler, with which tests run blocks and threads one by one.
  * All arithmetic is that of vector.h without AVX-512, operation by operation.
  */
 #define W 1
@@ -63,6 +63,5 @@ static inline T MIN(T a, T b) { return a.v < b.v ? a : b; }
 static inline T MAX(T a, T b) { return a.v > b.v ? a : b; }
 
 static inline T NUMBERS(I a) { return T((double)a.v); }
-/* A step of no finite size is handled by its caller: the place of its exponent is then not of interest, but its
- * conversion must be defined. */
+/* The caller handles steps that are not finite; their conversion only must be defined. */
 static inline I WHOLE(T a) { return I(fabs(a.v) < 1e15 ? (int64_t)a.v : 0); }

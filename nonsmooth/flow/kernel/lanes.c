@@ -1,4 +1,5 @@
-/* A step of W trajectories, for one mode or all of them: state.h. What differs by the law is in surface.c and set.c. */
+/* A step of W trajectories, for one mode or all of them: state.h. surface.c and set.c have the parts that depend on the
+ * law. */
 
 /* Short where the series of a step need no checks. */
 #if SET || ROWS + GUARDS > 0
@@ -47,7 +48,7 @@ INLINE void guard_ratio(const Options *o, Step *e, int j, const T *gradient, I c
   if (any(zero)) *sum = SELECT(zero & ((g[P - 2] != 0) | (g[P - 3] != 0)), BC(INFINITY), *sum);
 }
 
-/* Not ``finite`` is also a lane where the last terms vanish, or are far smaller, and earlier ones bound the step. */
+/* ``finite`` is false also in lanes where the last terms vanish, or are far smaller, and earlier ones bound the step. */
 SHORT_OR_CHECKED T step_size(const Lanes *s, const Options *o, Step *e, int mode, I *finite) {
   T last = BC(1e-300), before = BC(1e-300), third = BC(0), fourth = BC(0), sum = BC(0);
   UNROLL for (int i = 0; i < N; i++) {
@@ -122,8 +123,8 @@ INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j
   return unclear;
 }
 
-/* Hard cases: sign changes of all Bernstein coefficients, one slot of each lane at a time; what has
- * several goes to hard_root, or is returned. */
+/* Hard cases: sign changes of all Bernstein coefficients, one slot of each lane at a time. Several changes go to hard_root,
+ * or are returned. */
 OUTLINED I resolve(Guards *v) {
   I lost = NONE;
   for (;;) {
@@ -157,8 +158,8 @@ OUTLINED I resolve(Guards *v) {
   }
 }
 
-/* Polish the isolated roots that can be the first, of ``n`` vectors in step: of each lane the one that a secant puts
- * first, the slots of different lanes together, then others only if they are not clearly later. */
+/* Polish isolated roots that can be the first, of ``n`` vectors together: in each lane the first one by a secant, the slots of
+ * different lanes together; then others only if they are not clearly later. */
 INLINE void polish_guards(int n, Guards *const *given, const T *margin) {
   T a[MOST][P + 1], end[MOST], at[MOST], slope[MOST];
   const T *series[MOST];
@@ -275,9 +276,9 @@ INLINE void states_at(const Step *e, T at, int degree, T *x, T *slope) {
 }
 
 #if ROWS + GUARDS > 0
-/* Lanes where field and guards at a time of the step, and states there, are not those of the polynomials. A surface or a
- * stop that is ``met`` has to be zero to the tolerance of a step: else its root is improved by the driver. */
-INLINE I disagrees(const Lanes *s, const Step *e, int mode, T at, int degree, I met, T *x, I *missed) {
+/* Lanes where field and guards at a time of the step, or the states there, disagree with the polynomials. A ``located``
+ * surface or stop has to be zero to the tolerance of a step, or the driver improves its root. */
+INLINE I disagrees(const Lanes *s, const Step *e, int mode, T at, int degree, I located, T *x, I *missed) {
   T f[ROWS + 1], guard[GUARDS + 1], slope[N], rate = rate_of(e, at);
   I wrong = {0};
   states_at(e, at, degree, x, slope);
@@ -290,14 +291,14 @@ INLINE I disagrees(const Lanes *s, const Step *e, int mode, T at, int degree, I 
     I counts = (M > 0 && j == 1) || j >= SLOTS ? has_second(s, mode) : ~NONE;
     wrong |= counts & ~(I)(ABS(guard[m] - series_at(e->g[j], at, degree)) <= WRONG * e->of_guards[j]);
     I height = j >= SLOTS ? NONE : j >= FIRST_STOP ? ~NONE : j == 0 ? ~has_second(s, mode) : NONE;
-    *missed |= height & (met == j + 1) & ~(I)(ABS(guard[m]) <= e->of_guards[j]);
+    *missed |= height & (located == j + 1) & ~(I)(ABS(guard[m]) <= e->of_guards[j]);
   }
   return wrong;
 }
 #endif
 
-/* The states at the ends of steps, which are shortened at a set to where the polynomials agree; shortened lanes have no
- * event. Lanes whose step is not clear: it may not see what comes, or its defect stays too large. */
+/* The states at the ends of steps, shortened at a set until the polynomials agree; shortened lanes have no event. Returns
+ * undecided lanes: the step may miss an event, or its defect remains too large. */
 SHORT_OR_CHECKED I verify(const Lanes *s, Step *e, int mode, T *end) {
   I unclear = {0};
 #if ROWS + GUARDS > 0
@@ -365,7 +366,7 @@ INLINE void expand_step(Lanes *s, Work *w, Step *e, int mode) {
 #endif
   e->unclear |= ~e->last & ((time_of(e, h) <= SHORTEST * ABS(s->t)) | (h >= LONGEST));
   e->unclear |= (s->steps >= o->max_steps) | passed_between(s, e->g);
-  /* What happens at the end, to rounding, happens. */
+  /* Events at the end of the run, to rounding, are included. */
   T ends = left + AT_END * MAX(ABS(s->t), ABS(s->t + left));
   e->h = SET && !any(e->last) ? h : SELECT(e->last, place_of(e, ends), h);
   e->left = left;
@@ -378,7 +379,7 @@ INLINE void sort_step(Lanes *s, Step *e, int mode) {
   if (any(hard)) e->unclear |= resolve(&e->v);
 }
 
-/* What a step may change, but the states. */
+/* Store the variables that a step may change, except the states. */
 INLINE void keep_start(Lanes *s, Step *e) {
   e->t = s->t;
   e->since = s->since;
@@ -386,7 +387,7 @@ INLINE void keep_start(Lanes *s, Step *e) {
   keep_mode(s, e);
 }
 
-/* What a step may have changed in the lanes ``which`` is again as at its start. */
+/* Restore the lanes ``which`` as at the start of the step. */
 OUTLINED void undo_step(Lanes *s, const Step *e, I which) {
   UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(which, e->c[i][0], s->x[i]);
   s->t = SELECT(which, e->t, s->t);
@@ -395,7 +396,7 @@ OUTLINED void undo_step(Lanes *s, const Step *e, I which) {
   undo_mode(s, e, which);
 }
 
-/* Take the step where it is clear; the lanes are returned where it is not. */
+/* Make the step; returns undecided lanes. */
 INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   const Options *o = limits(w);
   I unclear = e->unclear | by_chance(s, w);
@@ -405,7 +406,7 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   e->last &= time_of(e, e->dt) >= e->left;
   if (!SET || any(e->last)) e->dt = SELECT(e->last, place_of(e, e->left), e->dt);
   unclear |= e->last & (e->slot != 0) & (e->slot <= FIRST_STOP); /* a mode without a step */
-  T wanted = e->dt, end[N];
+  T requested = e->dt, end[N];
   unclear |= verify(s, e, mode, end);
   T passed = time_of(e, e->dt);
   keep_start(s, e);
@@ -413,7 +414,7 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   s->t += passed;
   s->since += passed;
   if (TIMED) s->x[N - 1] = s->t;
-  if (SET || ROWS + GUARDS > 0) s->length = SELECT(e->dt < wanted, passed, MIN(time_of(e, e->h), e->left));
+  if (SET || ROWS + GUARDS > 0) s->length = SELECT(e->dt < requested, passed, MIN(time_of(e, e->h), e->left));
   s->steps += 1;
   unclear |= ~finite_lanes(s);
   unclear |= land(s, w, e, mode, s->live & ~unclear);
@@ -423,6 +424,10 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
     s->steps += unclear;
   }
   I live = s->live & ~unclear, stopped = live & (e->slot > FIRST_STOP);
+#if RARE_CASES_HERE && !SET
+  I due = live & (s->due < e->t + e->dt);
+  if (any(due)) keep_samples(s, w, e, due);
+#endif
 #if STOPS > 0
   for (int j = 0; j < STOPS; j++)
     s->above_stop[j] = (s->above_stop[j] & ~live) | ((I)(e->g[FIRST_STOP + j][0] > 0) & live);
@@ -438,7 +443,7 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
 }
 
 #if SET
-/* What is near the set reaches it, or goes on off it. */
+/* Lanes near the set reach it, or continue off it. */
 INLINE I come_near(Lanes *s, Work *w, Step *e) {
   UNROLL for (int i = 0; i < N; i++) e->c[i][0] = s->x[i];
   keep_start(s, e);

@@ -57,8 +57,7 @@ INLINE T values_at(const T *a, int n, T s, T z) {
   return even + s * odd;
 }
 
-/* What follows is done for ``n`` vectors in step, MOST at most: each of its chains waits for its own results, and
- * the work of another fills that time. */
+/* The following functions treat ``n`` vectors together, at most MOST, so that one computes while another waits. */
 #define MOST 2
 #define IN_STEP UNROLL for (int i = 0; i < n; i++)
 
@@ -85,18 +84,18 @@ INLINE void expand(int n, const T *const *a, int degree, const T *top, const T *
   }
 }
 
-/* Where a step of Halley's iteration leaves less than rounding: its error is step^3 times the difference
- * of (f2/f1)^2 and f3/f1. The size of the step alone says nothing beside another root. */
+/* Where the error of a step of Halley's iteration, step^3 times the difference of (f2/f1)^2 and f3/f1, is below rounding. The
+ * size of the step alone is no measure near another root. */
 INLINE I converged(const T *f, T third, T step) {
   T bent = step * f[2], error = ABS(step) * (bent * bent + ABS(step * step * third * f[1]));
   return (ABS(step) <= 2e-6) & (I)(error <= 1e-16 * (f[1] * f[1]));
 }
 
-/* In a bracket, or it goes to another root. */
+/* In the bracket; outside it another root is found. */
 INLINE I within(T next, T lo, T hi) { return (next >= lo - 4 * EPSILON) & (next <= hi + 4 * EPSILON); }
 
-/* After a step of Halley's iteration one of Newton's, with the slope where it ended from the coefficients where
- * it began. Lanes where this leaves less than rounding get its end and that slope. */
+/* A Newton step after one of Halley's iteration, with the slope from the coefficients at its start. Lanes whose error is then
+ * below rounding get its end and that slope. */
 INLINE void corrected(int n, const T *const *a, T f[MOST][3], const T *third, const T *step, const T *lo, const T *hi,
                       const I *which, T *next, T *slope, I *good) {
   T value[MOST];
@@ -149,7 +148,7 @@ INLINE void polish(int n, const T *const *a, const T *end, const I *which, T *s,
       hi[i] = SELECT(positive | ~active[i], hi[i], s[i]);
       inside[i] = (next[i] > lo[i]) & (next[i] < hi[i]);
       small[i] = (converged(f[i], third[i], step[i]) & within(next[i], lo[i], hi[i])) | (I)(hi[i] - lo[i] <= 4 * EPSILON);
-      rest[i] = active[i] & ~small[i]; /* the others stay, whatever their neighbours need */
+      rest[i] = active[i] & ~small[i]; /* the others stay */
     }
     some = NONE;
     IN_STEP { some |= rest[i]; rest[i] &= inside[i]; }
@@ -207,12 +206,12 @@ static __attribute__((noinline)) double hard_root(const T *a, int l, int stop, i
   double c[P + 1], d = 0;
   for (int k = 0; k <= P; k++) c[k] = LANE(a[k], l);
   int direction = stop < 0 ? 0 : flipped ? -DIRECTION[stop] : DIRECTION[stop];
-  double s = c[0] > 0 ? first_root(c, P, 1) : 0, met = s;
+  double s = c[0] > 0 ? first_root(c, P, 1) : 0, at = s;
   if (hides && s != 0 && hides_roots(c, P, 1, s)) return NAN;
-  /* What is positive and is to fall has its crossing there, and what stays positive has none. */
-  if (stop >= 0 && !(c[0] > 0 && (s < 0 || direction <= 0))) met = first_crossing(c, P, 1, direction);
-  for (int k = P; k > 0; k--) d = d * met + k * c[k];
+  /* A positive guard that must fall crosses at its first root; one that stays positive has no crossing. */
+  if (stop >= 0 && !(c[0] > 0 && (s < 0 || direction <= 0))) at = first_crossing(c, P, 1, direction);
+  for (int k = P; k > 0; k--) d = d * at + k * c[k];
   *slope = d;
-  return stop >= 0 && s > 0 && met > s ? NAN : met;
+  return stop >= 0 && s > 0 && at > s ? NAN : at;
 }
 #endif

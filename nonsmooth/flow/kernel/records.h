@@ -1,10 +1,8 @@
-/* What lanes of every kind keep alike on this processor: itineraries as nodes of a tree, starts that are no numbers, the
- * last events of each. */
+/* Data common to all kinds of lanes on a CPU: itineraries as nodes of a tree, starts that are not finite, the last events. */
 #define MEMORY 256
 
-/* Of a trajectory, what only the driver needs: the last events, and up to which row of a log; halved steps, and up to
- * which step that is so. */
-typedef struct { Recent event[HISTORY]; int64_t count, row, steps; double shortened; } Past;
+/* Data of a trajectory for the driver: the last events, up to a row of a log; halved steps, up to a step; hits of a section, samples. */
+typedef struct { Recent event[HISTORY]; int64_t count, row, steps, hits, kept; double shortened; } Past;
 
 /* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
 static int may_accumulate(const Past *p) {
@@ -18,7 +16,7 @@ static int may_accumulate(const Past *p) {
   return 0;
 }
 
-/* A tree of itineraries, and nodes by code as a memory of the last ones. */
+/* A tree of itineraries, and a cache of nodes by code. */
 typedef struct {
   Tree *tree;
   int64_t code[MEMORY];

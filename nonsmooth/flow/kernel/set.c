@@ -1,10 +1,10 @@
 /* Clear decisions at a set of codimension two or three, whose modes have pools of their own. */
 #define LIMIT 1 /* friction's limit, among the guards on the set */
 #define FALLEN 0.01 /* a step ends where |h| has fallen to this part, closer to rounding to FALL */
-#define PASSED 1e-11 /* what passes h = 0 closer than this much of its terms may cross it: the driver sees to it */
-#define TURNED 1e-7 /* to this at least the direction is known in which a set is left */
-#define THIRD 3 /* what the last way leaves out is so many times what its terms suggest, or less */
-#define LAST_WAY 0.1 /* part of the tolerance that it may be, once for each time that a set is reached */
+#define PASSED 1e-11 /* below this part of its terms h may cross zero: left to the driver */
+#define TURNED 1e-7 /* accuracy of the direction in which a set is left */
+#define THIRD 3 /* factor of the error estimate of the last part of the way */
+#define LAST_WAY 0.1 /* its part of the tolerance, once for each arrival at a set */
 #define SMALL 0.05 /* it is tried where |h| is a third of the cube root of the tolerance */
 #define AT_LIMIT 10 /* at the end of rolling |lambda| is 1 to so many times the tolerance */
 #define ROOM_TO_ROLL 1e-6 /* |lambda| is clearly below 1 */
@@ -35,8 +35,8 @@ INLINE T place_of(const Step *e, T time) {
   return 3.0 * time / (1.0 + y + y * y);
 }
 
-/* Friction near the set: h' = |h| a - M h, where M is symmetric and positive definite and friction takes a away at
- * y of M y = a, of length below 1 where the set holds; exact where M is isotropic too, with the mean diagonal c. */
+/* Friction near the set: h' = |h| a - M h, where M is symmetric positive definite. M y = a gives the friction that cancels a;
+ * |y| < 1 where the mode on the set is admissible. Exact where M is isotropic, with the mean diagonal c. */
 typedef struct { T a[M], m[M * M], y[M], c; I definite, holds, exact; } Pull;
 
 INLINE T inner(const T *u, const T *v) {
@@ -76,11 +76,11 @@ INLINE T nearness(const Pull *p, const T *h, T radius) {
          / SELECT(p->exact, p->c * radius + inner(p->a, h), cubed);
 }
 
-/* What remains of the way to h = 0 where M is isotropic, to second order in its length.
+/* The last part of the way to h = 0 where M is isotropic, to second order in its length.
  *
- * With dt = |h| ds states and h have the rates |h| f(x, 0) + B(x) h, |h| has a.h - c |h|: linear in (h, |h|), with
- * coefficients that change by as much as the states. Their integrals to h = 0 follow order by order from the frozen
- * solution and its products; derivatives along the way are differences. What is left out is of third order. */
+ * With dt = |h| ds states and h have the rates |h| f(x, 0) + B(x) h, and |h| has a.h - c |h|: linear in (h, |h|), with
+ * slowly varying coefficients. Their integrals to h = 0 follow order by order from the frozen solution and its products;
+ * derivatives along the way are differences. The error is of third order. */
 typedef struct { T one[N], two[N], time, later; } Rest; /* by frozen a and M, what their change adds; times */
 
 /* y of L y = (b, t) with L = (-c, a; a, -c). */
@@ -106,8 +106,8 @@ INLINE void frozen_products(const Pull *f, const T *h, T radius, T p[M + 1][M + 
   p[M][M] = ss + ff - 2.0 * sf;
 }
 
-/* Directions along h and across it in which the frozen solution stays, and that of |h|. As they turn and mirror with
- * h and a, so do differences along them. */
+/* Directions of the frozen solution, along h and across it, and that of |h|. They rotate and reflect with h and a, and so do
+ * differences along them. */
 INLINE void own_directions(const T *a, const T *h, T radius, T e[3][M + 1]) {
   T size = length_of(a);
   UNROLL for (int i = 0; i < M; i++) { e[0][i] = h[i] / radius; e[1][i] = a[i]; e[2][i] = e[0][M] = e[1][M] = BC(0); }
@@ -169,7 +169,7 @@ INLINE void second_order(const Lanes *s, const T *h, T radius, const Pull *p, Re
   rest->later = -more[M];
 }
 
-/* Lanes near h = 0: those that reach it now are put there; those left to the driver are added to ``unclear``. */
+/* Lanes near h = 0: move those that reach it now onto it; add those left to the driver to ``unclear``. */
 OUTLINED I reach(Lanes *s, Work *w, I which, I *unclear) {
   const Options *o = limits(w);
   T h[M], g[M][N], u[M], b[M], mean[M], field[N], other[N], end[N];
@@ -181,8 +181,8 @@ OUTLINED I reach(Lanes *s, Work *w, I which, I *unclear) {
   double shortest = pow(OVERFLOW, -1.0 / P);
   I floor = (radius <= VANISHES * scale) | (I)(dt < MAX(BC(shortest), TENFOLD * SHORTEST * ABS(s->t)));
   *unclear |= which & ((~holds & (floor | (I)(radius <= PASSED * scale))) | ~(I)(radius > 0));
-  I met = which & holds & (dt > 0) & (dt < INFINITY);
-  *unclear |= which & floor & ~met;
+  I reached = which & holds & (dt > 0) & (dt < INFINITY);
+  *unclear |= which & floor & ~reached;
   UNROLL for (int i = 0; i < M; i++) { u[i] = h[i] / radius; b[i] = p.a[i] + h[i] / dt; }
   solve_block(p.m, b, mean);
   field_values(s->x, s->q, LAMBDA(mean), field);
@@ -215,21 +215,21 @@ OUTLINED I reach(Lanes *s, Work *w, I which, I *unclear) {
       close &= exact | (I)((turn[i] + ABS(field[i] - other[i])) * dt <= whole + EPSILON * (s->size + ABS(s->x[i])));
     }
   }
-  met &= close | floor;
-  *unclear |= met & ((I)(dt > o->t_end - s->t) | (floor & ~(I)(bend <= radius)));
-  if (!any(met)) return met;
-  UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(met, end[i], s->x[i]);
-  s->t = SELECT(met, s->t + dt, s->t);
-  s->since = SELECT(met, s->since + dt, s->since);
+  reached &= close | floor;
+  *unclear |= reached & ((I)(dt > o->t_end - s->t) | (floor & ~(I)(bend <= radius)));
+  if (!any(reached)) return reached;
+  UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(reached, end[i], s->x[i]);
+  s->t = SELECT(reached, s->t + dt, s->t);
+  s->since = SELECT(reached, s->since + dt, s->since);
   if (TIMED) s->x[N - 1] = s->t;
-  s->steps -= met;
-  *unclear |= project(s, met);
+  s->steps -= reached;
+  *unclear |= project(s, reached);
   find_pull(s, &later);
-  *unclear |= met & ~(later.definite & (length_of(later.y) < 1 - ROOM_TO_ROLL));
-  return met;
+  *unclear |= reached & ~(later.definite & (length_of(later.y) < 1 - ROOM_TO_ROLL));
+  return reached;
 }
 
-/* Lanes on the set at the end of friction's range leave it in the direction of friction; those where they are not. */
+/* Lanes on the set at friction's limit leave it in the direction of friction; returns lanes that are not at the limit. */
 INLINE I release(Lanes *s, const Work *w, I which) {
   Pull p;
   find_pull(s, &p);
@@ -238,7 +238,7 @@ INLINE I release(Lanes *s, const Work *w, I which) {
   return which & ~(p.definite & (ABS(size - 1) <= larger(1e-9, AT_LIMIT * limits(w)->rtol)));
 }
 
-/* Modes of lanes just loaded: all are off the set. Those that are on it, or where nothing is friction. */
+/* Modes of lanes just loaded: off the set. Returns lanes that are on it, or without friction. */
 INLINE I begin_modes(Lanes *s, I fresh) {
   T h[M], g[M][N], scale = heights(s, h, g);
   I unclear = ~(I)(length_of(h) > CLOSE * scale), moved = {0};
@@ -310,7 +310,7 @@ INLINE void law_ratios(const Lanes *s, const Options *o, Step *e, int mode, T *l
     all += 2.0 * (ABS(value[i]) + ABS(value[M])) * (part[i] + part[M]);
     e->of_guards[SLOTS + i] = part[i] + (VANISHES / WRONG) * rounding_scale(s, slope[i]);
   }
-  /* Where rolling ends the motion is smooth to the second order: the time is known to the tolerance itself. */
+  /* At the end of rolling the motion is smooth to second order: the time needs only the tolerance itself. */
   bound(g[P], g[P - 1], SAFETY * BEFORE_LAST(ON) * ROUGH_INVERSE(all + o->rtol * ABS(g[0]) + 1e-290), last, before);
   e->radius = limit[0];
   I moves = limit[0] != 0;
@@ -320,8 +320,7 @@ INLINE void law_ratios(const Lanes *s, const Options *o, Step *e, int mode, T *l
 
 INLINE T size_of(T last, T before, int more);
 
-/* Where the set is far behind at the end of a step away from it, h has to be known to the tolerance, nearer its
- * direction. */
+/* At the end of a step away from the set h has to be known to the tolerance if the set is far, else its direction. */
 INLINE T law_size(const Step *e, const Options *o, int mode, T h) {
   if (mode != GOING) return h;
   T rate = e->g[0][0], part = rate / e->level, per = BC(1.0 / (SAFETY * o->rtol));
@@ -330,7 +329,7 @@ INLINE T law_size(const Step *e, const Options *o, int mode, T h) {
   return MIN(h, MAX(far, size_of(e->turn[0] * per, e->turn[1] * per, 0)));
 }
 
-/* The direction of slip as a step leaves the set, of length one; that length before. */
+/* The unit direction of slip as a step leaves the set; its length before normalisation. */
 INLINE T direction_at(const Step *e, T at, int degree, T *u) {
   UNROLL for (int i = 0; i < M; i++) u[i] = values_at(e->g[SLOTS + i], degree, at, at * at);
   return length_of(u);
@@ -350,7 +349,7 @@ INLINE void check_series(const Lanes *s, const Step *e, int mode, const T *x, T 
 
 static Past *past_of(const Lanes *s, int l) { return &s->past[LANE_I(s->own, l)]; }
 
-/* Whatever changes its mode: the lanes that are left to the driver, unchanged. */
+/* Change the mode of lanes; returns the lanes left to the driver, unchanged. */
 INLINE I change_mode(Lanes *s, Work *w, I which, int kind, int guard, int mode) {
   I unclear = which & (s->events + 1 >= limits(w)->max_events);
   for EACH(l, which & ~unclear) {
@@ -380,7 +379,7 @@ INLINE void polish_slip(Step *e) {
       square += v * v;
       along += v * d;
     }
-    /* The limit's series stands in its slot over its first value. */
+    /* The series of the limit is divided by its first value. */
     UNROLL for (int k = P - 1; k >= 0; k--) { of_n = of_n * root + n; n = n * root + (k ? e->g[LIMIT][k] : BC(1)); }
     n *= e->radius;
     of_n *= e->radius;
@@ -391,26 +390,26 @@ INLINE void polish_slip(Step *e) {
   e->dt = SELECT(which & (ABS(root - e->dt) <= 1e-6 * e->dt), root, e->dt);
 }
 
-/* The end of a step: lanes that go on in the next pool are ``gone``. Lanes where that is not clear. */
+/* The end of a step: lanes that continue in the next pool are ``gone``. Returns undecided lanes. */
 OUTLINED I land(Lanes *s, Work *w, Step *e, int mode, I live) {
   T h[M], g[M][N], u[M];
-  I unclear = {0}, met = live & (e->slot == 1), goes_on = live & (e->slot == 0) & ~e->last;
+  I unclear = {0}, reached = live & (e->slot == 1), goes_on = live & (e->slot == 0) & ~e->last;
   if (mode == AWAY) {
     T scale = heights(s, h, g), radius = length_of(h);
     if (any(s->behind)) s->behind &= radius <= LEFT * scale;
     I small = (radius <= CLOSE * scale) | ((e->stretch > 0) & (radius * radius * radius <= SMALL * limits(w)->rtol * scale * scale * scale));
-    e->gone = met | (goes_on & small);
-    s->fell = met;
+    e->gone = reached | (goes_on & small);
+    s->fell = reached;
   } else if (mode == ON) {
     unclear |= project(s, s->live);
-    e->gone = met & ~unclear;
+    e->gone = reached & ~unclear;
     if (!any(e->gone)) return unclear;
     unclear |= e->gone & ~(I)(e->slope < -1e-10 * e->g[0][0]);
     unclear |= release(s, w, e->gone);
     unclear |= change_mode(s, w, e->gone & ~unclear, EXIT, SLIP_GUARD, 0);
     s->left_at = SELECT(e->gone & ~unclear, s->t, s->left_at);
   } else {
-    unclear |= met | (live & ~(I)(e->g[0][0] > 0));
+    unclear |= reached | (live & ~(I)(e->g[0][0] > 0));
     e->gone = goes_on;
     T distance = values_at(e->g[0], P, e->dt, e->dt * e->dt) * e->dt * e->dt;
     direction_at(e, e->dt, P, u);

@@ -1,13 +1,12 @@
-/* W trajectories in step, for systems of at most one surface, or of one set of codimension two or three, without resets.
+/* W trajectories together, for systems of at most one surface, or of one set of codimension two or three, without resets.
  *
- * Each lane holds one trajectory and is refilled when it ends. Whatever is common is done for all lanes at once:
- * expansion, step size, roots, projection, clear decisions. Whatever is rare (tangency, repelling sliding, ties,
- * accumulating events, limits, points that are not finite) is not clear: the lane gives its trajectory to the driver for
- * that step and takes it back. No lane's result depends on its neighbours.
+ * Each lane holds one trajectory and is refilled when it ends. Common operations run for all lanes at once: expansion,
+ * step size, roots, projection, clear decisions. The driver makes steps with rare cases (tangency, repelling sliding, ties,
+ * accumulating events, limits, points that are not finite). No lane's result depends on its neighbours.
  *
- * Modes of a surface are masks: one jet expands them all. Off a set, on it and leaving it have a jet each, and pools of
- * lanes of their own, and what is done near it is a fourth; a trajectory waits until all lanes of a pool are filled
- * (fewer run only when no start is left).
+ * Modes of a surface are masks: one jet expands them all. The modes off a set, on it and leaving it have a jet and a pool of
+ * lanes each; a fourth pool is for states near it. A trajectory waits until all lanes of a pool are filled (fewer run only
+ * when no start is left).
  *
  * The generated text defines, besides what common.h needs: N states with time, ND without, M surfaces,
  * TIMED whether time is a state, W, GROUPS, SLOTS guards (surface or exit to +, exit to -, stops; of a set its guard,
@@ -25,7 +24,7 @@
 #define LONG_CODE (1LL << 2 * MOST_MODES)
 #define LETTERS M1
 #if SET
-#define LAST_TERM(mode) ((mode) == GOING ? 1.0 : 2.0) /* the last two terms may be so many times the tolerance */
+#define LAST_TERM(mode) ((mode) == GOING ? 1.0 : 2.0) /* size of the last two terms in units of the tolerance */
 #define BEFORE_LAST(mode) ((mode) == GOING ? 1.0 : 10.0)
 #if M == 2
 #define UNPACK(v) (v)[0], (v)[1]
@@ -45,8 +44,7 @@ enum { AWAY, POOLS };
 #if RARE_CASES_HERE
 #define ROWS_KEPT 256 /* a power of two */
 
-/* The last events of all lanes in the order in which they came: the intervals before them, and patterns that are
- * negative where a lane had none. */
+/* The last events of all lanes in order: the intervals before them, and patterns, negative where a lane had none. */
 typedef struct { T interval[ROWS_KEPT]; I pattern[ROWS_KEPT]; } Log;
 
 #endif
@@ -64,15 +62,16 @@ typedef struct {
   I live, steps, events, kinds[LAST_KIND];
   I entered; /* number of steps when the mode began */
   I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
-  I above_stop[STOPS > 0 ? STOPS : 1]; /* where the guard of a stop was at the start of the step before */
+  I above_stop[STOPS > 0 ? STOPS : 1]; /* side of the guard of a stop at the start of the step before */
   I index, base;
   OWN(T, q, NQ); /* prepared from the parameters */
-  double size; /* of states at which both tolerances are as large */
+  double size; /* of states at which both tolerances are equal */
 #if RARE_CASES_HERE
   Past *past; /* of each lane, or of each ``own`` */
   Log *log; /* of a surface's events */
   int64_t row; /* next one of the log */
   int pool;
+  T due; /* the time of each lane's next sample */
 #else
   T shortest;
   I shrinking;
@@ -83,7 +82,7 @@ typedef struct {
  * whose root is found at once. */
 typedef struct { T a[S1][P + 1], end[S1], root[S1], slope[S1]; I one[S1], hard[S1], flipped[S1], wrong_way[S1]; } Guards;
 
-/* A step: its series, its guards, and what is known of its end. */
+/* A step: its series, its guards, and its end. */
 typedef struct {
   T c[N][P + 1], g[SERIES][P + 1], allowed[N], of_guards[SERIES], by_series, h, left;
   T dt, slope; /* to the first event, or the step's end, and how fast the event's guard falls */
@@ -99,7 +98,7 @@ typedef struct {
   Guards v;
 } Step;
 
-/* What feeds the lanes and takes their results: batch.c, or cuda.c on a GPU. */
+/* Source of starts and sink of results: batch.c, or cuda.c on a GPU. */
 typedef struct Work Work;
 INLINE const Options *limits(const Work *w);
 static void store(Lanes *s, Work *w, int l, int status);
@@ -107,6 +106,11 @@ static void shorten_codes(Lanes *s, Work *w);
 static void begin_elsewhere(Lanes *s, Work *w, I which);
 INLINE I by_chance(const Lanes *s, const Work *w);
 INLINE void count(Lanes *s, Work *w, int kind, I which);
+#if RARE_CASES_HERE
+static void keep_samples(Lanes *s, Work *w, const Step *e, I which);
+static I ends_sampling(const Lanes *s, const Work *w, I which);
+static void keep_hits(Lanes *s, Work *w, int kind, int guard, I which, I above);
+#endif
 
 static void note_modes(Lanes *s, Work *w, I which, I mode) {
   s->code = (s->code & ~which) | (((s->code << 2) + mode + 1) & which);
@@ -172,8 +176,8 @@ INLINE void solve_block(const T *m, const T *b, T *y) {
 #endif
 }
 
-/* Newton steps of the states (not the time) along the gradients; lanes that they do not lead onto the surface,
- * because its zero is a multiple one. */
+/* Newton steps of the states (not the time) along the gradients. Returns lanes that do not reach the surface, because its
+ * zero is multiple. */
 INLINE I project(Lanes *s, I which) {
   T h[M], g[M][N], m[M * M], y[M];
   for (int iteration = 0; iteration < (CURVED ? 3 : 2); iteration++) {
@@ -185,7 +189,7 @@ INLINE I project(Lanes *s, I which) {
       m[i] = BC(0);
       UNROLL for (int n = 0; n < ND; n++) m[i] += g[i / M][n] * g[i % M][n];
     }
-    solve_block(m, h, y); /* what is left of h moves a state at rest for as long as it rests */
+    solve_block(m, h, y); /* a remainder of h would move a state at rest */
     UNROLL for (int i = 0; i < M; i++) {
       y[i] = SELECT(apart, y[i], BC(0));
       UNROLL for (int n = 0; n < ND; n++) s->x[n] -= y[i] * g[i][n];

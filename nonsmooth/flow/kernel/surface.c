@@ -25,8 +25,8 @@ INLINE void check_series(const Lanes *s, const Step *e, int mode, const T *x, T 
 #endif
 }
 
-/* Lanes on the surface whose fields are both clearly transversal get their mode and the number of
- * coefficients to drop; the mask of those that are not clear is returned. */
+/* Set the mode, and the number of coefficients to drop, of lanes on the surface with clearly transversal fields; returns
+ * undecided lanes. */
 INLINE I decide(Lanes *s, I which, const T *lie, const T *scale) {
   I clear = (ABS(lie[0]) > VANISHES * scale[0]) & (ABS(lie[1]) > VANISHES * scale[1]);
   I up0 = lie[0] > 0, up1 = lie[1] > 0;
@@ -47,7 +47,7 @@ INLINE void lie(const Lanes *s, T *value, T *scale) {
 }
 #endif
 
-/* Modes of lanes just loaded; those that are not clear. */
+/* Set modes of lanes just loaded; returns undecided lanes. */
 INLINE I begin_modes(Lanes *s, I fresh) {
   I unclear = {0};
   s->slides &= ~fresh;
@@ -99,9 +99,8 @@ static void recall(const Lanes *s, int l) {
   }
 }
 
-/* Lanes whose last event, just before, may be one of those that accumulate, so that the run may end here: the driver
- * acts where the states change by less than their tolerances up to the limit, and the time left is a part of the last
- * interval, SHRINKS_TO or more. */
+/* Lanes whose last event may accumulate with earlier ones, so that the run may end: the states change by less than their
+ * tolerances until the limit, whose time is at least SHRINKS_TO of the last interval. */
 OUTLINED I watch_limit(const Lanes *s, T c[N][P + 1], const T *allowed, I which) {
   T interval = s->log->interval[(s->row - 1) & (ROWS_KEPT - 1)], rate = BC(0);
   UNROLL for (int i = 0; i < ND; i++)
@@ -114,7 +113,7 @@ OUTLINED I watch_limit(const Lanes *s, T c[N][P + 1], const T *allowed, I which)
   return may;
 }
 
-/* Remember events of the lanes ``which`` by their kinds and those of their guards. */
+/* Record events of the lanes ``which`` by their kinds and those of their guards. */
 INLINE I remember(Lanes *s, I which, I kind, I guard) {
   int64_t row = s->row++ & (ROWS_KEPT - 1);
   s->log->interval[row] = s->since;
@@ -123,7 +122,7 @@ INLINE I remember(Lanes *s, I which, I kind, I guard) {
   return NONE;
 }
 #else
-/* Ever shorter intervals are left to the driver, which knows their limit. */
+/* Decreasing intervals are left to the driver, which computes their limit. */
 INLINE I remember(Lanes *s, I which, I, I) {
   I shorter = which & (s->since < SHRINKS * s->shortest);
   s->shortest = SELECT(shorter, s->since, s->shortest);
@@ -134,9 +133,9 @@ INLINE I remember(Lanes *s, I which, I, I) {
 #endif
 
 #if M > 0
-/* Lanes that met the surface or an end of sliding change their mode; ``slope`` is that of the guard
- * over the step. Those that are not clear are returned, and have no event. */
-INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
+/* Change the mode of lanes that reached the surface or an end of sliding; ``slope`` is that of the guard over the step.
+ * Returns undecided lanes, which have no event. */
+INLINE I change_modes(Lanes *s, Work *w, I reached, I up, I down, T slope) {
   T value[2], scale[2];
   lie(s, value, scale);
   I ends = up | down, was = s->slides, unclear = {0};
@@ -145,20 +144,28 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   I attracts = (up & (I)(value[1] > clear * scale[1])) | (down & (I)(value[0] < -clear * scale[0]));
   unclear |= ends & ~(steep & attracts);
   I was_above = s->above;
-  unclear |= decide(s, met, value, scale);
+  unclear |= decide(s, reached, value, scale);
   s->slides &= ~ends;
   s->above = (s->above & ~ends) | up;
   s->drop = (s->drop & ~ends) | (ends & 2);
   unclear |= s->events + 1 >= limits(w)->max_events;
-  I all = (met | ends) & ~unclear & (s->slides ^ was | s->above ^ was_above);
+#if RARE_CASES_HERE
+  unclear |= ends_sampling(s, w, reached | ends);
+#endif
+  I all = (reached | ends) & ~unclear & (s->slides ^ was | s->above ^ was_above);
   I entered = all & s->slides & ~was, kind = (entered & ENTRY) | (ends & EXIT) | (~entered & ~ends & CROSSING);
   all &= ~remember(s, all, kind, ends & EXIT_GUARD);
   count(s, w, ENTRY, entered & all);
   count(s, w, EXIT, all & ends);
   count(s, w, CROSSING, all & ~ends & ~entered);
+#if RARE_CASES_HERE
+  keep_hits(s, w, ENTRY, SURFACE_GUARD, entered & all, was_above);
+  keep_hits(s, w, EXIT, EXIT_GUARD, all & ends, was_above);
+  keep_hits(s, w, CROSSING, SURFACE_GUARD, all & ~ends & ~entered, was_above);
+#endif
   set_lambda(s);
   note_modes(s, w, all, mode_of(s));
-  return (met | ends) & ~all;
+  return (reached | ends) & ~all;
 }
 
 /* Lanes that slide towards a two-fold where the sliding field is 0/0. */
@@ -170,19 +177,19 @@ INLINE I near_two_fold(const Lanes *s, double tolerance) {
 }
 #endif
 
-/* The end of a step: onto the surface, and into the next mode. Lanes where that is not clear. */
+/* The end of a step: project onto the surface and enter the next mode. Returns undecided lanes. */
 INLINE I land(Lanes *s, Work *w, Step *e, int mode, I live) {
   I unclear = {0};
 #if M > 0
-  I slides = live & s->slides, met = live & ~s->slides & (e->slot == 1), up = slides & (e->slot == 1), down = live & (e->slot == 2);
-  if (any(met | slides)) unclear |= project(s, met | s->slides);
+  I slides = live & s->slides, reached = live & ~s->slides & (e->slot == 1), up = slides & (e->slot == 1), down = live & (e->slot == 2);
+  if (any(reached | slides)) unclear |= project(s, reached | s->slides);
   I on = slides & (e->slot == 0) & ~e->last;
   if (!CANCELLED && any(on)) unclear |= on & near_two_fold(s, limits(w)->rtol);
-  met &= ~unclear;
+  reached &= ~unclear;
   up &= ~unclear;
   down &= ~unclear;
-  if (any(met | up | down)) unclear |= change_modes(s, w, met, up, down, e->slope);
-  s->length = SELECT(met | up | down, BC(0), s->length);
+  if (any(reached | up | down)) unclear |= change_modes(s, w, reached, up, down, e->slope);
+  s->length = SELECT(reached | up | down, BC(0), s->length);
 #endif
   return unclear;
 }

@@ -1,4 +1,4 @@
-/* What is moved to where it may be needed fills registers, and vectors are written here by hand. */
+/* No code motion or automatic vectorisation: hoisted values fill registers, and vectors are written by hand. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("no-tree-pre", "no-gcse", "no-tree-vectorize")
 #endif
@@ -11,7 +11,7 @@ typedef int64_t I __attribute__((vector_size(8 * W)));
 #define NONE ((I){0})
 #define LANE(v, l) (((double *)&(v))[l])
 #define LANE_I(v, l) (((int64_t *)&(v))[l])
-#define OWN(type, name, size) type name[size] /* what each lane has a copy of */
+#define OWN(type, name, size) type name[size] /* a copy for each lane */
 #define RARE_CASES_HERE 1
 #define LAST_KIND (SIMPLE_KINDS - 1) /* the end of a run; events of the kinds before it are counted */
 #define SELECT(m, a, b) ((T)(((I)(a) & (m)) | ((I)(b) & ~(m))))
@@ -31,7 +31,7 @@ LANEWISE(SQRT_, sqrt)
 #endif
 INLINE T ABS(T a) { return (T)((I)a & 0x7fffffffffffffffLL); }
 #if defined(__AVX512F__) && W == 8 && !defined(__clang__)
-/* The same as below; GCC does not find the instruction by itself. */
+/* As below; GCC does not select the instruction. */
 INLINE T MIN(T a, T b) { return (T)__builtin_ia32_minpd512_mask(a, b, BC(0), -1, 4); }
 INLINE T MAX(T a, T b) { return (T)__builtin_ia32_maxpd512_mask(a, b, BC(0), -1, 4); }
 #else

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ...model import FilippovSystem, NonsmoothError, OptionError, instruction_form
 from ...model.schema import CLASSES, Validator, savable
+from ...tables import Tabular
 from ..status import Status
 from . import archive, files
 
@@ -29,7 +30,7 @@ _FORMAT = 4
 _LONGEST = 1 << 48
 
 
-class Savable:
+class Savable(Tabular):
     """A result that can be written to a file; :func:`load` reads it."""
 
     def __init_subclass__(cls, **schema: Any) -> None:
@@ -221,7 +222,7 @@ class _Reader:
         self.systems: list[FilippovSystem] = []
 
     def value(self, tree: Any) -> Any:
-        """Return what a part of the tree stands for."""
+        """Return the value of a part of the tree."""
         if isinstance(tree, list):
             return [self.value(part) for part in tree]
         if not isinstance(tree, dict):

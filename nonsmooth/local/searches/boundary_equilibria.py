@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
+from ...tables import Tabular
 from ..checks import (
     MARGIN,
     parameter_index,
@@ -50,7 +51,7 @@ from .search import search
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryEquilibrium:
+class BoundaryEquilibrium(Tabular):
     """An equilibrium of one field on the surface, and the bifurcation that it is.
 
     Attributes
@@ -106,7 +107,7 @@ class BoundaryEquilibrium:
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryBifurcation:
+class BoundaryBifurcation(Tabular):
     """The value of a parameter at which an equilibrium of one field is on the surface.
 
     Attributes
@@ -239,8 +240,7 @@ def _continuous(x: Array, derivatives: Array, margin: float) -> BoundaryEquilibr
     margins, numbers = dict[str, float](), dict[str, float]()
     determinants = [float(np.linalg.det(a)) for a in derivatives]
     for i, (a, det) in enumerate(zip(derivatives, determinants, strict=True), 1):
-        singular = np.linalg.svd(a, compute_uv=False)
-        margins[f"det A{i} = 0"] = float(singular[-1] / singular[0]) if singular[0] else 0.0
+        margins[f"det A{i} = 0"] = _regularity(a)
         numbers[f"det A{i}"] = det
     unfolding = "persistence" if determinants[0] * determinants[1] > 0 else "nonsmooth fold"
     cycle = None
@@ -256,86 +256,62 @@ def _continuous(x: Array, derivatives: Array, margin: float) -> BoundaryEquilibr
     )
 
 
+def _persistence(c: Array, a: Array, push: Array) -> tuple[dict[str, float], dict[str, float], str]:
+    """Numbers and margins of an equilibrium with a linear part and the push beside it, and its unfolding."""
+    margins = {"determinant": _regularity(a)}
+    if not margins["determinant"] > 1e-14:
+        return {"s": math.nan}, margins, "degenerate"
+    inverse: Array = np.asarray(np.linalg.solve(a, push), dtype=np.float64)
+    s, margins["s"] = float(c @ inverse), _sine(c, inverse)
+    return {"s": s}, margins, "nonsmooth fold" if s > 0 else "persistence"
+
+
 def _with_a_jumping_force(
     x: Array, k: int, gradient: Array, other: Array, a: Array, margin: float
 ) -> BoundaryEquilibrium:
     """The equilibrium of field ``k`` where the other one, not zero, is tangent to the surface too."""
     c = gradient if k == 0 else -gradient
-    singular = np.linalg.svd(a, compute_uv=False)
-    margins = {"determinant": float(singular[-1] / singular[0]) if singular[0] else 0.0}
-    values, unfolding = {"s": math.nan}, "degenerate"
-    if margins["determinant"] > 1e-14:
-        inverse: Array = np.asarray(np.linalg.solve(a, other), dtype=np.float64)
-        values["s"], margins["s"] = float(c @ inverse), _sine(c, inverse)
-        unfolding = "nonsmooth fold" if values["s"] > 0 else "persistence"
+    values, margins, unfolding = _persistence(c, a, other)
     values["bend of h"] = float(c @ a @ other)
     margins["bend of h"] = _sine(c @ a, other)
     label = unfolding if min(margins.values()) >= margin else "degenerate"
-    return BoundaryEquilibrium(
-        x,
-        SIDES[k],
-        label,
-        unfolding,
-        False,
-        np.linalg.eigvals(a),
-        ReadOnly(values),
-        ReadOnly(margins),
-        "velocity continuous",
-    )
+    rest = ReadOnly(values), ReadOnly(margins), "velocity continuous"
+    return BoundaryEquilibrium(x, SIDES[k], label, unfolding, False, np.linalg.eigvals(a), *rest)
 
 
 def _of_a_contact(
     x: Array, gradient: Array, push: Array, a: Array, margin: float
 ) -> BoundaryEquilibrium:
     """An equilibrium whose gap is zero: the contact that it becomes is closed where s < 0, on the side without it."""
-    singular = np.linalg.svd(a, compute_uv=False)
-    margins = {"determinant": float(singular[-1] / singular[0]) if singular[0] else 0.0}
-    values, unfolding = {"s": math.nan}, "degenerate"
-    if margins["determinant"] > 1e-14:
-        inverse: Array = np.asarray(np.linalg.solve(a, push), dtype=np.float64)
-        values["s"], margins["s"] = float(gradient @ inverse), _sine(gradient, inverse)
-        unfolding = "nonsmooth fold" if values["s"] > 0 else "persistence"
+    values, margins, unfolding = _persistence(gradient, a, push)
     label = unfolding if min(margins.values()) >= margin else "degenerate"
     rest = ReadOnly(values), ReadOnly(margins)
     return BoundaryEquilibrium(x, "+", label, unfolding, False, np.linalg.eigvals(a), *rest)
 
 
 def boundary_equilibrium_of(
-    x: Array, k: int, gradient: Array, other: Array, a: Array, margin: float = MARGIN
+    x: Array, k: int, gradient: Array, other: Array, a: Array, margin: float
 ) -> BoundaryEquilibrium:
     """Class from the linear data: grad h, the other field and the linear part of field ``k``."""
     c = gradient if k == 0 else -gradient  # towards the equilibrium's own side
-    eigenvalues = np.linalg.eigvals(a)
-    singular = np.linalg.svd(a, compute_uv=False)
-    margins = {"determinant": float(singular[-1] / singular[0]) if singular[0] else 0.0}
-    d = float(c @ other)
-    margins["d"] = _sine(c, other)
-    reversed_time = d < 0
-    values = {"d": d, "s": math.nan}
-    if margins["determinant"] > 1e-14:
-        inverse: Array = np.asarray(np.linalg.solve(a, other), dtype=np.float64)
-        values["s"] = s = float(c @ inverse)
-        margins["s"] = _sine(c, inverse)
-        unfolding = "nonsmooth fold" if s > 0 else "persistence"
-        label = unfolding
-        if x.size == 2:
-            sign = -1.0 if reversed_time else 1.0
-            label, more = _planar_class(sign * a, c, sign * d, s, margins)
-            values.update(more)
-    else:
-        label = unfolding = "degenerate"
+    own, margins, unfolding = _persistence(c, a, other)
+    d, label = float(c @ other), unfolding
+    values = {"d": d} | own
+    margins = {"determinant": 0.0, "d": _sine(c, other)} | margins
+    if x.size == 2 and unfolding != "degenerate":
+        sign = -1.0 if d < 0 else 1.0
+        label, more = _planar_class(sign * a, c, sign * d, own["s"], margins)
+        values.update(more)
     if min(margins.values()) < margin:
         label = "degenerate"
-    return BoundaryEquilibrium(
-        x,
-        SIDES[k],
-        label,
-        unfolding,
-        reversed_time,
-        eigenvalues,
-        ReadOnly(values),
-        ReadOnly(margins),
-    )
+    rest = np.linalg.eigvals(a), ReadOnly(values), ReadOnly(margins)
+    return BoundaryEquilibrium(x, SIDES[k], label, unfolding, d < 0, *rest)
+
+
+def _regularity(a: Array) -> float:
+    """The smallest singular value relative to the largest."""
+    singular = np.linalg.svd(a, compute_uv=False)
+    return float(singular[-1] / singular[0]) if singular[0] else 0.0
 
 
 def _sine(u: Array, v: Array) -> float:

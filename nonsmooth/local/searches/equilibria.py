@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, Parameters, call
 from ...model.derivatives.mode_derivatives import mode_equations
+from ...tables import Tabular
 from ..checks import require_autonomous
 from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import (
@@ -29,7 +30,7 @@ HYPERBOLIC = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
+class Equilibrium(Tabular):
     """A zero of one of the two fields, or of a smooth system's one field.
 
     Attributes

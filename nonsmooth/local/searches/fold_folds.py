@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, require_system
 from ...model.checks import positive
+from ...tables import Tabular
 from ..checks import MARGIN, relative_difference, require_generic
 from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import LocalSurface, Numbers, on_surface, surface_at
@@ -23,7 +24,7 @@ from .folds import bend
 
 
 @dataclass(frozen=True, eq=False)
-class FoldFold:
+class FoldFold(Tabular):
     """A point of a planar system where both fields are tangent to the surface.
 
     Attributes

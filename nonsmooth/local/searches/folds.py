@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
+from ...tables import Tabular
 from ..checks import require_generic
 from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import (
@@ -32,7 +33,7 @@ from .search import Found, search, unknowns
 
 
 @dataclass(frozen=True, eq=False)
-class Fold:
+class Fold(Tabular):
     """A tangency of one field with the surface.
 
     Attributes

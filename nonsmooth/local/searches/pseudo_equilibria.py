@@ -23,6 +23,7 @@ from ...model import (
     PointError,
     layer_of,
 )
+from ...tables import Tabular
 from ..checks import require_autonomous, require_generic, require_linear
 from ..discrete_states import with_discrete_states_held
 from ..point.intersections import Meeting
@@ -33,7 +34,7 @@ from .search import Found, search
 
 
 @dataclass(frozen=True, eq=False)
-class PseudoEquilibrium:
+class PseudoEquilibrium(Tabular):
     """A zero of the sliding field.
 
     Attributes

@@ -11,7 +11,7 @@ Examples
 [0.585786, 3.414214]
 """
 
-from ...notebook import add_cards
+from ...tables import add_views
 from .classification import Boundary, Classification, Slopes, classify_two_fold
 from .flights import (
     accumulation_time,
@@ -40,4 +40,4 @@ __all__ = [
     "return_matrix",
 ]
 
-add_cards(globals(), __all__)
+add_views(globals(), __all__)

@@ -1,6 +1,6 @@
-"""Terms of a program that is printed: nodes of one graph, with the arithmetic in which a tape is expanded.
+"""Terms of a program that is printed: nodes of one graph, with the arithmetic in which instructions are expanded.
 
-Equal terms are one node, constants are computed, and what adds or multiplies nothing is left out.
+Equal terms are one node, constants are computed, and neutral terms and factors are left out.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from ..expressions.float_arithmetic import BINARY, UNARY
 from ..expressions.graph import Node, evaluate
 from ..expressions.taylor_rules import touched
 from ..laws.coupled import Coupled
+from .instructions import Entries, Values, instructions_of
 from .jets import Expansion
-from .tape import Entries, Values, tape_of
 
 Terms: TypeAlias = "Sequence[Term | None]"
 
@@ -197,7 +197,7 @@ class Graph:
         return None if mask is None or u is None else self.select(mask, u, None)
 
     def whole(self, a: Term | None) -> Term:
-        """Return a term that is none as a constant."""
+        """Return a zero term as a constant."""
         return self.constant(0.0) if a is None else a
 
     def total(self, a: Term | None, b: Term | None) -> Term | None:
@@ -257,7 +257,7 @@ class _Evaluation:
 
 @dataclass(frozen=True)
 class Point:
-    """Values of the layer and of what it is made of; gradients by the states, row by row."""
+    """Values of the layer and of its parts; gradients by the states, row by row."""
 
     layer: Terms
     factors: Terms
@@ -266,17 +266,17 @@ class Point:
     factor_gradient: Terms
 
 
-class OfTape:
-    """The tape of a system without contacts, in terms of states and parameters."""
+class OfInstructions:
+    """Instructions of a system without contacts, in terms of states and parameters."""
 
     def __init__(self, coupled: Coupled):
         system = coupled.system
-        self.coupled, self.tape, self.graph = coupled, tape_of(coupled), Graph()
+        self.coupled, self.lists, self.graph = coupled, instructions_of(coupled), Graph()
         self.n, self.m = system.extended_dimension, system.surface_count
         self.x = self.graph.inputs(0, self.n)
         self.p = self.graph.inputs(1, len(system.parameter_names))
         #: Rules that multipliers enter.
-        self.late = touched(self.tape.series.rules, self.n)
+        self.late = touched(self.lists.series.rules, self.n)
 
     def begun(self) -> list[list[Term | None]]:
         """Rows of coefficients of the states, with their values."""
@@ -289,42 +289,44 @@ class OfTape:
 
     def expansion(self, outputs: Sequence[int]) -> Expansion:
         """The series of some of field, layer, heights, factors, stops."""
-        series = self.tape.series
+        series = self.lists.series
         rows = [series.rows[i] for i in outputs]
         return Expansion(series.rules, rows, self.p, self.graph)
 
     def point(self, acting: Terms) -> Point:
         """Values for some multipliers and unknowns."""
-        tape, m = self.tape, self.m
-        values = self.graph.values(tape.point, [*self.x, *acting], self.p)
-        parts = [2 * m, *(len(e.row) for e in (tape.slope, tape.layer_gradient))]
+        lists, m = self.lists, self.m
+        values = self.graph.values(lists.point, [*self.x, *acting], self.p)
+        parts = [2 * m, *(len(e.row) for e in (lists.slope, lists.layer_gradient))]
         first, second = sum(parts[:2]), sum(parts)
         return Point(
             values[:m],
             values[m : 2 * m],
-            self._dense(values[2 * m : first], tape.slope, m, m),
-            self._dense(values[first:second], tape.layer_gradient, m, self.n),
-            self._dense(values[-len(tape.factor_gradient.row) :], tape.factor_gradient, m, self.n),
+            self._dense(values[2 * m : first], lists.slope, m, m),
+            self._dense(values[first:second], lists.layer_gradient, m, self.n),
+            self._dense(
+                values[-len(lists.factor_gradient.row) :], lists.factor_gradient, m, self.n
+            ),
         )
 
     def columns(self, acting: Terms) -> list[list[Term | None]]:
         """Derivatives of the field by the unknowns, in rows."""
-        values = self.graph.values(self.tape.columns, [*self.x, *acting], self.p)
-        dense = self._dense(values, self.tape.column, self.n, self.m)
+        values = self.graph.values(self.lists.columns, [*self.x, *acting], self.p)
+        dense = self._dense(values, self.lists.column, self.n, self.m)
         return [dense[i : i + self.m] for i in range(0, len(dense), self.m)]
 
     def surfaces(self) -> tuple[list[Term | None], list[Term | None]]:
         """The surfaces, and their gradients."""
-        rows, tape = self.coupled.kept.numel(), self.tape
-        values = self.graph.values(tape.surfaces, self.x, self.p)
-        slopes = self._dense(values[rows:], tape.surface_gradient, rows, self.n)
+        rows, lists = self.coupled.kept.numel(), self.lists
+        values = self.graph.values(lists.surfaces, self.x, self.p)
+        slopes = self._dense(values[rows:], lists.surface_gradient, rows, self.n)
         return values[: self.m], slopes[: self.m * self.n]
 
     def stops(self) -> tuple[list[Term | None], list[Term | None]]:
         """The guards of stops, and their gradients."""
-        rows, tape = self.coupled.stops.numel(), self.tape
-        values = self.graph.values(tape.atoms, self.x, self.p)
-        return values[:rows], self._dense(values[rows:], tape.atom_gradient, rows, self.n)
+        rows, lists = self.coupled.stops.numel(), self.lists
+        values = self.graph.values(lists.atoms, self.x, self.p)
+        return values[:rows], self._dense(values[rows:], lists.atom_gradient, rows, self.n)
 
     def _dense(self, entries: Terms, of: Entries, rows: int, columns: int) -> list[Term | None]:
         """A matrix from its entries."""

@@ -24,6 +24,7 @@ from ...model import (
 )
 from ...model.checks import positive
 from ...solvers.continuation import Arc, Curve, Departure, Zero, directions, pieces, trace
+from ...tables import Table, Tabular, stacked
 from ..homoclinic.homoclinic_orbits import Connection
 from .branch import DIVIDE, BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of
 from .codimension_two import CodimensionTwo, leaving, special_point
@@ -48,7 +49,7 @@ Piece = tuple[EventCurve | ConnectionCurve, Arc]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BifurcationCurve:
+class BifurcationCurve(Tabular):
     """A curve of bifurcations in the plane of two parameters.
 
     Attributes
@@ -73,6 +74,14 @@ class BifurcationCurve:
     special: tuple[CodimensionTwo, ...]
     ends: tuple[BranchEnd, BranchEnd]
     nodes: tuple[Node, ...]
+
+    def _tables(self) -> dict[str, Table]:
+        columns = dict(zip(self.parameters, self.values.T, strict=True))
+        special = {"special": len(self.special)}
+        return {
+            "points": Table({"point": len(self.values)}, columns),
+            "special": stacked(self.special, special),
+        }
 
     def solution(self, k: int) -> Any:
         """Return the equilibrium or orbit at a point of the curve.
@@ -196,7 +205,7 @@ def continue_bifurcation(
 
 
 def _follow(departure: Departure, **options: Any) -> list[Piece]:
-    """Follow a curve from where it departs, in pieces between which legs of orbits are divided."""
+    """Follow a curve from its start, in pieces between which legs of orbits are divided."""
 
     def following(at: Departure, arc: Arc) -> Departure | None:
         last = arc.points[-1]
@@ -303,7 +312,7 @@ def _occurs(curve: EventCurve | ConnectionCurve, zero: Zero) -> bool:
 
 
 def _merged(points: Sequence[CodimensionTwo]) -> list[CodimensionTwo]:
-    """Points in their order, those at one place once."""
+    """Points in their order, without repeated ones."""
     found = list[CodimensionTwo]()
     for point in points:
         near = [one for one in found if np.abs(one.values - point.values).max() <= _MERGED]
@@ -313,7 +322,7 @@ def _merged(points: Sequence[CodimensionTwo]) -> list[CodimensionTwo]:
 
 
 def _like(one: CodimensionTwo, other: CodimensionTwo) -> bool:
-    """Whether two points at the same parameters are one: of the same equations and unknowns."""
+    """Whether two points at the same parameters have the same equations and unknowns."""
     a, b = one.meeting, other.meeting
     if a is None or b is None or a.u.size != b.u.size:
         return one.kind == other.kind

@@ -1,7 +1,7 @@
 """Branches of solutions as one parameter varies, and their continuation.
 
-Each piece is continued by :mod:`nonsmooth.continuation` with equations of its own; where one ends at an
-event the next one begins among the solutions beyond.
+Each piece is continued by :mod:`nonsmooth.continuation` with its own equations; where one ends at an
+event the next one begins with the solutions beyond it.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from ...solvers.continuation import (
     pieces,
     trace,
 )
+from ...tables import Table, Tabular, stacked
 
 
 class BranchEnd(Enum):
@@ -44,7 +45,7 @@ class BranchEnd(Enum):
     REACHED_BOUND: the parameter reached a bound. CLOSED: the branch is a closed curve. EVENT: nothing
     continues it beyond an event. PERIOD_DIVERGES: the period grows without bound. STEP_TOO_SMALL: no
     solution was found at the shortest step. TOO_MANY_POINTS: it has ``max_points`` points. FAILED: an
-    error was raised, whose words are in ``Branch.reasons``. INTERRUPTED: Ctrl-C.
+    error was raised, with its message in ``Branch.reasons``. INTERRUPTED: Ctrl-C.
     """
 
     REACHED_BOUND = "bound"
@@ -79,14 +80,14 @@ _ADVICE = {
 
 @dataclass(frozen=True, eq=False)
 class FarSide:
-    """What is beyond an event.
+    """Unfolding of an event: the solutions beyond it.
 
     Attributes
     ----------
     itinerary : str
         Or the kind of solution; empty if nothing continues the branch.
     verdict : str
-        What becomes of the solutions there.
+        The fate of the solutions there, in words.
     numbers : mapping of str to float
         The numbers that decide the verdict.
     """
@@ -101,7 +102,7 @@ class FarSide:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BranchEvent:
+class BranchEvent(Tabular):
     """A bifurcation on a branch.
 
     Attributes
@@ -153,7 +154,7 @@ def _beside(choices: Sequence[tuple[Any, Point]], wanted: float) -> list[Any]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branch:
+class Branch(Tabular):
     """Solutions as a parameter varies.
 
     Attributes
@@ -181,6 +182,18 @@ class Branch:
     ends: tuple[BranchEnd, BranchEnd]
     reasons: tuple[str, str] = ("", "")
     nodes: tuple[tuple[Any, Point], ...] = ()
+
+    def _tables(self) -> dict[str, Table]:
+        names = self.nodes[0][0].system.state_names if self.nodes else ()
+        found = [e.parameter for e in self.events]
+        events = {
+            "kind": [e.kind for e in self.events],
+            "far_side": [str(e.far_side) for e in self.events],
+        }
+        return {
+            "points": stacked(self.solutions, {self.parameter: self.values}, names),
+            "events": Table({"event": len(found)}, {self.parameter: found, **events}),
+        }
 
     @property
     def orbits(self) -> tuple[Any, ...]:
@@ -300,14 +313,14 @@ class BranchCurve(Curve):
         return None
 
     def restart(self, u: Array) -> None:
-        """Prepare to be followed from a point of it."""
+        """Prepare a continuation from a point of the curve."""
 
     def admissible(self, u: Array) -> bool:
-        """Whether the motion has the solution at a point."""
+        """Whether the solution at a point is admissible."""
         return getattr(self.describe(u), "status", "") != "virtual"
 
     def turned(self, u: Array, tangent: Array) -> Array | None:
-        """Change the equations at a point, if need be; the tangent of the new ones."""
+        """Change the equations at a point, if necessary; returns the tangent of the new ones."""
         return None
 
     def renewed(self, point: Point) -> Point | None:
@@ -501,7 +514,7 @@ def _off_events(
 
 @dataclass
 class _Half:
-    """One way along a branch."""
+    """One direction along a branch."""
 
     nodes: list[tuple[BranchCurve, Point]] = field(default_factory=list)
     events: list[BranchEvent] = field(default_factory=list)
@@ -509,7 +522,7 @@ class _Half:
     reason: str = ""
 
     def name_end(self) -> None:
-        """The event at the last point of a curve that could not be followed."""
+        """The event at the last point of a curve whose continuation failed."""
         curve, point = self.nodes[-1]
         try:
             last = curve.ending(point.u, self.end)

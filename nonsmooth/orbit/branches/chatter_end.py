@@ -26,7 +26,7 @@ _TIMES, _IMPACTS = 0.05 * 0.6 ** np.arange(9.0), 0.01
 #: becoming smaller.
 _MOST_STEPS, _SMALL, _LEAST = 12, 1e-8, 1e-6
 
-#: Change of the limit, relative to that of the parameter, below which it is one.
+#: Change of the limit, relative to that of the parameter, below which it has converged.
 _RESOLVED = 1e-3
 
 

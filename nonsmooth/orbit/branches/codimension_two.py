@@ -51,7 +51,7 @@ _CONTACT = " with contact"
 #: Distance of a point from its guess, and of the states of one event in two itineraries, in scaled unknowns.
 _NEAR, _SAME = 0.05, 1e-4
 
-#: Relative durations of what grows from a degenerate tangency.
+#: Relative durations of legs that grow from a degenerate tangency.
 _SIZES = (1e-2, 3e-3, 3e-2)
 
 
@@ -72,7 +72,7 @@ class Degenerate:
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """What vanishes at a point of codimension two, and where its equations are regular."""
+    """The functions that vanish at a point of codimension two, and its regular equations."""
 
     base: BranchCurve
     u: Array

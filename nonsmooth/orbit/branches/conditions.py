@@ -1,11 +1,11 @@
 """Test functions along a branch of periodic orbits: itinerary changes and smooth bifurcations.
 
-Some functions are positive while the itinerary holds; others vanish at smooth bifurcations.
+Some functions are positive while the itinerary is admissible; others vanish at smooth bifurcations.
 
-An itinerary ceases to hold where a leg's duration vanishes, where a guard is grazed inside a leg, where a
+An itinerary ceases to be admissible where a leg's duration vanishes, where a guard is grazed inside a leg, where a
 guard fails at the start of the next leg or at the end of one, or where an event is no longer crossed
 (the table of sliding bifurcations: di Bernardo, Kowalczyk & Nordmark 2002; with resets Nordmark 1991).
-Each test is a smooth function along the branch, which goes on, virtual, beyond its zero.
+Each test is a smooth function along the branch, which continues as a virtual one beyond its zero.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ...model.derivatives.variational import guarded_field, states_at
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from ..periodic.multipliers import Multipliers, finite_return_map
 from ..runs.cell_field import Guarded, field_of
-from ..runs.guards import CONDITIONS, LegGuards, is_met, watch
+from ..runs.guards import CONDITIONS, LegGuards, is_active, watch
 from ..runs.legs import Leg, surface_of
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
@@ -91,8 +91,8 @@ def condition_row(
     problem: BoundaryProblem, u: Array, p: Array, free: tuple[int, ...], condition: Condition
 ) -> tuple[float, Array] | None:
     """Value of a condition on one leg, and its derivatives by the unknowns and free parameters."""
-    # Only the start of its leg and the parameters matter, by which differences are taken; they steer
-    # Newton's method, whose accuracy is that of the value. None for conditions on the end of a leg.
+    # Differences by the start of its leg and the parameters; they affect only the speed of Newton's method,
+    # not its accuracy. None for conditions on the end of a leg.
     if condition.what not in ("interior", "start"):
         return None
     i, n = condition.leg, problem.dimension
@@ -191,7 +191,7 @@ def _starting(
 
 
 def _leaves_zero(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> bool:
-    """Whether a function that the leg before kept at zero is zero where this leg begins, which it leaves at a rate."""
+    """Whether a function that the previous leg kept at zero leaves zero at a rate where this leg begins."""
     k = guard.element
     if guard.kind != "surface" or before.timed or before.mode[k] not in "sc" or leg.mode[k] in "sc":
         return False
@@ -265,7 +265,7 @@ def _through(
     for value in _LAYER:
         lam[i] = value
         numbers = layer.at(x, lam, p)
-        if numbers.rates_l.reshape(len(lam), -1)[i][slides].any():  # by what slides beside it
+        if numbers.rates_l.reshape(len(lam), -1)[i][slides].any():  # by other sliding functions
             return rate
         rates.append(sign * float(numbers.rates[i]))
     inside = np.polynomial.Chebyshev.fit(_LAYER, rates, len(_LAYER) - 1, domain=[-1, 1])
@@ -303,7 +303,7 @@ def _interior(
         number, _, value, bend = row[:4].tolist()
         k = int(number)
         guard = guards[k][1]
-        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_met(field, row, p):
+        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_active(field, row, p):
             value = _signed(guard, value)
             least[k] = min(value, least.get(k, np.inf))
     return [(guards[k][0], value) for k, value in least.items()]
@@ -332,7 +332,7 @@ def touching(
     duration: float,
     p: Array,
 ) -> tuple[float, float]:
-    """Time and value of the extremum of a guard that an interior condition means."""
+    """Time and value of the extremum of a guard in an interior condition."""
     assert condition.guard is not None
     found, near = minima(system, leg, condition.guard, x, duration, p), condition.t
     if near is not None:

@@ -101,7 +101,7 @@ def continue_orbit(
     max_points : int, optional
         Largest number of points on each side of the start.
     through : bool, optional
-        Whether to change the itinerary and go on beyond events that end it.
+        Whether to change the itinerary and continue beyond events that end it.
     progress : bool, optional
         Whether to show a bar that counts points. After Ctrl-C the points computed so far are returned.
     events : mapping of str to OrbitFunction, optional
@@ -128,7 +128,7 @@ def continue_orbit(
     Raises
     ------
     ConvergenceError
-        The orbit at the start does not solve its equations, or a branch cannot be entered.
+        The orbit at the start does not solve its equations, or no orbit of the new branch was found.
     DefinitionError
         Neither an orbit nor an event from which orbits start; a parameter that the system does not have.
     OptionError

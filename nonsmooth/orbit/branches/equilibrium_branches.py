@@ -51,7 +51,7 @@ VIRTUAL = 1e-9
 _ROUNDING = 1e-13
 
 
-#: What meets at a boundary equilibrium, and what continues the branch, by the class of the surface.
+#: The solutions that meet at a boundary equilibrium, and the one that continues the branch, by the class of the surface.
 _MEETS = {
     "generic": ("equilibrium and pseudo-equilibrium", "pseudo-equilibrium"),
     "continuous": ("the equilibria of both sides", "equilibrium"),
@@ -415,14 +415,14 @@ def continue_equilibrium(
 ) -> Branch:
     """Follow an equilibrium or pseudo-equilibrium as a parameter varies.
 
-    Pseudo-arclength continuation both ways from the value in ``parameters``, round turning points,
+    Pseudo-arclength continuation in both directions from the value in ``parameters``, past turning points,
     with stability at each point.
 
     Parameters
     ----------
     system, parameters, surface, mode
         As in :func:`region`; a smooth system has neither surface nor mode. With complementarity conditions, constraints
-        or closed contacts ``mode`` has all letters, also those of what slides or is closed.
+        or closed contacts ``mode`` has all letters, also those of sliding surfaces and closed elements.
     near : array_like (n,)
         Guess of the first one.
     parameter : str
@@ -437,7 +437,7 @@ def continue_equilibrium(
     max_points : int, optional
         Largest number of points on each side of the start.
     through : bool, optional
-        Whether to go on beyond a boundary equilibrium with the pseudo-equilibria, or equilibria,
+        Whether to continue beyond a boundary equilibrium with the pseudo-equilibria, or equilibria,
         that end there too.
     progress : bool, optional
         Whether to show a bar that counts points. After Ctrl-C the points computed so far are returned.
@@ -449,7 +449,7 @@ def continue_equilibrium(
         its first Lyapunov coefficient, for an eigenvector of length one), ``"branch point"``,
         ``"pseudo-saddle-node"``, ``"boundary equilibrium"`` of any surface, condition or contact (persistence or
         nonsmooth fold, in its ``far_side``), ``"two-fold"`` (sliding changes its stability), ``"intersection"``
-        (a pseudo-equilibrium meets another surface, where its branch ends).
+        (a pseudo-equilibrium reaches another surface, where its branch ends).
 
     Raises
     ------

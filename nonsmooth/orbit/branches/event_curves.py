@@ -44,7 +44,7 @@ TWO_FOLD, SECOND = "two-fold", "a second touch"
 CUSP, HIGHER = "tangency of higher order", "touch of higher order"
 AT_START, AT_END = "touch at the start", "touch at the end"
 
-#: Tests of an event itself, beyond whose zeros it is another one.
+#: Tests of an event itself; beyond their zeros it is an event of another kind.
 OWN_ENDS = (
     TWO_FOLD,
     SECOND,
@@ -197,7 +197,7 @@ class EventCurve(Curve):
 
     def _touching_rows(self, u: Array, inner: Array) -> tuple[Array, Array]:
         """The guard and its rate at the touch, and their derivatives by the unknowns."""
-        # Where the touch is only the point of the flow matters; there both are differentiated numerically.
+        # Only the point of the flow at the touch is needed; both are differentiated numerically there.
         leg, _, _, p = self._leg(inner)
         assert self.condition is not None
         n, k, free = self.problem.dimension, self.columns, self.base.free
@@ -275,7 +275,7 @@ class EventCurve(Curve):
         return found if leg.timed else found | {AT_START: t, AT_END: duration - t}
 
     def _bend(self) -> float:
-        """The sign of a guard's second derivative at an extremum beside which it holds."""
+        """The sign of a guard's second derivative at an extremum near which it is satisfied."""
         assert self.condition is not None and self.condition.guard is not None
         guard = self.condition.guard
         if guard.kind not in CONDITIONS:
@@ -295,8 +295,8 @@ class EventCurve(Curve):
         return ""
 
     def comes_to(self, u: Array) -> str:
-        """What a touch comes to where steps become short: an equilibrium to which the orbit shrinks, or by which it passes
-        ever more slowly; empty where it is neither."""
+        """The limit of a touch where steps become short: an equilibrium to which the orbit shrinks, or that it passes ever
+        more slowly; empty where it is neither."""
         if not self.touches or self.base.system.time_dependent:
             return ""
         assert self.condition is not None

@@ -2,8 +2,8 @@
 
 The size of the orbits is proportional to the distance of the parameter from that of a boundary equilibrium,
 or to its square root at a Hopf point or a two-fold. On a surface all tests of the itinerary vanish with the
-size, so none of them names the end. The equations of the point are regular there, and give its parameter to
-rounding.
+size, so none of them identifies the end. The equations of the point are regular there, and give its parameter
+to rounding.
 
 Source: Kuznetsov, Rinaldi & Gragnani 2003 (Int. J. Bifurcation Chaos 13, 2157), boundary focus and
 fused focus; di Bernardo et al. 2008, ch. 5.

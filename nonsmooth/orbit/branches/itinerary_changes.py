@@ -134,7 +134,7 @@ CENTRE = "focus-centre-limit cycle"
 
 
 def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array) -> str:
-    """The bifurcation that the zero of a test is."""
+    """The kind of bifurcation at the zero of a test."""
     legs, i = problem.legs, test.leg
     leg, guard = legs[i], test.guard
     before, after = neighbours(problem, i)
@@ -226,7 +226,7 @@ def _grazed(
 
 
 def _touch(problem: BoundaryProblem, element: int, of_degree_one: str) -> str:
-    """What a touch of a complementarity condition is: of degree 0 the field is continuous there."""
+    """The kind of a touch of a complementarity condition; for degree 0 the field is continuous there."""
     system = problem.system
     return SOFT if system.entries[element][0] in system.algebraic else of_degree_one
 
@@ -437,7 +437,7 @@ def _missed(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | No
         return None
     count = len(before.problem.legs)
     if before.problem.legs[(i + 1) % count].repeats:
-        return None  # what repeats begins behind it
+        return None  # the repeated events begin after it
     turned = rotated(before, i, p) if i + 1 == count > 1 else before
     i = 0 if turned is not before else i
     editor = LegEditor(turned.problem, turned.u, turned.origin)
@@ -477,7 +477,7 @@ def _start_guard(problem: BoundaryProblem, legs: Sequence[Leg], i: int) -> Guard
     """The guard that fails where leg ``i`` vanishes: of the leg after it."""
     removed, after = legs[i], legs[(i + 1) % len(legs)]
     mode = after.mode if i + 1 < len(legs) else mode_after(removed)
-    if i + 1 == len(legs) and problem.symmetry is not None:  # as the first leg sees it
+    if i + 1 == len(legs) and problem.symmetry is not None:  # for the first leg
         removed, mode = mirrored(problem, removed), after.mode
     surface = surface_of(problem.system, removed)
     for guard in guarded_field(problem.system, mode).motion.guards:
@@ -633,7 +633,7 @@ _STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
 
 
 def departures(curve: Any, u: Array, fresh: Sequence[int]) -> list[Departure]:
-    """Ways to leave an event into the side where the itinerary holds, new legs growing from zero."""
+    """Ways to leave an event to the side where the itinerary is admissible, new legs growing from zero."""
     for size in _STARTS:
         ways: list[tuple[Array, Array]] = []
         tangent = None

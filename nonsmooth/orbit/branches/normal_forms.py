@@ -9,7 +9,7 @@ field whose derivative is A (Kuznetsov 2004, sections 3.5, 5.4 and 10.2; p is th
                                            + B(q*, (e^(2 i theta)-A)^-1 B(q,q))]/2
     Hopf            l1 = Re p.[C(q,q,q*) - 2 B(q, A^-1 B(q,q*)) + B(q*, (2 i w-A)^-1 B(q,q))]/(2 w)
 
-What branches off is stable in these directions (supercritical) where c > 0, a < 0, l1 < 0. Only the matrices
+The new branch is stable in these directions (supercritical) where c > 0, a < 0, l1 < 0. Only the matrices
 B(q, .) and C(q, q*, .) are needed.
 """
 
@@ -80,7 +80,7 @@ def hopf_coefficient(
     third = (real[1] + imaginary[1]).astype(complex)
     at = Expansion(a, q, left, real[0] + 1j * imaginary[0], third)
     matrix, right = a.astype(complex), -(at.second @ q.conj())
-    if "s" in mode:  # a sliding field keeps h: what is across the surface follows its bend
+    if "s" in mode:  # a sliding field keeps h: its part across the surface follows the curvature
         matrix = np.vstack([matrix, gradient.reshape(1, -1)])
         right = np.append(right, -(q @ bend @ q.conj()))
     still = np.linalg.lstsq(matrix, right, rcond=None)[0]

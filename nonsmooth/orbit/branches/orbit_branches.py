@@ -2,7 +2,7 @@
 
 The boundary value problem of a fixed itinerary is continued by :mod:`nonsmooth.continuation`. An itinerary
 ends at a zero of one of its tests (``conditions``). Of the two itineraries that meet there the one with
-fewer legs is regular, so the event is located in it, and the branch goes on in the other one
+fewer legs is regular, so the event is located in it, and the branch continues in the other one
 (``itinerary_changes``).
 
 Source: Kowalczyk, di Bernardo, Champneys et al. 2006 (Int. J. Bifurcation Chaos 16, 601); Kuznetsov 2004,
@@ -26,7 +26,7 @@ from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, elimi
 from ..periodic.divided_legs import divided, to_divide
 from ..periodic.find_periodic import at_two_fold
 from ..periodic.multipliers import Multipliers, return_map
-from ..periodic.orbit import PeriodicOrbit, faults_of, named
+from ..periodic.orbit import PeriodicOrbit, named, violations_of
 from ..periodic.orbit_functions import OrbitFunction, UserRows
 from ..periodic.symmetry import halves, prime_period, require_symmetric
 from ..runs.guards import watch
@@ -120,7 +120,7 @@ class OrbitEquations(BranchCurve):
 
     def hold_family(self, u: Array) -> None:
         """Where orbits form a neutral family at each value of the parameter, keep to a branch that does not move along it."""
-        # A combination of the equations that the family leaves without a meaning says that it does not move.
+        # A combination of the equations that the family makes redundant is replaced by the condition not to move along it.
         self.held = None
         if self.problem.has_many or len(self.free) > 1:
             return
@@ -178,7 +178,7 @@ class OrbitEquations(BranchCurve):
 #: Distance along a curve, scaled, over which a fold changes the parameter by more than rounding of it.
 _BESIDE, _SAME_VALUE = 1e-3, 1e-12
 
-#: Relative singular value of the equations with the parameter below which they do not decide a direction.
+#: Relative singular value of the equations with the parameter below which a direction is undetermined.
 _FAMILY = 1e-10
 
 #: Relative growth of a long period, over a change of the parameter by its bounds, at which it diverges.
@@ -191,7 +191,7 @@ _TINY, _SMALL = 1e-4, 1e-2
 #: L of the other field where a slide ends, relative to its gradient and the state, at the last step to a two-fold.
 _REACHED = 1e-5
 
-#: The same that is rounding: the slide of a branch ends at the two-fold, as it tends to it exponentially.
+#: Rounding of this L: the slide of a branch ends at the two-fold, as it tends to it exponentially.
 _ROUNDED = 1e-11
 
 #: Change of the parameter, over its bounds, per relative change of the period below which it is rounding, and part of
@@ -258,7 +258,7 @@ class OrbitCurve(OrbitEquations):
         return name == "Hopf" or not is_smooth(name)
 
     def ends_at(self, zero: Zero) -> bool:
-        """As by name; also at a period doubling of doubled orbits, beyond which they repeat."""
+        """Whether the branch ends, by the name; also at a period doubling of doubled orbits, which repeat beyond it."""
         doubled = zero.name == "branch point" and _as_doubling(self, zero) is not None
         return doubled or self.ends(zero.name)
 
@@ -321,7 +321,7 @@ class OrbitCurve(OrbitEquations):
                 f"{found.start.tolist()}. Continue with a smaller step."
             )
         p = found.parameter_vector
-        return replace(found, faults=tuple(faults_of(found.problem, found.evaluation, p)))
+        return replace(found, faults=tuple(violations_of(found.problem, found.evaluation, p)))
 
     def out(self, u: Array) -> str:
         """``"period diverges"`` where it is long and grows at a constant parameter; else empty."""
@@ -390,7 +390,7 @@ class OrbitCurve(OrbitEquations):
             )
         for verb in ("ends at", "passes"):
             if self._at_two_fold(u, _REACHED, inside=verb == "passes"):
-                verdict = f"a slide {verb} a two-fold, beyond which its future is not unique"
+                verdict = f"a slide {verb} a two-fold, beyond which its continuation is not unique"
                 point = Point(u, np.zeros(u.size))
                 return self._event("two-fold", self, point, "", FarSide("", verdict))
         name, width = self.system.parameter_names[self.free[-1]], float(self.widths[-1])
@@ -452,7 +452,7 @@ class OrbitCurve(OrbitEquations):
 
     def faults(self, u: Array) -> list[str]:
         """Violated guards."""
-        return faults_of(self.problem, self.evaluation(u), self.parameters_at(u))
+        return violations_of(self.problem, self.evaluation(u), self.parameters_at(u))
 
     def admissible(self, u: Array) -> bool:
         return not self.faults(u)
@@ -693,7 +693,7 @@ class OrbitCurve(OrbitEquations):
         return self.with_problem(found.problem, found.u, p).leave(start, found.fresh)
 
     def leave(self, u: Array, fresh: Sequence[int]) -> Departure | None:
-        """Leave an event into the side where the itinerary holds, new legs growing from zero."""
+        """Leave an event to the side where the itinerary is admissible, new legs growing from zero."""
         return next(iter(departures(self, u, fresh)), None)
 
     def grown(self, u: Array, fresh: Sequence[int], by: float) -> Array:

@@ -90,7 +90,7 @@ def trace_two_folds(
     Raises
     ------
     TraceError
-        A search failed or met a degenerate two-fold; ``value`` and the ``folds`` before it.
+        A search failed or reached a degenerate two-fold; ``value`` and the ``folds`` before it.
     DefinitionError
         ``over`` is neither a parameter nor a state; ``values`` are not finite; and as in
         :func:`find_two_fold`.

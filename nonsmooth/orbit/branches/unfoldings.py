@@ -44,7 +44,7 @@ VERDICTS = {
     "end of complete chatter": "the contact opens before impacts have accumulated: finitely many follow",
     "plastic impact": "the impacts after the first vanish: beyond, the contact closes at once",
     "grazing, escaping": "the orbit leaves along the other field: nothing continues it",
-    "two-fold": "the orbit passes a two-fold, where its future may not be unique",
+    "two-fold": "the orbit passes a two-fold, where its continuation may not be unique",
     "corner": "two events at one time, {one} and {other}; the itinerary beyond is not known here: "
     "simulate there and continue what is found",
 }

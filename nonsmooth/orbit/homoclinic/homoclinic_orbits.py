@@ -33,6 +33,7 @@ from ...model import (
     require_system,
 )
 from ...solvers.newton import Equations, converge, solve
+from ...tables import Table, Tabular, stacked
 from ..periodic.orbit import OrbitLeg, named
 from ..periodic.orbit_run import orbit_run
 from ..runs.legs import Leg, Stretch, stretches
@@ -279,7 +280,7 @@ _ENOUGH = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Connection:
+class Connection(Tabular):
     """A homoclinic orbit to a saddle, a pseudo-saddle or a saddle-focus.
 
     Attributes
@@ -322,6 +323,9 @@ class Connection:
     loop: Loop
     unknowns: Array
     complete: bool = True
+
+    def _tables(self) -> dict[str, Table]:
+        return {"legs": stacked(self.legs, {"leg": len(self.legs)}, self.system.state_names)}
 
     @property
     def itinerary(self) -> str:
@@ -411,13 +415,13 @@ def find_homoclinic(
         Name of the parameter that is varied.
     guess : float, optional
         Its value to start from; by default that of ``parameters``. There an orbit of the unstable
-        manifold should come back to within half of its size.
+        manifold should return to within half of its size.
     parameters : mapping, optional
         Values that replace defaults.
     max_iterations : int, optional
         Newton's method gives up after this many steps.
     progress : bool, optional
-        Show on a terminal how close to the saddle the orbit comes.
+        Whether to show on a terminal the distance of the orbit from the saddle.
 
     Returns
     -------
@@ -508,7 +512,7 @@ def _by_projections(
     max_iterations: int,
     progress: bool,
 ) -> Connection:
-    """Solve for the orbit that ends where the guess does, then move its end to the saddle."""
+    """Solve for the orbit with the end of the guess, then move its end to the saddle."""
     far, near = start.miss, float(np.linalg.norm(start.starts[0] - start.saddle))
     parameter = system.parameter_names[index]
     loop = SaddleLoop(system, start.legs, (index,), p, mode, start.saddle, near, far, start.held)

@@ -5,7 +5,7 @@ ends at a distance d in the stable one. With rows W_s, W_u that annihilate the o
 
     W_s (x_1 - x*) = 0,  |x_1 - x*| = e,  W_u (x_end - x*) = 0,  |x_end - x*| = d.
 
-On a surface the mode slides, and h(x_1) = 0 takes the place of the direction across it. The error in the
+On a surface the mode slides, and h(x_1) = 0 replaces the condition across it. The error in the
 parameter is d^(2 + r), where r is the ratio of the unstable to the stable eigenvalue, and rounding is
 magnified by d^-(1 + r): d is chosen between the two.
 
@@ -180,8 +180,8 @@ class Loop(ABC):
             if duration <= 0.0:
                 faults.append(f"{name} has the duration {duration:.3g}")
             else:
-                seen = watch(self.system, leg, x, duration, p).faults
-                faults += [f"{name}: {fault}" for fault in seen]
+                seen = watch(self.system, leg, x, duration, p).violations
+                faults += [f"{name}: {one}" for one in seen]
         return tuple(legs), tuple(faults)
 
     def pieces(self, u: Array) -> tuple[OrbitLeg, ...]:

@@ -57,7 +57,7 @@ class Path:
 
 @dataclass(frozen=True)
 class Slider:
-    """Follows the sliding flow of one surface to the end of its region."""
+    """Integration of the sliding flow of one surface to the end of its region."""
 
     where: LocalSurface
     surfaces: Surfaces

@@ -1,14 +1,14 @@
 """Dividing surfaces of two-folds, as curves in a plane of starts.
 
-Starts on a dividing surface have one itinerary up to where it is decided on which side of the switching
-surface the orbit goes on: at a two-fold, into which it slides, or where it grazes the surface. With the
-itinerary fixed this condition is a smooth function of the start, so an arc is continued like any curve. It
-ends where its itinerary ceases to be admissible, and the next arc begins there. Two kinds are computed:
+Orbits from a dividing surface have one itinerary up to a deciding point: a two-fold into which they slide, or a
+grazing of the switching surface. Neighbours continue on either side of it. With the itinerary fixed this
+condition is a smooth function of the start, so an arc is continued like any curve. It ends where its
+itinerary ceases to be admissible, and the next arc begins there. Two kinds are computed:
 
 - orbits end at an *event* at which both fields agree across the surface (a contact that opens: with the
   load its friction vanishes). They end on one side of the surface, on the other, or in it;
-- orbits go on, and a *two-fold* divides them: beside it they leave for either side. Where they do not slide
-  into it they are divided by grazing: what misses the surface and what crosses it.
+- orbits continue, and a *two-fold* divides them: beside it they leave to either side. Where they do not slide
+  into it they are divided by grazing, into those that miss the surface and those that cross it.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ from ...solvers.continuation import (
     pieces,
     trace,
 )
-from ..runs.guards import change_fault
+from ...tables import Table, joined
+from ..runs.guards import change_violation
 from ..runs.itinerary import Arrival, FixedItinerary, leg_between, read_word
 from .two_fold_sheet import Meeting, TwoFoldSheet
 
@@ -68,7 +69,7 @@ _JUNCTION, _STEPS = 1e-13, 8
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """Where the orbit of a start with a fixed itinerary is decided.
+    """The deciding point of the orbit of a start with a fixed itinerary.
 
     Attributes
     ----------
@@ -112,7 +113,7 @@ class Passages(Protocol):
         ...
 
     def simulated(self, u: Array) -> str:
-        """The itinerary of a simulation; its last letter is the side on which the orbit goes on."""
+        """The itinerary of a simulation; its last letter is the side on which the orbit continues."""
         ...
 
 
@@ -270,7 +271,7 @@ def joint_root(
 
 @dataclass(eq=False)
 class DividingTracer:
-    """Follows a dividing surface in a plane of starts from arc to arc.
+    """Continuation of a dividing surface in a plane of starts from arc to arc.
 
     Each arc is continued by :mod:`nonsmooth.continuation`. Where its itinerary ceases to be admissible
     the end is located, and a junction is solved for. The next itinerary is the common beginning of
@@ -282,7 +283,7 @@ class DividingTracer:
     step : float
         Largest step on bent arcs, in scaled coordinates.
     out : callable, optional
-        The reason to end the curve at a start; empty to go on.
+        The reason to end the curve at a start; empty to continue.
     first : callable, optional
         The first step of an arc from its start.
     bounds : sequence of (index, low, high), optional
@@ -680,7 +681,7 @@ class _TwoFoldPassages:
             arrival = fixed.arrive(x)
             by_start = fixed.derivative(arrival)[1] @ slope
             x, entry = arrival.x, arrival.t
-            fault = arrival.fault or self._entry_fault(itinerary, x)
+            fault = arrival.fault or self._entry_violation(itinerary, x)
         met = self.sheet.meet(x, self._met.get(itinerary))
         self._met[itinerary] = met
         return Passage(
@@ -693,9 +694,9 @@ class _TwoFoldPassages:
             (met.slope @ by_start)[None, :],
         )
 
-    def _entry_fault(self, itinerary: str, x: Array) -> str:
+    def _entry_violation(self, itinerary: str, x: Array) -> str:
         leg, p = leg_between(self.system, itinerary[-2], "s"), self.sheet.parameters
-        return change_fault(self.system, leg, "s", x, x, p)
+        return change_violation(self.system, leg, "s", x, x, p)
 
     def _grazes(self, u: Array, itinerary: str) -> Passage:
         """The passage of an orbit whose last leg turns back from the surface: h is least there."""
@@ -768,13 +769,13 @@ _FIRST, _APART = 0.2, 1e-6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DividingCurves(Savable, point="n"):
-    """Curves in which a plane of starts cuts a dividing surface of two-folds.
+    """Intersections of a plane of starts with a dividing surface of two-folds.
 
     Attributes
     ----------
     stable : bool
-        Whether orbits that come to the two-folds divide (True), or those that leave them, backward
-        in time.
+        Whether orbits that enter the two-folds divide (True), or those that leave them, backward in
+        time.
     point : ndarray (n,)
         The given two-fold.
     curves : list of list of DividingArc
@@ -787,6 +788,11 @@ class DividingCurves(Savable, point="n"):
     point: Array
     curves: list[list[DividingArc]]
     complete: bool = True
+
+    def _tables(self) -> dict[str, Table]:
+        names = ("points", "entry", "t", "decided")
+        parts = [{name: getattr(arc, name) for name in names} for arc in self.arcs]
+        return {"points": joined("arc", parts)}
 
     @property
     def arcs(self) -> list[DividingArc]:
@@ -920,7 +926,7 @@ def _require_plain(system: FilippovSystem) -> None:
 
 
 class _Search:
-    """Searches the edges of cells for curves and follows them."""
+    """Search for curves on the edges of cells, and their continuation."""
 
     def __init__(
         self,

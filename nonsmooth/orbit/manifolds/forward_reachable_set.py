@@ -31,6 +31,7 @@ from ...model import (
     real_array,
     require_system,
 )
+from ...tables import Table, Tabular, joined, stacked
 from .canards import Path, Slider, paths_from
 
 
@@ -60,7 +61,7 @@ class Departure:
 
 
 @dataclass(frozen=True, repr=False)
-class Funnel:
+class Funnel(Tabular):
     """Samples of a forward-reachable set: call it with a time to get the set of states there.
 
     Attributes
@@ -92,6 +93,14 @@ class Funnel:
     departures: tuple[Departure, ...]
     two_fold: TwoFold | None = None
     past: Trajectory | None = field(default=None)
+
+    def _tables(self) -> dict[str, Table]:
+        parts = [{"t": run.t, "x": run.x} for run in self.trajectories]
+        members = {"run": len(self.departures)}
+        return {
+            "points": joined("number", parts, self.system.state_names),
+            "departures": stacked(self.departures, members),
+        }
 
     def __len__(self) -> int:
         return len(self.trajectories)

@@ -37,6 +37,7 @@ from ...model import (
     reversed_system,
     whole,
 )
+from ...tables import Table, joined
 from ..periodic.multipliers import leg_maps
 from ..periodic.orbit import PeriodicOrbit
 from ..runs.legs import integrate_leg
@@ -87,7 +88,7 @@ class Arc:
 
 
 class _InterruptedOrbit(KeyboardInterrupt):
-    """Ctrl-C while an orbit was followed, with the part ``run`` of it and its curve ``arc``."""
+    """Ctrl-C during the integration of an orbit, with the part ``run`` of it and its curve ``arc``."""
 
     def __init__(self, run: Trajectory):
         super().__init__()
@@ -97,7 +98,7 @@ class _InterruptedOrbit(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Follower:
-    """Follows orbits of a system in one direction of time."""
+    """Integration of orbits of a system in one direction of time."""
 
     system: FilippovSystem
     parameters: dict[str, float]
@@ -395,7 +396,7 @@ class Manifold(Savable, point="n", points="k n | 0 0", triangles="q 3 <points"):
     Attributes
     ----------
     stable : bool
-        Whether orbits come to the point (True) or leave it.
+        Whether orbits approach the point (True) or leave it.
     point : ndarray (n,)
         Of the saddle, pseudo-saddle or fold.
     dimension : int
@@ -419,6 +420,14 @@ class Manifold(Savable, point="n", points="k n | 0 0", triangles="q 3 <points"):
     triangles: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     complete: bool = True
 
+    def _tables(self) -> dict[str, Table]:
+        tables = {"points": joined("arc", [{"t": arc.t, "x": arc.points} for arc in self.arcs])}
+        if len(self.triangles):
+            tables["vertices"] = Table({"vertex": len(self.points)}, {"x": self.points})
+            corners = {"vertex": ("corner", self.triangles)}
+            tables["triangles"] = Table({"triangle": len(self.triangles)}, corners)
+        return tables
+
     def __repr__(self) -> str:
         what = "stable" if self.stable else "unstable"
         of = (
@@ -439,7 +448,7 @@ def _too_high(dimension: int) -> DegenerateError:
 
 
 class _Grower:
-    """Computes the manifold of one point or orbit from its local directions."""
+    """Computation of the manifold of one point or orbit from its local directions."""
 
     def __init__(
         self, follower: Follower, of: Any, stable: bool, most: int, report: Callable[[], object]
@@ -706,13 +715,13 @@ def manifold(
         Without explicit time. A stable manifold is followed backward: without resets and impacts.
     of : Equilibrium, PseudoEquilibrium, Fold, FoldFold, TwoFold or PeriodicOrbit
         From ``find_equilibrium``, ``find_pseudo_equilibrium``, ``fold``, ``fold_fold``,
-        ``find_two_fold``, ``periodic_orbit``. Of a visible fold in the plane: the orbits that come to
-        it, or leave it. Of a two-fold of three states: the orbits that come to its one canard, the
+        ``find_two_fold``, ``periodic_orbit``. Of a visible fold in the plane: the orbits that reach
+        it, or leave it. Of a two-fold of three states: the orbits that reach its one canard, the
         dividing surface of those that pass it on either side (or those that leave the canard). Of a
         periodic orbit of three states: the surface of one multiplier inside the unit circle, or one
         outside.
     stable : bool, optional
-        Whether to compute orbits that come to the point (True) or those that leave it.
+        Whether to compute orbits that approach the point (True) or those that leave it.
     length : float
         Of the orbits on it. Not with ``starts``.
     starts : array_like (3, n), callable or orbit.ComputedStarts, optional
@@ -742,13 +751,13 @@ def manifold(
     max_orbits : int, optional
         Of a surface.
     progress : bool, optional
-        Show on a terminal how many orbits were followed.
+        Whether to show on a terminal the number of computed orbits.
 
     Returns
     -------
     Manifold
         Curves where the manifold has one dimension, a surface where it has two. Backward it ends
-        where it meets sliding, at which orbits arrive from a whole neighbourhood. After Ctrl-C it has
+        at sliding, where orbits arrive from a whole neighbourhood. After Ctrl-C it has
         the orbits computed so far, and ``complete`` is False.
     DividingCurves
         With ``starts``: curves in the plane that divide orbits, made of arcs that slide into a two-fold
@@ -769,8 +778,8 @@ def manifold(
 
     Notes
     -----
-    Orbits come to attracting sliding in finite time, so the stable manifold of a pseudo-saddle has
-    the orbits of both fields that end on it, exactly: they start at the point itself. Other manifolds
+    Orbits reach attracting sliding in finite time, so the stable manifold of a pseudo-saddle consists of
+    the orbits of both fields that end on it: they start exactly at the point. Other manifolds
     start at a distance of a millionth of ``length`` along eigenvectors.
 
     In n states two-folds fill a set of dimension n - 3, and the orbits that slide into it a surface of
@@ -780,7 +789,7 @@ def manifold(
 
     Examples
     --------
-    The orbits that end at a pseudo-saddle of the plane divide what slides to the left and right:
+    The orbits that end at a pseudo-saddle of the plane divide those that slide to the left from those to the right:
 
     >>> import casadi as ca, nonsmooth as ns
     >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
@@ -857,7 +866,7 @@ def _cut(
         require_event(system, until, of, parameters)
         if not stable:
             raise OptionError(
-                "stable=False does not go with until=, as stops are not met backward in time. Drop one."
+                "stable=False does not go with until=, as stops do not end orbits backward in time. Drop one."
             )
     span = real(duration, "duration", expected="a positive number", low=_LEAST)
     bar = progress_bar(None, progress, "arc")

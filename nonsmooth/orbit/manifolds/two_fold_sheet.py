@@ -186,10 +186,10 @@ class TwoFoldSheet:
         m, rate = self._slopes(fold)[(self.root + 1) // 2]
         left = (m - 1.0) * self.distance / rate
         near = abs(gap) <= _CLOSE * self.size
-        fault = self._fault(fold, duration) if near else ""
+        fault = self._violation(fold, duration) if near else ""
         return Meeting(fold, duration, left, gap, turned, slope, fault)
 
-    def _fault(self, fold: Array, duration: float) -> str:
+    def _violation(self, fold: Array, duration: float) -> str:
         """The guard of sliding that fails on the way to a two-fold; empty if none does."""
         e, _ = self._direction(fold)
         run = follow(

@@ -6,8 +6,8 @@ every leg. With the flow phi of the leg's mode, its event e_i and reset g_i,
     g_i(phi_i(x_i, T_i; p)) - x_(i+1) = 0,     e_i(phi_i(x_i, T_i; p)) = 0,     i = 1 .. N,
 
 and the last leg leads back to the first: R g_N - d - x_1 = 0, where R is a symmetry (half orbits) and
-d advances the time of a forced system. The Jacobian holds plain variational matrices; saltation appears
-by itself when the durations are eliminated.
+d advances the time of a forced system. The Jacobian contains plain variational matrices; eliminating the
+durations gives the saltation matrices.
 
 Guards are not checked here: a solution may be virtual, and branches pass through such points smoothly. Source: Dercole & Kuznetsov 2005 (SlideCont), Thota & Dankowicz 2008 (TC-HAT), with Taylor
 legs in place of collocation.
@@ -29,6 +29,7 @@ from ...flow.fixed import TOLERANCE
 from ...model import Array, ConvergenceError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, EventMap, kept_maps
 from ...model.derivatives.forcing import Forcing
+from ...solvers import linear_equations
 from ..runs.cell_legs import CellLegs
 from ..runs.leg_integration import LegFlows, LegIntegrator
 from ..runs.legs import Leg, LegFlow, integrate_leg, rate_at, surface_of
@@ -161,7 +162,7 @@ class BoundaryProblem:
         return np.array(rows) if all(rows) else None
 
     def _label(self, flows: LegFlows) -> None:
-        """Give the discrete states the values of the following leg, whatever is perturbed."""
+        """Set the discrete states to the values of the following leg, without derivatives."""
         if self.labels is not None:
             n, count = self.system.dimension, self.labels.shape[1]
             following = np.roll(self.labels, -1, axis=0)
@@ -198,8 +199,8 @@ class BoundaryProblem:
         return range(i, i + 1)
 
     def begun_at(self, u: Array, i: int, t: float) -> tuple[Array, int, float, float]:
-        """The last start of a part of a leg before a time t since its start: the state, its place among the unknowns,
-        the time since then, and how much less that is per duration of the leg."""
+        """The last start of a part of a leg before a time t since its start: the state, its index among the unknowns, the
+        time since then, and the derivative of this time by the duration of the leg, with its sign changed."""
         return self.split(u)[0][i], i * self.dimension, t, 0.0
 
     def undivided(self, u: Array) -> Array:
@@ -317,7 +318,7 @@ class BoundaryProblem:
     def _phased(
         self, residual: Array, jacobian: Array, by_parameters: Array, flows: LegFlows, start: Array
     ) -> None:
-        """The phase condition in place of the event that the one leg does not have."""
+        """The phase condition, which replaces the missing event of the one leg."""
         assert self.phase is not None and self.reference is not None
         n = self.dimension
         residual[n] = self.phase @ (start - self.reference)
@@ -335,13 +336,13 @@ class BoundaryProblem:
         p: Array,
         columns: Sequence[int],
     ) -> None:
-        """Replace the redundant equations of what is zero all the time by that."""
+        """Replace redundant equations by the functions that are zero all the time."""
         n = self.dimension
         first = (len(self.legs) - 1) * n
         maps = [own(start, p) for own in self.held]
         rest = np.array([at.gradient[: self.system.dimension] for at in maps])
         for i, at in enumerate(maps):
-            k = int(np.argmax(np.abs(rest[i])))  # of what the rows before leave
+            k = int(np.argmax(np.abs(rest[i])))  # of the remainder
             rest[i + 1 :] -= np.outer(rest[i + 1 :, k] / rest[i, k], rest[i])
             residual[first + k] = at.value
             jacobian[first + k] = 0.0
@@ -365,7 +366,7 @@ class BoundaryProblem:
         """Solve these equations, with rows of a border below; by elimination where legs are many."""
         if self.has_many:
             return eliminated(self, matrix, right).solution()
-        return np.asarray(np.linalg.solve(matrix, right), float)
+        return linear_equations.solve(matrix, right)
 
     def scales(self, u: Array, p: Array | None = None) -> Array:
         """Sizes of the unknowns: states by their range over the legs, times by the duration."""

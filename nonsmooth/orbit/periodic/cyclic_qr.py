@@ -1,7 +1,7 @@
 """Eigenvalues of a product of matrices by QR decompositions of its factors, as logarithms.
 
 The product itself would lose the small eigenvalues beside the large ones, and overflow. Orthonormal bases are
-carried through the factors, and round again until the sizes of the columns no longer change.
+multiplied by the factors cyclically until the sizes of the columns converge.
 
 Source: Bojanczyk, Golub & Van Dooren 1992 (periodic Schur decomposition); Dieci & Van Vleck 1995.
 """
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...model import Array
 
-#: A direction of which a factor leaves no more than this part is lost.
+#: A direction that a factor shrinks to this part or less is lost.
 _LOST = 1e-12
 
 #: Passes through all factors. Eigenvalues that these do not separate differ by no more than a factor of 12.
@@ -38,7 +38,7 @@ class Factor:
     beside: Array | None = None
 
     def image(self, basis: Array) -> Array:
-        """Orthonormal basis of what it leaves of some directions (n, r)."""
+        """Orthonormal basis of the image of some directions (n, r)."""
         moved = self.matrix @ basis
         if self.beside is None or not basis.shape[1]:
             return np.linalg.qr(moved)[0] if basis.shape[1] else basis
@@ -55,7 +55,7 @@ class Product:
 
     @cached_property
     def basis(self) -> Array:
-        """Orthonormal basis (n, r) of the directions that are kept however often the product is taken."""
+        """Orthonormal basis (n, r) of the directions that no power of the product loses."""
         basis: Array = np.eye(len(self.factors[0].matrix))
         while True:
             before = basis.shape[1]
@@ -93,12 +93,12 @@ class Product:
     @property
     def error(self) -> float:
         """Error of the eigenvalues, relative to those beyond 1, estimated by the transposed factors in reverse order."""
-        # the difference does not see the rounding of the factors themselves, which is ten times as large
+        # the difference does not include the rounding of the factors themselves, which is ten times as large
         found = self.logarithms
         other = self.reversed.logarithms if found.size else found
         n = min(
             found.size, other.size
-        )  # directions that one of them takes for lost are as small as that
+        )  # directions that only one of them loses are as small as that
         lost = np.exp(np.minimum([*found.real[n:], *other.real[n:]], 0.0)).max(initial=0.0)
         apart = np.exp(np.minimum(found.real[:n], 0.0)) * np.abs(found.real[:n] - other.real[:n])
         return 10.0 * float(max(apart.max(initial=0.0), lost))

@@ -1,6 +1,6 @@
 """Boundary value problem of a periodic orbit some of whose legs are divided: multiple shooting inside legs.
 
-Where derivatives grow along a leg, its end hardly depends on its start as Newton's method assumes. The leg is
+Where derivatives grow along a leg, the linearisation of Newton's method holds only very near the orbit. The leg is
 divided into parts of equal duration, whose starts are unknowns too. Source: Stoer & Bulirsch 2002, sec. 7.3.5.
 """
 

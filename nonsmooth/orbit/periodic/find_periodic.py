@@ -31,10 +31,10 @@ from ..runs.legs import Leg, integrate_leg, leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
 from .divided_legs import divided, to_divide
 from .guess import Start, about_of, equations_of, is_about, starts_of
-from .orbit import PeriodicOrbit, faults_of, named
+from .orbit import PeriodicOrbit, named, violations_of
 from .symmetry import prime_period, require_symmetric, symmetry_matrix
 
-#: No leg may grow to so many times the guess of the whole orbit.
+#: Largest duration of a leg relative to the guess of the whole orbit.
 _LONGEST = 10.0
 
 
@@ -53,9 +53,9 @@ def periodic_orbit(
     max_time: float | None = None,
     progress: bool = False,
 ) -> PeriodicOrbit:
-    """Find a periodic orbit, stable or not, with all digits, its multipliers and its margins.
+    """Find a periodic orbit, stable or not, to rounding, with its multipliers and margins.
 
-    The itinerary is read off the guess and kept; the boundary value problem of its legs is solved by
+    The itinerary is that of the guess; the boundary value problem of its legs is solved by
     Newton's method with exact derivatives; then the guards are checked along the orbit.
 
     Parameters
@@ -224,7 +224,7 @@ def _solved(
     require_motion(problem, at, start)
     require_duration(problem, at, about_of(system, period, start.p))
     _require_multiplicity(problem, multiplicity)
-    faults = tuple(faults_of(problem, at, start.p))
+    faults = tuple(violations_of(problem, at, start.p))
     orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, iterations, faults)
     orbit = _of_neutral_family(orbit, most, budget) or orbit
     require_simple(orbit)
@@ -256,7 +256,7 @@ def _of_neutral_family(orbit: PeriodicOrbit, most: int, budget: _Budget) -> Peri
                 problem, u, at, count = _closed_orbit(part, once, p, most, budget)
         except (ConvergenceError, DegenerateError):
             continue
-        faults = tuple(faults_of(problem, at, p))
+        faults = tuple(violations_of(problem, at, p))
         found = PeriodicOrbit(system, orbit.parameters, problem, u, at, count, faults)
         if found.floquet.repeats and not faults:
             return found
@@ -344,7 +344,7 @@ _POLISH = 1e-3
 #: A guess that closes to a part e of its size is as near as this times sqrt(e) to its orbit.
 _FAR = 10.0
 
-#: Directions that equations say less of than the others, by these factors.
+#: Relative singular values below which directions are weak, in turn.
 _WEAK = (1e-15, 1e-8, 1e-6, 1e-4, 1e-2)
 
 #: Residual, relative to the orbit, with which it does not close.
@@ -422,7 +422,7 @@ class _Solver:
         return self._closed(*self._polished(root * scales))
 
     def _closed(self, u: Array, at: Evaluation) -> tuple[Array, Evaluation]:
-        """Refuse what no step brings nearer to an orbit."""
+        """Refuse a guess that no step brings nearer to an orbit."""
         sizes = self._sizes(at.jacobian * self.problem.scales(u))
         if not float(np.abs(at.residual / sizes).max()) <= _CLOSES:
             self.last = u, at
@@ -448,8 +448,8 @@ class _Solver:
 
     def _nearest(self, equations: Equations, v: Array, most: int, far: float) -> Array | None:
         """Newton's method that does not run along a family of orbits."""
-        # Where a step makes the residual larger, it is one along a direction that the residual does not
-        # decide: less and less weak directions are left as they are.
+        # A step that increases the residual goes along a direction that the residual does not determine: the
+        # weakest directions, more and more of them, are kept fixed.
         start, (values, jacobian) = v, equations(v)
         for _ in range(most):
             sizes = self._sizes(jacobian)
@@ -548,7 +548,7 @@ class _Solver:
         ]
         if not backward and at is not None:
             try:
-                backward = faults_of(self.problem, at, self.p)
+                backward = violations_of(self.problem, at, self.p)
             except NonsmoothError:
                 backward = []
         why = f" {reason}" if reason else ""
@@ -581,7 +581,7 @@ _SPACINGS = 8.0
 #: Gaps between legs, beside the size of the guess, from which an orbit is none.
 _OPEN = 1e-3
 
-#: What moves by no more than this part of its size rests.
+#: States that move by no more than this part of their size rest.
 _STILL = 1e-6
 
 
@@ -610,7 +610,7 @@ def require_motion(problem: BoundaryProblem, at: Evaluation, start: Start) -> No
 
 
 def _require_closed(problem: BoundaryProblem, at: Evaluation, start: Start) -> None:
-    """Refuse states that do not close in the size of the guess: they ran away, to where they close beside their size."""
+    """Refuse states that diverged from the guess and close only relative to their own size."""
     n, count = problem.dimension, len(problem.legs)
     own = problem.system.dimension
     size = float(start.problem.scales(start.unknowns, start.p)[:own].max())
@@ -627,12 +627,12 @@ def _require_closed(problem: BoundaryProblem, at: Evaluation, start: Start) -> N
 
 
 def _require_resolved(problem: BoundaryProblem, at: Evaluation) -> None:
-    """Refuse an orbit whose states are so large that they do not change by what its legs move."""
+    """Refuse an orbit whose motion is below the rounding of its states."""
     n, count = problem.system.dimension, len(problem.legs)
     ways = np.abs(at.flows.rate[:count, :n]) * np.abs(at.durations[:, None])
     spacings = np.spacing(np.abs(at.starts[:, :n]).max(axis=0))
     if (ways > _SPACINGS * spacings).any() or not ways.any() or not _singular(problem, at):
-        return  # or at rest where the equations say so
+        return  # or at rest by the equations
     raise ConvergenceError(
         f"periodic orbit: expected an orbit that moves, received the state {at.starts[0, :n].tolist()}, "
         f"which moves by {ways.max():.2g} at most: less than {_SPACINGS:g} spacings of numbers of that "
@@ -642,7 +642,7 @@ def _require_resolved(problem: BoundaryProblem, at: Evaluation) -> None:
 
 
 def _singular(problem: BoundaryProblem, at: Evaluation) -> bool:
-    """Whether the equations, in units of the orbit, say next to nothing of it in some direction."""
+    """Whether the equations, in units of the orbit, are nearly singular."""
     jacobian = at.jacobian * problem.scales(problem.pack(at.starts, at.durations))
     rows = np.linalg.norm(jacobian, axis=1)
     values = np.linalg.svd(jacobian / np.where(rows > 0.0, rows, 1.0)[:, None], compute_uv=False)

@@ -86,7 +86,7 @@ _CLOSE = 0.25
 #: Factor within which a period agrees with the given one.
 _ABOUT = 1.5
 
-#: Ratio of the times between events at the end and in the middle of a run below which they go on falling.
+#: Ratio of the times between events at the end and in the middle of a run below which they are decreasing.
 _FALLING = 0.7
 
 #: Relative range of the states of a part of a run below which it rests.
@@ -155,7 +155,7 @@ def recurrence(
     distances, periods = _distances(run, parts, anchor, others, scale, symmetry, period)
     if period is not None and whole is not None:
         distances = [d if n == whole else math.inf for d, n in zip(distances, periods, strict=True)]
-    best = min(distances)  # of those that close about as well as the best the shortest
+    best = min(distances)  # the shortest of those that close nearly as well as the best
     good = [i for i, apart in enumerate(distances) if apart <= max(3.0 * best, 1e-9)]
     i = min(good, key=lambda i: abs(others[i] - anchor))
     low, high = sorted((anchor, others[i]))
@@ -322,7 +322,7 @@ def refused(
 
 
 def _rests(run: Trajectory) -> bool:
-    """Whether a run moves no more at its end."""
+    """Whether a run is at rest at its end."""
     if run.status is not Status.REACHED_END:
         return False
     last = run(run.t[-1] - _AT_END * (run.t[-1] - run.t[0]) * np.linspace(0.0, 1.0, 33))

@@ -1,7 +1,7 @@
-"""Master stability: do equal oscillators, coupled by a network, stay in step on their periodic orbit?
+"""Master stability function: stability of synchrony of equal oscillators on a network.
 
-Oscillators x_i' = f(x_i) - s sum_j L_ij H(x_j) with row sums of L zero have the orbit of one as a common
-motion. Perturbations of it split into eigenvectors of s L; with an eigenvalue kappa
+Oscillators x_i' = f(x_i) - s sum_j L_ij H(x_j), where the row sums of L are zero, have the periodic orbit of one as
+a common motion. Perturbations of it split into eigenvectors of s L; with an eigenvalue kappa
 
     delta' = (Df - kappa Pi DH) delta  on legs,    delta+ = S delta-  at events,
 
@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, ConvergenceError, DegenerateError, OptionError
 from ...model.derivatives.given_functions import Coupling
+from ...tables import Table, Tabular
 from ..runs.legs import integrate_leg
 from ..runs.saltation import saltations
 from .multipliers import events_of
@@ -49,7 +50,7 @@ _JUMPS = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MasterStability:
+class MasterStability(Tabular):
     """Growth of perturbations across synchrony.
 
     Attributes
@@ -69,6 +70,11 @@ class MasterStability:
     multipliers: NDArray[np.complex128]
     exponents: Array
     period: float
+
+    def _tables(self) -> dict[str, Table]:
+        columns = {"kappa": self.kappa, "exponent": self.exponents}
+        columns["multipliers"] = ("multiplier", self.multipliers)  # type: ignore[assignment]
+        return {"nodes": Table({"node": len(self.kappa)}, columns)}
 
     @property
     def stable(self) -> NDArray[np.bool_]:
@@ -93,7 +99,7 @@ def master_stability(
     orbit : PeriodicOrbit
         Of one oscillator.
     coupling : sequence of n expressions
-        H(x): what each row of the field receives from the others, in the system's states and parameters.
+        H(x): the coupling in each row of the field, in the system's states and parameters.
     kappa : array_like (m,)
         Eigenvalues of strength times Laplacian, such as ``strength * np.linalg.eigvals(laplacian)``; a
         pair with diffusive coupling of strength s has 0 and 2 s.
@@ -115,8 +121,8 @@ def master_stability(
 
     Notes
     -----
-    At an impact the states jump as those of one oscillator: a coupling in the rate of a gap, as of positions that
-    pull positions, is not in the law of restitution.
+    At an impact the states jump as those of one oscillator: the law of restitution does not include a coupling in
+    the rate of a gap, as in the rates of positions.
 
     Examples
     --------

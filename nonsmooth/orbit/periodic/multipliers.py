@@ -1,9 +1,9 @@
 """Floquet multipliers of a periodic orbit from the derivatives of its legs.
 
-Perturbations are kept on the surfaces of the events, where the direction of the flow is left out, and in the
-subspaces that entries to sliding leave. What remains are the multipliers that are not structural; a
-multiplier 1 of the flow (or of the time) and a 0 for each dimension lost are exact. Legs on which derivatives
-grow too differently are divided. With the direction of the flow the 1 is computed too, which estimates the error.
+Perturbations are restricted to the surfaces of the events, without the direction of the flow, and to the subspaces
+after entries to sliding. This gives the multipliers that are not structural; a multiplier 1 of the flow (or of the
+time) and a 0 for each lost dimension are exact. Legs on which derivatives grow too differently are divided. The 1 is
+also computed with the direction of the flow, which estimates the error.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Multipliers:
 
     @cached_property
     def zeros(self) -> int:
-        """How many are structurally zero. Discrete states have none."""
+        """Number of structural zeros. Discrete states have none."""
         return self._count - self.logarithms.size if not self.refusal else 0
 
     @property
@@ -137,7 +137,7 @@ class Multipliers:
 
     @cached_property
     def _carried(self) -> tuple[Product, float]:
-        """The map, and how well the flow carries its own direction."""
+        """The map, and the error of the flow's own direction."""
         problem, at, units = self.problem, self.at, self._units
         n, events = problem.dimension, event_maps(problem, at)
         fields = at.flows.before[:, :n] / units
@@ -183,7 +183,7 @@ class Multipliers:
 
     def _even(self, part: Array) -> bool:
         """Whether derivatives (S, N) do not grow too differently."""
-        if self.problem.system.sets:  # what they take is lost, however short the leg is
+        if self.problem.system.sets:  # their null space is lost, however short the leg is
             return True
         moved = part[: self._units.size] / self._units[:, None]
         sizes = np.linalg.svd(moved, compute_uv=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
 from ...model import Array, FilippovSystem, ParameterError, Surfaces
 from ...notebook import card, circle
-from ..runs.guards import faults_along, watch
+from ...tables import Table, Tabular, stacked
+from ..runs.guards import violations_of_legs, watch
 from ..runs.legs import Leg, integrate_leg, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation, mirrored
 from .multipliers import Multipliers, monodromy
@@ -68,7 +69,7 @@ class OrbitDerivative(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PeriodicOrbit:
+class PeriodicOrbit(Tabular):
     """A periodic orbit with a fixed itinerary.
 
     Attributes
@@ -96,6 +97,14 @@ class PeriodicOrbit:
     evaluation: Evaluation
     iterations: int
     faults: tuple[str, ...] = ()
+
+    row: ClassVar[tuple[str, ...]] = ("period", "start", "itinerary", "stability", "multipliers")
+
+    def _tables(self) -> dict[str, Table]:
+        names = self.system.state_names
+        legs = stacked(self.legs, {"leg": len(self.legs)}, names)
+        multipliers = Table({"multiplier": len(self.multipliers)}, {"value": self.multipliers})
+        return {**self.trajectory._tables(), "legs": legs, "multipliers": multipliers}
 
     # properties ---------------------------------------------------------------------------------
 
@@ -183,7 +192,7 @@ class PeriodicOrbit:
     def half_multipliers(self) -> NDArray[np.complex128]:
         """Multipliers of the map of the legs that were solved for.
 
-        Of an orbit with a symmetry these are those of half the orbit, mirrored back; otherwise
+        Of an orbit with a symmetry these are those of half the orbit, mapped back by it; otherwise
         ``multipliers``.
         """
         return self.floquet.of_map
@@ -215,7 +224,7 @@ class PeriodicOrbit:
 
     @property
     def residual(self) -> float:
-        """Largest entry that is left of the equations that were solved."""
+        """Largest residual of the equations that were solved."""
         return float(np.abs(self.evaluation.residual).max())
 
     # derivatives and margins ---------------------------------------------------------------------------------
@@ -307,15 +316,17 @@ def mirrored_mode(orbit: PeriodicOrbit, leg: Leg, x: Array, duration: float) -> 
     return letters + mode[len(system.entries) :]
 
 
-def faults_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
+def violations_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
     """Violations of guards along a solution, leg by leg."""
     speeds = (at.flows.gradient * at.flows.rate).sum(axis=1)
     closes = problem.symmetry is None
-    found = faults_along(problem.system, problem.legs, at.starts, at.durations, speeds, p, closes)
-    return found if found or problem.system.definition.plain else _fault_of_run(problem, at, p)
+    found = violations_of_legs(
+        problem.system, problem.legs, at.starts, at.durations, speeds, p, closes
+    )
+    return found if found or problem.system.definition.plain else _violation_of_run(problem, at, p)
 
 
-def _fault_of_run(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
+def _violation_of_run(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
     """Whether the motion, with all conditions of events, has the events of the legs."""
     system, legs = problem.system, problem.legs
     if problem.symmetry is not None or any(leg.timed or leg.repeats for leg in legs):
@@ -363,4 +374,4 @@ def named(system: FilippovSystem, values: Array) -> dict[str, float]:
     return dict(zip(system.parameter_names, np.asarray(values).tolist(), strict=True))
 
 
-__all__ = ["Margin", "OrbitDerivative", "OrbitLeg", "PeriodicOrbit", "faults_of", "named"]
+__all__ = ["Margin", "OrbitDerivative", "OrbitLeg", "PeriodicOrbit", "named", "violations_of"]

@@ -1,7 +1,7 @@
-"""Phase response of a periodic orbit: how much a kick of the state shifts its phase.
+"""Phase response of a periodic orbit: the shift of phase by a kick of the state.
 
-The phase of a state near a stable orbit is that of the point of the orbit with which it meets in the end,
-in the unit of time. Its gradient Z along the orbit solves
+The asymptotic phase of a state near a stable orbit is that of the point of the orbit to which it converges, in
+the unit of time. Its gradient Z along the orbit solves
 
     Z' = -Df^T Z  on legs,    Z- = S^T Z+  at events,    Z . f = 1,
 
@@ -20,16 +20,17 @@ from functools import cached_property
 import numpy as np
 
 from ...model import Array, DegenerateError, OptionError, PointError
+from ...tables import Table, Tabular
 from ..runs.legs import integrate_leg
 from ..runs.saltation import saltations
 from ..runs.saltation_matrix import saltation_matrix
 from .multipliers import events_of, monodromy
 from .orbit import PeriodicOrbit
 
-#: Singular values of the equations of Z below this part of the largest: there is more than one Z.
+#: Relative singular value of the equations of Z below which Z is not unique.
 _FAMILY = 1e-8
 
-#: A leg in parts ends where the whole leg ends, to this part of the size of the states.
+#: Largest distance of the ends of a divided and of the whole leg, relative to the size of the states.
 _SAME_END = 1e-8
 
 #: Parts of each leg at the least: derivatives over a part stay moderate.
@@ -37,7 +38,7 @@ _PARTS = 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PhaseResponse:
+class PhaseResponse(Tabular):
     """Phase response of a periodic orbit.
 
     Attributes
@@ -63,6 +64,10 @@ class PhaseResponse:
     z: Array
     leg: Array
     error: float
+
+    def _tables(self) -> dict[str, Table]:
+        columns = {"x": self.x, "z": self.z, "leg": self.leg}
+        return {"points": Table({"t": self.t}, columns, {"state": self.orbit.system.state_names})}
 
     def __call__(self, t: float) -> Array:
         """Phase response (n,) at a time, of any size; at an event that after it.

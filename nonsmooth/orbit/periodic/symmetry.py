@@ -121,7 +121,7 @@ def halves(problem: BoundaryProblem, u: Array, p: Array) -> Iterator[tuple[Bound
         yield half, half.pack(starts[:k], spans)
 
 
-#: The other half may miss the mirror image of the first by this part of the orbit, and of what it magnifies.
+#: Largest distance of the other half from the image of the first, relative to the orbit and its magnification.
 _MISS = 1e-8
 
 
@@ -151,7 +151,7 @@ def symmetry_matrix(system: FilippovSystem, symmetry: ArrayLike | str | None) ->
 
 
 def require_symmetric(orbit: PeriodicOrbit) -> None:
-    """Refuse an orbit whose other half is not the mirror image of the half that was solved for."""
+    """Refuse an orbit whose other half is not the image under the symmetry of the half that was solved for."""
     if not orbit.symmetric:
         return
     surface = _surface_missed(orbit)
@@ -207,7 +207,7 @@ def _surface_missed(orbit: PeriodicOrbit) -> str:
 
 
 def _beside(orbit: PeriodicOrbit, i: int) -> tuple[Array, Array]:
-    """A point beside the start of a leg, and its mirror image."""
+    """A point beside the start of a leg, and its image under the symmetry."""
     problem = orbit.problem
     sizes = problem.scales(orbit.unknowns)[: problem.dimension]
     x = orbit.evaluation.starts[i] + 0.1 * sizes * np.cos(1.0 + np.arange(sizes.size))
@@ -217,7 +217,7 @@ def _beside(orbit: PeriodicOrbit, i: int) -> tuple[Array, Array]:
 
 
 def _fields_agree(orbit: PeriodicOrbit) -> bool:
-    """Whether the fields of all modes are those of their mirror images, beside the orbit."""
+    """Whether the fields of all modes are symmetric beside the orbit."""
     # That suffices without jumps and is far quicker than integration, which decides otherwise.
     problem, p, system = orbit.problem, orbit.parameter_vector, orbit.system
     legs, wrap, n = problem.legs, problem.wrap, system.dimension
@@ -242,7 +242,7 @@ def _fields_agree(orbit: PeriodicOrbit) -> bool:
 
 
 def _miss_of_legs(orbit: PeriodicOrbit) -> tuple[float, str]:
-    """By how much the mirrored legs, integrated in their modes, end beside the mirror images of the ends."""
+    """Distances of the ends of the mapped legs, integrated in their modes, from the images of the ends."""
     problem, at, p = orbit.problem, orbit.evaluation, orbit.parameter_vector
     system, n, count = orbit.system, orbit.system.dimension, len(problem.legs)
     units = problem.scales(orbit.unknowns)[:n]
@@ -260,7 +260,7 @@ def _miss_of_legs(orbit: PeriodicOrbit) -> tuple[float, str]:
 
 
 def _miss_of_run(orbit: PeriodicOrbit) -> float:
-    """By how much a run over half the period, from the middle of the first leg, misses its mirror image."""
+    """Distance of the end of a run over half the period, from the middle of the first leg, from the image of its start."""
     system, problem, n = orbit.system, orbit.problem, orbit.system.dimension
     leg, half = orbit.legs[0], 0.5 * orbit.period
     begin = leg.t + 0.5 * leg.duration

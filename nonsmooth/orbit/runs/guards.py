@@ -32,7 +32,7 @@ _CONSTANT = 1e-13
 #: Newton steps to an extremum between two steps of the driver.
 _REFINED = 4
 
-#: The same beside sets, where the direction of h turns ever faster.
+#: Newton steps beside sets, where the direction of h turns ever faster.
 _NEAR_SETS = 1e-4
 
 #: Guards that are functions of conditions of events.
@@ -57,7 +57,7 @@ class Watch:
     """Extrema of the guards inside a leg, and violations."""
 
     approaches: list[Approach]
-    faults: list[str]
+    violations: list[str]
 
 
 def watch(system: FilippovSystem, leg: Leg, x: Array, duration: float, p: Array) -> Watch:
@@ -67,8 +67,8 @@ def watch(system: FilippovSystem, leg: Leg, x: Array, duration: float, p: Array)
     return Watch(_approaches(field, rows, p), _violations_along(field, rows, p))
 
 
-def is_met(field: Guarded, row: Array, p: Array) -> bool:
-    """Whether something happens where the guard of a row of ``LegsWatch`` passes zero."""
+def is_active(field: Guarded, row: Array, p: Array) -> bool:
+    """Whether an event is due where the guard of a row of ``LegsWatch`` passes zero."""
     guard, system = field.motion.guards[int(row[0])], field.motion.system
     if guard.kind not in CONDITIONS:
         return True
@@ -80,7 +80,7 @@ def _approaches(field: Guarded, rows: Array, p: Array) -> list[Approach]:
     guards, found = field.motion.guards, list[Approach]()
     for row in rows:
         guard, (t, value, bend) = guards[int(row[0])], row[1:4].tolist()
-        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_met(field, row, p):
+        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_active(field, row, p):
             slope = field.gradients.copied(row[4:], p)[0][int(row[0])]
             size = math.sqrt(float(slope @ slope))
             if size > 0.0:
@@ -210,7 +210,7 @@ def _violations(
     return [f"{described(system, guard)} is violated {t:.6g} after its start (by {abs(v):.3g})"]
 
 
-def change_fault(
+def change_violation(
     system: FilippovSystem, leg: Leg, following: str, end: Array, after: Array, p: Array
 ) -> str:
     """Why a mode cannot follow a leg after its event; empty if it can."""
@@ -219,19 +219,19 @@ def change_fault(
     own, rate = leg.at_event(system, end, p), rate_at(system, leg, end, p)
     field = guarded_field(system, following)
     begin = np.vstack(first_terms(field, states_at(system, following, after, p), p))
-    return _change_fault(
+    return _change_violation(
         leg, guarded_field(system, leg.mode), float(own.gradient @ rate), field, begin, p
     )
 
 
-def begin_fault(system: FilippovSystem, leg: Leg, end: Array, p: Array) -> str:
+def begin_violation(system: FilippovSystem, leg: Leg, end: Array, p: Array) -> str:
     """A guard of a leg's mode that is negative where the leg ends; empty if there is none."""
     field = guarded_field(system, leg.mode)
     values = np.vstack(first_terms(field, states_at(system, leg.mode, end, p), p, 0))
     return _negative(field, values, p)
 
 
-def _change_fault(
+def _change_violation(
     leg: Leg, own: Guarded, speed: float, field: Guarded, begin: Array, p: Array
 ) -> str:
     """The same from the rate of the event's function, and from the first coefficients of the next leg."""
@@ -239,19 +239,19 @@ def _change_fault(
     found = (g for g in own.motion.guards if g.ends(leg.kind, leg.element, leg.side))
     guard = next(found, None) if not leg.repeats else None
     if guard is None:
-        return _following_fault(field, begin, p)
+        return _following_violation(field, begin, p)
     if guard.kind in ("surface", "exit", "impact", "release") and speed > 0.0:
         condition, name = described(system, guard), leg.name(system)
-        return f"at its end {condition} starts to hold instead of failing ({name})"
+        return f"at its end {condition} becomes true instead of false ({name})"
     if guard.kind in ("stop", "reset") and guard.side * speed < 0.0:
         return f"{guard.kind} {leg.name(system)!r} reaches zero from the wrong side at its end"
-    return _following_fault(field, begin, p)
+    return _following_violation(field, begin, p)
 
 
-def _following_fault(field: Guarded, begin: Array, p: Array) -> str:
+def _following_violation(field: Guarded, begin: Array, p: Array) -> str:
     """A guard of the next mode that is negative, or zero and falling, where the mode begins."""
-    fault = _negative(field, begin, p)
-    return fault and f"where mode {field.motion.mode!r} begins after it, {fault}"
+    violation = _negative(field, begin, p)
+    return violation and f"where mode {field.motion.mode!r} begins after it, {violation}"
 
 
 def _negative(field: Guarded, begin: Array, p: Array) -> str:
@@ -275,7 +275,7 @@ def _negative(field: Guarded, begin: Array, p: Array) -> str:
     return ""
 
 
-def faults_along(
+def violations_of_legs(
     system: FilippovSystem,
     legs: Sequence[Leg],
     starts: Array,
@@ -299,9 +299,9 @@ def faults_along(
         following = (i + 1) % count
         if not leg.timed and (closes or following):
             field, begin = fields[following], begins[following]
-            fault = _change_fault(leg, fields[i], float(speeds[i]), field, begin, p)
-            found += [fault] if fault else []
-        result += [f"leg {i + 1} {leg_name(system, leg)}: {fault}" for fault in found]
+            violation = _change_violation(leg, fields[i], float(speeds[i]), field, begin, p)
+            found += [violation] if violation else []
+        result += [f"leg {i + 1} {leg_name(system, leg)}: {violation}" for violation in found]
     return result
 
 

@@ -33,7 +33,7 @@ from ...model.derivatives.event_maps import event_map, function_map
 from ...model.derivatives.variational import guarded_field, states_at
 from ...model.laws.motion import motion
 from ...model.laws.switches import event_guards
-from .guards import change_fault
+from .guards import change_violation
 from .legs import Leg, LegFlow, integrate_leg, rate_at
 from .saltation import saltation
 
@@ -233,7 +233,7 @@ class FixedItinerary:
             t, x = float(run.t[-1]), run.x[-1]
             if not fault and leg is not None:
                 at = system.extended_point(x, t)
-                fault = change_fault(system, leg, self.modes[k + 1], at, at, p)
+                fault = change_violation(system, leg, self.modes[k + 1], at, at, p)
                 fault = f"{what}: {fault}" if fault else ""
             legs.append(leg or Leg(mode))
             starts.append(begin)

@@ -286,7 +286,7 @@ class LegIntegrator:
             part, after = limit_flow(self.system, leg, x, duration, p, self.chosen)
         before = flows.before[following, : len(x)]
         if np.abs(before - after).max() <= _SAME * np.abs(after).max():
-            before[:] = after  # equal up to residuals: what is lost is so exactly
+            before[:] = after  # equal up to residuals: lost directions are so exactly
         flows.end[i], flows.rate[i] = part.end, part.rate
         flows.by_start[i], flows.by_parameters[i] = part.by_start, part.by_parameters
         self._fill(flows, i, leg.at_event(self.system, part.end, p))
@@ -303,7 +303,7 @@ class LegIntegrator:
 
     @contextmanager
     def _naming(self, i: int) -> Iterator[None]:
-        """Say in errors of a leg which it is."""
+        """Name the leg in its errors."""
         try:
             yield
         except ConvergenceError as error:

@@ -41,10 +41,10 @@ from .cells import cells_of
 #: Errors of located events, relative to the size of the states.
 _LOCATED = 1e-7
 
-#: Switching functions of a set that was held are zero at this part of what they are made of.
+#: Switching functions of a set on which the mode was are zero to this part of their terms.
 _ON_SET = 1e-14
 
-#: Between impacts at speeds that are lost in rounding is less than this part of the time between those before.
+#: Ratio of consecutive times between impacts below which their speeds are lost in rounding.
 _LOST = 1e-6
 
 #: Impulses and bounds that are negative by this part of the error of a location are zero.
@@ -130,7 +130,7 @@ class Leg:
         return system.laws[self.element] in ("surface", "table") and not any(system.nonlinear)
 
     def map(self, system: FilippovSystem) -> EventMap | None:
-        """The event's function and what it does to the state; None where a time ends the leg."""
+        """The event's function and its map of the state; None where a time ends the leg."""
         if self.timed:
             return None
         return event_map(
@@ -226,6 +226,14 @@ class LegFlow:
     #: The legs of which it is one, with its number, along which rows are pulled back if they were recorded.
     carried: tuple[CarriedLegs, int] | None = None
 
+    @property
+    def parts(self) -> tuple[Array, Array]:
+        """Times since the start (k,) at which derivatives begin anew, and those before (k, N, N)."""
+        if self.carried is None:
+            return NONE, np.zeros((0, 0, 0))
+        found, leg = self.carried
+        return found.parts[leg]
+
 
 def integrate_leg(
     system: FilippovSystem,
@@ -270,14 +278,13 @@ def carry_leg(
     p: Array,
     chosen: tuple[int, ...] = (),
     times: Array = NONE,
-    back: bool = False,
 ) -> LegFlow:
-    """The same of a leg of a run, by the states alone; at times since its start, or recorded to be taken ``back``."""
-    if not (system.sets or back or len(times)):  # one leg costs less by its own program
+    """The same of a leg of a run, by the states alone; at times since its start."""
+    if not (system.sets or len(times)):  # one leg costs less by its own program
         none = np.zeros((0, len(x), len(x) + len(chosen)))
         return replace(integrate_leg(system, leg, x, duration, p, chosen), at_samples=none)
     arcs = [leg.arc(system, x, duration)]
-    carried = carry_legs(system, arcs, p, chosen, times, back=back)
+    carried = carry_legs(system, arcs, p, chosen, times)
     require_done(system, arcs, carried)
     return flows_of(carried)[0]
 
@@ -410,7 +417,7 @@ def _extended(system: FilippovSystem, x: Array, t: float) -> Array:
 
 
 def held_before(system: FilippovSystem, leg: Leg) -> str:
-    """The mode of a leg, where friction in space holds if it did so at the impact that ends the leg."""
+    """The mode of a leg, in which friction in space sticks if it did so at the impact that ends the leg."""
     if leg.kind != "impact":
         return leg.mode
     contact = leg.element - len(system.entries)
@@ -574,7 +581,7 @@ def _require_one_surface(system: FilippovSystem, event: Event, p: Array) -> None
     changed = [k for k, (a, b) in enumerate(letters) if a != b and a in "+-*"]
     if event.kind == "crossing" and len(system.entries[event.element]) > 1:
         raise DegenerateError(
-            f"run: expected hits of sets and ends of sliding only, received {event.kind!r} at "
+            f"run: expected entries to sets and ends of sliding only, received {event.kind!r} at "
             f"t = {event.t:.10g}. A set that is crossed exactly is a corner: perturb the start."
         )
     others = [k for k in changed if k != event.element]

@@ -23,7 +23,7 @@ _TOLERANCE = 1e-12
 #: A limit is searched for over so many times the duration of its leg, and over more if it is not found.
 _LONGER = (1.3, 4.0)
 
-#: Times between events that accumulate do not become so many times as long as they have been.
+#: Largest ratio of consecutive times between events that accumulate.
 _GROWS = 10.0
 
 

@@ -68,7 +68,7 @@ class Limit:
         return time, np.tensordot(self.weights, dx, 1) + np.outer(self.by_ratio[1:], ratio)
 
     def pull(self, time: float, row: Array) -> tuple[Array, Array]:
-        """The transpose: what it gives by the times (m + 1,) and states (m + 1, N) of the events."""
+        """The transpose: derivatives by the times (m + 1,) and states (m + 1, N) of the events."""
         ratio = self.by_ratio[0] * time + float(self.by_ratio[1:] @ row)
         return self.weights * time + self.by_times * ratio, np.outer(self.weights, row)
 
@@ -83,7 +83,7 @@ class Nearest(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class AtLimit:
-    """What happens to derivatives at a limit of events."""
+    """Map of derivatives through a limit of events."""
 
     limit: Limit
     #: (m + 1, N): Fields after its events.
@@ -166,7 +166,7 @@ def limit_of(parts: Sequence[Stretch], tail: range, block: int, what: str) -> Li
         least, limit = math.inf, None
         for m in range(
             best.m, min(best.m + _MORE, len(best.rows) - 1) + 1
-        ):  # the ratio needs more than the limit
+        ):  # the ratio needs more events than the limit
             points = best.rows[-m - 1 :]
             own = _extrapolated(q[points], tuple(int(tail[k]) for k in points), best.error)
             miss = (

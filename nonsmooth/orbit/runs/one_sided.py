@@ -44,7 +44,9 @@ def one_sided(
     first that are ``needed``."""
     x, p = _direction(run, side)
     found, word, reason = list[Array](), None, ""
-    for distance in reversed(_DISTANCES):  # as far as neighbours have the events of the nearest
+    for distance in reversed(
+        _DISTANCES
+    ):  # as far as neighbours have the same events as the nearest
         try:
             near = _neighbour(run, distance * x, {k: distance * v for k, v in p.items()})
             own = values(near)

@@ -16,7 +16,7 @@ from ...model import (
     require_system,
 )
 from ...model.derivatives.event_maps import AtEvent, surface_map
-from .guards import begin_fault, change_fault
+from .guards import begin_violation, change_violation
 from .itinerary import leg_between
 from .legs import Leg, rate_at
 from .saltation import saltation
@@ -100,14 +100,14 @@ def saltation_matrix(
     _require_near(system, leg, at, x, p)
     rates = rate_at(system, leg, x, p), rate_at(system, Leg(after), at.after, p)
     matrix = saltation(at, *rates, f"{name!r} at {x[:n].tolist()}").matrix
-    fault = ""
+    violation = ""
     if leg.kind != "reset":  # a reset may lead from any mode to any other
-        fault = begin_fault(system, leg, x, p)
-        fault = fault or change_fault(system, leg, after, x, at.after, p)
-    if fault:
+        violation = begin_violation(system, leg, x, p)
+        violation = violation or change_violation(system, leg, after, x, at.after, p)
+    if violation:
         raise PointError(
             f"point {x[:n].tolist()}: {name!r} does not lead from mode {before!r} to {after!r} there, "
-            f"as {fault}. Change the point or the modes."
+            f"as {violation}. Change the point or the modes."
         )
     return np.asarray(matrix[:n, :n])
 

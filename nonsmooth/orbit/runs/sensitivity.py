@@ -23,6 +23,7 @@ from ...model import (
     require_system,
 )
 from ...model.derivatives.given_functions import cost_over
+from ...tables import Tabular
 from .legs import parameters_of
 from .one_sided import Side, one_sided
 from .variation import (
@@ -128,7 +129,7 @@ def _beside(run: Trajectory, side: Side, names: tuple[str, ...]) -> Sensitivity:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Gradient:
+class Gradient(Tabular):
     """Gradient of a cost at the end of a run.
 
     Attributes
@@ -230,7 +231,7 @@ def gradient(
 
 
 def _end(parts: Sequence[Passage]) -> Array:
-    """The end of a run, integrated as its derivatives are; behind a jump as the run has it."""
+    """The end of a run, integrated as its derivatives are; after a jump that of the run."""
     last = parts[-1].stretch
     if parts[-1].limit is not None:
         return parts[-1].limit.limit.value[1:]
@@ -264,7 +265,7 @@ def vjp(
     run : Trajectory
         The run, from :func:`nonsmooth.simulate`.
     cotangent : array_like (n,), optional
-        Derivatives of something by the final state.
+        Derivatives of a quantity by the final state.
     samples : array_like (K, n), optional
         Its derivatives by the states ``run.sample_x`` at the times ``t_eval``, which are fixed. A sample at the time of
         an event is taken on the side of ``sample_x``: after the event where the state does not jump.
@@ -376,7 +377,7 @@ def _pulled_through(
 ) -> tuple[Array, Array]:
     system, some, last, rows = run.system, list(chosen), parts[-1], np.ascontiguousarray(rows)
     every = np.zeros(len(last.stretch.p))  # by all parameters
-    own = every if last.back else np.zeros(len(some))  # what legs give
+    own = every if last.back else np.zeros(len(some))  # by the legs
     pulling = last.flow.carried[0].pulling(every, rows) if last.flow.carried else nullcontext()
     row = row + rows[last.samples.stop :].sum(axis=0)
     added = dict[int, tuple[Array, float]]()  # rows after events that accumulate

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...flow.names import described
 from ...flow.trajectory import Trajectory
-from ...flow.variation import NONE, carry_legs, require_done
+from ...flow.variation import NONE, ROUNDING, Precision, carry_legs, require_done
 from ...model import (
     Array,
     ConvergenceError,
@@ -30,6 +30,7 @@ from ...model import (
 )
 from ...model.derivatives.event_maps import AtEvent
 from ...model.laws.motion import rests_on
+from ...tables import Table, Tabular
 from .cells import cells_of
 from .guards import watch
 from .legs import (
@@ -279,8 +280,8 @@ class Passage:
         return dx - np.multiply.outer(s.jump, t_x), dp - np.multiply.outer(s.jump, t_p)
 
     def backward(self, row: Array, rows: Array, by_parameters: Array) -> Array:
-        """Pull a row (N,) at the end of the flow, and rows (K, N) at the samples of the run, back to the start, and add to
-        what they give by the parameters that were chosen, or by all where the legs were recorded."""
+        """Pull a row (N,) at the end of the flow, and rows (K, N) at the samples of the run, back to the start, and add
+        their derivatives by the chosen parameters, or by all where the legs were recorded."""
         flow, n = self.flow, len(row)
         if self.back and flow.carried is not None:
             carried, leg = flow.carried
@@ -352,10 +353,11 @@ def passages_over(
     since: Array = NONE,
     cuts: Sequence[int] = (),
     back: bool = False,
+    precision: Precision = ROUNDING,
 ) -> list[Passage]:
     """Legs of a run with derivatives, also at times ``since`` their starts that are cut by legs; or recorded."""
     cuts = cuts or [0] * (len(parts) + 1)
-    flows = flows_over(run, parts, chosen, since, cuts, back)
+    flows = flows_over(run, parts, chosen, since, cuts, back, precision)
     limits, repeating = _limits(parts, flows)
     events = _saltations(run, parts, flows, repeating)
     every = zip(parts, flows, events, pairwise(cuts), strict=True)
@@ -399,13 +401,14 @@ def flows_over(
     since: Array = NONE,
     cuts: Sequence[int] = (),
     back: bool = False,
+    precision: Precision = ROUNDING,
 ) -> list[LegFlow]:
     """Flows of legs, with samples at times ``since`` their starts that are cut by legs."""
     cuts = cuts or [0] * (len(parts) + 1)
     system = parts[0].system
     arcs = [part.leg.arc(system, part.start, part.duration) for part in parts]
     p = np.array([part.p for part in parts]) if system is not run.system else parts[0].p
-    found = carry_legs(system, arcs, p, chosen, since, cuts, back)
+    found = carry_legs(system, arcs, p, chosen, since, cuts, back, precision)
     if found.failed < 0:
         return flows_of(found)
     if back:
@@ -570,7 +573,7 @@ def _rate_after(part: Stretch, leg: Leg, at: AtEvent, p: Array) -> Array | None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sensitivity:
+class Sensitivity(Tabular):
     """Derivatives of the end of a run and of the times of its events.
 
     Attributes
@@ -605,6 +608,21 @@ class Sensitivity:
     run: Trajectory
     dsample_dx0: Array | None = None
     dsample_dp: Array | None = None
+
+    def _tables(self) -> dict[str, Table]:
+        states = self.run.system.state_names
+        labels = {"start": states, "parameter": self.names}
+        by = lambda name, x0, p: {f"{name}_dx0": ("start", x0), f"{name}_dp": ("parameter", p)}
+        times = {"t": self.event_times, **by("dt", self.dt_dx0, self.dt_dp)}
+        tables = {
+            "end": Table({"state": states}, by("dx", self.dx_dx0, self.dx_dp), labels),
+            "events": Table({"event": len(self.event_times)}, times, labels),
+        }
+        if self.dsample_dx0 is not None:
+            rows = {"sample": ("t", self.run.sample_t), "state": states}
+            columns = by("dx", self.dsample_dx0, self.dsample_dp)
+            tables["samples"] = Table(rows, columns, labels)
+        return tables
 
     @cached_property
     def clearance(self) -> float:

@@ -14,7 +14,7 @@ class Engine {
     this.width = system.m + system.c;
     this.parameters = system.parameters.length + system.cells + 1; // with room for cells of tables
     this.row = system.n + 2 * this.width + system.atoms; // numbers of a state that is sampled
-    this.image = this.placed(system);
+    this.image = this.loadImage(system);
     for (const name of ["Options", "Batch", "Output"]) {
       this[name] = c.calloc(1, this.machine.layout[name].size);
     }
@@ -38,11 +38,11 @@ class Engine {
   }
 
   /** Copy the image of a system into the memory, with the addresses that it has there. */
-  placed({ image, places }) {
+  loadImage({ image, addresses }) {
     const at = this.c.malloc(image.length + 8);
     new Uint8Array(this.c.memory.buffer, at, image.length).set(image);
     const words = new DataView(this.c.memory.buffer, at);
-    for (const place of places) words.setUint32(place, words.getUint32(place, true) + at, true);
+    for (const offset of addresses) words.setUint32(offset, words.getUint32(offset, true) + at, true);
     return at;
   }
 
@@ -263,12 +263,12 @@ class Engine {
     const base = this.c.malloc(sizes.reduce((sum, size) => sum + size + 16, 16));
     if (!base) throw new Error("no memory for so many runs");
     let next = base;
-    const places = sizes.map((size) => {
+    const addresses = sizes.map((size) => {
       const at = (next + 7) & ~7;
       next = at + size + 8;
       return at;
     });
-    return { places, free: () => this.c.free(base) };
+    return { addresses, free: () => this.c.free(base) };
   }
 
   /**
@@ -284,9 +284,9 @@ class Engine {
     this.refreshIfLarge();
     const kindCount = this.machine.kinds.length;
     const words = [n, stride, d, 1, 1, 1, kindCount, room, room * d].map((k) => 8 * k * count);
-    const { places, free } = this.reserve([...words, 16, 8]);
+    const { addresses, free } = this.reserve([...words, 16, 8]);
     const [starts, values, ends, t, status, itinerary, kinds, sampleT, sampleX, totals, next] =
-      places;
+      addresses;
     this.f64(starts, x0.length).set(x0);
     const table = this.f64(values, stride * count).fill(0);
     for (let k = 0; k < count; k++) table.set(p.subarray(k * own, (k + 1) * own), k * stride);
@@ -330,8 +330,8 @@ class Engine {
     const count = points.length / n;
     const { row, parameters } = this;
     const sizes = [points.length, parameters, this.width, row * count].map((k) => 8 * k);
-    const { places, free } = this.reserve(sizes);
-    const [at, values, held, out] = places;
+    const { addresses, free } = this.reserve(sizes);
+    const [at, values, held, out] = addresses;
     this.f64(at, points.length).set(points);
     this.f64(values, parameters).fill(0).set(p);
     this.f64(held, this.width).fill(0).set(multipliers);

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+from ...model.expressions.graph import Node
 from .flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx
 from .instructions import ExpressionGraph
 from .intervals import COMMON, Numbers, exact
@@ -26,6 +27,8 @@ class Algebra:
         self.atoms = [k for k in chosen if not self._is_polynomial(k)]
         # A quotient is a product with the inverse of its denominator, which is an atom.
         below = {k: graph.nodes[k].args[1] for k in chosen if graph.nodes[k].op == "div"}
+        divisors = {k: graph.nodes[b] for k, b in below.items() if graph.nodes[b].op == "const"}
+        below = {k: b for k, b in below.items() if k not in divisors}
         self._inverse = {k: graph.node("inv", b) for k, b in below.items()}
         self.atoms += sorted(set(self._inverse.values()) - set(self.atoms))
         names = [f"a{k}" for k in self.atoms] or ["a"]
@@ -35,10 +38,12 @@ class Algebra:
             if k not in self._value:
                 node = graph.nodes[k]
                 args = [self._value[a] for a in node.args]
-                if node.op == "div":
+                if k in divisors:
+                    self._value[k] = args[0] / self._number(divisors[k], numbers)
+                elif node.op == "div":
                     self._value[k] = args[0] * self._value[self._inverse[k]]
                 elif node.op == "const":
-                    self._value[k] = self.constant(exact(node.payload, numbers))
+                    self._value[k] = self.ring.constant(self._number(node, numbers))
                 elif node.op in COMMON:
                     self._value[k] = COMMON[node.op](*args)
                 else:
@@ -47,9 +52,9 @@ class Algebra:
     def _is_polynomial(self, k: int) -> bool:
         return self.graph.nodes[k].op in _POLYNOMIAL
 
-    def constant(self, value: Fraction) -> fmpq_mpoly:
-        """A constant polynomial."""
-        return self.ring.constant(fmpq(value.numerator, value.denominator))
+    def _number(self, node: Node, numbers: Numbers) -> fmpq:
+        value = exact(node.payload, numbers)
+        return fmpq(value.numerator, value.denominator)
 
     def __getitem__(self, k: int) -> fmpq_mpoly:
         """The polynomial of a node."""

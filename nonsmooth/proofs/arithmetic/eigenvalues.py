@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from .flint import arb, arb_mat
@@ -71,9 +72,12 @@ def roots(half: arb, disc: arb, product: arb, side: int) -> list[tuple[arb, arb]
 
 def _isolated(matrix: arb_mat) -> list[tuple[arb, arb]] | None:
     """Isolated eigenvalues of a real matrix as (real part, imaginary part)."""
-    try:
-        values: list[Any] = matrix.eig()
-    except (ValueError, ArithmeticError):
+    values: list[Any] = []
+    for several in ({}, {"multiple": True}):  # enclosures that are apart have one eigenvalue each
+        with suppress(ValueError, ArithmeticError):
+            values = matrix.eig(**several)
+            break
+    if not values or any(v.overlaps(w) for i, v in enumerate(values) for w in values[:i]):
         return None
     result = []
     for v in values:

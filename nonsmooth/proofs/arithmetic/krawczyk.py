@@ -79,12 +79,15 @@ def polish(equations: Equations, start: Sequence[arb], steps: int = 40) -> list[
 
 
 def prove_zero(
-    equations: Equations, start: Sequence[arb], scales: Sequence[float] | None = None
+    equations: Equations,
+    start: Sequence[arb],
+    scales: Sequence[float] | None = None,
+    known: Zero | None = None,
 ) -> Zero | None:
-    """Prove one zero near the start, in as large a box as a few trials find."""
+    """Prove one zero near the start, in as large a box as a few trials find, or narrow a known one."""
     u = polish(equations, start)
-    if u is None:
-        return None
+    if u is None or known is not None:
+        return None if u is None or known is None else _narrowed(equations, u, known)
     sizes = list(scales) if scales else [max(1.0, abs(float(v))) for v in u]
     found = None
     with precision(64):

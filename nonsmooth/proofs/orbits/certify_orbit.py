@@ -144,17 +144,12 @@ def _run(
     moving = [r for r in initial.ranges if r[0] < r[1]]
     x = enclosed([*initial.start, *moving])
     try:
-        order = max(12, int(ctx.prec * 0.3))
         on = modes.surfaces_at([*initial.start, *moving], initial.ranges)
-        flow = OrbitEnclosure(modes, x, enclosed(initial.ranges), order, on)
+        flow = OrbitEnclosure(modes, x, enclosed(initial.ranges), on)
         flow.smallest = min(1e-3, float(initial.duration) / (50 * max_steps))
         flow.end = end
-        while not status:
-            if flow.steps >= max_steps:
-                raise DigitsError(f"more than {max_steps} steps")
-            event = flow.step_through()
-            if event is not None and event.kind in ("stop", "end"):
-                status = event.function.name
+        *_, last = flow.run(max_steps)
+        status = last.function.name
     except UnprovenError as error:
         why, digits = str(error), not isinstance(error, DigitsError)
     except KeyboardInterrupt:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from ..arithmetic.flint import arb
-from ..arithmetic.intervals import sign
-from ..proof import UnprovenError
+from ..arithmetic.intervals import precision, sign
+from ..proof import DigitsError, UnprovenError
 from .modes import EventFunction, Modes
 from .validated_flow import ValidatedFlow
 
@@ -32,13 +32,23 @@ class OrbitEnclosure(ValidatedFlow):
         modes: Modes,
         x: Sequence[arb],
         p: Sequence[arb],
-        order: int,
         on: Sequence[int] = (),
     ):
-        super().__init__(modes, x, p, order)
+        super().__init__(modes, x, p)
         self.events: list[EnclosedEvent] = []
         self._enter(list(x), on, "start")
         self._initial_signs()
+
+    def run(self, most: int) -> Iterator[EnclosedEvent]:
+        """Integrate through the events, with so many steps at most, to a stop or the end."""
+        event = None
+        while event is None or event.kind not in ("stop", "end"):
+            if self.steps >= most:
+                raise DigitsError(f"more than {most} steps")
+            with precision(self.bits):
+                event = self.step_through()
+            if event is not None:
+                yield event
 
     def step_through(self) -> EnclosedEvent | None:
         """Take one step, and change the mode at an event; return the event, or the end, or None."""

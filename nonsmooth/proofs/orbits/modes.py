@@ -14,7 +14,7 @@ from ..arithmetic.instructions import ExpressionGraph, Program
 from ..arithmetic.intervals import Enclosures, Numbers, Rationals, hull, sign
 from ..arithmetic.series import along, coefficients
 from ..proof import UnprovenError
-from ..surface_functions import SurfaceFunctions, SystemGraph
+from ..surface_functions import SurfaceFunctions, SystemGraph, enclosed
 
 
 @dataclass(frozen=True)
@@ -284,6 +284,11 @@ class Modes:
         node = left if direction > 0 else self.graph.apply("neg", [left])
         self.ends.append(EventFunction("end", name, node, index=index))
         return self.ends[-1]
+
+    def constant(self, node: int, ranges: Sequence[Range]) -> arb:
+        """The value of a node that depends on parameters alone."""
+        x = [arb(0)] * (self.clock + 1) + enclosed([r for r in ranges if r[0] < r[1]])
+        return self._values(("constant", node), lambda: [[node]], x, enclosed(ranges))[0][0]
 
     def across(self, surface: int, mode: str, x: Sequence[arb], p: Sequence[arb]) -> str:
         """The side to which a surface is crossed while another slides."""

@@ -14,18 +14,21 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from ...model import OptionError, require_plain
+from ...flow.trajectory import Trajectory
+from ...model import Array, OptionError, require_plain
 from ...orbit import PeriodicOrbit
+from ...orbit.periodic.orbit_run import OrbitLeg
 from ..arithmetic.decimals import given
 from ..arithmetic.eigenvalues import eigenvalues, numbered
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.equations import Equations, column
 from ..arithmetic.flint import arb, arb_mat, ctx
-from ..arithmetic.intervals import Numbers
+from ..arithmetic.intervals import Numbers, ends
 from ..arithmetic.krawczyk import Zero, identity
 from ..proof import READ, Classification, UnprovenError, intervals, listed, paragraph
 from ..record import interval, motion_of, text, zero_record
 from ..surface_functions import enclosed, parameter_ranges
+from .forcing import forcing_period
 from .itinerary import EnclosedEvent, OrbitEnclosure
 from .modes import EventFunction, Modes
 
@@ -41,7 +44,7 @@ _STEPS = 2000
 
 @dataclass(frozen=True)
 class Section:
-    """A plane x_k = c that a leg crosses, and the part of the orbit from there to the next plane."""
+    """A plane x_k = c or t = c that a leg crosses, and the part of the orbit from there to the next plane."""
 
     mode: str
     position: int
@@ -65,32 +68,49 @@ def sections_of(orbit: PeriodicOrbit) -> list[Section]:
     run, found, n = orbit.trajectory, list[Section](), orbit.system.dimension
     size = np.ptp(run.x, axis=0)
     size[size == 0] = np.inf
-    passed = 0
+    passed = first = 0  # events since the last plane, and those before the first one
     for leg in orbit.legs:
-        passed += 1
         if leg.duration <= 0:
+            passed += bool(leg.event)
             continue
-        for share in _SHARES:
-            t = leg.t + leg.duration * np.linspace(1e-6, share, _SAMPLES)
-            x = run(t)[:, :n]
-            steps = np.diff(x, axis=0) / size
-            same = np.sign(steps) == np.sign(steps[0])
-            count = np.where(same.all(axis=0), len(steps), same.argmin(axis=0))
-            if np.any(count > 4):
-                break
-        at = np.maximum(count * 2 // 3, 1)  # the states are monotone up to there and beyond
-        k = int(np.argmax(np.abs(steps[at - 1, np.arange(n)]) * (count > 4)))
-        around = slice(at[k] - 1, at[k] + 2)
-        unit = 2.0 ** np.floor(np.log2(np.ptp(x[around, k]) / 4))  # a number with few digits
-        value = unit * np.round(x[at[k], k] / unit)
-        direction = 1 if steps[0, k] > 0 else -1
-        before, after = t[around][[0, -1]]
-        state = run(brentq(lambda s, k=k, c=value: run(s)[k] - c, before, after, xtol=1e-15))[:n]
+        if orbit.system.time_dependent:
+            k, direction = n, 1
+            value = _short(leg.t + leg.duration / 2, leg.duration)
+            state = run(value)[:n]
+        else:
+            k, value, direction, state = _plane(run, leg, size, n)
         if found:
             found[-1] = replace(found[-1], events=passed)
-        passed = 0
+        else:
+            first = passed
+        passed = int(bool(leg.event))
         found.append(Section(leg.mode, k, Fraction(value), direction, state.tolist(), 0))
-    return [*found[:-1], replace(found[-1], events=passed + 1)]
+    return [*found[:-1], replace(found[-1], events=passed + first)]
+
+
+def _short(value: float, width: float) -> float:
+    """A number with few digits near another."""
+    unit = 2.0 ** np.floor(np.log2(width / 4))
+    return float(unit * np.round(value / unit))
+
+
+def _plane(run: Trajectory, leg: OrbitLeg, size: Array, n: int) -> tuple[int, float, int, Array]:
+    """A state, its value on a plane across a leg, the sign of its rate, and the point of the orbit there."""
+    for share in _SHARES:
+        t = leg.t + leg.duration * np.linspace(1e-6, share, _SAMPLES)
+        x = run(t)[:, :n]
+        steps = np.diff(x, axis=0) / size
+        same = np.sign(steps) == np.sign(steps[0])
+        count = np.where(same.all(axis=0), len(steps), same.argmin(axis=0))
+        if np.any(count > 4):
+            break
+    at = np.maximum(count * 2 // 3, 1)  # the states are monotone up to there and beyond
+    k = int(np.argmax(np.abs(steps[at - 1, np.arange(n)]) * (count > 4)))
+    around = slice(at[k] - 1, at[k] + 2)
+    value = _short(x[at[k], k], np.ptp(x[around, k]))
+    before, after = t[around][[0, -1]]
+    state = run(brentq(lambda s: run(s)[k] - value, before, after, xtol=1e-15))[:n]
+    return k, value, 1 if steps[0, k] > 0 else -1, state
 
 
 class Shooting(Equations):
@@ -104,11 +124,10 @@ class Shooting(Equations):
         ranges: Sequence[Any],
     ):
         self.modes, self.sections, self.ends, self.ranges = modes, sections, ends, ranges
-        n = modes.system.dimension
+        n = modes.system.extended_dimension
         self.free = [[i for i in range(n) if i != s.position] for s in sections]
         self.n, self.held = sum(map(len, self.free)), []
-        self.why = ""
-        self._last: tuple[Any, Any] = (None, None)
+        self._known: dict[Any, tuple[arb_mat, arb_mat]] = {}
 
     def holding(self, held: list[list[Any]]) -> Shooting:
         """The same equations, as nothing is held."""
@@ -120,15 +139,15 @@ class Shooting(Equations):
 
     def with_jacobian(self, u: Sequence[arb]) -> tuple[arb_mat, arb_mat]:
         """The equations and their Jacobian; not finite where a piece is undecided."""
-        if self._last[0] is not u:
-            self._last = u, self._evaluated(u)
-        return self._last[1]
+        key = (ctx.prec, *map(ends, u))
+        if key not in self._known:
+            self._known[key] = self._evaluated(u)
+        return self._known[key]
 
     def _evaluated(self, u: Sequence[arb]) -> tuple[arb_mat, arb_mat]:
         try:
-            pieces, self.why = self.pieces(u), ""
-        except UnprovenError as error:
-            self.why = str(error)
+            pieces = self.pieces(u)
+        except UnprovenError:
             unknown = arb.nan()
             return column([unknown] * self.n), arb_mat([[unknown] * self.n] * self.n)
         m = len(self.free[0])
@@ -155,18 +174,15 @@ class Shooting(Equations):
         for k, v in zip(self.free[i], u, strict=True):
             x[k] = v
         x += enclosed([r for r in self.ranges if r[0] < r[1]])
-        flow = OrbitEnclosure(self.modes, x, enclosed(self.ranges), max(12, int(ctx.prec * 0.3)))
+        flow = OrbitEnclosure(self.modes, x, enclosed(self.ranges))
         if flow.mode != own.mode:
             raise UnprovenError(f"leg {i + 1} is in mode {flow.mode!r}, not {own.mode!r}")
-        event = None
-        while event is None or event.kind != "end":
-            if flow.steps >= _STEPS:
-                raise UnprovenError(f"leg {i + 1} needs more than {_STEPS} steps")
+        flow.end = None if own.events else self.ends[j]
+        for event in flow.run(_STEPS):
             if len(flow.events) == own.events:
                 flow.end = self.ends[j]
-            event = flow.step_through()
-            if len(flow.events) > own.events or (event is not None and event.kind == "stop"):
-                name = event.function.name if event is not None else ""
+            if len(flow.events) > own.events or event.kind == "stop":
+                name = event.function.name
                 raise UnprovenError(f"{name} is reached before the plane of leg {j + 1}")
         if flow.mode != self.sections[j].mode:
             raise UnprovenError(f"leg {j + 1} is in mode {flow.mode!r}")
@@ -198,6 +214,8 @@ class OrbitInstance:
     start: list[float]
     numbers: Numbers
     near: bool  # whether only the given orbit will do
+    multiplicity: int = 0  # periods of the forcing
+    span: int = -1  # node of its period, if there is a forcing
     refusal: str = ""
 
     kind = "periodic orbit"
@@ -216,7 +234,7 @@ class OrbitInstance:
     @property
     def unknowns(self) -> list[tuple[int, int]]:
         """Leg and state of each unknown."""
-        n = range(self.orbit.system.dimension)
+        n = range(self.orbit.system.extended_dimension)
         return [(i, k) for i, s in enumerate(self.sections) for k in n if k != s.position]
 
     @property
@@ -239,9 +257,10 @@ class OrbitInstance:
 
     def failure(self, equations: Any) -> str:
         """Why nothing was proven."""
-        equations.with_jacobian([arb(v) for v in self.start])
-        if equations.why:
-            return f"{equations.why[:1].upper()}{equations.why[1:]}."
+        try:
+            equations.pieces([arb(v) for v in self.start])
+        except UnprovenError as error:
+            return f"{str(error)[:1].upper()}{str(error)[1:]}."
         return (
             "Krawczyk's operator mapped no box into itself: a multiplier is 1, or the parameters "
             "are too wide."
@@ -251,6 +270,10 @@ class OrbitInstance:
         """Period, multipliers and stability."""
         pieces = equations.pieces(zero.point)
         period = sum((p.duration for p in pieces), arb(0))
+        values, label = {"period": period, "multiplier1": arb(1)}, ""
+        if self.multiplicity:
+            values = {"period": self.multiplicity * self.modes.constant(self.span, self.parameters)}
+            period = values["period"]
         away = self._distance(zero, period) if self.near else 0.0
         if away > _NEAR:
             why = f"the periodic orbit nearby is {away:.1e} of its size away from the given one"
@@ -260,7 +283,6 @@ class OrbitInstance:
             product = piece.derivative * product
         found = eigenvalues(product)
         events = [[[e.kind, e.function.name, e.after] for e in p.events] for p in pieces]
-        values, label = {"period": period, "multiplier1": arb(1)}, ""
         claims = {"label": label, "period": interval(period), "events": events}
         if found is None:  # a multiple one, perhaps
             label = "asymptotically stable" if contracts(product) else ""
@@ -269,7 +291,7 @@ class OrbitInstance:
             return Classification(label, self.kind, why, values=values, claims=claims)
         sizes = [re * re + im * im for re, im in found]
         order = sorted(range(len(found)), key=lambda k: -float(sizes[k].mid()))
-        values |= numbered("multiplier", [found[j] for j in order], 2)
+        values |= numbered("multiplier", [found[j] for j in order], len(values))
         outside = sum(bool(s > 1) for s in sizes)
         if all(s < 1 for s in sizes):
             label = "asymptotically stable"
@@ -283,7 +305,8 @@ class OrbitInstance:
 
     def _distance(self, zero: Zero, period: arb) -> float:
         """Of the proven orbit from the given one, relative to its size."""
-        size = np.maximum(np.ptp(self.orbit.trajectory.x, axis=0), 1e-300)
+        x = self.orbit.trajectory.x
+        size = np.maximum(np.ptp(x, axis=0), _NEAR * np.maximum(1.0, np.abs(x[0])))
         found = np.array([float(v.mid()) for v in [*zero.point, period]])
         scale = [*(size[k] for _, k in self.unknowns), self.orbit.period]
         return float(np.max(np.abs(found - [*self.start, self.orbit.period]) / scale))
@@ -297,7 +320,7 @@ class OrbitInstance:
         values: Mapping[str, Enclosure],
     ) -> str:
         """The theorem in words."""
-        states, m = self.orbit.system.state_names, len(box) // len(self.sections)
+        states, m = [*self.orbit.system.state_names, "t"], len(box) // len(self.sections)
         parts, boxes = list[str](), list(box.values())
         for i, s in enumerate(self.sections):
             free = [k for k in range(m + 1) if k != s.position]
@@ -311,6 +334,7 @@ class OrbitInstance:
             f"{self.orbit.itinerary} that crosses, leg by leg, {'; '.join(parts[:6])}"
             + (f"; and so on through {len(parts)} legs." if len(parts) > 6 else "."),
             f"It is {classification.label}." if classification.label else "",
+            f"It takes {self.multiplicity} of the forcing's periods." * (self.multiplicity > 0),
             f"{listed(values)}.",
             f"In leg 1 {listed(first)}.",
             f"Not decided: {classification.why}." if classification.why else "",
@@ -329,6 +353,7 @@ class OrbitInstance:
                 for s in self.sections
             ],
             "parameters": [[text(v) for v in pair] for pair in self.parameters],
+            "multiplicity": self.multiplicity,
             "longest": text(Fraction(8 * self.orbit.period)),
             **zero_record(zero, classification, bits),
         }
@@ -349,26 +374,53 @@ def orbit_instance(
     own = {k: v for k, v in orbit.parameters.items() if k not in names}
     ranges = parameter_ranges(system, {**own, **(parameters or {})}, numbers)
     modes = Modes(system, numbers, [i for i, (a, b) in enumerate(ranges) if a < b])
-    refusal = _refusal(orbit)
-    sections = [] if refusal else sections_of(orbit)
-    n, constant = system.dimension, modes.graph.constant
-    ends = [
-        modes.end_at("section", s.position, constant(s.value), s.direction, k)
-        for k, s in enumerate(sections)
-    ]
+    refusal, multiplicity, span, sections = _refusal(orbit), 0, -1, list[Section]()
+    if system.time_dependent and not refusal:
+        try:
+            multiplicity, span = _forcing(orbit, modes, ranges)
+        except UnprovenError as error:
+            refusal = f"{str(error)[:1].upper()}{str(error)[1:]}."
+    n, graph, ends = system.extended_dimension, modes.graph, []
+    for k, s in enumerate([] if refusal else sections_of(orbit)):
+        sections.append(s)
+        value, timed = graph.constant(s.value), s.position == modes.clock
+        if timed and not k:
+            whole = graph.apply("mul", [graph.constant(multiplicity), span])
+            value = graph.add(value, whole)
+        ends.append(modes.end_at("plane", s.position, value, s.direction, -1 if timed else k))
     start = [s.start[i] for s in sections for i in range(n) if i != s.position]
-    return OrbitInstance(orbit, sections, modes, ends, ranges, start, numbers, not names, refusal)
+    near = not names
+    return OrbitInstance(
+        *(orbit, sections, modes, ends, ranges, start, numbers, near),
+        *(multiplicity, span, refusal),
+    )
+
+
+def _forcing(orbit: PeriodicOrbit, modes: Modes, ranges: Sequence[Any]) -> tuple[int, int]:
+    """The number of the forcing's periods that an orbit takes, and the node of one."""
+    span = forcing_period(modes)
+    value = modes.constant(span, ranges)
+    if value < 0:
+        span, value = modes.graph.apply("neg", [span]), -value
+    ratio = orbit.period / float(value.mid()) if value > 0 else 0.0
+    count = round(ratio) if value > 0 else 0
+    if not count or abs(ratio - count) > _NEAR:
+        raise UnprovenError(
+            f"the orbit takes {ratio:.9g} of the periods of the forcing, {value.str(12)}, not a whole number; "
+            'frequencies such as 0.1 and 0.3 have a rational ratio with numbers="written"'
+        )
+    return count, span
 
 
 def _refusal(orbit: PeriodicOrbit) -> str:
     """Why no theorem covers an orbit."""
     if orbit.is_virtual:
         return f"The orbit is virtual: {orbit.faults[0]}."
-    if orbit.system.time_dependent:
-        return "The system depends on time."
     for i, leg in enumerate(orbit.legs):
         if set(leg.mode) - set("+-o"):
             return f"Leg {i + 1} slides or is in contact (mode {leg.mode!r}), and only crossing orbits are proven."
+    if orbit.system.time_dependent:
+        return ""
     if not any(leg.event for leg in orbit.legs):
         return "The orbit has no events, so no plane of a leg comes after one."
     if orbit.system.dimension < 2:

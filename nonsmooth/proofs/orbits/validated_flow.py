@@ -1,6 +1,6 @@
 """Validated integration of one orbit, or of all orbits from a box.
 
-A step has an a-priori enclosure B (Picard), the Taylor polynomial with the coefficient K + 1 over B as
+A step has an a-priori enclosure B, the Taylor polynomial with the coefficient K + 1 over B as
 remainder, and the set of states as middle + frame r with an orthogonal frame (Lohner 1987). Guards
 are proven positive, or to have one simple zero; there the time is eliminated by the derivative of the
 return map, (1 - f grad g/(grad g . f)) D. The end of the integration is such a zero too, of the time
@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -59,6 +60,12 @@ def orthogonal(matrix: arb_mat, sides: arb_mat) -> arb_mat:
     return arb_mat([[arb(float(v)) for v in row] for row in q.tolist()])
 
 
+#: Bits that the terms of a Taylor polynomial may lose where they cancel.
+_GUARD_BITS = 32
+
+#: Sets of a smaller radius take longer steps.
+_NARROW = 1e-4
+
 #: How often a step is shortened so that event functions are enclosed well.
 _SHORTER = 5
 
@@ -66,8 +73,9 @@ _SHORTER = 5
 class ValidatedFlow:
     """A set of states that moves in one mode."""
 
-    def __init__(self, modes: Modes, x: Sequence[arb], p: Sequence[arb], order: int):
-        self.modes, self.p, self.order, self.n = modes, list(p), order, len(x)
+    def __init__(self, modes: Modes, x: Sequence[arb], p: Sequence[arb]):
+        self.modes, self.p, self.n = modes, list(p), len(x)
+        self.bits, self.order = ctx.prec + _GUARD_BITS, max(12, int(ctx.prec * 0.3))
         self.along = identity(self.n)  # derivatives of r by the start
         self.adopt(list(x))
         self.origin = x[modes.clock]
@@ -142,32 +150,32 @@ class ValidatedFlow:
 
     def _prepare(self, limit: float) -> Step:
         """A step size with an a-priori enclosure and a small remainder."""
-        mode, x, count = self.now, self.hull(), self.order + 2
-        c = mode.series(x, self.p, count)
-        size = max(max(abs(float(v[self.order].mid())) for v in c), 1e-300)
+        mode, x = self.now, self.hull()
         wide = max(radius(v) for v in x)
-        tolerance = max(2.0 ** (2 - ctx.prec), 1e-3 * wide)
-        natural = min((tolerance / size) ** (1 / self.order), 1e6)
+        # Series of affine fields are cheap; those of wide sets are far wider than the sets after a long step.
+        order = self.order * (2 if mode.affine and wide < _NARROW else 1)
+        c = mode.series(x, self.p, order + 2)
+        size = max(max(abs(float(v[order].mid())) for v in c), 1e-300)
+        tolerance = max(2.0**-self.bits, 1e-3 * wide)
+        natural = min((tolerance / size) ** (1 / order), 1e6)
+        if wide >= _NARROW:
+            natural = min(natural, wide / max(1e-300, *(radius(v[1]) for v in c)))
         h, shorter, guards = min(natural, limit), 0, mode.event_series(c, self.p)
         for _ in range(60):
-            tube = self._tube(x, h)
-            if tube is not None:
-                top = mode.series(tube, self.p, count)
-                rest = max(float(abs(v[-1]).upper()) for v in top) * h ** (self.order + 1)
-                if rest <= 8 * tolerance:
-                    tops = mode.event_series(top, self.p)
-                    if not all(v[-1].is_finite() for v in tops):
-                        h /= 2
-                        continue
-                    if shorter == _SHORTER or not _coarse(guards, tops, h, tolerance):
-                        break
-                    shorter += 1
-                    h *= 0.6
+            tube, top = self._tube(c, h, 16 * tolerance)
+            rest = max(float(abs(v[-1]).upper()) for v in top) * h ** (order + 1)
+            if rest <= 8 * tolerance:
+                tops = mode.event_series(top, self.p)
+                if not all(v[-1].is_finite() for v in tops):
+                    h /= 2
                     continue
-                ratio = (8 * tolerance / rest) ** (1 / (self.order + 1)) if rest < 1e300 else 0.0
-                h *= min(0.9, max(0.3, 0.9 * ratio))
-            else:
-                h /= 2
+                if shorter == _SHORTER or not _coarse(guards, tops, h, tolerance):
+                    break
+                shorter += 1
+                h *= 0.6
+                continue
+            ratio = (8 * tolerance / rest) ** (1 / (order + 1)) if rest < 1e300 else 0.0
+            h *= min(0.9, max(0.3, 0.9 * ratio))
         else:
             raise UnprovenError(
                 f"no enclosure of the motion from t = {float(self.t.mid()):.9g} (the field is not "
@@ -181,18 +189,12 @@ class ValidatedFlow:
             guards = mode.narrowed(guards, self.middle, (self.frame, self.r), self.p)
         return Step(h, natural, tube, x, c, top, guards, tops)
 
-    def _tube(self, x: list[arb], h: float) -> list[arb] | None:
-        """B with x + [0, h] F(B) inside B: every orbit from x exists on [0, h] and stays in B."""
-        t, b = hull(arb(0), arb(h)), x
-        for _ in range(12):
-            f = self.now.field(b, self.p)
-            new = [v + t * w for v, w in zip(x, f, strict=True)]
-            if not all(v.is_finite() for v in new):
-                return None
-            if all(u.contains(v) for u, v in zip(b, new, strict=True)):
-                return b
-            b = [v + arb(0, 0.1 * radius(v) + 1e-300) for v in new]
-        return None
+    def _tube(self, c: list[list[arb]], h: float, margin: float) -> Any:
+        """States B around the Taylor polynomials on [0, h], and the coefficients over B."""
+        # Remainders over B that are less than the margin keep every orbit in B (Corliss and Rihm 1996).
+        t = hull(arb(0), arb(h))
+        tube = [horner(v[:-1], t) + arb(0, margin) for v in c]
+        return tube, self.now.series(tube, self.p, len(c[0]))
 
     def _first_event(self, step: Step) -> tuple[int, arb] | None:
         """The guard with the first zero, proven, and its time."""
@@ -278,7 +280,7 @@ class ValidatedFlow:
 
     def _advance(self, step: Step, event: tuple[int, arb] | None) -> int | None:
         if event is None:
-            c, time = self.now.series(self.middle, self.p, self.order + 2), arb(step.h)
+            c, time = self.now.series(self.middle, self.p, len(step.c[0])), arb(step.h)
             image, derivative = at(c, step.top, time), self._derivative(step, time)
         else:
             image, derivative = self._at_event(step, event)
@@ -288,16 +290,24 @@ class ValidatedFlow:
 
     def _at_event(self, step: Step, event: tuple[int, arb]) -> tuple[list[arb], arb_mat]:
         """Image of the middle at an event, and the derivative of the return map there."""
-        c = self.now.series(self.middle, self.p, self.order + 2)
+        c = self.now.series(self.middle, self.p, len(step.c[0]))
         image = at(c, step.top, self._own_time(c, step, event))
-        derivative = self._derivative(step, event[1])
-        return image, self._return_map(step, event[0], event[1], derivative)
+        derivative, x = self._derivative(step, event[1]), at(step.c, step.top, event[1])
+        for _ in range(2):  # the image of the set encloses its states at the event, too
+            back = self._return_map(x, event, derivative)
+            move = entries(back * self.frame * self.r)
+            x = [
+                v.intersection(u + w) if v.overlaps(u + w) else v
+                for v, u, w in zip(x, image, move, strict=True)
+            ]
+        return image, back
 
     def _derivative(self, step: Step, time: arb) -> arb_mat:
         """Derivatives of the flow to times in ``time``, for all states of the set."""
         mode = self.now
         if mode.affine:
-            return (mode.jacobian(step.hull, self.p) * time).exp()
+            middle, jacobian = time.mid(), mode.jacobian(step.hull, self.p)
+            return (jacobian * middle).exp() * (jacobian * (time - middle)).exp()
         jacobian = mode.jacobian(step.tube, self.p)
         if not all(v.is_finite() for v in jacobian.entries()):
             raise UnprovenError(f"the field has no derivative near t = {float(self.t.mid()):.9g}")
@@ -316,9 +326,9 @@ class ValidatedFlow:
         g = self.now.event_series(c, self.p)[k]
         return narrowed(Polynomial(g[:-1], step.guard_tops[k][-1]), time)
 
-    def _return_map(self, step: Step, k: int, time: arb, derivative: arb_mat) -> arb_mat:
-        """(1 - f grad g/(grad g . f)) D at the event."""
-        x = at(step.c, step.top, time)
+    def _return_map(self, x: list[arb], event: tuple[int, arb], derivative: arb_mat) -> arb_mat:
+        """(1 - f grad g/(grad g . f)) D for the states at the event."""
+        k, time = event
         f, g = self.now.field(x, self.p), self.now.slope(k, x, self.p)
         rate = sum((a * b for a, b in zip(f, g, strict=True)), arb(0))
         if rate.contains(0) or not rate.is_finite():

@@ -149,7 +149,7 @@ def _one(instance: Instance, width: float, max_bits: int) -> tuple[Proof, list[f
     while True:
         with precision(bits):
             equations = instance.equations()
-            zero = prove_zero(equations, start)
+            zero = prove_zero(equations, start, known=best[0] if best else None)
             why = "" if zero else instance.failure(equations)
             if zero is not None:
                 classification = instance.classification(equations, zero)

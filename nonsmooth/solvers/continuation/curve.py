@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...model import Array, DefinitionError, NonsmoothError, is_real
+from .. import linear_equations
 from ..newton import Secant, converge
 
 
@@ -325,7 +326,7 @@ class Curve:
         numpy.linalg.LinAlgError
             A singular matrix.
         """
-        return np.asarray(np.linalg.solve(matrix, right), float)
+        return linear_equations.solve(matrix, right)
 
     def along(self, jacobian: Array, before: Array) -> tuple[Array, float]:
         """Return the tangent of a Jacobian, and a determinant.
@@ -365,8 +366,7 @@ class Curve:
         matrix : ndarray (N, N)
             The bordered Jacobian.
         """
-        sign, size = np.linalg.slogdet(matrix)
-        return float(sign) * float(np.exp(size))
+        return linear_equations.determinant(matrix)
 
 
 def read_tests(found: Any) -> dict[str, float]:

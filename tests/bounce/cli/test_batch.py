@@ -113,16 +113,6 @@ def test_other_inputs_are_refused_and_nothing_is_lost(command, table, tmp_path):
         assert out.read_text() == before
 
 
-def test_resume_needs_a_file_to_go_on_with(command, table):
-    for argv in (
-        ["launch", "--input", table(), "--resume"],
-        ["launch", "--input", table(), "--output", "x.csv", "--json", "--resume"],
-        "launch --speed 70 --angle 11 --spin 2700 --resume".split(),
-    ):
-        code, _, err = command(*argv)
-        assert code == 2 and "--resume" in err
-
-
 def test_what_was_computed_is_printed_at_an_interrupt(command, table, stopped):
     for options, count in (([], rows_of), (["--json"], lambda out: json.loads(out)["rows"])):
         stopped(at=3)

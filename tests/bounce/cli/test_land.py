@@ -31,19 +31,6 @@ def test_shot_is_play(command):
     assert command(*SHOT)[1].startswith("lift-off  10.7 m/s, 37.3 deg")
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ("--turf natural", "(III+: slips, then rolls from compression on)"),
-        ("--turf natural-rigid --angle 10", "(I+: slips throughout)"),
-        ("--model KelvinVoigt --stiffness 2e4", "(+ s -: slips forward, rolls, slips in reverse)"),
-    ],
-)
-def test_what_the_ball_does_on_the_ground_is_said_in_words(command, options, said):
-    extra = " --set mu=0.3 --set d1=0.1 --set d2=0.1 --set eta=0.5" * ("Kelvin" in options)
-    assert said in command(*SHOT, *options.split(), *extra.split())[1]
-
-
 def test_the_turf_that_was_not_typed_is_an_input_too(command):
     shot = json.loads(command(*SHOT, "--json")[1])
     assert shot["inputs"]["turf"] == "natural"
@@ -176,27 +163,3 @@ def test_a_table_without_units_has_those_of_the_system(command, tmp_path):
     assert float(rows[0]["run_run_out [m]"]) == pytest.approx(RUN_OUT, rel=1e-4)
     rows = list(csv.DictReader(io.StringIO(command("land", "--input", path, "--units", "us")[1])))
     assert float(rows[0]["landing_speed [mph]"]) == pytest.approx(28.5)
-
-
-@pytest.mark.parametrize(
-    ("titles", "row", "said"),
-    [
-        ("speed [mph],angle [deg],spin [rpm]", "-64,37,2000", "-64 mph"),
-        ("speed [km/h],angle [rad],spin [rad/s]", "103,2,200", "2 rad"),
-        ("speed [m/s],angle [deg],spin [rpm]", "0,37,2000", "0 m/s"),
-        ("speed,angle,spin", "-64,37,2000", "-64 mph"),  # of --units us
-    ],
-)
-def test_what_is_wrong_with_a_row_is_said_in_the_units_of_its_columns(
-    command, tmp_path, titles, row, said
-):
-    path = tmp_path / "wrong.csv"
-    path.write_text(f"{titles}\n{row}\n", encoding="utf-8")
-    (found,) = csv.DictReader(io.StringIO(command("land", "--input", path, "--units", "us")[1]))
-    assert said in found["error"]
-
-
-@pytest.mark.parametrize("side", [[], ["--side-spin", "100"]])
-def test_one_bounce_is_said_in_the_singular(command, side):
-    out = command(*"land --speed 2 --angle 41 --spin 2141".split(), *side)[1]
-    assert ": 1 bounce (1 of them outside the fit)" in out

@@ -88,22 +88,3 @@ def test_a_flight_curves_with_the_axis(command, tmp_path):
     table = tmp_path / "launches.csv"
     table.write_text("speed,angle,spin\n70,11,2700\n", encoding="utf-8")
     assert "side [m]" in command("launch", "--input", table, "--axis-tilt", 10)[1]
-
-
-@pytest.mark.parametrize(
-    "argv, message",
-    [
-        (["--first-only", "--axis-tilt", "10"], "--launch-angle"),
-        (["--first-only", "--launch-angle", "10"], "--launch-angle"),
-        (
-            ["--first-only", "--side-spin", "1", "--axis-tilt", "10", "--launch-angle", "9"],
-            "--axis-tilt",
-        ),
-        (["--axis-tilt", "95", "--launch-angle", "28"], "--axis-tilt"),
-        (["--axis-tilt", "10", "--launch-angle", "2.2rad"], "--launch-angle"),
-        (["--first-only", "--side-slope", "95"], "--side-slope"),
-    ],
-)
-def test_usage_errors(command, argv, message):
-    code, _, err = command(*"land --speed 25 --angle 53 --spin 9000".split(), *RIGID, *argv)
-    assert code == 2 and message in err

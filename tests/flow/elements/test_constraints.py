@@ -542,7 +542,7 @@ WIRES = {
 def test_friction_in_space_holds_and_releases_along_a_joint(wire, start):
     """Where a joint takes a part of the load, the least friction that holds decides when it slips."""
     free, plain, placed_at = _on_a_wire(*WIRES[wire])
-    place = lambda z: np.concatenate([np.ravel(part) for part in placed_at(*z)])
+    place = lambda z: np.concatenate([ca.DM(part).full().ravel() for part in placed_at(*z)])
     run = ns.simulate(free, place(start), 6.0, tol=1e-10)
     want = ns.simulate(plain, start, 6.0, tol=1e-10)
     assert run.status is ns.Status.REACHED_END, run.message

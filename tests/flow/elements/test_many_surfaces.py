@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import tape_for
+from nonsmooth.flow.engine import interpreter_for
 from nonsmooth.flow.options import Options
 
 from ..independent import blocks
@@ -103,7 +103,7 @@ def test_a_program_is_generated_in_proportion_to_its_graph():
         calls = itertools.count()
         sys.setprofile(lambda frame, event, _, calls=calls: "call" in event and next(calls))
         try:
-            tape_for(system, Options(t_end=1.0))
+            interpreter_for(system, Options(t_end=1.0))
         finally:
             sys.setprofile(None)
         work[k] = next(calls)

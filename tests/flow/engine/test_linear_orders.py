@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import find_compiler, tape_for
+from nonsmooth.flow.engine import find_compiler, interpreter_for
 from nonsmooth.flow.options import Options
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
@@ -21,7 +21,7 @@ def oscillator(surface, push=0.0):
 
 
 def test_orders_are_higher_where_all_is_linear_and_of_one_surface():
-    order = lambda system, tol: tape_for(system, Options(1.0, rtol=tol, atol=tol)).order
+    order = lambda system, tol: interpreter_for(system, Options(1.0, rtol=tol, atol=tol)).order
     linear, bent = oscillator(v - 9.0), oscillator(v + x**2 - 9.0)
     usual = Options(1.0, rtol=1e-6).order
     assert order(bent, 1e-6) == usual and 3 * order(linear, 1e-6) == 4 * usual

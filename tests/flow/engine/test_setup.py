@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import tape_for
+from nonsmooth.flow.engine import interpreter_for
 from nonsmooth.flow.options import Options
 from nonsmooth.model.expressions import graph
 
@@ -53,8 +53,10 @@ def calls(work):
 
 
 def test_calls_grow_as_the_number_of_surfaces():
-    tape_for(blocks(3), Options(t_end=1.0))
-    one, four = (calls(lambda n=n: tape_for(blocks(n), Options(t_end=1.0))) for n in (30, 120))
+    interpreter_for(blocks(3), Options(t_end=1.0))
+    one, four = (
+        calls(lambda n=n: interpreter_for(blocks(n), Options(t_end=1.0))) for n in (30, 120)
+    )
     assert four < 4.2 * one
 
 
@@ -69,5 +71,5 @@ def test_graphs_are_read_a_few_times(make, monkeypatch):
         graph, "_read", lambda f, merged: found.append(f.n_instructions()) or read(f, merged)
     )
     monkeypatch.setattr(ca, "is_linear", lambda *args: found.append(own) or linear(*args))
-    tape_for(system, Options(t_end=1.0))
+    interpreter_for(system, Options(t_end=1.0))
     assert sum(found) < 9 * own

@@ -12,8 +12,8 @@ import nonsmooth as ns
 from nonsmooth.flow.constants import KINDS
 from nonsmooth.flow.engine.building import webassembly
 from nonsmooth.flow.engine.image import image_of
+from nonsmooth.flow.engine.interpreter import interpreter_for
 from nonsmooth.flow.engine.structures import structure
-from nonsmooth.flow.engine.tape import tape_for
 from nonsmooth.flow.options import Options
 from tests.flow.independent.hybrid import package_system
 from tests.flow.random_systems import draw
@@ -127,13 +127,13 @@ def test_the_image_of_a_system_without_surfaces_parameters_and_events():
 
 
 def test_the_layout_is_that_of_a_machine_of_32_bits():
-    engine = tape_for(stiff(), Options(t_end=1.0))
+    engine = interpreter_for(stiff(), Options(t_end=1.0))
     system, _ = engine.blocks()
     image = image_of(engine)
     own = structure("System", ctypes.c_uint32)
     assert ctypes.sizeof(own) < ctypes.sizeof(system) < len(image.bytes)
-    assert all(at % 4 == 0 and at + 4 <= len(image.bytes) for at in image.places)
-    assert len(set(image.places)) == len(image.places)
+    assert all(at % 4 == 0 and at + 4 <= len(image.bytes) for at in image.addresses)
+    assert len(set(image.addresses)) == len(image.addresses)
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """An ensemble gives each start the result of its own run, however the work is divided."""
 
 import concurrent.futures
+import math
 import multiprocessing
 import pickle
 import signal
@@ -19,6 +20,7 @@ from nonsmooth.flow.ensembles import chunks
 from nonsmooth.flow.ensembles import work as work_module
 from nonsmooth.flow.ensembles.ensemble import ensemble
 from nonsmooth.flow.ensembles.work import Work
+from nonsmooth.flow.section import Section
 from nonsmooth.model import (
     DefinitionError,
     FilippovSystem,
@@ -29,6 +31,7 @@ from nonsmooth.model import (
     Stop,
 )
 
+WORTH = sys.modules[ensemble.__wrapped__.__module__]._WORTH
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 
@@ -275,3 +278,44 @@ def test_events_that_cannot_happen_are_none(engine, count):
     saw = ensemble(FilippovSystem([x], field=[1], resets=Reset(x - 5, [x - 1], 1)), starts, 9.7)
     assert np.array_equal(saw.events["reset"], np.floor(5.7 + starts[:, 0]))
     assert np.all(saw.events["end"] == 1) and not saw.events["stop"].any()
+
+
+@needs_compiler
+def test_lanes_are_compiled_where_that_pays(monkeypatch):
+    """A hundred starts of an oscillator wait for a compiler where the runs take as long one by one."""
+    monkeypatch.setattr("nonsmooth.flow.ensembles.ensemble._WORTH", WORTH)
+    x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    system = FilippovSystem([x, v], surface=x, above=[v, -1 - x], below=[v, 1 - x])
+    starts = np.random.default_rng(0).normal(size=(100, 2))
+    engines = [ensemble(system, starts, t_end).engine for t_end in (10.0, 9000.0)]
+    assert engines == ["core", "lanes"]
+    starts[49] = np.nan  # of which nothing is known
+    assert ensemble(system, starts, 10.0).engine == "lanes"
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "section",
+    [
+        Section("crossing", count=5),
+        Section("h0", count=7),
+        Section("h0", count=2, skip=1, every=2),
+        Section("h0", direction=-1, count=50),
+        Section("entry", count=3),
+        Section("exit", count=100),
+    ],
+    ids=str,
+)
+def test_sections_in_lanes_are_those_of_the_driver(section, monkeypatch):
+    starts = np.random.default_rng(2).normal(size=(100, 2))
+    starts[7] = np.nan
+    run = lambda: ensemble(make_system(), starts, 30.0, at=section)
+    lanes = run()
+    monkeypatch.setattr("nonsmooth.flow.ensembles.ensemble._WORTH", math.inf)
+    core = run()
+    assert (lanes.engine, core.engine) == ("lanes", "core")
+    assert np.isfinite(core.sample_t).sum() > 5
+    assert np.array_equal(lanes.status, core.status)
+    assert lanes.itinerary.tolist() == core.itinerary.tolist()
+    for name in ("sample_t", "sample_x", "x", "t"):
+        np.testing.assert_allclose(getattr(lanes, name), getattr(core, name), rtol=0, atol=1e-8)

@@ -69,7 +69,7 @@ def test_on_a_card(system, monkeypatch, places):
 def test_bins_hold_both_ends_and_nothing_outside():
     bins = kernel.Bins(4, np.array([0.0]), np.array([2.0]))
     values = np.array([-1e-9, 0.0, 0.5, 1.9, 2.0, 2.1, np.nan])
-    assert bins.places(0, values).tolist() == [0, 1, 3, 3]
+    assert bins.indices(0, values).tolist() == [0, 1, 3, 3]
 
 
 @pytest.mark.parametrize("ranges", [{"z": (0, 1)}, {"x": (1, 1)}, {"x": 3}, {"x": (0, np.inf)}])

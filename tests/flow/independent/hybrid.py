@@ -381,7 +381,8 @@ class Run:
                 raise Undecided("a guard that should leave zero does not")
             if self._ahead(h * parts[k])[row] >= 0:
                 raise Undecided("a guard that is nearly touched")
-            root = brentq(lambda s, row=row: self._ahead(h * s)[row], low, parts[k], xtol=1e-16)
+            ahead = lambda s, row=row: self._ahead(h * s)[row]
+            root = brentq(ahead, low, parts[k], xtol=1e-16, maxiter=1000)
             roots.append((root, row))
         roots.sort()
         if len(roots) > 1 and (roots[1][0] - roots[0][0]) * h < 1e-9:

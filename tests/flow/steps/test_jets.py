@@ -13,7 +13,7 @@ from nonsmooth.flow.engine.smooth import SmoothProgram
 from nonsmooth.model import NotSmoothError
 from nonsmooth.model.expressions.float_arithmetic import BINARY, UNARY
 from nonsmooth.model.expressions.graph import operation
-from nonsmooth.model.printing.tape import series_of, sparse_entries
+from nonsmooth.model.printing.instructions import series_of, sparse_entries
 
 x, y, p = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("p")
 U = 0.45 + 0.3 * ca.sin(x) + 0.1 * y  # stays in (0.05, 0.85), inside every domain below

@@ -6,7 +6,7 @@ import pytest
 
 import nonsmooth as ns
 
-X, V, K, Q, T = (ca.MX.sym(name) for name in ("x", "v", "k", "q", "t"))
+X, V, K, T = (ca.MX.sym(name) for name in ("x", "v", "k", "t"))
 W = ca.MX.sym("w", 3)
 
 

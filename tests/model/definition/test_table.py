@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 import nonsmooth as ns
 from nonsmooth.model import raised_of
 from nonsmooth.model.definition.instruction_form import read_system, written
-from nonsmooth.model.printing.tape import tape_of
+from nonsmooth.model.printing.instructions import instructions_of
 
 x, v, t = (ca.SX.sym(s) for s in ("x", "v", "t"))
 
@@ -208,8 +208,8 @@ def test_what_runs_of_a_table_evaluate_does_not_grow_with_it():
         system = ns.FilippovSystem.from_expression([x, v], [v, -ns.table(x, xs, np.sin(5 * xs), 3)])
         assert system.surface_count == count
         assert system.of_pieces.surface_count == 1
-        tape = tape_of(raised_of(system.of_pieces))
-        sizes.add((len(tape.series.rule), len(tape.point.op), len(tape.surfaces.op)))
+        lists = instructions_of(raised_of(system.of_pieces))
+        sizes.add((len(lists.series.rule), len(lists.point.op), len(lists.surfaces.op)))
     assert len(sizes) == 1
 
 

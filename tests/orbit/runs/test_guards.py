@@ -7,7 +7,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.flow.names import described
 from nonsmooth.model import Guard
-from nonsmooth.orbit.runs.guards import change_fault, faults_along, watch
+from nonsmooth.orbit.runs.guards import change_violation, violations_of_legs, watch
 from nonsmooth.orbit.runs.legs import Leg, integrate_leg, leg_name
 
 
@@ -67,17 +67,17 @@ def test_legs_are_judged_together_as_one_by_one():
         if durations[i] <= 0.0:
             expected.append(f"leg {i + 1} {leg_name(system, leg)} has the duration 0")
             continue
-        found = watch(system, leg, starts[i], durations[i], p).faults
+        found = watch(system, leg, starts[i], durations[i], p).violations
         j = (i + 1) % len(legs)
-        fault = change_fault(system, leg, legs[j].mode, ends[i].end, starts[j], p)
-        found += [fault] if fault else []
-        expected += [f"leg {i + 1} {leg_name(system, leg)}: {fault}" for fault in found]
-    together = faults_along(system, legs, starts, durations, speeds, p, True)
+        violation = change_violation(system, leg, legs[j].mode, ends[i].end, starts[j], p)
+        found += [violation] if violation else []
+        expected += [f"leg {i + 1} {leg_name(system, leg)}: {violation}" for violation in found]
+    together = violations_of_legs(system, legs, starts, durations, speeds, p, True)
     assert together == expected and len(together) >= 5
-    assert sum("is violated" in fault for fault in together) >= 1
-    assert sum("begins after it" in fault for fault in together) >= 1
+    assert sum("is violated" in violation for violation in together) >= 1
+    assert sum("begins after it" in violation for violation in together) >= 1
     assert (
-        sum("'out' reaches zero" in fault for fault in together) == 2
+        sum("'out' reaches zero" in violation for violation in together) == 2
     )  # from 7 to 8, and from 0 to 9
 
 
@@ -96,9 +96,9 @@ def test_what_is_passed_inside_a_step_is_seen(kind, duration):
         [x, y], surface=y + 99, above=[1, 1 + 0.1 * turn], below=[1, 1 + 0 * y], **given
     )
     p = np.zeros(0)
-    (fault,) = watch(system, Leg("+"), np.array([0.0, 0.0]), duration, p).faults
-    assert fault.startswith(f"{kind} 'out' reaches zero ")
-    assert watch(system, Leg("+"), np.array([0.91, 0.0]), duration, p).faults == []
-    late = np.array([0.9 - duration, 0.0])  # met at the very end, as by what ends the leg
-    assert watch(system, Leg("+"), late, duration, p).faults == []
-    assert watch(system, Leg("+"), np.array([0.9, 0.0]), duration, p).faults == []
+    (violation,) = watch(system, Leg("+"), np.array([0.0, 0.0]), duration, p).violations
+    assert violation.startswith(f"{kind} 'out' reaches zero ")
+    assert watch(system, Leg("+"), np.array([0.91, 0.0]), duration, p).violations == []
+    late = np.array([0.9 - duration, 0.0])  # zero at the very end, as the guard that ends the leg
+    assert watch(system, Leg("+"), late, duration, p).violations == []
+    assert watch(system, Leg("+"), np.array([0.9, 0.0]), duration, p).violations == []

@@ -101,4 +101,4 @@ def test_extrema_of_a_guard_are_those_of_its_closed_form():
     times = [near.t for near in seen.approaches]
     np.testing.assert_allclose(times, np.pi / 2 + 2 * np.pi / 3 * np.arange(2), rtol=1e-13)
     np.testing.assert_allclose([near.value for near in seen.approaches], 0.1, rtol=1e-13)
-    assert not seen.faults
+    assert not seen.violations

@@ -7,7 +7,7 @@ from matplotlib.text import Text
 from numpy.testing import assert_allclose
 
 import nonsmooth as ns
-from papers.pictures import faults
+from papers.pictures import illegible
 
 x, y, z = (ca.SX.sym(name) for name in "xyz")
 BOX = (-1.0, 1.0, -1.0, 1.0)
@@ -125,7 +125,7 @@ def test_bad_input_is_refused_with_advice(call, error, words):
 def test_the_name_of_a_class_is_inside_of_a_narrow_frame(box):
     system = ns.textbook.two_fold("VV-C1").system
     figure = ns.plot.sliding_portrait(system, box, size=(3.4, 4.4))
-    assert [fault for fault in faults(figure) if "VV-C1" in fault] == []
+    assert [text for text in illegible(figure) if "VV-C1" in text] == []
 
 
 def test_a_condition_slides_where_it_is_closed():

@@ -12,7 +12,7 @@ import nonsmooth as ns
 from nonsmooth.local.two_folds import classify_two_fold, max_flights
 from nonsmooth.plot.two_folds.atlas import CASES
 from nonsmooth.plot.two_folds.class_map import FILLS, areas
-from papers.pictures import faults
+from papers.pictures import illegible
 
 SIGMA = {"VV": (1, -1), "II": (-1, 1), "VI": (1, 1), "IV": (-1, -1)}
 
@@ -114,7 +114,7 @@ def test_the_whole_atlas_is_drawn():
     assert len(figure.axes) == 2 * len(CASES) + 3
     pages = ns.plot.two_fold_atlas_pages()
     assert sum(len(page.axes) for page in pages) == len(figure.axes)
-    assert [fault for page in pages for fault in faults(page)] == []
+    assert [text for page in pages for text in illegible(page)] == []
 
 
 def test_wrong_input_is_refused():

@@ -15,16 +15,7 @@ from nonsmooth.local import find_two_fold
 from nonsmooth.local.two_folds import ReducedFlow, classify_two_fold
 from nonsmooth.local.two_folds.reduced_flow import eigenlines
 
-CLASSES = {
-    "VV-C1": ((1, -1), (-2.0, -1.0)),
-    "VV-F": ((1, -1), (2.0, 1.0)),
-    "II-C": ((-1, 1), (-2.0, -1.0)),
-    "II-F": ((-1, 1), (-0.5, -0.5)),
-    "mix-0": ((1, 1), (0.0, 0.5)),
-    "mix-S": ((1, 1), (-1.5, 1.5)),
-    "mix-C": ((1, 1), (-3.0, -0.5)),
-    "mix-F": ((1, 1), (0.5, 3.0)),
-}
+CLASSES = ns.textbook.TWO_FOLDS
 BOUNDARIES = {
     "Delta=0, ball": ((1, -1), (-1.0325, 1 / -1.0325)),
     "Delta=0, VV": ((1, -1), (2.0, 0.5)),

@@ -10,9 +10,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
+from nonsmooth.proofs.orbits.forcing import forcing_period
+from nonsmooth.proofs.orbits.modes import Modes
 from tests.proofs.checking import run
 
-x, v, y, z, d, a, b = (ca.SX.sym(s) for s in ("x", "v", "y", "z", "d", "a", "b"))
+x, v, y, z, d, a, b, t = (ca.SX.sym(s) for s in ("x", "v", "y", "z", "d", "a", "b", "t"))
 
 
 def relay(d):
@@ -134,25 +136,127 @@ def test_piecewise_affine_orbits_have_the_closed_form(name):
             assert value.radius < 1e-13 and any(holds(value, m.real) for m in multipliers)
 
 
-#: Values of closed forms, 20 digits.
+PASSENGERS = [-40 * y + x, 5 * z + v]  # LM1 of the reference cases: multipliers from 2e-110 to 5e13
+STIFF = ns.FilippovSystem(
+    [x, v, y, z],
+    surface=v,
+    above=[v, 1 - x - 0.2 * v, *PASSENGERS],
+    below=[v, -1 - x - 0.2 * v, *PASSENGERS],
+)
+
+#: System, guess, and values of closed forms, 20 digits: period, multipliers by size; least radius of the box.
 KNOWN = {
-    "relay": (relay(0.1), [-6.38, 0.01], "6.3148388339965529095", "0.53180208294425965119"),
-    "kick": (KICK, [-0.1, 0.8], "6.2910540457760034274", "0.73011538017940582909"),
-    "heat": (HEAT, [0.625, 1.0], "1.1755733298042381", "0"),
+    "relay": (
+        *(relay(0.1), [-6.38, 0.01], "6.3148388339965529095"),
+        *(["0.53180208294425965119"], 0.2),
+    ),
+    "kick": (KICK, [-0.1, 0.8], "6.2910540457760034274", ["0.73011538017940582909"], 0.01),
+    "heat": (HEAT, [0.625, 1.0], "1.1755733298042381", ["0"], 0.03),
+    "stiff": (
+        *(STIFF, [-6.3868231843577333, 0.01, -0.15958604063869290, -0.27358603355134122]),
+        "6.3148388339965529095",
+        ["51582014424075.48989", "0.53180208294425965119", "1.9953248506316915178e-110"],
+        1e-8,
+    ),
 }
 
 
+@pytest.mark.slow_cases("stiff")
 @pytest.mark.parametrize("name", KNOWN)
-def test_period_and_multiplier_are_those_of_the_closed_form(name):
-    system, guess, period, multiplier = KNOWN[name]
-    proof = ns.certify(ns.periodic_orbit(system, guess=guess), width=1e-18)
+def test_period_and_multipliers_are_those_of_the_closed_form(name):
+    system, guess, period, multipliers, box = KNOWN[name]
+    orbit = ns.periodic_orbit(system, guess=guess)
+    proof = ns.certify(orbit, width=1e-18, numbers="written")
     with mpmath.workdps(40):
-        # 0.1 is stored as a double, 5e-18 from one tenth.
-        slack = 1e-15
         assert proof.proven and proof.values["period"].radius < 1e-20
-        assert holds(proof.values["period"], mpmath.mpf(period), slack)
-        assert holds(proof.values["multiplier2"], mpmath.mpf(multiplier), slack)
-        assert all(box.radius > 1e-3 for box in proof.box.values())
+        assert holds(proof.values["period"], mpmath.mpf(period), 1e-15 if name == "heat" else 1e-18)
+        for k, multiplier in enumerate(multipliers, 2):
+            value = mpmath.mpf(multiplier)
+            assert holds(proof.values[f"multiplier{k}"], value, 1e-18 * max(1, value))
+        assert all(side.radius > box for side in proof.box.values())
+
+
+# Forcing ------------------------------------------------------------------------------------------
+
+
+def forced(field, **options):
+    """A system that depends on time."""
+    return ns.FilippovSystem([x], field=[field], time=t, **options)
+
+
+FRICTION = ns.FilippovSystem(
+    [x],
+    surface=x,
+    above=[3 * ca.cos(t) - x / 2 - 1],
+    below=[3 * ca.cos(t) - x / 2 + 1],
+    time=t,
+)
+BEATS = forced(-x + ca.sin(0.7 * t) + ca.cos(2.1 * t))
+
+
+def friction_values():
+    """Symmetric orbit of FRICTION: x = 1.2 cos t + 2.4 sin t - 2 + C exp(-t/2) from zero to zero in pi."""
+    q = mpmath.exp(-mpmath.pi / 2)
+    u = -2 * (1 - q) / (1 + q)
+    start = mpmath.findroot(lambda s: (6 * mpmath.cos(s) + 12 * mpmath.sin(s)) / 5 - u, -1)
+    rate = 3 * mpmath.cos(start)
+    return 2 * mpmath.pi, [(q * (rate - 1) / (rate + 1)) ** 2]
+
+
+#: System, guess, how constants are read, and as functions of nothing the period and multipliers.
+FORCED = {
+    "friction": (FRICTION, [1.0], "written", 1, friction_values),
+    "no events": (
+        *(forced(-x + ca.sin(2 * t)), [0.0], "stored", 1),
+        lambda: (mpmath.pi, [mpmath.exp(-mpmath.pi)]),
+    ),
+    "two frequencies": (
+        *(BEATS, [0.0], "written", 1),
+        lambda: (20 * mpmath.pi / 7, [mpmath.exp(-20 * mpmath.pi / 7)]),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FORCED)
+def test_forced_orbits_have_the_period_of_the_forcing_and_the_multipliers_of_closed_forms(name):
+    system, guess, numbers, multiplicity, values = FORCED[name]
+    proof = ns.certify(ns.periodic_orbit(system, guess=guess), numbers=numbers, width=1e-18)
+    with mpmath.workdps(40):
+        period, multipliers = values()
+        assert proof.proven and f"It takes {multiplicity} of the forcing's periods" in str(proof)
+        assert holds(proof.values["period"], period, 0) and proof.values["period"].radius < 1e-30
+        for k, multiplier in enumerate(multipliers, 1):
+            assert holds(proof.values[f"multiplier{k}"], multiplier, 1e-30)
+            assert proof.values[f"multiplier{k}"].radius < 1e-18
+
+
+#: Functions of the time, and their period over pi, or why they have none.
+PERIODS = {
+    ca.sin(t): 2,
+    ca.cos(2 * t) + ca.sin(3 * t): 2,
+    ca.cos(d * t + x) + ca.sin(3 * d * t / 2): 2,
+    ca.sin(-4 * (t + 1) / d): 1,
+    ca.exp(ca.sin(t / 3)) / (2 + ca.cos(t)): 6,
+    ca.sin(t + ca.cos(t)) + (t + 1) * x - t * x: 2,
+    ca.sin(t) ** 2 + t: "phases",
+    ca.sin(t * t): "phases",
+    ca.sin(x * t): "phases",
+    ca.tan(t): "phases",
+    ca.sin(t) + ca.cos(d * t): "no rational ratio",
+    0 * ca.sin(t) + t - t + x: "no sine",
+}
+
+
+@pytest.mark.parametrize("expression", PERIODS)
+def test_periods_of_forcings_follow_from_their_instructions(expression):
+    system = forced(-x + expression + 0 * t, parameters={d: 2.0})
+    modes = Modes(system, "stored")
+    if isinstance(PERIODS[expression], str):
+        with pytest.raises(ns.proofs.UnprovenError, match=PERIODS[expression]):
+            forcing_period(modes)
+        return
+    period = modes.constant(forcing_period(modes), [(Fraction(2), Fraction(2))])
+    assert abs(float(period.mid())) == pytest.approx(PERIODS[expression] * mpmath.pi, rel=1e-15)
 
 
 @pytest.mark.slow
@@ -180,6 +284,7 @@ REFUSED = {
     "slides": (STICK, [0.0, 0.0], {}, {}, "slides"),
     "touches": (TOUCH, [1.0, 0.01], {}, {"d": 5}, "undecided"),
     "one of many": (ROUND, [0.0, 1.0], {}, {}, "a multiplier is 1"),
+    "no ratio": (BEATS, [0.0], {}, {}, "not a whole number"),
 }
 
 
@@ -238,6 +343,7 @@ def test_orbits_are_checked_and_altered_ones_are_not(tmp_path):
         [THIRD, [0.01, 0.29, 0.72]],
         [DOUBLE, [-6.38, 0.01, 0, 0]],
         [WARM, [0.625, 1.0]],
+        [FRICTION, [1.0]],
         [HEAT, [0.625, 1.0]],
     )
     records = [ns.certify(ns.periodic_orbit(s, guess=g)).record for s, g in orbits]
@@ -246,6 +352,11 @@ def test_orbits_are_checked_and_altered_ones_are_not(tmp_path):
     code, words = run(true)
     assert code == 0 and words.count("checked: exactly one") == len(records), words
     wrong = [*altered(json.loads(json.dumps(records[-1])))]
+    friction = records[-2]
+    wrong += [{**friction, "multiplicity": k} for k in (0, 2, -1, "1")]
+    nodes = [["const", "2"] if n == ["const", "3"] else n for n in friction["graph"]["nodes"]]
+    tangent = [["tan", *n[1:]] if n[0] == "cos" else n for n in friction["graph"]["nodes"]]
+    wrong += [{**friction, "graph": {**friction["graph"], "nodes": n}} for n in (nodes, tangent)]
     false.write_text(json.dumps({"proofs": wrong}))
     words = run(false)[1]
     assert words.count("NOT CHECKED") == len(wrong), words

@@ -1,4 +1,4 @@
-/* Banded systems of linear equations, real and complex: numbers of ``w`` parts, one or two, side by side. */
+/* Banded systems of linear equations, real (w = 1) or complex (w = 2, interleaved). */
 
 /* x -= y z and x /= y. */
 static inline void less_product(double *x, const double *y, const double *z, const int w) {
@@ -14,8 +14,7 @@ static inline void divide_by(double *x, const double *y, const int w) {
 }
 static inline double size_of_number(const double *x, const int w) { return w == 1 ? fabs(x[0]) : fabs(x[0]) + fabs(x[1]); }
 
-/* Factors in place, rows changed for the largest pivots; entries are no further than ``band`` from the diagonal. 0 where
- * there is no inverse. */
+/* Factorise in place with partial pivoting; ``band`` is the half bandwidth. 0 where the matrix is singular. */
 static inline __attribute__((always_inline)) int factor_parts(double *f, int n, int band, int32_t *pivot, const int w) {
   for (int k = 0; k < n; k++) {
     int best = k, low = k + band < n ? k + band : n - 1, right = k + 2 * band < n ? k + 2 * band : n - 1;

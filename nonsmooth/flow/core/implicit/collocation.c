@@ -5,13 +5,13 @@
  */
 
 /* A field of n states, of which the first ``moving`` have errors; its values and derivatives at the stages of a step
- * (stage 0 is the start), each 0 where it has none. Length and polynomial (in powers of the part of its step) of the
- * last step, and where in it this one begins. */
+ * (stage 0 is the start), which return 0 where undefined. Length and polynomial (in the normalised time) of the last step,
+ * and the point in it where this one begins. */
 typedef struct Collocation Collocation;
 struct Collocation {
   const Radau *method;
   int32_t n, moving, is_fresh, rejected, band, *pivot;
-  const int32_t *places; /* states in an order in which what is coupled is close, or none */
+  const int32_t *ordering; /* states in an order that reduces the bandwidth, or none */
   void *of;
   int (*rate_at)(void *of, int stage, const double *x, double *rate);
   int (*jacobian_at)(void *of, int stage, const double *x, double *jacobian);
@@ -35,30 +35,30 @@ static size_t place_collocation(Collocation *m, char *base, size_t used) {
   return used;
 }
 
-/* The state in the place k of the matrices, in which what belongs together is close. */
-static int placed(const Collocation *m, int k) { return m->places ? m->places[k] : k; }
+/* The state of row k of the matrices. */
+static int state_at(const Collocation *m, int k) { return m->ordering ? m->ordering[k] : k; }
 
-/* Largest distance from the diagonal. */
+/* Half bandwidth. */
 static int band_of(const Collocation *m, const double *jacobian) {
   int n = m->n, band = 0;
   for (int i = 0; i < n; i++) {
-    const double *row = jacobian + (int64_t)placed(m, i) * n;
+    const double *row = jacobian + (int64_t)state_at(m, i) * n;
     for (int j = 0; j < n; j++) {
       int far = i > j ? i - j : j - i;
-      if (far > band && row[placed(m, j)] != 0) band = far;
+      if (far > band && row[state_at(m, j)] != 0) band = far;
     }
   }
   return band;
 }
 
-/* Factors of g/h - J for the real eigenvalue, behind ``factors`` if at the end. */
+/* Factors of g/h - J for the real eigenvalue g, after ``factors`` if at the end of the step. */
 static int factor_filter(Collocation *m, const double *jacobian, double h, double *factors, int32_t *pivot) {
   int n = m->n, band = band_of(m, jacobian);
   double shift = m->method->eigenvalues[0] / h;
   if (band > m->band) m->band = band;
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++)
-      factors[(int64_t)i * n + j] = (i == j ? shift : 0) - jacobian[(int64_t)placed(m, i) * n + placed(m, j)];
+      factors[(int64_t)i * n + j] = (i == j ? shift : 0) - jacobian[(int64_t)state_at(m, i) * n + state_at(m, j)];
   return factor_real(factors, n, m->band, pivot);
 }
 
@@ -70,7 +70,7 @@ static int factor_pairs(Collocation *m, double h) {
     for (int i = 0; i < n; i++)
       for (int j = 0; j < n; j++) {
         double *c = f + 2 * ((int64_t)i * n + j);
-        c[0] = (i == j ? eigenvalue[0] / h : 0) - m->jacobian[(int64_t)placed(m, i) * n + placed(m, j)];
+        c[0] = (i == j ? eigenvalue[0] / h : 0) - m->jacobian[(int64_t)state_at(m, i) * n + state_at(m, j)];
         c[1] = i == j ? eigenvalue[1] / h : 0;
       }
     if (!factor_complex(f, n, m->band, m->pivot + (q + 1) * n)) return 0;
@@ -81,12 +81,12 @@ static int factor_pairs(Collocation *m, double h) {
 /* (g/h - J)^-1 times a rate, in place. */
 static void filter(const Collocation *m, const double *factors, const int32_t *pivot, double *rate) {
   double *b = m->work;
-  for (int i = 0; i < m->n; i++) b[i] = rate[placed(m, i)];
+  for (int i = 0; i < m->n; i++) b[i] = rate[state_at(m, i)];
   solve_real(factors, m->n, m->band, pivot, b);
-  for (int i = 0; i < m->n; i++) rate[placed(m, i)] = b[i];
+  for (int i = 0; i < m->n; i++) rate[state_at(m, i)] = b[i];
 }
 
-/* In the weights. */
+/* Weighted norm. */
 static double weighed(const Collocation *m, const double *v) {
   double most = 0;
   for (int i = 0; i < m->moving; i++) {
@@ -112,7 +112,7 @@ static int residuals(Collocation *m, double h) {
   return 1;
 }
 
-/* One step of Newton's method; its size in the weights. */
+/* One step of Newton's method; its weighted norm. */
 static double correct(Collocation *m) {
   const Radau *t = m->method;
   int n = m->n, s = t->s;
@@ -123,7 +123,7 @@ static double correct(Collocation *m) {
     memset(own, 0, sizeof(double) * 2 * n);
     for (int i = 0; i < s; i++)
       for (int k = 0; k < n; k++) {
-        double value = m->residual[i * n + placed(m, k)];
+        double value = m->residual[i * n + state_at(m, k)];
         if (q) { own[2 * k] += left[2 * i] * value; own[2 * k + 1] += left[2 * i + 1] * value; }
         else own[k] += left[2 * i] * value;
       }
@@ -131,7 +131,7 @@ static double correct(Collocation *m) {
     else solve_real(m->factors, n, m->band, m->pivot, own);
     for (int i = 0; i < s; i++)
       for (int k = 0; k < n; k++)
-        change[i * n + placed(m, k)] +=
+        change[i * n + state_at(m, k)] +=
             q ? 2 * (right[2 * i] * own[2 * k] - right[2 * i + 1] * own[2 * k + 1]) : right[2 * i] * own[k];
   }
   for (int i = 0; i < s; i++) {
@@ -160,8 +160,7 @@ static int solve_stages(Collocation *m, double h) {
   return 0;
 }
 
-/* Coefficients of the polynomial through s rows of values that begins at zero: row i has power i + 1 of the part of
- * the step. */
+/* Coefficients of the polynomial through zero and s rows of values: row i has power i + 1 of the normalised time. */
 static void powers_of(const Radau *t, const double *values, int n, double *to) {
   for (int k = 0; k < t->s; k++)
     for (int i = 0; i < n; i++) {
@@ -171,7 +170,7 @@ static void powers_of(const Radau *t, const double *values, int n, double *to) {
     }
 }
 
-/* A guess: the last polynomial goes on, or nothing moves but the time. */
+/* Initial guess: the last polynomial extrapolated, or constant states. */
 static void guess_stages(Collocation *m, double h) {
   int n = m->n, s = m->method->s;
   double part = m->length > 0 ? h / m->length : INFINITY;
@@ -186,7 +185,7 @@ static void guess_stages(Collocation *m, double h) {
   }
 }
 
-/* The error of the polynomial, in the weights: its defect at the start, without what decays. */
+/* Weighted error of the polynomial: its filtered defect at the start. */
 static double error_of(Collocation *m, double h, int again) {
   int n = m->n, s = m->method->s;
   double *est = m->estimate, *x = m->work + n;
@@ -207,8 +206,7 @@ static double error_of(Collocation *m, double h, int again) {
   return INFINITY;
 }
 
-/* Whether the derivative at the end agrees: with that of the start Newton's method is blind where a step has left a
- * thin layer. */
+/* Whether the derivative at the end confirms the step: that of the start does not show that a step left a thin layer. */
 static int end_agrees(Collocation *m, double h) {
   int n = m->n, s = m->method->s;
   double *rest = m->estimate, *factors = m->factors + (int64_t)n * n;
@@ -234,7 +232,7 @@ static double next_length(const Collocation *m, double h, double error) {
   return h * factor;
 }
 
-/* Solve with a length, from the derivative that is known; 0 if Newton's method fails. */
+/* Solve with a length and the known derivative; 0 if Newton's method fails. */
 static int try_length(Collocation *m, double h) {
   m->band = 0;
   if (!factor_filter(m, m->jacobian, h, m->factors, m->pivot) || !factor_pairs(m, h)) return 0;
@@ -242,8 +240,7 @@ static int try_length(Collocation *m, double h) {
   return solve_stages(m, h);
 }
 
-/* Solve from x, where the field is known, with an allowed error, no longer than ``most``; the length, or 0 where that
- * is not above ``least``. */
+/* Solve a step from x with an allowed error; its length from ``least`` to ``most``, or 0. */
 static double collocate(Collocation *m, double most, double least) {
   if (!m->is_fresh && !m->jacobian_at(m->of, 0, m->x, m->jacobian)) return 0;
   m->is_fresh = 1;
@@ -273,7 +270,7 @@ static double collocate(Collocation *m, double most, double least) {
   return 0;
 }
 
-/* The next step begins at the end of this one, with the derivative there if it is known. */
+/* Begin the next step at the end of this one, with the derivative there if it is known. */
 static void go_on_from(Collocation *m, int is_known) {
   double *kept = m->jacobian;
   m->from = 1;
@@ -282,7 +279,7 @@ static void go_on_from(Collocation *m, int is_known) {
   m->end_jacobian = kept;
 }
 
-/* The equations of all stages, (A/h - J) dz = b, or their transpose: add those of a stage; 0 where they have no value. */
+/* Add a stage to the equations of all stages, (A/h - J) dz = b, or to their transpose; 0 where they have no value. */
 static int add_stage(Collocation *m, int stage, const double *x, double h, int transposed, double *matrix) {
   const Radau *t = m->method;
   int n = m->n, size = t->s * n;
@@ -295,9 +292,8 @@ static int add_stage(Collocation *m, int stage, const double *x, double h, int t
   return 1;
 }
 
-/* Move columns of derivatives by the step whose stages are known: the exact derivatives of the discrete step, each stage
- * with its own J. ``push`` gives the rates of all columns at a stage, ``apart`` numbers after one another. 0 where that
- * is not possible. */
+/* Advance columns by the exact derivatives of the discrete step, each stage with its own J. ``push`` gives the rates of all
+ * columns at a stage, with the stride ``apart``. 0 where that is not possible. */
 static int move_through_stages(Collocation *m, double h, int64_t columns, double *y, void *with,
                                void (*push)(void *with, int stage, const double *x, double *rates, int64_t apart)) {
   int n = m->n, s = m->method->s, size = s * n, is_solved = 1;
@@ -320,7 +316,7 @@ static int move_through_stages(Collocation *m, double h, int64_t columns, double
   return is_solved;
 }
 
-/* The fastest rate, renewed by products with the field's derivative. */
+/* Update the fastest rate by power iteration with the field's derivative. */
 static double fastest(Collocation *m, const double *jacobian, int pairs) {
   int n = m->n;
   double *v = m->fast, *next = m->work, rho = 0;
@@ -337,10 +333,10 @@ static double fastest(Collocation *m, const double *jacobian, int pairs) {
   return rho;
 }
 
-/* The part of the longest Taylor step that a decay rate allows, in units of its inverse. */
+/* The longest Taylor step at a decay rate, in units of its inverse. */
 static double longest_decay(double tol) { return 3 - 0.5 * log10(tol); }
 
-/* Steps anew, of about eight times the length of a Taylor step that a decay rate may hold; whether it does. */
+/* Restart with about eight times the length of a Taylor step; whether a decay rate limits Taylor steps. */
 static int begin_lengths(Collocation *m, double h, double tol) {
   m->h = EIGHTFOLD * h;
   m->length = 0;
@@ -349,7 +345,7 @@ static int begin_lengths(Collocation *m, double h, double tol) {
   return tol > 0 && h * fastest(m, m->jacobian, 8) > HELD_PART * longest_decay(tol);
 }
 
-/* Write s coefficients after the first of series, for powers of the time. */
+/* Write coefficients 1 to s of series, for powers of the time. */
 static void write_powers(const Radau *t, const double *powers, int n, double h, int stride, double *series) {
   double part = 1;
   for (int k = 0; k < t->s; k++) {
@@ -360,8 +356,7 @@ static void write_powers(const Radau *t, const double *powers, int n, double h, 
     memset(series + (int64_t)i * stride + t->s + 1, 0, sizeof(double) * (stride - t->s - 1));
 }
 
-/* Coefficients after the first of series of n functions, by powers of the time, from their values at the stages less those
- * at the start; room for as many powers is behind these. */
+/* Coefficients 1 to s of series of n functions from their differences at the stages, which have as much room after them. */
 static void interpolate(const Radau *t, double *values, int n, double h, int stride, double *series) {
   double *powers = values + (int64_t)t->s * n;
   powers_of(t, values, n, powers);

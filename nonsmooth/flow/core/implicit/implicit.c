@@ -1,13 +1,13 @@
-/* Implicit steps of a run, where a motion decays faster than it changes.
+/* Implicit steps of a run, for stiff systems.
  *
- * Multipliers of what slides follow from the layer in every stage. The polynomial through the stages has the place of
- * a Taylor polynomial; guards are interpolated at the same nodes. An event ends a step that is made anew with its
- * length, so that it is a stage.
+ * Sliding multipliers follow from the layer in every stage. The polynomial through the stages replaces the Taylor
+ * polynomial; guards are interpolated at the same nodes. A step with an event is repeated with the event as its end, so
+ * that the event is a stage.
  */
 
-/* The steps; multipliers at the stages, values of guards there; the program of the field's derivatives and parts of
- * it. How many held steps are waited for, steps in a row that were not worth it, those since implicit steps began;
- * events before the leg that goes on; modes in which steps are implicit. */
+/* Collocation; multipliers and guards at the stages; the program of the field's derivatives and parts of it. Counts: limited
+ * Taylor steps to wait for, consecutive implicit steps that cost more, implicit steps, events before the present leg; modes
+ * in which steps are implicit. */
 struct Implicit {
   Collocation c;
   int32_t wait, idle, steps, is_end_known, modes;
@@ -44,7 +44,7 @@ static int rate_at_stage(void *of, int stage, const double *x, double *rate) {
   return finite_all(rate, r->n);
 }
 
-/* The field's derivative by differences, where no program has it: it only steers Newton's method. */
+/* The field's derivative by differences, where there is no program: only Newton's method uses it. */
 static int differences(Run *r, int stage, const double *x, double *jacobian) {
   int n = r->n;
   double *rate = r->implicit->c.work, *moved = rate + n, *there = moved + n, most = largest_of(x, n);
@@ -59,7 +59,7 @@ static int differences(Run *r, int stage, const double *x, double *jacobian) {
   return finite_all(jacobian, n * n);
 }
 
-/* The field's derivative by the states, multipliers of what slides following them. */
+/* The field's derivative by the states, with sliding multipliers as their functions. */
 static int jacobian_at_stage(void *of, int stage, const double *x, double *jacobian) {
   Run *r = of;
   Implicit *m = r->implicit;
@@ -104,14 +104,14 @@ static int jacobian_at_stage(void *of, int stage, const double *x, double *jacob
   return 1;
 }
 
-/* What follows from the parameters. */
+/* Evaluate the parts that depend on parameters only. */
 static void prepare_implicit(Run *r) {
   if (!r->implicit || !r->s->implicit) return;
   series_prepare(r->s->implicit, r->p, r->implicit->program);
   pairs_begin(r->s->implicit->size, stride_of_implicit(r), r->begun, r->implicit->program);
 }
 
-/* Memory for implicit steps; 0 where there is none. */
+/* Allocate implicit steps; 0 where that fails. */
 static int begin_implicit(Run *r) {
   Implicit *m = r->implicit;
   if (m) return 1;
@@ -119,7 +119,7 @@ static int begin_implicit(Run *r) {
   if (!m) return 0;
   m->c = (Collocation){.method = RADAU + (r->o.rtol < SEVEN_STAGES && r->order >= 7), .n = r->n};
   m->c.moving = r->s->dimension;
-  m->c.places = r->s->places;
+  m->c.ordering = r->s->ordering;
   m->c.of = r;
   m->c.rtol = r->o.rtol;
   m->c.rate_at = rate_at_stage;
@@ -176,7 +176,7 @@ static void write_step(Run *r, Expansion *e, double h) {
   e->end = m->c.end;
 }
 
-/* Whether guards that may vanish are those of the polynomials, between the stages. */
+/* Whether guards that may vanish agree with their polynomials between the stages. */
 static int guards_agree(Run *r, Expansion *e, double h) {
   Implicit *m = r->implicit;
   const Radau *t = m->c.method;
@@ -210,7 +210,7 @@ static void expand_first(Run *r, const double *x, const double *unknowns, Expans
   r->order = order;
 }
 
-/* A step from the present state, of which an expansion is known. */
+/* Begin a step from the present state with a known expansion. */
 static void begin_stages(Run *r, const Expansion *e) {
   Implicit *m = r->implicit;
   memcpy(m->c.x, r->x, sizeof(double) * r->n);
@@ -218,7 +218,7 @@ static void begin_stages(Run *r, const Expansion *e) {
   for (int i = 0; i < r->n; i++) m->c.start_rate[i] = e->states[(int64_t)i * r->stride + 1];
 }
 
-/* What a step begins with: first coefficients of guards, what is allowed, the field. */
+/* Begin a step: first coefficients of guards, tolerances, the field. */
 static int begin_step(Run *r, Expansion *e) {
   Collocation *m = &r->implicit->c;
   expand_first(r, r->x, r->unknowns, e);
@@ -228,7 +228,7 @@ static int begin_step(Run *r, Expansion *e) {
   return 1;
 }
 
-/* A step from the present state; its length, or 0 where there is none. */
+/* Make a step from the present state; its length, or 0. */
 static double implicit_step(Run *r, Expansion *e, double most) {
   Implicit *m = r->implicit;
   if (!begin_step(r, e)) return 0;
@@ -244,7 +244,7 @@ static double implicit_step(Run *r, Expansion *e, double most) {
   return 0;
 }
 
-/* Make the step anew with the length at which a guard is zero, or with a given one where there is none. */
+/* Repeat the step with the length at which a guard is zero, or with a given length. */
 static int end_at(Run *r, Expansion *e, int row, double *dt) {
   Implicit *m = r->implicit;
   Collocation *c = &m->c;

@@ -1,5 +1,5 @@
-/* Flows of known durations that decay faster than they change: implicit steps of legs (implicit_legs.c), of a run without
- * elements whose atoms are the functions that are watched.
+/* Stiff flows of known durations: implicit steps of legs (implicit_legs.c), of a run without elements whose atoms are the
+ * monitored functions.
  */
 
 /* A flow as such a leg; whether its steps are implicit. */
@@ -24,7 +24,7 @@ static void end_flow(Flow *w) {
   w->implicit = 0;
 }
 
-/* Memory for implicit steps; 0 where there is none. */
+/* Allocate implicit steps; 0 where that fails. */
 static int begin_flow(Flow *w) {
   const Field *f = w->field;
   ImplicitFlow *m = w->implicit = calloc(1, sizeof(ImplicitFlow) + sizeof(int32_t) * (f->watched + 1 + f->columns));
@@ -47,7 +47,7 @@ static int begin_flow(Flow *w) {
   return 1;
 }
 
-/* The leg goes on from a state. */
+/* Continue the leg from a state. */
 static void enter_flow(const Flow *w, const double *z) {
   ImplicitFlow *m = w->implicit;
   memcpy(m->r->x, z, sizeof(double) * w->field->n);
@@ -55,7 +55,7 @@ static void enter_flow(const Flow *w, const double *z) {
   m->l.left = w->left;
 }
 
-/* The length of an implicit step, whose polynomials are those of the flow; 0 where there is none. */
+/* Make an implicit step, which writes the polynomials of the flow; its length, or 0. */
 static double implicit_flow_step(Flow *w, const double *z) {
   ImplicitFlow *m = w->implicit;
   Run *r = m->r;
@@ -69,7 +69,7 @@ static double implicit_flow_step(Flow *w, const double *z) {
   return h;
 }
 
-/* The length of the next step, of the kind that costs less; not above zero where there is none. */
+/* The length of the next step, of the cheaper kind; zero or negative where there is none. */
 static double next_step(Flow *w, const double *z, int64_t step) {
   const Field *f = w->field;
   ImplicitFlow *m = w->implicit;
@@ -77,7 +77,7 @@ static double next_step(Flow *w, const double *z, int64_t step) {
   double h = m && m->is_used ? implicit_flow_step(w, z) : 0;
   if (h > 0) return h;
   h = expand_flow(w, z) ? flow_step(w) : 0;
-  if (step % LOOK_AGAIN < LOOK_AGAIN - 1 || !(w->left > FAR_AWAY * h) || w->sign < 0 || !is_whole) return h;
+  if (step % CHECK_AGAIN < CHECK_AGAIN - 1 || !(w->left > FAR_AWAY * h) || w->sign < 0 || !is_whole) return h;
   if (RADAU[1].s * f->n > MOST_STATES / 2 || !(m || begin_flow(w))) return h;
   m = w->implicit;
   enter_flow(w, z);
@@ -96,7 +96,7 @@ static void make_step(Flow *w, double h, double *z) {
   w->left = h == w->left ? 0 : w->left - h;
 }
 
-/* A flow to its end, by the steps that cost less. */
+/* Integrate a flow to its end by the cheaper steps. */
 static void run_whole_flow(Flow *w, double *z, int64_t most_steps) {
   for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
     double h = next_step(w, z, step);

@@ -1,8 +1,8 @@
-/* Implicit steps of legs of known duration, where a motion decays faster than it changes (implicit.c).
+/* Implicit steps of legs of known duration, for stiff systems (implicit.c).
  * Rows are pulled back through the transposed equations of the stages.
  */
 
-/* Whether a decay rate holds steps of such a length, so that implicit ones are tried. */
+/* Whether a decay rate limits steps of this length, so that implicit ones are tried. */
 static int is_step_held(Run *r, const Leg *l, double h) {
   if (l->duration < 0 || !r->s->implicit || !can_collocate(r) || r->order < RADAU[1].s || RADAU[1].s * r->n > MOST_STATES / 2) return 0;
   if (!(l->left > FAR_AWAY * h) || !begin_implicit(r)) return 0;
@@ -44,7 +44,7 @@ static void push_at_stage(void *with, int stage, const double *x, double *rates,
   }
 }
 
-/* Move state and columns by the step whose stages are known; 0 where that is not possible. */
+/* Advance state and columns by the step with known stages; 0 where that is not possible. */
 static int move_implicit(Run *r, Leg *l, Slopes *g, double h, double begun) {
   Implicit *m = r->implicit;
   Stages of = {r, l, g, begun};
@@ -56,7 +56,7 @@ static int move_implicit(Run *r, Leg *l, Slopes *g, double h, double begun) {
   return is_solved;
 }
 
-/* From the end of a recorded implicit step, and samples there, to its start; 0 where that is not possible. */
+/* Pull a row back from the end of a recorded implicit step, with samples there, to its start; 0 where that fails. */
 static int pull_implicit(Run *r, Leg *l, Slopes *g, const double *row, int64_t *sample) {
   const Variation *v = g->v;
   const Radau *t = RADAU + 1;

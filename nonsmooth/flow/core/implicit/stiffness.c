@@ -1,7 +1,7 @@
-/* When steps are implicit: where a decay rate holds Taylor steps, and an implicit step costs less. */
+/* Choice of implicit steps: where a decay rate limits Taylor steps and an implicit step costs less. */
 
 static int can_collocate(const Run *r) {
-  return r->o.method != METHOD_TAYLOR && !r->s->sets && !r->has_roots && !r->repelling && r->n <= MOST_STATES;
+  return r->o.method != METHOD_TAYLOR && !r->s->sets && !r->has_roots && r->n <= MOST_STATES;
 }
 
 static void set_known(Implicit *m, int mode, int8_t known) {
@@ -16,7 +16,7 @@ static void set_known(Implicit *m, int mode, int8_t known) {
   m->known[mode] = known;
 }
 
-/* Whether the next step is implicit: never the first of a leg, in which guards have known zeros. */
+/* Whether the next step is implicit. The first of a leg is not: its guards have known zeros. */
 static int is_implicit(Run *r) {
   Implicit *m = r->implicit;
   if (r->since <= 0 || !can_collocate(r)) return 0;
@@ -39,8 +39,8 @@ static double cost_ratio(const Run *r) {
   return taylor / (30 * rules + linear + 4 * s * s * n);
 }
 
-/* Whether a decay rate holds a Taylor step, as so many before. Where that takes the program of derivatives the step is
- * made once it is there. */
+/* Start implicit steps where a decay rate has limited enough Taylor steps. If the program of derivatives is missing, the
+ * step waits for it. */
 static void watch_decay(Run *r, const Expansion *e, double h) {
   Implicit *m = r->implicit;
   double last = 0, before = 0, limit;
@@ -67,7 +67,7 @@ static void watch_decay(Run *r, const Expansion *e, double h) {
   else m->wait *= 2;
 }
 
-/* Go back to Taylor steps where those would be cheaper, or where no implicit step is possible. */
+/* Return to Taylor steps where those are cheaper, or where no implicit step is possible. */
 static void watch_cost(Run *r, double h) {
   Implicit *m = r->implicit;
   if (h > 0 && r->o.method == METHOD_AUTO) {

@@ -1,7 +1,7 @@
 /* Sets of codimension two and more in a run ----------------------------------------------------------------- */
 
-/* The law at a state with multipliers of the functions ``own`` (or 0) that are given; what slides beside them is listed
- * as r->pending. Their number. */
+/* Evaluate the law at a state with given multipliers of the functions ``own`` (or 0); list the other sliding functions as
+ * r->pending and return their number. */
 static int beside(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
                   const double *lam) {
   int w = r->width, count = 0;
@@ -17,7 +17,7 @@ static int beside(Run *r, const int8_t *letter, const double *x, const double *u
   return count;
 }
 
-/* The unknowns of what slides beside, in place of rates b that they take away; 0 where there are none. */
+/* Solve for the unknowns of the other sliding functions that cancel rates b, in place of b; 0 where there are none. */
 static int balance(Run *r, int count, double *b) {
   double *d = r->work;
   for (int i = 0; i < count; i++)
@@ -25,7 +25,7 @@ static int balance(Run *r, int count, double *b) {
   return !count || solve_any(d, b, count, INFINITY, d + (int64_t)count * count, r->decision->pivot);
 }
 
-/* h' = a - M lambda of the functions ``own``, with what else slides eliminated; 0 where that is impossible. */
+/* h' = a - M lambda of the functions ``own``, the other sliding functions eliminated; 0 where that is impossible. */
 static int freeze(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
                   double *a, double *m) {
   int w = r->width, count = beside(r, letter, x, unknowns, own, k, 0);
@@ -48,7 +48,7 @@ static int freeze(Run *r, const int8_t *letter, const double *x, const double *u
   return finite_all(a, k) && finite_all(m, k * k);
 }
 
-/* The field with given multipliers of a set, and what slides elsewhere in balance. */
+/* The field with given multipliers of a set, and sliding multipliers of the other functions. */
 static int field_with(Run *r, const int8_t *letter, const double *x, const double *unknowns, const int32_t *own, int k,
                       const double *lam, double *field) {
   int count = beside(r, letter, x, unknowns, own, k, lam);
@@ -81,11 +81,14 @@ static void jump(Run *r, const double *rate, double dt) {
   note(r);
 }
 
-/* Time to a set below which coefficients of series are too large for numbers. */
+/* Time to a point without a series below which coefficients of series overflow. */
 static double shortest(const Run *r) { return pow(OVERFLOW, -1.0 / r->order); }
 
-/* Whether the state is on a set, or as close as no series can begin; after surface_values. */
-static int is_met(Run *r, const int8_t *letter, int f, const double *h, const double *scales_of) {
+/* The shortest time in which a run comes close to such a point: shorter ones are rounding, or have no series. */
+static double least_time(const Run *r) { return larger(shortest(r), TENFOLD * SHORTEST * time_scale(r)); }
+
+/* Whether the state is on a set, or too close to it for a series; after surface_values. */
+static int is_reached(Run *r, const int8_t *letter, int f, const double *h, const double *scales_of) {
   int k = size_of(r, f);
   int32_t own[3];
   double a[3], m[9], scale = scale_of_set(r, f, scales_of), radius = length_of(h + f, k), speed = 0;
@@ -96,7 +99,7 @@ static int is_met(Run *r, const int8_t *letter, int f, const double *h, const do
   return radius < shortest(r) * (length_of(a, k) + sqrt(speed));
 }
 
-/* a of a set that is not zero from its present rates: loads that are not determined are the present ones. */
+/* a of a set off its zero from its present rates, so that undetermined loads keep their present values. */
 static void keep_loads(Run *r, const int32_t *own, int k, double *a, const double *m) {
   aim(r, r->letter, r->x, r->unknowns);
   error_scales(r, r->x, held_of(r, r->letter), r->unknowns);
@@ -106,14 +109,14 @@ static void keep_loads(Run *r, const int32_t *own, int k, double *a, const doubl
   }
 }
 
-/* |h| has fallen tenfold, or is small: the set is reached or passed now, or the test is repeated nearer. What has
- * fallen to rounding is zero, whatever its direction says. */
+/* Treat a set whose |h| has fallen tenfold or is small: reach it, pass it, or repeat the test nearer. |h| below rounding is
+ * zero, whatever its direction. */
 static void near_set(Run *r, int row, int fell) {
   int f = r->now.index[row], k = size_of(r, f), n = r->n, before = r->mode;
   int32_t own[3];
   double h[3], a[3], m[9], u[3], b[3], mean[3], frozen[3], dt, c = 0;
-  r->met = (Met){NEAR_GUARD, f, 0};
-  if (r->letter[f] == 0) return; /* friction's limit has fallen: the next step sees its digits */
+  r->guard = (Guard){NEAR_GUARD, f, 0};
+  if (r->letter[f] == 0) return; /* friction's limit has fallen: the next step resolves its digits */
   const double *height = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
   for (int i = 0; i < k; i++) {
     own[i] = f + i;
@@ -140,7 +143,7 @@ static void near_set(Run *r, int row, int fell) {
     square += a[i] * a[i];
   }
   dt = hits && same ? (c * radius + along) / (c * c - square) : rate < 0 ? radius / -rate : INFINITY;
-  at_floor |= dt < larger(shortest(r), TENFOLD * SHORTEST * time_scale(r));
+  at_floor |= dt < least_time(r);
   if (!hits && !at_floor) return;
   if (!(dt > 0 && dt < INFINITY)) {
     if (!(at_floor && (hits || fell))) return;
@@ -173,7 +176,7 @@ static void near_set(Run *r, int row, int fell) {
     }
     if (bend <= radius) jump(r, field, smaller(dt, r->o.t_end - r->t - r->t_low));
   }
-  if (r->s->sets > 1 || r->c) { /* others may be zero there too; what is closed stays so along a line */
+  if (r->s->sets > 1 || r->c) { /* others may be zero there too; closed contacts stay so along a line */
     int held = kept_by(r, r->letter, r->involved);
     for (int i = 0; i < k; i++) r->involved[held++] = own[i];
     project(r, r->involved, held);
@@ -188,7 +191,7 @@ static void near_set(Run *r, int row, int fell) {
   if (choose(r, r->start, 0, 0) && r->mode != before) event(r, change_kind(r, before, r->mode), before, row, r->x);
 }
 
-/* Sets that were left a step ago: h is carried along until it is far above rounding. */
+/* Integrate h of sets that were left a step ago until it is far above rounding. */
 static void after_step(Run *r) {
   int changed = 0, carried = 0;
   double *level = r->later;
@@ -209,9 +212,10 @@ static void after_step(Run *r) {
   if (carried) project_to(r, r->involved, carried, level);
   if (!changed) return;
   enter_mode(r);
+  improve(r, &r->now, r->x, r->unknowns, 2); /* the direction is that of the state again */
 }
 
-/* Nodes of a program that are zero whatever moves, from the values of those that do not. */
+/* Find nodes of a program that are zero for all states, from the values of the constant ones. */
 static void find_zeros(const Values *t, const double *w, int8_t *zero) {
   memset(zero, 0, t->size);
   for (int32_t k = 0; k < t->still_count; k++) zero[t->still[k]] = w[t->still[k]] == 0;
@@ -229,7 +233,7 @@ static void find_zeros(const Values *t, const double *w, int8_t *zero) {
   }
 }
 
-/* Sets whose multiplier does not enter the field with these parameters: no friction. */
+/* Find sets whose multiplier does not enter the field with these parameters: no friction. */
 static void find_idle(Run *r) {
   const Entries *column = &r->s->column;
   if (!r->s->sets) return;
@@ -243,8 +247,8 @@ static void find_idle(Run *r) {
   EACH_SET(r, s) r->idle[s] |= r->vanishes[r->s->point.output[r->width + s]];
 }
 
-/* After a step that ended with no guard: sets that are close may be reached to rounding. */
-static void look_at_sets(Run *r) {
+/* After a step without an event: find sets that are reached to rounding. */
+static void check_sets(Run *r) {
   for (int row = 0; row < r->now.rows; row++) {
     int f = r->now.index[row], k = size_of(r, f);
     if (r->now.kind[row] != NEAR_GUARD || r->letter[f] < OFF || r->drop[row]) continue;

@@ -1,33 +1,33 @@
-/* One block of elements that act on one another, at one order: w = a - A nu, and w_i in the normal cone of the set of
- * nu_i. What decide.c asks of it: one solution by pivoting, Lemke's method or Gauss and Seidel, a point inside all
- * solutions, or all of them by enumeration. Nothing here knows of a run.
+/* One block of coupled elements, at one order: w = a - A nu, and w_i in the normal cone of the set of nu_i. One solution by
+ * pivoting, Lemke's method or Gauss-Seidel iteration, a point inside all solutions, or all of them by enumeration.
+ * Independent of the run; used by decide.c.
  *
  * Source: Cottle, Pang & Stone 1992, The Linear Complementarity Problem.
  */
 
-/* What is known of an element after some orders: nothing; nu at a bound and w = 0 so far; decided. A contact that
- * is open is BELOW. */
+/* The state of an element after some orders: undecided; nu at a bound and w = 0 so far; decided. An open contact is
+ * BELOW. */
 enum { UNDECIDED, AT_TOP, AT_BOTTOM, INSIDE, ABOVE, BELOW };
 
-/* Where nu is in a trial: inside its set with w = 0, or at a bound. */
+/* The position of nu in a trial: inside its set with w = 0, or at a bound. */
 enum { HELD, TOP, BOTTOM };
 
-enum { MOST_TRIED = 8, TRIED = 1 << MOST_TRIED, DIODES_TRIED = 1 << 12, MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4 };
+enum { MOST_TRIED = 8, TRIED = 1 << MOST_TRIED, DIODES_TRIED = 1 << 12, MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4, LIMITS = 6 };
 
-/* One block of elements that act on one another, with copies of its part of the law at one order. */
+/* One block of coupled elements, with copies of its part of the law at one order. */
 typedef struct {
-  int size, first, is_coupled, is_joined; /* is_joined: its rows may depend on one another by joints */
+  int size, is_coupled, is_joined, may_end; /* joints may make its rows dependent; at a limit it is decided by later times */
   double tie; /* part of terms that is zero */
   const int32_t *own;
   double *a, *b, *matrix, *share, *floor; /* share: bounds by the reactions in the block; floor: rounding of w */
-  double *room; /* rounding of nu where the diagonal does not say it, or NULL */
+  double *room; /* rounding of nu where the diagonal does not determine it, or NULL */
   int8_t *state, *is_contact;
   const int8_t *span; /* of a vector multiplier the number of its rows, at the first, and -1 at the others; or none */
 } Block;
 
 /* Lemke's method ------------------------------------------------------------------------------------ */
 
-/* Whether row i leaves before row j: the least ratio, ties by the rows of the inverse. */
+/* Whether row i leaves before row j: lexicographic minimum ratio test. */
 static int leaves_first(const double *t, int width, int n, int i, int j, int column) {
   const double *one = t + (int64_t)i * width, *two = t + (int64_t)j * width;
   double x = one[width - 1] / one[column], y = two[width - 1] / two[column];
@@ -74,7 +74,7 @@ static int lemke(const double *m, const double *q, int n, uint32_t seed, double 
     row = -1;
     for (int i = 0; i < n; i++)
       if (t[(int64_t)i * width + column] > SINGULAR && (row < 0 || leaves_first(t, width, n, i, row, column))) row = i;
-    for (int i = 0; i < n; i++) /* the covering variable leaves as soon as it may */
+    for (int i = 0; i < n; i++) /* the covering variable leaves at the first opportunity */
       if (row >= 0 && basis[i] == 2 * n && i != row && t[(int64_t)i * width + column] > SINGULAR) {
         const double *one = t + (int64_t)i * width, *two = t + (int64_t)row * width;
         if (one[width - 1] / one[column] <= two[width - 1] / two[column]) row = i;
@@ -84,13 +84,13 @@ static int lemke(const double *m, const double *q, int n, uint32_t seed, double 
   return 0;
 }
 
-/* The same with rows and columns of one size; m and q are lost. */
+/* Lemke's method after scaling of rows and columns; m and q are overwritten. */
 static int lemke_scaled(double *m, double *q, int n, double *z, double *work, int32_t *basis) {
   double *unit = work, largest;
   equilibrate(m, n, n, n, q, unit);
   largest = largest_of(q, n);
   if (largest > 0) for (int i = 0; i < n; i++) q[i] /= largest;
-  uint32_t seed = 1; /* of the covering vector: rounding in ties may lead to a ray */
+  uint32_t seed = 1; /* of the covering vector: rounding in ties may end on a ray */
   while (!lemke(m, q, n, seed, z, work + n, basis)) if (seed++ == COVERINGS) return 0;
   for (int j = 0; j < n; j++) z[j] *= largest / unit[j];
   return 1;
@@ -117,7 +117,7 @@ static double rate_of(const Block *k, int i, const double *nu, double *terms) {
   return w;
 }
 
-/* What w_i and nu_i are zero to. */
+/* Tolerances at which w_i and nu_i count as zero. */
 static double zero_of(const Block *k, int i, double terms) { return larger(k->floor[i], k->tie * terms); }
 static double room_zero(const Block *k, int i, double zero, double bound) {
   double own = fabs(k->matrix[i * (k->size + 1)]), most = k->tie * fabs(bound);
@@ -139,8 +139,7 @@ static int allows(const Block *k, int i, int position) {
   }
 }
 
-/* nu of positions, with that of vectors at their bounds as it is; 0 where there is none. ``work`` has room for
- * 3 n^2 + 4 n. */
+/* nu for given positions, vectors at their bounds unchanged; 0 where there is none. ``work`` has room for 3 n^2 + 4 n. */
 static int place_unknowns(const Block *k, const int8_t *position, double *nu, double *work, int32_t *pivot) {
   int n = k->size;
   double *m = work;
@@ -160,8 +159,8 @@ static int place_unknowns(const Block *k, const int8_t *position, double *nu, do
   return solve_any(m, nu, n, TIED, work + (int64_t)n * n, pivot);
 }
 
-/* The position that a vector takes next, from its first row on: inside ``room``, or w along nu. */
-static int wanted_of_vector(const Block *k, int i, int position, const double *nu, double zero, double room) {
+/* The next position of a vector, given its first row: inside ``room``, or w along nu. */
+static int next_of_vector(const Block *k, int i, int position, const double *nu, double zero, double room) {
   double along = 0, terms;
   if (k->span[i] < 0 || !allows(k, i, position == HELD ? TOP : HELD)) return position;
   if (position == HELD) return length_of(nu + i, k->span[i]) > room ? TOP : HELD;
@@ -169,11 +168,11 @@ static int wanted_of_vector(const Block *k, int i, int position, const double *n
   return along < -zero ? HELD : TOP;
 }
 
-/* The position that an element takes next: its own where that is consistent. */
-static int wanted(const Block *k, int i, int position, const double *nu) {
+/* The next position of an element: its present one if that is consistent. */
+static int next_position(const Block *k, int i, int position, const double *nu) {
   double terms, w = rate_of(k, i, nu, &terms), zero = zero_of(k, i, terms), bound = bound_of(k, i, nu);
   double low = k->is_contact[i] ? 0 : -bound, room = room_zero(k, i, zero, bound);
-  if (span_of(k, i)) return wanted_of_vector(k, i, position, nu, zero * bound, bound + room);
+  if (span_of(k, i)) return next_of_vector(k, i, position, nu, zero * bound, bound + room);
   if (position == HELD) {
     if (allows(k, i, TOP) && nu[i] > bound + room) return TOP;
     if (allows(k, i, BOTTOM) && nu[i] < low - room) return BOTTOM;
@@ -185,28 +184,28 @@ static int wanted(const Block *k, int i, int position, const double *nu) {
   return is_empty ? position == TOP ? BOTTOM : TOP : HELD;
 }
 
-/* Principal pivoting: all that are not consistent change, one at a time where that does not help. */
+/* Principal pivoting: all inconsistent elements change, or one at a time where that does not help. */
 static int pivot_block(const Block *k, int8_t *position, double *nu, int most, double *work, int32_t *pivot) {
   int best = k->size + 1, patience = 10;
   for (int count = 0; count < most; count++) {
     if (!place_unknowns(k, position, nu, work, pivot)) return 0;
     int wrong = 0, first = -1, next = 0;
     for (int i = 0; i < k->size; i++) {
-      int want = wanted(k, i, position[i], nu);
-      if (want != position[i] && wrong++ == 0) { first = i; next = want; }
+      int other = next_position(k, i, position[i], nu);
+      if (other != position[i] && wrong++ == 0) { first = i; next = other; }
     }
     if (!wrong) return 1;
     if (wrong < best) { best = wrong; patience = 10; }
     if (--patience > 0) {
-      for (int i = 0; i < k->size; i++) pivot[i] = wanted(k, i, position[i], nu);
+      for (int i = 0; i < k->size; i++) pivot[i] = next_position(k, i, position[i], nu);
       for (int i = 0; i < k->size; i++) position[i] = (int8_t)pivot[i];
     } else position[first] = (int8_t)next;
   }
   return 0;
 }
 
-/* nu, and what has to be positive beside z, of variables z that are: distances to a bound, for two bounds that from
- * the lower one and how far w is positive; two parts of nu where w = 0. The number of variables. */
+/* Standard form with variables z >= 0: nu, and ``beside`` >= 0 complementary to z. z is the distance to a bound; for two
+ * bounds that to the lower one and the positive part of w; two parts of nu where w = 0. The number of variables. */
 static int standard_form(const Block *k, const double *z, double *nu, double *beside) {
   int at = 0, n = k->size;
   for (int contacts = 1; contacts >= 0; contacts--) /* bounds depend on contacts */
@@ -249,7 +248,7 @@ static int lemke_block(const Block *k, double *nu, double *work, int32_t *pivot)
   return finite_all(nu, k->size);
 }
 
-/* What a solution says of an element; ``part`` of its terms is zero, if that is more than rounding. */
+/* The class of an element in a solution; ``part`` of its terms counts as zero, if that is more than rounding. */
 static int class_of(const Block *k, int i, const double *nu, double part) {
   double terms, w = rate_of(k, i, nu, &terms), bound = bound_of(k, i, nu), zero = larger(zero_of(k, i, terms), part * terms);
   double room = larger(room_zero(k, i, zero, bound), part * fabs(bound));
@@ -264,7 +263,7 @@ static int class_of(const Block *k, int i, const double *nu, double part) {
   return INSIDE;
 }
 
-/* The same of a vector, from its first row on. */
+/* The class of a vector, given its first row. */
 static int class_of_vector(const Block *k, int i, const double *nu, double part) {
   double w[3], terms, zero = 0, room = 0, bound = bound_of(k, i, nu);
   int size = k->span[i];
@@ -275,7 +274,7 @@ static int class_of_vector(const Block *k, int i, const double *nu, double part)
     room = larger(larger(room_zero(k, i + j, own, bound), part * bound), room);
   }
   if (k->state[i] >= INSIDE) return k->state[i];
-  if (k->is_coupled) room = VANISHES * bound; /* loads are shared anew until all are at their bounds */
+  if (k->is_coupled) room = larger(part, VANISHES) * bound; /* loads are redistributed until all are at their bounds */
   if (length_of(w, size) > zero) return ABOVE;
   if (bound <= room) return UNDECIDED;
   return bound - length_of(nu + i, size) <= room ? AT_TOP : INSIDE;
@@ -305,7 +304,7 @@ static int maximise(const double *g, const double *s, const double *c, double ca
   return 1;
 }
 
-/* Distances of nu from the bounds that are open to it (rows), where w is zero, and whose they are. */
+/* Distances of nu from its bounds where w is zero (rows), and their elements. */
 static int distances(const Block *k, const double *nu, const int8_t *is_moving, double *s, int32_t *of) {
   int rows = 0;
   for (int i = 0; i < k->size; i++) {
@@ -317,7 +316,7 @@ static int distances(const Block *k, const double *nu, const int8_t *is_moving, 
   return rows;
 }
 
-/* How large an unknown can be where it has no bound: it takes what others bring. */
+/* The largest size of an unbounded unknown, from the other unknowns. */
 static double reach_of(const Block *k, const double *nu, int i) {
   double reach = 0, own = 0;
   if (!k->is_contact[i]) return 0;
@@ -327,8 +326,8 @@ static double reach_of(const Block *k, const double *nu, int i) {
   return reach;
 }
 
-/* Move a solution, whose w is the only one, inside all solutions: the mean of those that are farthest from a bound.
- * Room as lemke_block's and 40 n^2 + 40 n. The dimension of the solutions is returned. */
+/* Move a solution, whose w is unique, inside all solutions: the mean of those that are farthest from a bound. Room as
+ * lemke_block's and 40 n^2 + 40 n. Returns the dimension of the set of solutions. */
 static int move_inside(const Block *k, double *nu, double *work, int32_t *pivot) {
   int n = k->size, rows = 0, found = 1;
   int8_t *is_moving = (int8_t *)work;
@@ -376,7 +375,7 @@ static int move_inside(const Block *k, double *nu, double *work, int32_t *pivot)
 
 /* All solutions of a block ---------------------------------------------------------------------------- */
 
-/* Whether two solutions are one, or have the same w. */
+/* Whether two solutions are equal, or have the same w. */
 static int is_same(const Block *k, const double *one, const double *two, int only_rates) {
   for (int i = 0; i < k->size; i++) {
     double terms, more, w = rate_of(k, i, one, &terms), v = rate_of(k, i, two, &more);
@@ -389,7 +388,7 @@ static int is_same(const Block *k, const double *one, const double *two, int onl
   return 1;
 }
 
-/* Solutions of positions; more than one where a vector is at its bound. */
+/* Solutions for given positions; more than one where a vector is at its bound. */
 static int solutions_at(const Block *k, const int8_t *position, double *found, double *work, int32_t *pivot) {
   int n = k->size, first = -1, size, count;
   double base[MOST_ENUMERATED], moved[3][MOST_ENUMERATED], a[3], m[9], u[6][3], terms;
@@ -418,8 +417,7 @@ static int solutions_at(const Block *k, const int8_t *position, double *found, d
   return count;
 }
 
-/* All positions are tried; of solutions with the same w the mean. They are written to ``found`` (MOST_SOLUTIONS,
- * n); their number is returned. */
+/* Try all positions; solutions with the same w are averaged. Writes ``found`` (MOST_SOLUTIONS, n), returns their number. */
 static int enumerate(const Block *k, double *found, double *work, int32_t *pivot) {
   int n = k->size, count = 0, groups = 0, in_group[MOST_SOLUTIONS];
   int8_t position[MOST_ENUMERATED];
@@ -437,7 +435,7 @@ static int enumerate(const Block *k, double *found, double *work, int32_t *pivot
       const double *nu = each + (some - 1) * n;
       fits = 1;
       for (int i = 0; i < n && fits; i++) {
-        fits = wanted(k, i, position[i], nu) == position[i];
+        fits = next_position(k, i, position[i], nu) == position[i];
         double bound = bound_of(k, i, nu);
         fits = fits && (k->is_contact[i] || k->state[i] != UNDECIDED || bound >= -room_zero(k, i, k->floor[i], bound));
       }
@@ -456,13 +454,63 @@ static int enumerate(const Block *k, double *found, double *work, int32_t *pivot
   return groups;
 }
 
-/* Each element of a block with vectors in turn, as the others are (Gauss and Seidel); whether that converges. */
-static int relax_from(const Block *k, double *nu, double most) {
+/* nu - P(nu + w/slope), P being the projection to the sets of the unknowns, and its derivatives by them (n, n); its
+ * largest element. */
+static double natural_map(const Block *k, const double *nu, double *rest, double *slopes) {
   int n = k->size;
-  double change = INFINITY, last = INFINITY;
+  for (int i = 0, size; i < n; i += size) {
+    size = span_of(k, i) > 0 ? k->span[i] : 1;
+    int state = k->state[i], is_open = state == UNDECIDED, is_vector = span_of(k, i) > 0;
+    double y[3], u[3], slope = 0, bound = bound_of(k, i, nu), terms;
+    for (int q = i; q < i + size; q++) slope = larger(k->matrix[q * (n + 1)], slope);
+    double per = slope > 0 ? 1 / slope : 1;
+    for (int q = 0; q < size; q++) y[q] = nu[i + q] + per * rate_of(k, i + q, nu, &terms);
+    double length = is_vector ? unit_of(y, size, u) : bound;
+    if (!is_vector) {
+      int is_above = state == ABOVE || ((is_open || state == AT_TOP) && !k->is_contact[i] && y[0] > bound);
+      int is_below = state == BELOW || ((is_open || state == AT_BOTTOM) && y[0] < (k->is_contact[i] ? 0 : -bound));
+      u[0] = is_above - is_below;
+    }
+    int is_out = is_vector ? length > bound : u[0] != 0;
+    for (int q = 0; q < size; q++) {
+      rest[i + q] = nu[i + q] - (is_out ? k->is_contact[i] ? 0 : bound * u[q] : y[q]);
+      for (int j = 0; j < n; j++) {
+        double *to = slopes + (int64_t)(i + q) * n + j, along = 0, turns = per * k->matrix[(i + q) * n + j];
+        *to = is_out ? (j == i + q) - (k->is_coupled ? k->share[i * n + j] * u[q] : 0) : turns;
+        if (!is_out || !is_vector) continue;
+        for (int c = 0; c < size; c++) along += u[c] * ((j == i + c) - per * k->matrix[(i + c) * n + j]);
+        *to -= bound / length * ((j == i + q) - turns - u[q] * along);
+      }
+    }
+  }
+  return largest_of(rest, n);
+}
+
+/* A solution close to nu by Newton's method; whether it converges. */
+static int polish(const Block *k, double *nu, double most, double *work, int32_t *pivot) {
+  int n = k->size;
+  double *slopes = work, *step = slopes + (int64_t)n * n, *trial = step + n, *rest = trial + n, left = INFINITY;
+  memcpy(trial, nu, sizeof(double) * n);
+  for (int again = 0; again < LAYER_NEWTON && left > EPSILON * most; again++) {
+    double now = natural_map(k, trial, step, slopes);
+    if (now < left) { left = now; memcpy(nu, trial, sizeof(double) * n); }
+    if (!solve_any(slopes, step, n, INFINITY, rest, pivot)) break;
+    for (int i = 0; i < n; i++) trial[i] -= step[i];
+  }
+  return left <= VANISHES * most;
+}
+
+/* Gauss-Seidel iteration of a block with vectors, finished by Newton's method; whether it converges. */
+static int relax_from(const Block *k, double *nu, double most, double *work, int32_t *pivot) {
+  int n = k->size;
+  double change = INFINITY, last = INFINITY, *found = work;
   for (int again = 0; again < 2000 && change > 4 * EPSILON * most && !(change >= last && last < TIED * most); again++) {
     last = change;
     change = 0;
+    if (again == 10 || again == 100 || again == 1000) {
+      memcpy(found, nu, sizeof(double) * n);
+      if (polish(k, found, most, work + n, pivot)) { memcpy(nu, found, sizeof(double) * n); return 1; }
+    }
     for (int i = 0, size; i < n; i += size) {
       double rest[3], y[3], own[9], bound = bound_of(k, i, nu), low = k->is_contact[i] ? 0 : -bound;
       int state = k->state[i];
@@ -478,7 +526,11 @@ static int relax_from(const Block *k, double *nu, double most) {
       if (span_of(k, i) > 0) {
         if (state != INSIDE && (state == ABOVE || !is_inside || length_of(y, size) > bound)) {
           for (int q = 0; q < size * size; q++) own[q] *= bound;
-          if (bound > 0 && !leaving_direction(rest, own, size, y)) return 0;
+          if (bound > 0 && !leaving_direction(rest, own, size, y)) { /* it has no inverse: a step downhill */
+            double most_of = largest_of(own, size * size) / bound;
+            for (int q = 0; q < size; q++) y[q] = nu[i + q] + (rest[q] - dot(own + q * size, nu + i, size) / bound) / (size * most_of);
+            unit_of(y, size, y);
+          }
           for (int q = 0; q < size; q++) y[q] = bound > 0 ? bound * y[q] : 0;
         }
       } else {
@@ -504,8 +556,8 @@ static int needs_no_bound(const Block *k, const double *nu) {
   return 1;
 }
 
-/* Gradient and Hessian by ``n`` variables of tau times the last, the slack s, less the logarithms of the distances from all
- * bounds with it, at nu; 0 where one is not positive. Columns of z (n - 1, size) are what moves nu. */
+/* Gradient and Hessian of the barrier function tau s - sum log(distances from the bounds, with the slack s) by ``n``
+ * variables, s the last; 0 where a distance is not positive. Columns of z (n - 1, size) are the directions of nu. */
 static int barrier_of(const Block *k, const double *nu, const double *z, int n, double s, double unit, double tau, double *grad,
                       double *hess) {
   int size = k->size;
@@ -535,31 +587,51 @@ static int barrier_of(const Block *k, const double *nu, const double *z, int n, 
   return 1;
 }
 
-/* Move a solution with w = 0 to where it is farthest from all bounds, by an interior-point method; whether it is inside. */
-static int move_into_cones(const Block *k, double *nu, double *work, int32_t *pivot) {
+/* Move a solution with w = 0 to where it is farthest from all bounds, by an interior-point method: how
+ * far outside it is, in units of the largest bound or unknown; 1 where it cannot move. */
+static double move_into_cones(const Block *k, double *nu, double *work, int32_t *pivot) {
   int size = k->size, n;
   double *z = work, *trial = z + (int64_t)size * size, *grad = trial + size, *hess = grad + size + 1;
   double *step = hess + (int64_t)(size + 1) * (size + 1), unit = 0, s = 0;
   for (int i = 0; i < size; i++) unit = larger(unit, larger(fabs(nu[i]), k->is_contact[i] ? 0 : fabs(bound_of(k, i, nu))));
   n = null_space(k->matrix, size, size, z, step, pivot) + 1;
-  if (n == 1 || n > size || !(unit > 0)) return 0;
+  if (n == 1 || n > size || !(unit > 0)) return 1;
+  while (!barrier_of(k, nu, z, n, s, unit, 1, grad, hess)) if ((s = 2 * s + 1) > 1 / MERGED) return 1;
   for (double tau = 1; tau < 1 / TIED; tau *= 3)
     for (int again = 0; again < 20; again++) {
-      while (again == 0 && tau == 1 && !barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) if ((s = 2 * s + 1) > 1 / MERGED) return 0;
-      if (!barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) return 0;
+      if (!barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) return 1;
+      if (s < -0.5) return s;
       memcpy(step, grad, sizeof(double) * n);
-      if (!solve(hess, step, n)) return 0;
-      double decrement = sqrt(larger(dot(grad, step, n), 0)), part = 1 / (1 + decrement);
-      for (int l = 0; l < n - 1; l++) for (int i = 0; i < size; i++) nu[i] -= part * step[l] * z[(int64_t)l * size + i];
-      s -= part * step[n - 1];
-      if (s < -0.5) return 1;
+      if (!solve(hess, step, n)) return 1;
+      double decrement = sqrt(larger(dot(grad, step, n), 0)), part = 1 / (1 + decrement), before = s;
+      memcpy(trial, nu, sizeof(double) * size);
+      do { /* as far as rounding in the step lets it stay inside */
+        memcpy(nu, trial, sizeof(double) * size);
+        for (int l = 0; l < n - 1; l++) for (int i = 0; i < size; i++) nu[i] -= part * step[l] * z[(int64_t)l * size + i];
+        s = before - part * step[n - 1];
+      } while ((part /= 2) > TIED && !barrier_of(k, nu, z, n, s, unit, tau, grad, hess));
       if (decrement < WEAK) break;
     }
-  return s < -TIED;
+  return s;
 }
 
-/* The solution of a block with vectors, symmetric but for loads, from the smallest nu with w = 0 on. Loads that are not
- * determined are shared in proportion to the bounds, in units of whose roots nu is the smallest. */
+/* Whether all that holds with w = 0 does so at a bound, of many unknowns: sizes of vectors are at theirs, or loads none. */
+static int is_at_limit(const Block *k, const double *nu, double *work, int32_t *pivot) {
+  int is_tight = 0;
+  double most = 0, terms;
+  for (int i = 0; i < k->size; i++) most = larger(most, larger(fabs(nu[i]), k->is_contact[i] ? 0 : fabs(bound_of(k, i, nu))));
+  for (int i = 0; i < k->size; i++) {
+    double w = rate_of(k, i, nu, &terms);
+    if (fabs(w) > zero_of(k, i, terms)) return 0;
+    if (span_of(k, i) < 0) continue;
+    double bound = k->is_contact[i] ? 2 * nu[i] : bound_of(k, i, nu);
+    is_tight |= bound - length_of(nu + i, span_of(k, i) > 0 ? k->span[i] : 1) <= 8 * TIED * most;
+  }
+  return is_tight && null_space(k->matrix, k->size, k->size, work, work + k->size * k->size, pivot);
+}
+
+/* The solution of a block with vectors, symmetric but for loads, starting at the least nu with w = 0, in units of the roots
+ * of the bounds. Undetermined loads are shared in proportion to the bounds. */
 static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
   int n = k->size;
   double *unit = work, *inverse = unit + n, *last = inverse + 4 * (int64_t)n * n + n, most = 0, change = INFINITY;
@@ -579,12 +651,13 @@ static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
   int is_kept = (k->is_coupled || k->is_joined) && needs_no_bound(k, nu), may_move = 1;
   for (int i = 0; i < n; i++) may_move &= k->state[i] == UNDECIDED;
   memcpy(last, nu, sizeof(double) * n);
-  if (may_move && k->span && move_into_cones(k, nu, last + n, pivot)) return 1;
+  double out = may_move && k->span ? move_into_cones(k, nu, last + n, pivot) : 1;
+  if (out < (k->may_end ? MERGED : -TIED)) return 1;
   memcpy(nu, last, sizeof(double) * n);
-  return is_kept || relax_from(k, nu, most);
+  return is_kept || relax_from(k, nu, most, last + n, pivot);
 }
 
-/* Solutions of a block that is not of one element: one where a certificate or the size says so. */
+/* Solutions of a block of several elements: only one where a certificate proves uniqueness or the block is large. */
 static int solve_block_of_many(const Block *k, int certificate, int8_t *position, double *found, double *work,
                                int32_t *pivot) {
   int is_loaded = k->span && k->is_coupled; /* friction in space by reactions */
@@ -596,7 +669,7 @@ static int solve_block_of_many(const Block *k, int certificate, int8_t *position
   return solved;
 }
 
-/* Of one element without a matrix the bound is left open: higher orders decide between both. */
+/* Solutions of one element. Without a matrix higher orders decide between its bounds. */
 static int solve_single(const Block *k, double *found) {
   double a = k->a[0], m = k->matrix[0], b = k->b[0], low = k->is_contact[0] ? 0 : -b, zero = k->floor[0];
   int state = k->state[0], count = 0;

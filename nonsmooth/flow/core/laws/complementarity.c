@@ -9,7 +9,7 @@
  * Source: Moreau 1977, Evolution problem associated with a moving convex set; Acary & Brogliato 2008, chapter 2.
  */
 
-/* Conditions of degree one, with ``every`` all; whether one of them is negative. */
+/* Conditions of degree one, or all with ``every``; whether one of them is negative. */
 static int find_jumping(Run *r, int every, int32_t *own, int *is_due) {
   int n = 0;
   *is_due = every;
@@ -21,7 +21,7 @@ static int find_jumping(Run *r, int every, int32_t *own, int *is_due) {
   return n;
 }
 
-/* What impulses p add at a point. */
+/* The jump of impulses p at a point. */
 static void impulses_at(Run *r, const double *x, const int32_t *own, int n, const double *p, double *change) {
   memset(r->lam, 0, sizeof(double) * r->width);
   for (int i = 0; i < n; i++) r->lam[own[i]] = p[i];
@@ -29,7 +29,7 @@ static void impulses_at(Run *r, const double *x, const int32_t *own, int n, cons
   add_impulses(r, x, r->letter, r->lam, change);
 }
 
-/* The inverse of what x - B(x) p changes with the states, by differences, in ``inverse``; 0 where there is none. */
+/* The inverse of the derivative of x - B(x) p by x, by differences, in ``inverse``; 0 where there is none. */
 static int invert_change(Run *r, const int32_t *own, int n, const double *p, double *inverse) {
   int nd = r->s->dimension;
   double *a = inverse + (int64_t)nd * nd, *x = r->vector, *base = r->at_work, *moved = r->aside;
@@ -53,7 +53,7 @@ static int step_jump(Run *r, const int32_t *own, int n, const double *from, doub
   double *q = r->decision->block, *m = q + n, *k = r->jump_work, *columns = k + 2 * (int64_t)nd * nd, *change = r->at_work;
   double *rest = columns + (int64_t)n * nd, *rows = r->gradient_row, *one = r->small;
   if (!is_first && !invert_change(r, own, n, p, k)) return -1;
-  for (int j = 0; j <= n; j++) { /* columns of B, then what the present point misses */
+  for (int j = 0; j <= n; j++) { /* columns of B, then the residual */
     double *to = j < n ? columns + (int64_t)j * nd : rest;
     for (int i = 0; i < n; i++) one[i] = i == j;
     if (j < n) impulses_at(r, r->x, own, n, one, change);
@@ -93,8 +93,8 @@ static int find_jump(Run *r, const int32_t *own, int n, const double *from, doub
   return 0;
 }
 
-/* Letters with which conditions take impulses, where e is the part ``share`` of what makes e C B as large as D, or with
- * which they go on after the time e, an implicit step; 0 where there are none. */
+/* Letters of the conditions that take impulses, with e scaled so that e C B is ``share`` of D, or letters after an implicit
+ * step of length e; 0 where there are none. */
 static int find_taking(Run *r, const int32_t *own, int n, double share, int goes_on, int8_t *letter) {
   double *q = r->decision->block, *m = q + n, *nu = r->decision->large, of_d = 0, of_rates = 0;
   int w = r->width, count = 0;
@@ -117,7 +117,7 @@ static int find_taking(Run *r, const int32_t *own, int n, double share, int goes
   return 1;
 }
 
-/* Impulses of the conditions that are closed by ``letter``, to what they keep at zero; 0 where they do not lead there. */
+/* Impulses of the closed conditions of ``letter``, to the zeros of their functions; 0 where they do not reach them. */
 static int take_impulses(Run *r, const int8_t *letter, const int32_t *own, int n, const double *from, double *p) {
   double *a = r->work, *b = a + (int64_t)n * n, *change = r->at_work;
   int w = r->width, k = 0, *which = r->decision->order;
@@ -152,7 +152,7 @@ static int take_impulses(Run *r, const int8_t *letter, const int32_t *own, int n
   return finite_all(r->x, r->n) && satisfies(r, letter);
 }
 
-/* The same where closed conditions may leave equations of the states. */
+/* The jump where closed conditions may leave equations of the states. */
 static int find_hidden_jump(Run *r, const int32_t *own, int n, const double *from, double *p) {
   int8_t *letter = r->tried_letter;
   memcpy(letter, r->letter, r->width);
@@ -163,7 +163,7 @@ static int find_hidden_jump(Run *r, const int32_t *own, int n, const double *fro
   return 0;
 }
 
-/* The mode of a short implicit step, as r->chosen, if it can continue: where modes are too many to try all. */
+/* Choose the mode of a short implicit step as r->chosen, if it can continue: for too many modes to try all. */
 static int follow_step(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int32_t *own = r->decision->own;
   int8_t *trial = r->tried_letter;
@@ -184,7 +184,7 @@ static int follow_step(Run *r, const int8_t *letter, const Known *known, int kno
   return 0;
 }
 
-/* Jump to y >= 0 where a condition is negative; whether it did. The state before is r->jumped_from. */
+/* Jump to y >= 0 where a condition is negative; whether a jump occurred. The state before is r->jumped_from. */
 static int become_consistent(Run *r) {
   int due, count = 0, is_hidden = r->s->combined > 0;
   int32_t *own = r->decision->own, *closed = r->involved;
@@ -203,7 +203,7 @@ static int become_consistent(Run *r) {
   for (int i = 0; i < n; i++) if (p[i] > 0 && keeps_height(r, own[i])) closed[count++] = own[i];
   project(r, closed, count);
   for (int i = 0; i < n && !count; i++) if (p[i] > 0) closed[count++] = own[i];
-  r->met = (Met){SURFACE_GUARD, count ? closed[0] : own[0], 1};
+  r->guard = (Guard){SURFACE_GUARD, count ? closed[0] : own[0], 1};
   note(r);
   return 1;
 }

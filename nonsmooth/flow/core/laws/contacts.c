@@ -1,6 +1,6 @@
 /* Impacts ------------------------------------------------------------------------------------------------- */
 
-/* Add what impulses change to ``after``. */
+/* Add the jump of impulses to ``after``. */
 static void add_impulses(Run *r, const double *x, const int8_t *letter, const double *impulses, double *after) {
   set_inputs(r, x, held_of(r, letter), r->none);
   values_at(&r->s->columns, r->input, r->p, r->columns);
@@ -11,13 +11,13 @@ static void add_impulses(Run *r, const double *x, const int8_t *letter, const do
   }
 }
 
-/* Where the rate is that an impulse of an element changes, among what is kept. */
+/* Row of the rate that an impulse of an element changes, among the functions kept at zero. */
 static int rate_row(const Run *r, int i) {
   const Element *e = element(r, i);
   return e->degree > 1 ? e->lower + e->degree - 2 : i;
 }
 
-/* One of some contacts whose restitution is not from 0 to 1, or -1. */
+/* A contact whose restitution is outside [0, 1], or -1. */
 static int improper(Run *r, const double *x, const int32_t *involved, int count) {
   values_at(&r->s->restitution, x, r->p, r->restitution);
   for (int i = 0; i < count; i++) {
@@ -27,22 +27,22 @@ static int improper(Run *r, const double *x, const int32_t *involved, int count)
   return -1;
 }
 
-/* Contacts in a group of which all subsets are tried, and choices of letters of the surfaces that they carry. */
+/* Largest number of contacts whose subsets are all tried, and of choices of letters of the surfaces that they carry. */
 enum { MOST_TAKING = 12, MOST_CHOICES = 100000 };
 
-/* Whether a trial is one of Newton's law: contacts that take no impulse part by no more than ``slack`` below their
- * velocity of restitution. Plastic impulses may have any size and sign. */
+/* Whether a trial satisfies Newton's law: contacts without an impulse separate at their velocity of restitution less
+ * ``slack`` at least. Plastic impulses may have any size and sign. */
 static int is_of_newton(const Block *k, const int8_t *position, const double *nu, const double *slack, int plastic) {
   for (int i = 0; i < k->size; i++) {
     double terms, w = rate_of(k, i, nu, &terms);
     int is_open = k->is_contact[i] && position[i] == BOTTOM, is_free = is_open || (plastic && position[i] == HELD);
-    if (is_open ? w > slack[i] + zero_of(k, i, terms) : !is_free && wanted(k, i, position[i], nu) != position[i]) return 0;
+    if (is_open ? w > slack[i] + zero_of(k, i, terms) : !is_free && next_position(k, i, position[i], nu) != position[i]) return 0;
   }
   return 1;
 }
 
-/* Impulses by Newton's law, with most contacts that take one and with the present positions first; 0 where there are
- * none, or too many possibilities. */
+/* Impulses by Newton's law on as many contacts as possible, the present positions first; 0 where there are none, or too
+ * many possibilities. */
 static int take_most(const Block *k, int8_t *position, const double *slack, int plastic, double *found, double *work,
                      int32_t *pivot) {
   static const int8_t order[3][3] = {{HELD, TOP, BOTTOM}, {TOP, HELD, BOTTOM}, {BOTTOM, HELD, TOP}};
@@ -67,13 +67,13 @@ static int take_most(const Block *k, int8_t *position, const double *slack, int 
   return 0;
 }
 
-/* How an impact is to be: of each contact what its rate changes by; whether impulses may have any sign; whether by the
- * law of elements; impulses that contacts have taken before, which bound friction too, or none. */
+/* An impact: of each contact the change of its rate; whether impulses may have any sign; whether by the law of elements;
+ * earlier impulses of the contacts, which bound friction too, or none. */
 typedef struct { const double *x, *target, *before; int plastic, by_law; } Strike;
 
-/* Impulses of a group of elements that act on one another, by their law with velocities in place of rates: each contact
- * parts with at least the velocity that its restitution gives it, and with no more where it takes an impulse (Moreau).
- * To ``taken`` those that contacts take; 0 where there are none. */
+/* Impulses of a group of coupled elements by their law at the level of velocities (Moreau): each contact separates with at
+ * least its velocity of restitution, and with exactly that where its impulse is positive. ``taken`` gets the impulses of
+ * contacts; 0 where there are none. */
 static int strike_group(Run *r, const int32_t *own, int n, const Strike *of, double *taken, double *after) {
   Decision *d = r->decision;
   int w = r->width, m = r->m, solved;
@@ -117,7 +117,7 @@ static int strike_group(Run *r, const int32_t *own, int n, const Strike *of, dou
   return 1;
 }
 
-/* Groups of contacts, of surfaces that they carry and of joints, that act on one another: of each element its number. */
+/* The group of each element: contacts, surfaces that they carry and joints that are coupled. */
 static int find_striking(Run *r, const int32_t *involved, int count, int32_t *group) {
   const Entries *slope = &r->s->slope;
   int w = r->width, c = r->c, m = r->m, groups = 0;
@@ -133,7 +133,7 @@ static int find_striking(Run *r, const int32_t *involved, int count, int32_t *gr
   return groups;
 }
 
-/* All groups are struck in turn. */
+/* Apply the impulses of all groups in turn. */
 static int strike_groups(Run *r, const int32_t *involved, int count, const Strike *of, double *taken, double *after) {
   int w = r->width;
   int32_t *group = r->decision->mark, *own = group + w;
@@ -147,7 +147,7 @@ static int strike_groups(Run *r, const int32_t *involved, int count, const Strik
   return 1;
 }
 
-/* Poisson's law: impulses that end the approach, then at least the restitution's part of them at each contact. */
+/* Poisson's law: impulses that end the compression, then at each contact at least its restitution times them. */
 static int compress_and_expand(Run *r, const int32_t *involved, int count, double *target, double *after) {
   int m = r->m, c = r->c, any = 0;
   double *taken = target + c, *x = r->saved, *every = r->lam;
@@ -169,7 +169,7 @@ static int compress_and_expand(Run *r, const int32_t *involved, int count, doubl
   return strike_groups(r, involved, count, &rest, 0, after);
 }
 
-/* State after the impulses at some closed gaps; 0 if none are consistent. */
+/* The state after the impulses at some closed gaps; 0 if none are consistent. */
 static int strike(Run *r, const int32_t *involved, int count, int plastic, double *after) {
   int c = r->c, law = r->s->impact_law;
   double *target = r->rates + 2 * r->kept_rows;

@@ -1,17 +1,17 @@
-/* Which motion continues from a point where several elements act: lexicographic complementarity.
+/* The motion that continues from a point where several elements act: lexicographic complementarity.
  *
  * Element i is a surface, a set or a contact. w_i is its row of the layer, the first derivative of its function that
- * holds an unknown (negative for contacts), nu_i its unknown, n_i times lambda_i or the reaction: w = a - A nu, and
+ * contains an unknown (negative for contacts), nu_i its unknown, n_i times lambda_i or the reaction: w = a - A nu, and
  * w_i lies in the normal cone of [-n_i, n_i], of |nu_i| <= n_i for vectors, or of [0, inf), at nu_i. The coefficients of
- * this law are solved in turn (blocks.c), until each element moves inside its set (it slides) or along its bound (it
- * leaves to a side). A vector that has reached its bound has from then on rows along it and across it like others.
+ * this law are solved order by order (blocks.c), until each element moves inside its set (it slides) or along its bound
+ * (it leaves to a side). Once a vector reaches its bound its rows are those along and across it.
  *
  * Source: Acary & Brogliato 2008, Numerical Methods for Nonsmooth Dynamical Systems, chapter 4.
  */
 
 /* The law at a point --------------------------------------------------------------------------------- */
 
-/* Bounds that are negative turn the law around: the unknown changes its sign. */
+/* Make a negative bound positive by the opposite sign of the unknown. */
 static void turn_bound(Decision *d, int i, double *b) {
   int k = d->count;
   double all = *b;
@@ -22,13 +22,13 @@ static void turn_bound(Decision *d, int i, double *b) {
   for (int j = 0; j < k; j++) { d->share[i * k + j] *= -1; d->matrix[j * k + i] *= -1; }
 }
 
-/* Edges of the graph: row i of the law holds the unknown j. */
+/* Edges of the graph: row i of the law contains the unknown j. */
 static int holds(const Decision *d, int i, int j) {
   if (abs(i - j) == 1 && d->span[i > j ? i : j] < 0) return 1;
   return i != j && (d->matrix[i * d->count + j] != 0 || d->share[i * d->count + j] != 0);
 }
 
-/* Depth-first search of the strongly connected components (Tarjan 1972), those that others depend on first. */
+/* Depth-first search of the strongly connected components (Tarjan 1972), in topological order. */
 static void visit(Decision *d, int i, int *time, int *top) {
   int32_t *index = d->mark, *low = index + d->count, *stack = low + d->count, *on = stack + d->count;
   index[i] = low[i] = ++*time;
@@ -56,8 +56,8 @@ static void find_blocks(Decision *d) {
   for (int i = 0; i < d->count; i++) if (!d->mark[i]) visit(d, i, &time, &top);
 }
 
-/* Reactions of joints follow from the other unknowns. Rows of the law have them eliminated: row i less these parts of
- * those of the joints, (count, joints), at ``d->through``; ``d->joint`` is the inverse of the joints' own matrix. */
+/* Reactions of joints follow from the other unknowns and are eliminated: row i less the parts ``d->through`` (count, joints)
+ * of the joints' rows; ``d->joint`` is the inverse of the joints' own matrix. */
 static void read_joints(Run *r, Decision *d) {
   int first = r->m - r->s->joints, n = r->s->joints, w = r->width, k = d->count;
   double *m = d->work, *size = m + n * n, *rest = size + n;
@@ -83,7 +83,7 @@ static double with_rounding(const Run *r, const Decision *d, int i, const double
   return sum;
 }
 
-/* A row of the law from one of each element: its own less that of the joints, ``of`` being those of all. */
+/* A row of the law with joints eliminated, ``of`` being the rows of all elements. */
 static double beside_joints(const Run *r, const Decision *d, int i, const double *of, int64_t apart) {
   int first = r->m - r->s->joints;
   double sum = of[d->own[i] * apart];
@@ -91,7 +91,7 @@ static double beside_joints(const Run *r, const Decision *d, int i, const double
   return sum;
 }
 
-/* Rows and bounds at a point with all active unknowns zero, and rounding in both; 0 where they are no numbers. */
+/* Rows and bounds at a point with all active unknowns zero, and rounding in both; 0 where they are not finite. */
 static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b, double *floor, double *room) {
   int k = d->count, w = r->width;
   double *near = r->vector + r->n + w, *factor = r->small + w; /* not where inputs are put together */
@@ -116,7 +116,7 @@ static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b,
   return 1;
 }
 
-/* Bounds of friction by one of the reactions, of which they are affine functions; bounds that are negative turned. */
+/* Dependence of friction's bounds on the reactions, which is affine; negative bounds made positive. */
 static void read_shares(Run *r, Decision *d, const double *x) {
   int k = d->count;
   memset(d->share, 0, sizeof(double) * k * k);
@@ -133,7 +133,7 @@ static void read_shares(Run *r, Decision *d, const double *x) {
   for (int i = 0; i < k; i++) { d->sign[i] = 1; turn_bound(d, i, d->b + i); }
 }
 
-/* Rows, matrix and bounds at the present point; 0 where they are no numbers. */
+/* Rows, matrix and bounds at the present point; 0 where they are not finite. */
 static int read_law(Run *r, Decision *d) {
   int k = d->count, w = r->width;
   memcpy(d->base, d->letter, w);
@@ -154,7 +154,7 @@ static int read_law(Run *r, Decision *d) {
   return finite_all(d->matrix, k * k);
 }
 
-/* The unknowns of the mode before, those whose guard ended it at their bounds. */
+/* The unknowns of the previous mode; those whose guard ended it are at their bounds. */
 static void read_old(const Run *r, Decision *d, const int8_t *letter, const Known *known, int known_count) {
   int k = d->count;
   for (int i = 0; i < k; i++) {
@@ -182,7 +182,7 @@ static int is_at_bound(const Decision *d, int i) {
   return bound - fabs(d->old[i]) <= TIED * d->room[i];
 }
 
-/* Elements of components in which nothing is new go on as they are. */
+/* Find elements of changed components; the others keep their states. */
 static void find_touched(Decision *d, const int8_t *letter) {
   int k = d->count, any = 0, changed = 1;
   for (int i = 0; i < k; i++) {
@@ -223,8 +223,7 @@ static void begin_orders(Run *r, Decision *d, const int8_t *letter) {
   e->l.is_free = 0;
 }
 
-/* Rounding of the states' coefficients, and of the rows of each order: what is zero at rest is not compared with
- * itself. */
+/* Rounding of the states' coefficients and of the rows of each order, with a lower bound where they are zero at rest. */
 static void read_noise(Run *r, Decision *d) {
   int k = d->count;
   double *ones = r->vector + r->n + r->width, *steep = r->small, *height = r->rates + r->kept_rows;
@@ -265,8 +264,8 @@ static int is_finite_order(const Decision *d, int order) {
   return finite_all(d->a + order * d->count, d->count) && finite_all(d->b + order * d->count, d->count);
 }
 
-/* In place of an order whose coefficients are no numbers, as those of t^(3/2), rows and bounds themselves at the shortest
- * time at which they are above rounding: how they grow decides. 0 where they are no numbers there. */
+/* Replace an order without finite coefficients, as of t^(3/2), by rows and bounds at the shortest time at which they are
+ * above rounding; 0 where these are not finite. */
 static int read_growth(Run *r, Decision *d, int order) {
   Expansion *e = &r->trial;
   int k = d->count, at = order * k, found = 0;
@@ -308,8 +307,8 @@ static double middle(const double *one, const double *two, int apart, int other,
   return sum;
 }
 
-/* Coefficients of a vector that is at its bound, from the order at which that was decided: nu = b u, w = s u, |u| = 1.
- * Of those of an order all that is known before it, the part along u of u itself is returned. */
+/* Coefficients of a vector at its bound from the deciding order on: nu = b u, w = s u, |u| = 1, as far as lower orders
+ * determine them. Returns the component of u along itself. */
 static double along_bound(const Decision *d, int i, int order, double *nu, double *w) {
   int k = d->count, size = d->span[i], j = order - d->began[i];
   const double *b = d->bound + d->began[i] * k + i, *s = d->speed + d->began[i] * k + i, *u = d->along + d->began[i] * k + i;
@@ -322,7 +321,7 @@ static double along_bound(const Decision *d, int i, int order, double *nu, doubl
   return bend;
 }
 
-/* Keep what an order says of a vector, from its first row on. */
+/* Store the result of an order for a vector, given its first row. */
 static void keep_vector(Decision *d, int i, int order) {
   int k = d->count, size = d->span[i], at = order * k, state = d->state[at + k + i];
   if (d->state[at + i] == UNDECIDED) d->began[i] = (int8_t)(order + (state == UNDECIDED));
@@ -335,7 +334,11 @@ static void keep_vector(Decision *d, int i, int order) {
       if (d->matrix[(i + q) * k + c] != 0) w[q] -= d->matrix[(i + q) * k + c] * d->nu[at + c];
   }
   if (order > d->began[i]) bend = along_bound(d, i, order, known, rest);
-  else { unit_of(bound > 0 ? d->nu + at + i : w, size, first); axes_of(first, size, d->axes + 3 * i); }
+  else {
+    unit_of(bound > 0 ? d->nu + at + i : w, size, first);
+    for (int q = 0; q < size; q++) if (fabs(first[q]) <= VANISHES) first[q] = 0;
+    axes_of(first, size, d->axes + 3 * i);
+  }
   for (int q = 0; q < size; q++) speed += first[q] * (w[q] - rest[q]);
   d->speed[at + i] = state == ABOVE ? speed : 0;
   for (int q = 0; q < size && order > d->began[i]; q++) {
@@ -344,7 +347,7 @@ static void keep_vector(Decision *d, int i, int order) {
   }
 }
 
-/* Rows of a vector have one rounding; what it has left of their slopes where joints allow no slip is zero. */
+/* Give rows of a vector a common rounding, and clear slopes below it where joints allow no slip. */
 static void clean_rows(Block *b, int i, int size) {
   double most = 0, floor = largest_of(b->floor + i, size);
   for (int q = 0; q < size; q++) b->floor[i + q] = floor;
@@ -357,8 +360,7 @@ static void clean_rows(Block *b, int i, int size) {
       }
 }
 
-/* Rows of a vector that is at its bound, in axes along and across it: its part along is at a bound, that across is
- * where w keeps its direction. */
+/* Rows of a vector at its bound, in axes along and across it: along it is at a bound, across it w keeps its direction. */
 static void turn_rows(const Decision *d, Block *b, int i, int order) {
   int n = b->size, own = b->own[i], size = d->span[own];
   const double *axes = d->axes + 3 * own, first = d->bound[d->began[own] * d->count + own];
@@ -382,7 +384,7 @@ static void turn_rows(const Decision *d, Block *b, int i, int order) {
   }
 }
 
-/* A block's part of the law at an order, with what blocks before it add. */
+/* A block's part of the law at an order, with terms of earlier blocks. */
 static Block part_of_law(Decision *d, int order, int which) {
   int k = d->count, first = d->first[which], n = d->first[which + 1] - first, at = order * k;
   Block b = {.size = n, .tie = tie_of(d), .own = d->order + first, .a = d->block, .state = d->block_state, .is_contact = d->block_state + k};
@@ -425,8 +427,8 @@ static Block part_of_law(Decision *d, int order, int which) {
   return b;
 }
 
-/* Rounding of the unknowns through an inverse of the matrix, and of the rates by them: a row may hold hardly anything of
- * its own unknown, and no state, as those of a diode bridge. */
+/* Rounding of the unknowns through the inverse matrix, and of the rates by them: a row may depend weakly on its own unknown
+ * and on no state, as in a diode bridge. */
 static void add_rounding(Decision *d, Block *b) {
   int n = b->size, any = 0;
   double *room = b->share + n * n, *inverse = d->work, *ones = inverse + n * n;
@@ -444,7 +446,7 @@ static void add_rounding(Decision *d, Block *b) {
   b->room = room;
 }
 
-/* What is proved of each block, once, or after its vectors have been turned. */
+/* Certificate of each block, computed once, or after its vectors have been turned. */
 static int certificate_of(Decision *d, const Block *b, int which) {
   int has_vectors = 0;
   for (int i = 0; i < b->size; i++) has_vectors |= d->span[b->own[i]];
@@ -453,7 +455,7 @@ static int certificate_of(Decision *d, const Block *b, int which) {
   return d->proved[which];
 }
 
-/* The run ends where friction would push against slip in some direction. */
+/* End the run where the friction matrix is indefinite. */
 static void refuse_negative(Run *r, const Block *b) {
   double own[9];
   for (int i = 0; i < b->size; i++) {
@@ -464,24 +466,25 @@ static void refuse_negative(Run *r, const Block *b) {
   }
 }
 
-/* The part of its scale by which what one of many solutions leaves of a bound is zero: none where it is inside all bounds by
- * more than ``part``; else all that are closer to theirs than others by far. Such reactions are made zero. */
+/* Relative distance at which one of many solutions counts as at a bound: 0 where it is inside all bounds by more than
+ * ``part``; else it separates reactions far closer to theirs than the others, which become zero. */
 static double find_tight(const Block *b, double *nu, double part) {
   double most = 0;
   int is_tight = 0;
   for (int i = 0; i < b->size; i++) if (b->is_contact[i]) most = larger(nu[i], most);
-  for (int i = 0; i < b->size; i++)
-    is_tight |= b->is_contact[i] ? nu[i] <= part * most : bound_of(b, i, nu) - fabs(nu[i]) <= part * bound_of(b, i, nu);
+  for (int i = 0; i < b->size; i++) /* vectors are left where none of their loads can be less */
+    is_tight |= b->is_contact[i] ? nu[i] <= part * most : !b->span && bound_of(b, i, nu) - fabs(nu[i]) <= part * bound_of(b, i, nu);
   if (!is_tight) return 0;
   for (int i = 0; i < b->size; i++) if (b->is_contact[i] && nu[i] <= sqrt(part) * most) nu[i] = 0;
   return sqrt(part);
 }
 
-/* Solutions of a block at an order; where the old unknowns are one, what its guard says of an element is known. */
+/* Solutions of a block at an order; if the previous unknowns are one, the guard decides its element. */
 static int solutions_of(Run *r, Decision *d, int order, int which, double *found, int8_t *class) {
   Block b = part_of_law(d, order, which);
   int n = b.size, count;
   b.is_joined = r->s->joints > 0;
+  b.may_end = b.span && order == 0 && d->ended <= which;
   add_rounding(d, &b);
   int8_t *position = b.is_contact + d->count;
   for (int i = 0; i < n; i++) {
@@ -512,12 +515,16 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
       contacts |= b.is_contact[i];
     }
     double loose = KNOWN_TO * r->o.rtol;
-    if (agrees && is_dependent && contacts && !b.span) loose = find_tight(&b, nu, loose);
+    if (agrees && is_dependent && contacts) loose = find_tight(&b, nu, loose);
     for (int i = 0; i < n; i++) {
       int is_loose = agrees && (is_dependent ? contacts : d->is_known[b.own[i]]), own = b.own[i], size = d->span[own];
-      double part = is_loose && !(is_dependent && b.span) ? loose : 0; /* loads are shared anew */
+      double part = is_loose && (contacts || !(is_dependent && b.span)) ? loose : 0; /* loads are redistributed */
       class[q * n + i] = (int8_t)(size < 0 ? class[q * n + i - 1] : span_of(&b, i) ? class_of_vector(&b, i, nu, part)
                                                                                    : class_of(&b, i, nu, part));
+    }
+    if (b.may_end && d->proved[which] < UNIQUE && is_at_limit(&b, nu, d->work, d->pivot)) {
+      for (int i = 0; i < n; i++) class[i] = AT_TOP;
+      d->ending = which + 1;
     }
     for (int i = 0; i < n; i++) { /* back from the axes in which it was solved */
       int own = b.own[i];
@@ -529,7 +536,7 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
 
 /* Stability ---------------------------------------------------------------------------------------------- */
 
-/* Whether all eigenvalues have positive real parts: powers of (A + c)^-1 (A - c) vanish. A is lost. */
+/* Whether all eigenvalues have positive real parts: powers of (A + c)^-1 (A - c) vanish. A is overwritten. */
 static int is_positive_stable(double *a, int n, double *work) {
   double c = sqrt(dot(a, a, n * n) / n), *inverse = work, *power = inverse + (int64_t)n * n, *next = power + (int64_t)n * n;
   if (n == 1) return a[0] > 0;
@@ -546,16 +553,18 @@ static int is_positive_stable(double *a, int n, double *work) {
   return 0;
 }
 
-/* The state of an element after so many orders. One that is still undecided moves with nu at its bound and w = 0:
- * letters that leave and that slide are the same motion, except where nu makes no difference. */
+/* The state of an element after some orders. An undecided one has nu at its bound and w = 0: sliding and leaving are then
+ * the same motion, except where nu does not act. */
 static int final_state(const Decision *d, int i, int orders) {
   int state = d->state[orders * d->count + i];
+  int first = first_row(d->span, i), end = first + (d->span[first] > 1 ? d->span[first] : 1), matters = d->is_contact[i] || d->is_idle[i];
   if (state >= INSIDE) return state;
-  if (d->is_contact[i] || d->is_idle[i] || d->matrix[i * (d->count + 1)] != 0) return INSIDE;
+  for (int j = first; j < end; j++) matters |= d->matrix[j * (d->count + 1)] != 0;
+  if (matters) return INSIDE;
   return state == AT_TOP ? ABOVE : state == AT_BOTTOM ? BELOW : INSIDE;
 }
 
-/* The matrix of the surfaces that slide in a block, and bounds over widths of their layers; its size. */
+/* The matrix of the sliding surfaces of a block, and bounds over widths of their layers; its size. */
 static int layer_matrix(const Run *r, const Decision *d, int which, int orders, double *a, double *weight) {
   int k = d->count, n = 0;
   int32_t *own = d->pivot;
@@ -573,7 +582,7 @@ static int layer_matrix(const Run *r, const Decision *d, int which, int orders, 
   return n;
 }
 
-/* Move the eigenvalues that are zero because elements depend on one another: they move nothing. */
+/* Shift eigenvalues that are zero because elements are dependent: they do not affect the motion. */
 static void lift_null_space(double *a, int n, double *work, int32_t *pivot) {
   double *z = work, *rest = z + (int64_t)n * n, most = largest_of(a, n * n);
   int count = null_space(a, n, n, z, rest, pivot);
@@ -584,7 +593,7 @@ static void lift_null_space(double *a, int n, double *work, int32_t *pivot) {
   }
 }
 
-/* Whether the sliding of a block is stable across its layers; what depends on their widths is noted. */
+/* Whether the sliding of a block is stable across its layers; dependence on their widths is noted. */
 static int is_stable_block(Run *r, Decision *d, int which, int orders) {
   int size = d->first[which + 1] - d->first[which];
   if (d->is_imposed || !d->is_touched[d->order[d->first[which]]] || d->proved[which] == UNIQUE_AND_STABLE) return 1;
@@ -608,7 +617,7 @@ static int is_stable_block(Run *r, Decision *d, int which, int orders) {
   return stable;
 }
 
-/* Add a motion, whose letters are decided, unless its sliding is unstable. */
+/* Add a motion with decided letters, unless its sliding is unstable. */
 static void add_motion(Run *r, Decision *d, int orders) {
   int k = d->count;
   for (int q = 0; q < d->blocks; q++) if (!is_stable_block(r, d, q, orders)) { d->unstable++; return; }
@@ -653,6 +662,90 @@ static void close_with(Run *r, Decision *d, int order) {
   next_states(r, e, order);
 }
 
+/* Take a solution of a block at an order. */
+static void take_solution(Decision *d, int order, int which, const double *nu, const int8_t *class) {
+  int k = d->count, at = order * k, n = d->first[which + 1] - d->first[which];
+  const int32_t *own = d->order + d->first[which];
+  for (int i = 0; i < n; i++) {
+    d->nu[at + own[i]] = nu[i];
+    d->state[at + k + own[i]] = class[i];
+  }
+  for (int i = 0; i < n; i++) {
+    d->bound[at + own[i]] = d->b[at + own[i]];
+    for (int j = 0; j < d->first[which + 1]; j++) d->bound[at + own[i]] += d->share[own[i] * k + d->order[j]] * d->nu[at + d->order[j]];
+  }
+  for (int i = 0; i < n; i++) if (d->span[own[i]] > 0) keep_vector(d, own[i], order);
+}
+
+/* What the solution of a block says of its elements: those that move leave a limit that others hold. */
+static void classes_of(const Block *b, const double *nu, int8_t *class) {
+  for (int i = 0; i < b->size; i++)
+    class[i] = (int8_t)(span_of(b, i) < 0 ? class[i - 1] : span_of(b, i) ? class_of_vector(b, i, nu, 0) : class_of(b, i, nu, 0));
+}
+
+/* A block holds no longer than up to this instant, and its unknowns need not be unique until then. As the law goes on in
+ * time, with rates of order 1, so do its solutions; those of order 0 are their limit, by polynomials through some of them,
+ * and those of order 1 its derivative. 0 where there is none. */
+static int leave_limit(Decision *d, int which, int order) {
+  Block b = part_of_law(d, 0, which);
+  int n = b.size, k = d->count, jumps = 0, levels = 0;
+  double *a = d->work, *bound = a + n, *rate = bound + n, *slope = rate + n, *table = slope + n, *work = table + LIMITS * n;
+  double step = INFINITY, most = 0, terms;
+  int8_t *class = b.is_contact + k, *first = d->large_class;
+  memcpy(a, b.a, sizeof(double) * n);
+  memcpy(bound, b.b, sizeof(double) * n);
+  memset(class, INSIDE, n);
+  for (int i = 0; i < n; i++) {
+    int own = b.own[i];
+    rate[i] = d->a[k + own];
+    slope[i] = d->b[k + own];
+    for (int q = 0; q < d->first[which]; q++) {
+      rate[i] -= d->matrix[own * k + d->order[q]] * d->nu[k + d->order[q]];
+      slope[i] += d->share[own * k + d->order[q]] * d->nu[k + d->order[q]];
+    }
+    table[i] = d->nu[own];
+    most = larger(most, larger(fabs(table[i]), bound[i]));
+    if (rate[i] != 0) step = smaller(step, RESOLVED * d->yard[own] / fabs(rate[i]));
+    if (slope[i] != 0) step = smaller(step, RESOLVED * fabs(bound[i] / slope[i]));
+  }
+  for (int again = 0; step < INFINITY && levels < LIMITS && again < 4 * LIMITS; again++, step /= 2) {
+    double *nu = table + levels * n;
+    if (again) memcpy(nu, table + (levels ? levels - 1 : 0) * n, sizeof(double) * n);
+    for (int i = 0; i < n; i++) { b.a[i] = a[i] + step * rate[i]; b.b[i] = bound[i] + step * slope[i]; }
+    if (!(levels && polish(&b, nu, most, work, d->pivot)) && !relax_from(&b, nu, most, work, d->pivot)) return 0;
+    classes_of(&b, nu, class);
+    if (levels && memcmp(class, first, n)) { memcpy(table, nu, sizeof(double) * n); levels = 0; }
+    memcpy(first, class, n);
+    levels++;
+  }
+  memcpy(b.a, a, sizeof(double) * n);
+  memcpy(b.b, bound, sizeof(double) * n);
+  if (step < INFINITY && levels < LIMITS) return 0;
+  double *nu = table + (levels ? levels - 1 : 0) * n, *last = a, shortest = 2 * step;
+  memcpy(last, nu, sizeof(double) * n);
+  memcpy(first, class, n);
+  for (int j = 1; j < levels; j++)
+    for (int l = levels - 1; l >= j; l--)
+      for (int i = 0; i < n; i++) table[l * n + i] += (table[l * n + i] - table[(l - 1) * n + i]) / ((1 << j) - 1);
+  for (int i = 0; i < n; i++) jumps |= fabs(rate_of(&b, i, nu, &terms)) > MERGED * terms;
+  if (jumps && !polish(&b, nu, most, work, d->pivot)) return 0;
+  if (jumps) classes_of(&b, nu, class);
+  for (int i = 0; i < n && !jumps; i++) {
+    double room = MERGED * most;
+    if (!levels) break;
+    if (b.is_contact[i]) class[i] = class[i] == BELOW || nu[i] <= room ? AT_BOTTOM : INSIDE;
+    else if (span_of(&b, i) >= 0 && bound_of(&b, i, nu) <= room) class[i] = UNDECIDED;
+    else if (span_of(&b, i) < 0) class[i] = class[i - 1];
+    else class[i] = class[i] == ABOVE ? AT_TOP : class[i] == BELOW ? AT_BOTTOM : class[i];
+    if (class[i] == UNDECIDED || (b.is_contact[i] && class[i] == AT_BOTTOM)) nu[i] = 0;
+  }
+  take_solution(d, 0, which, nu, class);
+  if (order == 0) return 1;
+  for (int i = 0; i < n; i++) nu[i] = levels ? (last[i] - nu[i]) / shortest : 0;
+  take_solution(d, 1, which, nu, first);
+  return 1;
+}
+
 /* Follow all solutions from a block of an order on. */
 static void explore(Run *r, Decision *d, int order, int which) {
   int k = d->count;
@@ -679,26 +772,22 @@ static void explore(Run *r, Decision *d, int order, int which) {
       which = 0;
       continue;
     }
+    if (order == 1 && (d->ending == which + 1 || d->ended == which + 1)) {
+      int again = d->ended != which + 1; /* the order before is taken anew */
+      if (!leave_limit(d, which, !again)) return;
+      d->ended = which + 1;
+      d->ending = 0;
+      order = !again;
+      which++;
+      continue;
+    }
     int n = d->first[which + 1] - d->first[which], is_large = n > MOST_ENUMERATED;
     double *nu = is_large ? d->large : found;
     int8_t *to = is_large ? d->large_class : class;
     int count = solutions_of(r, d, order, which, nu, to);
     if (count > 1) d->branches++;
     for (int q = 0; q < count; q++) {
-      for (int i = 0; i < n; i++) {
-        int own = d->order[d->first[which] + i];
-        d->nu[order * k + own] = nu[q * n + i];
-        d->state[(order + 1) * k + own] = to[q * n + i];
-      }
-      for (int i = d->first[which]; i < d->first[which + 1]; i++) {
-        int own = d->order[i], at = order * k;
-        d->bound[at + own] = d->b[at + own];
-        for (int j = 0; j < d->first[which + 1]; j++) d->bound[at + own] += d->share[own * k + d->order[j]] * d->nu[at + d->order[j]];
-      }
-      for (int i = d->first[which]; i < d->first[which + 1]; i++) {
-        int own = d->order[i];
-        if (d->span[own] > 0) keep_vector(d, own, order);
-      }
+      take_solution(d, order, which, nu + q * n, to + q * n);
       if (count > 1) explore(r, d, order, which + 1);
     }
     if (count != 1) return;
@@ -706,7 +795,7 @@ static void explore(Run *r, Decision *d, int order, int which) {
   }
 }
 
-/* Whether two motions are one: their series are equal. */
+/* Whether two motions are equal, by their series. */
 static int is_same_motion(const Run *r, const Motion *one, const Motion *two) {
   int terms = one->terms < two->terms ? one->terms : two->terms;
   for (int j = 0; j < terms; j++) {
@@ -760,17 +849,17 @@ static int is_determined(Run *r, const Layout *l, const int8_t *letter) {
   return 1;
 }
 
-/* Note a mode whose unknowns are not determined; whether the motion is, in spite of that. */
+/* Note a mode with undetermined unknowns; whether the motion is still unique. */
 static int find_dependent(Run *r, const Layout *l, const int8_t *letter, const double *unknowns) {
-  combine_rows(r, letter, r->x);
+  aim(r, letter, r->x, unknowns);
   error_scales(r, r->x, held_of(r, letter), unknowns);
   if (l->slides < 2 || invert_layer(r, l, unknowns, r->matrix)) return 1;
   r->dependent = l->mode;
   return is_determined(r, l, letter);
 }
 
-/* Unknowns of a mode, which is laid out, that keep what it holds: bounds that were reached to a tolerance are exact then.
- * 0 where the run ends. */
+/* Unknowns of a mode that keep its functions at zero; bounds that were reached to a tolerance become exact. 0 where the run
+ * ends. */
 static int hold(Run *r, Continuation *to, int may_depend) {
   Layout *l = &r->trial.l;
   lay_out(r, to->letter, l);
@@ -803,8 +892,8 @@ static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   }
 }
 
-/* What multipliers of complementarity conditions can be, where all elements are such: their solution, as estimates by
- * the diagonal are far too large where that is a small resistance. */
+/* Sizes of multipliers of complementarity conditions, if all elements are such: from their solution, as estimates by a
+ * small diagonal are far too large. */
 static void estimate_multipliers(const Run *r, Decision *d) {
   int k = d->count;
   double *nu = d->large, *q = d->block, *m = q + k;
@@ -839,14 +928,14 @@ static void begin_decision(const Run *r, Decision *d) {
 
 /* One surface ------------------------------------------------------------------------------------------- */
 
-/* Whether a surface's row of the layer holds its own unknown; not where only those of other surfaces enter it. */
+/* Whether a surface's row of the layer contains its own unknown. */
 static int holds_its_own(const Run *r, int surface) {
   const Entries *slope = &r->s->slope;
   for (int e = 0; e < slope->count; e++) if (slope->row[e] == surface && slope->column[e] == surface) return 1;
   return 0;
 }
 
-/* The rate of h on one side of a surface, unknowns being aimed at, and rounding in it. */
+/* The rate of h on one side of a surface, and rounding in it. */
 static double rate_on_side(Run *r, const int8_t *letter, int surface, int side, double *rounding) {
   held_of(r, letter);
   r->held[surface] = side;
@@ -869,8 +958,8 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
   return 1;
 }
 
-/* One active surface whose rates of h on both sides decide, without series: crossing, entry, and exit where the
- * multiplier is known to pass its bound. The choice to r->chosen; 0 where it is not clear. */
+/* Decide one active surface by the rates of h on both sides: crossing, entry, and exit where the multiplier is known to pass
+ * its bound. The choice to r->chosen; 0 where series are needed. */
 static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int own = r->active[0], exits = known_count && known[0].kind == EXIT_GUARD, chosen = 0;
   double rate[2], rounding;
@@ -898,7 +987,7 @@ static int decide_by_rates(Run *r, const int8_t *letter, const Known *known, int
   return 1;
 }
 
-/* Where no mode continues: stay where all orbits spiral in, or say why the run ends. */
+/* No mode continues: stay where all orbits spiral in, or set the reason why the run ends. */
 static int no_motion(Run *r, const int8_t *letter) {
   int contacts = 0, sets = 0, k = r->active_count;
   for (int i = 0; i < k; i++) { contacts |= is_half_line(r, r->active[i]); sets |= set_of(r, r->active[i]) >= 0; }
@@ -911,12 +1000,12 @@ static int no_motion(Run *r, const int8_t *letter) {
   return 0;
 }
 
-/* The law at the point of the active elements; 0 where it is no number. */
+/* The law of the active elements at the present point; 0 where it is not finite. */
 static int begin_law(Run *r, const int8_t *letter, const Known *known, int known_count) {
   Decision *d = r->decision;
   d->count = r->active_count;
   d->letter = letter;
-  d->motions = d->branches = d->unstable = d->is_imposed = 0;
+  d->motions = d->branches = d->unstable = d->is_imposed = d->ending = d->ended = 0;
   d->last = ORDERS;
   if (!read_law(r, d)) return 0;
   find_blocks(d);
@@ -926,8 +1015,8 @@ static int begin_law(Run *r, const int8_t *letter, const Known *known, int known
   return 1;
 }
 
-/* Whether multipliers of a motion are not determined in the order in which they enter: the closed conditions depend on one
- * another, or leave equations of the states. */
+/* Whether multipliers of a motion are not determined at the order where they enter: the closed conditions are dependent, or
+ * leave equations of the states. */
 static int has_hidden(Run *r, const Decision *d) {
   if (!r->s->combined || r->status != RUNNING) return 0;
   for (int i = 0; i < d->motions; i++) {
@@ -940,8 +1029,8 @@ static int has_hidden(Run *r, const Decision *d) {
   return d->motions != 1;
 }
 
-/* Choose, as r->chosen, the motion that continues from a point of the active elements; 0 if the run ends.
- * ``letter`` has those of the other elements. */
+/* Choose the motion that continues from a point of the active elements as r->chosen; 0 if the run ends. ``letter`` has the
+ * letters of the other elements. */
 static int decide(Run *r, const int8_t *letter, const Known *known, int known_count) {
   Decision *d = r->decision;
   int k = r->active_count, contacts = 0, several = 0, apart = 0;

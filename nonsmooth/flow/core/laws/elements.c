@@ -1,9 +1,9 @@
-/* Elements: which of them the state is on, what they keep at zero, and their laws. The unknown nu is in [-n, n] for a
- * surface, in [0, inf) for a contact or a complementarity condition, |nu| <= n for vectors of a set (sets.c), and h^(degree) in its normal cone. What
- * differs between the laws stands in LAWS; bounds and signs where they are solved, in decide.c.
+/* Elements: those that are active at a state, the functions that they keep at zero, and their laws. The unknown nu is in
+ * [-n, n] for a surface, in [0, inf) for a contact or a complementarity condition, |nu| <= n for vectors of a set (sets.c),
+ * and h^(degree) in its normal cone. LAWS has the differences between the laws; decide.c solves them.
  */
 
-/* Surfaces, gaps, their rates and lower derivatives at x; gradients stay among the program's values. */
+/* Surfaces, gaps, their rates and lower derivatives at x; gradients remain among the program's values. */
 static const double *surface_values(Run *r, const double *x) {
   const Values *t = &r->s->surfaces;
   values_at(t, x, r->p, r->heights);
@@ -19,8 +19,8 @@ static const double *surface_scales(Run *r, const double *x) {
   return scale;
 }
 
-/* Least-norm Newton steps of the states (not the time) onto functions that are kept at zero: the rows are
- * made orthogonal one after the other, those that can overlap (a dependent row drops out). */
+/* Least-norm Newton steps of the states (not the time) onto functions that are kept at zero: overlapping rows are
+ * orthogonalised one after the other; dependent rows drop out. */
 static void project_to(Run *r, const int32_t *which, int count, const double *level) {
   const Entries *g = &r->s->surface_gradient;
   int all = r->kept_rows, more = r->s->combined, nd = r->s->dimension;
@@ -74,7 +74,7 @@ static void project_to(Run *r, const int32_t *which, int count, const double *le
 
 static void project(Run *r, const int32_t *which, int count) { project_to(r, which, count, 0); }
 
-/* Where the derivatives are that an element keeps at zero too; their number. */
+/* Rows of the derivatives that an element keeps at zero too; their number. */
 static int lower_rows(const Run *r, int i, int32_t *which) {
   const Element *e = element(r, i);
   for (int k = 0; k < e->degree - 1; k++) which[k] = e->lower + k;
@@ -93,8 +93,8 @@ static int passes_to(const Run *r, int i, const double *scale) {
   return 0;
 }
 
-/* Letters of the surfaces that the motion passes by a lower derivative: the ``certain`` one (or -1) and those on which
- * it is to rounding. */
+/* Set letters of the surfaces that the motion passes by a lower derivative: the ``certain`` one (or -1) and those that are
+ * zero to rounding. */
 static void take_sides(Run *r, int8_t *letter, int certain) {
   int needed = 0;
   for (int i = 0; i < r->m; i++) needed |= degree_of(r, i) > 1;
@@ -108,15 +108,15 @@ static void take_sides(Run *r, int8_t *letter, int certain) {
   }
 }
 
-/* The functions of joints, and derivatives. */
+/* Add the functions of joints and their derivatives. */
 static int with_joints(const Run *r, int32_t *which, int count) {
   for (int i = 0; r->s->joints && i < r->m; i++) if (has_law(r, i, JOINT_LAW)) which[count++] = i;
   for (int i = 0; r->s->joints && i < r->m; i++) if (has_law(r, i, JOINT_LAW)) count += lower_rows(r, i, which + count);
   return count;
 }
 
-/* What the active elements below ``width`` keep at zero, contacts their gaps, and the ``certain`` one (or -1), also if
- * it is passed. */
+/* Functions that the active elements below ``width`` keep at zero, contacts their gaps, and the ``certain`` one (or -1),
+ * also if it is passed. */
 static int gather(const Run *r, int certain, int width, int32_t *which) {
   int count = 0, found = certain < 0 || degree_of(r, certain) <= 1;
   for (int i = 0; i < r->active_count && r->active[i] < width; i++) {
@@ -139,7 +139,7 @@ static int kept_by(Run *r, const int8_t *letter, int32_t *which) {
   return count;
 }
 
-/* Whether a state satisfies the equations that a mode leaves. */
+/* Whether a state satisfies the equations of a mode. */
 static int satisfies(Run *r, const int8_t *letter) {
   if (!r->s->combined) return 1;
   combine_rows(r, letter, r->x);
@@ -151,21 +151,21 @@ static int satisfies(Run *r, const int8_t *letter) {
   return 1;
 }
 
-/* Whether a surface is one of the time alone, onto which no step of the states leads. */
+/* Whether a surface depends on the time alone, so that no step of the states reaches it. */
 static int is_of_time(const Run *r, int surface) {
   const Entries *g = &r->s->surface_gradient;
   for (int k = 0; k < g->count; k++) if (g->row[k] == surface && g->column[k] < r->s->dimension) return 0;
   return 1;
 }
 
-/* Whether Newton's steps have led onto a surface: not where its zero is a multiple one. */
+/* Whether Newton steps have reached a surface; they fail where its zero is multiple. */
 static int is_on(Run *r, int surface) {
   if (is_of_time(r, surface)) return 1;
   double h = surface_values(r, r->x)[surface];
   return fabs(h) <= VANISHES * surface_scales(r, r->x)[surface];
 }
 
-/* Gaps and rates that are zero to rounding are so, in r->rates. */
+/* Gaps and rates in r->rates, set to zero where they are zero to rounding. */
 static const double *gaps(Run *r, const double *x) {
   surface_values(r, x);
   const double *scale = surface_scales(r, x);
@@ -173,8 +173,8 @@ static const double *gaps(Run *r, const double *x) {
   return r->rates + r->m;
 }
 
-/* Of the active surfaces, those stay that Newton's steps from the others lead onto within rounding of the states: one
- * that is nearly parallel is passed by itself, its nearer root first. */
+/* Keep active surfaces that Newton steps from the others reach within rounding of the states. A nearly parallel surface is
+ * passed separately, at its nearer root first. */
 static void leave_parallel(Run *r, int certain, const int8_t *letter) {
   double *x = r->before, *first = r->at_work;
   int32_t *onto = r->involved;
@@ -205,7 +205,7 @@ static void leave_parallel(Run *r, int certain, const int8_t *letter) {
   memcpy(r->x, x, sizeof(double) * r->n);
 }
 
-/* The run ends where a state does not satisfy a joint, or does not move along it. */
+/* End the run where a state does not satisfy a joint, or does not move along it. */
 static void require_joints(Run *r, const double *scale) {
   for (int i = 0; r->s->joints && i < r->m; i++) {
     const Element *e = element(r, i);
@@ -218,13 +218,13 @@ static void require_joints(Run *r, const double *scale) {
   }
 }
 
-/* Sets without load are idle. */
+/* Set letters of sets without load to IDLE. */
 static void idle_sets(const Run *r, int8_t *letter, const double *scale) {
   EACH_SET(r, s) if (is_unloaded(r, letter, s, scale)) memset(letter + s, IDLE, size_of(r, s));
 }
 
-/* Surfaces through the present state, to rounding, and contacts at rest; those that slide in a mode and the
- * ``certain`` one (or -1). The run ends where a gap is negative. */
+/* List active elements: surfaces through the present state, to rounding, contacts at rest, those that slide in a mode and
+ * the ``certain`` one (or -1). The run ends where a gap is negative. */
 static void active_surfaces(Run *r, int certain, const int8_t *letter) {
   r->active_count = 0;
   if (!r->width) return;
@@ -235,14 +235,14 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
     if (gap < 0 && !(fabs(gap) <= ON_SURFACE * scale[r->m + j])) finish(r, INCONSISTENT, BEHIND, j);
   }
   require_joints(r, scale);
-  int met = 0;
+  int reached = 0;
   for (int i = 0; i < r->width; i++) {
     int rests = fabs(h[i]) <= ON_SURFACE * scale[i], s = set_of(r, i), sure = i == certain;
     if (has_law(r, i, RELAY_LAW) || has_law(r, i, JOINT_LAW) || has_law(r, i, TABLE_LAW)) continue; /* nothing is decided */
-    rests |= !keeps_height(r, i); /* its function holds unknowns: it is decided with them */
+    rests |= !keeps_height(r, i); /* its function contains unknowns: it is decided with them */
     if (s >= 0) {
-      if (i == s) met = letter[s] <= OFF && !is_unloaded(r, letter, s, scale) && is_met(r, letter, s, h, scale);
-      rests = met;
+      if (i == s) reached = letter[s] <= OFF && !is_unloaded(r, letter, s, scale) && is_reached(r, letter, s, h, scale);
+      rests = reached;
       sure = certain >= s && certain < s + size_of(r, s);
     }
     if (letter[i] != 0 && passes_to(r, i, scale)) continue; /* its letter follows from a lower derivative */
@@ -253,7 +253,7 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
 
 /* Laws -------------------------------------------------------------------------------------------------- */
 
-/* The sign of a bound's first coefficient that is not zero; one that rounding has left before it passes zero is. */
+/* The sign of a bound's first coefficient that is nonzero to rounding. */
 static double turn_of(const Run *r, int i, const double *factor, int count) {
   const Entries *g = &r->s->factor_gradient;
   int k = 0;
@@ -315,7 +315,7 @@ static double rounding_of_element(Run *r, const Expansion *e, int row, const Sum
 
 static int8_t side_of_surface(const Run *r, int i, double h) {
   (void)r, (void)i;
-  return h > 0 ? 1 : -1; /* what is on it counts as below until it is decided */
+  return h > 0 ? 1 : -1; /* on it counts as below until decided */
 }
 
 static int8_t side_of_one(const Run *r, int i, double h) {
@@ -323,7 +323,8 @@ static int8_t side_of_one(const Run *r, int i, double h) {
   return 1;
 }
 
-/* A relay that is at its threshold, or beyond by rounding, is just before it: the motion switches it or leaves. */
+/* The guard of a relay. At its threshold, or beyond by rounding, it counts as just before: the motion switches it or
+ * leaves. */
 static void guard_of_relay(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
   (void)series;
   guard_of_height(r, l, row, count, g);
@@ -335,25 +336,25 @@ static int8_t side_of_relay(const Run *r, int i, double h) {
   return r->rates[element(r, i)->lower] > 0 ? 1 : h < 0 ? -1 : r->letter[i] > 0 ? 1 : -1;
 }
 
-/* Relays whose times cannot be told apart switch together. */
+/* Relays whose switching times coincide to rounding switch together. */
 static void serve_relay(Run *r, int row) {
   int before = r->mode;
-  double last = r->met_at[row] + TIE * time_scale(r);
+  double last = r->root_at[row] + TIE * time_scale(r);
   for (int k = 0; k < r->now.atoms; k++) {
     int i = r->now.index[k];
-    if (has_law(r, i, RELAY_LAW) && r->met_at[k] >= 0 && r->met_at[k] <= last) r->letter[i] = (int8_t)-r->letter[i];
+    if (has_law(r, i, RELAY_LAW) && r->root_at[k] >= 0 && r->root_at[k] <= last) r->letter[i] = (int8_t)-r->letter[i];
   }
   settle_in(r);
   if (r->status == RUNNING) event(r, change_kind(r, before, r->mode), before, row, r->x);
 }
 
-/* A joint holds its function at zero with a reaction of any size and sign: nothing ends that. */
+/* A joint keeps its function at zero with a reaction of any size and sign, always. */
 static int8_t side_of_joint(const Run *r, int i, double h) {
   (void)r, (void)i, (void)h;
   return 0;
 }
 
-/* Tables: the cell of the function among the breakpoints sets parameters of the field, which is continuous ------- */
+/* Tables: the cell of the function between breakpoints sets parameters of the field, which is continuous ---------- */
 
 static const Cells *cells_of(const Run *r, int i) { return r->s->cells + i; }
 
@@ -388,7 +389,7 @@ static int is_at_level(const Run *r, int i, int side, double h) {
   return k >= 0 && fabs(h - level) <= ON_SURFACE * (r->size + fabs(h) + fabs(level));
 }
 
-/* At an end of a table the state is in the cell within, from which its motion may lead out. */
+/* At an end of a table the state is in the inner cell, which its motion may leave. */
 static void enter_limits(Run *r, int i, double h) {
   const int32_t *q = cells_of(r, i)->limit;
   for (int k = 0; k < cells_of(r, i)->limits; k++, q += 3 + 2 * q[2]) {
@@ -397,7 +398,7 @@ static void enter_limits(Run *r, int i, double h) {
   }
 }
 
-/* The cells of a state, of present ones those that it is in to rounding. */
+/* Find the cells of a state; a present cell is kept to rounding. */
 static void find_cells(Run *r) {
   for (int i = 0; r->s->tables && i < r->m; i++) {
     if (!has_law(r, i, TABLE_LAW)) continue;
@@ -409,7 +410,7 @@ static void find_cells(Run *r) {
   }
 }
 
-/* The run ends where the function of a table that is in use has left its limits, unless it ends there anyway. */
+/* End the run where the function of an active table has left its limits, unless it has ended. */
 static void require_limits(Run *r) {
   double gone = time_scale(r);
   int ends = gone > 0 && r->t >= r->o.t_end - TIE * gone;
@@ -432,7 +433,7 @@ static void renumber(Run *r) {
   require_limits(r);
 }
 
-/* A state at a breakpoint is in the cell into which it moves. */
+/* Put a state at a breakpoint into the cell that its motion enters. */
 static void turn_cells(Run *r) {
   int turned = 0, is_known = 0;
   const double *h = surface_values(r, r->x);
@@ -450,14 +451,14 @@ static void turn_cells(Run *r) {
   if (turned) renumber(r);
 }
 
-/* Tables whose times cannot be told apart from that of a guard pass with it, as does its own. */
+/* Tables whose breakpoints coincide with a guard to rounding pass with it, as does its own. */
 static void pass_cells(Run *r, int row) {
-  double last = r->met_at[row] + TIE * time_scale(r);
+  double last = r->root_at[row] + TIE * time_scale(r);
   const double *h = r->s->tables ? surface_values(r, r->x) : 0;
   for (int k = 0; r->s->tables && k < r->now.atoms; k++) {
     int i = r->now.index[k], side = r->now.side[k];
     if (!has_law(r, i, TABLE_LAW)) continue;
-    int tied = r->met_at[k] >= 0 && r->met_at[k] <= last && is_at_level(r, i, side, h[i]);
+    int tied = r->root_at[k] >= 0 && r->root_at[k] <= last && is_at_level(r, i, side, h[i]);
     if (k == row) r->passed = breakpoint(r, i, side);
     if (k == row || tied) set_cell(r, i, r->cell[i] - side);
     if (k == row || tied) h = surface_values(r, r->x);
@@ -495,10 +496,10 @@ static void serve_table(Run *r, int row) {
   if (cells_of(r, i)->shown[r->passed] >= 0) event(r, CROSSING, before, row, r->x);
 }
 
-/* Number in results of the function whose guard was served. */
+/* Number in results of the function whose guard ended the mode. */
 static int shown_index(const Run *r) {
-  int i = r->met.index;
-  if (is_atom(r->met.kind)) return i;
+  int i = r->guard.index;
+  if (is_atom(r->guard.kind)) return i;
   return element(r, i)->shown + (has_law(r, i, TABLE_LAW) ? cells_of(r, i)->shown[r->passed] : 0);
 }
 

@@ -1,14 +1,13 @@
-/* Equations of the states alone that closed complementarity conditions of degree zero leave, as those of capacities that
- * diodes join.
+/* Equations of the states alone from closed complementarity conditions of degree zero, as of capacitors that diodes join.
  *
- * Closed conditions have y = C x + D nu = 0. Each vector v with v D = 0 on them leaves v C x = 0, which is kept by the
- * multipliers of its rate: one of its rows of the layer gives way to v y', without the rates of the multipliers, which v
- * D takes away. Rows of the layer are sums of all y and of all y' with weights among the parameters of the programs.
+ * Closed conditions have y = C x + D nu = 0. Each vector v with v D = 0 on them gives v C x = 0, which the multipliers keep
+ * through its rate: one of its rows of the layer is replaced by v y', from which v D removes the rates of the multipliers.
+ * Rows of the layer are sums of all y and of all y' with weights among the parameters of the programs.
  *
  * Source: Hairer & Wanner 1996, Solving Ordinary Differential Equations II, chapter VII (index reduction).
  */
 
-/* What rows are combined for: nothing yet, as they are given, their rates, a mode. */
+/* The rows at present: unknown, as given, their rates, those of a mode. */
 enum { UNKNOWN_ROWS, GIVEN_ROWS, RATE_ROWS, MODE_ROWS };
 
 static void forget_rows(Run *r) {
@@ -39,7 +38,7 @@ static void plain_rows(Run *r, int kind) {
   weights_changed(r);
 }
 
-/* Slopes that make no difference but below rounding: those of resistances that are as good as none. */
+/* Drop slopes that act only below rounding, as of very small resistances. */
 static void drop_small_slopes(Run *r, const double *x) {
   Equations *h = &r->equations;
   int q = r->s->combined, w = r->width;
@@ -58,7 +57,7 @@ static void drop_small_slopes(Run *r, const double *x) {
     }
 }
 
-/* Slopes and gradients of the conditions, which follow from the parameters. */
+/* Slopes and gradients of the conditions, which depend on parameters only. */
 static void read_conditions(Run *r, const double *x) {
   Equations *h = &r->equations;
   const Entries *g = &r->s->layer_gradient;
@@ -91,7 +90,7 @@ static int is_of_states(const Run *r, const double *v, const int32_t *closed, in
   return 0;
 }
 
-/* Combine the rows of the conditions that are closed in a mode. */
+/* Combine the rows of the closed conditions of a mode. */
 static void combine_rows(Run *r, const int8_t *letter, const double *x) {
   Equations *h = &r->equations;
   int q = r->s->combined, w = r->width, closed = 0, columns = 0, free = 0;
@@ -127,7 +126,7 @@ static void combine_rows(Run *r, const int8_t *letter, const double *x) {
   weights_changed(r);
 }
 
-/* Whether the present mode keeps y of a condition of degree zero by that of its rate. */
+/* Whether the present mode keeps y = 0 of a condition of degree zero through its rate. */
 static int is_held_alone(Run *r, int own) {
   int q = r->s->combined, found = 0;
   combine_rows(r, r->letter, r->x);

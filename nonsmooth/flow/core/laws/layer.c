@@ -1,17 +1,17 @@
-/* Modes that are tried one by one, each with all its unknowns: where laws are not linear complementarity (hidden laws,
- * products, sets of codimension two and more). A mode can continue if each of its guards that vanishes here becomes
- * positive at once: its first coefficient that is not zero is positive. */
+/* Modes tried one by one, each with all its unknowns, where laws are not linear complementarity (hidden laws, products, sets
+ * of codimension two and more). A mode can continue if the first nonzero coefficient of each of its guards that vanish here
+ * is positive. */
 
 static int bits(int a) { return (a & 1) + (a >> 1 & 1) + (a >> 2 & 1); }
 
-/* Number of the modes that are possible, or 0 where they are more than are tried. */
+/* Number of possible modes, or 0 where they are too many to try. */
 static int choices_of(const Run *r, const int8_t *possible, int count) {
   int total = 1, most = r->s->combined ? DIODES_TRIED : TRIED;
   for (int i = 0; i < count && total <= most; i++) total *= bits(possible[i]);
   return total <= most ? total : 0;
 }
 
-/* Coefficients that are no numbers decide nothing. */
+/* Drop coefficients that are not finite. */
 static void keep_finite(Run *r, Expansion *e) {
   for (int i = 0; i < r->n * r->stride; i++) if (!(fabs(e->states[i]) < INFINITY)) e->states[i] = 0;
   for (int i = 0; i < e->l.rows * r->stride; i++) if (!(fabs(e->guards[i]) < INFINITY)) e->guards[i] = 0;
@@ -35,7 +35,7 @@ static int is_stable(Run *r, const Layout *l) {
   return rows == 0 || is_positive_stable(a, rows, r->decision->work);
 }
 
-/* Whether all active elements but one have the letters of the mode before: what its guard says of it holds only then. */
+/* Whether all active elements but one have the letters of the previous mode: only then its guard decides it. */
 static int others_stay(const Run *r, const int8_t *letter, int but) {
   for (int i = 0; i < r->active_count; i++) {
     int own = r->active[i], set = set_of(r, own);
@@ -90,11 +90,11 @@ static int rests(const Run *r, const int8_t *letter) {
   return 0;
 }
 
-/* Modes that can continue, so far; the rank of the chosen one: 2 if no guard of it stays zero, 1 if something rests. */
+/* Admissible modes so far; the rank of the chosen one: 2 if none of its guards stays zero, else 1. */
 typedef struct { int strict, found, rank; } Tally;
 
-/* Whether a mode that continues, that of r->trial, has the motion of the first one: loads that are not determined may be
- * anywhere. It is kept if it is the first. */
+/* Whether the admissible mode of r->trial has the motion of the first one, up to undetermined loads. Store it if it is the
+ * first. */
 static int is_found(Run *r, const Tally *t) {
   Motion *first = r->decision->motion, *own = first + 1;
   first->terms = own->terms = COMPARED;
@@ -119,7 +119,7 @@ static int is_chosen(Run *r, const Tally *t) {
   return t->strict < 2 && t->found && (t->rank || t->found == 1);
 }
 
-/* Letters of the active elements by the number of a choice of those that are possible. */
+/* Letters of the active elements by the number of a choice of possible letters. */
 static void spell_choice(const Run *r, const int8_t *letter, const int8_t *possible, int number, int8_t *trial) {
   memcpy(trial, letter, r->width);
   for (int i = r->active_count - 1; i >= 0; i--) {
@@ -185,8 +185,8 @@ static int zeros_of(const double *g, int order, double h, int zeros) {
   return zeros;
 }
 
-/* Roots of the rate of an element on the way of its multiplier from one value to another, of which ``zeros``
- * coefficients vanish at the first; -1 where it is no number. */
+/* Roots of the rate of an element between two values of its multiplier; ``zeros`` coefficients vanish at the first. -1 where
+ * the rate is not finite. */
 static int roots_along(Run *r, const Layout *l, double *unknowns, int own, double from, double to, int zeros,
                        double *root) {
   int order = r->order, count = 0;
@@ -204,7 +204,7 @@ static int roots_along(Run *r, const Layout *l, double *unknowns, int own, doubl
     double there = ahead == left ? to : at + way * ahead;
     unknowns[own] = there;
     rate_along(r, l, unknowns, own, next);
-    if (fabs(next[0] - (s > 0 ? 0 : end)) > sqrt(EPSILON) * size) { /* a pole or a pulse that the series does not see */
+    if (fabs(next[0] - (s > 0 ? 0 : end)) > sqrt(EPSILON) * size) { /* a pole or a pulse that the series misses */
       most = 0.5 * h;
       unknowns[own] = at;
       rate_along(r, l, unknowns, own, g);
@@ -219,7 +219,7 @@ static int roots_along(Run *r, const Layout *l, double *unknowns, int own, doubl
   return count;
 }
 
-/* Add a solution that Newton's method improves and that is new; unknowns of surfaces are within their bounds. */
+/* Add a solution after Newton's method if it is new and unknowns of surfaces are within their bounds. */
 static void keep_solution(Run *r, const Layout *l, double *unknowns, int steps, Solutions *found) {
   int w = r->width;
   if (found->count == SOLUTIONS || !improve(r, l, r->x, unknowns, steps)) return;
@@ -239,10 +239,10 @@ static void keep_solution(Run *r, const Layout *l, double *unknowns, int steps, 
   memcpy(found->each + found->count++ * w, unknowns, sizeof(double) * w);
 }
 
-/* The box of a product's variables, of which its functions are linear in each. */
+/* The box of a product's variables; its functions are linear in each variable. */
 typedef struct { const Layout *l; const double *low, *width; double *unknowns; int k; } Cube;
 
-/* Solutions in a box by halving: a function that is linear in each variable is between its values at the corners. */
+/* Solutions in a box by bisection: a function that is linear in each variable is between its values at the corners. */
 static void search_cube(Run *r, const Cube *c, const double *corner, const double *at, double size, int depth,
                         Solutions *found) {
   int k = c->k, axis = depth % k, step = 1 << axis;
@@ -289,7 +289,7 @@ static void solve_products(Run *r, const Layout *l, double *unknowns, Solutions 
   search_cube(r, &(Cube){l, low, width, unknowns, k}, corner, start, 1, 0, found);
 }
 
-/* The same for other laws, and with reactions: Newton's method from a grid. */
+/* Solutions of a mode with other laws or with reactions: Newton's method from a grid. */
 static void solve_from_grid(Run *r, const Layout *l, double *unknowns, Solutions *found) {
   int surfaces = 0, points = 1;
   for (int i = 0; i < l->slides; i++) surfaces += is_bounded(r, l->sliding[i]);
@@ -329,7 +329,7 @@ static void solutions_of_leaving(Run *r, const Layout *l, Solutions *found) {
   }
 }
 
-/* All unknowns with which a mode keeps what slides in it. */
+/* All unknowns of a mode that keep its sliding functions at zero. */
 static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
   int w = r->width, bent = 0, contacts = 0;
   double *unknowns = r->tried, root[SOLUTIONS];
@@ -355,7 +355,7 @@ static void mode_solutions(Run *r, const Layout *l, Solutions *found) {
   else solve_from_grid(r, l, unknowns, found);
 }
 
-/* Of several solutions of a mode with a hidden law keep those that attract in the layer. */
+/* Keep solutions of a mode with a hidden law that attract in the layer, if there are several. */
 static void keep_stable(Run *r, const Layout *l, Solutions *found) {
   int kept = 0, w = r->width, bent = 0;
   for (int i = 0; i < l->slides; i++) bent |= r->s->mixed[l->sliding[i] * (w + 1)];
@@ -368,7 +368,7 @@ static void keep_stable(Run *r, const Layout *l, Solutions *found) {
   found->count = kept;
 }
 
-/* Unknowns of a mode to r->unknowns; how many sets of them it has, of which one is wanted. */
+/* Unknowns of a mode to r->unknowns; the number of solutions, which has to be one. */
 static int find_unknowns(Run *r, const Layout *l) {
   Solutions all = {0};
   mode_solutions(r, l, &all);
@@ -377,14 +377,14 @@ static int find_unknowns(Run *r, const Layout *l) {
   return all.count;
 }
 
-/* Where the multiplier of the one active surface comes from, and which way it moves; 0 where that is not known. */
+/* The previous multiplier of the one active surface, and its direction of motion; 0 where that is unknown. */
 static int way_in_layer(Run *r, const Layout *l, double *from) {
-  int own = r->active[0], kind = r->met.kind;
+  int own = r->active[0], kind = r->guard.kind;
   double g[P + 1];
-  if (r->active_count != 1 || (kind == BRANCH_GUARD ? r->folded : r->met.index) != own) return 0;
-  *from = r->met.side;
-  if (kind == SURFACE_GUARD) return -r->met.side;
-  if (kind == EXIT_GUARD) return r->met.side;
+  if (r->active_count != 1 || (kind == BRANCH_GUARD ? r->folded : r->guard.index) != own) return 0;
+  *from = r->guard.side;
+  if (kind == SURFACE_GUARD) return -r->guard.side;
+  if (kind == EXIT_GUARD) return r->guard.side;
   if (kind != BRANCH_GUARD) return 0;
   memcpy(r->tried, r->unknowns, sizeof(double) * r->width);
   rate_along(r, l, r->tried, own, g);
@@ -392,18 +392,18 @@ static int way_in_layer(Run *r, const Layout *l, double *from) {
   return g[2] > 0 ? 1 : -1;
 }
 
-/* Unknowns that are known in a mode: those that go on beside the element that is decided. */
+/* Keep unknowns of a mode besides that of the decided element. */
 static void keep_others(const Run *r, const int8_t *letter, int own, double *unknowns) {
   keep_carried(r, letter, unknowns);
   for (int i = 0; i < r->width; i++) if (i != own && letter[i] == 0 && r->letter[i] == 0) unknowns[i] = r->unknowns[i];
 }
 
-/* The element whose guard or fold ended the mode, if all other active ones are held as before and no unknown acts on
- * both; else -1. */
+/* The element whose guard or fold ended the mode, if all other active ones keep their letters and no unknown couples it to
+ * them; else -1. */
 static int moves_alone(Run *r, const int8_t *letter) {
-  int own = r->met.kind == BRANCH_GUARD ? r->folded : r->met.index, w = r->width, is_active = 0;
-  if (r->met.kind != SURFACE_GUARD && r->met.kind != EXIT_GUARD && r->met.kind != BRANCH_GUARD) return -1;
-  if (r->met.kind != BRANCH_GUARD && !r->met.side) return -1;
+  int own = r->guard.kind == BRANCH_GUARD ? r->folded : r->guard.index, w = r->width, is_active = 0;
+  if (r->guard.kind != SURFACE_GUARD && r->guard.kind != EXIT_GUARD && r->guard.kind != BRANCH_GUARD) return -1;
+  if (r->guard.kind != BRANCH_GUARD && !r->guard.side) return -1;
   error_scales(r, r->x, held_of(r, r->letter), r->unknowns);
   for (int k = 0; k < r->active_count; k++) {
     int i = r->active[k];
@@ -415,7 +415,7 @@ static int moves_alone(Run *r, const int8_t *letter) {
   return is_active && r->s->mixed[own * (w + 1)] ? own : -1;
 }
 
-/* The mode that one surface's layer leads to: the first attracting root on the way, or the side at its end. */
+/* The mode that the layer dynamics of one surface reach: the first attracting root, or the side at the end. */
 static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int own = r->active[0], count;
   double from, root[SOLUTIONS];
@@ -427,7 +427,7 @@ static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int
   int way = way_in_layer(r, l, &from);
   if (!way) return 0;
   keep_others(r, trial, own, r->tried);
-  count = roots_along(r, l, r->tried, own, from, way, r->met.kind == BRANCH_GUARD ? 2 : 0, root);
+  count = roots_along(r, l, r->tried, own, from, way, r->guard.kind == BRANCH_GUARD ? 2 : 0, root);
   for (int k = 0; k <= count && r->status == RUNNING; k++) {
     trial[own] = k < count ? 0 : (int8_t)way;
     keep_others(r, trial, own, r->found.unknowns);
@@ -439,15 +439,15 @@ static int follow_in_layer(Run *r, const int8_t *letter, const Known *known, int
   return 0;
 }
 
-/* Whether a solution is the one that has just ended in a fold. */
+/* Whether a solution is the one that just ended in a fold. */
 static int is_folded(const Run *r, const int8_t *letter, const double *unknowns) {
   double apart = 0;
-  if (r->met.kind != BRANCH_GUARD || memcmp(letter, r->letter, r->width)) return 0;
+  if (r->guard.kind != BRANCH_GUARD || memcmp(letter, r->letter, r->width)) return 0;
   for (int i = 0; i < r->width; i++) apart = larger(fabs(unknowns[i] - r->unknowns[i]), apart);
   return apart <= FOLD_APART;
 }
 
-/* Choose, as r->chosen, the motion that continues, of all modes and all their solutions. */
+/* Choose the motion that continues as r->chosen, of all modes and all their solutions. */
 static int try_modes(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int k = r->active_count;
   int8_t *trial = r->tried_letter, *possible = trial + r->width;
@@ -473,7 +473,7 @@ static int try_modes(Run *r, const int8_t *letter, const Known *known, int known
   return r->status == RUNNING && (is_chosen(r, &tally) || no_motion(r, letter));
 }
 
-/* The same where unknowns of the active elements enter nonlinearly. */
+/* Choose the motion that continues where unknowns of the active elements enter nonlinearly. */
 static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int alone = r->active_count == 1, own = alone ? r->active[0] : moves_alone(r, letter), count = r->active_count;
   if (own >= r->m || r->s->joints) own = -1;
@@ -490,8 +490,8 @@ static int decide_in_layer(Run *r, const int8_t *letter, const Known *known, int
   return r->status == RUNNING && try_modes(r, letter, known, known_count);
 }
 
-/* Folds of sliding: where the slope of what slides vanishes the multipliers go with a root of the time. With one of
- * them as the independent variable states, time and the others are regular there. */
+/* Folds of sliding: where the slope of the layer vanishes the multipliers vary as a root of the time. With one of them as the
+ * independent variable states, time and the others are regular there. */
 
 /* Whether sliding may end in a fold within some steps of length h. */
 static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
@@ -503,7 +503,7 @@ static int is_fold_ahead(const Run *r, const Expansion *e, double h) {
   return 0;
 }
 
-/* Whether a step would end at a root that a series has where a fold is: no series sees it, so it is come closer to. */
+/* Whether a step ends at a spurious root of a series near a fold; the fold is then approached more closely. */
 static int is_before_fold(const Run *r, const Expansion *e, int row, double dt) {
   if (e->l.kind[row] != BRANCH_GUARD || !is_mixed(r, e->l.sliding, e->l.slides)) return 0;
   return dt > FOLD_NEAR * time_scale(r);

@@ -1,8 +1,8 @@
 /* Roots of switching functions -----------------------------------------------------------------------
  *
  * A field with |h|^p, 0 < p < 1, has no derivatives on h = 0, where the root is zero (lambda_i is zero there and
- * multiplies it). Steps come close to the surface, as far as their series converge; the rest of the way, which is
- * below the tolerance, is a line with the mean of a field in which the root is a power of the time.
+ * multiplies it). Taylor steps approach the surface as far as their series converge. The remaining distance, below the
+ * tolerance, is a straight line with the mean of a field in which the root is a power of the time.
  */
 
 /* The field of the present mode at a state, with the root of a surface or without; the rate of its h. */
@@ -20,7 +20,7 @@ static double field_at_root(Run *r, int i, const double *x, int with_root, doubl
   return rate;
 }
 
-/* What the tolerance of the states makes of h, after surface_values. */
+/* The tolerance of h from that of the states, after surface_values. */
 static double near_root(Run *r, int i) {
   double *allowed = r->vector;
   for (int k = 0; k < r->n; k++) allowed[k] = k < r->s->dimension ? SAFETY * (r->o.atol + r->o.rtol * fabs(r->x[k])) : 0;
@@ -49,7 +49,7 @@ static int move_by(Run *r, const double *field, double dt) {
   return 1;
 }
 
-/* How fast the rate of h without its root changes along a field. */
+/* Derivative along a field of the rate of h without its root. */
 static double change_of_rate(Run *r, int i, double bare, const double *field) {
   double time = INFINITY, *x = r->at_root + r->n, *other = x + r->n;
   for (int k = 0; k < r->n; k++) if (field[k] != 0) time = smaller((size_of_state(r, k) + fabs(r->x[k])) / fabs(field[k]), time);
@@ -65,7 +65,7 @@ static void put_at(Run *r, int i, double height) {
   project_to(r, &which, 1, &height);
 }
 
-/* Whether a line would lead to the other side of another surface with a root: the field is not the same beyond it. */
+/* Whether a straight line crosses another surface with a root, beyond which the field differs. */
 static int leads_beyond(Run *r, int i, const double *field, double dt) {
   double *x = r->at_root + r->n;
   for (int k = 0; k < r->n; k++) x[k] = r->x[k] + dt * field[k];
@@ -74,7 +74,7 @@ static int leads_beyond(Run *r, int i, const double *field, double dt) {
   return 0;
 }
 
-/* Pass the zero of what balances a root: h is below the tolerance before and after it. Whether the surface is reached. */
+/* Pass the zero of the rate that balances a root; h is below the tolerance on both sides. Whether the surface is reached. */
 static int pass_balance(Run *r, int i, double bare, const double *field, double left) {
   double change = change_of_rate(r, i, bare, field), dt = -2 * bare / change;
   if (!(change * bare < 0) || leads_beyond(r, i, field, dt)) return 0;
@@ -82,13 +82,13 @@ static int pass_balance(Run *r, int i, double bare, const double *field, double 
   return dt < left;
 }
 
-/* Leave a surface whose h is hardly driven away yet, to where h has the size ``level``; 0 where it is not driven away. */
+/* Leave a surface with a slowly growing h, until h has the size ``level``; 0 where h does not grow. */
 static int grow_off_root(Run *r, int i, double rate, const double *bare, double level, double left) {
   double change = change_of_rate(r, i, rate, bare), *with = r->at_root + 2 * r->n, own, dt, height = r->letter[i] * level;
   if (!(change * r->letter[i] > 0) || (rate * r->letter[i] < 0 && rate * rate > level * fabs(change))) return 0;
   memcpy(r->saved, r->x, sizeof(double) * r->n);
   put_at(r, i, height);
-  own = fabs(field_at_root(r, i, r->x, 1, with) - rate); /* what the root is there */
+  own = fabs(field_at_root(r, i, r->x, 1, with) - rate); /* the root there */
   memcpy(r->x, r->saved, sizeof(double) * r->n);
   dt = larger((own - fabs(rate)) / fabs(change), sqrt(2 * level / fabs(change)));
   if (leads_beyond(r, i, bare, dt)) return 0;
@@ -98,8 +98,8 @@ static int grow_off_root(Run *r, int i, double rate, const double *bare, double 
   return 1;
 }
 
-/* Where a surface slides, multipliers follow the root of another one: the time to its zero and the mean field until
- * then, where h is a power of the time to it above one, as its series say; 0 where it is not. */
+/* Time to the zero of h and mean field until then, if sliding multipliers of another surface follow the root, so that h is a
+ * power above one of the time; 0 where the series contradict that. */
 static double power_law(Run *r, int i, double *mean) {
   Expansion *e = &r->e;
   int row = 0;
@@ -118,7 +118,7 @@ static double power_law(Run *r, int i, double *mean) {
   return time;
 }
 
-/* Go to a surface with a root that is near; whether it is reached. */
+/* Go to a near surface with a root; whether it is reached. */
 static int approach_root(Run *r, int i, double h, double level, double left) {
   double p = element(r, i)->power, *with = r->before, *mean = r->at_root, own, bare, share = 0, rate, dt;
   if ((dt = power_law(r, i, mean)) > 0) {
@@ -138,7 +138,8 @@ static int approach_root(Run *r, int i, double h, double level, double left) {
   }
   if (h * side <= 0) return 1;
   if (!(own * h < 0) || bare * h > 0) return 0;
-  if (fabs(own - bare) <= ROOT_SHARE * fabs(bare)) share = 1 / (1 + p); /* the root is a power p of the time */
+  double part = fabs(h) <= least_time(r) * fabs(own) ? FALL : ROOT_SHARE; /* rounding in the time hides its square */
+  if (fabs(own - bare) <= part * fabs(bare)) share = 1 / (1 + p); /* the root is a power p of the time */
   else if (fabs(bare) <= ROOT_SHARE * fabs(own)) share = 1 - p; /* h' = -k h^p */
   else if (fabs(h) <= level && degree_of(r, i) == 1) share = 1;
   if (share == 0) return 0;
@@ -150,14 +151,14 @@ static int approach_root(Run *r, int i, double h, double level, double left) {
   return dt < left;
 }
 
-/* Leave a surface with a root on which the run is; 0 where the motion does not lead away from it. */
+/* Leave a surface with a root; 0 where the motion does not leave it. */
 static int leave_root(Run *r, int i, double near, double level, double left) {
   double p = element(r, i)->power, *bare = r->before, *mean = r->at_root, *x = mean + r->n, *with = x + r->n;
   double rate = field_at_root(r, i, r->x, 0, bare), dt = near / fabs(rate);
   if (!(rate * r->letter[i] > 0)) return grow_off_root(r, i, rate, bare, level, left);
-  for (int count = 0; count < DEPTH; count++, dt *= FALL) { /* the root changes the rate by a small part */
+  for (double least = least_time(r) / FALL; ; dt *= FALL) { /* the root changes the rate by a small part */
     for (int k = 0; k < r->n; k++) x[k] = r->x[k] + dt * bare[k];
-    if (fabs(field_at_root(r, i, x, 1, with) - rate) <= ROOT_SHARE * fabs(rate)) break;
+    if (fabs(field_at_root(r, i, x, 1, with) - rate) <= ROOT_SHARE * fabs(rate) || !(dt >= least)) break;
   }
   if (degree_of(r, i) == 1 && dt * fabs(rate) < level) {
     if (grow_off_root(r, i, rate, bare, level, left)) return 1;
@@ -169,8 +170,8 @@ static int leave_root(Run *r, int i, double near, double level, double left) {
   return 1;
 }
 
-/* Rest on a surface with a root and its lower derivatives where they are below the tolerance: there may be no crossings
- * that accumulate. */
+/* Rest on a surface with a root where it and its lower derivatives are below the tolerance: crossings need not
+ * accumulate. */
 static int rest_near_root(Run *r, int i) {
   int before = r->mode, first = element(r, i)->lower;
   int32_t own = i;
@@ -187,7 +188,7 @@ static int rest_near_root(Run *r, int i) {
   return 1;
 }
 
-/* Whether a surface in ``letter`` could be left to a side, where only its root moves h: h' = k h^p with k > 0. */
+/* Whether a surface in ``letter`` can be left to a side through its root alone: h' = k h^p with k > 0. */
 static int is_driven_away(Run *r, int i, int side) {
   double *field = r->before, *with = r->at_root, terms = 0, level, bare, own;
   const Entries *g = &r->s->surface_gradient;
@@ -204,7 +205,7 @@ static int is_driven_away(Run *r, int i, int side) {
   return own * side > 0;
 }
 
-/* Whether a root drives away from an active surface on which, or to whose other side, r->chosen goes on. */
+/* Whether a root drives the state off an active surface that r->chosen keeps or crosses. */
 static int leaves_by_root(Run *r) {
   for (int q = 0; r->has_roots && q < r->active_count; q++) {
     int i = r->active[q];
@@ -225,11 +226,17 @@ static int leaves_by_root(Run *r) {
   return 0;
 }
 
+/* How near a surface with a root a run may come: where |h| is at most ``near``, or no series can begin. */
+static double least_of_root(Run *r, int i, double h, double near) {
+  if (fabs(h) > larger(near, CLOSE * surface_scales(r, r->x)[i])) return near;
+  return larger(near, least_time(r) * fabs(field_at_root(r, i, r->x, 1, r->at_root)));
+}
+
 /* Pass a surface with a root, where no series converges; whether the run has moved. */
 static int pass_root(Run *r, double left) {
   for (int i = 0; i < r->m; i++) {
     if (element(r, i)->power == 0 || r->letter[i] == 0) continue;
-    double h = surface_values(r, r->x)[i], near = near_root(r, i);
+    double h = surface_values(r, r->x)[i], near = least_of_root(r, i, h, near_root(r, i));
     if (!(fabs(h) <= near)) continue;
     if (rest_near_root(r, i)) return 1;
     double rounding = ON_SURFACE * surface_scales(r, r->x)[i], level = larger(ROOT_SHARE * ROOT_SHARE * near, rounding);

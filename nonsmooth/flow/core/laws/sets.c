@@ -1,6 +1,5 @@
-/* Sets of codimension two and more. Their switching functions stand side by side; each has the
- * letter of its set: 0 on it, OFF, and for what comes after leaving it LEFT_BEHIND (h is carried along) and
- * LEAVING (its first step). */
+/* Sets of codimension two and more. Their switching functions are adjacent; each has the letter of its set: 0 on it, OFF,
+ * LEAVING in the first step off it, then LEFT_BEHIND while h is integrated. */
 
 static double length_of(const double *h, int k) {
   double most = 0, sum = 0;
@@ -22,8 +21,7 @@ static double unit_of(const double *h, int k, double *u) {
   return r;
 }
 
-/* Multipliers of the sets at a state; ``unknowns`` are h of those left behind, and directions of those that are
- * being left. */
+/* Set the multipliers of the sets at a state; ``unknowns`` are h of sets left behind and directions of sets being left. */
 static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns) {
   const double *h = 0;
   combine_rows(r, letter, x);
@@ -42,7 +40,7 @@ static void aim(Run *r, const int8_t *letter, const double *x, const double *unk
   }
 }
 
-/* As the expansion began. */
+/* Set the multipliers at the start of an expansion. */
 static void aim_again(Run *r, const Expansion *e) {
   combine_rows(r, e->l.letter, r->x);
   for (int i = 0; r->s->sets && i < r->m; i++) {
@@ -69,7 +67,7 @@ static void push_direction(Run *r, Expansion *e, int f, int k, const double *h, 
     square += own[0] * own[k];
     if (k > 1) curved += convolve(own, own, k, 1, k - 1);
   }
-  /* Along a line curved is that of the root, exactly so along an axis. */
+  /* Along a straight line ``curved`` is that of the root, exactly so along an axis. */
   root[k] = k > 1 ? square + 0.5 * (curved - convolve(root, root, k, 1, k - 1)) : k ? square : 1;
   for (int i = 0; i < size; i++) {
     double *u = e->lambda + (int64_t)(f + i) * stride;
@@ -77,7 +75,7 @@ static void push_direction(Run *r, Expansion *e, int f, int k, const double *h, 
   }
 }
 
-/* Coefficients k of the sets off which the mode is. */
+/* Coefficients k of the multipliers of sets that the mode is off. */
 static void follow_sets(Run *r, Expansion *e, int k) {
   int stride = r->stride;
   EACH_SET(r, f) {
@@ -91,7 +89,7 @@ static void follow_sets(Run *r, Expansion *e, int k) {
   }
 }
 
-/* Rates at which sets are left, in the directions in which they are. */
+/* Rates at which sets are left, along their directions; zero where later orders decided. */
 static void leave_at_rates(Run *r, Expansion *e) {
   int w = r->width, stride = r->stride;
   EACH_LEAVING(r, e, f) {
@@ -103,14 +101,17 @@ static void leave_at_rates(Run *r, Expansion *e) {
       rate += u * g;
       terms += fabs(u) * sum;
     }
+    int known = 0;
+    for (int row = 0; row < e->l.atoms && e->l.mode == r->now.mode; row++)
+      if (e->l.kind[row] == NEAR_GUARD && e->l.index[row] == f) known = r->drop[row];
     radius[0] = 0;
-    radius[1] = fabs(rate) > VANISHES * terms ? rate : 0;
+    radius[1] = known <= 1 && fabs(rate) > VANISHES * terms ? rate : 0;
     e->radius[f] = 0;
   }
 }
 
-/* The matrix, r->work, of coefficients k of what slides and of directions in which sets are left, listed as r->pending,
- * and of coefficients k + 1 of the distances; its rows. ``count``: without the distances. */
+/* The matrix r->work of coefficients k of sliding multipliers and leaving directions, listed as r->pending, and of
+ * coefficients k + 1 of the distances; its rows. ``count``: without the distances. */
 static int leaving_matrix(Run *r, const Expansion *e, int k, int *count) {
   int slides = e->l.slides, n = 0, sets = 0, stride = r->stride, w = r->width, at = slides;
   int32_t *which = r->pending;
@@ -138,7 +139,7 @@ static int leaving_matrix(Run *r, const Expansion *e, int k, int *count) {
   return all;
 }
 
-/* Solve it in place of b: what is not determined is small, but reactions of joints. */
+/* Solve it in place of b; undetermined unknowns are small, except reactions of joints. */
 static void leaving_rates(Run *r, const Expansion *e, double *a, int all, double *b) {
   double *inverse = r->decision->work, *size = inverse + (int64_t)all * all, *rest = size + all;
   int is_solved;
@@ -151,8 +152,8 @@ static void leaving_rates(Run *r, const Expansion *e, double *a, int all, double
   if (!is_solved) for (int i = 0; i < all; i++) b[i] = NAN;
 }
 
-/* Where joints restrict the slip of a set that is left without a rate, rows of order k say what coefficients k - 1 of its
- * direction are across, with those of what slides: whether they have changed those. ``b`` is what is left of the rows. */
+/* Where joints restrict the slip of a set that is left at rate zero, rows of order k, with residual ``b``, determine
+ * coefficients k - 1 across its direction and of sliding multipliers. Whether these changed. */
 static int turn_leaving(Run *r, Expansion *e, int k, const double *a, int all, const double *b) {
   double *z = r->decision->work, *y = z + (int64_t)all * all, *turned = y + (int64_t)all * all, *rest = turned + (int64_t)all * all;
   int stride = r->stride, slides = e->l.slides, at = slides, changes = 0, count = null_space(a, all, all, z, rest, r->decision->pivot);
@@ -179,8 +180,8 @@ static int turn_leaving(Run *r, Expansion *e, int k, const double *a, int all, c
   return 1;
 }
 
-/* Coefficients k of directions in which sets are left and k + 1 of the distances, with those of what slides; 1 where those
- * before have changed. */
+/* Coefficients k of leaving directions and k + 1 of the distances, with those of sliding multipliers; 1 where earlier ones
+ * changed. */
 static int leave_sets(Run *r, Expansion *e, int k, int may_turn) {
   if (k == 0) { leave_at_rates(r, e); return 0; }
   int slides = e->l.slides, stride = r->stride, n, all = leaving_matrix(r, e, k, &n), at = slides, column = n;
@@ -200,7 +201,7 @@ static int leave_sets(Run *r, Expansion *e, int k, int may_turn) {
     }
     column++;
   }
-  if (r->s->joints && may_turn && k > 1 && turn_leaving(r, e, k, a, all, b)) return 1;
+  if ((r->s->joints || r->c) && may_turn && k > 1 && turn_leaving(r, e, k, a, all, b)) return 1;
   leaving_rates(r, e, a, all, b);
   for (int i = 0; i < slides; i++) e->series[(int64_t)which[i] * stride + k] = b[i];
   for (int i = slides; i < n; i++) e->lambda[(int64_t)which[i] * stride + k] = b[i];
@@ -209,7 +210,7 @@ static int leave_sets(Run *r, Expansion *e, int k, int may_turn) {
   return 0;
 }
 
-/* Coefficients k + 1 of h that is carried along. */
+/* Coefficients k + 1 of the integrated h. */
 static void close_sets(Run *r, Expansion *e, int k) {
   int stride = r->stride;
   EACH_SET(r, f) {
@@ -227,8 +228,7 @@ static void close_sets(Run *r, Expansion *e, int k) {
   }
 }
 
-/* What the expansion of a mode begins with, besides the states: multipliers of sets, h that is carried, derivatives of the
- * rates by the multipliers. */
+/* Begin the expansion of a mode: multipliers of sets, integrated h, derivatives of the rates by the multipliers. */
 static void begin_sets(Run *r, Expansion *e, const double *unknowns) {
   int w = r->width, leaving = 0;
   memset(e->lambda, 0, sizeof(double) * w * r->stride); /* the first guess of each order is zero */
@@ -305,7 +305,7 @@ static int8_t side_of_set(const Run *r, int i, double h) {
   return r->idle[set_of(r, i)] ? IDLE : OFF;
 }
 
-/* Largest coefficients, in units of the tolerance, of what has to be known to a relative tolerance. */
+/* Largest coefficients, in units of the tolerance, of quantities with a relative tolerance. */
 static void direction_bounds(const Run *r, const Expansion *e, double *last, double *before) {
   int order = r->order, stride = r->stride;
   double per = 1 / (SAFETY * r->o.rtol);
@@ -345,7 +345,7 @@ static void measure_limits(Run *r, Expansion *e) {
   }
 }
 
-/* Unknowns of a mode that are known: h of sets left behind. */
+/* Keep h of sets left behind among the unknowns of a mode. */
 static void keep_carried(const Run *r, const int8_t *letter, double *unknowns) {
   for (int i = 0; i < r->width; i++) unknowns[i] = i < r->m && letter[i] == LEFT_BEHIND ? r->unknowns[i] : 0;
 }

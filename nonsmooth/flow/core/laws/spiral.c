@@ -1,6 +1,6 @@
-/* Orbits of the plane round the point where two surfaces meet: r -> ratio r (1 + bend r) in a turn. Where they spiral
- * in, the point is reached and held. A quarter begins at distance r from one surface, on the other, which is reached
- * again after the time first r + second r^2.
+/* Planar orbits around the intersection of two surfaces: r -> ratio r (1 + bend r) in a turn. Where they spiral in, the
+ * state reaches the point and stays. A quarter turn begins on one surface at distance r and takes the time
+ * first r + second r^2.
  */
 
 /* Rates of two surfaces in a quadrant, and their derivatives by the surfaces; 0 where these are dependent. */
@@ -27,8 +27,8 @@ static int in_quadrant(Run *r, const int8_t *letter, const int *sign, double *ra
   return finite_all(slope, 4) && finite_all(rate, 2);
 }
 
-/* How an orbit comes back that runs once round, from rates and slopes in the quadrants ++, -+, --, +-; 0 where none
- * does. A ratio that is 1 to rounding is 1, a bend that is rounding 0. */
+/* The return map of one turn, from rates and slopes in the quadrants ++, -+, --, +-; 0 where no orbit returns. A ratio that
+ * is 1 to rounding is 1, a bend that is rounding 0. */
 static int go_round(double (*rate)[2], double (*slope)[4], double *ratio, double *bend) {
   static const int sign[4][2] = {{1, 1}, {-1, 1}, {-1, -1}, {1, -1}};
   int clockwise = !(rate[0][0] < 0);
@@ -56,7 +56,7 @@ static int go_round(double (*rate)[2], double (*slope)[4], double *ratio, double
   return 1;
 }
 
-/* Whether orbits run round the point of the two active surfaces, and towards it. */
+/* Whether orbits spiral into the intersection of the two active surfaces. */
 static int spirals_in(Run *r, const int8_t *letter) {
   static const int sign[4][2] = {{1, 1}, {-1, 1}, {-1, -1}, {1, -1}};
   double ratio, bend, rate[4][2], slope[4][4];
@@ -65,7 +65,7 @@ static int spirals_in(Run *r, const int8_t *letter) {
   return go_round(rate, slope, &ratio, &bend) && (ratio < 1 || (ratio == 1 && bend < 0));
 }
 
-/* Stay where two surfaces meet though no layer attracts: all orbits spiral in, so none leaves. */
+/* Stay at the intersection of two surfaces though no layer attracts: all orbits spiral in, so none leaves. */
 static int hold_there(Run *r, const int8_t *letter) {
   Continuation *c = &r->chosen;
   memcpy(c->letter, letter, r->width);

@@ -1,6 +1,6 @@
 /* Stability of sliding across layers: decide.c has the law at a point.
  *
- * In layers of widths e_i, e_i u_i' = a_i - A_ij n_j sat(u_j). With A the matrix of the surfaces that slide in a group,
+ * In layers of widths e_i, e_i u_i' = a_i - A_ij n_j sat(u_j). With A the matrix of the sliding surfaces of a group,
  * sliding is stable while all eigenvalues of n A / e have positive real parts. From a stable start the first of two
  * functions to vanish is its first loss: det A, and the determinant of the bialternate sum of n A / e with itself,
  * the product of all sums of two eigenvalues.
@@ -11,8 +11,7 @@
 /* What a guard of stability is: the slope of one unknown, or determinants of a group. */
 enum { OF_ONE, OF_GROUP, OF_SUMS };
 
-/* The group of each unknown that slides, of numbers below how many these are: those that act on one another, directly or
- * not. */
+/* The number of the coupled group of each sliding unknown; the number of groups. */
 static int find_groups(const Run *r, Layout *l) {
   const int32_t *output = r->s->slope_output, *own = l->sliding;
   int w = r->width;
@@ -59,7 +58,7 @@ static void divide_series(const double *a, const double *b, int count, double *c
   for (int k = 0; k < count; k++) c[k] = (a[k] - convolve(c, b, k, 0, k - 1)) / b[0];
 }
 
-/* The determinant of a matrix of series, which is lost; pivots are the largest values. */
+/* The determinant of a matrix of series, which is overwritten; pivots are the largest values. */
 static void determinant_series(double *a, int n, int count, int stride, double *result) {
   double sign = 1;
   double factor[P + 1], product[P + 1];
@@ -85,7 +84,7 @@ static void determinant_series(double *a, int n, int count, int stride, double *
   }
 }
 
-/* A of a group to ``to``, with rows times n / e, both of a sign, or only turned by the sign of n. */
+/* Copy A of a group to ``to``, with rows times n / e, or only times the sign of n. */
 static void group_matrix(const Run *r, const int32_t *own, int n, int count, int weighted, double *to) {
   int stride = r->stride;
   for (int i = 0; i < n; i++) {
@@ -131,7 +130,7 @@ static int group_of(const Layout *l, int first, int32_t *own) {
   return n;
 }
 
-/* What a guard of stability is of the size of: a product of slopes, as r->slope has them. */
+/* The scale of a guard of stability: a product of slopes of r->slope. */
 static double branch_scale(const Run *r, const Layout *l, int row) {
   int kind = l->side[row], first = l->index[row], w = r->width;
   int32_t own[MOST_ENUMERATED];

@@ -1,7 +1,7 @@
 /* Vectors of multipliers at a point: |nu| <= b, and w = a - M nu is zero inside and along nu at the bound.
  *
- * On the bound nu = b u and w = s u with |u| = 1 and s >= 0, so that (b M + s) u = a. Nothing here knows of a run; rows
- * are two or three.
+ * On the bound nu = b u and w = s u with |u| = 1 and s >= 0, so that (b M + s) u = a. Independent of the run; two or three
+ * rows.
  */
 
 static int is_vector_symmetric(const double *m, int k, double part) {
@@ -10,7 +10,7 @@ static int is_vector_symmetric(const double *m, int k, double part) {
   return 1;
 }
 
-/* Whether the symmetric part, of a largest element 1, is positive definite by a margin. */
+/* Whether the symmetric part, scaled to a largest element 1, is positive definite by a margin. */
 static int is_vector_definite(const double *m, int k, double margin) {
   double a[9], most = largest_of(m, k * k);
   for (int i = 0; i < k; i++) for (int j = 0; j < k; j++) a[i * k + j] = 0.5 * (m[i * k + j] + m[j * k + i]) / most;
@@ -25,10 +25,13 @@ static int solve_vector(const double *m, int k, double shift, const double *b, d
   return solve(a, y, k);
 }
 
-/* The direction u with (M + s) u = a, |u| = 1 and the largest s, which is not negative: Newton's method from the
- * left, where it is monotone (1/|(M + s)^-1 a| is concave). M is symmetric and positive definite. */
+/* The direction u with (M + s) u = a, |u| = 1 and the largest s >= 0: Newton's method from the left, where it is monotone
+ * (1/|(M + s)^-1 a| is concave). M is symmetric, and positive definite but for directions in which a is zero. */
 static int leaving_direction(const double *a, const double *m, int k, double *u) {
-  double d[3], w[3], s = larger(0, length_of(a, k) - sqrt(dot(m, m, k * k)));
+  double d[3], w[3], s, along = 0, square = dot(a, a, k);
+  for (int i = 0; i < k; i++) along += a[i] * dot(m + i * k, a, k);
+  s = larger(sqrt(square) - along / square, 0); /* |(M + s)^-1 a| is at least |a|^3 / (a (M + s) a) */
+  if (s == 0 && !solve_vector(m, k, s, a, d)) s = SINGULAR * sqrt(dot(m, m, k * k));
   for (int again = 0; again < 100; again++) {
     if (!solve_vector(m, k, s, a, d) || !solve_vector(m, k, s, d, w)) return 0;
     double n = length_of(d, k);
@@ -65,7 +68,7 @@ static void secular(const double *a, const double *m, int k, double *polynomial)
       for (int l = 0; l < k; l++) polynomial[2 * k - 2 - i - j] -= numerator[i][l] * numerator[j][l];
 }
 
-/* Direction u = (M + s)^-1 a where its length is 1 close to s; 0 where Newton's method leads away. */
+/* Direction u = (M + s)^-1 a of length 1 for an s near the given one; 0 where Newton's method diverges. */
 static int direction_at(const double *a, const double *m, int k, double s, double *u) {
   double d[3], w[3], start = s, n = 0;
   for (int again = 0; again < LAYER_NEWTON; again++) {
@@ -81,7 +84,7 @@ static int direction_at(const double *a, const double *m, int k, double s, doubl
   return 1;
 }
 
-/* All directions with (M + s) u = a and s that is not negative; their number. */
+/* All directions with (M + s) u = a and s >= 0; their number. */
 static int limit_directions(const double *given, const double *matrix, int k, double (*u)[3]) {
   double a[3], m[9], p[P + 1], size = largest_of(given, k) + largest_of(matrix, k * k), at = -LAYER_RESIDUAL;
   int degree = 2 * k, count = 0, zeros = 0;

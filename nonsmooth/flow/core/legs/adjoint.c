@@ -1,11 +1,11 @@
-/* Rows of derivatives, pulled back through the recursion of columns (variation.c): its transpose.
+/* Rows of derivatives, pulled back through the transposed recursion of columns (variation.c).
  *
- * A row has the derivatives of something by all coefficients that the recursion gives. Each coefficient, from the last
- * order to the first, passes its own on to those that it is made of; what reaches the first coefficients is the row
- * before the step. All parameters come along, and the cost is that of one column.
+ * A row has the derivatives of a quantity by all coefficients of the recursion. From the last order to the first, each
+ * coefficient adds its derivative to those of its arguments; the derivatives by the first coefficients are the row before
+ * the step. Derivatives by all parameters are included, at the cost of one column.
  */
 
-/* What links of a group pass back at an order. */
+/* Pull links of a group back at an order. */
 static void pull_links(const Slopes *g, int group, int k) {
   int count = g->begin[group + 1] - g->begin[group];
   for (int q = 0; q < count; q++) {
@@ -21,7 +21,7 @@ static void pull_links(const Slopes *g, int group, int k) {
   }
 }
 
-/* What sums up to an order give by parameters. */
+/* Pull sums up to an order back to parameters. */
 static void pull_parameters(const Run *r, const Slopes *g, int order) {
   int size = moving_size(r);
   for (int j = 0; j < r->s->parameters; j++)
@@ -32,7 +32,7 @@ static void pull_parameters(const Run *r, const Slopes *g, int order) {
     }
 }
 
-/* From coefficients and sums up to an order to the first coefficients of states and of h, and to parameters. */
+/* Pull coefficients and sums up to an order back to the first coefficients of states and of h, and to parameters. */
 static void pull_series(Run *r, const Expansion *e, const Slopes *g, int order) {
   for (int k = order; k >= 0; k--)
     for (int group = k < r->order ? NEXT : LATE; group >= DIRECTIONS; group--) {
@@ -43,7 +43,7 @@ static void pull_series(Run *r, const Expansion *e, const Slopes *g, int order) 
   pull_parameters(r, g, order);
 }
 
-/* From values of surfaces at a point to states and parameters. */
+/* Pull values of surfaces at a point back to states and parameters. */
 static void pull_surfaces(const Run *r, const Slopes *g, const double *h) {
   memset(g->v->sum, 0, sizeof(double) * (r->n + 3 * r->width) * r->stride);
   for (int i = 0; i < r->m; i++) g->v->sum[(int64_t)(r->n + r->width + i) * r->stride] = h[i];
@@ -75,7 +75,7 @@ static void event_gradient(Run *r, const Leg *l, Slopes *g) {
     *factor = 2 * row_of(r, n + 2 * w + own)[0];
   }
   pull_series(r, e, g, 0);
-  if (r->s->sets) { /* h that is carried */
+  if (r->s->sets) { /* integrated h */
     for (int i = 0; i < r->m; i++) c->h[i] = e->l.letter[i] == LEFT_BEHIND ? c->series[(int64_t)i * stride] : 0;
     pull_surfaces(r, g, c->h);
   }
@@ -83,7 +83,7 @@ static void event_gradient(Run *r, const Leg *l, Slopes *g) {
   memcpy(l->gradient + n, c->p, sizeof(double) * r->s->parameters);
 }
 
-/* From y and h behind the start of a leg to the row before it: what ``land`` does. */
+/* Pull y and h after the start of a leg back to before it: the transpose of ``land``. */
 static void pull_land(Run *r, Leg *l, Slopes *g) {
   const Expansion *e = &r->e;
   const Variation *c = g->v;
@@ -103,12 +103,12 @@ static void pull_land(Run *r, Leg *l, Slopes *g) {
   for (int i = 0; i < r->n; i++) l->row[i] += c->states[(int64_t)i * r->stride];
 }
 
-/* Whether a time of a sample is in a step that begins so long after the start of a leg. */
+/* Whether a sample time is in the step that begins ``begun`` after the start of a leg. */
 static int is_within(const Leg *l, double begun, double t) {
   return begun <= 0 || way_of_leg(l) * t > begun + 4 * EPSILON * length_of_leg(l);
 }
 
-/* From the end of a Taylor step, whose expansion is known, to its start. */
+/* Pull a row back from the end of a Taylor step with known expansion to its start. */
 static void pull_step(Run *r, Leg *l, Slopes *g, double dt, double begun, int64_t *sample) {
   const Variation *c = g->v;
   int n = r->n, order = r->order, stride = r->stride;

@@ -1,13 +1,13 @@
 /* Flows of known durations: nonsmooth/flow/fixed.py -------------------------------------------------------- */
 
-/* Numbers that the work of a field needs. */
+/* Size of the work array of a field. */
 int64_t field_work(const Field *f) {
   int64_t stride = f->order + 1;
   int64_t numbers = f->columns * f->n + 2 * f->derivatives.count;
   return series_room(&f->series, stride) + (f->n * (1 + f->columns) + f->watched) * stride + f->n + numbers / 2 + 1;
 }
 
-/* Move z (n) along a smooth field by a duration of either sign. The time that is left where the field is not
+/* Integrate z (n) along a smooth field for a duration of either sign. Returns the remaining time where the field is not
  * finite or steps are too small, else 0. */
 double fixed_flow(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
                   double *work) {
@@ -16,7 +16,7 @@ double fixed_flow(const Field *f, const double *p, double *z, double duration, d
   return w.left;
 }
 
-/* Series of states and of what is watched at a state z, in rows (n + watched, order + 1). */
+/* Series of states and monitored functions at a state z, in rows (n + watched, order + 1). */
 void fixed_terms(const Field *f, const double *p, const double *z, double *terms, double *work) {
   Flow w = flow_of(f, p, 0, 1, work);
   expand_flow(&w, z);
@@ -25,14 +25,14 @@ void fixed_terms(const Field *f, const double *p, const double *z, double *terms
 
 /* Legs ----------------------------------------------------------------------------------------------------- */
 
-/* Move all states to the ends of their legs. The number of a leg that fails and what is left of it, or -1. */
-int64_t fly_legs(const Legs *l, double *a, double tol, int64_t most_steps, double *left) {
+/* Integrate all states to the ends of their legs. Returns the number of a failed leg, with its remaining time, or -1. */
+int64_t run_legs(const Legs *l, double *a, double tol, int64_t most_steps, double *left) {
   return integrate_legs(l, a, tol, most_steps, left, run_whole_flow);
 }
 
-/* The same in extended precision (as ``long double`` has it), for residuals of equations whose solution is known to
- * rounding. Results come in two parts: rounded, and in ``rest`` (results for each leg) what that leaves. */
-int64_t fly_legs_extended(const Legs *l, double *a, double tol, int64_t most_steps, double *left, double *rest) {
+/* As run_legs in extended precision (``long double``), for residuals of equations solved to rounding. Results are rounded;
+ * ``rest`` (results for each leg) has the remainders. */
+int64_t run_legs_extended(const Legs *l, double *a, double tol, int64_t most_steps, double *left, double *rest) {
   int64_t room = 0;
   for (int64_t i = 0; i < l->count; i++) {
     room = room < field_work(l->field[i]) ? field_work(l->field[i]) : room;
@@ -51,7 +51,7 @@ int64_t fly_legs_extended(const Legs *l, double *a, double tol, int64_t most_ste
   return failed;
 }
 
-/* What is watched ------------------------------------------------------------------------------------------ */
+/* Monitored functions ---------------------------------------------------------------------------------------- */
 
 typedef struct { double *root; int count, room; } Roots;
 
@@ -86,15 +86,15 @@ static int extrema(const double *c, int n, double h, double *root, int room) {
   return found.count;
 }
 
-/* First coefficients, to order 3, of the states and of what is watched. */
+/* Coefficients to order 3 of the states and of monitored functions. */
 static void first_terms(const Flow *w, double *begin) {
   int64_t rows = w->field->n + w->field->watched, stride = w->field->order + 1;
   for (int64_t i = 0; i < rows; i++) memcpy(begin + 4 * i, w->states + i * stride, 4 * sizeof(double));
 }
 
-/* Values of what is watched at its extrema and at the ends of steps, no nearer than ``margin`` to both ends of the
- * flow, and at that distance from them. Rows of ``found``: number, time, value, second derivative (0 where it is
- * no extremum), state; their number, which stops at ``room``, is returned. First coefficients at the start go to ``begin``. */
+/* Values of monitored functions at their extrema and at the ends of steps, no nearer than ``margin`` to both ends of the
+ * flow, and at that distance from them. Rows of ``found``: number, time, value, second derivative (0 where it is no
+ * extremum), state. Returns their number, at most ``room``. First coefficients at the start go to ``begin``. */
 static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin, double *found, int64_t room,
                           double *begin) {
   const Field *f = w->field;
@@ -125,7 +125,7 @@ static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin,
   return count;
 }
 
-/* Values of what is watched at a state. */
+/* Values of monitored functions at a state. */
 static void watched_at(Flow *w, const double *z, double *values) {
   const Field *f = w->field;
   const Series *t = &f->series;
@@ -135,10 +135,9 @@ static void watched_at(Flow *w, const double *z, double *values) {
   for (int j = 0; j < f->watched; j++) values[j] = w->rules[t->output[f->n + j]];
 }
 
-/* The same of many flows, with the margin ``ends`` times the duration: rows of all with the same width, their numbers in
- * ``counts``, first coefficients, and behind those of a leg values at its end. Those whose duration is not positive
- * have coefficients alone. The number of a flow
- * that fails, with what is left of it, or -1; -2 where there was not enough room. */
+/* watch_flow of many flows, with the margin ``ends`` times the duration: rows of all with the same width, their numbers in
+ * ``counts``, first coefficients, each followed by values at the end of the leg. Flows without a positive duration have
+ * coefficients only. Returns the number of a failed flow, with its remaining time, or -1; -2 where room is insufficient. */
 int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, const double *p, int64_t parameters, double *z,
                    const double *durations, double tol, int64_t most_steps, double ends, double *found, int64_t room,
                    int64_t *counts, double *begins, int64_t begin_width, double *left, double *work) {
@@ -162,8 +161,8 @@ int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, cons
   return -1;
 }
 
-/* Time until a watched function passes zero in a direction; a start nearer to zero than ``still`` is not counted.
- * -1 if it does not within the duration, -2 where the flow ends before. z is where the last step begins. */
+/* Time until a monitored function passes zero in a direction; a start within ``still`` of zero does not count. -1 if it does
+ * not within the duration, -2 where the flow ends before. z is the start of the last step. */
 double fixed_march(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
                    int32_t row, int32_t direction, double still, double *work) {
   Flow w = flow_of(f, p, duration, tol, work);

@@ -1,9 +1,8 @@
 /* Steps of a flow without events: nonsmooth/flow/fixed.py -------------------------------------------------- */
 
-/* A smooth field of n states and functions that are watched along it, as the outputs of one program; errors of
- * states of one group have one scale, those of group -1 are exact. After the states come columns of derivatives, by
- * the start and by parameters; the program's last outputs are entries of the field's derivatives, column after column,
- * by the states and by those parameters. */
+/* A smooth field of n states and functions monitored along it, as the outputs of one program. States of one group share an
+ * error scale; those of group -1 are exact. Columns of derivatives by the start and by parameters follow the states; the
+ * program's last outputs are entries of the field's derivatives by the states and those parameters, column after column. */
 typedef struct {
   int32_t n, watched, order, groups, starts, columns;
   const int32_t *group;
@@ -11,8 +10,8 @@ typedef struct {
   Entries derivatives;
 } Field;
 
-/* A flow on its way: series of the rules, of the states, of what is watched and of columns, and what is left. Of the
- * columns and of the field's derivatives: terms up to the last that is not zero. */
+/* A flow in progress: series of the rules, the states, the monitored functions and the columns, and the remaining time. Of
+ * the columns and of the field's derivatives: terms up to the last nonzero one. */
 typedef struct {
   const Field *field;
   const double *p;
@@ -79,7 +78,7 @@ static void expand_column(Flow *w, int column, const double *z) {
   }
 }
 
-/* Series of states and of what is watched at a state; whether they are finite. */
+/* Series of states and monitored functions at a state; whether they are finite. */
 static int expand_flow(Flow *w, const double *z) {
   const Field *f = w->field;
   const Series *t = &f->series;
@@ -104,8 +103,8 @@ static int expand_flow(Flow *w, const double *z) {
   return zero == 0;
 }
 
-/* Step for which the last two terms of series with one scale stay below the tolerance. States that rounding keeps from
- * zero, beside what their terms of second to fifth order, ``early``, make along the leg, have no scale, as zeros. */
+/* Step for which the last two terms of series with one scale stay below the tolerance. States that are zero up to rounding,
+ * compared with their terms of second to fifth order along the leg, ``early``, have no scale. */
 static double scaled_step(const Flow *w, double size, double rate, double early, double before, double final) {
   double scale = larger(size, rate * w->whole), allowed = w->tol * scale, h = INFINITY;
   int order = w->field->order;
@@ -115,14 +114,14 @@ static double scaled_step(const Flow *w, double size, double rate, double early,
   return h;
 }
 
-/* What the terms of second to fifth order of a series make along a leg. */
+/* Sum of the terms of second to fifth order of a series at the end of a leg. */
 static double early_terms(const Flow *w, const double *own) {
   double early = 0, power = w->whole;
   for (int k = 2; k <= 5; k++) early = larger(fabs(own[k]) * (power *= w->whole), early);
   return early;
 }
 
-/* Step for columns from one to another, of which what moves has one scale. */
+/* Step for a range of columns, whose moving parts share one scale. */
 static double column_steps(const Flow *w, int from, int to) {
   int order = w->field->order;
   double size = 0, rate = 0, early = 0, before = 0, final = 0;
@@ -138,7 +137,7 @@ static double column_steps(const Flow *w, int from, int to) {
   return scaled_step(w, size, rate, early, before, final);
 }
 
-/* Length of the next step; not above zero where it is too small. */
+/* Length of the next step; zero or negative where it is too small. */
 static double flow_step(const Flow *w) {
   const Field *f = w->field;
   int order = f->order;
@@ -162,7 +161,7 @@ static double flow_step(const Flow *w) {
   }
   h = smaller(column_steps(w, 0, f->starts), smaller(column_steps(w, f->starts, f->columns), h));
   if (!(h > FIXED_SHORTEST * w->whole)) return 0;
-  /* Two equal steps rather than a long one and the rest of it. */
+  /* Two equal steps rather than a long and a short one. */
   if (h >= w->left) return w->left;
   return w->left < 1.5 * h ? smaller(h, 0.5 * w->left) : h;
 }
@@ -190,9 +189,9 @@ static void run_flow(Flow *w, double *z, int64_t most_steps) {
   }
 }
 
-/* Legs and what happens at their ends. One array has, from the places given: parameters, of each leg so many or, with 0,
- * of all, and in rows for each leg its state (width), duration, field at its start and at its end (width each), what the event's program gives of
- * the state at its end (results); then room for work. A leg without a program ends at a time. */
+/* Legs and the events at their ends. One array has, at the given offsets: parameters, so many of each leg or, with 0, of all;
+ * rows for each leg of its state (width), duration, field at its start and at its end (width each), and outputs of the
+ * event's program at its end (results); then room for work. A leg without a program ends at a time. */
 typedef struct {
   int64_t count, width, results, parameters, states, durations, before, after, events, work;
   const Field *const *field;

@@ -1,6 +1,6 @@
 /* Legs of known duration, forward with columns (variation.c) and back with rows (adjoint.c): nonsmooth/flow/variation.py. */
 
-/* The mode of a leg at its start: sets off which it is carry h. 0 where its unknowns are not unique. */
+/* Enter the mode of a leg at its start; h of sets that the mode is off is integrated. 0 where its unknowns are not unique. */
 static int begin_leg(Run *r, const Leg *l) {
   memcpy(r->x, l->x, sizeof(double) * r->n);
   set_time_state(r);
@@ -9,7 +9,7 @@ static int begin_leg(Run *r, const Leg *l) {
   const double *h = surface_values(r, r->x);
   EACH_SET(r, f) {
     if (r->letter[f] == 0) continue;
-    int k = size_of(r, f), stays = r->idle[f] && !(length_of(h + f, k) > 0); /* friction that a parameter may bring acts */
+    int k = size_of(r, f), stays = r->idle[f] && !(length_of(h + f, k) > 0); /* a parameter may make friction act */
     stays |= is_unloaded(r, r->letter, f, 0);
     for (int i = f; i < f + k; i++) {
       r->letter[i] = stays ? IDLE : r->letter[i] == OFF ? LEFT_BEHIND : LEAVING;
@@ -20,7 +20,7 @@ static int begin_leg(Run *r, const Leg *l) {
   return find_unknowns(r, &r->now) == 1;
 }
 
-/* Move state, unknowns and columns by a step. */
+/* Advance state, unknowns and columns by a step. */
 static void move_columns(Run *r, const Leg *l, const Variation *v, double dt) {
   const Expansion *e = &r->e;
   int n = r->n, w = r->width, m = r->m, order = r->order, stride = r->stride;
@@ -35,7 +35,7 @@ static void move_columns(Run *r, const Leg *l, const Variation *v, double dt) {
   improve(r, &r->now, r->x, r->unknowns, 2);
 }
 
-/* Whether a set is so close that nothing is left of the way to it. */
+/* Whether a set is reached to rounding. */
 static int has_arrived(const Run *r, int f, double *most) {
   int k = size_of(r, f);
   double rate[3], radius = length_of(r->unknowns + f, k);
@@ -44,7 +44,7 @@ static int has_arrived(const Run *r, int f, double *most) {
   return r->letter[f] == LEFT_BEHIND && radius < larger(ARRIVED * *most, TENFOLD * shortest(r) * length_of(rate, k));
 }
 
-/* A step that is no longer than until |h| of a set has fallen tenfold. */
+/* Shorten a step so that |h| of a set falls tenfold at most. */
 static double near_step(const Run *r, int f, double h) {
   const Expansion *e = &r->e;
   for (int row = 0; row < e->l.rows; row++) {
@@ -55,7 +55,7 @@ static double near_step(const Run *r, int f, double h) {
   return h;
 }
 
-/* What is read of columns at times within a step, or at the end of the leg: those from ``sample`` on. */
+/* Sample columns at times within a step, or at the end of the leg, from ``sample`` on. */
 static void read_columns(const Run *r, const Leg *l, const Variation *v, double begun, double dt, int64_t *sample) {
   double sign = way_of_leg(l), end = begun + dt + 4 * EPSILON * length_of_leg(l);
   for (; *sample < l->samples && sign * l->sample_t[*sample] <= end; ++*sample) {
@@ -86,7 +86,7 @@ static double taylor_step(Run *r, Leg *l, Slopes *g) {
   return h >= l->left ? l->left : l->left < 1.5 * h ? smaller(h, 0.5 * l->left) : h;
 }
 
-/* A Taylor step and what it leaves; its length, or 0. */
+/* Make a Taylor step; its length, or 0. */
 static double make_taylor_step(Run *r, Leg *l, Slopes *g, double begun, int64_t *sample) {
   double h = taylor_step(r, l, g);
   if (!(h > 0)) return 0;
@@ -96,13 +96,29 @@ static double make_taylor_step(Run *r, Leg *l, Slopes *g, double begun, int64_t 
   return h;
 }
 
-/* The same of an implicit step, which ends at the next sample. */
+/* Make an implicit step, which ends at the next sample; its length, or 0. */
 static double make_implicit_step(Run *r, Leg *l, Slopes *g, double begun, int64_t *sample) {
   double most = *sample < l->samples ? smaller(l->left, l->sample_t[*sample] - begun) : l->left;
   double h = solve_step(r, l, most);
   if (!(h > 0) || !move_implicit(r, l, g, h, begun)) return 0;
   read_columns(r, l, 0, begun, h, sample);
   return h;
+}
+
+/* Where derivatives by the start have grown apart, keep them and begin with others, which have all their digits. */
+static void divide(const Run *r, Leg *l) {
+  int64_t n = r->n, size = n * n;
+  double *own = l->parts + l->part_count * (1 + size), *inverse = l->parts + l->part_room * (1 + size), forward = 0, back = 0;
+  if (l->part_count >= l->part_room || !(l->left > 0)) return;
+  memcpy(own + 1, l->y, sizeof(double) * size);
+  if (!invert(own + 1, r->n, inverse)) return;
+  for (int64_t i = 0; i < size; i++) { forward += l->y[i] * l->y[i]; back += inverse[i] * inverse[i]; }
+  if (!(forward * back > l->ratio * l->ratio)) return;
+  own[0] = length_of_leg(l) - l->left;
+  memcpy(own + 1, l->y, sizeof(double) * size);
+  memset(l->y, 0, sizeof(double) * size);
+  for (int64_t i = 0; i < size; i += n + 1) l->y[i] = 1;
+  l->part_count++;
 }
 
 static int carry(Run *r, Leg *l, Slopes *g) {
@@ -144,14 +160,15 @@ static int carry(Run *r, Leg *l, Slopes *g) {
     } else {
       h = make_taylor_step(r, l, g, begun, &sample);
       if (!(h > 0)) return LEG_STUCK;
-      is_implicit = step % LOOK_AGAIN == LOOK_AGAIN - 1 && is_step_held(r, l, h);
+      is_implicit = step % CHECK_AGAIN == CHECK_AGAIN - 1 && is_step_held(r, l, h);
     }
     l->left = h == l->left ? 0 : l->left - h;
+    divide(r, l);
   }
   return LEG_STUCK;
 }
 
-/* Begin at the start of a leg; parameters that are those of the last one are known. */
+/* Begin at the start of a leg; programs are prepared only for new parameters. */
 static void begin_at(Run *r, const Leg *l) {
   int is_known = r->prepared && !r->s->timed && !memcmp(r->p, l->p, sizeof(double) * r->s->parameters);
   Options o = {.rtol = l->tol / SAFETY, .atol = l->tol};
@@ -161,11 +178,11 @@ static void begin_at(Run *r, const Leg *l) {
   r->prepared = 1;
 }
 
-/* Carry states and columns of legs with as many columns to their ends, where gradients of events are taken. Their steps
- * go one after the other into the room of the first. The number of the leg that is not done, or -1. */
+/* Integrate states and columns of legs with equal numbers of columns to their ends, and take gradients of events there. Their
+ * steps are recorded consecutively in the room of the first. Returns the number of an unfinished leg, or -1. */
 int64_t carry_legs(Run *r, Leg *l, int64_t count) {
-  int64_t room = l->step_room, used = 0, failed = -1;
-  double *begin = l->steps;
+  int64_t room = l->step_room, used = 0, failed = -1, part_room = l->part_room, parts = 0;
+  double *begin = l->steps, *first_part = l->parts;
   Slopes g;
   Variation v;
   char *memory = calloc(place_variation(r, l->columns, &g, &v, 0), 1);
@@ -175,6 +192,8 @@ int64_t carry_legs(Run *r, Leg *l, int64_t count) {
     int64_t taken = used < room ? used : room;
     l[i].steps = room ? begin + taken * row_width(r) : 0;
     l[i].step_room = room - taken;
+    l[i].parts = first_part + parts * (1 + (int64_t)r->n * r->n);
+    l[i].part_room = part_room - parts;
     memset(v.h, 0, sizeof(double) * l->columns * r->m);
     begin_at(r, l + i);
     if (i == 0) begin_slopes(r, &g);
@@ -182,13 +201,14 @@ int64_t carry_legs(Run *r, Leg *l, int64_t count) {
     if (l[i].status != LEG_DONE) failed = i;
     else if (l[i].gradient) event_gradient(r, l + i, &g);
     used += l[i].step_count;
+    parts += l[i].part_count;
   }
   free(memory);
   return failed;
 }
 
-/* Pull a row at the end of a leg whose steps are recorded back to its start, with rows at the samples: LEG_DONE, or why
- * not. */
+/* Pull a row back from the end of a leg with recorded steps to its start, with rows at the samples: LEG_DONE, or the
+ * reason of failure. */
 int32_t pull_row(Run *r, Leg *l) {
   int64_t sample = l->samples;
   Slopes g;

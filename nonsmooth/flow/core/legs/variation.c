@@ -1,19 +1,18 @@
 /* Columns of derivatives along legs of known duration: nonsmooth/flow/variation.py.
  *
- * A leg is one mode, in which nothing is decided (legs.c). Columns are derivatives of the states by the start and by
- * parameters. The program of a step gives series of its outputs' derivatives too, once for all columns; multipliers
- * of sliding follow by the inverse that the step has. Sets off which the mode is carry h along, so that close to them
- * its direction has all its digits. Neighbours of a state on a set reach the set at once: B M^-1 h is added to their
- * columns.
+ * A leg has one mode, in which nothing is decided (legs.c). Columns are derivatives of the states by the start and by
+ * parameters. The program of a step also gives series of its outputs' derivatives, once for all columns; sliding
+ * multipliers follow by the inverse of the step. h of sets that the mode is off is integrated, so that its direction is
+ * accurate near them. Neighbours of a state on a set reach the set at once: B M^-1 h is added to their columns.
  */
 
-/* A leg, of a duration of either sign: columns, each a row of n derivatives of the state and a direction of parameters: none (-1), one of them, or the
- * one ``dp`` (ALONG_DP). The first ``starts`` columns have one error scale. At ``samples`` times since its start columns are read (n for each, time after time), or rows are
- * added (adjoint.c). Its steps are recorded: length, time since the start, stages, state, unknowns; of each stage of an
- * implicit one once more the last two. */
+/* A leg of a duration of either sign. Each column has n derivatives of the state and a direction of parameters: none (-1),
+ * one of them, or ``dp`` (ALONG_DP); the first ``starts`` share an error scale. At ``samples`` times since its start columns
+ * are read (n for each, time after time), or rows are added (adjoint.c). Recorded steps: length, time since the start,
+ * stages, state, unknowns; of each implicit stage again the last two. */
 typedef struct {
   int32_t columns, starts, hit, kind, index, side, status, pad; /* hit: the first function of the set that is reached at its end, or -1; then the guard that ends it */
-  double duration, tol, left; /* left: of the duration, where it is stuck */
+  double duration, tol, left; /* left: of the duration, where integration failed */
   int64_t most_steps, samples, step_count, step_room;
   const double *p, *dp;
   const int32_t *direction;
@@ -23,30 +22,32 @@ typedef struct {
   double *start_rate, *end_rate, *gradient; /* gradient: of the event's function by states, then by parameters */
   const double *sample_t;
   double *at_samples, *steps;
-  double *row, *by_parameters; /* a row at the end, then at the start; what it gives by parameters */
+  double *row, *by_parameters; /* a row at the end, then at the start; its derivatives by parameters */
+  double ratio, *parts; /* rows: a time since the start, and columns whose condition is beyond the ratio: others begin there */
+  int64_t part_room, part_count;
 } Leg;
 
-/* One term of the recursion: to coefficient k of ``to`` the sum of products of coefficients of ``by``, from ``first`` to
- * below ``terms``, with those of ``from`` up to k + ahead, times a factor. */
+/* One term of the recursion: coefficient k of ``to`` gets a factor times the sum of products of coefficients of ``by``,
+ * ``first`` to ``terms`` - 1, with those of ``from`` up to k + ahead. */
 typedef struct { double *to, *from; const double *by; double value; int32_t first, terms, ahead, factor, known; } Link; /* value: of ``by``, if it has one term; known: coefficients of ``from`` up to the last that is not zero */
 enum { PLUS, MINUS, TIMES_ORDER, OVER_ORDER }; /* the last two: k + 1 and its inverse */
 
-/* Links in the order in which they are used: distances of sets at the start; of an order directions of sets, sums,
- * unknowns or the right sides of those in which sets are left, what these add to the sums, coefficients k + 1. */
+/* Groups of links in their order of use: distances of sets at the start; at each order directions of sets, sums, unknowns or
+ * right sides of leaving directions, their terms in the sums, coefficients k + 1. */
 enum { AT_START, DIRECTIONS, SUMS, UNKNOWNS, LATE, NEXT, GROUPS };
 
-/* Derivatives on their way through the recursion, of a column or, back, of a row by all of these: series of states, of
- * unknowns (h is carried there), sums of all orders (n + 3 width rows), and of sets directions, h in units of |h|, its
- * root, distances, right sides of equations. Of all columns: series of states and unknowns, h of sets (m each) at the
- * start. What parameters have of a row. */
+/* Derivatives in the recursion, of a column or, backward, of a row by all of these: series of states, of unknowns (with the
+ * integrated h), sums of all orders (n + 3 width rows); of sets directions, h in units of |h|, its root, distances, right
+ * sides of equations. Of all columns: series of states and unknowns, h of sets (m each) at the start. Derivatives of a row
+ * by parameters. */
 typedef struct {
   double *states, *series, *sum, *lambda, *apart, *root, *rates, *right;
   size_t room;
   double *of_states, *of_series, *h, *p;
 } Variation;
 
-/* Entries of the program's derivatives: where those by each of its inputs begin, terms of their series, at most so many
- * in any mode and in one where nothing slides; the ones by what moves that count in a mode. The recursion that they give. */
+/* Entries of the program's derivatives: offsets by input, terms of their series, their maxima in any mode and without
+ * sliding; those by moving inputs that are nonzero in a mode. The recursion that they define. */
 typedef struct {
   int32_t *first, *terms, *most, *active, count, leaving, begin[GROUPS + 1];
   Link *link;
@@ -65,7 +66,7 @@ static const double *derivative_row(const Run *r, int q) {
 }
 
 /* Whether an output's derivative is needed: by the series, and at a point also surfaces, gaps and factors. */
-static int is_wanted(const Run *r, const Expansion *e, int row, int at_point) {
+static int is_needed(const Run *r, const Expansion *e, int row, int at_point) {
   if (row < r->n || row >= r->n + r->width) return row < r->n || at_point;
   int letter = e->l.letter[row - r->n];
   return letter == 0 || letter == LEAVING || letter == LEFT_BEHIND;
@@ -134,8 +135,8 @@ static void add_single(Slopes *g, double *to, double *from, const double *by, in
   add_link(g, to, from, by ? by : &one, 0, 1, 0, factor);
 }
 
-/* Links of sums along the derivatives that count: by states, directions of sets and unknowns of sliding. Those by the
- * latter, and by directions in which sets are left, follow from the sums of their order, which come ``late``. */
+/* Links of sums by the nonzero derivatives: by states, directions of sets and sliding unknowns. Those by the latter and by
+ * leaving directions, ``late``, follow from the other sums of their order. */
 static void link_sums(const Run *r, const Expansion *e, Slopes *g, int late) {
   const Variation *v = g->v;
   int input = -1, letter = 1;
@@ -154,7 +155,7 @@ static void link_sums(const Run *r, const Expansion *e, Slopes *g, int late) {
   }
 }
 
-/* Of the direction h/|h| from h that is carried. */
+/* Links of the direction h/|h| from the integrated h. */
 static void link_direction(const Run *r, const Expansion *e, Slopes *g, int f) {
   const Variation *v = g->v;
   int64_t stride = r->stride, size = size_of(r, f);
@@ -170,7 +171,7 @@ static void link_direction(const Run *r, const Expansion *e, Slopes *g, int f) {
   }
 }
 
-/* Right sides of the equations of directions in which sets are left, and of what slides beside (leaving_matrix). */
+/* Links of right sides of the equations of leaving directions and sliding multipliers (leaving_matrix). */
 static void link_right_sides(Run *r, const Expansion *e, Slopes *g) {
   const Variation *v = g->v;
   int64_t stride = r->stride;
@@ -188,7 +189,7 @@ static void link_right_sides(Run *r, const Expansion *e, Slopes *g) {
   }
 }
 
-/* Of coefficients k + 1 of the states and of h. */
+/* Links of coefficients k + 1 of the states and of h. */
 static void link_next(const Run *r, const Expansion *e, Slopes *g) {
   const Variation *v = g->v;
   int64_t stride = r->stride;
@@ -203,7 +204,7 @@ static void link_next(const Run *r, const Expansion *e, Slopes *g) {
   }
 }
 
-/* The recursion that an expansion and the slopes that count in it give. */
+/* Build the recursion of an expansion and its nonzero slopes. */
 static void link_up(Run *r, const Expansion *e, Slopes *g) {
   const Variation *v = g->v;
   int slides = e->l.slides;
@@ -228,7 +229,7 @@ static void link_up(Run *r, const Expansion *e, Slopes *g) {
   }
 }
 
-/* Entries of an expansion that count, and their recursion. */
+/* Find nonzero entries of an expansion, and build their recursion. */
 static void measure_slopes(Run *r, const Expansion *e, Slopes *g, int at_point) {
   int size = moving_size(r);
   const int32_t *most = g->most + (e->l.is_free ? r->s->derivatives.count : 0);
@@ -242,14 +243,14 @@ static void measure_slopes(Run *r, const Expansion *e, Slopes *g, int at_point) 
     for (int q = g->first[j]; counts && q < g->first[j + 1]; q++) {
       const double *own = derivative_row(r, q);
       if (own != row || most[q] != room) known = terms_of(row = own, room = most[q]);
-      g->terms[q] = is_wanted(r, e, r->s->derivatives.row[q], at_point) ? known : 0;
+      g->terms[q] = is_needed(r, e, r->s->derivatives.row[q], at_point) ? known : 0;
       if (g->terms[q] && j < size) g->active[g->count++] = q;
     }
   }
   link_up(r, e, g);
 }
 
-/* What links of groups from one to another add at an order. */
+/* Add the links of a range of groups at an order. */
 static void follow_links(const Slopes *g, int first_group, int last_group, int k) {
   for (Link *l = g->link + g->begin[first_group], *end = g->link + g->begin[last_group + 1]; l < end; l++) {
     double sum;
@@ -270,7 +271,7 @@ static void follow_links(const Slopes *g, int first_group, int last_group, int k
   }
 }
 
-/* The same in a mode in which sets are left: unknowns by their equations, or what their right sides have of them. */
+/* Solve for the unknowns in a mode in which sets are left, or apply the transpose to their right sides. */
 static void solve_leaving(Run *r, const Expansion *e, const Variation *v, int k, int is_back) {
   int64_t stride = r->stride;
   int slides = e->l.slides, n, all = leaving_matrix(r, e, k, &n), row = n;
@@ -284,7 +285,7 @@ static void solve_leaving(Run *r, const Expansion *e, const Variation *v, int k,
   for (int i = 0; i < all; i++) *(is_back ? v->right + i * stride + k : unknown[i]) = b[i];
 }
 
-/* Coefficients of a column to an order, from the first of states and of h. */
+/* Coefficients of a column to an order, from the first ones of states and of h. */
 static void column_series(Run *r, const Expansion *e, const Slopes *g, int order) {
   follow_links(g, AT_START, AT_START, 0);
   for (int k = 0; k <= order; k++) {
@@ -296,7 +297,7 @@ static void column_series(Run *r, const Expansion *e, const Slopes *g, int order
   }
 }
 
-/* A column as the beginning of its series, with what parameters add to the sums of all orders. */
+/* Begin the series of a column, with the terms of parameters in the sums of all orders. */
 static void begin_column(Run *r, const Leg *l, const Slopes *g, int column) {
   const Variation *v = g->v;
   int size = moving_size(r), own = l->direction[column], stride = r->stride;
@@ -312,7 +313,7 @@ static void begin_column(Run *r, const Leg *l, const Slopes *g, int column) {
     }
 }
 
-/* Move a state or a column from where sets have values h by what their multipliers do at once. */
+/* Move a state or a column from values h of sets onto them, along the instantaneous action of their multipliers. */
 static void move_onto(const Run *r, const Slopes *g, const double *h, double *y) {
   const Expansion *e = &r->e;
   const Variation *v = g->v;
@@ -326,7 +327,7 @@ static void move_onto(const Run *r, const Slopes *g, const double *h, double *y)
   for (int i = 0; i < n; i++) y[i] += v->sum[i * stride];
 }
 
-/* Derivatives of h of the sets at the start, and columns from which what leads off sets is taken. */
+/* Derivatives of h of the sets at the start, and projection of the columns onto the sets. */
 static void land(Run *r, const Leg *l, Slopes *g) {
   const Expansion *e = &r->e;
   const Variation *v = g->v;
@@ -344,7 +345,7 @@ static void land(Run *r, const Leg *l, Slopes *g) {
   }
 }
 
-/* The same of a state; whether it was off sets on which it is held. */
+/* Project a state onto the sets of its mode; whether it was off them. */
 static int land_state(Run *r, Slopes *g) {
   const Expansion *e = &r->e;
   int is_off = 0;
@@ -358,8 +359,8 @@ static int land_state(Run *r, Slopes *g) {
   return 1;
 }
 
-/* The longest step for which the last two terms of columns stay below the tolerance: a part of them, or of what they
- * change by; what multipliers of sliding cancel counts, as its rounding stays. */
+/* The longest step for which the last two terms of columns stay below the tolerance, relative to the columns or their
+ * changes. Terms that sliding multipliers cancel count too, as their rounding remains. */
 static double column_step(const Run *r, const Leg *l, const Variation *v, int first, int count) {
   const Entries *g = &r->s->derivatives;
   int n = r->n, w = r->width, size = moving_size(r), order = r->order, stride = r->stride;

@@ -47,7 +47,7 @@ __all__ = [
     "library_key",
 ]
 
-#: Seconds after which a compilation says that it is under way, and after which it is ended.
+#: Seconds after which a compilation is announced, and after which it is ended.
 _QUIET, _LONGEST = 1.0, 600.0
 
 #: How folders in which a compiler works begin.
@@ -58,7 +58,7 @@ _HANGING: set[Command] = set()
 
 
 def _call(command: Sequence[str]) -> str:
-    """Run a compiler; what went wrong, or nothing. One that takes long says so on stderr."""
+    """Run a compiler and return its error message, or an empty one; a long compilation is announced on stderr."""
     name = "ziglang" if "ziglang" in command[:3] else command[0]
     with tempfile.TemporaryFile() as errors:
         try:

@@ -6,14 +6,14 @@ from ....model import FilippovSystem, coupled_of
 from ....model.printing.programs import lanes_program
 from ....model.printing.set_program import set_program
 from ...options import Options
-from .core_source import driver_text, facts_header, listed
+from .core_source import constants_header, driver_text, listed
 
-#: The order to which that of linear systems is raised: beyond, longer steps lose digits to terms that cancel.
+#: Largest order for linear systems: above it longer steps lose digits by cancellation.
 _MOST_LINEAR = 22
 
 
 def supports_lanes(system: FilippovSystem) -> bool:
-    """Whether the lanes engine can be generated: one surface at most, or one set of constant slopes."""
+    """Whether lanes can be generated: one surface at most, or one set of constant slopes."""
     if system.sets:
         alone = len(system.sets) == 1 and system.surface_count == len(system.sets[0])
         coupled = coupled_of(system)
@@ -28,7 +28,7 @@ def _is_plain(system: FilippovSystem) -> bool:
     return not (others or system.written.tables) and system.definition.plain
 
 
-def tape_order(system: FilippovSystem, options: Options) -> int:
+def interpreter_order(system: FilippovSystem, options: Options) -> int:
     """Order of the series of one trajectory: a third more where all is linear."""
     order = options.order
     if system.coupled or not coupled_of(system).linearity.everywhere:
@@ -36,7 +36,7 @@ def tape_order(system: FilippovSystem, options: Options) -> int:
     return max(order, min((4 * order + 2) // 3, _MOST_LINEAR))
 
 
-#: Characters of a program from which on a step's instructions fill a processor's nearest memory of 32 KiB: measured.
+#: Characters of a program above which a step's instructions exceed the first-level cache of 32 KiB: measured.
 _LONG_TEXT = 200_000
 
 
@@ -97,4 +97,4 @@ def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
         f"static const int ROW[] = {{{listed(shape.rows) or 0}}}, SLOT[] = {{{listed(shape.slots) or 0}}};\n"
         f"static const int AFFINE[] = {{{affine or 1}}}, OWN_STATE[] = {{{listed(shape.own) or 0}}};\n"
     )
-    return facts_header() + numbers + arrays, program
+    return constants_header() + numbers + arrays, program

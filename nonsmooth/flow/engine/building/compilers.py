@@ -1,4 +1,4 @@
-"""Which C compilers there are, in the order in which they are tried, and what a build depends on."""
+"""Available C compilers in order of preference, and the properties that a build depends on."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def version(command: Command) -> str:
 
 @lru_cache(maxsize=1)
 def processor() -> str:
-    """What -march=native depends on."""
+    """Identify the processor for -march=native."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").split("\n\n")[0].splitlines()
     except OSError:

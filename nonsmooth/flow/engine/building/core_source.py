@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ....model.expressions.float_arithmetic import BINARY
-from ....model.numbering import OPERATIONS, TAPE_RULES, operation_in_c
+from ....model.numbering import OPERATIONS, TAYLOR_RULES, operation_in_c
 from ... import constants
 from ...status import Status
 
@@ -48,7 +48,7 @@ def driver_text(name: str) -> str:
 def run_source() -> str:
     """C of runs: the driver without derivatives and flows of known durations."""
     # UNFUSED: the same bits on every processor.
-    enumerations = [("OP", OPERATIONS), ("RULE", TAPE_RULES)]
+    enumerations = [("OP", OPERATIONS), ("RULE", TAYLOR_RULES)]
     head = "".join(
         f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
         for prefix, names in enumerations
@@ -60,7 +60,7 @@ def run_source() -> str:
     driver = [driver_text(f"core/{name}") for name in _FILES]
     at = _FILES.index("state.c") + 1
     texts = [*driver[:at], _declarations(driver[at:]), *driver[at:]]
-    return "".join([facts_header(), sizes, head, driver_text("core/common.h"), *texts])
+    return "".join([constants_header(), sizes, head, driver_text("core/common.h"), *texts])
 
 
 def _declarations(texts: Sequence[str]) -> str:
@@ -98,7 +98,7 @@ def _extended(*files: str) -> str:
 
 
 @lru_cache(maxsize=1)
-def facts_header() -> str:
+def constants_header() -> str:
     """C of ``flow/constants.py`` and of the statuses: constants, enumerations, priorities."""
     numbers = {
         n: v for n, v in vars(constants).items() if n.isupper() and isinstance(v, (int, float))

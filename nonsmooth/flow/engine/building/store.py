@@ -1,9 +1,8 @@
 """The folder of compiled libraries: this user's alone, because what is in it is run.
 
-The folder is made with mode 0700. One that belongs to somebody else, that others can write, or that
-lies where others could exchange it is not used; neither is an entry of that kind, nor one that does
-not end in its own hash. Where no folder can be used, the process has one of its own, for as long as it
-lives, and says so once.
+The folder is made with mode 0700. A folder that belongs to another user, that others can write, or that
+others could exchange is not used; neither is such an entry, nor one that does not end in its own hash.
+If no folder can be used, the process uses a temporary one and warns once.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ def usable_folder() -> Path:
     """Return the folder of compiled engines, or the process' own where that one cannot be used."""
     try:
         folder = _made(cache_directory())
-        why = _fault(folder) or _unwritable(folder)
+        why = _unsafe(folder) or _unwritable(folder)
     except (OSError, ValueError, RuntimeError) as error:
         folder, why = Path(), str(error)
     if not why:
@@ -75,13 +74,13 @@ def _made(folder: Path) -> Path:
     return folder
 
 
-def _fault(folder: Path) -> str:
+def _unsafe(folder: Path) -> str:
     """Why a folder is not safe, or empty."""
-    facts = os.lstat(folder)
-    if not stat.S_ISDIR(facts.st_mode):
+    info = os.lstat(folder)
+    if not stat.S_ISDIR(info.st_mode):
         return f"{folder} is no folder"
-    why = files.writable_by_others(facts)
-    if why and facts.st_uid == getattr(os, "geteuid", int)() and _is_ours(folder):
+    why = files.writable_by_others(info)
+    if why and info.st_uid == getattr(os, "geteuid", int)() and _is_ours(folder):
         folder.chmod(0o700)  # of an earlier version, or of a generous umask
         why = ""
     if why:
@@ -98,17 +97,17 @@ def _is_ours(folder: Path) -> bool:
     return not os.environ.get("NONSMOOTH_CACHE") and folder.name == "nonsmooth"
 
 
-def _exchangeable(facts: os.stat_result) -> str:
+def _exchangeable(info: os.stat_result) -> str:
     """Why others could exchange what is in a folder above ours, or empty."""
     if not hasattr(os, "geteuid"):
         return ""
-    if facts.st_uid not in (0, os.geteuid(), os.stat("/").st_uid):
-        return f"it belongs to user {facts.st_uid}"
-    writable = facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    if writable == stat.S_IWGRP and _is_private(facts.st_gid):
+    if info.st_uid not in (0, os.geteuid(), os.stat("/").st_uid):
+        return f"it belongs to user {info.st_uid}"
+    writable = info.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    if writable == stat.S_IWGRP and _is_private(info.st_gid):
         writable = 0
-    if writable and not facts.st_mode & stat.S_ISVTX:
-        return f"others can write it (mode {stat.S_IMODE(facts.st_mode):04o})"
+    if writable and not info.st_mode & stat.S_ISVTX:
+        return f"others can write it (mode {stat.S_IMODE(info.st_mode):04o})"
     return ""
 
 

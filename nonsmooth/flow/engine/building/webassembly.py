@@ -17,7 +17,7 @@ from .core_source import keyed, run_source
 #: The module in the package.
 MODULE = Path(__file__).parents[1] / "core.wasm"
 
-#: What pages call.
+#: Functions that pages call.
 _EXPORTS = """
     table_new table_modes table_size table_free table_read
     run_new run_free run_begin run_continue run_read run_resume run_many run_sample malloc free calloc

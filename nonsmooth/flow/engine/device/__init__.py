@@ -1,1 +1,1 @@
-"""The lanes on a GPU: one trajectory for each thread, by the same text as on this processor."""
+"""The lanes on a GPU: one trajectory per thread, from the same sources as on a CPU."""

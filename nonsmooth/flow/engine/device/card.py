@@ -24,7 +24,7 @@ _INSTALL = (
 #: registers spill too much, and two blocks of 128 threads read the long text of a nonlinear step at different points.
 _THREADS, _RESIDENT = 256, 1
 
-#: Bytes of each of the two buffers by which arrays are copied.
+#: Bytes of each of the two buffers for copies of arrays.
 _STAGED = 1 << 24
 
 #: PTX for this architecture is compiled by every driver, for every card.
@@ -32,7 +32,7 @@ COMMON = "80"
 
 
 class DeviceError(NonsmoothError, RuntimeError):
-    """There is no GPU to run on, what drives it is missing, or it failed; the message says what to do."""
+    """No GPU or driver was found, or the GPU failed; the message says what to do."""
 
 
 class Card:
@@ -175,14 +175,14 @@ def card(fused: bool = True) -> Card:
 
 
 def machine_for(device: str) -> Card:
-    """Return what runs ``device="cuda"``."""
+    """Return the machine that runs ``device="cuda"``."""
     if device != "cuda":
         raise OptionError(f"device: expected None or 'cuda', received {device!r}.")
     return card()
 
 
 def numbers(arguments: Sequence[Any]) -> list[Any]:
-    """Anys with their widths: integers and floats of 64 bits, 0 for no memory."""
+    """Arguments of fixed width: integers and floats of 64 bits, 0 for no memory."""
     made: list[Any] = []
     for a in arguments:
         if a is None:

@@ -1,4 +1,4 @@
-"""A system's trajectories on a GPU, from Python: where starts come from, and what comes back."""
+"""A system's trajectories on a GPU, from Python: sources of starts, and results."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from .records import Records, record_type, word_of
 #: Kinds of starts, by number in cuda.c.
 _ROWS, _GRID, _BOX, _RECORDS = 0, 1, 2, 3
 
-#: What may count without end, in a number of 64 bits.
+#: An unlimited count, in 64 bits.
 _MOST = 2**62
 
-#: Seconds of a launch, so that Python hears Ctrl-C between them; steps of each thread in the first one.
+#: Seconds of a launch, after which Python handles Ctrl-C; steps of each thread in the first one.
 _SECONDS, _FIRST_STEPS = 0.1, 1000
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where the starts of a kernel come from."""
+    """Source of the starts of a kernel."""
 
     kind: int
     seed: int
@@ -58,7 +58,7 @@ class Source:
 
     @classmethod
     def records(cls, left: Records) -> Source:
-        """Runs that go on where a step was not clear."""
+        """Runs that continue after a step of the driver."""
         return cls(_RECORDS, 0, np.ascontiguousarray(left).view(np.float64), np.zeros(1, np.int64))
 
 
@@ -80,17 +80,17 @@ class Bins:
     low: Array
     high: Array
 
-    def places(self, k: int, values: Array) -> NDArray[np.int64]:
-        """Numbers of the bins that some values of column k lie in; those that lie in one."""
+    def indices(self, k: int, values: Array) -> NDArray[np.int64]:
+        """Bin indices of values of column k; values outside all bins are dropped."""
         low, high = self.low[k], self.high[k]
-        place = (values - low) * (self.count / (high - low))
-        place = np.where(values == high, self.count - 1, place)
-        return place[(place >= 0) & (place < self.count)].astype(np.int64)
+        index = (values - low) * (self.count / (high - low))
+        index = np.where(values == high, self.count - 1, index)
+        return index[(index >= 0) & (index < self.count)].astype(np.int64)
 
 
 @dataclass(frozen=True)
 class Reduced:
-    """What became of some runs."""
+    """Sums over the ends of some runs."""
 
     words: dict[str, int]
     status: dict[int, int]
@@ -99,7 +99,7 @@ class Reduced:
 
 
 class Kernel:
-    """What runs a system's trajectories on a machine, compiled when first needed."""
+    """Kernels that run a system's trajectories on a machine, compiled when first needed."""
 
     def __init__(self, system: FilippovSystem, order: int, machine: Card):
         self.system, self.order, self.machine = system, order, machine
@@ -130,7 +130,7 @@ class Kernel:
     def run(self, given: Given, at: tuple[int, int] | None, out: Chunk) -> Records:
         """Run trajectories, with an event at which they are kept.
 
-        Those that need a step of the driver have the status HAND_OVER; their records are returned.
+        Those that need a step of the driver have the status FALL_BACK; their records are returned.
         """
         with self.lock:
             machine, (kernels, _), count = self.machine, self.compiled, given.size
@@ -223,7 +223,7 @@ class Reduction:
         self._ranges = [bins.count, machine.write(bins.low), machine.write(bins.high)]
 
     def add(self, given: Given) -> tuple[Records, Chunk | None]:
-        """Run trajectories and add what becomes of them, except that of the records and of the chunk."""
+        """Run trajectories and add their ends, except those in the records and in the chunk."""
         # The chunk has the runs whose itineraries have no room in the table.
         kernel, machine, there, count = self.kernel, self.kernel.machine, self._there, given.size
         with kernel.lock:

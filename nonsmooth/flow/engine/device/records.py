@@ -1,4 +1,4 @@
-"""Runs between two steps, as a card leaves them to the driver and takes them back."""
+"""Runs between two steps, exchanged by a GPU and the driver."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....model import Array, FilippovSystem
-from ...constants import HAND_OVER, NEEDS_PROGRAM, SIMPLE_KINDS
+from ...constants import FALL_BACK, NEEDS_PROGRAM, SIMPLE_KINDS
 from ...options import Options
 from ...results import Chunk, Stopped
 from ..arrays import BURST, address, batch_of, options_of
-from ..tape import TapeEngine, library, tape_for
+from ..interpreter import Interpreter, interpreter_for, library
 
 #: An array of :func:`record_type`.
 Records = NDArray[np.void]
@@ -75,7 +75,7 @@ def continued(
     """
     count = len(records)
     size = max(_LEAST, -(-count // max(workers, 1)))
-    engine, stop = tape_for(system, options), threading.Event()
+    engine, stop = interpreter_for(system, options), threading.Event()
     assert engine is not None
 
     def part(first: int) -> tuple[slice, Chunk]:
@@ -92,14 +92,14 @@ def continued(
             stop.set()
             raise
     out.take(parts)
-    rows = np.flatnonzero(out.status == HAND_OVER)
+    rows = np.flatnonzero(out.status == FALL_BACK)
     going = records[rows]
     going["index"], going["shortest"], going["shrinking"] = rows, 1e-3, 0
     return going
 
 
 def _continue(
-    engine: TapeEngine,
+    engine: Interpreter,
     records: Records,
     p: Array,
     options: Options,

@@ -10,9 +10,9 @@ import pytest
 
 import hatch_build
 import nonsmooth as ns
-from nonsmooth.flow.engine import find_compiler, library, tape
+from nonsmooth.flow.engine import find_compiler, interpreter, library
 from nonsmooth.flow.engine.building.core_source import core_source, source_key
-from nonsmooth.flow.engine.tape import tape_for
+from nonsmooth.flow.engine.interpreter import interpreter_for
 from nonsmooth.flow.options import Options
 
 ROOT = Path(hatch_build.__file__).parent
@@ -39,12 +39,12 @@ def test_the_library_of_a_wheel_needs_no_compiler_and_has_the_bits_of_the_cache(
     assert Path(place).parent == Path(library.__file__).parent.relative_to(ROOT)
     monkeypatch.setattr(library, "_PACKAGED", Path(built))
     monkeypatch.setattr(library, "build", lambda source: pytest.fail("a compiler was run"))
-    wheel = tape.declare(library.core_library())
+    wheel = interpreter.declare(library.core_library())
     problem = ns.textbook.by_name("leine_stick_slip")
     options, p = Options(t_end=30.0), problem.system.parameter_vector(problem.parameters)
-    run = lambda: tape_for(problem.system, options).run(np.array(problem.start), p, options)
+    run = lambda: interpreter_for(problem.system, options).run(np.array(problem.start), p, options)
     ours = run()
-    monkeypatch.setattr(tape, "library", lambda: wheel)
+    monkeypatch.setattr(interpreter, "library", lambda: wheel)
     theirs = run()
     assert ours.x.tobytes() == theirs.x.tobytes() and ours.t.tobytes() == theirs.t.tobytes()
     hatch_build.CustomBuildHook.finalize(hook, "standard", data, "")
@@ -58,12 +58,12 @@ def test_the_processor_does_not_change_the_bits(monkeypatch):
         library, "build", lambda source, build=library.build: build(source, ["-march=native"])
     )
     monkeypatch.setattr(library, "_PACKAGED", Path("none"))
-    native = tape.declare(library.core_library())
+    native = interpreter.declare(library.core_library())
     problem = ns.textbook.by_name("kelvin_voigt_bounce")
     options, p = Options(t_end=problem.t_end), problem.system.parameter_vector(problem.parameters)
-    run = lambda: tape_for(problem.system, options).run(np.array(problem.start), p, options)
+    run = lambda: interpreter_for(problem.system, options).run(np.array(problem.start), p, options)
     ours = run()
-    monkeypatch.setattr(tape, "library", lambda: native)
+    monkeypatch.setattr(interpreter, "library", lambda: native)
     assert ours.x.tobytes() == run().x.tobytes()
 
 

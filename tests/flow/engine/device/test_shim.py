@@ -7,7 +7,7 @@ import pytest
 import nonsmooth as ns
 import nonsmooth.textbook as textbook
 from benchmarks.problems import bounce_system, random_starts
-from nonsmooth.flow.constants import HAND_OVER
+from nonsmooth.flow.constants import FALL_BACK
 from nonsmooth.flow.engine import find_compiler
 from nonsmooth.flow.engine import lanes as engine
 from nonsmooth.flow.engine.device import kernel as kernel_module
@@ -57,7 +57,7 @@ def compared(system, x, options, machine, monkeypatch, at=None, p=None):
     one = ends(machine, system, x, options, p, at)
     two = plain_lanes(system, x, p, options, at, monkeypatch)
     # What is not clear is handed over by the kernel, and made here for a step by the driver.
-    done = one.status != HAND_OVER
+    done = one.status != FALL_BACK
     words = [[c.words[k] for k in c.itinerary[done]] for c in (one, two)]
     assert words[0] == words[1]
     for name in ("t", "x", "status", "kinds", "at_t", "at_x"):

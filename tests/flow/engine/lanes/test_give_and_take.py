@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import find_compiler, lanes_for, tape_for
+from nonsmooth.flow.engine import find_compiler, interpreter_for, lanes_for
 from nonsmooth.flow.engine import lanes as engine
 from nonsmooth.flow.options import Options
+from nonsmooth.flow.results import Chunk
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
@@ -76,7 +77,7 @@ def same(one, two, digits):
     assert words(one) == words(two)
     for name in ("status", "kinds"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
-    for name in ("t", "x", "at_t", "at_x"):
+    for name in ("t", "x", "at_t", "at_x", "sample_t", "sample_x"):
         if getattr(one, name) is not None:
             pair = getattr(one, name), getattr(two, name)
             np.testing.assert_allclose(*pair, rtol=0, atol=digits, err_msg=name)
@@ -85,15 +86,20 @@ def same(one, two, digits):
 @pytest.mark.parametrize("name", SYSTEMS)
 @pytest.mark.parametrize("width", [1, 4, 8])
 def test_steps_made_by_the_driver_at_random(width, name, monkeypatch):
-    """Half of all steps are made by the driver: same itineraries, the same numbers to the tolerance."""
+    """Half of all steps are made by the driver: same itineraries and samples, the same numbers to the tolerance."""
     system, t_end, size = SYSTEMS[name]()
     options, p = Options(t_end=t_end, rtol=1e-10, atol=1e-10), system.parameter_vector()
-    start, at = starts_of(system, size, 60), (0, 2)
-    scalar = tape_for(system, options).run_many(start, p, options, at)
+    start, at, rng = starts_of(system, size, 60), (0, 2), np.random.default_rng(3)
+    times = np.sort(rng.uniform(0, t_end, (60, 30)), axis=1)
+    times[:, [0, 1, -2, -1]] = 0, 0, t_end, t_end
+    start[5, 0] = np.nan
+    rows = lambda: Chunk.empty(60, system, True, 30)
+    scalar = interpreter_for(system, options).run_many(start, p, options, at, rows(), times=times)
+    assert np.isnan(scalar.sample_t[5]).all() and np.isfinite(scalar.sample_t[:, 0]).sum() == 59
     lanes = lanes_of(system, options.order, width, monkeypatch)
-    same(lanes.run_many(start, p, options, at), scalar, 1e-7)
+    same(lanes.run_many(start, p, options, at, rows(), times=times), scalar, 1e-7)
     lanes.random = 5
-    mixed = lanes.run_many(start, p, options, at)
+    mixed = lanes.run_many(start, p, options, at, rows(), times=times)
     same(mixed, scalar, 1e-7)
     assert 0.45 < mixed.totals[2] / mixed.totals[0] < 0.6
 
@@ -106,7 +112,7 @@ def test_runs_that_begin_late(monkeypatch):
     )
     options, p = Options(t_start=1e3, t_end=1e3 + 9, rtol=1e-9), system.parameter_vector()
     start = starts_of(system, 2.0, 40) + np.array([0, 0, 1e3])
-    scalar = tape_for(system, options).run_many(start, p, options, (1, 1))
+    scalar = interpreter_for(system, options).run_many(start, p, options, (1, 1))
     assert (scalar.status == ns.Status.REACHED_END).all()
     lanes = lanes_of(system, options.order, 4, monkeypatch)
     lanes.random = 5
@@ -121,7 +127,7 @@ def test_parameters_of_each_start(monkeypatch):
     p, start = np.linspace(0.1, 0.9, 40)[:, None], starts_of(system, 2.0, 40)
     lanes = lanes_of(system, options.order, 4, monkeypatch)
     lanes.random = 3
-    scalar = tape_for(system, options).run_many(start, p, options, (1, 1))
+    scalar = interpreter_for(system, options).run_many(start, p, options, (1, 1))
     same(lanes.run_many(start, p, options, (1, 1)), scalar, 1e-7)
 
 
@@ -140,7 +146,7 @@ def test_events_that_accumulate(base, monkeypatch):
     options, p = Options(t_end=2.0, rtol=1e-10, atol=1e-10), system.parameter_vector()
     start = starts_of(system, 1.0, 12) * [1, 0]
     start[:, 1] = np.linspace(0, 1 - 1e-6, 12)
-    scalar = tape_for(system, options).run_many(start, p, options, None)
+    scalar = interpreter_for(system, options).run_many(start, p, options, None)
     lanes = lanes_of(system, options.order, 4, monkeypatch)
     found = lanes.run_many(start, p, options, None)
     assert (found.status == ns.Status.ACCUMULATION).all()

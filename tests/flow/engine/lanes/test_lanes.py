@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import nonsmooth.flow.engine.lanes as lanes_module
 import nonsmooth.textbook as textbook
 from nonsmooth.flow.constants import KINDS
-from nonsmooth.flow.engine import find_compiler, lanes_for, tape_for
+from nonsmooth.flow.engine import find_compiler, interpreter_for, lanes_for
 from nonsmooth.flow.engine.building.codegen import lanes_source
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.simulate import simulate
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 def both(system, options):
     """The lanes, and the driver for one trajectory at a time."""
-    return lanes_for(system, options), tape_for(system, options)
+    return lanes_for(system, options), interpreter_for(system, options)
 
 
 def agree(system, start, options, parameters=None, tolerance=1e-12):
@@ -268,7 +268,7 @@ def test_lanes_of_any_width_and_instruction_set(width, flags, monkeypatch):
         patch.setattr(lanes_module, "lane_width", lambda: width)
         chunk = lanes_module.Lanes(system, options.order).run_many(starts, p, options, None)
     assert chunk.totals[2] < chunk.totals[1]  # the driver makes fewer steps than there are events
-    expected = tape_for(system, options).run_many(starts, p, options, None)
+    expected = interpreter_for(system, options).run_many(starts, p, options, None)
     np.testing.assert_allclose(chunk.x, expected.x, rtol=0, atol=1e-8)
     assert [chunk.words[k] for k in chunk.itinerary] == [
         expected.words[k] for k in expected.itinerary

@@ -10,8 +10,8 @@ import pytest
 import nonsmooth as ns
 from benchmarks.bouncing import bounces_in_space
 from nonsmooth.flow.engine import lanes as engine
+from nonsmooth.flow.engine.interpreter import interpreter_for
 from nonsmooth.flow.engine.lanes import lanes_for
-from nonsmooth.flow.engine.tape import tape_for
 from nonsmooth.flow.ensembles import ensemble
 from nonsmooth.flow.options import Options
 from tests.flow import plane_friction as plane
@@ -33,25 +33,25 @@ def both(system, x, p, tol, t_end=20.0):
     """Runs in lanes and in the interpreter, and how many of the first were left to the second."""
     options = Options(t_end=t_end, rtol=tol, atol=tol)
     lanes = lanes_for(system, options).run_many(x, p, options, None)
-    one_by_one = tape_for(system, options).run_many(x, p, options, None)
+    one_by_one = interpreter_for(system, options).run_many(x, p, options, None)
     return lanes, one_by_one
 
 
-def agree(lanes, tape, bound):
+def agree(lanes, expected, bound):
     """Itineraries and events are the same, and states to a bound."""
-    words = [np.array(c.words)[c.itinerary] for c in (lanes, tape)]
-    assert np.array_equal(*words) and np.array_equal(lanes.status, tape.status)
-    assert np.array_equal(lanes.kinds, tape.kinds)
-    size = 1 + np.abs(tape.x).max(axis=1)
-    assert (np.abs(lanes.x - tape.x).max(axis=1) / size).max() < bound
-    assert np.abs(lanes.t - tape.t).max() < bound
+    words = [np.array(c.words)[c.itinerary] for c in (lanes, expected)]
+    assert np.array_equal(*words) and np.array_equal(lanes.status, expected.status)
+    assert np.array_equal(lanes.kinds, expected.kinds)
+    size = 1 + np.abs(expected.x).max(axis=1)
+    assert (np.abs(lanes.x - expected.x).max(axis=1) / size).max() < bound
+    assert np.abs(lanes.t - expected.t).max() < bound
 
 
 def test_random_landings_agree_with_the_interpreter():
     x, p = drawn(400)
-    lanes, tape = both(plane.ball("contact", True), x, p, TOL)
-    agree(lanes, tape, 10 * TOL)
-    assert len(tape.words) > 6
+    lanes, expected = both(plane.ball("contact", True), x, p, TOL)
+    agree(lanes, expected, 10 * TOL)
+    assert len(expected.words) > 6
     # Landings on a line pass h = 0 exactly, and some begin at rounding from it; of the others few are rare.
     kind = np.arange(400) % 8
     alone = both(plane.ball("contact", True), x[kind < 5], p[kind < 5], TOL)[0]
@@ -64,16 +64,20 @@ def mixed(system, x, p, tol, t_end, width, monkeypatch, at=None):
     options = Options(t_end=t_end, rtol=tol, atol=tol)
     lanes = engine.Lanes(system, lanes_for(system, options).order)
     lanes.random = 5
-    return lanes.run_many(x, p, options, at), tape_for(system, options).run_many(x, p, options, at)
+    return lanes.run_many(x, p, options, at), interpreter_for(system, options).run_many(
+        x, p, options, at
+    )
 
 
 @pytest.mark.parametrize("width", [1, 4, 8])
 def test_steps_made_by_the_driver_at_random(width, monkeypatch):
     x, p = drawn(400)
-    found, tape = mixed(plane.ball("contact", True), x, p, TOL, 20.0, width, monkeypatch, (0, 1))
-    agree(found, tape, 10 * TOL)
+    found, expected = mixed(
+        plane.ball("contact", True), x, p, TOL, 20.0, width, monkeypatch, (0, 1)
+    )
+    agree(found, expected, 10 * TOL)
     for name in ("at_t", "at_x"):
-        pair = getattr(found, name), getattr(tape, name)
+        pair = getattr(found, name), getattr(expected, name)
         np.testing.assert_allclose(*pair, rtol=0, atol=100 * TOL, err_msg=name)
     assert 0.4 < found.totals[2] / found.totals[0] < 0.6
 
@@ -92,8 +96,8 @@ def test_steps_made_by_the_driver_at_random_where_slip_is_no_state(monkeypatch):
         time=t,
     )
     start = np.random.default_rng(3).uniform(-1, 1, (120, 5)) * [1, 1, 1, 1, 0]
-    found, tape = mixed(system, start, system.parameter_vector(), TOL, 6.0, 4, monkeypatch)
-    agree(found, tape, 100 * TOL)
+    found, expected = mixed(system, start, system.parameter_vector(), TOL, 6.0, 4, monkeypatch)
+    agree(found, expected, 100 * TOL)
     assert {"* s", "* s *"} <= set(found.words) and (found.status == ns.Status.STOPPED).any()
 
 
@@ -152,11 +156,11 @@ def test_ends_and_starts_that_are_not_finite():
     system, (x, p) = plane.ball("contact", True), drawn(64)
     x = x.copy()
     x[5, 2] = np.nan
-    lanes, tape = both(system, x, p, TOL, t_end=0.7)
-    assert np.array_equal(lanes.status, tape.status)
+    lanes, expected = both(system, x, p, TOL, t_end=0.7)
+    assert np.array_equal(lanes.status, expected.status)
     assert lanes.status[5] == ns.Status.NOT_FINITE
     rest = np.arange(64) != 5
-    assert np.abs(lanes.x - tape.x)[rest].max() < 100 * TOL
+    assert np.abs(lanes.x - expected.x)[rest].max() < 100 * TOL
     ended = lanes.status == ns.Status.REACHED_END
     assert ended.sum() > 50 and np.array_equal(lanes.t[ended], np.full(ended.sum(), 0.7))
 

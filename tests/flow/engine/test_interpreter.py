@@ -205,7 +205,7 @@ def test_quotients_whose_divisors_overflow():
 
 def test_interruption_is_heard(monkeypatch):
     """Between bursts of steps; the burst is shortened here, so that no clock is needed."""
-    import nonsmooth.flow.engine.tape as module
+    import nonsmooth.flow.engine.interpreter as module
 
     calls, original = [], module.library().run_continue
 

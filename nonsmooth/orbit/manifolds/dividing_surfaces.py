@@ -176,7 +176,7 @@ class StartCurve(Curve):
     itinerary : str
         One letter for each leg.
     out : callable, optional
-        The reason to end the curve at a start; empty to go on.
+        The reason to end the curve at a start; empty to continue.
     tol : float, optional
         Error of a point, in scaled coordinates.
     """
@@ -434,7 +434,7 @@ def require_event(
         raise DegenerateError(
             f"of: at the two-fold {fold.point.round(9).tolist()} the function of the event {until!r} is "
             f"{at.value:.3g}, and its zeros make the angle {angle:.3g} with those at which both fields have "
-            "the same component across the surface; both must be 0. Drop until where orbits go on."
+            "the same component across the surface; both must be 0. Drop until where orbits continue."
         )
 
 
@@ -682,16 +682,16 @@ class _TwoFoldPassages:
             by_start = fixed.derivative(arrival)[1] @ slope
             x, entry = arrival.x, arrival.t
             fault = arrival.fault or self._entry_violation(itinerary, x)
-        met = self.sheet.meet(x, self._met.get(itinerary))
-        self._met[itinerary] = met
+        reached = self.sheet.meet(x, self._met.get(itinerary))
+        self._met[itinerary] = reached
         return Passage(
-            met.fold,
-            entry + met.duration + met.left,
+            reached.fold,
+            entry + reached.duration + reached.left,
             entry,
-            met.gap,
+            reached.gap,
             np.full(2, np.nan),
-            fault or met.fault,
-            (met.slope @ by_start)[None, :],
+            fault or reached.fault,
+            (reached.slope @ by_start)[None, :],
         )
 
     def _entry_violation(self, itinerary: str, x: Array) -> str:

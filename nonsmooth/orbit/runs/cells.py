@@ -106,14 +106,14 @@ class Cells:
         """Of the function of each table the breakpoints beside the cell of a mode that is shown, with their guards."""
         found = dict[int, list[tuple[float, Guard]]]()
         for i, t in self.tables.items():
-            above, places, first = self._above(t, mode), self._places[i], self._entries[i]
+            above, positions, first = self._above(t, mode), self._places[i], self._entries[i]
             own = [(above - 1, 1)] * (above > 0) + [(above, -1)] * (above < t.count)
             guards = [
                 Guard("surface", self._shown.entries[j][0], side, j)
                 for k, side in own
                 for j in (self._first[first] + k,)
             ]
-            found[i] = [(t.levels[places[k]], g) for (k, _), g in zip(own, guards, strict=True)]
+            found[i] = [(t.levels[positions[k]], g) for (k, _), g in zip(own, guards, strict=True)]
         return found
 
     def parameters(self, p: Array, mode: str) -> Array:

@@ -87,7 +87,7 @@ def test_a_table_falls_on_four_feet_and_slides_on(velocity):
     np.testing.assert_allclose(run.x[-1, 2:], 0.0, atol=1e-10)
 
 
-def test_what_is_not_determined_is_said():
+def test_what_is_not_determined_is_reported():
     """On four feet that slip in different directions the motion depends on how they share the load."""
     run = ns.simulate(table(0.3, FOUR), [*[0] * 6, 1, 0.4, 0, 0, 0, 3], 1.0)
     assert run.status is ns.Status.NON_UNIQUE
@@ -109,7 +109,7 @@ def test_components_with_different_loads_are_refused():
 @pytest.mark.parametrize("side", [0.0, 0.5])
 @pytest.mark.parametrize(("angle", "mu"), [(0.7, 0.2), (0.7, 0.5), (1.0, 0.2), (1.0, 0.5)])
 def test_a_block_in_a_groove_holds_as_long_as_any_loads_can_hold_it(angle, mu, side):
-    """Friction across the groove presses it against both walls: the most that holds is 1/sqrt(1 - k^2) of what slides."""
+    """Friction across the groove presses it against both walls: at rest its limit is 1/sqrt(1 - k^2) of that in sliding."""
     t, q, w, n = ca.SX.sym("t"), ca.SX.sym("q", 3), ca.SX.sym("w", 3), ca.SX.sym("n", 2)
     limit = mu * G / np.cos(angle)
     force, gaps, slips, multipliers = ca.vertcat(limit * t, side, -G), [], [], []

@@ -78,7 +78,7 @@ def lines_to_a_node(rests):
     return spacing.until_met(second)
 
 
-def test_a_curve_goes_on_beside_another_until_they_are_one_line():
+def test_a_curve_continues_beside_another_until_they_are_one_line():
     kept = lines_to_a_node([])
     gap = 0.2 * (kept[-1, 0] / 0.9) ** 2 / 2  # in units of the box
     assert 0 < gap < 1 / 200

@@ -88,10 +88,10 @@ def compare(browser, page, folds, count):
     assert len(answers) == count
     labels = set()
     for pair, (*words, numbers) in zip(nu.tolist(), answers, strict=True):
-        wanted_words, wanted = expected(folds, tuple(pair))
+        wanted_words, required = expected(folds, tuple(pair))
         assert words == wanted_words, pair
         got = [number(v) for v in numbers]
-        np.testing.assert_allclose(got, wanted, rtol=1e-12, atol=1e-300, err_msg=str(pair))
+        np.testing.assert_allclose(got, required, rtol=1e-12, atol=1e-300, err_msg=str(pair))
         labels.add(words[0])
     return labels
 

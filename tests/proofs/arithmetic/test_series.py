@@ -54,10 +54,10 @@ def test_coefficients_are_those_of_mpmath(op):
     start = {"acosh": 1.75}.get(op, 0.375)
     function = named.get(op) or getattr(mpmath, op)
     with mpmath.workdps(60):
-        truth = mpmath.taylor(lambda s: function(start + s / 2 + s * s / 4), 0, 6)
+        exact = mpmath.taylor(lambda s: function(start + s / 2 + s * s / 4), 0, 6)
     with length(7):
         found = Series([], "stored").apply(op, [arb_series([start, 0.5, 0.25])])
-        for k, value in enumerate(truth):
+        for k, value in enumerate(exact):
             assert abs(mpmath.mpf(float(found[k].mid())) - value) < 1e-12
             assert float(found[k].rad()) < 1e-12
 

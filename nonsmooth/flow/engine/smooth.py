@@ -129,7 +129,7 @@ class LegsProgram:
         sizes = [every + 1, count * self.width, count, count * self.width, count * self.width]
         sizes += [count * results, max([*(f.work for f in fields), *(e.work for e in own)])]
         positions = np.cumsum([0, *sizes]).tolist()
-        self._places, self._count, self._parameters = positions, count, every
+        self._offsets, self._count, self._parameters = positions, count, every
         pointers = (ctypes.addressof(self._pointers), ctypes.addressof(self._events))
         self._c = structure("Legs")(
             count, self.width, results, parameters if by_leg else 0, *positions[1:7], *pointers
@@ -145,7 +145,7 @@ class LegsProgram:
         failed = library().run_legs(
             self._pointer, memory.ctypes.data, tol, most_steps, ctypes.byref(left)
         )
-        at, count = self._places, self._count
+        at, count = self._offsets, self._count
         kept = memory[at[1] : at[6]].copy()  # the work array is many times as large
         ends, before, after, results = (
             kept[at[k] - at[1] : at[k + 1] - at[1]].reshape(count, -1) for k in (1, 3, 4, 5)
@@ -153,7 +153,7 @@ class LegsProgram:
         return IntegratedLegs(ends, before, after, results, failed, left.value)
 
     def _given(self, z: Array, p: Array, durations: Array) -> tuple[Array, list[Array]]:
-        memory, at = np.empty(self._size), self._places
+        memory, at = np.empty(self._size), self._offsets
         parts = [memory[at[k] : at[k + 1]] for k in range(6)]
         parts[0][: self._parameters] = p.ravel()
         parts[1][:] = z.ravel()

@@ -85,17 +85,17 @@ def _distance(h: ca.SX, own: ca.SX, x: ca.SX, field: ca.SX) -> int:
     """Number of derivatives after which the sparsity alone lets the unknowns ``own`` enter."""
     moved = [bool(ca.depends_on(f, own)) for f in ca.vertsplit(field)]
     reads = [ca.symvar(f) for f in ca.vertsplit(field)]
-    place = {symbol.element_hash(): k for k, symbol in enumerate(ca.vertsplit(x))}
-    states = _places(ca.symvar(h), place)
+    index = {symbol.element_hash(): k for k, symbol in enumerate(ca.vertsplit(x))}
+    states = _indices(ca.symvar(h), index)
     for order in range(1, _MOST + 1):
         if any(moved[i] for i in states):
             return order
-        states |= {j for i in states for j in _places(reads[i], place)}
+        states |= {j for i in states for j in _indices(reads[i], index)}
     return _MOST + 1
 
 
-def _places(symbols: Sequence[ca.SX], place: dict[int, int]) -> set[int]:
-    return {place[s.element_hash()] for s in symbols if s.element_hash() in place}
+def _indices(symbols: Sequence[ca.SX], index: dict[int, int]) -> set[int]:
+    return {index[s.element_hash()] for s in symbols if s.element_hash() in index}
 
 
 def _vanishes(column: ca.SX, h: ca.SX, x: ca.SX) -> bool:

@@ -57,7 +57,7 @@ class Series:
     rule: NDArray[np.void]
     term: NDArray[np.void]
     input: Integers
-    place: Integers
+    index: Integers
     outputs: Integers
     lists: Mapping[str, Integers]
     rules: Sequence[Rule]
@@ -316,7 +316,7 @@ def _series(
         rule=rule,
         term=term,
         input=_integers([j for _, j in inputs]),
-        place=_integers([k for k, _ in inputs]),
+        index=_integers([k for k, _ in inputs]),
         outputs=_integers([j for row in rows for j in row]),
         lists={name: _integers(own) for name, own in lists.items()},
         rules=program.plain,

@@ -138,7 +138,7 @@ def by_pieces(d: Definition) -> Definition:
     return replace(d, parameters=ca.vertcat(p, *cells), field=field, defaults=defaults, tables=())
 
 
-def places_of(d: Definition) -> list[int]:
+def first_surfaces(d: Definition) -> list[int]:
     """The first surface of each function where breakpoints are surfaces, and their number."""
     counts = {table.element: table.count for table in d.tables}
     return [*accumulate((counts.get(i, 1) for i in range(d.surfaces.numel())), initial=0)]
@@ -146,7 +146,7 @@ def places_of(d: Definition) -> list[int]:
 
 def beyond_cells(d: Definition, signs: Sequence[float]) -> set[int]:
     """Surfaces of breakpoints that are not adjacent to the cell given by signs: others are reached before them."""
-    positions, found = places_of(d), set[int]()
+    positions, found = first_surfaces(d), set[int]()
     for table in d.tables:
         first = positions[table.element]
         own = signs[first : first + table.count]
@@ -158,7 +158,7 @@ def beyond_cells(d: Definition, signs: Sequence[float]) -> set[int]:
 
 def in_cells(d: Definition, signs: Sequence[float]) -> ca.SX | None:
     """The field where surfaces and breakpoints have signs; None where these are of no cell."""
-    positions, (_, values), found = places_of(d), _parted(d), list[ca.SX]()
+    positions, (_, values), found = first_surfaces(d), _parted(d), list[ca.SX]()
     elements = {table.element for table in d.tables}
     own = [signs[k] if i not in elements else 0.0 for i, k in enumerate(positions[:-1])]
     for table in d.tables:
@@ -200,7 +200,7 @@ def by_breakpoints(d: Definition) -> Definition:
             d.field, ca.vertcat(*[value for own in values for value in own]), ca.vertcat(*found)
         )
 
-    positions = places_of(d)
+    positions = first_surfaces(d)
     breakpoints = [positions[table.element] + i for table in d.tables for i in range(table.count)]
     laws = tuple(
         name

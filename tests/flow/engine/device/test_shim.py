@@ -208,7 +208,7 @@ def test_codes_beyond_the_table(system, as_card, monkeypatch):
     options = dict(t_end=3.0, tol=1e-5)
     whole = ns.ensemble(system, STARTS, device="cuda", **options)
     counted = ns.outcomes(system, STARTS, device="cuda", ranges={"x": (-1, 1)}, **options)
-    monkeypatch.setattr(kernel_module, "PLACES", 2)
+    monkeypatch.setattr(kernel_module, "TABLE_SIZE", 2)
     few = ns.ensemble(system, STARTS, device="cuda", **options)
     assert few.itinerary.tolist() == whole.itinerary.tolist()
     again = ns.outcomes(system, STARTS, device="cuda", ranges={"x": (-1, 1)}, **options)

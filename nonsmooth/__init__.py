@@ -114,7 +114,7 @@ _OF_PROOFS = (
     "prove_all",
 )
 
-__version__ = "0.1.0.dev0"
+__version__ = "0.1.0rc1"
 
 __all__ = [
     "Clock",

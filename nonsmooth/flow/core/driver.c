@@ -383,7 +383,9 @@ static int taylor_piece(Run *r, double left, Piece *q) {
   double dt = 0;
   expand(r, r->letter, r->x, r->unknowns, e);
   if (!e->finite) { leave_singular(r, e, left); return 0; }
-  double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
+  double by_series = step_size(r, e), far = e->l.bent_count ? leave_out_far(r, e, left, by_series) : 0;
+  if (far > 0) by_series = smaller(step_size(r, e), far);
+  double h = smaller(by_series, r->o.max_step);
   if (h <= SHORTEST * time_scale(r) && h < left) {
     if (!ends_at_singular(r)) finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
     return 0;

@@ -248,6 +248,7 @@ typedef struct {
   OF(int8_t, moving, w) OF(int8_t, turned, rows) OF(double, rates_of_several, SEVERAL * n) \
   OF(double, layer_series, s->slope_outputs ? (tried * tried + sums * sums) * stride : 0) \
   OF(int8_t, idle, m) OF(int8_t, vanishes, most) /* sets without friction; nodes of a program that are zero */ \
+  OF(double, spread, most) /* what nodes of a program may differ by in a step */ \
   OF(double, of_defect, rows) OF(int8_t, key, w + 8 * (s->rules.discrete + s->tables)) /* of_defect: errors of guards */ \
   OF(int32_t, cell, w) OF(double, levels, all + 1) /* of tables; target values of a projection */ \
   OF(double, jumped, s->resets ? HISTORY * n : 0) /* by the last events, states where those are resets */ \

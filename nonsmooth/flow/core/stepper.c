@@ -152,6 +152,51 @@ static double step_size(const Run *r, const Expansion *e) {
   return h;
 }
 
+/* By how much the nodes of a program may differ from their values w where inputs differ by ``off``. */
+static void spread_of(const Values *t, const double *w, const double *off, double *spread) {
+  for (int32_t k = 0; k < t->still_count; k++) spread[t->still[k]] = 0;
+  for (int32_t k = 0; k < t->moving_count; k++) {
+    int32_t j = t->moving[k], one = t->a[j], two = t->b[j];
+    if (t->op[j] == OP_input) { spread[j] = off[two]; continue; }
+    double a = spread[one], b = spread[two];
+    switch (t->op[j]) {
+      case OP_add: case OP_sub: spread[j] = a + b; break;
+      case OP_mul: spread[j] = fabs(w[one]) * b + (fabs(w[two]) + b) * a; break;
+      case OP_sq: spread[j] = (2 * fabs(w[one]) + a) * a; break;
+      case OP_twice: spread[j] = 2 * a; break;
+      case OP_neg: case OP_assign: case OP_fabs: spread[j] = a; break;
+      case OP_fmin: case OP_fmax: spread[j] = larger(a, b); break;
+      case OP_sin: case OP_cos: case OP_tanh: spread[j] = smaller(a, 1 + fabs(w[j])); break;
+      default: spread[j] = a == 0 && b == 0 ? 0 : INFINITY;
+    }
+  }
+}
+
+/* Leave curved guards out of a step that cannot vanish in it, as h = x + sin x where x is large, though their series reach
+ * far less than those of the states; the length in which that is so, or 0. */
+static double leave_out_far(Run *r, Expansion *e, double left, double by_guards) {
+  const Values *t[] = {&r->s->surfaces, &r->s->atoms};
+  double *w[] = {r->heights, r->atom_work}, *off = r->vector;
+  double longest = 0, h = by_guards < left ? smaller(state_step(r, e), left) : 0;
+  for (; h > FAR * by_guards && longest == 0; h *= FALL) {
+    for (int i = 0; i < r->n; i++) off[i] = 2 * rest_of(e->states + (int64_t)i * r->stride, r->order, h);
+    for (int q = 0; q < 2; q++) {
+      if (!(q ? r->s->rules.atoms : r->m)) continue;
+      values_at(t[q], r->x, r->p, w[q]);
+      spread_of(t[q], w[q], off, r->spread);
+      for (int row = 0; row < e->l.rows; row++) {
+        int i = q ? row - e->l.atoms : e->l.index[row], node = t[q]->output[is_atom(e->l.kind[row]) == q ? i : 0];
+        int is_own = q ? is_atom(e->l.kind[row]) : e->l.kind[row] == SURFACE_GUARD && has_law(r, i, SURFACE_LAW);
+        if (!is_own || !is_curved(r, &e->l, row) || !(fabs(w[q][node]) > r->spread[node])) continue;
+        memset(e->guards + (int64_t)row * r->stride + 1, 0, sizeof(double) * r->order);
+        e->of_guards[row] = INFINITY;
+        longest = h;
+      }
+    }
+  }
+  return longest;
+}
+
 /* Whether field and guards are affine, so that no step needs to be checked. */
 static int is_linear(const Run *r, const Expansion *e) { return e->l.is_free ? r->s->linear_free : r->s->linear; }
 

@@ -181,7 +181,8 @@ class TwoFold(Tabular):
         rows = (
             ("point", np.array2string(self.point, precision=6)),
             ("sigma, nu", f"{self.sigma}, ({self.nu[0]:.6g}, {self.nu[1]:.6g})"),
-            ("canards", f"{self.canards:g}, faux {self.faux_canards:g}"),
+            ("canards", _counted(self.canards)),
+            ("faux canards", _counted(self.faux_canards)),
         )
         meaning = representation("", [("", self.classification.determinism)])
         return (
@@ -394,6 +395,11 @@ def _point(fold: TwoFold) -> str:
     rounded = (0.0 if abs(v) < 1e-14 * size else v for v in fold.point)
     text = f"[{', '.join(f'{v:.10g}' for v in rounded)}]"
     return text + (f", t = {fold.t:.10g}" if fold.system.time_dependent else "")
+
+
+def _counted(orbits: float) -> str:
+    """A number of orbits, in words where it is not finite."""
+    return "infinitely many" if np.isinf(orbits) else f"{orbits:g}"
 
 
 def description(fold: TwoFold) -> str:

@@ -165,7 +165,7 @@ def _accept(
 
 
 class Secant:
-    """Equations without derivatives: the Jacobian is carried along from differences (Broyden 1965).
+    """Equations without derivatives: the Jacobian is updated from differences (Broyden 1965).
 
     Along a curve the Jacobian of the last point is good, and a point costs two or three evaluations
     instead of those and as many more as there are unknowns.

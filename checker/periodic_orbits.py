@@ -30,10 +30,17 @@ class Pieces:
         self.finest = max(1e-170, float(min(widths, default=0)))
         self.multiplicity: int = record.get("multiplicity", 0)  # periods of the forcing
         self.period: Iv | None = None  # all of them
+        self._known: dict[Any, tuple[list[Iv], Matrix]] = {}
         self.planes = [(s["position"], number(s["value"])) for s in self.sections]
 
     def system(self, u: list[Iv]) -> tuple[list[Iv], Matrix]:
         """Values and Jacobian of the equations; no Jacobian at a point."""
+        key = tuple((v.a, v.b) for v in u)
+        if key not in self._known:
+            self._known[key] = self._system(u)
+        return self._known[key]
+
+    def _system(self, u: list[Iv]) -> tuple[list[Iv], Matrix]:
         count, m = len(self.sections), self.size - 1
         J = [[whole(0)] * len(u) for _ in u]
         f: list[Iv] = []

@@ -132,6 +132,7 @@ typedef struct { int8_t *state, *order, *before; int32_t terms; double *nu, *ser
 typedef struct {
   int32_t count, blocks, motions, branches, unstable, last; /* last: order that growth decides instead of coefficients */
   int32_t is_imposed; /* whether states are given: those of a mode */
+  int32_t ending, ended; /* a block (from 1) that holds up to this instant, and the last whose limit was found */
   const int8_t *letter;
 #define DECISION_ARRAYS(OF) /* Lemke's method on one block of all elements needs most of them */ \
   OF(int32_t, own, w) OF(int32_t, order, w) OF(int32_t, first, w + 1) OF(int32_t, mark, 4 * w) \
@@ -202,7 +203,7 @@ typedef struct {
    * decisions; t_error is the largest ``hidden`` of events that move a state by more than the tolerance. */
   double since, length, shortened, held_length, t_error;
   int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history, hits, kept;
-  int32_t where, repelling, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
+  int32_t where, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
   Guard guard;
   Happened past[HISTORY];
   int32_t several[SEVERAL];

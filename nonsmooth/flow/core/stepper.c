@@ -485,15 +485,6 @@ static double singular_step(Run *r, Expansion *e, double most) {
   return 0;
 }
 
-/* Repelling sliding, in which a run may start, ends where its exit guards rise through zero. */
-static void turn_exits(const Run *r, Expansion *e) {
-  for (int j = 0; j < e->l.rows; j++)
-    for (int k = 0; k <= r->order && e->l.kind[j] == EXIT_GUARD; k++) {
-      double *c = e->guards + (int64_t)j * r->stride + k;
-      *c = -*c;
-    }
-}
-
 /* Time within h to the zero of an atom in a direction in which it is located; -1 if there is none. */
 static double atom_root(Run *r, Expansion *e, int atom, double h) {
   int row = e->l.atoms + atom, side = r->instant.side[atom], clock = clock_of(r, atom);
@@ -524,7 +515,6 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->root_at;
   int first = -1, found = 0, rows = e->l.rows;
   r->hold = INFINITY;
-  if (r->repelling) turn_exits(r, e);
   memset(r->hidden, 0, sizeof(double) * rows);
   for (int j = 0; j < rows; j++) {
     time[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);
@@ -532,7 +522,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
     found++;
     if (first < 0 || time[j] < time[first]) first = j;
   }
-  if (first < 0) { if (r->repelling) turn_exits(r, e); return -1; }
+  if (first < 0) return -1;
   double latest = time[first] + RESOLVED * h;
   for (int j = 0; j < rows; j++)
     if (time[j] > 0 && time[j] <= latest && (is_curved(r, &e->l, j) || (found > 1 && is_scaled_exit(r, &e->l, j))))
@@ -552,7 +542,6 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
     int rank = rank_of(r, e, j), best_rank = best < 0 ? rank + 1 : rank_of(r, e, best);
     if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
   }
-  if (r->repelling) turn_exits(r, e);
   r->instant.tied = atom < 0 ? -1 : best;
   if (atom >= 0) best = atom;
   if (best < 0) best = first;

@@ -61,5 +61,7 @@ clean: ## remove what was made, except .venv
 
 .venv/.%: .venv/.python pyproject.toml constraints.txt
 	@echo "Installing nonsmooth-dynamics[$*] into .venv ..."
+	@old=$$($(BIN)/python -c 'import importlib.metadata as m, json; print(json.loads(m.distribution("nonsmooth-dynamics").read_text("direct_url.json"))["url"])' 2>/dev/null); \
+	  test -z "$$old" || test "$$old" = "file://$(CURDIR)" || echo ".venv imported $$old; from here on it imports $(CURDIR)."
 	@$(PIP) -e '.[$*]' -c constraints.txt
 	@touch $@

@@ -90,6 +90,8 @@ ns.tables.add_views(globals(), __all__)
 
 def __getattr__(name: str) -> Any:
     """Load the pictures on first use (matplotlib is slow to import)."""
+    if name == "__version__":
+        return ns.__version__
     if name == "plot":
         return importlib.import_module(".plot", __name__)
     if name == "explore":

@@ -17,7 +17,7 @@ jet, integrates, locates events, tells a fold from a cusp and gives the normal f
 
 Conventions: one letter per surface names a mode, ``+`` ``-`` or ``s`` (sliding), and an itinerary
 is the sequence of modes. States are on the last axis, float64. Every run ends in a named status and
-never guesses where the future is not unique. Every error derives from NonsmoothError.
+never guesses where the continuation is not unique. Every error derives from NonsmoothError.
 
 The top level has the functions, the classes and the errors that most programs use. Analysis at one point
 and its results are in ``local``, events and parts of runs in ``flow``, orbits, derivatives and their results
@@ -114,7 +114,7 @@ _OF_PROOFS = (
     "prove_all",
 )
 
-__version__ = "0.1.0.dev0"
+__version__ = "0.1.0rc1"
 
 __all__ = [
     "Clock",

@@ -19,6 +19,8 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m nonsmooth",
         description="Textbook problems of nonsmooth dynamics, run and explored in a browser.",
     )
+    version = f"nonsmooth {importlib.import_module('nonsmooth').__version__}"
+    parser.add_argument("--version", action="version", version=version)
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("list", help="names and titles of the problems")
     show = verbs.add_parser("show", help="a problem: system, start, known values, one run")

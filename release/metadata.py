@@ -11,6 +11,7 @@ ROOT = Path(__file__).parents[1]
 _VERSION = {
     "CITATION.cff": r"(?m)^version: .*$",
     "nonsmooth/__init__.py": r"(?m)^__version__ = .*$",
+    "release/recipe.yaml": r"(?m)^  version: .*$",
 }
 
 
@@ -24,6 +25,7 @@ def written() -> dict[str, str]:
     lines = {
         "CITATION.cff": f"version: {version}",
         "nonsmooth/__init__.py": f'__version__ = "{version}"',
+        "release/recipe.yaml": f"  version: {version}",
     }
     for name, pattern in _VERSION.items():
         texts[name] = re.sub(pattern, lines[name], texts[name], count=1)

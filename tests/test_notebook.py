@@ -114,7 +114,7 @@ def test_expressions_are_typeset_with_the_parentheses_they_need(expression, writ
 
 def doors():
     """The modules whose names users import."""
-    return [ns.local, ns.orbit, ns.flow, ns.proofs, ns.two_folds, ns.textbook, bounce,
+    return [ns.local, ns.orbit, ns.flow, ns.proofs, ns.two_folds, ns.continuation, ns.textbook, bounce,
             bounce.golf, bounce.maps, bounce.shot]  # fmt: skip
 
 
@@ -152,6 +152,11 @@ def test_results_are_well_formed_and_short():
 
 def test_a_run_of_no_length_shows_itself():
     parsed(ns.simulate(RELAY, [1.0, 0.0], t_end=0.0)._repr_html_())
+
+
+def test_numbers_of_canards_are_words_and_a_shot_has_rows(objects):
+    assert rows(objects["TwoFold"])["canards"] == "infinitely many"
+    assert list(rows(objects["Shot"]))[:2] == ["phases", "lift-off"] and bounce.__version__
 
 
 def test_texts_are_escaped():

@@ -260,28 +260,60 @@ def pathsim(x: ca.SX, t: ca.SX, field: ca.SX, guards: ca.SX) -> Any:
     return leg
 
 
+def jaxonomy(x: ca.SX, t: ca.SX, field: ca.SX, guards: ca.SX) -> Any:
+    """A LeafSystem with terminal zero crossings, Dopri5, in major steps."""
+    import jax.numpy as jnp
+    from jaxonomy import LeafSystem, SimulatorOptions
+    from jaxonomy.simulation import Simulator
+
+    right, rows = symbols(x, t, field, jnp), symbols(x, t, guards, jnp)
+    system, n = LeafSystem(), x.numel()
+    rate = lambda t, state: jnp.stack([v + 0.0 * t for v in right(t, state.continuous_state)])
+    system.declare_continuous_state(default_value=jnp.zeros(n), ode=rate)
+    for k in range(guards.numel()):
+        value = lambda t, state, k=k: rows(t, state.continuous_state)[k]
+        system.declare_zero_crossing(value, direction="positive_then_non_positive", terminal=True)
+    options = SimulatorOptions(rtol=TOL, atol=TOL, precision="float64", ode_solver_method="dopri5")
+    simulator = Simulator(system, options=options)
+    first = system.create_context()
+    simulator.advance_to(1e-3, first)  # compiles
+
+    def leg(t: float, x: np.ndarray, t_end: float) -> Any:
+        begin, context = time.perf_counter(), first.with_continuous_state(jnp.asarray(x))
+        while t < t_end:
+            ahead = min(t + t_end / LONGEST, t_end)
+            context = simulator.advance_to(ahead, context.with_time(t)).context
+            t, x = float(context.time), np.array(context.continuous_state)
+            if time.perf_counter() - begin > SECONDS:
+                raise GaveUp(f"{SECONDS:.0f} s")
+            if t < ahead - 1e-12:
+                return t, x, int(np.argmin(np.abs([float(v) for v in rows(t, x)])))
+        return t_end, x, None
+
+    return leg
+
+
+def _require_relays(d: Any) -> None:
+    """Refuse problems that have more than signs of switching functions."""
+    if d.guards.numel() or d.gaps.numel() or not d.multipliers.numel() or not d.plain:
+        raise NotForModes("events beside relays, or no relay")
+    if d.laws or d.complementarity or d.constraints:
+        raise NotForModes("more than relays")
+
+
 def siconos(problem: Any) -> np.ndarray:
     """Time stepping of relays by EulerMoreauOSI with 20,000 steps: first order, of linear systems."""
     import siconos.kernel as sk
 
     d = problem.system.definition
-    if (
-        d.guards.numel()
-        or d.gaps.numel()
-        or d.time.numel()
-        or not d.multipliers.numel()
-        or not d.plain
-    ):
-        raise NotForModes("events beside relays, or no relay")
+    _require_relays(d)
+    if d.time.numel():
+        raise NotForModes("depends on time")
     x, lam, p = d.states, d.multipliers, list(d.defaults.values())
     parts = [ca.jacobian(d.field, x), ca.jacobian(d.field, lam), ca.jacobian(d.surfaces, x)]
     zero = lambda e: ca.substitute(e, ca.vertcat(x, lam), ca.SX.zeros(x.numel() + lam.numel(), 1))
     offset = ca.Function("o", [d.parameters], [zero(d.field), zero(d.surfaces)])
-    if (
-        any(ca.depends_on(part, ca.vertcat(x, lam)) for part in parts)
-        or d.laws
-        or d.complementarity
-    ):
+    if any(ca.depends_on(part, ca.vertcat(x, lam)) for part in parts):
         raise NotForModes("not linear")
     A, B, C = (np.array(ca.DM(v)) for v in ca.Function("m", [d.parameters], parts).call([p]))
     b, e = (np.array(ca.DM(v)).ravel() for v in offset.call([p]))
@@ -298,6 +330,41 @@ def siconos(problem: Any) -> np.ndarray:
         steps.computeOneStep()
         steps.nextStep()
     return np.array(block.x())
+
+
+def solve_nivp(problem: Any) -> np.ndarray:
+    """Composite steps (trapezoidal, backward Euler) with a projection on [-1, 1], 500 of them."""
+    from solve_nivp import solve_ivp_ns
+
+    d = problem.system.definition
+    _require_relays(d)
+    n, m, time_ = (
+        d.states.numel(),
+        d.multipliers.numel(),
+        d.time if d.time.numel() else ca.SX.sym("t"),
+    )
+    signal, values = ca.SX.sym("s", m), ca.vertcat(*d.defaults.values())
+    read = lambda e: ca.substitute(e, d.parameters, values) if d.parameters.numel() else e
+    y = ca.vertcat(d.states, signal, d.multipliers)  # states, their switching functions, signs
+    right = ca.vertcat(read(d.field), read(d.surfaces) - signal, ca.SX.zeros(m, 1))
+    slopes, jacobian = numbers(y, time_, ca.vec(ca.jacobian(right, y))), y.numel()
+    height = ca.Function("h", [d.states, time_], [read(d.surfaces)])
+    h0 = np.array(height(problem.start, 0.0)).ravel()
+    _, found, *_, info = solve_ivp_ns(
+        numbers(y, time_, right),
+        (0.0, problem.t_end),
+        np.concatenate([problem.start, h0, np.sign(h0)]),
+        projection="sign",
+        projection_opts=dict(y_indices=[*range(n, n + m)], w_indices=[*range(n + m, n + 2 * m)]),
+        solver="semismooth_newton",
+        solver_opts=dict(tol=TOL, rhs_jac=lambda t, v: slopes(t, v).reshape(jacobian, -1).T),
+        adaptive=False,
+        h0=problem.t_end / 500,
+        A=np.diag([1.0] * n + [0.0] * 2 * m),
+    )
+    if not all(done for _, done, _ in info[1:]):
+        raise GaveUp("a step did not converge")
+    return found[-1, :n]
 
 
 def by_hand(solver: Solver, written: bool = False) -> Callable[[Any], np.ndarray]:
@@ -322,7 +389,9 @@ PEERS: dict[str, tuple[str, Callable[[Any], np.ndarray]]] = {
     "diffrax, modes by hand": ("diffrax", by_hand(diffrax)),
     "PathSim, sign in the field": ("pathsim", by_hand(pathsim, True)),
     "PathSim, modes by hand": ("pathsim", by_hand(pathsim)),
+    "jaxonomy, modes by hand": ("jaxonomy", by_hand(jaxonomy)),
     "Siconos, 20,000 time steps": ("siconos", siconos),
+    "solve-nivp, 500 time steps": ("solve_nivp", solve_nivp),
 }
 
 

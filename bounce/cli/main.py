@@ -14,6 +14,10 @@ import nonsmooth as ns
 from . import explore, fit, land, launch, map, models
 
 _COMMANDS = (launch, land, map, fit, explore, models)
+_CODES = (
+    "Exit codes: 0 done, 1 a computation or a file failed, 2 wrong arguments, 3 a fit whose data do not "
+    "determine a parameter."
+)
 _USAGE = (ns.ParameterError, ns.OptionError, ns.DefinitionError, ns.PointError)
 
 
@@ -75,7 +79,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _arguments() -> argparse.ArgumentParser:
-    parser = _Parser(prog="bounce", description="The bounce of a spinning ball on the ground.")
+    parser = _Parser(
+        prog="bounce", description="The bounce of a spinning ball on the ground.", epilog=_CODES
+    )
     parser.add_argument("--version", action="version", version=f"bounce {ns.__version__}")
     commands = parser.add_subparsers(metavar="command", required=True, parser_class=_Parser)
     for command in _COMMANDS:

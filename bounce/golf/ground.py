@@ -18,6 +18,7 @@ import nonsmooth as ns
 from ..contact.model import Contact3D, ContactModel
 from ..errors import ModelError
 from ..laws import BounceLaw, RigidBounce, TiltedBounce, rigid_lift_off_3d
+from ..laws.tilted import tilt_at
 from ..shot.simulate import simulate
 from ..units import GOLF, Ball, Landing, Scaling
 from .side_spin import S, SideState, gravity_on, in_space, same_kind
@@ -189,12 +190,7 @@ def _by_law(model: BounceLaw, v: Array, down: float, w: Array) -> _LiftOff:
     speed = float(np.hypot(*v))
     e = v / speed if speed else np.array([1.0, 0.0])
     turn = np.array([[e[0], e[1]], [-e[1], e[0]]])  # into the direction of travel
-    tilt = (
-        model.tilt(math.hypot(speed, down), math.atan2(-down, speed))
-        if callable(model.tilt)
-        else model.tilt
-    )
-    b = float(np.asarray(tilt)) if speed else 0.0
+    b = float(tilt_at(model, speed, down)) if speed else 0.0
     cos, sin = math.cos(b), math.sin(b)
     along = turn @ w[:2]
     # -along[1] is the spin about the direction of travel; the plane's own is turned by b about z.

@@ -79,12 +79,7 @@ class TiltedBounce(BounceLaw):
             Speeds along the true ground; impulses and case along the tilted plane.
         """
         u, v, w = checked_landings(xdot, ydot, omega)
-        if callable(self.tilt):
-            angle = np.arctan2(-v, np.abs(u))
-            tilt = _check_tilt(np.asarray(self.tilt(np.hypot(u, v), angle), dtype=float))
-        else:
-            tilt = np.asarray(self.tilt)
-        tilt = np.sign(u) * tilt
+        tilt = np.sign(u) * tilt_at(self, u, v)
         cos, sin = np.cos(tilt), np.sin(tilt)
         shot = self.plane.lift_off(u * cos + v * sin, v * cos - u * sin, w)
         xdot_off = shot.xdot * cos - shot.ydot * sin
@@ -100,8 +95,7 @@ class TiltedBounce(BounceLaw):
             m/s.
         """
         angle = math.atan2(-ydot, abs(xdot))
-        tilt = self.tilt(math.hypot(xdot, ydot), angle) if callable(self.tilt) else self.tilt
-        steepest = math.pi / 2 - float(np.asarray(tilt))
+        steepest = math.pi / 2 - float(tilt_at(self, xdot, ydot))
         if angle <= steepest:
             return ""
         return (
@@ -114,6 +108,14 @@ class TiltedBounce(BounceLaw):
 
     def options(self) -> dict[str, Any]:
         return {"restitution": self.restitution, "tilt": self.tilt}
+
+
+def tilt_at(law: TiltedBounce, xdot: ArrayLike, ydot: ArrayLike) -> Array:
+    """The tilt for speeds along the ground and down onto it."""
+    if not callable(law.tilt):
+        return np.asarray(law.tilt)
+    angle = np.arctan2(-np.asarray(ydot), np.abs(xdot))
+    return _check_tilt(np.asarray(law.tilt(np.hypot(xdot, ydot), angle), dtype=float))
 
 
 def _check_tilt(tilt: Array) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -266,8 +265,11 @@ class Shot(Generic[Model, Along]):
 
     def _repr_html_(self) -> str:
         """Representation in a notebook: the lift-off, then the run."""
-        text = html.escape(repr(self))
-        return f"<div><b>{text}</b></div>{self.trajectory._repr_html_()}"
+        end = self.lift_off
+        rows = [("phases", self.itinerary), ("lift-off", f"t = {self.time:.6g}")]
+        rows += [(n, _short(getattr(end, n))) for n in ("xdot", "ydot", "omega")]
+        picture = self.trajectory._repr_html_()
+        return ns.notebook.card("Shot", [*rows, ("slip", _short(self.slip))], picture)
 
 
 def _short(along: Any) -> str:

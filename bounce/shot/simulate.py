@@ -103,7 +103,7 @@ def simulate(
         A number that is not finite, a ball above the ground or moving away from it, a pair beside
         a number.
     LiftOffError
-        No lift-off before ``t_max``, or a future that is not unique.
+        No lift-off before ``t_max``, or a continuation that is not unique.
 
     Warns
     -----

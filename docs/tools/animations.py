@@ -87,31 +87,31 @@ def funnel(count: int) -> Iterator[Figure]:
     fold = ns.find_two_fold(system, near=[0.0, 0.0, 0.0])
     slope = fold.classification.into.low
     run = ns.simulate(system, [0.0, 0.5, 0.5 * slope], t_end=10.0)
-    futures = ns.orbit.funnel(run, t_end=run.t[-1] + 1.0, samples=41)
+    funnel = ns.orbit.funnel(run, t_end=run.t[-1] + 1.0, samples=41)
     figure = Figure(figsize=(7.0, 3.5), layout="constrained")
-    for t in np.linspace(0.02, futures.t + 1.0, count):
+    for t in np.linspace(0.02, funnel.t + 1.0, count):
         figure.clear()
         axes = figure.add_subplot()
-        before = np.linspace(0.0, min(t, futures.t), 60)
+        before = np.linspace(0.0, min(t, funnel.t), 60)
         axes.plot(before, run(before)[:, 0], color="black", linewidth=2)
-        if t > futures.t:
-            after = np.linspace(futures.t, t, 80)
-            for states, departure in zip(futures(after), futures.departures, strict=True):
+        if t > funnel.t:
+            after = np.linspace(funnel.t, t, 80)
+            for states, departure in zip(funnel(after), funnel.departures, strict=True):
                 colour = {"+": STYLE.ABOVE, "-": STYLE.BELOW, "s": "black"}[departure.side]
                 order, width = (
                     (3, 2) if departure.side == "s" else (2, 0.9)
                 )  # slides until it leaves
                 axes.plot(after, states[:, 0], color=colour, linewidth=width, zorder=order)
-        axes.axvline(futures.t, color="0.7", linewidth=0.8)
-        axes.set(xlim=(0.0, futures.t + 1.0), ylim=(-0.65, 0.65))
+        axes.axvline(funnel.t, color="0.7", linewidth=0.8)
+        axes.set(xlim=(0.0, funnel.t + 1.0), ylim=(-0.65, 0.65))
         for y, word, colour in (
             (0.55, "leaves up", STYLE.ABOVE),
             (-0.55, "leaves down", STYLE.BELOW),
         ):
             axes.text(0.05, y, word, color=colour, va="center")
-        axes.text(futures.t + 0.02, 0.55, "two-fold", color="0.35", va="center")
+        axes.text(funnel.t + 0.02, 0.55, "two-fold", color="0.35", va="center")
         axes.set(xlabel="time", ylabel="height over the surface")
-        axes.set_title("one past" if t <= futures.t else "many futures")
+        axes.set_title("one past" if t <= funnel.t else "many continuations")
         yield figure
 
 
@@ -126,9 +126,9 @@ ANIMATIONS = (
     ),
     Animation(
         "funnel",
-        "One past, many futures",
+        "One past, many continuations",
         "Sliding comes to a visible two-fold at the grey line. From there the motion may slide on for any "
-        "while and leave to either side at any time. Forty-one of these futures are drawn.",
+        "while and leave to either side at any time. Forty-one of these motions are drawn.",
         funnel,
     ),
 )

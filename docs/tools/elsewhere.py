@@ -105,7 +105,7 @@ def measured() -> str:
         ),
         (
             "first answer of a new process",
-            f"{cached:.2g} s",
+            f"{cached:.2g} s of processor time",
             f"{cold:.2g} s with the compilation of its system",
         ),
     ]

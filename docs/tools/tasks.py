@@ -96,10 +96,10 @@ TASKS = {
         "continue_bifurcation orbit.BifurcationCurve orbit.CodimensionTwo orbit_functions orbit.OrbitFunctions "
         "orbit.OrbitFunction find_homoclinic orbit.Connection",
     ),
-    "futures": _task(
+    "reachable_sets": _task(
         "Follow sets of orbits",
-        "Every future of a point whose future is not unique, and the orbits that come to a special "
-        "point or leave it.",
+        "The forward-reachable set of a point where uniqueness fails, and the orbits that approach a "
+        "special point or leave it.",
         "nonsmooth",
         "orbit.funnel orbit.Funnel manifold orbit.Manifold orbit.DividingCurves orbit.DividingArc "
         "orbit.ComputedStarts",

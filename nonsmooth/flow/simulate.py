@@ -112,7 +112,7 @@ def simulate(
 
     Notes
     -----
-    Every run ends in a status: see :class:`Status`. Where the future is not unique the run stops
+    Every run ends in a status: see :class:`Status`. Where the solution is not unique the run stops
     with ``NON_UNIQUE`` and never guesses.
 
     Examples

@@ -24,6 +24,16 @@ from .fixed import MOST_STEPS, TOLERANCE, stuck
 NONE = np.zeros(0)
 
 
+class Precision(NamedTuple):
+    """Tolerance of legs, and the condition of derivatives by the start beyond which others begin, or 0."""
+
+    tol: float = TOLERANCE
+    ratio: float = 0.0
+
+
+ROUNDING = Precision()
+
+
 class Arc(NamedTuple):
     """A leg: its mode, start, duration and end; ``left``: switching functions of the sets on which it begins, and which
     it leaves."""
@@ -43,11 +53,13 @@ def carry_legs(
     times: Array = NONE,
     first: Sequence[int] = (),
     back: bool = False,
+    precision: Precision = ROUNDING,
 ) -> CarriedLegs:
     """Integrate states over legs, with derivatives of the ends, and at samples, by the starts and by chosen parameters.
 
     ``times`` are those of samples since the starts of their legs, which begin at ``first``. With ``back`` steps are
-    recorded, along which rows can be pulled back, instead of derivatives.
+    recorded, along which rows can be pulled back, instead of derivatives. With a ``precision`` that has a ratio
+    derivatives are those from the last of ``CarriedLegs.parts`` on.
     """
     engine: ColumnsEngine = system.cached("columns", lambda: ColumnsEngine(system, ORDER))
     words = {mode: list(system.parse_letters(mode)) for mode in {leg.mode for leg in legs}}
@@ -61,10 +73,11 @@ def carry_legs(
         np.array([leg.duration for leg in legs], float),
         [leg.ends for leg in legs],
         p,
-        TOLERANCE,
+        precision.tol,
         MOST_STEPS,
         times,
         np.array(first if len(first) else [0] * len(legs) + [len(times)]),
+        precision.ratio,
     )
     return engine.record(given) if back else engine.carry(given, chosen)
 

@@ -1,4 +1,4 @@
-"""A cache of what was built for a system, by content; the least recently used entry goes first."""
+"""A cache of objects built for a system, by content; the least recently used entry is dropped first."""
 
 from __future__ import annotations
 

@@ -63,11 +63,11 @@ LAWS = ("surface", "contact", "set", "relay", "joint", "complementarity", "table
 #: Laws of impacts, by number in C.
 IMPACT_LAWS = ("newton", "moreau", "poisson")
 
-#: Most numbers in a condition of an event, and how a function in it is located that is not watched.
+#: Most numbers in a condition of an event, and the direction of a function in it that is not located.
 MOST_CODES, UNWATCHED = 256, 2
 
-#: A step ends where |h| has fallen to this part: towards h = 0 a series may go on as -|h|.
+#: A step ends where |h| has fallen to this part: towards h = 0 a series may continue as -|h|.
 FALL = 0.1
 
-#: The same for friction's limit on the set, whose square is compared with that of what is needed.
+#: The same for friction's limit on the set, whose square is compared with that of the required friction.
 LIMIT_FALL = 1e-3

@@ -63,6 +63,9 @@ _FURTHER = 4
 #: Starts that are compared with an attractor in one call, during which Ctrl-C waits.
 _ROWS = 4096
 
+#: States at rest that are compared with what is known in one call.
+_TOGETHER = 256
+
 #: Numbers that samples may hold in one call.
 _HELD = 2**24
 
@@ -535,10 +538,18 @@ class Search:
         self, labels: NDArray[np.int32], rows: NDArray[np.intp], at: _Returns
     ) -> None:
         """Label runs that come to rest."""
-        if len(rows):
-            end, still = self._settled(at.end[rows])
-            for i in np.flatnonzero(still).tolist():
-                labels[rows[i]] = self._at_rest(end[i])
+        if not len(rows):
+            return
+        ends, still = self._settled(at.end[rows])
+        rows, ends = rows[still], ends[still]
+        while len(rows):  # up to the next one that changes what is known
+            known = self._at_known_rest(ends[:_TOGETHER])
+            new = np.flatnonzero(known == UNDECIDED)[:1]
+            if len(new):
+                known = known[: new[0] + 1]
+                known[-1] = self._at_rest(ends[new[0]])
+            labels[rows[: len(known)]] = known
+            rows, ends = rows[len(known) :], ends[len(known) :]
 
     def _settled(self, x: Array) -> tuple[Array, NDArray[np.bool_]]:
         """States (m, n) after the whole time again, and whether they rest there."""
@@ -547,24 +558,26 @@ class Search:
         two = self._ensemble(one, self.t_start + span / 16, "rest").x
         return one, self._distance(one, two) <= _STILL
 
+    def _at_known_rest(self, x: Array) -> NDArray[np.int32]:
+        """Labels of the known points or sets at which states (m, n) rest, or 0."""
+        label = self._near(x[:, None])
+        for k, attractor in enumerate(self.found):
+            if attractor.kind in ("point", "rest"):
+                left = np.flatnonzero(label == UNDECIDED)
+                least = self._radius(k) if attractor.kind == "point" else self.near / 8
+                label[left[self._away(k, x[left]) <= least]] = k + 1
+        return label
+
     def _at_rest(self, x: Array) -> int:
-        """Label of the point or set at which a state (n,) rests."""
-        given = int(self._near(x[None, None])[0])
-        if given:
-            return given
-        resting = [k for k, a in enumerate(self.found) if a.kind in ("point", "rest")]
-        for k in resting:
-            least = self._radius(k) if self.found[k].kind == "point" else self.near / 8
-            if self._away(k, x[None])[0] <= least:
-                return k + 1
+        """Label of another point or a larger set, at which a state (n,) rests."""
         step = _ISOLATED * self.near * self.scale
         around = np.vstack([x + step * e for e in (*np.eye(len(x)), *-np.eye(len(x)))])
         back, still = self._settled(around)
         if np.all(self._distance(back, x) <= 1e-3 * self.near) and still.all():
             return self.known(Attractor(x[None], "point"))
-        for k in resting:
-            if self.found[k].kind == "rest":
-                points = _thinned(np.vstack([self.found[k].points, x]), self.scale, self.near / 8)
+        for k, attractor in enumerate(self.found):
+            if attractor.kind == "rest":
+                points = _thinned(np.vstack([attractor.points, x]), self.scale, self.near / 8)
                 self.found[k] = Attractor(points, "rest")
                 self._trees[k] = _tree(points / self.scale)
                 return k + 1

@@ -13,6 +13,7 @@ True
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
@@ -153,7 +154,7 @@ def by_name(name: str) -> Problem:
     Raises
     ------
     OptionError
-        No problem of that name; the message lists them.
+        No problem of that name.
 
     Examples
     --------
@@ -161,8 +162,10 @@ def by_name(name: str) -> Problem:
     (3.0, 0.0)
     """
     if name not in PROBLEMS:
+        near = difflib.get_close_matches(str(name), PROBLEMS, 3, 0.5)
+        alike = f" Near it are {', '.join(near)}." if near else ""
         raise OptionError(
-            f"name: expected one of {', '.join(PROBLEMS)}, received {name!r}. `python -m "
-            "nonsmooth list` prints them with their titles."
+            f"name: no problem is called {name!r}.{alike} `python -m nonsmooth list` prints all, and "
+            "nonsmooth.textbook.PROBLEMS has them."
         )
     return PROBLEMS[name]()

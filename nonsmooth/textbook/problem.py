@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..flow import Trajectory, simulate
+from ..local.read_only import ReadOnly
 from ..model import Array, FilippovSystem, OptionError
 
 #: Values are compared to nine digits, or to their own if they have fewer.
@@ -19,7 +19,7 @@ RELATIVE = 1e-9
 
 
 def _nothing() -> Mapping[str, float]:
-    return MappingProxyType({})
+    return ReadOnly({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ def stated(
         values[0] if len(values) == 1 else values,
         tolerance,
         how,
-        MappingProxyType(dict(at or {})),
+        ReadOnly(dict(at or {})),
     )
 
 
@@ -221,7 +221,7 @@ def problem(
         (function.__doc__ or "").partition("Source: ")[2].partition("\n\n")[0].split()
     )
     values = system.parameter_vector().tolist()
-    parameters = MappingProxyType(dict(zip(system.parameter_names, values, strict=True)))
+    parameters = ReadOnly(dict(zip(system.parameter_names, values, strict=True)))
     return Problem(
         function.__name__, title, source, system, parameters, start, t_end, references, note
     )

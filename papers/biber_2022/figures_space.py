@@ -86,10 +86,10 @@ class Scene:
             self.region([(0, 0), corner, near], CROSSING, SURFACE)
         self.region([(0, 0), (a, 0), (a, a), (0, a)], ATTRACTING, SURFACE)
 
-    def lift_off_plane(self, height: float = 0.95) -> None:
+    def lift_off_plane(self) -> None:
         """The plane Lambda_N = 0, through both crossing regions."""
-        a = self.size
-        corners = np.array([[-height, a, -a], [-height, -a, a], [height, -a, a], [height, a, -a]])
+        a, b = self.size, 0.45
+        corners = np.array([[-b, a, -a], [-b, -a, a], [b, -a, a], [b, a, -a]])
         self.axes.add_patch(
             Polygon(project(corners), facecolor="0.72", alpha=0.55, edgecolor="0.3", zorder=PLANE)
         )
@@ -183,6 +183,21 @@ class Scene:
         self.lift_off(z[-1])
 
 
+def _ball(height: float) -> tuple[Figure, Axes, Scene]:
+    """The surface H = 0 with its folds, the lift-off plane and the axis of slip."""
+    figure, axes = pictures.canvas(7.0, height)
+    scene = Scene(axes, 1.25)
+    axes.set(xlim=(-1.95, 1.75), ylim=(-1.32, 1.22))
+    scene.surface()
+    scene.lift_off_plane()
+    scene.folds()
+    look.arrow(axes, project(np.zeros(3)), project(np.array([0.85, 0, 0])), zorder=PLANE + 0.5)
+    scene.text([0.91, 0, 0], "$H$")
+    axes.plot(0, 0, "o", color="black", markersize=6, zorder=TEXT)
+    scene.text([-0.06, -0.04, 0.02], "$s$")
+    return figure, axes, scene
+
+
 @picture("Fig. 9")
 def geometries() -> Figure:
     """What a bounce can do near lift-off, computed with the normal form of the linear ball's
@@ -191,12 +206,7 @@ def geometries() -> Figure:
     lift-off. Dotted: from a start straight to the surface, at a cross. Pale: behind or below a
     surface.
     """
-    figure, axes = pictures.canvas(7.0, 5.4)
-    scene = Scene(axes, 1.25)
-    axes.set(xlim=(-1.95, 1.75), ylim=(-1.32, 1.22))
-    scene.surface()
-    scene.lift_off_plane(0.45)
-    scene.folds()
+    figure, axes, scene = _ball(5.4)
     for name, start, offset in (
         ("(a)", (0.33, 0.5, 1.15), (-0.05, 0.09)),
         ("(b)", (-0.33, 1.15, 0.3), (-0.11, 0.0)),
@@ -218,16 +228,8 @@ def geometries() -> Figure:
             zorder=TEXT,
             path_effects=look.halo(),
         )
-    _axis_of_slip(axes, scene, 0.85)
     _ball_labels(axes, scene)
     return figure
-
-
-def _axis_of_slip(axes: Axes, scene: Scene, top: float) -> None:
-    look.arrow(axes, project(np.zeros(3)), project(np.array([top, 0, 0])), zorder=PLANE + 0.5)
-    scene.text([top + 0.06, 0, 0], "$H$")
-    axes.plot(0, 0, "o", color="black", markersize=6, zorder=TEXT)
-    scene.text([-0.06, -0.04, 0.02], "$s$")
 
 
 def _ball_labels(axes: Axes, scene: Scene) -> None:
@@ -259,12 +261,7 @@ def two_fold_visible() -> Figure:
     every orbit but that one ends. Pale: behind or below a surface.
     """
     flow = fold_of("linear")
-    figure, axes = pictures.canvas(7.0, 5.3)
-    scene = Scene(axes, 1.25)
-    axes.set(xlim=(-1.95, 1.75), ylim=(-1.32, 1.22))
-    scene.surface()
-    scene.lift_off_plane(0.45)
-    scene.folds()
+    figure, _, scene = _ball(5.3)
     slope = flow.slopes[0]
     canard = np.array([[0, 1, slope], [0, 0, 0], [0, -1, -slope]])
     canard *= scene.size / max(1.0, slope)  # to the edges of the surface
@@ -275,7 +272,6 @@ def two_fold_visible() -> Figure:
     for centre in (0.42, 0.85):
         scene.grazing("+", centre)
         scene.grazing("-", centre)
-    _axis_of_slip(axes, scene, 0.85)
     _region_labels(scene)
     scene.text([-0.3, -0.92, 0.92], r"lift-off, $\Lambda_N=0$", fontsize=9.5)
     return figure

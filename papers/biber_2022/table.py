@@ -50,10 +50,10 @@ class Row:
         ]
 
 
-def rounding_interval(text: str, figures: int = 3) -> tuple[float, float]:
-    """Numbers that round to ``text`` at the given number of significant figures."""
+def rounding_interval(text: str) -> tuple[float, float]:
+    """Numbers that round to ``text`` at three significant figures."""
     value = Decimal(text)
-    half = Decimal(5).scaleb(value.adjusted() - figures)
+    half = Decimal(5).scaleb(value.adjusted() - 3)
     return float(value - half), float(value + half)
 
 

@@ -10,13 +10,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from papers import pictures
 from papers.biber_2022 import PAPER, equations, errata, figures, results, table
 from papers.biber_2022.errata_general import fold_of
 from papers.biber_2022.exact import evaluate, identical
 from papers.biber_2022.model import LAWS, linear
 from papers.claims import failures
-from papers.pictures import illegible
 from papers.record import Done
 
 
@@ -117,20 +115,6 @@ def test_exact_evaluation_refuses_roots():
     x = ca.SX.sym("x")
     with pytest.raises(ValueError, match="rational"):
         evaluate(ca.sqrt(x), {"x": Fraction(4)})
-
-
-# Figures --------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow_cases("trajectories", "two_fold_b", "two_fold_c", "visible_fp1", "visible_fp2")
-@pytest.mark.parametrize("picture", figures.PICTURES, ids=lambda p: p.name)
-def test_figures_are_fit_for_print(picture):
-    figure = picture.draw()
-    texts = [t for axes in figure.axes for t in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
-    assert any(t.get_text() for t in texts)
-    assert picture.caption
-    with pictures.settings():
-        assert illegible(figure) == []
 
 
 # The record --------------------------------------------------------------------------------------

@@ -100,7 +100,7 @@ def canards() -> Found:
 
 @claim("severed-link")
 def severed() -> Found:
-    """No unique past, no unique future at an invisible two-fold with nu1 nu2 > 1."""
+    """No unique past, no unique continuation at an invisible two-fold with nu1 nu2 > 1."""
     system = normal_form(CLASSES["II-C"])
     fold = ns.find_two_fold(system, [0.0, 0.1, 0.1])
     runs = [ns.simulate(system, [0.0, *p], 20.0, tol=1e-11) for p in ring()]

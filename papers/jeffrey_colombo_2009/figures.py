@@ -164,9 +164,9 @@ def diabolo() -> Figure:
     return figure
 
 
-def _flights_by_slope(v: V, count: int = 90) -> tuple[Array, list[int]]:
+def _flights_by_slope(v: V) -> tuple[Array, list[int]]:
     """Edges of angles in the crossing region y < 0 < z, and the flights from between them."""
-    edges = np.linspace(0.0, math.pi / 2, count + 1)
+    edges = np.linspace(0.0, math.pi / 2, 91)
     middles = (edges[1:] + edges[:-1]) / 2
     runs = [run(v, (-math.cos(a), math.sin(a)), 60.0, tol=1e-8) for a in middles]
     return edges, [flights(r) if "s" in r.itinerary else 0 for r in runs]

@@ -103,8 +103,8 @@ def test_funnel_begins_where_the_canard_meets_the_two_fold():
     golden = (1 + math.sqrt(5)) / 2  # slope of the canard for nu = (-2, -1)
     assert found["slope"] == pytest.approx(golden, abs=1e-12)
     # on an eigenline t = (z2 + z3)/|lambda|, with lambda = -(1 + slope)
-    assert found["futures"].t == pytest.approx(0.5, abs=1e-9)
-    assert {d.side for d in found["futures"].departures} == {"+", "-", "s"}
+    assert found["funnel"].t == pytest.approx(0.5, abs=1e-9)
+    assert {d.side for d in found["funnel"].departures} == {"+", "-", "s"}
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """The Python blocks of every page and of README.md run, in order, as one program, and print what the page says."""
 
+import ast
+import builtins
 import contextlib
 import doctest
 import importlib
@@ -50,6 +52,16 @@ def test_blocks_run_and_print_what_the_page_says(page, tmp_path, monkeypatch):
             continue
         line = text[: found.start("source")].count("\n") + 1
         check_block(page.name, line, found["source"], found["output"], namespace)
+
+
+def test_each_program_of_the_readme_runs_by_itself():
+    """Every name that a block reads is one of its own."""
+    text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    for found in BLOCK.finditer(text):
+        names = [n for n in ast.walk(ast.parse(found["source"])) if isinstance(n, ast.Name)]
+        own = {n.id for n in names if isinstance(n.ctx, ast.Store)} | set(dir(builtins))
+        own |= set(re.findall(r"^import (?:\w+ as )?(\w+)", found["source"], re.MULTILINE))
+        assert {n.id for n in names} <= own
 
 
 def present(module):

@@ -1,10 +1,13 @@
 """`python -m nonsmooth` lists and shows the textbook, draws a run, and refuses unknown names."""
 
+import copy
+import pickle
 import subprocess
 import sys
 
 import pytest
 
+import nonsmooth as ns
 from nonsmooth import textbook
 from nonsmooth.__main__ import main
 
@@ -35,6 +38,21 @@ def test_show_prints_values_and_status(name, capsys):
     assert "run: Trajectory(" in out
 
 
+def test_version_and_names_near_a_wrong_one(capsys):
+    with pytest.raises(SystemExit):
+        main(["--version"])
+    assert capsys.readouterr().out == f"nonsmooth {ns.__version__}\n"
+    assert main(["show", "stick_slip"]) == 2
+    assert "Near it are" in (err := capsys.readouterr().err) and "leine_stick_slip" in err
+
+
+def test_a_problem_survives_pickle_and_copy():
+    problem = textbook.leine_stick_slip()
+    for again in (pickle.loads(pickle.dumps(problem)), copy.deepcopy(problem)):
+        assert dict(again.parameters) == dict(problem.parameters)
+        assert again.system == problem.system
+
+
 @pytest.mark.slow
 def test_show_draws(tmp_path, capsys):
     pytest.importorskip("nonsmooth.plot")
@@ -45,7 +63,7 @@ def test_show_draws(tmp_path, capsys):
 
 def test_unknown_name_is_an_error_in_words(capsys):
     assert main(["show", "nosuch"]) == 2
-    assert "received 'nosuch'" in capsys.readouterr().err
+    assert "called 'nosuch'" in capsys.readouterr().err
 
 
 def test_it_is_a_command():

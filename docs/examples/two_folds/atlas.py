@@ -2,7 +2,7 @@
 
 The generic two-folds, each by its sliding portrait and its flow in space, and at last where they lie in
 the plane of $(nu1, nu2)$. Two signs and two numbers decide: which orbits reach the singularity, and
-whether the future is unique behind it.
+whether orbits are unique beyond it.
 """
 
 import nonsmooth as ns

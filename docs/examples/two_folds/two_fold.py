@@ -3,7 +3,7 @@
 Where both fields are tangent to the surface the sliding field is 0/0. Here both folds are
 invisible, and every orbit of attracting sliding (Da) reaches the two-fold in finite time: a
 Teixeira singularity, class II-C. From there every orbit of repelling sliding (Dr) is a possible
-future.
+continuation.
 """
 
 import casadi as ca

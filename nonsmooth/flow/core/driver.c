@@ -26,7 +26,6 @@ static void adopt(Run *r, const Continuation *c) {
   memcpy(r->drop, c->drop, sizeof(int32_t) * r->guards);
   memcpy(r->unknowns, c->unknowns, sizeof(double) * r->width);
   enter_mode(r);
-  r->repelling = 0;
   if (alike) return;
   int shown = shown_number(r, r->letter);
   if (r->s->sets && shown == r->shown) { /* a set is passed again: another stretch, of the same letters */
@@ -127,8 +126,7 @@ static int settle_in(Run *r) {
 /* Whether a run can start in a mode, by the guards of its active elements. Repelling sliding is accepted. */
 static int can_start(Run *r) {
   Expansion *e = &r->e;
-  int exits = 0, holds = 1;
-  double most = -INFINITY, least = INFINITY;
+  int holds = 1;
   expand(r, r->letter, r->x, r->unknowns, e);
   r->turned_mode = r->mode;
   for (int row = 0; row < e->l.rows; row++) {
@@ -140,13 +138,9 @@ static int can_start(Run *r) {
     if (!is_active(r, index)) continue;
     double value;
     r->drop[row] = leading(r, e, row, kind == SURFACE_GUARD || kind == NEAR_GUARD, &value);
-    if (kind != EXIT_GUARD) { holds &= value >= 0; continue; }
-    exits = 1;
-    most = larger(value, most);
-    least = smaller(value, least);
+    holds &= value >= 0; /* of sliding from which both sides lead away, too */
   }
-  r->repelling = exits && most <= 0 && least < 0;
-  return holds && (!exits || r->repelling || least >= 0);
+  return holds;
 }
 
 static void start_in(Run *r, const int8_t *asked) {
@@ -383,7 +377,9 @@ static int taylor_piece(Run *r, double left, Piece *q) {
   double dt = 0;
   expand(r, r->letter, r->x, r->unknowns, e);
   if (!e->finite) { leave_singular(r, e, left); return 0; }
-  double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
+  double by_series = step_size(r, e), far = e->l.bent_count ? leave_out_far(r, e, left, by_series) : 0;
+  if (far > 0) by_series = smaller(step_size(r, e), far);
+  double h = smaller(by_series, r->o.max_step);
   if (h <= SHORTEST * time_scale(r) && h < left) {
     if (!ends_at_singular(r)) finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
     return 0;

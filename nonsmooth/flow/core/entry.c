@@ -32,7 +32,7 @@ static size_t place_run(Run *to, char *base) {
   const System *s = to->s;
   size_t n = to->n, m = to->m, w = to->width, c = to->c, all = to->kept_rows, rows = to->guards, stride = to->stride;
   size_t used = 0, jumping = 0, q = s->combined, tried = m < MOST_ENUMERATED ? m : MOST_ENUMERATED, sums = tried * (tried - (tried > 0)) / 2;
-  size_t most = s->point.size > s->columns.size ? s->point.size : s->columns.size;
+  size_t most = larger(larger(s->point.size, s->columns.size), larger(s->surfaces.size, s->atoms.size));
   size_t atoms = s->rules.atoms, triggers = s->rules.triggers, clocks = s->rules.clocks;
   Run *r = to;
   for (size_t i = 0; i < m; i++) jumping += s->element[i].law == COMPLEMENTARITY_LAW;
@@ -257,7 +257,7 @@ static int is_plain(Run *r) {
 /* The data of a run between two steps, here and in lanes. */
 #define GOES_ON(OF) \
   OF(t, t) OF(since, since) OF(shortened, shortened) OF(step_count, steps) OF(event_count, events) \
-  OF(segment_steps, segment_steps) OF(itinerary, itinerary) OF(history, history) OF(kept, kept)
+  OF(segment_steps, segment_steps) OF(itinerary, itinerary) OF(history, history) OF(hits, hits) OF(kept, kept)
 #define TAKEN(here, there) r->here = m->there;
 #define GIVEN(here, there) m->there = r->here;
 
@@ -329,7 +329,7 @@ static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Suspended *m) {
 void core_begin(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m) {
   static const Output none;
   Run *r = run;
-  m->history = m->kept = 0;
+  m->history = m->hits = m->kept = 0;
   sample_into(r, b, i);
   run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, 0, b->t0, 0);
   go_on_until_plain(r, b, i, m);

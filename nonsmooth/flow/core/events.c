@@ -39,7 +39,7 @@ static void evaluate_atoms(Run *r, const double *x) {
   gradient_sums(r, &s->atoms, r->atom_work, s->rules.atoms, &s->atom_gradient, s->rules.atoms, weight, 1, i->noise);
   for (int a = 0; a < s->rules.atoms; a++) {
     i->value[a] = out_of(&s->atoms, r->atom_work, a);
-    i->zero[a] = fabs(i->value[a]) <= VANISHES * i->noise[a] + 2 * i->residual[a];
+    i->zero[a] = fabs(i->value[a]) <= ON_GUARD * i->noise[a] + 2 * i->residual[a];
   }
 }
 

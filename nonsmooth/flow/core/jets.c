@@ -310,21 +310,22 @@ static int step_dependent(Run *r, const Layout *l, const double *unknowns, doubl
   double *rates = r->small + w;
   if (!may_be_singular(r, l)) return 0;
   invert_layer(r, l, unknowns, r->matrix);
-  for (int i = 0; i < n; i++) rates[i] = layer_of(r, l->sliding[i]);
-  for (int i = 0; i < n; i++) {
-    b[i] = 0;
-    for (int j = 0; j < n; j++) b[i] += r->matrix[i * n + j] * rates[j];
-  }
-  for (int i = 0; i < n; i++) {
-    double rest = rates[i], terms = fabs(rest);
-    for (int j = 0; j < n; j++) {
-      double term = r->slope[l->sliding[i] * w + l->sliding[j]] * b[j];
-      rest -= term;
-      terms += fabs(term);
+  memset(b, 0, sizeof(double) * n);
+  for (int pass = 0; pass < 3; pass++) { /* joints make the inverse inexact */
+    int fits = 1;
+    for (int i = 0; i < n; i++) {
+      double terms = fabs(rates[i] = layer_of(r, l->sliding[i]));
+      for (int j = 0; j < n; j++) {
+        double slope = r->slope[l->sliding[i] * w + l->sliding[j]];
+        rates[i] -= slope * b[j];
+        terms += fabs(slope * b[j]) + VANISHES / MERGED * fabs(slope * unknowns[l->sliding[j]]);
+      }
+      fits &= fabs(rates[i]) <= MERGED * terms;
     }
-    if (!(fabs(rest) <= MERGED * terms)) return 0;
+    if (pass && fits) return 1;
+    for (int i = 0; i < n; i++) for (int j = 0; j < n; j++) b[i] += r->matrix[i * n + j] * rates[j];
   }
-  return 1;
+  return 0;
 }
 
 /* Multipliers that keep the state on the sliding surfaces: one Newton step, as they enter linearly, and one against

@@ -132,6 +132,7 @@ typedef struct { int8_t *state, *order, *before; int32_t terms; double *nu, *ser
 typedef struct {
   int32_t count, blocks, motions, branches, unstable, last; /* last: order that growth decides instead of coefficients */
   int32_t is_imposed; /* whether states are given: those of a mode */
+  int32_t ending, ended; /* a block (from 1) that holds up to this instant, and the last whose limit was found */
   const int8_t *letter;
 #define DECISION_ARRAYS(OF) /* Lemke's method on one block of all elements needs most of them */ \
   OF(int32_t, own, w) OF(int32_t, order, w) OF(int32_t, first, w + 1) OF(int32_t, mark, 4 * w) \
@@ -202,7 +203,7 @@ typedef struct {
    * decisions; t_error is the largest ``hidden`` of events that move a state by more than the tolerance. */
   double since, length, shortened, held_length, t_error;
   int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history, hits, kept;
-  int32_t where, repelling, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
+  int32_t where, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
   Guard guard;
   Happened past[HISTORY];
   int32_t several[SEVERAL];
@@ -248,6 +249,7 @@ typedef struct {
   OF(int8_t, moving, w) OF(int8_t, turned, rows) OF(double, rates_of_several, SEVERAL * n) \
   OF(double, layer_series, s->slope_outputs ? (tried * tried + sums * sums) * stride : 0) \
   OF(int8_t, idle, m) OF(int8_t, vanishes, most) /* sets without friction; nodes of a program that are zero */ \
+  OF(double, spread, most) /* what nodes of a program may differ by in a step */ \
   OF(double, of_defect, rows) OF(int8_t, key, w + 8 * (s->rules.discrete + s->tables)) /* of_defect: errors of guards */ \
   OF(int32_t, cell, w) OF(double, levels, all + 1) /* of tables; target values of a projection */ \
   OF(double, jumped, s->resets ? HISTORY * n : 0) /* by the last events, states where those are resets */ \

@@ -152,6 +152,51 @@ static double step_size(const Run *r, const Expansion *e) {
   return h;
 }
 
+/* By how much the nodes of a program may differ from their values w where inputs differ by ``off``. */
+static void spread_of(const Values *t, const double *w, const double *off, double *spread) {
+  for (int32_t k = 0; k < t->still_count; k++) spread[t->still[k]] = 0;
+  for (int32_t k = 0; k < t->moving_count; k++) {
+    int32_t j = t->moving[k], one = t->a[j], two = t->b[j];
+    if (t->op[j] == OP_input) { spread[j] = off[two]; continue; }
+    double a = spread[one], b = spread[two];
+    switch (t->op[j]) {
+      case OP_add: case OP_sub: spread[j] = a + b; break;
+      case OP_mul: spread[j] = fabs(w[one]) * b + (fabs(w[two]) + b) * a; break;
+      case OP_sq: spread[j] = (2 * fabs(w[one]) + a) * a; break;
+      case OP_twice: spread[j] = 2 * a; break;
+      case OP_neg: case OP_assign: case OP_fabs: spread[j] = a; break;
+      case OP_fmin: case OP_fmax: spread[j] = larger(a, b); break;
+      case OP_sin: case OP_cos: case OP_tanh: spread[j] = smaller(a, 1 + fabs(w[j])); break;
+      default: spread[j] = a == 0 && b == 0 ? 0 : INFINITY;
+    }
+  }
+}
+
+/* Leave curved guards out of a step that cannot vanish in it, as h = x + sin x where x is large, though their series reach
+ * far less than those of the states; the length in which that is so, or 0. */
+static double leave_out_far(Run *r, Expansion *e, double left, double by_guards) {
+  const Values *t[] = {&r->s->surfaces, &r->s->atoms};
+  double *w[] = {r->heights, r->atom_work}, *off = r->vector;
+  double longest = 0, h = by_guards < left ? smaller(state_step(r, e), left) : 0;
+  for (; h > FAR * by_guards && longest == 0; h *= FALL) {
+    for (int i = 0; i < r->n; i++) off[i] = 2 * rest_of(e->states + (int64_t)i * r->stride, r->order, h);
+    for (int q = 0; q < 2; q++) {
+      if (!(q ? r->s->rules.atoms : r->m)) continue;
+      values_at(t[q], r->x, r->p, w[q]);
+      spread_of(t[q], w[q], off, r->spread);
+      for (int row = 0; row < e->l.rows; row++) {
+        int i = q ? row - e->l.atoms : e->l.index[row], node = t[q]->output[is_atom(e->l.kind[row]) == q ? i : 0];
+        int is_own = q ? is_atom(e->l.kind[row]) : e->l.kind[row] == SURFACE_GUARD && has_law(r, i, SURFACE_LAW);
+        if (!is_own || !is_curved(r, &e->l, row) || !(fabs(w[q][node]) > r->spread[node])) continue;
+        memset(e->guards + (int64_t)row * r->stride + 1, 0, sizeof(double) * r->order);
+        e->of_guards[row] = INFINITY;
+        longest = h;
+      }
+    }
+  }
+  return longest;
+}
+
 /* Whether field and guards are affine, so that no step needs to be checked. */
 static int is_linear(const Run *r, const Expansion *e) { return e->l.is_free ? r->s->linear_free : r->s->linear; }
 
@@ -440,15 +485,6 @@ static double singular_step(Run *r, Expansion *e, double most) {
   return 0;
 }
 
-/* Repelling sliding, in which a run may start, ends where its exit guards rise through zero. */
-static void turn_exits(const Run *r, Expansion *e) {
-  for (int j = 0; j < e->l.rows; j++)
-    for (int k = 0; k <= r->order && e->l.kind[j] == EXIT_GUARD; k++) {
-      double *c = e->guards + (int64_t)j * r->stride + k;
-      *c = -*c;
-    }
-}
-
 /* Time within h to the zero of an atom in a direction in which it is located; -1 if there is none. */
 static double atom_root(Run *r, Expansion *e, int atom, double h) {
   int row = e->l.atoms + atom, side = r->instant.side[atom], clock = clock_of(r, atom);
@@ -479,7 +515,6 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->root_at;
   int first = -1, found = 0, rows = e->l.rows;
   r->hold = INFINITY;
-  if (r->repelling) turn_exits(r, e);
   memset(r->hidden, 0, sizeof(double) * rows);
   for (int j = 0; j < rows; j++) {
     time[j] = is_atom(e->l.kind[j]) ? atom_root(r, e, j - e->l.atoms, h) : guard_root(r, e, j, r->drop[j], h);
@@ -487,7 +522,7 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
     found++;
     if (first < 0 || time[j] < time[first]) first = j;
   }
-  if (first < 0) { if (r->repelling) turn_exits(r, e); return -1; }
+  if (first < 0) return -1;
   double latest = time[first] + RESOLVED * h;
   for (int j = 0; j < rows; j++)
     if (time[j] > 0 && time[j] <= latest && (is_curved(r, &e->l, j) || (found > 1 && is_scaled_exit(r, &e->l, j))))
@@ -507,7 +542,6 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
     int rank = rank_of(r, e, j), best_rank = best < 0 ? rank + 1 : rank_of(r, e, best);
     if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
   }
-  if (r->repelling) turn_exits(r, e);
   r->instant.tied = atom < 0 ? -1 : best;
   if (atom >= 0) best = atom;
   if (best < 0) best = first;

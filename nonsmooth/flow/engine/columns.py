@@ -6,7 +6,8 @@ import ctypes
 import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,9 @@ LEAVING = 4
 #: Steps for which there is room at first, and those of each leg.
 _ROOM, _STEPS = 32, 6
 
+#: Parts of each leg for which there is room, and most numbers of them all.
+_PARTS, _MOST_PARTS = 64, 2**22
+
 _NO_STEPS = np.zeros((0, 0))
 
 #: Direction of a column along given parameters (``variation.c``).
@@ -45,7 +49,8 @@ class EndOfLeg(NamedTuple):
 
 class GivenLegs(NamedTuple):
     """Legs: letters of their modes (L, w), starts (L, n), durations (L,), ends; parameters (np,) or (L, np), error, most steps of a leg;
-    times of samples since the starts (K,), and where those of each leg begin (L + 1,)."""
+    times of samples since the starts (K,), and where those of each leg begin (L + 1,); the condition of derivatives by the
+    start beyond which others begin, or 0."""
 
     letters: NDArray[np.int8]
     starts: Array
@@ -56,6 +61,7 @@ class GivenLegs(NamedTuple):
     most_steps: int
     times: Array
     first: NDArray[np.intp]
+    ratio: float = 0.0
 
 
 @cache
@@ -84,6 +90,8 @@ class CarriedLegs:
         ]
         self.failed, self.status = -1, DONE
         self.row = np.zeros(n)
+        room = min(_PARTS * legs, _MOST_PARTS // (1 + n * n)) if given.ratio > 0.0 else 0
+        self._parts = np.empty((1 + room, 1 + n * n))
         self._c = self._structures(count, starts)
 
     def _structures(self, count: int, starts: int) -> NDArray[np.void]:
@@ -112,6 +120,8 @@ class CarriedLegs:
         made["sample_t"] = times.ctypes.data + 8 * given.first[:-1]
         made["at_samples"] = self._samples.ctypes.data + 8 * n * count * given.first[:-1]
         gradients = self.gradients.ctypes.data + np.arange(legs) * 8 * self.gradients.shape[1]
+        made["ratio"], made["parts"] = given.ratio, self._parts.ctypes.data
+        made["part_room"][0] = len(self._parts) - 1
         made["gradient"] = np.where([e is not None for e in given.ends], gradients, 0)
         return made
 
@@ -138,6 +148,13 @@ class CarriedLegs:
         rows = self._steps[first : first + counts[leg]]
         rows = rows[rows[:, 2] >= 0.0]  # without stages
         return rows[:, 1], rows[:, 3 : 3 + n]
+
+    @cached_property
+    def parts(self) -> list[tuple[Array, Array]]:
+        """Of each leg times since its start (k,) at which other derivatives begin, and what those are that end there (k, n, n)."""
+        n, first = self.ends.shape[1], [0, *np.cumsum(self._c["part_count"]).tolist()]
+        times, matrices = self._parts[:, 0], self._parts[:, 1:].reshape(-1, n, n).swapaxes(1, 2)
+        return [(times[i:j], matrices[i:j]) for i, j in pairwise(first)]
 
     def set_columns(self, first: Array) -> None:
         """Set the first column (n,) of all legs, and the others to zero."""

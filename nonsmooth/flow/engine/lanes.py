@@ -13,6 +13,7 @@ import numpy as np
 from ...model import Array, FilippovSystem
 from ..options import Options
 from ..results import Chunk
+from ..section import Hits
 from .arrays import BURST
 from .building.build import build
 from .building.codegen import lanes_source, supports_lanes
@@ -84,6 +85,15 @@ def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
         return None
     order = _order_with_sets(options) if system.sets else options.order
     return system.cached(("lanes", order), lambda: Lanes(system, order))
+
+
+def can_sample(system: FilippovSystem, hits: Hits | None) -> bool:
+    """Whether lanes keep samples: at times, or at events of a surface."""
+    stops = {name for name, _ in system.stops}
+    if system.sets or hits is None or hits.after:
+        return not system.sets and hits is None
+    named = hits.names is not None and not stops.intersection(hits.names)
+    return named or not stops or "stop" not in hits.kinds
 
 
 def _order_with_sets(options: Options) -> int:

@@ -14,7 +14,7 @@ from ...model import FilippovSystem, OptionError, require_system
 from ..constants import KINDS
 from ..engine.building.compilers import ADVICE, CompilerError, find_compiler
 from ..engine.interpreter import interpreter_for, library
-from ..engine.lanes import lanes_for
+from ..engine.lanes import can_sample, lanes_for
 from ..options import Options
 from ..other_names import hinted
 from ..results import Chunk, Collected, Ensemble
@@ -140,8 +140,8 @@ def ensemble(
             "at is a section at events without a count, which an ensemble needs. Give "
             "at=nonsmooth.Section(..., count=100) to keep up to 100 states of each run."
         )
-    sampled = sampling.room is not None and (sampling.hits is not None or bool(system.sets))
-    step = not sampled and t_end > t_start and device is None
+    step = sampling.room is None or can_sample(system, sampling.hits)
+    step = step and t_end > t_start and device is None
     chosen = engine_for(system, options, starts, step)
     job = Job(system, options, number, sampling.times, sampling.room, chosen)
     return _run(job, starts, work, device)

@@ -68,6 +68,29 @@ static __attribute__((noinline)) void keep_samples(Lanes *s, Work *w, const Step
     while (LANE(s->due, l) < LANE(end, l)) keep_sample(s, w, l, e->c[0], P, LANE(s->due, l) - LANE(e->t, l));
 }
 
+#if !SET
+/* Lanes whose next event may be the last that is sampled: the driver ends their runs. */
+static I ends_sampling(const Lanes *s, const Work *w, I which) {
+  const Options *o = w->o;
+  if (!o->hit_count) return NONE;
+  for EACH(l, which) if (past_of(s, l)->hits + 1 < o->hit_skip + o->hit_every * o->hit_count) LANE_I(which, l) = 0;
+  return which;
+}
+
+/* Samples of the lanes whose event is at the section; ``above``: the side from which they came. As count_hit. */
+static void keep_hits(Lanes *s, Work *w, int kind, int guard, I which, I above) {
+  const Options *o = w->o;
+  if (!(o->hit_kinds >> kind & 1) || !o->hit_named[guard * o->hit_width]) return;
+  for EACH(l, which) {
+    Past *past = past_of(s, l);
+    if ((o->hit_side && (LANE_I(above, l) ? 1 : -1) != o->hit_side) || LANE(s->t, l) <= w->b->t0) continue;
+    if (++past->hits <= o->hit_skip || (past->hits - o->hit_skip) % o->hit_every || past->kept >= w->b->room) continue;
+    LANE(s->due, l) = LANE(s->t, l);
+    keep_sample(s, w, l, s->x, 0, 0);
+  }
+}
+#endif
+
 static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   Suspended *m = &a->m;
   const Past *past = past_of(s, l);
@@ -83,6 +106,7 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   m->events = LANE_I(s->events, l);
   m->segment_steps = m->steps - LANE_I(s->entered, l);
   m->history = past->count;
+  m->hits = past->hits;
   m->kept = past->kept;
   m->itinerary = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
 }
@@ -102,6 +126,7 @@ static int unpack(Lanes *s, const Work *w, int l, const Packed *a) {
   LANE_I(s->events, l) = m->events;
   LANE_I(s->entered, l) = m->steps - m->segment_steps;
   past->count = m->history;
+  past->hits = m->hits;
   past->kept = m->kept;
   await_sample(s, w, l);
   LANE_I(s->base, l) = m->itinerary;

@@ -1,8 +1,8 @@
 /* Data common to all kinds of lanes on a CPU: itineraries as nodes of a tree, starts that are not finite, the last events. */
 #define MEMORY 256
 
-/* Data of a trajectory for the driver: the last events, up to a row of a log; halved steps, up to a step; samples. */
-typedef struct { Recent event[HISTORY]; int64_t count, row, steps, kept; double shortened; } Past;
+/* Data of a trajectory for the driver: the last events, up to a row of a log; halved steps, up to a step; hits of a section, samples. */
+typedef struct { Recent event[HISTORY]; int64_t count, row, steps, hits, kept; double shortened; } Past;
 
 /* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
 static int may_accumulate(const Past *p) {

@@ -108,6 +108,8 @@ INLINE I by_chance(const Lanes *s, const Work *w);
 INLINE void count(Lanes *s, Work *w, int kind, I which);
 #if RARE_CASES_HERE
 static void keep_samples(Lanes *s, Work *w, const Step *e, I which);
+static I ends_sampling(const Lanes *s, const Work *w, I which);
+static void keep_hits(Lanes *s, Work *w, int kind, int guard, I which, I above);
 #endif
 
 static void note_modes(Lanes *s, Work *w, I which, I mode) {

@@ -149,12 +149,20 @@ INLINE I change_modes(Lanes *s, Work *w, I reached, I up, I down, T slope) {
   s->above = (s->above & ~ends) | up;
   s->drop = (s->drop & ~ends) | (ends & 2);
   unclear |= s->events + 1 >= limits(w)->max_events;
+#if RARE_CASES_HERE
+  unclear |= ends_sampling(s, w, reached | ends);
+#endif
   I all = (reached | ends) & ~unclear & (s->slides ^ was | s->above ^ was_above);
   I entered = all & s->slides & ~was, kind = (entered & ENTRY) | (ends & EXIT) | (~entered & ~ends & CROSSING);
   all &= ~remember(s, all, kind, ends & EXIT_GUARD);
   count(s, w, ENTRY, entered & all);
   count(s, w, EXIT, all & ends);
   count(s, w, CROSSING, all & ~ends & ~entered);
+#if RARE_CASES_HERE
+  keep_hits(s, w, ENTRY, SURFACE_GUARD, entered & all, was_above);
+  keep_hits(s, w, EXIT, EXIT_GUARD, all & ends, was_above);
+  keep_hits(s, w, CROSSING, SURFACE_GUARD, all & ~ends & ~entered, was_above);
+#endif
   set_lambda(s);
   note_modes(s, w, all, mode_of(s));
   return (reached | ends) & ~all;

@@ -90,7 +90,7 @@ class Intersection:
     surfaces : tuple of int
         Which surfaces meet there, by index.
     continuations : tuple of Continuation
-        Modes that can go on. One: the future is unique for independent multipliers.
+        Admissible modes. One: the continuation is unique for independent multipliers.
     attraction : str
         Whether orbits beside the intersection reach it and slide along it: ``"attracting"`` (in finite
         time, shown by a Lyapunov function), ``"repelling"``, ``"spiralling in"`` and ``"spiralling out"``

@@ -290,7 +290,7 @@ def _of_a_contact(
 
 
 def boundary_equilibrium_of(
-    x: Array, k: int, gradient: Array, other: Array, a: Array, margin: float = MARGIN
+    x: Array, k: int, gradient: Array, other: Array, a: Array, margin: float
 ) -> BoundaryEquilibrium:
     """Class from the linear data: grad h, the other field and the linear part of field ``k``."""
     c = gradient if k == 0 else -gradient  # towards the equilibrium's own side

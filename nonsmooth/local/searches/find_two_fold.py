@@ -181,7 +181,8 @@ class TwoFold(Tabular):
         rows = (
             ("point", np.array2string(self.point, precision=6)),
             ("sigma, nu", f"{self.sigma}, ({self.nu[0]:.6g}, {self.nu[1]:.6g})"),
-            ("canards", f"{self.canards:g}, faux {self.faux_canards:g}"),
+            ("canards", _counted(self.canards)),
+            ("faux canards", _counted(self.faux_canards)),
         )
         meaning = card("", [("", self.classification.determinism)])
         return card(f"{self.kind} two-fold, class {self.label}", rows, quadrants(real)) + meaning
@@ -389,6 +390,11 @@ def _point(fold: TwoFold) -> str:
     rounded = (0.0 if abs(v) < 1e-14 * size else v for v in fold.point)
     text = f"[{', '.join(f'{v:.10g}' for v in rounded)}]"
     return text + (f", t = {fold.t:.10g}" if fold.system.time_dependent else "")
+
+
+def _counted(orbits: float) -> str:
+    """A number of orbits, in words where it is not finite."""
+    return "infinitely many" if np.isinf(orbits) else f"{orbits:g}"
 
 
 def description(fold: TwoFold) -> str:
@@ -639,7 +645,7 @@ def find_two_fold(
       eigenvalues -2.61803, -0.381966 with slopes z3/z2 = -1.61803, 0.618034
       canards (Da -> s -> Dr): infinitely many; faux canards (Dr -> s -> Da): none
       Determinism breaks on an open set (Teixeira singularity): every orbit of Da reaches s in
-      finite time, and from s every orbit of Dr is a possible future (infinitely many canards), as
+      finite time, and from s every orbit of Dr is a possible continuation (infinitely many canards), as
       are spirals of flights along the diabolo.
       Found 0.141 from the start in 1 iteration, residual 0.
     """

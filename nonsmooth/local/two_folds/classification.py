@@ -65,7 +65,7 @@ TABLE: tuple[Row, ...] = (
         out_of="all",
         determinism="No orbit of Da reaches s, so forward uniqueness holds in Da. Every orbit of "
         "Dr reaches s in finite time, and every orbit of Da comes from s (a fan of faux canards): "
-        "at s itself the future is any orbit of Da or a visible tangent orbit.",
+        "any orbit of Da or a visible tangent orbit continues the motion from s.",
     ),
     Row(
         "II-C",
@@ -75,8 +75,8 @@ TABLE: tuple[Row, ...] = (
         into="all",
         out_of="none",
         determinism="Determinism breaks on an open set (Teixeira singularity): every orbit of Da "
-        "reaches s in finite time, and from s every orbit of Dr is a possible future (infinitely "
-        "many canards), as are spirals of flights along the diabolo.",
+        "reaches s in finite time, and from s every orbit of Dr is a possible continuation "
+        "(infinitely many canards), as are spirals of flights along the diabolo.",
     ),
     Row(
         "II-F",
@@ -86,8 +86,8 @@ TABLE: tuple[Row, ...] = (
         into="none",
         out_of="one",
         determinism="No orbit of Da reaches s, so forward uniqueness holds in Da. One faux canard "
-        "runs from repelling sliding through s into attracting sliding and is the only future of "
-        "s.",
+        "runs from repelling sliding through s into attracting sliding and is the only "
+        "continuation from s.",
     ),
     Row(
         "mix-0",
@@ -131,7 +131,7 @@ TABLE: tuple[Row, ...] = (
         out_of="sector",
         determinism="No orbit of Da reaches s, so forward uniqueness holds in Da. A sector of Dr "
         "reaches s in finite time and a sector of Da comes from s (a fan of faux canards): at s "
-        "itself the future is not unique.",
+        "itself the continuation is not unique.",
     ),
 )
 

@@ -59,7 +59,7 @@ def _require_degree(d: Definition, name: str, y: ca.SX, own: ca.SX) -> None:
         "restitution says what happens to the rate."
         if again
         else "no multiplier of a complementarity condition enters it, its rate or its second derivative, so that "
-        "nothing keeps y from becoming negative."
+        "y can become negative."
     )
     raise DefinitionError(f"y of {name!r}: {what}")
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A joint: a function that is zero along the motion, held by a reaction of any size and sign.
+    """A joint: a function that a reaction of any size and sign keeps at zero.
 
     It has the letter ``s`` in every mode and no events. A start must satisfy it, with the derivatives that the
     reaction does not enter: for a joint between positions also the rate of ``function``.
@@ -27,7 +27,7 @@ class Constraint:
     Parameters
     ----------
     function : expression
-        Of states, parameters and time; it may hold reactions of constraints if they enter it linearly.
+        Of states, parameters and time; it may contain reactions of constraints linearly.
     reaction : SX symbol, optional
         A multiplier in the field, linear there: how the joint acts. Unless given, one is added that acts along the
         gradient of the function's rate (unit masses).
@@ -72,7 +72,7 @@ class Joints:
 
 
 def joints_of(items: Sequence[Constraint], reactions: Sequence[ca.SX], field: ca.SX) -> Joints:
-    """Entries of constraints whose function holds no reaction; the others give their reactions at once."""
+    """Entries of constraints whose function contains no reaction; the others give their reactions at once."""
     functions = [scalar(own.function, f"function of {own.name!r}") for own in items]
     every = ca.vertcat(*reactions)
     at_once = [i for i, g in enumerate(functions) if items and ca.depends_on(g, every)]
@@ -103,7 +103,7 @@ def _eliminated(
     if ca.sprank(ca.sparsify(slope)) < len(at_once):
         raise DefinitionError(
             f"function of {names}: it does not determine its own reaction. Exchange the reactions, or leave out "
-            "what depends on the others."
+            "dependent constraints."
         )
     value = -ca.solve(slope, ca.substitute(residual, own, 0))
     field, *rest = (ca.substitute(e, own, value) for e in (field, *functions))

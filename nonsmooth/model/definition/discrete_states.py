@@ -1,4 +1,4 @@
-"""Discrete states: comparisons of them in a field, as polynomials that agree at all values, and their values held."""
+"""Discrete states: comparisons of them in a field, as polynomials that agree at all values, and systems with fixed values."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Relay(Element):
 
     Given in place of a switching function in ``surfaces=``. The multiplier becomes +1 where the signal
     rises to ``on`` and -1 where it falls to ``off``; its letters are ``+`` and ``-``. A start between the
-    thresholds is off unless ``start_mode`` says ``+``; ``start=`` a run or an event goes on as that was.
+    thresholds is off unless ``start_mode`` has ``+``; ``start=`` a run or an event keeps its letter.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def read_entries(surface: Expression | None, surfaces: Sequence[Expression] | No
 
 
 def multipliers_of(entries: Sequence[Entry], given: Any) -> list[Any]:
-    """Multipliers of all entries: those that were given, between those that elements bring."""
+    """Multipliers of all entries: given ones, between those of elements."""
     rest = listed(given)
     if len(rest) == len(entries):
         return rest
@@ -171,7 +171,7 @@ def multipliers_of(entries: Sequence[Entry], given: Any) -> list[Any]:
 
 
 def unknowns_of(elements: Any) -> ca.SX:
-    """Multipliers and reactions that complementarity conditions, impacts or constraints bring."""
+    """Multipliers and reactions of complementarity conditions, impacts or constraints."""
     given = listed(elements) if isinstance(elements, (list, tuple)) else [elements]
     own = [getattr(e, "multiplier", getattr(e, "reaction", None)) for e in given]
     names = [f"unknown of {getattr(e, 'name', e)!r}" for e in given]
@@ -186,7 +186,7 @@ def functions_of(entries: Sequence[Entry]) -> ca.SX:
 
 
 def hysteresis_of(entries: Sequence[Entry]) -> ca.SX:
-    """Of each function how much lower it is at multiplier -1; nothing where none is."""
+    """Reduction of each function at multiplier -1; empty where there is none."""
     found = [e for entry in entries for e in entry.hysteresis]
     return ca.SX(0, 1) if all(e.is_zero() for e in found) else ca.vertcat(*found)
 

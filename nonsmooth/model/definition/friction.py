@@ -21,7 +21,7 @@ class Friction(Element):
     """Dry friction, with stiction, a Stribeck curve and a viscous part: a force against a slip.
 
     Put ``force`` into the field, and the friction itself into ``surfaces=`` of the system; its multiplier need
-    not be named. While it sticks the force is whatever holds the bodies together, up to ``static * load``.
+    not be named. While it sticks the force is that which keeps the slip at zero, up to ``static * load``.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Friction(Element):
     -----
     Friction that drops at once is a multiplier that enters nonlinearly (hidden dynamics): with the multiplier
     from -1 to 1 the force goes along $kinetic lambda (1 + b (1 - lambda^2))$, whose largest value is
-    ``static``, and slip begins at its fold. A start at rest under a force between both is not unique: say
+    ``static``, and slip begins at its fold. A start at rest under a force between both is not unique: give
     ``start_mode="s"`` if it sticks. Source: Armstrong-Helouvry, Dupont & Canudas de Wit 1994, "A
     survey of models ... for the control of machines with friction"; Jeffrey 2018, Hidden Dynamics.
 
@@ -146,7 +146,7 @@ class Friction(Element):
 
 
 def _require_above(static: ca.SX, kinetic: ca.SX) -> None:
-    """Refuse what is known to be no stiction."""
+    """Refuse coefficients that are known not to give stiction."""
     if static.is_constant() and kinetic.is_constant() and not float(static) > float(kinetic) > 0.0:
         raise DefinitionError(
             f"static of the friction: expected more than kinetic, {float(kinetic):g}, both positive, received "

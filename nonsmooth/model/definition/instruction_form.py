@@ -36,7 +36,7 @@ MOST, DEEPEST = 200_000, 4_000
 
 
 def _require(conditions: Iterator[tuple[bool, str]]) -> None:
-    """Raise DefinitionError for the first condition that does not hold."""
+    """Raise DefinitionError for the first condition that is false."""
     for holds, what in conditions:
         if not holds:
             raise DefinitionError(f"system: expected {what}, received something else.")
@@ -65,7 +65,7 @@ class Graph:
     op: NDArray[np.int32]  # positions in ``operations``
     args: NDArray[
         np.int32
-    ]  # instructions; of an input its vector and place; of a constant its place
+    ]  # instructions; of an input its vector and index; of a constant its index
     constants: Array
     outputs: NDArray[np.int32]  # instructions of the entries of all expressions
     shapes: tuple[tuple[int, int], ...]  # of the expressions
@@ -100,7 +100,7 @@ class Graph:
         )
 
     def conditions(self) -> Iterator[tuple[bool, str]]:
-        """What numbers have to be, beside their types and shapes."""
+        """Conditions on the numbers, besides their types and shapes."""
         every = [name for names in self.names for name in names]
         yield all("\0" not in name.encode().decode() for name in every), "names of symbols"
         yield {*self.operations} <= {*OPERATIONS}, "operations that are known"

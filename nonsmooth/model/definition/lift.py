@@ -1,6 +1,6 @@
 """Lifting: sign, fabs, fmin, fmax, if_else and tables in an expression become surfaces and multipliers.
 
-Each switch of the right-hand side is replaced by what it is on the two sides of the zero set of a
+Each switch of the right-hand side is replaced by its values on the two sides of the zero set of a
 smooth switching function h, with one multiplier lam = sgn h for all switches on the same set:
 
     sign(h)        lam                           h
@@ -14,11 +14,11 @@ A table is one element for each argument, on its sides like the other switches; 
 parameter of a cell (``pieces.py``).
 
 ``not``, ``and``, ``or`` act on conditions. Two functions that differ by a constant factor are one
-surface; the first one found is used, and a negative factor turns the sign of the multiplier.
+surface; the first one found is used, and a negative factor changes the sign of the multiplier.
 
 A switch inside a switch, such as fmax(fmin(x, 1), -1), is expanded over the sides of the inner one:
 sgn h(x, lam) = sum over lam = +1, -1 of its weight times sgn h(x, +-1). This is exact off the
-surfaces. It adds a surface for each side, which does nothing where the inner switch is on its
+surfaces. It adds a surface for each side, which has no effect where the inner switch is on its
 other side.
 
 The result is affine in each multiplier: Filippov's convention (Filippov 1988, sec. 4), by which
@@ -263,7 +263,7 @@ _INFINITELY_MANY = (
     "is a function of the phase of a Clock."
 )
 _EQUALITY = (
-    "Equality holds on a surface only, and what a field is there does not matter in Filippov's "
+    "Equality is true on a surface only, where the value of a field does not matter in Filippov's "
     "convention. Write the comparison as < or >, or leave the case out."
 )
 _REFUSED: dict[str, str] = {

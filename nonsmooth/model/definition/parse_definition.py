@@ -196,7 +196,7 @@ class Definition:
         return cls(**parts, **{name: state[name] for name in PLAIN if name in state})
 
 
-#: Parts of a definition that are no expressions, and what follows from others.
+#: Parts of a definition that are no expressions, and derived ones.
 PLAIN = tuple(f.name for f in fields(Definition) if f.type not in ("ca.SX", "frozenset[int]"))
 
 
@@ -216,7 +216,7 @@ class _Deferred:
 Definition.field = _Deferred()
 
 
-#: Classes of what a system is made of besides surfaces, their arguments, and how one is written.
+#: Classes of the parts of a system besides surfaces, their arguments, and an example of each.
 _ELEMENTS: tuple[tuple[Any, ...], ...] = (
     *((Stop, "stops"), (Reset, "resets"), (Impact, "impacts")),
     (Complementarity, "complementarity"),
@@ -315,13 +315,13 @@ def _require_one_field(above: Any, constraints: Sequence[Any]) -> None:
     """Refuse reactions of constraints in two fields."""
     if above is not None and any(own.reaction is not None for own in constraints):
         raise DefinitionError(
-            "constraints: their reactions are in above= and below=, of which one holds at a time. Give field= with "
-            "multipliers= and surfaces=, which holds them once."
+            "constraints: their reactions are in above= and below=, of which one applies at a time. Give field= with "
+            "multipliers= and surfaces=, which contains them once."
         )
 
 
 def _contacts(impacts: Sequence[Impact]) -> dict[str, Any]:
-    """Parts of a definition that contacts make."""
+    """Parts of a definition for contacts."""
     return {
         "gaps": _of_impacts(impacts, "gap"),
         "restitutions": _of_impacts(impacts, "restitution"),
@@ -339,7 +339,7 @@ def _events(
     t: ca.SX,
     p: ca.SX,
 ) -> dict[str, Any]:
-    """Parts of a definition that stops, resets, clocks and discrete states make."""
+    """Parts of a definition for stops, resets, clocks and discrete states."""
     _require_directions([*stops, *resets])
     maps, named = read_maps(resets, x)
     moving = ca.vertcat(x[: x.numel() - len(discrete)], t)
@@ -647,7 +647,7 @@ def _require_bare(what: str, expression: ca.SX, d: Definition) -> None:
 def _require_smooth_functions(
     d: Definition, gaps: list[tuple[str, ca.SX]], named: list[tuple[str, ca.SX]]
 ) -> None:
-    """Refuse switches in functions of the states, and say what to write in place of each."""
+    """Refuse switches in functions of the states, with advice for each."""
     moving = ca.vertcat(d.extended_states, d.multipliers, d.reactions)
     advice = dict.fromkeys(_function_names(d), IN_A_SURFACE)
     advice |= dict.fromkeys([name for name, _ in gaps], IN_A_GAP)
@@ -735,7 +735,7 @@ def _require_linear(d: Definition) -> None:
             raise DefinitionError(
                 f"multiplier {lam}: expected a field linear in it (Filippov's convex "
                 "combination), received a nonlinear one. Nonlinear multipliers are hidden "
-                "dynamics (Jeffrey 2018): say hidden=True if they are meant. Products of "
+                "dynamics (Jeffrey 2018): give hidden=True if they are intended. Products of "
                 "different multipliers are fine."
             )
 

@@ -1,9 +1,9 @@
 """Regularisation: each multiplier becomes a steep smooth function of its switching function.
 
 lambda_i = phi(h_i / eps) with phi from -1 to +1 (Sotomayor & Teixeira 1996). As eps -> 0 the smooth
-system tends to the Filippov system where the latter's future is unique: attracting sliding becomes
-a slow manifold h = eps phi^-1(lambda), and what Filippov's convention leaves open (repelling
-sliding, two-folds) is decided by the layer, differently for each phi and eps.
+system tends to the Filippov system where the latter's solution is unique: attracting sliding becomes
+a slow manifold h = eps phi^-1(lambda). Where the Filippov solution is not unique (repelling sliding,
+two-folds) the layer decides, differently for each phi and eps.
 
 The functions here have phi'(0) = 1 and approach +-1 without reaching them:
 

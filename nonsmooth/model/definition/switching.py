@@ -1,4 +1,4 @@
-"""The class of a switching surface: what of the field jumps on it, and so what can happen there.
+"""The class of a switching surface, by the part of the field that jumps on it.
 
 With h > 0 above, F1 there and F2 below, n = grad h, L = n F1 and J = F2 - F1, a surface is continuous
 where J = 0, velocity continuous where n J = 0, and generic otherwise: only then can anything slide.
@@ -91,7 +91,7 @@ def class_of(
         return Switching("undecided" if speed_jumps is None else "generic", None, None, how)
     speed = ca.mtimes(gradient, above)
     of_speed = ca.jacobian(speed, x)
-    if of_speed.is_zero():  # h is passed at one speed
+    if of_speed.is_zero():  # h has one rate on both sides
         return Switching("velocity continuous", None, None, how)
     along = of_speed - gradient * ca.mtimes(gradient, of_speed.T) / ca.mtimes(gradient, gradient.T)
     k, how = _first(ca.vertsplit(jump), along.T, [h, speed], x, how, 0)
@@ -147,7 +147,7 @@ def _jump(
 def _row(
     system: FilippovSystem, j: int, values: list[ca.SX], field: ca.SX, unknown: ca.SX
 ) -> ca.SX:
-    """The first derivative along a field of what is kept at zero that holds an unknown."""
+    """The first derivative along a field, of a function kept at zero, that contains an unknown."""
     row = ca.substitute(
         system.definition.surfaces[j], system.definition.multipliers, ca.vertcat(*values)
     )

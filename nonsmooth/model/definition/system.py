@@ -47,7 +47,7 @@ T = TypeVar("T")
 _CLASSES_SHOWN = 8
 _EQUATIONS_SHOWN = 12
 _FUNCTIONS_SHOWN = 24
-#: What is made for an orbit in each cell of a table is kept: so many results more for each breakpoint.
+#: Further cached results for each breakpoint of a table, for the objects of an orbit in each cell.
 _OF_CELL = 8
 
 _SIDES = (("+", "above"), ("-", "below"))
@@ -93,7 +93,7 @@ class FilippovSystem:
     constraints : sequence of Constraint, optional
         Joints: functions that stay zero. Each has the letter ``s`` in a mode, after the surfaces.
     clocks : sequence of Clock, optional
-        What is periodic in time; each adds its phase to the states.
+        Periodic functions of time; each adds its phase to the states.
     discrete : sequence of SX symbols or mapping, optional
         States that change at resets only; starts have them last. A mapping gives the values that each
         may have: ``{q: (0, 1)}``. The field may depend on them and has no entry for them.
@@ -102,8 +102,8 @@ class FilippovSystem:
         follows a stable solution $lambda$ of $grad h . f(x, lambda) = 0$.
     layer_widths : sequence of float, optional
         Widths of the layers of the surfaces, in the units of their functions; equal unless given. Where
-        several surfaces slide, it can depend on their ratios whether sliding is stable; ``run.facts`` says
-        where it does.
+        several surfaces slide, stability of sliding can depend on their ratios; ``run.facts`` records whether
+        it did.
 
     Raises
     ------
@@ -175,8 +175,8 @@ class FilippovSystem:
         """Find sign, fabs, fmin, fmax and if_else in a right-hand side and make them surfaces.
 
         Identical switching functions, also up to a constant factor, share one multiplier; see
-        ``lifted`` for the surfaces and their order. What the expression is on a surface does not
-        matter: between its two sides the field is Filippov's convex combination, also where the
+        ``lifted`` for the surfaces and their order. The value of the expression on a surface does not
+        matter: there the field is Filippov's convex combination of both sides, also where the
         expression is nonlinear in a switch, as sign(x)**2 is, unless ``hidden`` is true.
 
         Parameters
@@ -461,7 +461,7 @@ class FilippovSystem:
     def roots(self) -> dict[str, float]:
         """Roots of switching functions by name of the surface: the smallest exponent that was found.
 
-        A run goes through the zero of such a root; that of another function ends it.
+        A run passes the zero of such a root; that of another function ends it.
 
         Examples
         --------
@@ -528,7 +528,7 @@ class FilippovSystem:
 
     @cached_property
     def algebraic(self) -> tuple[int, ...]:
-        """Those of them that hold a multiplier: relative degree 0."""
+        """Those of them that contain a multiplier: relative degree 0."""
         d, states = self.definition, self.extended_states
         own = d.multipliers[list(self.half_lines)]
         return tuple(i for i in self.half_lines if holds(d.surfaces[i], own, states))
@@ -690,7 +690,7 @@ class FilippovSystem:
     def switching(
         self, surface: int = 0, *, mode: str | None = None, parameters: Parameters | None = None
     ) -> Switching:
-        """Say what of the field jumps on a surface: continuous, velocity continuous or generic.
+        """Classify a surface by the jump of the field: continuous, velocity continuous or generic.
 
         Parameters
         ----------

@@ -202,7 +202,7 @@ def _after(system: FilippovSystem, mode: str, guard: Guard, letters: str) -> ca.
 
 @dataclass(frozen=True)
 class Struck:
-    """Who may take part in the impact of a contact: friction that is carried, contacts that are closed."""
+    """Possible participants of the impact of a contact: its friction, closed contacts."""
 
     carried: tuple[int, ...]
     closed: tuple[int, ...]
@@ -214,7 +214,7 @@ class Struck:
 
 
 def struck_by(system: FilippovSystem, mode: str, contact: int) -> Struck:
-    """Who may take part in an impact."""
+    """Possible participants of an impact."""
     coupled, m = coupled_of(system), system.surface_count
     signs = system.parse_letters(mode)
     closed = [j for j in range(len(system.impacts)) if not signs[m + j] and j != contact]
@@ -229,8 +229,8 @@ def takes_in_space(system: FilippovSystem, mode: str, contact: int) -> bool:
 
 def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -> ca.SX:
     """The state after the impulses at a gap that closes (``contacts.c``)."""
-    # Contacts that are closed take part with the rate zero, if ``letters`` say so, which also say to which side
-    # friction acts, with the impulse in the same proportion as with the reaction.
+    # ``letters`` tell which closed contacts take part, with the rate zero, and the side to which friction acts, with
+    # the impulse in the same proportion as with the reaction.
     coupled, m, d = coupled_of(system), system.surface_count, system.definition
     others = struck_by(system, mode, contact)
     carried = others.carried
@@ -313,7 +313,7 @@ def surface_map(system: FilippovSystem, surface: int) -> EventMap:
 
 
 def kept_maps(system: FilippovSystem, kept: Sequence[int]) -> list[EventMap]:
-    """What is zero while surfaces slide and, behind them, contacts are closed, as maps on the extended states."""
+    """Functions that are zero while surfaces slide, then those of closed contacts, as maps on the extended states."""
     x, m, found = system.extended_states, system.surface_count, list[EventMap]()
     for i in kept:
         rows = [*coupled_of(system).lower[i]] if i in system.joints else []
@@ -328,7 +328,7 @@ def kept_maps(system: FilippovSystem, kept: Sequence[int]) -> list[EventMap]:
 
 
 def rest_maps(system: FilippovSystem, mode: str, elements: Sequence[int]) -> list[EventMap]:
-    """What is zero where surfaces, sets and contacts rest, by their positions in a mode: functions and their rates."""
+    """Functions and rates that are zero where surfaces, sets and contacts rest, by their positions in a mode."""
 
     def build() -> list[EventMap]:
         d, lower, count, kept = system.definition, raised_of(system).lower, len(system.entries), []

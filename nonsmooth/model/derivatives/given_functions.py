@@ -72,7 +72,7 @@ class Coupling:
         if given is None:
             raise OptionError(
                 f"coupling: expected {n} expressions, one for each state, received {rows!r}. Give 0 for "
-                "rows of the field that receive nothing."
+                "rows of the field without coupling."
             )
         named = zip(system.state_names, given, strict=True)
         read = [

@@ -23,7 +23,7 @@ from ..laws.switches import Guard
 from ..values import Array
 from .event_maps import AtEvent, EventMap, struck_by, takes_in_space
 
-#: Part of its bound up to which friction is taken to hold: closer to it, derivatives are one-sided.
+#: Part of its bound up to which friction is taken to stick: closer to it, derivatives are one-sided.
 _HOLDS = 1 - 1e-6
 
 #: Newton's iterations, and residuals to a part of the values.
@@ -39,7 +39,7 @@ _PARTS = 20
 class ImpactInSpace(EventMap):
     """The map of an impact in which contacts and friction take part as ``letters`` say.
 
-    For each phase of the impact a letter for each friction (``s`` holds, ``*``, ``+`` and ``-`` slip), then one for
+    For each phase of the impact a letter for each friction (``s`` sticks, ``*``, ``+`` and ``-`` slip), then one for
     each contact that takes an impulse (``c``) or none (``o``).
     """
 
@@ -180,7 +180,7 @@ class ImpactInSpace(EventMap):
 
 
 class _Parties:
-    """Contacts, friction and joints that take part in an impact, with what impulses change."""
+    """Contacts, friction and joints that take part in an impact, with the effect of their impulses."""
 
     def __init__(self, system: FilippovSystem, mode: str, contact: int):
         self._system, self._coupled = system, coupled_of(system)
@@ -210,12 +210,12 @@ class _Parties:
         return ca.substitute(expression, moving, ca.vertcat(x, rest))
 
     def columns(self, x: ca.SX) -> ca.SX:
-        """What impulses of all change."""
+        """Jump of the state by all impulses."""
         coupled = self._coupled
         return self._at(ca.jacobian(coupled.field, coupled.symbols_of(self._every)), x)
 
     def columns_of(self, impulses: dict[int, ca.SX], x: ca.SX) -> ca.SX:
-        """What impulses of contacts change."""
+        """Jump of the state by impulses of contacts."""
         return self.columns(x)[:, -len(impulses) :]
 
     def rates(self, x: ca.SX) -> ca.SX:
@@ -223,7 +223,7 @@ class _Parties:
         return ca.densify(self._at(self._rates, x))
 
     def slope(self, x: ca.SX, columns: ca.SX) -> ca.SX:
-        """What impulses change the rates by."""
+        """Jump of the rates by impulses."""
         return ca.mtimes(
             self._at(ca.jacobian(self._rates, self._system.extended_states), x), columns
         )
@@ -237,7 +237,7 @@ class _Parties:
 
 
 def holding(system: FilippovSystem, mode: str, contact: int, letters: str) -> list[int]:
-    """First functions of the sets of friction that holds to the end of an impact."""
+    """First functions of the sets of friction that sticks to the end of an impact."""
     if not takes_in_space(system, mode := system.widened(mode), contact):
         return []
     parties = _Parties(system, mode, contact)

@@ -1,6 +1,6 @@
 """The variational equations of a mode: X' = Df X and P' = Df P + f_p beside the state.
 
-X and P are the derivatives by the start and by parameters; ``flow/core/legs/flow.c`` carries their columns.
+X and P are the derivatives by the start and by parameters; ``flow/core/legs/flow.c`` integrates their columns.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class PlainField:
 
     @property
     def derivatives(self) -> Entries:
-        """Places of the last outputs of ``series`` among derivatives by states and parameters: none."""
+        """Row and column indices of the derivatives among the last outputs of ``series``: none."""
         return sparse_entries(ca.SX(0, 0))[1]
 
     @cached_property
@@ -87,7 +87,7 @@ class VariationalField(PlainField):
 
     @property
     def derivatives(self) -> Entries:
-        """Places of the field's derivatives by states and chosen parameters, which follow it in ``series``."""
+        """Row and column indices of the field's derivatives by states and chosen parameters, after it in ``series``."""
         return self._derived[1]
 
     @cached_property

@@ -217,16 +217,15 @@ def _on_surface(
 
 # In rational numbers -------------------------------------------------------------------------------
 
-# 0.7 x - 0.07 is not zero at the double 0.1, and nobody means a jump of 1e-17. Values of rational functions at random
-# rational points are exact, beside what half a unit in the last place of each number makes of them; whole numbers are
-# exact.
+# 0.7 x - 0.07 is not zero at the double 0.1, but a jump of 1e-17 is not intended. Values of rational functions at random
+# rational points are exact up to half a unit in the last place of each number; whole numbers are exact.
 
 _RATIONAL_POINTS = 4
 
 #: Half a unit in the last place, relative to a number, and so many of them are allowed.
 _ROUNDED, _TIMES = Fraction(1, 2**53), 4
 
-#: A value and how far it may be off.
+#: A value and its error.
 _Value = tuple[Fraction, Fraction]
 
 
@@ -315,7 +314,7 @@ def _moved(
 #: How it was decided: a nonzero value is a proof, zeros fail with a chance of about 2^-60.
 EXACTLY = "exact arithmetic modulo a prime"
 
-#: Not exactly, but no more than the rounding of its numbers makes of it.
+#: Not exact, but within the rounding of its numbers.
 BUT_FOR_ROUNDING = "exact arithmetic, but for the rounding of numbers"
 
 #: Numbers at some points are no proof.
@@ -324,7 +323,7 @@ IN_DOUBLES = "doubles at random points"
 _EPSILON = sys.float_info.epsilon
 _POINTS, _NEWTON = 8, 30
 
-#: Rounding errors that a value of zero may be off by, and those from which on it is none.
+#: Rounding errors below which a value is zero, and above which it is not.
 _ZERO, _CLEAR = 1e3, 1e6
 
 

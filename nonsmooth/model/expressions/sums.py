@@ -74,7 +74,7 @@ class _Joining:
         return self._single(a)
 
     def _single(self, a: int) -> list[_Term]:
-        """The same of one that is added later: its own sum would lose digits."""
+        """Terms of a rule that is added later: its own sum would lose digits."""
         if self.rules[a].rule == "constant":
             return [(self.rules[a].numbers[0], _ONE, _ONE)]
         found = self.sums[a] if a in self.sums and self.users[a] == 1 else ()

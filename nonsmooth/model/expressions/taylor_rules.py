@@ -102,7 +102,7 @@ class _Lowering:
         return w
 
     def _pair(self, one: str, other: str, u: int, signs: tuple[float, float]) -> int:
-        """A function and the one that its derivative is made of, which serves both of them."""
+        """A function and the one in its derivative, which both of them use."""
         if (one, u) not in self._pairs:
             w = len(self.rules)
             self._pairs[one, u] = self._integral(one, u, w + 1, signs[0])

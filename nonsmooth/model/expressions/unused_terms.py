@@ -1,8 +1,8 @@
 """Drop terms whose multiplier is zero in a mode, so that log or sqrt is not evaluated off its domain.
 
 One program serves all modes, with the multipliers as numbers: a field log(1 - x) of one side is in it as
-(1 - lambda)/2 log(1 - x), and 0 times NaN would be NaN. So a product that vanishes for a value at which
-some mode holds a multiplier is zero where that factor is, if the other factor may be undefined.
+(1 - lambda)/2 log(1 - x), and 0 times NaN would be NaN. So a product that vanishes for a value of a multiplier
+in some mode is zero where that factor is, if the other factor may be undefined.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Side = tuple[int, float]  # index of a multiplier and its value
 
 @dataclass(frozen=True)
 class _Term:
-    """An expression, whether it may be undefined, and its values where a multiplier is held."""
+    """An expression, whether it may be undefined, and its values at fixed multipliers."""
 
     e: ca.SX
     partial: bool = False
@@ -64,7 +64,7 @@ def _is_safe(node: Node, nodes: Sequence[Node]) -> bool:
 
 
 class _Sides:
-    """The algebra of expressions with their values where a multiplier is held."""
+    """The algebra of expressions with their values at fixed multipliers."""
 
     def __init__(self, inputs: Sequence[ca.SX], held: Mapping[int, Sequence[float]]):
         self._inputs, self._held = inputs, held

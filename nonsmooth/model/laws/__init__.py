@@ -1,8 +1,8 @@
-"""Laws of a mode: multipliers that hold a surface, and the smooth field that they give.
+"""Laws of a mode: multipliers that keep the motion on a surface, and the smooth field that they give.
 
 - All modes, with multipliers as inputs: ``coupled``; their guards: ``switches``.
 - An element whose multiplier enters a later derivative: ``coupled`` too; a root in the field: ``roots``.
-- Which mode continues, for uses without a run (``classify``): ``complementarity``, ``layer``; for sets of
+- Admissible modes without a run (``classify``): ``complementarity``, ``layer``; for sets of
   codimension two and more ``frozen``. In a run the driver decides (``flow/engine``).
 - A mode as a system of its own: ``motion``, ``followed``.
 

@@ -5,7 +5,7 @@ multipliers keep G_i = grad h_i . f(x, lambda) at zero: coefficient k of lambda 
 G linearly, with the matrix M = dG/dlambda at the start of the step (also where lambda enters
 nonlinearly: hidden dynamics). The size does not grow with the number of modes.
 
-Where the field is affine in all multipliers and what multiplies lambda_i has a factor n_i(x), the
+Where the field is affine in all multipliers and the coefficient of lambda_i has a factor n_i(x), the
 unknown is nu_i = n_i lambda_i (``factors``).
 
 Source: Acary & Brogliato 2008, "Numerical methods for nonsmooth dynamical systems", for the
@@ -99,7 +99,7 @@ def _places(symbols: Sequence[ca.SX], place: dict[int, int]) -> set[int]:
 
 
 def _vanishes(column: ca.SX, h: ca.SX, x: ca.SX) -> bool:
-    """Whether what an unknown is multiplied with is zero wherever ``h`` is."""
+    """Whether the coefficient of an unknown is zero wherever ``h`` is."""
     pieces = [e for e in ca.vertsplit(ca.densify(column.T)) if not e.is_zero()]
     return all(ca.depends_on(e, x) for e in pieces) and vanish_on(pieces, h, x)
 
@@ -124,7 +124,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
         column = ca.vertcat(*entries)
         if ca.depends_on(column, lam) or not ca.depends_on(column, variables):
             continue  # products of multipliers, or hidden dynamics; a constant
-        if len(members) == 1:  # what vanishes with h has no part in sliding
+        if len(members) == 1:  # terms that vanish with h do not act in sliding
             h = system.definition.surfaces[members[0]]
             acts = [not vanishes for vanishes in that_vanish_on(entries, h, x)]
             places = [own for own, is_there in zip(places, acts, strict=True) if is_there]
@@ -246,7 +246,7 @@ class Coupled:
         return weights
 
     def _is_continuous(self, surface: int, column: Sequence[ca.SX]) -> bool:
-        """Whether the multiplier makes no difference on its surface: it is 0 there."""
+        """Whether the multiplier does not act on its surface: it is 0 there."""
         special = (*self.system.set_of, *self.system.remembering, *self.system.half_lines)
         if surface in (*special, *self.system.joints):
             return False
@@ -336,7 +336,7 @@ class Coupled:
         return [i for i, sign in enumerate(signs) if sign == 0 and not self.is_idle(i, signs)]
 
     def is_idle(self, i: int, signs: Sequence[int]) -> bool:
-        """Whether a multiplier makes no difference: on its surface, or at open contacts alone."""
+        """Whether a multiplier does not act: on its surface, or at open contacts alone."""
         if i >= self._surfaces:
             return False
         carried = self.carriers[i]
@@ -412,13 +412,13 @@ class Coupled:
         return [ca.substitute(e, ca.vec(rest), held) for e in expressions]
 
     def awake(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
-        """Dense expressions in ``moving``, for numbers: terms that a mode leaves out are not evaluated."""
+        """Dense expressions in ``moving``, for numbers: terms without effect in a mode are not evaluated."""
         dense = [ca.densify(e) for e in expressions]
         return without_unused_terms(self._symbols, dense, self._values_held)
 
     @property
     def _values_held(self) -> dict[int, tuple[float, ...]]:
-        """Values at which modes hold entries of ``moving``."""
+        """Fixed values of entries of ``moving`` in modes."""
         n, m, places = self.system.extended_dimension, self._surfaces, self.moving.numel()
         held: dict[int, tuple[float, ...]] = dict.fromkeys(range(n + m, places), (0.0,))
         for i in range(m):

@@ -22,7 +22,7 @@ from .coupled import Coupled
 
 @dataclass(frozen=True)
 class Frozen:
-    """h' = a - M lambda of a set at a point, with what slides elsewhere eliminated."""
+    """h' = a - M lambda of a set at a point, with other sliding functions eliminated."""
 
     a: Array
     m: Array
@@ -35,13 +35,13 @@ class Frozen:
 
     @property
     def indefinite(self) -> bool:
-        """Whether it has a negative direction."""
+        """Whether M is indefinite."""
         w = np.linalg.eigvalsh(0.5 * (self.m + self.m.T))
         return bool(w.min() < -1e-13 * np.abs(self.m).max())
 
     @property
     def attracts(self) -> bool:
-        """Whether the set holds what is on it and must be reached from nearby: |M^-1 a| < 1."""
+        """Whether motions stay on the set and reach it from nearby: |M^-1 a| < 1."""
         return self.definite and bool(np.linalg.norm(np.linalg.solve(self.m, self.a)) < 1.0)
 
 
@@ -163,7 +163,7 @@ def _of_roots(polynomial: Array, a: Array, m: Array) -> list[tuple[float, Array]
 
 
 def _polished(s: float, a: Array, m: Array) -> float | None:
-    """Newton's method on |(M + s)^-1 a| = 1; None where it leads away."""
+    """Newton's method on |(M + s)^-1 a| = 1; None where it diverges."""
     start, eye = s, np.eye(len(a))
     for _ in range(30):
         try:

@@ -1,8 +1,8 @@
 """The smooth motion of one mode: its field, with multipliers solved for, and its guards.
 
-The multipliers of what slides, reactions and friction on them solve grad h_i . f(x, lambda) = 0, rates of gaps
-included: linear equations are solved here symbolically; where they are not linear (products of multipliers, hidden
-dynamics) the multipliers are further states, with the rate that keeps the equations.
+Sliding multipliers, reactions and friction on them solve grad h_i . f(x, lambda) = 0, rates of gaps included. Linear
+equations are solved here symbolically; for nonlinear ones (products of multipliers, hidden dynamics) the multipliers
+are further states, with the rate that keeps the equations.
 
 A guard is a function that is positive inside the mode; the mode ends where it falls through zero. Stops and resets
 follow the guards as they were given; the driver checks their direction.
@@ -50,7 +50,7 @@ class Motion:
         self.functions = functions
 
     def _solve(self, is_single: bool, may_depend: bool) -> None:
-        """Solve for the multipliers of what slides."""
+        """Solve for the sliding multipliers."""
         coupled, x = self._coupled, self.system.extended_states
         #: Surfaces whose unknown is lambda + c lambda^3, and their c: sliding ends where that is largest.
         self._cubic: dict[int, ca.SX] = {}
@@ -66,7 +66,9 @@ class Motion:
         self.states, self.field, self._values = x, field, symbols
         if not sliding:
             return
-        if is_single:  # the rate of h in the entries of the field, so that what cancels is zero
+        if (
+            is_single
+        ):  # the rate of h in the entries of the field, so that cancelling terms are zero
             gradient = ca.jacobian(self.system.surface_function(sliding[0]), x)
             free, column = ca.substitute(field, symbols, 0), ca.jacobian(field, symbols)
             rates = [ca.simplify(ca.mtimes(gradient, e)) for e in (column, free)]
@@ -270,7 +272,7 @@ def mode_field(system: FilippovSystem, mode: str) -> ca.SX:
 
 
 def watched_functions(system: FilippovSystem, watched: Sequence[ca.SX]) -> list[ca.SX]:
-    """Check functions that a user gives to be watched."""
+    """Check functions to be monitored."""
     return [
         read_function(system.definition, w, f"watched function {k}") for k, w in enumerate(watched)
     ]

@@ -37,7 +37,7 @@ def sliding_multipliers(
 
 
 def _is_linear(of: Coupled, mode: str, x: Array, unknowns: Array, p: Array) -> bool:
-    """Whether the slope of what slides is the same at some values of its multipliers, of which it is a polynomial."""
+    """Whether the slope of the sliding functions is equal at some values of their multipliers, of which it is a polynomial."""
     if any(of.system.nonlinear):
         return False
     held, sliding, slopes = of.held(mode), of.sliding(mode), []
@@ -67,7 +67,7 @@ def _is_solution(
 
 
 def is_stable(of: Coupled, sliding: Sequence[int], slope: Array, factors: Array) -> bool:
-    """Whether sliding is stable across the layer, from the slope dG/d(unknowns) of what slides."""
+    """Whether sliding is stable across the layer, from its slope dG/d(unknowns)."""
     system = of.system
     surfaces = {*range(system.surface_count)} - {*system.half_lines}
     own = [k for k, i in enumerate(sliding) if i in surfaces]

@@ -1,4 +1,4 @@
-"""One surface, condition or contact of a system, with the other elements held at the letters of a mode.
+"""One surface, condition or contact of a system, with the other elements fixed at the letters of a mode.
 
 Reactions of closed contacts, conditions and joints are eliminated: they are linear in the equations that keep
 their functions at zero. The fields that remain are tangent to the manifold on which those functions vanish.
@@ -141,7 +141,7 @@ class _Held:
         return self._with(made, push, load)
 
     def _one_sided(self, element: int) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-        """The function of a condition or contact, what its unknown adds to the field, and its equation without and by it."""
+        """The function of a condition or contact, the term of its unknown in the field, and its equation without and by it."""
         field, own = self.coupled.field, ca.SX.sym("own")
         push = ca.jacobian(self.at(0, field, own), own)
         row = self.at(0, self.coupled.layer[element], own)
@@ -180,7 +180,7 @@ class _Held:
         return OneSurface(self.kind, self.element, made, len(rows), evaluate)
 
     def kept(self) -> Sequence[ca.SX]:
-        """Functions of what is closed besides the element, and of joints with their lower derivatives."""
+        """Functions of the other closed elements, and of joints with their lower derivatives."""
         system, coupled, found = self.system, self.coupled, list[ca.SX]()
         m, c, every = system.surface_count, len(system.impacts), coupled.kept
         for i in self.elements:

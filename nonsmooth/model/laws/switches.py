@@ -9,7 +9,7 @@ from ..definition.system import FilippovSystem
 
 @dataclass(frozen=True)
 class Guard:
-    """What the zero of one event function means."""
+    """The meaning of a zero of one event function."""
 
     kind: str  # of ``GUARDS`` in flow/constants.py, or "zero"
     index: int  # of the switching function, gap, stop or reset in the definition

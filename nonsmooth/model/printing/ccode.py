@@ -1,9 +1,9 @@
 """Expressions printed as C: one statement per instruction, value-numbered over a whole program.
 
 A :class:`Program` collects named functions of one system (jets of its modes, guards, surfaces) in
-one graph, so that equal terms are found once. What depends on parameters alone is moved to a function
-``prepare`` that runs once per trajectory and fills an array ``q``; what remains is printed on a type ``T``
-that is ``double`` or a vector of doubles.
+one graph, so that equal terms are computed once. Nodes of parameters alone are moved to a function ``prepare``
+that runs once per trajectory and fills an array ``q``; the others are printed on a type ``T`` that is ``double``
+or a vector of doubles.
 """
 
 from __future__ import annotations

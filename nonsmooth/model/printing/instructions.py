@@ -66,7 +66,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Entries:
-    """Places of the nonzero entries of a matrix."""
+    """Row and column indices of the nonzero entries of a matrix."""
 
     row: Integers
     column: Integers
@@ -74,7 +74,7 @@ class Entries:
 
 @dataclass(frozen=True)
 class Instructions:
-    """What the driver in C reads of a system; see ``System`` in ``flow/core/state.c``."""
+    """Data of a system for the driver in C; see ``System`` in ``flow/core/state.c``."""
 
     series: Series
     free: Series
@@ -193,7 +193,7 @@ _KEEP_PAIRS = frozenset(
 def _paired(
     names: Sequence[str], arguments: Sequence[Sequence[int]], is_time: Sequence[bool]
 ) -> Integers:
-    """What is, or has an argument that is, the time or follows from it by arithmetic."""
+    """Nodes that are the time or follow from it by arithmetic, or have such an argument."""
     kept = list(is_time)
     found = list(is_time)
     for j, (name, own) in enumerate(zip(names, arguments, strict=True)):
@@ -209,7 +209,7 @@ def series_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Series:
 
 
 def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
-    """Rules of all that a mode needs: in any, and in one where nothing slides. They are numbered alike."""
+    """Rules of any mode, and those of a mode without sliding, with the same numbers."""
     n, m = coupled.system.extended_dimension, coupled.system.surface_count
     inputs = [coupled.moving, coupled.parameter_symbols]
     program = _rules_of(inputs, coupled.awake([*coupled.outputs, slopes]))
@@ -241,8 +241,7 @@ def _rules_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> _Rules:
 
 
 def derived_series_of(coupled: Coupled) -> tuple[Series, Series, Entries]:
-    """Rules of all that a mode needs and of its derivatives: in any, and in one where nothing slides. Places of the
-    derivatives in their matrix."""
+    """Rules of any mode and its derivatives, and those without sliding; indices of the derivatives in their matrix."""
     n, size = coupled.system.extended_dimension, coupled.moving.numel()
     derivatives, entries = sparse_entries(coupled.derivatives)
     outputs = [*coupled.outputs, _moving_slopes(coupled)[2], derivatives]
@@ -284,7 +283,7 @@ def _series(
     arguments = [rule.args for rule in rules]
     roots = [j for k in wanted for j in rows[k]]
     found = reached(arguments, change, [*roots, *more])
-    # What does not move has later coefficients, zeros, only where they are read.
+    # Constant nodes have later coefficients, zeros, only where they are read.
     read = [*roots, *(a for j in found if rules[j].rule == "atan2" for a in rules[j].args)]
     zeros = reached(arguments, change, [j for j in read if not moving[j]])
     needed = {*zeros, *(j for j in found if moving[j])}
@@ -374,7 +373,7 @@ _SPECIAL = {"div": ("under", "over"), "chosen": ("gated", "")}
 
 
 def _terms(rules: Sequence[Rule], moving: Sequence[bool]) -> NDArray[np.void]:
-    """Terms of all sums; what does not move is the second factor."""
+    """Terms of all sums; a constant factor is the second one."""
     made = []
     for rule in rules:
         if rule.rule == "sum":
@@ -391,7 +390,7 @@ def _are_knotted(rules: Sequence[Rule], some: set[int], second: set[int]) -> boo
 
 
 def _valued(rule: Rule) -> tuple[int, ...]:
-    """What the value of a rule follows from."""
+    """Rules from which the value of a rule follows."""
     return rule.args[: {"integral": 1, "quotient": 1, "atan2": 2}.get(rule.rule, len(rule.args))]
 
 
@@ -425,7 +424,7 @@ def _lines(rules: Sequence[Rule], still: Sequence[bool], is_time: Sequence[bool]
 
 
 def sparse_entries(matrix: ca.SX) -> tuple[ca.SX, Entries]:
-    """Nonzero entries of a matrix as a column, and their places."""
+    """Nonzero entries of a matrix as a column, and their indices."""
     rows, columns = matrix.sparsity().row(), matrix.sparsity().get_col()
     nonzeros = ca.vertcat(*matrix.nonzeros()) if rows else ca.SX(0, 1)
     return nonzeros, Entries(_integers(rows), _integers(columns))

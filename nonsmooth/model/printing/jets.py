@@ -68,10 +68,10 @@ class Expansion:
     def _quotient_of(self, a: Any, b: Any) -> Any:
         return None if a is None else self._on.divide(a, b)
 
-    def _weigh(self, u: list[Any], v: list[Any], k: int, first: int, last: int) -> Any:
-        """Sum of i u_i v_(k-i) for i from first to last."""
+    def _weigh(self, u: list[Any], v: list[Any], k: int, last: int) -> Any:
+        """Sum of i u_i v_(k-i) for i from 1 to last."""
         total = None
-        for i in range(first, last + 1):
+        for i in range(1, last + 1):
             total = self._on.total(total, self._product(self._scaled(u[i], float(i)), v[k - i]))
         return total
 
@@ -156,14 +156,14 @@ class Expansion:
 
     def _integral(self, rule: Rule, _: list[Any], u: list[Any], g: list[Any]) -> _Later:
         (sign,) = rule.numbers
-        later = lambda k: self._scaled(self._weigh(u, g, k, 1, k), sign / k)
+        later = lambda k: self._scaled(self._weigh(u, g, k, k), sign / k)
         return self._after(rule.operation, [u], later)
 
     def _quotient(self, rule: Rule, w: list[Any], u: list[Any], g: list[Any]) -> _Later:
         (sign,) = rule.numbers
 
         def quotient(k: int) -> Any:
-            known = self._weigh(w, g, k, 1, k - 1)
+            known = self._weigh(w, g, k, k - 1)
             top = self._on.difference(self._scaled(u[k], sign * k), known)
             return self._scaled(self._quotient_of(top, g[0]), 1.0 / k)
 
@@ -173,8 +173,8 @@ class Expansion:
         self, _: Rule, w: list[Any], y: list[Any], x: list[Any], radius: list[Any]
     ) -> _Later:
         def angle(k: int) -> Any:
-            turn = self._on.difference(self._weigh(y, x, k, 1, k), self._weigh(x, y, k, 1, k))
-            top = self._on.difference(turn, self._weigh(w, radius, k, 1, k - 1))
+            turn = self._on.difference(self._weigh(y, x, k, k), self._weigh(x, y, k, k))
+            top = self._on.difference(turn, self._weigh(w, radius, k, k - 1))
             return self._scaled(self._quotient_of(top, radius[0]), 1.0 / k)
 
         return self._after("atan2", [y, x], angle)

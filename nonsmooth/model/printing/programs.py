@@ -25,9 +25,9 @@ from .terms import OfInstructions, Term, Terms
 
 @dataclass(frozen=True)
 class Shape:
-    """What the lanes' text needs to know of the functions."""
+    """Properties of the functions for the text of lanes."""
 
-    rows: list[int]  # of the field, what a step has to be checked with
+    rows: list[int]  # of the field, rows that a step is checked with
     slots: list[int]  # of the guards
     affine: list[bool]  # which guards are affine in the states
     #: Whether all is, sines of the time added: above, below and on the surface; or off a set, on it and where it is left.
@@ -123,7 +123,7 @@ class _Writer(OfInstructions):
 
     @cached_property
     def _acts_alone(self) -> bool:
-        """Whether the unknown takes the multiplier's place in all of the field."""
+        """Whether the unknown replaces the multiplier everywhere in the field."""
         columns = [
             ca.jacobian(self.coupled.field, e)
             for e in (self.coupled.multipliers, self.coupled.unknown(0))
@@ -146,7 +146,7 @@ class _Writer(OfInstructions):
         return [("surface", *self.surfaces()), rates, stops]
 
     def shape(self) -> Shape:
-        """Return what is affine; a function that is a combination of rows of the field is checked with them."""
+        """Return the affine parts; a function that is a combination of rows of the field is checked with them."""
         of, system = self.coupled, self.coupled.system
         x, p, unknowns = (
             system.extended_states,

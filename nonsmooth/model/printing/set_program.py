@@ -42,7 +42,7 @@ class _Writer(OfInstructions):
         self.pull = [self._scaled(row) for row in self.push]  # -M of h' = a - M lambda
 
     def _scaled(self, row: Terms) -> list[Term | None]:
-        """What is there for each unknown for each multiplier."""
+        """The unknown of each multiplier."""
         return [self.graph.inner([e], [self.factor]) if self.scaled else e for e in row]
 
     def _acting(
@@ -103,7 +103,7 @@ class _Writer(OfInstructions):
         return [self.graph.inner(row, vector) for row in matrix]
 
     def _shape(self, states: list[int]) -> Shape:
-        """What is affine off the set and on it; the unknowns come after the guards."""
+        """Affine parts off the set and on it; the unknowns follow the guards."""
         of, k = self.coupled, self.k
         x, unknown = of.system.extended_states, of.symbols_of(range(k))
         lam = of.multipliers if self.scaled else ca.SX(0, 1)

@@ -1,6 +1,6 @@
 """Terms of a program that is printed: nodes of one graph, with the arithmetic in which instructions are expanded.
 
-Equal terms are one node, constants are computed, and what adds or multiplies nothing is left out.
+Equal terms are one node, constants are computed, and neutral terms and factors are left out.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ class Graph:
         return None if mask is None or u is None else self.select(mask, u, None)
 
     def whole(self, a: Term | None) -> Term:
-        """Return a term that is none as a constant."""
+        """Return a zero term as a constant."""
         return self.constant(0.0) if a is None else a
 
     def total(self, a: Term | None, b: Term | None) -> Term | None:
@@ -257,7 +257,7 @@ class _Evaluation:
 
 @dataclass(frozen=True)
 class Point:
-    """Values of the layer and of what it is made of; gradients by the states, row by row."""
+    """Values of the layer and of its parts; gradients by the states, row by row."""
 
     layer: Terms
     factors: Terms

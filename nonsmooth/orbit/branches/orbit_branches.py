@@ -390,7 +390,7 @@ class OrbitCurve(OrbitEquations):
             return BranchEvent(CHATTER_END, value, self.describe(near), side, curve=self)
         for verb in ("ends at", "passes"):
             if self._at_two_fold(u, _REACHED, inside=verb == "passes"):
-                verdict = f"a slide {verb} a two-fold, beyond which its future is not unique"
+                verdict = f"a slide {verb} a two-fold, beyond which its continuation is not unique"
                 point = Point(u, np.zeros(u.size))
                 return self._event("two-fold", self, point, "", FarSide("", verdict))
         name, width = self.system.parameter_names[self.free[-1]], float(self.widths[-1])

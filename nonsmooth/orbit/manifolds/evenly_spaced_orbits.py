@@ -25,6 +25,7 @@ _FINE = 12  # fine cells across a cell; curves in one of them coincide to the ey
 _BESIDE = 0.7  # largest length of a curve close to another
 _ON = 0.1  # part of it that is drawn, tapered
 _AT_REST = 4e-3  # distance from an equilibrium at which a curve ends
+_STEP = 1 / 90  # between points of a curve
 
 #: Shortens a curve (m, 2).
 Cut = Callable[[Array], Array]
@@ -40,9 +41,7 @@ class SpacedOrbit(NamedTuple):
     thins: tuple[bool, bool] = (False, False)
 
 
-def polyline(
-    run: Trajectory, scale: Array, step: float = 1 / 90, until: tuple[float, Array] | None = None
-) -> Array:
+def polyline(run: Trajectory, scale: Array, until: tuple[float, Array] | None = None) -> Array:
     """Points (m, n) of a run, dense enough to draw it by straight lines."""
     ends, last = run.t, run.x[-1]
     if until is not None:
@@ -54,7 +53,7 @@ def polyline(
     coarse = run((ends[:-1, None] + shares * spans[:, None]).ravel())
     gaps = np.linalg.norm(np.diff(np.vstack([coarse, last]), axis=0) / scale, axis=1)
     lengths = np.nan_to_num(gaps).reshape(-1, len(shares)).sum(axis=1)
-    counts = np.clip(np.ceil(lengths / step), len(shares), 400).astype(int)
+    counts = np.clip(np.ceil(lengths / _STEP), len(shares), 400).astype(int)
     times = [
         t + span * np.arange(n) / n for t, span, n in zip(ends[:-1], spans, counts, strict=True)
     ]

@@ -226,6 +226,14 @@ class LegFlow:
     #: The legs of which it is one, with its number, along which rows are pulled back if they were recorded.
     carried: tuple[CarriedLegs, int] | None = None
 
+    @property
+    def parts(self) -> tuple[Array, Array]:
+        """Times since the start (k,) at which derivatives begin anew, and those before (k, N, N)."""
+        if self.carried is None:
+            return NONE, np.zeros((0, 0, 0))
+        found, leg = self.carried
+        return found.parts[leg]
+
 
 def integrate_leg(
     system: FilippovSystem,
@@ -270,14 +278,13 @@ def carry_leg(
     p: Array,
     chosen: tuple[int, ...] = (),
     times: Array = NONE,
-    back: bool = False,
 ) -> LegFlow:
-    """The same of a leg of a run, by the states alone; at times since its start, or recorded to be taken ``back``."""
-    if not (system.sets or back or len(times)):  # one leg costs less by its own program
+    """The same of a leg of a run, by the states alone; at times since its start."""
+    if not (system.sets or len(times)):  # one leg costs less by its own program
         none = np.zeros((0, len(x), len(x) + len(chosen)))
         return replace(integrate_leg(system, leg, x, duration, p, chosen), at_samples=none)
     arcs = [leg.arc(system, x, duration)]
-    carried = carry_legs(system, arcs, p, chosen, times, back=back)
+    carried = carry_legs(system, arcs, p, chosen, times)
     require_done(system, arcs, carried)
     return flows_of(carried)[0]
 

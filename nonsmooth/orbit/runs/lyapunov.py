@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,11 +13,13 @@ from numpy.typing import ArrayLike
 
 from ...flow.constants import AT_END
 from ...flow.ensembles.progress import progress_bar
+from ...flow.fixed import TOLERANCE
 from ...flow.options import tolerances
 from ...flow.saving import Savable
 from ...flow.simulate import simulate
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
+from ...flow.variation import ROUNDING, Precision
 from ...model import (
     Array,
     DegenerateError,
@@ -43,6 +46,10 @@ _ROUNDED = 16.0 * float(np.finfo(float).eps)
 
 #: Largest ratio of the growths of two directions on a piece of a leg; beyond it rounding spoils the smaller one.
 _RATIO = 1e6
+
+#: The condition from which on derivatives along a leg begin anew, their tolerance as a part of the run's, and the
+#: largest ratio then: the smaller direction has the product of ratio and tolerance as its error.
+_APART, _OF_RUN, _LOOSE_RATIO = 1e2, 1e-3, 1e4
 
 #: Steps of the run in a piece of a leg, and pieces that are carried in one call.
 _STEPS, _AT_A_TIME = 256, 64
@@ -217,7 +224,7 @@ def lyapunov_spectrum(
     )
     if run.status is not Status.REACHED_END:
         raise DegenerateError(_ended(run, t_end))
-    return _Frame(run, count, t_start + wait).follow(progress)
+    return _Frame(run, count, t_start + wait, rtol).follow(progress)
 
 
 def _ended(run: Trajectory, t_end: float) -> str:
@@ -234,14 +241,17 @@ def _ended(run: Trajectory, t_end: float) -> str:
 class _Frame:
     """Orthonormal directions along a run, and the logarithms of their growth."""
 
-    def __init__(self, run: Trajectory, count: int, begin: float):
+    def __init__(self, run: Trajectory, count: int, begin: float, rtol: float):
         self.run, self.system = run, run.system
         self.n = self.system.dimension - len(self.system.definition.discrete)
         # Directions in general position: coordinate axes may lie in invariant subspaces.
         self.q = np.linalg.qr(np.random.default_rng(0).normal(size=(self.n, count)))[0]
         self.bounds = np.linspace(begin, float(run.t[-1]), _BLOCKS + 1)
+        self._edges = self.bounds.tolist()
         self.logs = np.zeros((_BLOCKS, count))
         self.volume, self.rate, self.t = 0.0, 0.0, float(run.t[0])
+        loose = Precision(max(TOLERANCE, _OF_RUN * rtol), _APART)
+        self.precision = ROUNDING if self.system.sets else loose
 
     def follow(self, progress: bool) -> LyapunovSpectrum:
         """Follow the run and return its exponents."""
@@ -272,7 +282,8 @@ class _Frame:
 
     def _pieces(self, part: Stretch) -> list[Stretch]:
         """Pieces of a leg that end at the bounds of blocks and after some steps of the run."""
-        pieces = self._cut(part, np.union1d(self.bounds, self._inner(part, self.rate)))
+        rate = self.rate if part.system.sets else 0.0  # others are divided as they are carried
+        pieces = self._cut(part, np.union1d(self.bounds, self._inner(part, rate)))
         return [beginning_of(part), *pieces] if part.system.sets else pieces
 
     def _inner(self, part: Stretch, rate: float) -> Array:
@@ -309,10 +320,11 @@ class _Frame:
     def _follow_pieces(self, pieces: Sequence[Stretch], following: Stretch | None) -> None:
         """Carry directions over pieces of legs and through the events between them."""
         after = [] if following is None else [beginning_of(following)]
-        for one in passages_over(self.run, [*pieces, *after])[: len(pieces)]:
+        found = passages_over(self.run, [*pieces, *after], precision=self.precision)
+        for one in found[: len(pieces)]:
             part = one.stretch
             if self.q.shape[1] and part.duration:
-                self._grow(part, one.flow)
+                self._grow(part, one.flow, _LOOSE_RATIO if self.precision.ratio else _RATIO)
             elif self.q.shape[1]:  # neighbours of a state on a set reach it at once
                 self._lose(one.flow.by_start[: self.n, : self.n], part, part.t)
             if one.event is not None and self.q.shape[1]:
@@ -320,23 +332,31 @@ class _Frame:
         if self.q.shape[1] == self.n:
             self._add_divergence(pieces)
 
-    def _grow(self, part: Stretch, flow: LegFlow) -> None:
+    def _grow(self, part: Stretch, flow: LegFlow, most: float = _RATIO) -> None:
         """Carry directions over a piece of a leg, divided where one grows so much more that another is lost in it."""
-        matrix = flow.by_start[: self.n, : self.n]
+        since, matrices = flow.parts
+        edges = [part.t, *(part.t + since).tolist(), part.t + part.duration]
+        for matrix, begin, end in zip([*matrices, flow.by_start], edges, edges[1:], strict=False):
+            self._grow_by(matrix[: self.n, : self.n], part, begin, end, most)
+
+    def _grow_by(self, matrix: Array, part: Stretch, begin: float, end: float, most: float) -> None:
+        """The same over a part of it, with the largest ratio."""
         q, r = np.linalg.qr(matrix @ self.q)
-        growth = np.abs(np.diag(r))
-        finite = bool(np.isfinite(growth).all()) and growth.min() > 0.0
-        spread = math.log(growth.max() / growth.min()) if finite else math.log(_HUGE)
-        self.rate = spread / part.duration
-        pieces = self._cut(part, self._inner(part, self.rate))
-        if len(pieces) > 1 and (finite or not part.system.sets):
-            for own, its_flow in zip(pieces, flows_over(self.run, pieces), strict=True):
-                self._grow(own, its_flow)
-        elif part.system.sets and not growth.min() > _LOST * growth.max():
+        growth = np.abs(r.diagonal())
+        least, largest = float(growth.min()), float(growth.max())
+        finite = math.isfinite(largest) and least > 0.0
+        spread = math.log(largest / least) if finite else math.log(_HUGE)
+        self.rate = spread / (end - begin)
+        if spread > math.log(most) and (finite or not part.system.sets):
+            own = next(one for one in self._cut(part, np.array([begin, end])) if one.t == begin)
+            pieces = self._cut(own, self._inner(own, self.rate))
+            for piece, its_flow in zip(pieces, flows_over(self.run, pieces), strict=True):
+                self._grow(piece, its_flow)
+        elif part.system.sets and not least > _LOST * largest:
             self._lose(matrix, part, self.t)  # a set is reached at its end
         else:
-            self._count(q, growth, part.t + part.duration / 2)
-        self.t = part.t + part.duration
+            self._count(q, growth, (begin + end) / 2)
+        self.t = end
 
     def _lose(self, matrix: Array, part: Stretch, end: float) -> None:
         """Apply the matrix (n, n) of an event, or of what happens until ``end``, at which directions may be lost."""
@@ -387,8 +407,8 @@ class _Frame:
 
     def _block(self, t: float) -> int:
         """Number of the block of a time, its end included; negative before the first."""
-        found = np.searchsorted(self.bounds, t - AT_END * max(1.0, abs(t)), side="left")
-        return min(int(found) - 1, _BLOCKS - 1)
+        found = bisect_left(self._edges, t - AT_END * max(1.0, abs(t)))
+        return min(found - 1, _BLOCKS - 1)
 
     def _add_divergence(self, pieces: Sequence[Stretch]) -> None:
         """Add the integral of the divergence of the fields along legs, by Gauss's rule on each step."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...flow.names import described
 from ...flow.trajectory import Trajectory
-from ...flow.variation import NONE, carry_legs, require_done
+from ...flow.variation import NONE, ROUNDING, Precision, carry_legs, require_done
 from ...model import (
     Array,
     ConvergenceError,
@@ -353,10 +353,11 @@ def passages_over(
     since: Array = NONE,
     cuts: Sequence[int] = (),
     back: bool = False,
+    precision: Precision = ROUNDING,
 ) -> list[Passage]:
     """Legs of a run with derivatives, also at times ``since`` their starts that are cut by legs; or recorded."""
     cuts = cuts or [0] * (len(parts) + 1)
-    flows = flows_over(run, parts, chosen, since, cuts, back)
+    flows = flows_over(run, parts, chosen, since, cuts, back, precision)
     limits, repeating = _limits(parts, flows)
     events = _saltations(run, parts, flows, repeating)
     every = zip(parts, flows, events, pairwise(cuts), strict=True)
@@ -400,13 +401,14 @@ def flows_over(
     since: Array = NONE,
     cuts: Sequence[int] = (),
     back: bool = False,
+    precision: Precision = ROUNDING,
 ) -> list[LegFlow]:
     """Flows of legs, with samples at times ``since`` their starts that are cut by legs."""
     cuts = cuts or [0] * (len(parts) + 1)
     system = parts[0].system
     arcs = [part.leg.arc(system, part.start, part.duration) for part in parts]
     p = np.array([part.p for part in parts]) if system is not run.system else parts[0].p
-    found = carry_legs(system, arcs, p, chosen, since, cuts, back)
+    found = carry_legs(system, arcs, p, chosen, since, cuts, back, precision)
     if found.failed < 0:
         return flows_of(found)
     if back:

@@ -10,6 +10,7 @@ piece to piece are traced by :func:`pieces`. An interrupt (Ctrl-C) returns what 
 Sources: Keller 1977 (pseudo-arclength); Allgower & Georg 1990; Kuznetsov 2004, ch. 10.
 """
 
+from ...tables import add_views
 from ..newton import Secant, Values, converge
 from .arc import Arc, ahead, trace
 from .curve import Curve, Point, Zero
@@ -32,3 +33,5 @@ __all__ = [
     "pieces",
     "trace",
 ]
+
+add_views(globals(), __all__)

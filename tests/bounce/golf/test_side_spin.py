@@ -127,6 +127,9 @@ def test_refusals():
         rebound(soft.in_3d(), landing, scaling=scaling)
     with pytest.raises(ns.OptionError, match="side_slope"):
         side_rebound(soft.in_3d(side_slope=0.1), landing, 1.0, scaling=scaling)
+    steep = bounce.laws.TiltedBounce(mu=0.4, restitution=0.3, tilt=lambda speed, angle: 2.0)
+    with pytest.raises(ns.ParameterError, match="tilt"):
+        side_rebound(steep, landing, 1.0)
     with pytest.raises(ns.OptionError, match="axis_tilt, launch_angle"):
         axis_spin(2000.0, 100.0, 0.2)
     with pytest.raises(ns.OptionError, match="side_slope"):

@@ -5,6 +5,7 @@ import itertools
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.optimize import brentq, minimize
 
 import nonsmooth as ns
 
@@ -15,12 +16,28 @@ pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.flow.warn.DecisionWar
 
 
 def table(
-    mu, feet, height=0.4, inertia=(0.1, 0.15, 0.2), e=0.0, pull=(0, 0), law="newton", **others
+    mu,
+    feet,
+    height=0.4,
+    inertia=(0.1, 0.15, 0.2),
+    e=0.0,
+    pull=(0, 0),
+    law="newton",
+    turn=0,
+    pivot=None,
+    **others,
 ):
-    """A rigid body of unit mass on feet, at small angles."""
+    """A rigid body of unit mass on feet, at small angles; it may turn on a pivot."""
     q, w, r = ca.SX.sym("q", 6), ca.SX.sym("w", 6), ca.SX.sym("r", len(feet))
     force, gaps, slips, multipliers = ca.SX.zeros(6), [], [], []
     force[:2] += ca.vertcat(*pull)
+    force[5] += turn
+    joints = []
+    if pivot is not None:
+        p, hold = ca.vertcat(*pivot), ca.SX.sym("hold", 2)
+        joints = [q[0] - p[1] * q[5], q[1] + p[0] * q[5]]
+        force[:2] += hold
+        force[5] += p[0] * hold[1] - p[1] * hold[0]
     for i, (px, py) in enumerate(feet):
         lam, p = ca.SX.sym(f"lam{i}", 2), ca.vertcat(px, py, -height)
         push = ca.vertcat(-mu * r[i] * lam, r[i])
@@ -37,6 +54,7 @@ def table(
         surfaces=slips,
         multipliers=multipliers,
         impacts=gaps,
+        constraints=[ns.Constraint(g, reaction=hold[i]) for i, g in enumerate(joints)],
         **others,
     )
 
@@ -106,28 +124,112 @@ def test_components_with_different_loads_are_refused():
         )
 
 
-@pytest.mark.parametrize("side", [0.0, 0.5])
-@pytest.mark.parametrize(("angle", "mu"), [(0.7, 0.2), (0.7, 0.5), (1.0, 0.2), (1.0, 0.5)])
-def test_a_block_in_a_groove_holds_as_long_as_any_loads_can_hold_it(angle, mu, side):
-    """Friction across the groove presses it against both walls: the most that holds is 1/sqrt(1 - k^2) of what slides."""
-    t, q, w, n = ca.SX.sym("t"), ca.SX.sym("q", 3), ca.SX.sym("w", 3), ca.SX.sym("n", 2)
-    limit = mu * G / np.cos(angle)
-    force, gaps, slips, multipliers = ca.vertcat(limit * t, side, -G), [], [], []
-    for k, sign in enumerate((-1, 1)):
-        c, s, lam = np.cos(angle), sign * np.sin(angle), ca.SX.sym(f"lam{k}", 2)
+@pytest.mark.parametrize("arm", [0.1, 0.3, 1.0])
+@pytest.mark.parametrize("mu", [0.2, 0.6])
+def test_a_tripod_that_is_pulled_beside_its_centre_turns_as_costs_least_power(mu, arm):
+    """Its friction is not determined while it holds."""
+    t, rate, (x, y) = ca.SX.sym("t"), 20 * mu, np.transpose(THREE)
+    system = table(mu, THREE, pull=(rate * t, 0), turn=-arm * rate * t, time=t)
+    run = ns.simulate(system, [0] * 12, 0.8)
+    assert run.status is ns.Status.REACHED_END and run.itinerary == "sssccc ***ccc"
+
+    def left(t):
+        loads = G / 3 + 0.4 * rate * t * x / (x @ x)
+        power = lambda z: mu * loads @ np.hypot(1 + (arm - y) * z[1], z[0] + x * z[1])
+        return minimize(power, [0, -0.1], method="BFGS", options={"gtol": 1e-12}).fun - rate * t
+
+    assert abs(brentq(left, 0.05, 0.6, xtol=1e-12) - run.events[0].t) < 1e-8
+
+
+@pytest.mark.parametrize(("feet", "pivot"), [(THREE, (0, 0)), (THREE, (0.1, 0.2)), (FOUR, (0, 0))])
+def test_a_plate_on_a_pivot_is_turned_by_what_its_feet_leave(feet, pivot):
+    """The pivot takes all of the friction but its moment."""
+    t, mu = ca.SX.sym("t"), 0.3
+    run = ns.simulate(table(mu, feet, 0, turn=4 * t, pivot=pivot, time=t), [0] * 12, 1.0)
+    assert run.status is ns.Status.REACHED_END and len(run.events) == 2
+    slips = mu * G * np.mean(np.hypot(*(np.array(feet) - pivot).T)) / 4
+    assert abs(run.events[0].t - slips) < 1e-9
+    speed = 2 * (1 - slips) ** 2 / (0.2 + np.dot(pivot, pivot))
+    assert abs(run.x[-1, 11] - speed) < 1e-8
+
+
+def test_where_feet_slip_in_many_directions_their_loads_must_be_determined():
+    t = ca.SX.sym("t")
+    run = ns.simulate(table(0.3, FOUR, pull=(4 * t, 0), turn=-t, time=t), [0] * 12, 1.0)
+    assert run.status is ns.Status.NON_UNIQUE and run.events[-1].t > 0.5
+
+
+def groove(walls, load, time):
+    """A block of unit mass between two walls, each an angle and a coefficient of friction."""
+    q, w, n = ca.SX.sym("q", 3), ca.SX.sym("w", 3), ca.SX.sym("n", 2)
+    force, gaps, slips, multipliers = ca.vertcat(*load), [], [], []
+    for k, (angle, mu) in enumerate(walls):
+        c, s, lam = np.cos(angle), (2 * k - 1) * np.sin(angle), ca.SX.sym(f"lam{k}", 2)
         gaps.append(ns.Impact(c * q[2] - s * q[1], reaction=n[k], name=f"wall{k}"))
         slips.append(ca.vertcat(w[0], c * w[1] + s * w[2]))
         multipliers.append(lam)
         force += n[k] * ca.vertcat(-mu * lam[0], -s - mu * c * lam[1], c - mu * s * lam[1])
-    groove = ns.FilippovSystem(
+    return ns.FilippovSystem(
         [*ca.vertsplit(q), *ca.vertsplit(w)],
         field=[*ca.vertsplit(w), *ca.vertsplit(force)],
         surfaces=slips,
         multipliers=multipliers,
         impacts=gaps,
-        time=t,
+        time=time,
     )
-    run = ns.simulate(groove, [0] * 6, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("walls", "load", "itinerary"),
+    [
+        ([(1.129, 0.1), (0.266, 0.1)], (24.76, -2.55), "sscc **cc"),
+        ([(0.4589, 0.1), (0.4417, 0.1)], (26.1, 0), "sscc **cc"),
+        ([(0.8101, 0.1), (0.2141, 0.1)], (3.289, -1.994), "sscc **cc"),
+        ([(1.002, 0.3), (0.3224, 0.3)], (3.662, 6.842), "sscc **oc"),
+        ([(0.249, 0.1), (0.4172, 0.6)], (17.69, 22.72), "sscc **oc"),
+        ([(0.3840, 1), (0.6044, 0.6)], (20.99, -18.26), "sscc **co"),
+    ],
+)
+def test_a_block_in_a_groove_leaves_when_no_loads_hold_it(walls, load, itinerary):
+    """Loads of the walls, and friction across, are not determined; the most that they hold is found by convex programming."""
+    t = ca.SX.sym("t")
+    run = ns.simulate(groove(walls, (load[0] * t, load[1] * t, -G), t), [0] * 6, 1.0)
+    assert run.status is ns.Status.REACHED_END and run.itinerary == itinerary
+    axes = []
+    for sign, (angle, _) in zip((-1, 1), walls, strict=True):
+        c, s = np.cos(angle), sign * np.sin(angle)
+        axes += [(0, -s, c), (1, 0, 0), (0, c, s)]
+    rows, ends = np.transpose(axes), run.events[0].t
+
+    def room(t):
+        rest = np.linalg.lstsq(rows, -np.array([load[0] * t, load[1] * t, -G]), rcond=None)[0]
+        free = np.linalg.svd(rows)[2][3:]
+        force = lambda z: rest + z[:3] @ free
+        cones = [
+            {
+                "type": "ineq",
+                "fun": lambda z, k=k, mu=mu: (
+                    mu * force(z)[3 * k] - np.hypot(*force(z)[3 * k + 1 : 3 * k + 3]) - z[3]
+                ),
+            }
+            for k, (_, mu) in enumerate(walls)
+        ]
+        return minimize(
+            lambda z: -z[3],
+            [*np.zeros(3), -50],
+            constraints=cones,
+            options={"maxiter": 100},
+        ).x[3]
+
+    assert room(0.999 * ends) > 0 > room(1.001 * ends)
+
+
+@pytest.mark.parametrize("side", [0.0, 0.5])
+@pytest.mark.parametrize(("angle", "mu"), [(0.7, 0.2), (0.7, 0.5), (1.0, 0.2), (1.0, 0.5)])
+def test_a_block_in_a_groove_holds_as_long_as_any_loads_can_hold_it(angle, mu, side):
+    """Friction across the groove presses it against both walls: the most that holds is 1/sqrt(1 - k^2) of what slides."""
+    t, limit = ca.SX.sym("t"), mu * G / np.cos(angle)
+    run = ns.simulate(groove([(angle, mu)] * 2, (limit * t, side, -G), t), [0] * 6, 2.0)
     assert run.status is ns.Status.REACHED_END and run.itinerary == "sscc **cc"
     release = 1 / np.sqrt(1 - (mu * np.tan(angle)) ** 2)
     if side == 0:

@@ -240,7 +240,7 @@ _LANDINGS = st.tuples(*[st.floats(-1.5, 1.5) for _ in range(4)])
 @settings(max_examples=12, deadline=None)
 def test_friction_brings_two_motions_closer(one, two, mu, eta):
     # |dV|^2 + k |dW|^2 + eta^2 |dX|^2 never rises: the rate of change is -4 d1 eta |dV|^2 + 2 dF.dh, and
-    # friction is monotone. So the future is unique.
+    # friction is monotone. So the continuation is unique.
     p = {"mu": mu, "d1": 0.1, "d2": 0.1, "eta": eta, "G": 1e-4, "k": 0.4}
     runs = [_ball(s[:2], s[2:], tol=1e-12, p=p) for s in (one, two)]
     t = np.linspace(0.0, runs[0].t[-1], 60)

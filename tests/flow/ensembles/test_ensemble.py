@@ -1,6 +1,7 @@
 """An ensemble gives each start the result of its own run, however the work is divided."""
 
 import concurrent.futures
+import math
 import multiprocessing
 import pickle
 import signal
@@ -19,6 +20,7 @@ from nonsmooth.flow.ensembles import chunks
 from nonsmooth.flow.ensembles import work as work_module
 from nonsmooth.flow.ensembles.ensemble import ensemble
 from nonsmooth.flow.ensembles.work import Work
+from nonsmooth.flow.section import Section
 from nonsmooth.model import (
     DefinitionError,
     FilippovSystem,
@@ -289,3 +291,31 @@ def test_lanes_are_compiled_where_that_pays(monkeypatch):
     assert engines == ["core", "lanes"]
     starts[49] = np.nan  # of which nothing is known
     assert ensemble(system, starts, 10.0).engine == "lanes"
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "section",
+    [
+        Section("crossing", count=5),
+        Section("h0", count=7),
+        Section("h0", count=2, skip=1, every=2),
+        Section("h0", direction=-1, count=50),
+        Section("entry", count=3),
+        Section("exit", count=100),
+    ],
+    ids=str,
+)
+def test_sections_in_lanes_are_those_of_the_driver(section, monkeypatch):
+    starts = np.random.default_rng(2).normal(size=(100, 2))
+    starts[7] = np.nan
+    run = lambda: ensemble(make_system(), starts, 30.0, at=section)
+    lanes = run()
+    monkeypatch.setattr("nonsmooth.flow.ensembles.ensemble._WORTH", math.inf)
+    core = run()
+    assert (lanes.engine, core.engine) == ("lanes", "core")
+    assert np.isfinite(core.sample_t).sum() > 5
+    assert np.array_equal(lanes.status, core.status)
+    assert lanes.itinerary.tolist() == core.itinerary.tolist()
+    for name in ("sample_t", "sample_x", "x", "t"):
+        np.testing.assert_allclose(getattr(lanes, name), getattr(core, name), rtol=0, atol=1e-8)

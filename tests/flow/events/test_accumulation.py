@@ -196,3 +196,5 @@ def test_resets_that_come_to_rest_have_moved_the_other_states_by_their_whole_sum
     assert run.status is ns.Status.REACHED_END and run.itinerary.endswith("s")
     np.testing.assert_allclose(run.x[-1], [0, 0, 1 / (1 - restitution**power)], atol=1e-13)
     assert abs(run.events[-2].t - 1 - 2 * restitution / (1 - restitution)) < 1e-13
+    many = ns.ensemble(switched, np.tile([0.5, 0.0, 0.0], (70, 1)), 20.0)
+    assert np.array_equal(many.x, np.tile(run.x[-1], (70, 1)))

@@ -34,7 +34,7 @@ class Path:
     x : ndarray (n,)
         Last state.
     trouble : str
-        Why it ended early: a case too close to call, or a future that is not unique.
+        Why it ended early: a case too close to call, or a continuation that is not unique.
     """
 
     itinerary: str
@@ -239,7 +239,7 @@ class Run:
         fixed = {surface: -1 if second else 1} if self.mode[s, surface] == 0 else {}
         found, near = continuations(one, self.x[[s]], self.t[[s]], self.mode[s], active, fixed)
         if len(found) != 1 or near:
-            path.trouble = "too close to call" if near else f"{len(found)} futures"
+            path.trouble = "too close to call" if near else f"{len(found)} continuations"
             return
         before, self.mode[s] = self.mode[s].copy(), found[0]
         if np.any(before != self.mode[s]):

@@ -1,7 +1,7 @@
 /* Choice of implicit steps: where a decay rate limits Taylor steps and an implicit step costs less. */
 
 static int can_collocate(const Run *r) {
-  return r->o.method != METHOD_TAYLOR && !r->s->sets && !r->has_roots && !r->repelling && r->n <= MOST_STATES;
+  return r->o.method != METHOD_TAYLOR && !r->s->sets && !r->has_roots && r->n <= MOST_STATES;
 }
 
 static void set_known(Implicit *m, int mode, int8_t known) {

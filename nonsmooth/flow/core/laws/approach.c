@@ -212,6 +212,7 @@ static void after_step(Run *r) {
   if (carried) project_to(r, r->involved, carried, level);
   if (!changed) return;
   enter_mode(r);
+  improve(r, &r->now, r->x, r->unknowns, 2); /* the direction is that of the state again */
 }
 
 /* Find nodes of a program that are zero for all states, from the values of the constant ones. */

@@ -12,11 +12,11 @@ enum { UNDECIDED, AT_TOP, AT_BOTTOM, INSIDE, ABOVE, BELOW };
 /* The position of nu in a trial: inside its set with w = 0, or at a bound. */
 enum { HELD, TOP, BOTTOM };
 
-enum { MOST_TRIED = 8, TRIED = 1 << MOST_TRIED, DIODES_TRIED = 1 << 12, MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4 };
+enum { MOST_TRIED = 8, TRIED = 1 << MOST_TRIED, DIODES_TRIED = 1 << 12, MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4, LIMITS = 6 };
 
 /* One block of coupled elements, with copies of its part of the law at one order. */
 typedef struct {
-  int size, first, is_coupled, is_joined; /* is_joined: joints may make its rows dependent */
+  int size, is_coupled, is_joined, may_end; /* joints may make its rows dependent; at a limit it is decided by later times */
   double tie; /* part of terms that is zero */
   const int32_t *own;
   double *a, *b, *matrix, *share, *floor; /* share: bounds by the reactions in the block; floor: rounding of w */
@@ -274,7 +274,7 @@ static int class_of_vector(const Block *k, int i, const double *nu, double part)
     room = larger(larger(room_zero(k, i + j, own, bound), part * bound), room);
   }
   if (k->state[i] >= INSIDE) return k->state[i];
-  if (k->is_coupled) room = VANISHES * bound; /* loads are redistributed until all are at their bounds */
+  if (k->is_coupled) room = larger(part, VANISHES) * bound; /* loads are redistributed until all are at their bounds */
   if (length_of(w, size) > zero) return ABOVE;
   if (bound <= room) return UNDECIDED;
   return bound - length_of(nu + i, size) <= room ? AT_TOP : INSIDE;
@@ -454,13 +454,63 @@ static int enumerate(const Block *k, double *found, double *work, int32_t *pivot
   return groups;
 }
 
-/* Gauss-Seidel iteration of a block with vectors; whether it converges. */
-static int relax_from(const Block *k, double *nu, double most) {
+/* nu - P(nu + w/slope), P being the projection to the sets of the unknowns, and its derivatives by them (n, n); its
+ * largest element. */
+static double natural_map(const Block *k, const double *nu, double *rest, double *slopes) {
   int n = k->size;
-  double change = INFINITY, last = INFINITY;
+  for (int i = 0, size; i < n; i += size) {
+    size = span_of(k, i) > 0 ? k->span[i] : 1;
+    int state = k->state[i], is_open = state == UNDECIDED, is_vector = span_of(k, i) > 0;
+    double y[3], u[3], slope = 0, bound = bound_of(k, i, nu), terms;
+    for (int q = i; q < i + size; q++) slope = larger(k->matrix[q * (n + 1)], slope);
+    double per = slope > 0 ? 1 / slope : 1;
+    for (int q = 0; q < size; q++) y[q] = nu[i + q] + per * rate_of(k, i + q, nu, &terms);
+    double length = is_vector ? unit_of(y, size, u) : bound;
+    if (!is_vector) {
+      int is_above = state == ABOVE || ((is_open || state == AT_TOP) && !k->is_contact[i] && y[0] > bound);
+      int is_below = state == BELOW || ((is_open || state == AT_BOTTOM) && y[0] < (k->is_contact[i] ? 0 : -bound));
+      u[0] = is_above - is_below;
+    }
+    int is_out = is_vector ? length > bound : u[0] != 0;
+    for (int q = 0; q < size; q++) {
+      rest[i + q] = nu[i + q] - (is_out ? k->is_contact[i] ? 0 : bound * u[q] : y[q]);
+      for (int j = 0; j < n; j++) {
+        double *to = slopes + (int64_t)(i + q) * n + j, along = 0, turns = per * k->matrix[(i + q) * n + j];
+        *to = is_out ? (j == i + q) - (k->is_coupled ? k->share[i * n + j] * u[q] : 0) : turns;
+        if (!is_out || !is_vector) continue;
+        for (int c = 0; c < size; c++) along += u[c] * ((j == i + c) - per * k->matrix[(i + c) * n + j]);
+        *to -= bound / length * ((j == i + q) - turns - u[q] * along);
+      }
+    }
+  }
+  return largest_of(rest, n);
+}
+
+/* A solution close to nu by Newton's method; whether it converges. */
+static int polish(const Block *k, double *nu, double most, double *work, int32_t *pivot) {
+  int n = k->size;
+  double *slopes = work, *step = slopes + (int64_t)n * n, *trial = step + n, *rest = trial + n, left = INFINITY;
+  memcpy(trial, nu, sizeof(double) * n);
+  for (int again = 0; again < LAYER_NEWTON && left > EPSILON * most; again++) {
+    double now = natural_map(k, trial, step, slopes);
+    if (now < left) { left = now; memcpy(nu, trial, sizeof(double) * n); }
+    if (!solve_any(slopes, step, n, INFINITY, rest, pivot)) break;
+    for (int i = 0; i < n; i++) trial[i] -= step[i];
+  }
+  return left <= VANISHES * most;
+}
+
+/* Gauss-Seidel iteration of a block with vectors, finished by Newton's method; whether it converges. */
+static int relax_from(const Block *k, double *nu, double most, double *work, int32_t *pivot) {
+  int n = k->size;
+  double change = INFINITY, last = INFINITY, *found = work;
   for (int again = 0; again < 2000 && change > 4 * EPSILON * most && !(change >= last && last < TIED * most); again++) {
     last = change;
     change = 0;
+    if (again == 10 || again == 100 || again == 1000) {
+      memcpy(found, nu, sizeof(double) * n);
+      if (polish(k, found, most, work + n, pivot)) { memcpy(nu, found, sizeof(double) * n); return 1; }
+    }
     for (int i = 0, size; i < n; i += size) {
       double rest[3], y[3], own[9], bound = bound_of(k, i, nu), low = k->is_contact[i] ? 0 : -bound;
       int state = k->state[i];
@@ -476,7 +526,11 @@ static int relax_from(const Block *k, double *nu, double most) {
       if (span_of(k, i) > 0) {
         if (state != INSIDE && (state == ABOVE || !is_inside || length_of(y, size) > bound)) {
           for (int q = 0; q < size * size; q++) own[q] *= bound;
-          if (bound > 0 && !leaving_direction(rest, own, size, y)) return 0;
+          if (bound > 0 && !leaving_direction(rest, own, size, y)) { /* it has no inverse: a step downhill */
+            double most_of = largest_of(own, size * size) / bound;
+            for (int q = 0; q < size; q++) y[q] = nu[i + q] + (rest[q] - dot(own + q * size, nu + i, size) / bound) / (size * most_of);
+            unit_of(y, size, y);
+          }
           for (int q = 0; q < size; q++) y[q] = bound > 0 ? bound * y[q] : 0;
         }
       } else {
@@ -533,27 +587,47 @@ static int barrier_of(const Block *k, const double *nu, const double *z, int n, 
   return 1;
 }
 
-/* Move a solution with w = 0 to where it is farthest from all bounds, by an interior-point method; whether it is inside. */
-static int move_into_cones(const Block *k, double *nu, double *work, int32_t *pivot) {
+/* Move a solution with w = 0 to where it is farthest from all bounds, by an interior-point method: how
+ * far outside it is, in units of the largest bound or unknown; 1 where it cannot move. */
+static double move_into_cones(const Block *k, double *nu, double *work, int32_t *pivot) {
   int size = k->size, n;
   double *z = work, *trial = z + (int64_t)size * size, *grad = trial + size, *hess = grad + size + 1;
   double *step = hess + (int64_t)(size + 1) * (size + 1), unit = 0, s = 0;
   for (int i = 0; i < size; i++) unit = larger(unit, larger(fabs(nu[i]), k->is_contact[i] ? 0 : fabs(bound_of(k, i, nu))));
   n = null_space(k->matrix, size, size, z, step, pivot) + 1;
-  if (n == 1 || n > size || !(unit > 0)) return 0;
+  if (n == 1 || n > size || !(unit > 0)) return 1;
+  while (!barrier_of(k, nu, z, n, s, unit, 1, grad, hess)) if ((s = 2 * s + 1) > 1 / MERGED) return 1;
   for (double tau = 1; tau < 1 / TIED; tau *= 3)
     for (int again = 0; again < 20; again++) {
-      while (again == 0 && tau == 1 && !barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) if ((s = 2 * s + 1) > 1 / MERGED) return 0;
-      if (!barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) return 0;
+      if (!barrier_of(k, nu, z, n, s, unit, tau, grad, hess)) return 1;
+      if (s < -0.5) return s;
       memcpy(step, grad, sizeof(double) * n);
-      if (!solve(hess, step, n)) return 0;
-      double decrement = sqrt(larger(dot(grad, step, n), 0)), part = 1 / (1 + decrement);
-      for (int l = 0; l < n - 1; l++) for (int i = 0; i < size; i++) nu[i] -= part * step[l] * z[(int64_t)l * size + i];
-      s -= part * step[n - 1];
-      if (s < -0.5) return 1;
+      if (!solve(hess, step, n)) return 1;
+      double decrement = sqrt(larger(dot(grad, step, n), 0)), part = 1 / (1 + decrement), before = s;
+      memcpy(trial, nu, sizeof(double) * size);
+      do { /* as far as rounding in the step lets it stay inside */
+        memcpy(nu, trial, sizeof(double) * size);
+        for (int l = 0; l < n - 1; l++) for (int i = 0; i < size; i++) nu[i] -= part * step[l] * z[(int64_t)l * size + i];
+        s = before - part * step[n - 1];
+      } while ((part /= 2) > TIED && !barrier_of(k, nu, z, n, s, unit, tau, grad, hess));
       if (decrement < WEAK) break;
     }
-  return s < -TIED;
+  return s;
+}
+
+/* Whether all that holds with w = 0 does so at a bound, of many unknowns: sizes of vectors are at theirs, or loads none. */
+static int is_at_limit(const Block *k, const double *nu, double *work, int32_t *pivot) {
+  int is_tight = 0;
+  double most = 0, terms;
+  for (int i = 0; i < k->size; i++) most = larger(most, larger(fabs(nu[i]), k->is_contact[i] ? 0 : fabs(bound_of(k, i, nu))));
+  for (int i = 0; i < k->size; i++) {
+    double w = rate_of(k, i, nu, &terms);
+    if (fabs(w) > zero_of(k, i, terms)) return 0;
+    if (span_of(k, i) < 0) continue;
+    double bound = k->is_contact[i] ? 2 * nu[i] : bound_of(k, i, nu);
+    is_tight |= bound - length_of(nu + i, span_of(k, i) > 0 ? k->span[i] : 1) <= 8 * TIED * most;
+  }
+  return is_tight && null_space(k->matrix, k->size, k->size, work, work + k->size * k->size, pivot);
 }
 
 /* The solution of a block with vectors, symmetric but for loads, starting at the least nu with w = 0, in units of the roots
@@ -577,9 +651,10 @@ static int relax(const Block *k, double *nu, double *work, int32_t *pivot) {
   int is_kept = (k->is_coupled || k->is_joined) && needs_no_bound(k, nu), may_move = 1;
   for (int i = 0; i < n; i++) may_move &= k->state[i] == UNDECIDED;
   memcpy(last, nu, sizeof(double) * n);
-  if (may_move && k->span && move_into_cones(k, nu, last + n, pivot)) return 1;
+  double out = may_move && k->span ? move_into_cones(k, nu, last + n, pivot) : 1;
+  if (out < (k->may_end ? MERGED : -TIED)) return 1;
   memcpy(nu, last, sizeof(double) * n);
-  return is_kept || relax_from(k, nu, most);
+  return is_kept || relax_from(k, nu, most, last + n, pivot);
 }
 
 /* Solutions of a block of several elements: only one where a certificate proves uniqueness or the block is large. */

@@ -334,7 +334,11 @@ static void keep_vector(Decision *d, int i, int order) {
       if (d->matrix[(i + q) * k + c] != 0) w[q] -= d->matrix[(i + q) * k + c] * d->nu[at + c];
   }
   if (order > d->began[i]) bend = along_bound(d, i, order, known, rest);
-  else { unit_of(bound > 0 ? d->nu + at + i : w, size, first); axes_of(first, size, d->axes + 3 * i); }
+  else {
+    unit_of(bound > 0 ? d->nu + at + i : w, size, first);
+    for (int q = 0; q < size; q++) if (fabs(first[q]) <= VANISHES) first[q] = 0;
+    axes_of(first, size, d->axes + 3 * i);
+  }
   for (int q = 0; q < size; q++) speed += first[q] * (w[q] - rest[q]);
   d->speed[at + i] = state == ABOVE ? speed : 0;
   for (int q = 0; q < size && order > d->began[i]; q++) {
@@ -468,8 +472,8 @@ static double find_tight(const Block *b, double *nu, double part) {
   double most = 0;
   int is_tight = 0;
   for (int i = 0; i < b->size; i++) if (b->is_contact[i]) most = larger(nu[i], most);
-  for (int i = 0; i < b->size; i++)
-    is_tight |= b->is_contact[i] ? nu[i] <= part * most : bound_of(b, i, nu) - fabs(nu[i]) <= part * bound_of(b, i, nu);
+  for (int i = 0; i < b->size; i++) /* vectors are left where none of their loads can be less */
+    is_tight |= b->is_contact[i] ? nu[i] <= part * most : !b->span && bound_of(b, i, nu) - fabs(nu[i]) <= part * bound_of(b, i, nu);
   if (!is_tight) return 0;
   for (int i = 0; i < b->size; i++) if (b->is_contact[i] && nu[i] <= sqrt(part) * most) nu[i] = 0;
   return sqrt(part);
@@ -480,6 +484,7 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
   Block b = part_of_law(d, order, which);
   int n = b.size, count;
   b.is_joined = r->s->joints > 0;
+  b.may_end = b.span && order == 0 && d->ended <= which;
   add_rounding(d, &b);
   int8_t *position = b.is_contact + d->count;
   for (int i = 0; i < n; i++) {
@@ -510,12 +515,16 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
       contacts |= b.is_contact[i];
     }
     double loose = KNOWN_TO * r->o.rtol;
-    if (agrees && is_dependent && contacts && !b.span) loose = find_tight(&b, nu, loose);
+    if (agrees && is_dependent && contacts) loose = find_tight(&b, nu, loose);
     for (int i = 0; i < n; i++) {
       int is_loose = agrees && (is_dependent ? contacts : d->is_known[b.own[i]]), own = b.own[i], size = d->span[own];
-      double part = is_loose && !(is_dependent && b.span) ? loose : 0; /* loads are redistributed */
+      double part = is_loose && (contacts || !(is_dependent && b.span)) ? loose : 0; /* loads are redistributed */
       class[q * n + i] = (int8_t)(size < 0 ? class[q * n + i - 1] : span_of(&b, i) ? class_of_vector(&b, i, nu, part)
                                                                                    : class_of(&b, i, nu, part));
+    }
+    if (b.may_end && d->proved[which] < UNIQUE && is_at_limit(&b, nu, d->work, d->pivot)) {
+      for (int i = 0; i < n; i++) class[i] = AT_TOP;
+      d->ending = which + 1;
     }
     for (int i = 0; i < n; i++) { /* back from the axes in which it was solved */
       int own = b.own[i];
@@ -653,6 +662,90 @@ static void close_with(Run *r, Decision *d, int order) {
   next_states(r, e, order);
 }
 
+/* Take a solution of a block at an order. */
+static void take_solution(Decision *d, int order, int which, const double *nu, const int8_t *class) {
+  int k = d->count, at = order * k, n = d->first[which + 1] - d->first[which];
+  const int32_t *own = d->order + d->first[which];
+  for (int i = 0; i < n; i++) {
+    d->nu[at + own[i]] = nu[i];
+    d->state[at + k + own[i]] = class[i];
+  }
+  for (int i = 0; i < n; i++) {
+    d->bound[at + own[i]] = d->b[at + own[i]];
+    for (int j = 0; j < d->first[which + 1]; j++) d->bound[at + own[i]] += d->share[own[i] * k + d->order[j]] * d->nu[at + d->order[j]];
+  }
+  for (int i = 0; i < n; i++) if (d->span[own[i]] > 0) keep_vector(d, own[i], order);
+}
+
+/* What the solution of a block says of its elements: those that move leave a limit that others hold. */
+static void classes_of(const Block *b, const double *nu, int8_t *class) {
+  for (int i = 0; i < b->size; i++)
+    class[i] = (int8_t)(span_of(b, i) < 0 ? class[i - 1] : span_of(b, i) ? class_of_vector(b, i, nu, 0) : class_of(b, i, nu, 0));
+}
+
+/* A block holds no longer than up to this instant, and its unknowns need not be unique until then. As the law goes on in
+ * time, with rates of order 1, so do its solutions; those of order 0 are their limit, by polynomials through some of them,
+ * and those of order 1 its derivative. 0 where there is none. */
+static int leave_limit(Decision *d, int which, int order) {
+  Block b = part_of_law(d, 0, which);
+  int n = b.size, k = d->count, jumps = 0, levels = 0;
+  double *a = d->work, *bound = a + n, *rate = bound + n, *slope = rate + n, *table = slope + n, *work = table + LIMITS * n;
+  double step = INFINITY, most = 0, terms;
+  int8_t *class = b.is_contact + k, *first = d->large_class;
+  memcpy(a, b.a, sizeof(double) * n);
+  memcpy(bound, b.b, sizeof(double) * n);
+  memset(class, INSIDE, n);
+  for (int i = 0; i < n; i++) {
+    int own = b.own[i];
+    rate[i] = d->a[k + own];
+    slope[i] = d->b[k + own];
+    for (int q = 0; q < d->first[which]; q++) {
+      rate[i] -= d->matrix[own * k + d->order[q]] * d->nu[k + d->order[q]];
+      slope[i] += d->share[own * k + d->order[q]] * d->nu[k + d->order[q]];
+    }
+    table[i] = d->nu[own];
+    most = larger(most, larger(fabs(table[i]), bound[i]));
+    if (rate[i] != 0) step = smaller(step, RESOLVED * d->yard[own] / fabs(rate[i]));
+    if (slope[i] != 0) step = smaller(step, RESOLVED * fabs(bound[i] / slope[i]));
+  }
+  for (int again = 0; step < INFINITY && levels < LIMITS && again < 4 * LIMITS; again++, step /= 2) {
+    double *nu = table + levels * n;
+    if (again) memcpy(nu, table + (levels ? levels - 1 : 0) * n, sizeof(double) * n);
+    for (int i = 0; i < n; i++) { b.a[i] = a[i] + step * rate[i]; b.b[i] = bound[i] + step * slope[i]; }
+    if (!(levels && polish(&b, nu, most, work, d->pivot)) && !relax_from(&b, nu, most, work, d->pivot)) return 0;
+    classes_of(&b, nu, class);
+    if (levels && memcmp(class, first, n)) { memcpy(table, nu, sizeof(double) * n); levels = 0; }
+    memcpy(first, class, n);
+    levels++;
+  }
+  memcpy(b.a, a, sizeof(double) * n);
+  memcpy(b.b, bound, sizeof(double) * n);
+  if (step < INFINITY && levels < LIMITS) return 0;
+  double *nu = table + (levels ? levels - 1 : 0) * n, *last = a, shortest = 2 * step;
+  memcpy(last, nu, sizeof(double) * n);
+  memcpy(first, class, n);
+  for (int j = 1; j < levels; j++)
+    for (int l = levels - 1; l >= j; l--)
+      for (int i = 0; i < n; i++) table[l * n + i] += (table[l * n + i] - table[(l - 1) * n + i]) / ((1 << j) - 1);
+  for (int i = 0; i < n; i++) jumps |= fabs(rate_of(&b, i, nu, &terms)) > MERGED * terms;
+  if (jumps && !polish(&b, nu, most, work, d->pivot)) return 0;
+  if (jumps) classes_of(&b, nu, class);
+  for (int i = 0; i < n && !jumps; i++) {
+    double room = MERGED * most;
+    if (!levels) break;
+    if (b.is_contact[i]) class[i] = class[i] == BELOW || nu[i] <= room ? AT_BOTTOM : INSIDE;
+    else if (span_of(&b, i) >= 0 && bound_of(&b, i, nu) <= room) class[i] = UNDECIDED;
+    else if (span_of(&b, i) < 0) class[i] = class[i - 1];
+    else class[i] = class[i] == ABOVE ? AT_TOP : class[i] == BELOW ? AT_BOTTOM : class[i];
+    if (class[i] == UNDECIDED || (b.is_contact[i] && class[i] == AT_BOTTOM)) nu[i] = 0;
+  }
+  take_solution(d, 0, which, nu, class);
+  if (order == 0) return 1;
+  for (int i = 0; i < n; i++) nu[i] = levels ? (last[i] - nu[i]) / shortest : 0;
+  take_solution(d, 1, which, nu, first);
+  return 1;
+}
+
 /* Follow all solutions from a block of an order on. */
 static void explore(Run *r, Decision *d, int order, int which) {
   int k = d->count;
@@ -679,26 +772,22 @@ static void explore(Run *r, Decision *d, int order, int which) {
       which = 0;
       continue;
     }
+    if (order == 1 && (d->ending == which + 1 || d->ended == which + 1)) {
+      int again = d->ended != which + 1; /* the order before is taken anew */
+      if (!leave_limit(d, which, !again)) return;
+      d->ended = which + 1;
+      d->ending = 0;
+      order = !again;
+      which++;
+      continue;
+    }
     int n = d->first[which + 1] - d->first[which], is_large = n > MOST_ENUMERATED;
     double *nu = is_large ? d->large : found;
     int8_t *to = is_large ? d->large_class : class;
     int count = solutions_of(r, d, order, which, nu, to);
     if (count > 1) d->branches++;
     for (int q = 0; q < count; q++) {
-      for (int i = 0; i < n; i++) {
-        int own = d->order[d->first[which] + i];
-        d->nu[order * k + own] = nu[q * n + i];
-        d->state[(order + 1) * k + own] = to[q * n + i];
-      }
-      for (int i = d->first[which]; i < d->first[which + 1]; i++) {
-        int own = d->order[i], at = order * k;
-        d->bound[at + own] = d->b[at + own];
-        for (int j = 0; j < d->first[which + 1]; j++) d->bound[at + own] += d->share[own * k + d->order[j]] * d->nu[at + d->order[j]];
-      }
-      for (int i = d->first[which]; i < d->first[which + 1]; i++) {
-        int own = d->order[i];
-        if (d->span[own] > 0) keep_vector(d, own, order);
-      }
+      take_solution(d, order, which, nu + q * n, to + q * n);
       if (count > 1) explore(r, d, order, which + 1);
     }
     if (count != 1) return;
@@ -762,7 +851,7 @@ static int is_determined(Run *r, const Layout *l, const int8_t *letter) {
 
 /* Note a mode with undetermined unknowns; whether the motion is still unique. */
 static int find_dependent(Run *r, const Layout *l, const int8_t *letter, const double *unknowns) {
-  combine_rows(r, letter, r->x);
+  aim(r, letter, r->x, unknowns);
   error_scales(r, r->x, held_of(r, letter), unknowns);
   if (l->slides < 2 || invert_layer(r, l, unknowns, r->matrix)) return 1;
   r->dependent = l->mode;
@@ -916,7 +1005,7 @@ static int begin_law(Run *r, const int8_t *letter, const Known *known, int known
   Decision *d = r->decision;
   d->count = r->active_count;
   d->letter = letter;
-  d->motions = d->branches = d->unstable = d->is_imposed = 0;
+  d->motions = d->branches = d->unstable = d->is_imposed = d->ending = d->ended = 0;
   d->last = ORDERS;
   if (!read_law(r, d)) return 0;
   find_blocks(d);

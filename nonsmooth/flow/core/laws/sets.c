@@ -89,7 +89,7 @@ static void follow_sets(Run *r, Expansion *e, int k) {
   }
 }
 
-/* Rates at which sets are left, along their directions. */
+/* Rates at which sets are left, along their directions; zero where later orders decided. */
 static void leave_at_rates(Run *r, Expansion *e) {
   int w = r->width, stride = r->stride;
   EACH_LEAVING(r, e, f) {
@@ -101,8 +101,11 @@ static void leave_at_rates(Run *r, Expansion *e) {
       rate += u * g;
       terms += fabs(u) * sum;
     }
+    int known = 0;
+    for (int row = 0; row < e->l.atoms && e->l.mode == r->now.mode; row++)
+      if (e->l.kind[row] == NEAR_GUARD && e->l.index[row] == f) known = r->drop[row];
     radius[0] = 0;
-    radius[1] = fabs(rate) > VANISHES * terms ? rate : 0;
+    radius[1] = known <= 1 && fabs(rate) > VANISHES * terms ? rate : 0;
     e->radius[f] = 0;
   }
 }
@@ -198,7 +201,7 @@ static int leave_sets(Run *r, Expansion *e, int k, int may_turn) {
     }
     column++;
   }
-  if (r->s->joints && may_turn && k > 1 && turn_leaving(r, e, k, a, all, b)) return 1;
+  if ((r->s->joints || r->c) && may_turn && k > 1 && turn_leaving(r, e, k, a, all, b)) return 1;
   leaving_rates(r, e, a, all, b);
   for (int i = 0; i < slides; i++) e->series[(int64_t)which[i] * stride + k] = b[i];
   for (int i = slides; i < n; i++) e->lambda[(int64_t)which[i] * stride + k] = b[i];

@@ -105,6 +105,22 @@ static double make_implicit_step(Run *r, Leg *l, Slopes *g, double begun, int64_
   return h;
 }
 
+/* Where derivatives by the start have grown apart, keep them and begin with others, which have all their digits. */
+static void divide(const Run *r, Leg *l) {
+  int64_t n = r->n, size = n * n;
+  double *own = l->parts + l->part_count * (1 + size), *inverse = l->parts + l->part_room * (1 + size), forward = 0, back = 0;
+  if (l->part_count >= l->part_room || !(l->left > 0)) return;
+  memcpy(own + 1, l->y, sizeof(double) * size);
+  if (!invert(own + 1, r->n, inverse)) return;
+  for (int64_t i = 0; i < size; i++) { forward += l->y[i] * l->y[i]; back += inverse[i] * inverse[i]; }
+  if (!(forward * back > l->ratio * l->ratio)) return;
+  own[0] = length_of_leg(l) - l->left;
+  memcpy(own + 1, l->y, sizeof(double) * size);
+  memset(l->y, 0, sizeof(double) * size);
+  for (int64_t i = 0; i < size; i += n + 1) l->y[i] = 1;
+  l->part_count++;
+}
+
 static int carry(Run *r, Leg *l, Slopes *g) {
   double most = 0, size = 0;
   int64_t sample = 0;
@@ -147,6 +163,7 @@ static int carry(Run *r, Leg *l, Slopes *g) {
       is_implicit = step % CHECK_AGAIN == CHECK_AGAIN - 1 && is_step_held(r, l, h);
     }
     l->left = h == l->left ? 0 : l->left - h;
+    divide(r, l);
   }
   return LEG_STUCK;
 }
@@ -164,8 +181,8 @@ static void begin_at(Run *r, const Leg *l) {
 /* Integrate states and columns of legs with equal numbers of columns to their ends, and take gradients of events there. Their
  * steps are recorded consecutively in the room of the first. Returns the number of an unfinished leg, or -1. */
 int64_t carry_legs(Run *r, Leg *l, int64_t count) {
-  int64_t room = l->step_room, used = 0, failed = -1;
-  double *begin = l->steps;
+  int64_t room = l->step_room, used = 0, failed = -1, part_room = l->part_room, parts = 0;
+  double *begin = l->steps, *first_part = l->parts;
   Slopes g;
   Variation v;
   char *memory = calloc(place_variation(r, l->columns, &g, &v, 0), 1);
@@ -175,6 +192,8 @@ int64_t carry_legs(Run *r, Leg *l, int64_t count) {
     int64_t taken = used < room ? used : room;
     l[i].steps = room ? begin + taken * row_width(r) : 0;
     l[i].step_room = room - taken;
+    l[i].parts = first_part + parts * (1 + (int64_t)r->n * r->n);
+    l[i].part_room = part_room - parts;
     memset(v.h, 0, sizeof(double) * l->columns * r->m);
     begin_at(r, l + i);
     if (i == 0) begin_slopes(r, &g);
@@ -182,6 +201,7 @@ int64_t carry_legs(Run *r, Leg *l, int64_t count) {
     if (l[i].status != LEG_DONE) failed = i;
     else if (l[i].gradient) event_gradient(r, l + i, &g);
     used += l[i].step_count;
+    parts += l[i].part_count;
   }
   free(memory);
   return failed;

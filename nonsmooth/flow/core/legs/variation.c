@@ -23,6 +23,8 @@ typedef struct {
   const double *sample_t;
   double *at_samples, *steps;
   double *row, *by_parameters; /* a row at the end, then at the start; its derivatives by parameters */
+  double ratio, *parts; /* rows: a time since the start, and columns whose condition is beyond the ratio: others begin there */
+  int64_t part_room, part_count;
 } Leg;
 
 /* One term of the recursion: coefficient k of ``to`` gets a factor times the sum of products of coefficients of ``by``,

@@ -1,7 +1,7 @@
 """Conditions of events as trees of relations between smooth functions, the atoms.
 
 A tree is a list of numbers in postfix order: ``8 * atom + mask`` is a relation, ``AND`` and ``OR`` join the two
-before them. A mask has the signs of the atom for which the relation holds.
+before them. A mask has the signs of the atom for which the relation is true.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ V = TypeVar("V")
 
 @dataclass(frozen=True)
 class Rule:
-    """When a stop or reset is due, and what becomes of it."""
+    """The rule of a stop or reset: when it is due, and its options."""
 
     triggers: tuple[Tree, ...]  # due where one becomes true: one, or two without a direction
     when: Tree | None = None  # the filter as a tree; the expression is in ``Definition.whens``
     level: bool = False  # due while the condition is true
     initially: int = (
         -1
-    )  # 1: due at a start if true; 0: never; -1: a reset on its zero, if the motion goes in
+    )  # 1: due at a start if true; 0: never; -1: a reset on its zero, if the motion enters
     by_jumps: bool = True  # whether jumps make it due
     persistent: bool = False  # whether it stays due
     at_trigger: bool = False  # whether its map takes the state when it became due
@@ -82,7 +82,7 @@ def passages(atom: int, direction: int) -> tuple[Tree, ...]:
 def folded(
     tree: Sequence[int], relation: Callable[[int, int], V], joined: Callable[[V, V, bool], V]
 ) -> V:
-    """A condition in the values of relations, by their atoms and masks, and of what joins two: and, or or."""
+    """A condition as a value of its relations, by atoms and masks, joined by and, or."""
     stack: list[V] = []
     for code in tree:
         if code >= 0:
@@ -119,7 +119,7 @@ def is_piecewise(e: ca.SX) -> bool:
     return isinstance(_pieces(e), _Choice)
 
 
-#: Signs of the second argument less the first for which a relation holds.
+#: Signs of the second argument less the first for which a relation is true.
 _RELATIONS = {
     ca.OP_LE: ABOVE | ZERO,
     ca.OP_LT: ABOVE,
@@ -228,7 +228,7 @@ class Atoms:
         return found
 
     def _joined(self, e: ca.SX | _Choice, mask: int, what: str) -> Tree | bool:
-        """The same; what constants decide is true or false."""
+        """The condition; a relation of constants is true or false."""
         if not isinstance(e, _Choice):
             if e.is_constant():
                 return bool(mask >> (1 + int(np.sign(float(e)))) & 1)

@@ -16,7 +16,7 @@ from ..discrete_states import without_choices
 
 @dataclass(frozen=True)
 class _Conditional:
-    """What stops and resets have in common."""
+    """Common attributes of stops and resets."""
 
     function: Expression
     when: Expression | None = field(default=None, kw_only=True)
@@ -76,19 +76,19 @@ class Reset(_Conditional):
     name : str
         Shown in events and messages.
     when : condition, optional
-        A filter: the event is served only if it holds at that instant.
+        A filter: the event fires only if it is true at that instant.
     level : bool, optional
         Due while the condition (and ``when``) is true: at the start, after a jump, by the motion.
         Otherwise where the condition becomes true.
     initially : bool, optional
-        True: due at the start if true there. False: never due at the start. Unless given, what is clearly
-        true at the start is not due, and the run's message says so if it does not happen later; a reset on its
-        zero is, if the motion goes in.
+        True: due at the start if true there. False: never due at the start. Unless given, an event that is clearly
+        true at the start is not due, and the run's message notes it if it does not fire later; a reset on its
+        zero is due if the motion enters.
     by_jumps : bool, optional
         Whether a jump of another event that makes the condition true makes the event due.
     priority : number or expression, optional
-        Of several events due at one instant the largest is served first, evaluated then; then in the order of
-        definition. Stops are served before resets.
+        Of several events due at one instant the largest fires first, evaluated then; then in the order of
+        definition. Stops fire before resets.
     persistent : bool, optional
         Stay due where another event of the instant makes the condition false.
     values : {"now", "trigger"}, optional
@@ -98,7 +98,7 @@ class Reset(_Conditional):
     Notes
     -----
     A jump that makes the condition of an event true makes it due at the same instant. Events that are due at
-    one instant are served one at a time, and all is evaluated again after each.
+    one instant fire one at a time, and all conditions are evaluated again after each.
 
     Examples
     --------
@@ -124,7 +124,7 @@ class Impact:
     """A unilateral contact: a gap that is never negative, with restitution.
 
     The contact is open (letter ``o``) or closed (``c``). Where the gap falls to zero with a rate v,
-    an impulse along the reaction turns it into -restitution v. Impacts that accumulate end in the
+    an impulse along the reaction changes it to -restitution v. Impacts that accumulate end in the
     closed contact, in which the reaction keeps the gap at zero; it opens when the reaction falls to
     zero.
 
@@ -145,12 +145,11 @@ class Impact:
 
     Notes
     -----
-    Of closed contacts that act on one another, ``"newton"`` chooses a set of most contacts that can take an
-    impulse: each of them turns its rate v into -restitution v, the others open or stay closed without one.
-    ``"moreau"`` solves one complementarity problem: each contact parts with at least -restitution v, and with no
-    more where it takes an impulse. ``"poisson"`` first ends the approach, as with restitution 0, then returns at each
-    contact at least the restitution's part of the impulse that it took. Friction at the contacts is bounded by their
-    impulses in all three. One contact without friction has the same impact in each. Friction at several contacts may leave no impulse that
+    Of coupled closed contacts, ``"newton"`` chooses as many as possible to have an impulse: each of them changes its
+    rate v to -restitution v, the others open or stay closed without one. ``"moreau"`` solves one complementarity
+    problem: each contact separates at -restitution v at least, and exactly so if its impulse is positive.
+    ``"poisson"`` first ends the compression, as with restitution 0; in the expansion each contact gets at least
+    restitution times that impulse. Friction at the contacts is bounded by their impulses in all three. One contact without friction has the same impact in each. Friction at several contacts may leave no impulse that
     fits, and then the run ends, and Poisson's law may depend on impulses that are not determined.
 
     Source: Acary & Brogliato 2008, Numerical Methods for Nonsmooth Dynamical Systems, chapter 3; Glocker & Pfeiffer
@@ -241,7 +240,7 @@ class Clock:
 
 
 def with_added_states(given: dict[str, Any]) -> dict[str, Any]:
-    """Put clocks and discrete states into the arguments of a definition: as states, with ticks as resets."""
+    """Add clocks and discrete states to the arguments of a definition: as states, with ticks as resets."""
     clocks, discrete = items_of(given["clocks"], Clock, "clocks", "period"), given["discrete"]
     values = dict(discrete) if isinstance(discrete, Mapping) else dict.fromkeys(listed(discrete))
     states, phases = listed(given["states"]), [c.phase for c in clocks]

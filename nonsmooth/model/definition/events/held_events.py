@@ -1,4 +1,4 @@
-"""Stops and resets of a system whose discrete states are held: where they are due among the states that move."""
+"""Stops and resets of a system with fixed discrete states: where they are due among the other states."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..system import FilippovSystem
 from .conditions import ABOVE, BELOW, ZERO, folded
 from .declarations import Stop
 
-#: A condition that always holds, or never.
+#: A condition that is always true, or never.
 _ALWAYS = float("inf")
 
 
@@ -27,11 +27,11 @@ class HeldEvent:
     ----------
     name : str
     due : SX scalar
-        Not negative where its condition holds.
+        Not negative where its condition is true.
     when : SX scalar or None
-        Not negative where its filter holds; None if it always does.
+        Not negative where its filter is true; None if it always is.
     level : bool
-        Whether it is due while its condition holds, so that there is no motion where it does.
+        Whether it is due while its condition is true, so that there is no motion where it is.
     direction : {0, 1}
         Whether it is due where ``due`` rises through zero, or (0) where it passes zero either way.
     """
@@ -49,7 +49,7 @@ class HeldEvent:
 
     @property
     def functions(self) -> tuple[ca.SX, ca.SX]:
-        """A function that is zero where it becomes due, and one that is not negative where its filter holds."""
+        """A function that is zero where it becomes due, and one that is not negative where its filter is true."""
         if self.level or self.when is None:
             return self.region if self.level else self.due, ca.SX(0.0)
         return self.due, self.when
@@ -99,7 +99,7 @@ def held_events(system: FilippovSystem, values: Mapping[Any, float]) -> tuple[He
 
 
 def _function(tree: Sequence[int], atoms: Sequence[ca.SX]) -> ca.SX | float:
-    """A function that is not negative where a condition holds; plus or minus inf where it always or never does."""
+    """A function that is not negative where a condition is true; plus or minus inf where it always or never is."""
     return folded(tree, lambda atom, mask: _relation(atoms[atom], mask), _joined)
 
 

@@ -19,7 +19,7 @@ def direction_of(event: Stop | Reset) -> int:
 
 
 def read_when(event: Stop | Reset) -> ca.SX:
-    """The filter of an event as an expression that is not zero where it holds."""
+    """The filter of an event as an expression that is not zero where it is true."""
     return ca.SX(1) if event.when is None else scalar(event.when, f"when of {event.name!r}")
 
 
@@ -101,7 +101,7 @@ def require_no_endless_level(
         if not any(ca.depends_on(own, symbol) for symbol in changed):
             raise DefinitionError(
                 f"reset {reset.name!r}: its map keeps every function of its condition, so that it would "
-                "happen without end. Give when=, a condition that the map makes false, for example "
+                "fire without end. Give when=, a condition that the map makes false, for example "
                 "when=q == 0 with the map {q: 1}."
             )
 

@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import DefinitionError
 from ...expressions.graph import NOT_SMOOTH, Node, operation, reached
 
-#: Part of the largest value that values may be off by.
+#: Relative error of values.
 _LOST = 1e-9
 
 #: A curve is marked in expressions by a number that changes no value: this much and a part of it for each curve.
@@ -48,7 +48,7 @@ class Curve:
 
     @cached_property
     def kinks(self) -> tuple[float, ...]:
-        """Breakpoints that add something."""
+        """Breakpoints with a jump of a derivative."""
         return tuple(x for x, jump in zip(self.levels, self.jumps, strict=True) if any(jump))
 
     def of(self, u: ca.SX) -> ca.SX:

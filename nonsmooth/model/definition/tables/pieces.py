@@ -52,7 +52,7 @@ class Table:
     Attributes
     ----------
     element : int
-        The argument's place among the surfaces.
+        The argument's index among the surfaces.
     curves : tuple of Curve
         Their values are parameters of the definition, in their order.
     sides : tuple of Sides
@@ -145,7 +145,7 @@ def places_of(d: Definition) -> list[int]:
 
 
 def beyond_cells(d: Definition, signs: Sequence[float]) -> set[int]:
-    """Surfaces of breakpoints that are not beside the cell where surfaces have signs: others are reached before them."""
+    """Surfaces of breakpoints that are not adjacent to the cell given by signs: others are reached before them."""
     places, found = places_of(d), set[int]()
     for table in d.tables:
         first = places[table.element]

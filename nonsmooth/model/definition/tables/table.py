@@ -1,4 +1,4 @@
-"""Measured curves: a table of values as an expression whose breakpoints are switches of the class they have."""
+"""Measured curves: a table of values as an expression whose breakpoints are switches."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def table(
 ) -> ca.SX:
     """Interpolate a table, for use in ``FilippovSystem.from_expression``.
 
-    Nothing is interpolated behind the solver's back: a step ends at each breakpoint that it passes, where the
-    curve has a kink (order 1) or a jump of its third derivative (order 3). Breakpoints that the argument cannot
-    pass, as that at 0 of the absolute value of something, are none. A run has the cell of a table between two
-    breakpoints as its state: what a step costs does not depend on their number, and neither do the derivatives of a leg
+    A step ends at each breakpoint that it passes, where the curve has a kink (order 1) or a jump of its third
+    derivative (order 3). Breakpoints that the argument cannot pass, as 0 for an absolute value, are left out. A run
+    has the cell of a table between two breakpoints as part of its state: the cost of a step does not depend on their
+    number, nor does that of the derivatives of a leg
     (``sensitivity``, ``gradient``, ``vjp``, ``lyapunov_spectrum``). Elsewhere, as in ``periodic_orbit``, each breakpoint is
     a switch.
 
@@ -181,7 +181,7 @@ def _bounds_of(e: ca.SX) -> Bounds:
 
 
 class _Bounds:
-    """The algebra of bounds; what is not known is not bounded."""
+    """The algebra of bounds; unknown operations are unbounded."""
 
     def constant(self, value: float) -> Bounds:
         return value, value

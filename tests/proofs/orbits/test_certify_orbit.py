@@ -175,6 +175,8 @@ def test_what_is_given_wrongly_is_refused():
         ns.certify_orbit(s, [1], t_end=1)
     with pytest.raises(ns.OptionError, match="t_end"):
         ns.certify_orbit(s, [1, 1], t_end=-1)
+    with pytest.raises(ns.OptionError, match="numbers='decimal'"):
+        ns.certify_orbit(s, [1, 1], t_end=1, numbers="decimal")
     with pytest.raises(ns.OptionError, match="start of 'x'"):
         ns.certify_orbit(s, [np.nan, 1], t_end=1)
 

@@ -36,7 +36,7 @@ GROWS, PARTS, TOUCH = 1e3, 40, 1e-5
 #: Ends of a branch that say nothing of its orbits.
 NAMELESS = (BranchEnd.STEP_TOO_SMALL, BranchEnd.FAILED)
 
-#: Events beside which rounding decides how a simulation goes on, or when.
+#: Events beside which rounding decides how a simulation continues, or when.
 BESIDE = ("two-fold", "infinite period at a boundary node")
 
 #: Events at which a multiplier passes the unit circle.
@@ -277,9 +277,9 @@ def _of_multipliers(branch: Branch, counts: Counter[str]) -> list[str]:
 def false_events(branch: Branch, counts: Counter[str]) -> list[str]:
     """Events at which nothing happens between the nodes beside them, or no multiplier is on the unit circle."""
     found = list[str]()
-    places = {id(p): k for k, (_, p) in enumerate(branch.nodes)}
+    positions = {id(p): k for k, (_, p) in enumerate(branch.nodes)}
     for event in branch.events:
-        k = places.get(id(event.point), 0)
+        k = positions.get(id(event.point), 0)
         if event.kind in SMOOTH:
             found += _off_circle(event, counts)
         if event.kind in SMOOTH or not 0 < k < len(branch) - 1:

@@ -39,6 +39,7 @@ class Orbit:
         self.plane: tuple[int, Iv, int] | None = (
             None  # x_k = c, where it ends, and the side it comes from
         )
+        self._tried = 0  # the last step
         self.smooth = False  # whether the derivatives of the motion are enclosed
         start, given = box[: self.n], box[self.n :]
         self.given = [Iv.of(*pair) for pair in given]
@@ -200,6 +201,8 @@ class Orbit:
         ]
         guards = self.guards(c)
         h = natural = min(left.b, int(0.8 * min(*steps, 1e6) * 2**53) * (UNIT >> 53))
+        if self._tried:  # far from the step before, most of the first trials fail
+            h = min(h, self._tried * 5 // 4)
         for _ in range(_HALVINGS):
             if left.a < h < left.b:  # some orbits would be past the end
                 h = left.a
@@ -213,8 +216,9 @@ class Orbit:
                 h = unsure.since * 7 // 8  # so that the guard is positive there
                 continue
             except CheckError:
-                h >>= 1
+                h = h * 5 // 8
                 continue
+            self._tried = h
             last = h >= left.b
             if candidate is not None and last and (left - candidate[1]).b < 0:
                 candidate = None

@@ -15,6 +15,9 @@ from special_points import krawczyk, zero_near
 FORMAT = "nonsmooth periodic orbit 1"
 _STEPS = 4000
 
+#: By how much errors may grow along a piece from a point.
+_LOST = 1e6
+
 Complex = tuple[Iv, Iv]
 
 
@@ -30,10 +33,17 @@ class Pieces:
         self.finest = max(1e-170, float(min(widths, default=0)))
         self.multiplicity: int = record.get("multiplicity", 0)  # periods of the forcing
         self.period: Iv | None = None  # all of them
+        self._known: dict[Any, tuple[list[Iv], Matrix]] = {}
         self.planes = [(s["position"], number(s["value"])) for s in self.sections]
 
     def system(self, u: list[Iv]) -> tuple[list[Iv], Matrix]:
         """Values and Jacobian of the equations; no Jacobian at a point."""
+        key = tuple((v.a, v.b) for v in u)
+        if key not in self._known:
+            self._known[key] = self._system(u)
+        return self._known[key]
+
+    def _system(self, u: list[Iv]) -> tuple[list[Iv], Matrix]:
         count, m = len(self.sections), self.size - 1
         J = [[whole(0)] * len(u) for _ in u]
         f: list[Iv] = []
@@ -48,6 +58,18 @@ class Pieces:
 
     def piece(self, i: int, u: list[Iv]) -> tuple[list[Iv], Matrix, Iv]:
         """End of a piece, its derivatives by the start, and its duration."""
+        point, found = all(v.a == v.b for v in u), None
+        try:
+            found = self._piece(i, u)
+        except CheckError:
+            if not point:
+                raise
+        if found and not (point and _lost(found[0]) > _LOST * self.finest):
+            return found
+        # Where errors of intervals grow, a set around the point is followed in frames.
+        return self._piece(i, [Iv(v.a - 1, v.b + 1) for v in u], False)
+
+    def _piece(self, i: int, u: list[Iv], smooth: bool = True) -> tuple[list[Iv], Matrix, Iv]:
         j = (i + 1) % len(self.sections)
         own, other = self.sections[i], self.sections[j]
         (k, value), (k2, value2) = self.planes[i], self.planes[j]
@@ -56,7 +78,7 @@ class Pieces:
         orbit = Orbit(
             self.record | {"start": start, "events": [], "end": []}, [*start, *self.given]
         )
-        orbit.smooth = any(v.a < v.b for v in u)
+        orbit.smooth = smooth and any(v.a < v.b for v in u)
         orbit.aim(min((v.b - v.a) / UNIT for v in u) if orbit.smooth else self.finest)
         if orbit.mode != own["mode"]:
             raise CheckError(f"piece {i + 1} begins in {orbit.mode!r}")
@@ -80,7 +102,7 @@ class Pieces:
             raise CheckError(f"piece {i + 1} does not end on its plane in {other['mode']!r}")
         last = [Iv(v.a, v.b) for a, v in enumerate(orbit.x) if a != k2]
         if not orbit.smooth:
-            return last, [], orbit.t
+            return last, [], Iv(orbit.t.a, orbit.t.b)
         D = orbit.states.derivatives()
         rows = [[v for b, v in enumerate(D[a][: self.size]) if b != k] for a in range(self.size)]
         return last, [row for a, row in enumerate(rows) if a != k2], Iv(orbit.t.a, orbit.t.b)
@@ -115,6 +137,10 @@ def check_periodic(record: dict[str, Any]) -> str:
             raise CheckError(f"it is not proven to be {claims['label']}")
         summary += f"; {claims['label']}"
     return summary
+
+
+def _lost(values: list[Iv]) -> float:
+    return max(v.b - v.a for v in values) / UNIT
 
 
 # Multipliers -------------------------------------------------------------------------------------

@@ -33,7 +33,9 @@ def open_defects(request):
         request.node.add_marker(pytest.mark.xfail(reason=reason, strict=True))
 
 
-@pytest.fixture(autouse=True)
-def lanes_for_all(monkeypatch):
+@pytest.fixture(autouse=True, scope="session")
+def lanes_for_all():
     """Let ensembles of 64 starts run in lanes, which wait for longer runs where compilation has to pay."""
-    monkeypatch.setattr("nonsmooth.flow.ensembles.ensemble._WORTH", 0.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("nonsmooth.flow.ensembles.ensemble._WORTH", 0.0)
+        yield

@@ -68,7 +68,8 @@ class Proof:
     values : mapping of str to Enclosure
         For two-folds ``nu1``, ``nu2``, ``Delta``, ``T`` and the eigenvalues; the second
         derivatives ``L11`` ... ; for equilibria the eigenvalues and h; for periodic orbits the
-        ``period`` and ``multiplier1``, which is 1, ``multiplier2`` ... by their size.
+        ``period`` and ``multiplier1``, which is 1, ``multiplier2`` ... by their size; there is no 1
+        where the system depends on time.
     parameters : mapping of str to Enclosure
         Values or ranges for which it holds.
     pieces : tuple of Proof

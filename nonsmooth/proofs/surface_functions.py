@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from ..model import DefinitionError, FilippovSystem, ParameterError
+from ..model import DefinitionError, FilippovSystem, OptionError, ParameterError
 from .arithmetic.flint import arb
 from .arithmetic.instructions import ExpressionGraph
 from .arithmetic.intervals import Numbers, between, enclose, exact, exact_range
+from .proof import READ
 
 #: A parameter's value, or the ends of an interval of values.
 Range = Any
@@ -142,6 +143,8 @@ def parameter_ranges(
     system: FilippovSystem, given: Mapping[Any, Range] | None, numbers: Numbers
 ) -> list[tuple[Any, Any]]:
     """Ends of the intervals of all parameters, as exact fractions."""
+    if numbers not in READ:
+        raise OptionError(f"numbers={numbers!r} is not 'stored' or 'written'. See certify.")
     intervals: dict[str, tuple[Any, Any]] = {}
     for key, value in (given or {}).items():
         name = key if isinstance(key, str) else str(key)

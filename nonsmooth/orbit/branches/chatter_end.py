@@ -45,26 +45,26 @@ def chatter_end(
         i = min(legs, key=lambda k: float(durations[k]), default=-1)
         times = times * float(durations.sum())
         if i >= 0 and durations[i] < times[1]:
-            place = len(durations) * problem.dimension + i
-            found = _vanishing(u, place, times, scale, equations)
+            index = len(durations) * problem.dimension + i
+            found = _vanishing(u, index, times, scale, equations)
             return None if found is None else (kind, *found)
     return None
 
 
 def _vanishing(
     u: Array,
-    place: int,
+    index: int,
     times: Array,
     scale: Array,
     equations: Callable[[Array], tuple[Array, Array]],
 ) -> tuple[float, Array] | None:
-    """Value of the parameter at which the time at a place of the unknowns vanishes, and unknowns near it."""
-    values, nearest, shortest = list[float](), u, float(u[place])
+    """Value of the parameter at which the time at an index of the unknowns vanishes, and unknowns near it."""
+    values, nearest, shortest = list[float](), u, float(u[index])
     jacobian = equations(u)[1]
     for time in times[::-1]:
         if time < shortest:
             continue
-        found = _closed_for(u, jacobian, place, time, scale, equations)
+        found = _closed_for(u, jacobian, index, time, scale, equations)
         if found is None:  # so near to the end impacts may seem to end early
             values = []
             continue
@@ -78,17 +78,17 @@ def _vanishing(
 def _closed_for(
     u: Array,
     jacobian: Array,
-    place: int,
+    index: int,
     time: float,
     scale: Array,
     equations: Callable[[Array], tuple[Array, Array]],
 ) -> tuple[Array, Array] | None:
-    """The orbit of the branch on which the unknown at a place is a time, with derivatives near it; None where Newton's
+    """The orbit of the branch on which one unknown is a time, with derivatives near it; None where Newton's
     method fails."""
-    row, values, size = np.eye(1, u.size, place), np.zeros(u.size - 1), np.inf
+    row, values, size = np.eye(1, u.size, index), np.zeros(u.size - 1), np.inf
     try:
         for _ in range(_MOST_STEPS):
-            right = np.append(values, u[place] - time)
+            right = np.append(values, u[index] - time)
             step = np.linalg.solve(np.vstack([jacobian, row]) * scale, right) * scale
             u, before, size = u - step, size, float(np.abs(step / scale).max())
             if size < _SMALL or 0.5 * before < size < _LEAST:

@@ -79,7 +79,7 @@ def certify_orbit(
     ParameterError
         An unknown parameter, one without a value, or a value that is no finite number or interval.
     OptionError
-        A start or a time that is not finite; bits or a limit out of its range.
+        A start or a time that is not finite; bits or a limit out of its range; ``numbers`` that are neither.
     NotSmoothError
         An operation that jumps or has a kink.
 

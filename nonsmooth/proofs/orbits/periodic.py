@@ -300,7 +300,10 @@ class OrbitInstance:
         if not all(s < 1 or s > 1 for s in sizes):
             label = ""
         why = "" if label else "whether a multiplier is inside of the unit circle is undecided"
-        claims |= {"label": label, "multipliers": [[interval(v) for v in found[j]] for j in order]}
+        # Wider than they are, since they follow from the same matrix to fewer digits in other arithmetics.
+        slack = arb(0, 2.0 ** (16 - ctx.prec) * (1 + max(float(s.upper()) for s in sizes) ** 0.5))
+        wide = [[v if v.is_zero() else v + slack for v in found[j]] for j in order]
+        claims |= {"label": label, "multipliers": [[interval(v) for v in pair] for pair in wide]}
         return Classification(label, self.kind, why, values=values, claims=claims)
 
     def _distance(self, zero: Zero, period: arb) -> float:

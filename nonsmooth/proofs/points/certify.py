@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from ...local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
-from ...model import FilippovSystem, OptionError, real, whole
+from ...model import FilippovSystem, real, whole
 from ...orbit import PeriodicOrbit
 from ..arithmetic.decimals import enclosure, given, inner
 from ..arithmetic.flint import arb
@@ -21,12 +21,6 @@ from .problem_instance import ProblemInstance, instance_of
 
 #: A special point or a periodic orbit that is to be proven.
 Instance = ProblemInstance | OrbitInstance
-
-
-def check_numbers(numbers: Any) -> None:
-    """Raise OptionError unless ``numbers`` is "stored" or "written"."""
-    if numbers not in READ:
-        raise OptionError(f"numbers={numbers!r} is not 'stored' or 'written'. See certify.")
 
 
 def certify(
@@ -48,8 +42,8 @@ def certify(
     Parameters
     ----------
     found : TwoFold, Fold, Equilibrium, PseudoEquilibrium or PeriodicOrbit
-        As a search returns it. Periodic orbits may cross surfaces and jump, but not slide; their
-        period, multipliers and stability are proven. In systems with more states than equations the theorem is about the
+        As a search returns it. Periodic orbits may cross surfaces and jump, but not slide; the time may enter through
+        sines and cosines. Their period, multipliers and stability are proven. In systems with more states than equations the theorem is about the
         point on the plane through it, across the set of such points (or of held states).
     system : FilippovSystem, optional
         Needed for folds and points of rest; two-folds and orbits carry their system.
@@ -108,7 +102,6 @@ def certify(
     limit = real(width, "width", low=5e-324, expected="a positive number")
     whole(max_bits, "max_bits", least=64)
     whole(max_pieces, "max_pieces")
-    check_numbers(numbers)
     refusal = getattr(instance, "refusal", "")
     pieces = [_proof(instance, None, 64, refusal)] if refusal else []
     pieces = pieces or _divided(instance, limit, max_bits, max_pieces)

@@ -20,7 +20,7 @@ from ..proof import READ, Classification, Proof, intervals, paragraph
 from ..record import problem_record, record_of
 from ..surface_functions import SurfaceFunctions, parameter_ranges
 from .census import Census, Undecided
-from .certify import check_numbers, prove_instance
+from .certify import prove_instance
 from .problem_instance import ProblemInstance
 from .special_points import PROBLEMS, PointProblem
 from .subdivide import Search, clusters
@@ -109,7 +109,6 @@ def prove_all(
         raise OptionError(f"kind={kind!r} is not one of {list(PROBLEMS)}.")
     limit = real(width, "width", low=5e-324, expected="a positive number")
     most = whole(max_boxes, "max_boxes")
-    check_numbers(numbers)
     problem = PROBLEMS[kind](SurfaceFunctions(system, surface, mode), numbers, side)
     ranges = _read_box(system, box, numbers)
     ranges += [exact(t, numbers, "t")] if system.time_dependent else []

@@ -1,6 +1,8 @@
 """Proven periodic orbits have the period and multipliers of closed forms; others are refused in words."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from fractions import Fraction
 
@@ -12,7 +14,7 @@ from scipy.integrate import solve_ivp
 import nonsmooth as ns
 from nonsmooth.proofs.orbits.forcing import forcing_period
 from nonsmooth.proofs.orbits.modes import Modes
-from tests.proofs.checking import run
+from tests.proofs.checking import CHECKER, run
 
 x, v, y, z, d, a, b, t = (ca.SX.sym(s) for s in ("x", "v", "y", "z", "d", "a", "b", "t"))
 
@@ -47,6 +49,12 @@ WARM = ns.FilippovSystem(  # the same, not linear
 TWIN = [-0.3 * y + x, -0.3 * z + v]  # two states with the same multiplier
 DOUBLE = ns.FilippovSystem(
     [x, v, y, z], surface=v, above=[v, 1 - x - 0.2 * v, *TWIN], below=[v, -1 - x - 0.2 * v, *TWIN]
+)
+LATE = ns.FilippovSystem(  # intervals that forget the frame of a set grow by exp(75) in each leg
+    [x, v, y],
+    surface=v,
+    above=[v, 1 - x - 0.2 * v, x - 24 * y],
+    below=[v, -1 - x - 0.2 * v, x - 24 * y],
 )
 DAMPING = 0.75 * (1 + a - b)  # -0.75 between -1 and 1, and 0.75 beyond
 VAN_DER_POL = ns.FilippovSystem(
@@ -117,8 +125,8 @@ def closed_form(orbit):
     return sum(found[n:]), sorted(multipliers, key=abs, reverse=True)
 
 
-def holds(enclosure, truth, slack=1e-19):
-    return mpmath.mpf(enclosure.low) - slack <= truth <= mpmath.mpf(enclosure.high) + slack
+def holds(enclosure, exact, slack=1e-19):
+    return mpmath.mpf(enclosure.low) - slack <= exact <= mpmath.mpf(enclosure.high) + slack
 
 
 @pytest.mark.slow_cases("van der Pol", "third order")
@@ -360,6 +368,21 @@ def test_orbits_are_checked_and_altered_ones_are_not(tmp_path):
     false.write_text(json.dumps({"proofs": wrong}))
     words = run(false)[1]
     assert words.count("NOT CHECKED") == len(wrong), words
+
+
+@pytest.mark.slow
+def test_the_checker_follows_points_in_frames_where_intervals_grow(tmp_path):
+    path = tmp_path / "late.json"
+    ns.certify(ns.periodic_orbit(LATE, guess=[-6.38, 0.01, -0.7])).save(path)
+    code = (
+        f"import sys; sys.path.insert(0, {str(CHECKER)!r}); from records import read; "
+        "from periodic_orbits import UNIT, Iv, Pieces; "
+        f"record = read({str(path)!r})['proofs'][0]; pieces = Pieces(record); "
+        "end, *_ = pieces.piece(0, [Iv.of(*p).mid() for p in record['point'][:2]]); "
+        "print(max(v.b - v.a for v in end) / UNIT)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert float(done.stdout) < 1e-20
 
 
 @pytest.mark.slow

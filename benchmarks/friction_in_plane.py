@@ -129,7 +129,7 @@ RIDES = (
         (-0.0686153343753281915759452, -0.135804142579161874984840),
     ),
     Ride(
-        *("a sphere rolls once round its circle on a turntable", 2.0, 1.0, 0.0, 1.3),
+        *("a sphere rolls one turn of its circle on a turntable", 2.0, 1.0, 0.0, 1.3),
         *((0.4, 0.2), (0.3, -0.5, -0.56, 1.02), 0.4, 16.9162681347142712840296),
         (0.4, 0.2),
     ),

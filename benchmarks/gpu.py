@@ -77,9 +77,9 @@ def ends(name: str, x: Array, machine: Card) -> Chunk:
 
 def the_card(quick: bool) -> dict[str, Any]:
     """The card, its driver, and what its compiler makes of the kernels."""
-    ask = ("nvidia-smi", "--query-gpu=driver_version,clocks.max.sm", "--format=csv,noheader")
+    command = ("nvidia-smi", "--query-gpu=driver_version,clocks.max.sm", "--format=csv,noheader")
     try:
-        said = subprocess.run(ask, capture_output=True, text=True, check=False).stdout.strip()
+        said = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
     except OSError as error:
         said = str(error)
     found: dict[str, Any] = {"name": card().name, "driver, clock": said, "kernels": {}}

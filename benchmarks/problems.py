@@ -56,7 +56,7 @@ class Problem:
     free: int
 
     def decide(self, x: Sequence[float], before: int) -> int:
-        """Mode after the surface is met from ``before``: slide where both fields push to it."""
+        """Mode after reaching the surface from ``before``: sliding where both fields point to it."""
         below_zero, above_zero = self.slopes(*x)
         return SLIDING if below_zero < 0.0 < above_zero else 2 - before
 

@@ -33,7 +33,7 @@ LIMIT, NODES, CLOSURE, DIFFERENCE, LOST = 60, 10, 1e-7, 1e-4, 1e13
 #: Ends of a branch that say nothing of its orbits.
 NAMELESS = (BranchEnd.STEP_TOO_SMALL, BranchEnd.FAILED)
 
-#: Events beside which rounding decides how a simulation goes on, or when.
+#: Events beside which rounding decides how a simulation continues, or when.
 BESIDE = ("two-fold", "infinite period at a boundary node")
 
 #: Events at which a multiplier passes the unit circle.
@@ -247,9 +247,9 @@ def _of_multipliers(orbit: PeriodicOrbit) -> list[str]:
 def false_events(branch: Branch) -> list[str]:
     """Events at which nothing happens between the nodes beside them."""
     found = list[str]()
-    places = {id(p): k for k, (_, p) in enumerate(branch.nodes)}
+    positions = {id(p): k for k, (_, p) in enumerate(branch.nodes)}
     for event in branch.events:
-        k = places.get(id(event.point), 0)
+        k = positions.get(id(event.point), 0)
         if event.kind in SMOOTH or not 0 < k < len(branch) - 1:
             continue
         before, after = branch.orbits[k - 1], branch.orbits[k + 1]

@@ -146,9 +146,9 @@ def _targets(results: dict[str, Any]) -> str:
     for name, (limit, sense) in TARGETS.items():
         if name in found:
             value = found[name]
-            met = value >= limit if sense == "at least" else value <= limit
+            reached = value >= limit if sense == "at least" else value <= limit
             rows.append(
-                [name, f"{sense} {limit:g}", f"{value:.3g}", "met" if met else "**missed**"]
+                [name, f"{sense} {limit:g}", f"{value:.3g}", "met" if reached else "**missed**"]
             )
     return table(["what", "target", "measured", ""], rows)
 

@@ -138,7 +138,7 @@ class Parametrised:
         raise AttributeError(f"{type(self).__name__} is immutable.")
 
     def _structure(self) -> tuple[Any, ...]:
-        """What besides the values makes two of these different (hashable)."""
+        """Further properties, besides the values, by which two of these differ (hashable)."""
         return ()
 
     def options(self) -> dict[str, Any]:

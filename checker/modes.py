@@ -128,7 +128,7 @@ class Modes:
         (l1, f1), (l2, f2) = found
         side = 1 if mode[j] == "-" else -1
         if l1.sign() >= 0 or l2.sign() <= 0:
-            raise CheckError("whether a surface goes on sliding is undecided")
+            raise CheckError("whether a surface continues sliding is undecided")
         a = l1 / (l1 - l2)
         values = self._at(*at, [whole(0)] * self.count)
         field = [p - a * (p - q) for p, q in zip(f1, f2, strict=True)]

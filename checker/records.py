@@ -49,7 +49,7 @@ _LISTS = (
 
 
 def read(name: str) -> dict[str, Any]:
-    """What a file holds; CheckError where it is none that a proof was saved in."""
+    """The content of a file; CheckError unless a proof was saved in it."""
     try:
         handle = os.open(name, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
         with os.fdopen(handle, "rb") as file:
@@ -65,7 +65,7 @@ def read(name: str) -> dict[str, Any]:
 
 
 def _parsed(content: bytes) -> Any:
-    """What a text in JSON stands for; RecursionError where it is nested deeply."""
+    """The value of a JSON text; RecursionError where it is nested deeply."""
     # The limit of the other modules is for calls in Python, not for those of the parser in C.
     limit = sys.getrecursionlimit()
     sys.setrecursionlimit(1_000)

@@ -25,7 +25,7 @@ _MANY = 12  # numbers of an array, or entries of a list, that are written out
 _NUMBER = "{:.4g}"
 
 
-def card(title: str, rows: Iterable[tuple[str, object]], picture: str = "") -> str:
+def representation(title: str, rows: Iterable[tuple[str, object]], picture: str = "") -> str:
     """Return HTML of a title and rows of a name and a value, beside a picture."""
     shown = [(name, _cell(value)) for name, value in rows]
     body = "".join(
@@ -35,13 +35,15 @@ def card(title: str, rows: Iterable[tuple[str, object]], picture: str = "") -> s
 
 
 class Markup(str):
-    """HTML that a card shows as it is."""
+    """HTML that a representation shows as it is."""
 
 
 def shown_fields(result: Any) -> str:
-    """The card of a result: its public fields."""
+    """Representation of a result: its public fields."""
     shown = [field.name for field in dataclasses.fields(result) if not field.name.startswith("_")]
-    return card(type(result).__name__, [(name, _short(getattr(result, name))) for name in shown])
+    return representation(
+        type(result).__name__, [(name, _short(getattr(result, name))) for name in shown]
+    )
 
 
 def _short(value: Any) -> object:

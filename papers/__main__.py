@@ -75,7 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             wrong += [f"{name}: {row}" for row in reproduce(paper_of(name), options.out / name)]
         except KeyboardInterrupt:
             print(
-                f"Interrupted. What was computed is in {options.out}/. To go on:", file=sys.stderr
+                f"Interrupted. What was computed is in {options.out}/. To continue:",
+                file=sys.stderr,
             )
             print(f"  python -m papers {' '.join(names[k:])}", file=sys.stderr)
             return 130

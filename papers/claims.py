@@ -88,7 +88,8 @@ class Statements:
 
     def __init__(self, path: Path, row: Callable[..., Row] = Claim):
         text = path.read_text(encoding="utf-8").rpartition("<!-- claims")[2]
-        lines = [line for line in text.splitlines() if line.startswith("| ")][2:]
+        table = text.partition("<!-- end")[0]
+        lines = [line for line in table.splitlines() if line.startswith("| ")][2:]
         rows = [line[2:-2].split(" | ") for line in lines]
         self.cells = {row[0]: [cell.replace(r"\|", "|") for cell in row[1:]] for row in rows}
         self.row, self.computed = row, dict[str, Callable[[], Row]]()

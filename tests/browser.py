@@ -1,4 +1,4 @@
-"""A headless Chromium for tests that open pages: what they asked for, what they complained about.
+"""A headless Chromium for tests that open pages: requests and errors of pages.
 
 Driven by selenium (extra ``browser``) and the ``chromedriver`` beside the browser; nothing is
 downloaded. Without any of the three the tests that need it are skipped and say which is missing.

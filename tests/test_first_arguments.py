@@ -16,7 +16,7 @@ PACKAGES = [
     *(ns, ns.local, ns.orbit, ns.plot, ns.two_folds),
     *(bounce, bounce.golf, bounce.laws, bounce.plot),
 ]
-#: Of what a user hands over; other classes are what functions return.
+#: Classes that a user passes; functions return the others.
 CLASSES = [ns.FilippovSystem, ns.Clock, ns.Grid, ns.RandomStarts, ns.orbit.FixedItinerary, ns.Work]
 
 #: What Python says of a function's inside.

@@ -69,14 +69,14 @@ class Profile:
 
 @pytest.mark.slow_cases("an intersection")
 @pytest.mark.parametrize("name", WORKS)
-def test_an_interrupt_is_heard_at_every_place(name):
+def test_an_interrupt_is_raised_at_every_point(name):
     work = WORKS[name]
     for _ in range(2):  # what is built once is not looked at
         work()
     counted = Profile()
     counted.run(work)
-    places = np.unique(np.linspace(2, counted.count - 4, 25).astype(int))
-    for at in places.tolist():
+    points = np.unique(np.linspace(2, counted.count - 4, 25).astype(int))
+    for at in points.tolist():
         with pytest.raises(KeyboardInterrupt):
             Profile(at).run(work)
     work()

@@ -119,9 +119,9 @@ def undocumented(name, thing):
     if not inspect.isfunction(inspect.unwrap(thing)):
         return []
     signature = inspect.signature(thing)
-    wanted = ["Parameters"] if signature.parameters else []
-    wanted += [] if signature.return_annotation in (None, "None") else ["Returns"]
-    sections = [s for s in wanted if not re.search(rf"^{s}\n-{{{len(s)}}}$", doc, re.MULTILINE)]
+    expected = ["Parameters"] if signature.parameters else []
+    expected += [] if signature.return_annotation in (None, "None") else ["Returns"]
+    sections = [s for s in expected if not re.search(rf"^{s}\n-{{{len(s)}}}$", doc, re.MULTILINE)]
     return [f"{name} has no {section} section" for section in sections]
 
 

@@ -12,7 +12,7 @@ import pytest
 import bounce
 import nonsmooth as ns
 from nonsmooth.model.expressions.mathml import equation, symbol
-from nonsmooth.notebook import card, circle, lines, quadrants
+from nonsmooth.notebook import circle, lines, quadrants, representation
 
 
 def parsed(text):
@@ -167,7 +167,7 @@ def test_texts_are_escaped():
         text = thing._repr_html_()
         parsed(text)
         assert "<script>" not in text and "&lt;script&gt;" in text
-    assert card("<a>", [("<b>", "<c>")], "").count("&lt;") == 3
+    assert representation("<a>", [("<b>", "<c>")], "").count("&lt;") == 3
 
 
 def test_lines_keep_extremes_of_what_is_finite():
@@ -194,7 +194,7 @@ def test_slopes_that_are_infinite_are_left_out():
 
 
 def test_long_texts_are_cut():
-    assert len(card("t", [("a", "x" * 10_000)])) < 400
+    assert len(representation("t", [("a", "x" * 10_000)])) < 400
 
 
 def test_nothing_is_drawn_by_matplotlib():

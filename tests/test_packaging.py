@@ -83,8 +83,8 @@ def test_an_author_has_orcid_and_affiliation_everywhere(tmp_path, monkeypatch):
 
 def test_the_paper_has_the_headings_that_its_journal_wants():
     text = (ROOT / "joss" / "paper.md").read_text(encoding="utf-8")
-    wanted = "Summary|Statement of need|State of the field|Software design|Research impact statement|AI usage disclosure"
-    assert re.findall(r"(?m)^# (.*)$", text.split("---\n", 2)[2])[:6] == wanted.split("|")
+    expected = "Summary|Statement of need|State of the field|Software design|Research impact statement|AI usage disclosure"
+    assert re.findall(r"(?m)^# (.*)$", text.split("---\n", 2)[2])[:6] == expected.split("|")
     assert len(text.split()) < 1750
 
 

@@ -60,5 +60,5 @@ def test_a_dividing_curve_prints_its_arcs_and_where_they_join():
     a, b = curve.junction
     assert f"junction ({a:g}, {b:g})" in repr(curve)
     assert len(curve.points) == sum(len(arc.points) for arc in curve.arcs)
-    # The curve goes on from arc to arc: the slipping one begins where the rolling one ends.
+    # The curve continues from arc to arc: the slipping one begins where the rolling one ends.
     np.testing.assert_allclose(first.points[-1], second.points[0], atol=1e-9)

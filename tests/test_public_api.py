@@ -69,7 +69,7 @@ def test_modules_at_the_top_are_those_of_its_docstring():
 @pytest.mark.parametrize(
     ("door", "names"), [("two_folds", TWO_FOLDS), ("local", RESULTS), ("orbit", ORBITS)]
 )
-def test_each_name_has_one_place(door, names):
+def test_each_name_is_exported_once(door, names):
     module = getattr(ns, door)
     assert names <= set(module.__all__)
     for name in names:

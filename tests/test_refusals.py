@@ -21,12 +21,12 @@ def test_a_smooth_system_has_no_sliding():
 
 
 def test_what_is_no_work():
-    for ask in (
+    for call in (
         lambda: ns.ensemble(SMOOTH, [0.0, 0.0], t_end=1.0, work=2),
         lambda: ns.basins(SMOOTH, [[0.0, 0.0]], t_end=1.0, work=2),
     ):
         with pytest.raises(ns.OptionError, match=r"^work .*2"):
-            ask()
+            call()
 
 
 def test_how_constants_are_read():

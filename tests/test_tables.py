@@ -116,9 +116,9 @@ COLUMNS = [
 def test_columns_are_the_arrays(name, what, column, read):
     pytest.importorskip("pandas")
     result = found(name)
-    table, wanted = result.to_pandas(what), np.asarray(read(result))
-    assert len(table) == len(wanted) > 0
-    equal = np.array_equal(table[column], wanted, equal_nan=wanted.dtype.kind in "fc")
+    table, expected = result.to_pandas(what), np.asarray(read(result))
+    assert len(table) == len(expected) > 0
+    equal = np.array_equal(table[column], expected, equal_nan=expected.dtype.kind in "fc")
     assert equal, table[column]
 
 
@@ -169,7 +169,7 @@ def test_tables_that_are_not_there_are_refused():
 
 
 @pytest.mark.parametrize("name", ["pandas", "xarray"])
-def test_libraries_that_are_not_there_are_asked_for(name, monkeypatch):
+def test_libraries_that_are_not_there_are_required(name, monkeypatch):
     monkeypatch.setitem(sys.modules, name, None)
     for make in MADE.values():
         with pytest.raises(ns.OptionError, match=rf"^to_{name} needs {name}"):

@@ -139,7 +139,7 @@ class Modes:
         return leg, self._function(ca.densify(put(lam)), self._rates(field)), effects
 
     def signs(self, x: np.ndarray, t: float, before: Sequence[int | None]) -> tuple[int, ...]:
-        """The mode that goes on from a point, those of ``before`` that are None being chosen."""
+        """The mode that continues from a point, those of ``before`` that are None being chosen."""
         open_ = [i for i, s in enumerate(before) if s is None]
         admissible = []
         for choice in sorted(
@@ -155,7 +155,7 @@ class Modes:
             if all((signs[i] * rate[i] > 0) if signs[i] else abs(lam[i]) <= 1 for i in open_):
                 admissible.append(tuple(signs))
         if len(admissible) != 1:
-            raise GaveUp(f"{len(admissible)} modes go on from here")
+            raise GaveUp(f"{len(admissible)} modes continue from here")
         return admissible[0]
 
     def impact(self, x: np.ndarray, t: float, k: int) -> np.ndarray:

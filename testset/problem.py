@@ -119,7 +119,7 @@ class Problem:
         """The largest relative error of the states that are named."""
         names = self.system.state_names
         pairs = [(found[names.index(name)], self.number(value)) for name, value in true.items()]
-        return max(abs(value - truth) / max(1.0, abs(truth)) for value, truth in pairs)
+        return max(abs(value - exact) / max(1.0, abs(exact)) for value, exact in pairs)
 
     def near(self, found: float | None, text: str | float) -> bool:
         """Whether a time is the one in the text."""

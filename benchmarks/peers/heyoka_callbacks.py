@@ -1,7 +1,7 @@
 """heyoka, in its fastest form: one integrator whose parameters are the mode.
 
 The friction is p0*load + p1*along, so that a Python callback at each event changes the mode and the
-integrator goes on without returning. The push off the surface is needed: without it 114 (linear) and
+integrator continues without returning. The push off the surface is needed: without it 114 (linear) and
 252 (nonlinear) of 500 itineraries were wrong, with it none, whatever the cooldown.
 """
 

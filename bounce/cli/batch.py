@@ -105,8 +105,8 @@ def _as_csv(
             "".join(_line(bare, one) for one in [dict(zip(bare, bare, strict=True)), *waiting])
         )
     if args.output is None:
-        return count.finish("they are printed. With --output FILE the next time --resume goes on")
-    return count.finish(f"they are in {args.output}. To go on, add --resume to the same command")
+        return count.finish("they are printed. With --output FILE the next time --resume continues")
+    return count.finish(f"they are in {args.output}. To continue, add --resume to the same command")
 
 
 def _bare(starts: Sequence[Start]) -> list[str]:

@@ -35,7 +35,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fly the ball and print where it lands and comes to rest."""
+    """Compute the flight and print where the ball lands and comes to rest."""
     chosen = chosen_model(args)
     require_scale(args, chosen)
     require_side(args)

@@ -62,7 +62,7 @@ def start_arguments(parser: argparse.ArgumentParser, what: str) -> None:
         "--output", metavar="FILE", help="of --input: CSV, to the terminal if not given"
     )
     parser.add_argument(
-        "--resume", action="store_true", help="go on behind the rows that --output has already"
+        "--resume", action="store_true", help="continue after the rows that --output has already"
     )
 
 

@@ -333,7 +333,7 @@ class Equations:
         )
 
     def _ends(self) -> list[ns.Stop]:
-        """What ends the contact: the model's lift-off function, and the load itself."""
+        """Functions that end the contact: the model's lift-off function, and the load."""
         # The friction that can hold a rolling ball vanishes with the load. Where its approximate zero
         # comes a little before that of another function, this ends the contact, not the rolling.
         ends = [ns.Stop(self.lift_off, -1, "lift-off")]

@@ -96,7 +96,7 @@ class ContactModel(Parametrised, ABC):
     ...     def tangential_force(self, s, p):
     ...         return 0
     >>> shot = bounce.simulate(Spring(), xdot=1.0, ydot=-1.0, omega=0.2)
-    >>> f"{shot.time:.10f}", shot.itinerary  # pi/2; without a tangential force it goes on rolling
+    >>> f"{shot.time:.10f}", shot.itinerary  # pi/2; without a tangential force it continues rolling
     ('1.5707963268', '+ s')
     """
 

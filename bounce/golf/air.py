@@ -30,7 +30,7 @@ class Air:
     largest_spin_ratio : float, optional
         Beyond it the coefficients keep their value there: a slow ball leaves every measured range.
     largest_reynolds : float, optional
-        A launch beyond it is flown with a caution: so fast a ball was not measured.
+        A launch beyond it is computed with a warning: no such fast ball was measured.
     name, source : str, optional
         What the law is called, and where its coefficients come from.
 

@@ -260,9 +260,9 @@ def _through_air(
         return solve(True).sol  # three more evaluations a step, for the path only
 
     def path(t: Array) -> Array:
-        places = np.repeat(place[:, None], t.size, axis=1)
-        places[:axes] = between()(t.ravel())[:axes]
-        return np.moveaxis(places.reshape(3, *t.shape), 0, -1)
+        positions = np.repeat(place[:, None], t.size, axis=1)
+        positions[:axes] = between()(t.ravel())[:axes]
+        return np.moveaxis(positions.reshape(3, *t.shape), 0, -1)
 
     end, way = run.y[:, -1], np.zeros(3)
     way[:axes] = end[:axes] - place[:axes]

@@ -25,7 +25,7 @@ from .side_spin import S, SideState, gravity_on, in_space, same_kind
 
 Array = NDArray[np.float64]
 
-#: What a ball can bounce on in a vertical plane.
+#: Grounds for bounces in a vertical plane.
 Model = BounceLaw | ContactModel
 
 

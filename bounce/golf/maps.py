@@ -142,10 +142,10 @@ def _of_law(law: BounceLaw, landing: tuple[Array, ...]) -> LiftOffs:
 
 def _scaled(many: LiftOffs, unit: Scaling) -> LiftOffs:
     speeds = {name: getattr(many, name) * unit.speed for name in ("xdot", "ydot", "omega")}
-    places = {name: getattr(many, name) * unit.length for name in ("x", "y")}
+    positions = {name: getattr(many, name) * unit.length for name in ("x", "y")}
     return LiftOffs(
         **speeds,
-        **places,
+        **positions,
         time=many.time * unit.time,
         status=many.status,
         itineraries=many.itineraries,

@@ -384,8 +384,8 @@ def _glide(
 
 def _parabola(place: Array, v: Array, acceleration: Array, t: Array) -> Array:
     s = t[..., None]
-    places = place + v * s + acceleration * s**2 / 2
-    return np.concatenate([places, v + acceleration * s], axis=-1)
+    positions = place + v * s + acceleration * s**2 / 2
+    return np.concatenate([positions, v + acceleration * s], axis=-1)
 
 
 def _no_rest(what: str, pull: Array, friction: float) -> NoRestError:

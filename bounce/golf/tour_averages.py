@@ -15,7 +15,7 @@ from ..units import UNITS, Landing
 from .air import Air
 from .flight import flight
 
-#: Where the numbers are from.
+#: Source of the numbers.
 SOURCE = (
     "TrackMan, Introducing updated tour averages, 2024-05-02, trackman.com/blog/introducing-updated-tour-averages "
     "(season 2023, competition and range); read from the transcription in github.com/jhoblitt/tmelevation, "

@@ -16,7 +16,7 @@ from ..shot.state import AlongTheGround
 
 Array = NDArray[np.float64]
 
-#: What the cases of a rigid impact mean; the sign behind them is that of the slip at touch-down.
+#: Meanings of the cases of a rigid impact; the sign after them is that of the slip at touch-down.
 CASES = {
     "I": "slips throughout",
     "II": "slips, then rolls from restitution on",

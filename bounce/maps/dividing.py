@@ -428,7 +428,7 @@ def critical_eta(
     name : str, optional
         The parameter that is varied.
     bounds : (float, float), optional
-        Where the zero is looked for.
+        Range of the search for the zero.
     ydot, xdot : float, optional
         Landing; ``xdot`` is small, so that what depends on its square is lost in rounding.
 

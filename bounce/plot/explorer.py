@@ -19,7 +19,7 @@ from ..shot.state import check_approach, require_model
 from .regions import COLOURS, MORE
 
 WEB = Path(__file__).parent / "web"
-#: What the page shows without a model: slip, rolling, and reverse slip at lift-off.
+#: Content of the page without a model: slip, rolling, and reverse slip at lift-off.
 TURF = KelvinVoigt(mu=0.3, eta=0.5, d1=0.1, d2=0.1, G=0.0001)
 _SCRIPTS = ("contact.js", "maps.js", "pictures.js", "bounce.js")
 #: Symbol, words, and the largest value of a slider.
@@ -138,7 +138,7 @@ def _conventions(model: ContactModel) -> dict[str, ContactModel]:
 
 
 def _systems(model: ContactModel) -> dict[str, ns.FilippovSystem]:
-    """What the page integrates: the contact, the phase before it, and the load as the function of a stop."""
+    """The systems that the page integrates: the contact, the phase before it, and the load as the function of a stop."""
     blueprint = model.blueprint()
     eq = equations(blueprint)
     states = list(eq.x.values())

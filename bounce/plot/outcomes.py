@@ -179,7 +179,7 @@ def _outside(page: Canvas, outcomes: OutcomeMap, x: Array, y: Array) -> dict[str
 
 
 def _cases(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
-    """What the cases of a law on the map mean, for the key; in a column there is no room for it."""
+    """Meanings of the cases of a law on the map, for the key, if there is room."""
     from matplotlib.patches import Patch
 
     cases = {case for name in outcomes.regions for case in name.rstrip("+-").split("/")}
@@ -228,7 +228,7 @@ def _field(
 
 
 def _contour(page: Canvas, outcomes: OutcomeMap, x: Array, y: Array) -> dict[str, Any]:
-    """Where the slip at lift-off changes its sign; what rolls at lift-off has none."""
+    """Curves on which the slip at lift-off changes its sign; a rolling ball has none."""
     slip = np.where(outcomes.lift_offs.complete, outcomes.slip, np.nan)
     rolls = np.array([*(name.endswith("R") for name in outcomes.regions), False])[outcomes.code]
     size = np.abs(np.nan_to_num(slip)).max()

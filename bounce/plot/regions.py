@@ -65,12 +65,12 @@ def regions(page: Canvas, outcomes: OutcomeMap, x: Array, y: Array, room: int) -
     ax = page.ax
     clear = ~_turns(outcomes.slip)
     inside = [outcomes.code == code for code in range(len(outcomes.regions))]
-    places = [
+    positions = [
         _place(ax, x, y, cells & clear, name)
         for cells, name in zip(inside, outcomes.regions, strict=True)
     ]
-    named = [code for code, place in enumerate(places) if place is not None]
-    narrow = [code for code, place in enumerate(places) if place is None]
+    named = [code for code, place in enumerate(positions) if place is not None]
+    narrow = [code for code, place in enumerate(positions) if place is None]
     narrow.sort(key=lambda code: -np.count_nonzero(inside[code]))
     listed = narrow if len(narrow) <= room + 1 else narrow[:room]  # not "and 1 more"
     spare = iter(MORE)
@@ -84,7 +84,7 @@ def regions(page: Canvas, outcomes: OutcomeMap, x: Array, y: Array, room: int) -
     cells = np.ma.masked_less(outcomes.code, 0)  # without lift-off
     ax.pcolormesh(x, y, cells, shading="nearest", rasterized=True, **look)
     for code in named:
-        place = places[code]
+        place = positions[code]
         assert place is not None
         ink = "white" if style.luminance(colours[code]) < 0.2 else "black"
         style.write(
@@ -141,7 +141,7 @@ def _borders(ax: Axes, code: NDArray[Any], rest: Sequence[int], x: Array, y: Arr
 def _place(
     ax: Axes, x: Array, y: Array, inside: NDArray[np.bool_], name: str
 ) -> tuple[float, float] | None:
-    """Where a region is widest, if its name has room there."""
+    """The widest point of a region, if its name fits there."""
     from scipy.ndimage import distance_transform_edt, minimum_filter
 
     room = distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]

@@ -269,7 +269,7 @@ class Shot(Generic[Model, Along]):
         rows = [("phases", self.itinerary), ("lift-off", f"t = {self.time:.6g}")]
         rows += [(n, _short(getattr(end, n))) for n in ("xdot", "ydot", "omega")]
         picture = self.trajectory._repr_html_()
-        return ns.notebook.card("Shot", [*rows, ("slip", _short(self.slip))], picture)
+        return ns.notebook.representation("Shot", [*rows, ("slip", _short(self.slip))], picture)
 
 
 def _short(along: Any) -> str:

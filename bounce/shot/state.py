@@ -19,7 +19,7 @@ from ..parameters import Parametrised, number
 Array = NDArray[np.float64]
 Along = TypeVar("Along", bound=float | Array)
 
-#: What a bounce takes at touch-down.
+#: State at touch-down of a bounce.
 INPUTS = ("xdot", "ydot", "omega", "x", "y")
 
 

@@ -28,7 +28,7 @@ _AHEAD = 1e-17 * 4.0 ** np.arange(25)
 _SHORT = int(np.searchsorted(_AHEAD, INSTANT))
 #: A ball this near to y = 0 that moves up is back at the surface.
 _SURFACE = 1e-9
-#: A ball that is slower than this, relative to how it came and how deep it is, has come to rest.
+#: A ball that is slower than this, relative to its speed at touch-down and its depth, has come to rest.
 _REST = 1e-12
 
 

@@ -22,7 +22,7 @@ SENTENCES = {
     "two_fold": "Both fields are tangent to h{entry} = 0: a two-fold, where the sliding field is 0/0 "
     "and Filippov's convention does not determine the motion.",
     "slid_to_two_fold": "Sliding reached a two-fold of h{entry} = 0: both fields are tangent there.",
-    "ambiguous": "On {differing} = 0 ({place}) the motion can continue in each of the modes {modes}{delay}.",
+    "ambiguous": "On {differing} = 0 ({situation}) the motion can continue in each of the modes {modes}{delay}.",
     "undetermined_rates": "On {entries} = 0 many sets of multipliers keep the motion on the surfaces, and the "
     "field differs between them. Only a combination of them is determined.",
     "stability_lost": "At t = {t:.8g} sliding on {surface} and other surfaces loses its stability across their "
@@ -80,7 +80,7 @@ UNFIRED = (
 )
 
 #: Where several modes can continue, in one surface or in more, and when.
-PLACES = ("repelling sliding or a fold of both fields", "an intersection")
+SITUATIONS = ("repelling sliding or a fold of both fields", "an intersection")
 DELAYS = (", at once or after sliding for a while", "")
 
 #: Notes on diodes and other conditions without a solution, and on steps that a decay rate limits.

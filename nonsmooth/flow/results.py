@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array, FilippovSystem
-from ..notebook import card
+from ..notebook import representation
 from ..tables import Table
 from .constants import KINDS, SIMPLE_KINDS
 from .saving import Savable
@@ -233,7 +233,7 @@ class Ensemble(
             ("itineraries", len(self.itineraries)),
             ("ends", self._ends()),
         )
-        return card("Ensemble", rows)
+        return representation("Ensemble", rows)
 
     def __repr__(self) -> str:
         return (

@@ -54,7 +54,7 @@ class Section:
     skip : int, optional
         Number of events to skip before, to let transients decay.
     count : int, optional
-        Number of samples. A run ends with the last of them, STOPPED; one at a period goes on in
+        Number of samples. A run ends with the last of them, STOPPED; one at a period continues in
         ensembles, where the periods differ.
     after : bool, optional
         The state after a reset or an impact instead of the one before.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..model import Array, FilippovSystem, OptionError, PointError, real_array
-from ..notebook import card, lines
+from ..notebook import lines, representation
 from ..tables import Table
 from .events import Events, Segments, ShownMode
 from .names import shown_mode
@@ -325,7 +325,7 @@ class Trajectory(
         if not self.dense:
             times = self.t[:: max(1, len(self.t) // 240)]
         states = self(times) if self.t[-1] > self.t[0] else self.x[:1]
-        return card(
+        return representation(
             "Trajectory", rows, lines(times[: len(states)], states, self.system.state_names)
         )
 

@@ -1,4 +1,4 @@
-"""Checks and margins that the functions of ``local`` share."""
+"""Checks and margins common to the functions of ``local``."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class LocalObject(Tabular):
         ``"crossing"``, ``"sliding"``, ``"fold"``, ``"cusp"``, ``"fold-fold"`` (plane),
         ``"two-fold"``, ``"touch"`` (of a surface on which nothing slides), ``"rest"`` (between the two
         forces there), ``"equilibrium"``, ``"pseudo-equilibrium"``, ``"boundary equilibrium"``,
-        ``"intersection"`` (of surfaces, where no mode or several can go on) or ``"degenerate"``. On the
+        ``"intersection"`` (of surfaces, where no mode or several are admissible) or ``"degenerate"``. On the
         boundary of a complementarity condition or contact also ``"leaving"``, ``"closed"`` and ``"impact"``.
     label : str
         Its class: ``"crossing up"``, ``"attracting sliding"``, ``"visible"``, ``"II2"``,
@@ -124,7 +124,7 @@ def classify(
     tol: float = 1e-9,
     margin: float = MARGIN,
 ) -> LocalObject:
-    """Say which local object a point is: of a surface, or an equilibrium off it.
+    """Classify a point: the local object of a surface, or an equilibrium off it.
 
     Parameters
     ----------
@@ -143,10 +143,10 @@ def classify(
 
     Notes
     -----
-    Conditions, closed contacts and joints have the letters that go on at the point unless ``mode`` gives them; what
-    they keep at zero is not counted among the directions, so eigenvalues are those of the motions that are possible.
-    Where a condition or contact opens or closes, rest while it is closed is a pseudo-equilibrium, and ``evidence`` has its
-    multiplier; a condition whose y holds its multiplier is a continuous surface.
+    Conditions, closed contacts and joints have the admissible letters at the point unless ``mode`` gives them.
+    Eigenvalues are those of motions that keep their functions at zero. Where a condition or contact opens or closes, rest
+    while it is closed is a pseudo-equilibrium, and ``evidence`` has its multiplier; a condition whose y contains its
+    multiplier is a continuous surface.
 
     Raises
     ------
@@ -574,7 +574,7 @@ def meeting_at(
 def classify_intersection(meeting: Meeting, tol: float, margin: float) -> LocalObject:
     """Classify a point where several surfaces meet."""
     found = meeting.intersection()
-    margins = {"a change of the modes that can go on": found.distance}
+    margins = {"a change of the admissible modes": found.distance}
     whole = found.sliding
     evidence: dict[str, float] = {}
     if whole is not None:
@@ -629,5 +629,5 @@ def _named(found: Intersection) -> tuple[str, str]:
             else ("crossing", f"crossing to {modes[0]}")
         )
     if not modes:
-        return "intersection", "no mode can go on"
-    return "intersection", f"several modes can go on: {', '.join(modes)}"
+        return "intersection", "no mode is admissible"
+    return "intersection", f"several modes are admissible: {', '.join(modes)}"

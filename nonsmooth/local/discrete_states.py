@@ -1,4 +1,4 @@
-"""Analysis at a point of a system with discrete states: they are held at their values there."""
+"""Analysis at a point of a system with discrete states, which are fixed at their values there."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def with_discrete_states_held(analyse: Callable[P, R]) -> Callable[P, R]:
 def _named_virtual(
     found: Any, system: FilippovSystem, values: dict[str, float], parameters: Parameters | None
 ) -> Any:
-    """Rest as virtual where a stop or reset is due at once, so that no motion comes to it."""
+    """Mark an equilibrium as virtual where a stop or reset is due at once, so that no motion reaches it."""
     own, kind = getattr(found, "status", None), getattr(found, "kind", "")
     named = kind in ("equilibrium", "pseudo-equilibrium")
     if own != "real" and not named:

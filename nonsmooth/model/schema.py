@@ -147,12 +147,12 @@ class _Spec:
 
     def _shape(self, found: tuple[int, ...], words: Sequence[str]) -> None:
         leading = words[:1] == ["..."]
-        wanted = words[1:] if leading else words
-        first = len(found) - len(wanted)
+        target = words[1:] if leading else words
+        first = len(found) - len(target)
         _demand(first >= 0 if leading else not first, f"it has the shape {found}")
         if leading:
             self._length("...", found[:first])
-        for word, length in zip(wanted, found[first:], strict=True):
+        for word, length in zip(target, found[first:], strict=True):
             if word != "*":
                 self._length(word, length)
 

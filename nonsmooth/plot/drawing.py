@@ -34,7 +34,7 @@ _DARK = 0.5  # luminance of a background below which lightness is inverted
 
 
 class Canvas:
-    """Axes to draw on, and the colours and line styles that the user wants."""
+    """Axes to draw on, and the colours and line styles of the user."""
 
     def __init__(self, place: Any, drawn: Drawn, colors: Colors, look: dict[str, Any]):
         self.figure: Any = place.get_figure(root=True) if isinstance(place, Axes) else place

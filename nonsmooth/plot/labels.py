@@ -161,9 +161,9 @@ class Labels(Artist):
         offsets = [_DIRECTIONS * (size / 2 + gap * point) for gap in gaps]
         offset = np.zeros((1, 2)) if name.inside else np.vstack(offsets)
         far = np.repeat(gaps, len(offset) // len(gaps))
-        wanted = (anchors[:, None] + offset).reshape(-1, 2)
-        tried = room.within(wanted, size)
-        moved = np.linalg.norm(tried - wanted, axis=1) / point
+        target = (anchors[:, None] + offset).reshape(-1, 2)
+        tried = room.within(target, size)
+        moved = np.linalg.norm(tried - target, axis=1) / point
         cost = room.cost(tried, size) + _FAR * (np.tile(far, len(anchors)) + moved)
         if not name.inside:
             own = np.repeat(anchors, len(offset), 0)

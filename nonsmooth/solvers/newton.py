@@ -3,7 +3,7 @@
 Each step is the shortest one that solves the linearised equations (Gauss-Newton; Ben-Israel 1966),
 so the root found is close to the start. Equations are divided by the length of their gradient:
 residuals are distances, whatever the units of the equations. A step is halved until the residual
-falls. The iteration goes on to rounding and is accepted if the residual is below ``tol``.
+falls. The iteration continues to rounding and is accepted if the residual is below ``tol``.
 
 From a good guess of as many equations as unknowns ``converge`` takes full steps and stops as soon as
 the next one would be below ``tol``; ``Secant`` carries the Jacobian from one evaluation to the next
@@ -165,7 +165,7 @@ def _accept(
 
 
 class Secant:
-    """Equations without derivatives: the Jacobian is carried along from differences (Broyden 1965).
+    """Equations without derivatives: the Jacobian is updated from differences (Broyden 1965).
 
     Along a curve the Jacobian of the last point is good, and a point costs two or three evaluations
     instead of those and as many more as there are unknowns.

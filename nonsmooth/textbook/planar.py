@@ -89,7 +89,7 @@ def scalar_sliding() -> Problem:
 def scalar_repelling() -> Problem:
     """One state that can leave to either side, or stay: the continuation is not unique.
 
-    $x' = sgn x$ from 0. A run must stop with NON_UNIQUE at once; with ``start_mode`` it goes on.
+    $x' = sgn x$ from 0. A run must stop with NON_UNIQUE at once; with ``start_mode`` it continues.
 
     Returns
     -------

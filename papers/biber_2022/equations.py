@@ -207,14 +207,14 @@ def regions() -> Checks:
     system = ns.FilippovSystem(
         ca.vertsplit(z), surface=z[0], above=[-z[1], -1, -2], below=[z[2], -1, -1]
     )
-    wanted = {
+    target = {
         (1, 1): ns.Region.ATTRACTING,
         (-1, -1): ns.Region.REPELLING,
         (-1, 1): ns.Region.CROSSING_UP,
         (1, -1): ns.Region.CROSSING_DOWN,
     }
-    found = {k: ns.region(system, [0.0, *k]) for k in wanted}
-    yield Check("D_att attracts, D_rep repels, C1 crosses upwards, C2 downwards", found == wanted)
+    found = {k: ns.region(system, [0.0, *k]) for k in target}
+    yield Check("D_att attracts, D_rep repels, C1 crosses upwards, C2 downwards", found == target)
 
 
 @EQUATIONS("56")

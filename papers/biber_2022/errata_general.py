@@ -187,7 +187,7 @@ def visible_condition() -> Checks:
     """19: when the ball's two-fold is visible."""
     stiff = linear(mu=0.3, d1=0.0, d2=0.1, eta=2.0, G=0.0)
     hertz = hunt_crossley_law(1e-9)
-    found, wanted = {}, {}
+    found, target = {}, {}
     for name, model, xp in (("stiff", stiff, 0.5), ("slow", stiff, 0.05), ("hertz", hertz, 0.2)):
         fold = ns.find_two_fold(model.system, near=two_fold_point(model, xp, 0.7))
         drift = Xp * ca.jacobian(model.A, X) + Yp * ca.jacobian(model.A, Y)
@@ -195,7 +195,7 @@ def visible_condition() -> Checks:
         size = abs(model.value(drift, fold.point))
         limit = model.value(bound, fold.point)
         found[name] = (fold.kind, size, limit, fold.nu[0] * fold.nu[1], fold.canards)
-        wanted[name] = (fold.kind == "visible") == (size < limit)
+        target[name] = (fold.kind == "visible") == (size < limit)
     g = generic()
     both = g.equations.lie(1, 1) + g.equations.lie(2, 2)
     drift = Xp * ca.jacobian(g.equations.A, X) + Yp * ca.jacobian(g.equations.A, Y)
@@ -205,7 +205,7 @@ def visible_condition() -> Checks:
         return Check(
             f"{what}: {size:.4g} against {limit:.4g}, {actual}, nu1 nu2 = {product:.12g}, "
             f"canards {canards:g}",
-            actual == kind and wanted[name] and canards == (kind == "visible"),
+            actual == kind and target[name] and canards == (kind == "visible"),
         )
 
     yield Check(

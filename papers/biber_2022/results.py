@@ -79,10 +79,10 @@ def rigid_cases() -> Found:
     for ratio in (0.3, 0.999 * low, 1.001 * low, 0.999 * high, 1.001 * high, 3.0):
         for letter, sign in (("+", 1), ("-", -1)):
             run = ns.simulate(system, [sign * ratio * v0, -v0], 10.0, tol=1e-12)
-            wanted = letter if ratio > high else f"{letter} s"
+            target = letter if ratio > high else f"{letter} s"
             entries = [e.x[1] for e in run.events if e.kind == "entry"]
             in_compression = bool(entries) and entries[0] < 0
-            right.append(run.itinerary == wanted and in_compression == (ratio < low))
+            right.append(run.itinerary == target and in_compression == (ratio < low))
     return (
         f"{sum(right)} of {len(right)} starts, on both sides of each boundary and of both signs, "
         "behave as stated",
@@ -238,7 +238,7 @@ def dividing_surface() -> Found:
     rolling, slipping = dividing_points()
     return (
         f"so at X'0 = {rolling['Xp0']:.4f}, Omega0 = {rolling['Omega0']:.9f} "
-        f"({rolling['sides'][0]} | {rolling['sides'][1]}); but the surface goes on where the ball "
+        f"({rolling['sides'][0]} | {rolling['sides'][1]}); but the surface continues where the ball "
         f"slips throughout and H = 0 at lift-off: X'0 = {slipping['Xp0']:.4f}, Omega0 = "
         f"{slipping['Omega0']:.9f} ({slipping['sides'][0]} | {slipping['sides'][1]}), a second part "
         "that the paper does not mention",

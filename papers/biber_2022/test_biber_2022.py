@@ -48,7 +48,7 @@ def test_kv_pert_trajectories_match_the_reference(name):
     end = [float(v) for v in reference["p_F"]]
     assert results.last_state(shot) == pytest.approx(end, rel=0, abs=1e-10)
     assert shot.time == pytest.approx(float(reference["tau_F"]), rel=0, abs=1e-10)
-    # H_F of A is 4e-20: below rounding, so its last phase is not asked of float64.
+    # H_F of A is 4e-20: below rounding, so its last phase is not tested in float64.
     if name != "A_printed":
         assert shot.itinerary == reference["itinerary"]
     inner = [e for e in shot.trajectory.events if e.kind in ("entry", "exit", "crossing")]

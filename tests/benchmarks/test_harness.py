@@ -38,11 +38,11 @@ def test_peers_and_library_get_the_same_fields(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_mpmath_scipy_and_the_library_agree(name):
     starts = problems.random_starts(2, seed=7)
-    truth = reference.solve(name, starts)
+    exact = reference.solve(name, starts)
     for solve in (library.make(name, 1e-13), scipy_dop853.make(name, 1e-11)):
         ends = solve(starts)
-        assert reference.error(ends, truth).max() < 1e-9
-        assert (ends.itinerary == truth.itinerary).all()
+        assert reference.error(ends, exact).max() < 1e-9
+        assert (ends.itinerary == exact.itinerary).all()
 
 
 @pytest.mark.parametrize(
@@ -54,10 +54,10 @@ def test_peers_that_are_installed_agree(peer):
     if not peer.available():
         pytest.skip("an extra of the benchmarks")
     starts = problems.random_starts(2, seed=7)
-    truth = reference.solve("linear", starts)
+    exact = reference.solve("linear", starts)
     ends = peer.make("linear", 1e-10)(starts)
-    assert reference.error(ends, truth).max() < 1e-8
-    assert (ends.itinerary == truth.itinerary).all()
+    assert reference.error(ends, exact).max() < 1e-8
+    assert (ends.itinerary == exact.itinerary).all()
 
 
 def test_stick_slip_is_the_same_for_peers():

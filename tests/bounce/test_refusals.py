@@ -64,7 +64,7 @@ def test_a_failed_lift_off_keeps_its_trajectory_through_a_pickle():
     assert (type(again), str(again), again.trajectory) == (type(error), str(error), None)
 
 
-def test_a_hypothesis_that_is_not_the_usual_one_is_told_and_kept():
+def test_a_hypothesis_that_is_not_the_usual_one_is_reported_and_kept():
     law = bounce.laws.RigidBounce(mu=0.3, restitution=0.5, hypothesis="poisson")
     assert "poisson" in repr(law)
     assert law.replace(mu=0.4).options()["hypothesis"] == "poisson"

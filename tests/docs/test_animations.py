@@ -1,4 +1,4 @@
-"""Moving pictures have as many moments as asked for, move, and end with a still of the last one."""
+"""Animations have the requested number of frames, move, and end with a still of the last one."""
 
 import itertools
 

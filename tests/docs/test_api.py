@@ -68,7 +68,7 @@ def entries(doc):
     return said | {name.strip(" *") for head in heads for name in head.split(",")}
 
 
-def wanted(path, thing):
+def expected(path, thing):
     """Parameters of functions and methods, and fields of results; those of overrides are their base's."""
     if not inspect.isclass(thing):
         return [(path, thing.__doc__, [*inspect.signature(thing).parameters])]
@@ -98,7 +98,7 @@ def test_no_parameter_and_no_field_is_left_out(module):
     missing = {
         where: [name for name in names if name not in entries(doc or "")]
         for path, thing in of(module)
-        for where, doc, names in wanted(path, thing)
+        for where, doc, names in expected(path, thing)
     }
     assert {where: names for where, names in missing.items() if names} == {}
 
@@ -122,15 +122,15 @@ def test_no_name_is_on_two_pages():
     assert [path for path, n in counts.items() if n > 1] == []
 
 
-def test_pages_ask_for_each_name_and_are_in_the_navigation():
+def test_pages_request_each_name_and_are_in_the_navigation():
     pages = api.pages()
     text = "\n".join(t for uri, t in pages.items() if uri != "api/index.md")
-    asked = re.findall(r"^(?:\[\]\(\)\{#([\w.]+)\}\n\n)?::: ([\w.]+)$", text, re.MULTILINE)
-    assert sorted(shown or path for shown, path in asked) == sorted(OBJECTS)
-    for shown, path in asked:  # a module of the same name would be described instead
+    requested = re.findall(r"^(?:\[\]\(\)\{#([\w.]+)\}\n\n)?::: ([\w.]+)$", text, re.MULTILINE)
+    assert sorted(shown or path for shown, path in requested) == sorted(OBJECTS)
+    for shown, path in requested:  # a module of the same name would be described instead
         module, _, name = path.rpartition(".")
         thing = getattr(importlib.import_module(module), name)
         assert not inspect.ismodule(thing) and thing is OBJECTS[shown or path]
-    assert len([shown for shown, _ in asked if shown]) > 20
+    assert len([shown for shown, _ in requested if shown]) > 20
     navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
     assert [uri for uri in pages if f": {uri}\n" not in navigation] == []

@@ -197,15 +197,15 @@ def test_dividing_curve_divides_the_map():
 def test_wells_are_divided_where_the_closed_form_says():
     wells = ran("wells")
     zeta = 0.1
-    truth = 1 + math.exp(zeta * math.pi / math.sqrt(1 - zeta**2))
-    assert wells["threshold"] == pytest.approx(truth, abs=1e-7)
+    exact = 1 + math.exp(zeta * math.pi / math.sqrt(1 - zeta**2))
+    assert wells["threshold"] == pytest.approx(exact, abs=1e-7)
     labels, (xs, vs) = wells["found"].labels, wells["found"].axes.values()
     assert set(np.unique(labels)) == {1, 2}
     assert np.array_equal(labels, 3 - labels[::-1, ::-1])  # the system is odd
     row = labels[:, int(np.argmin(abs(vs)))]
-    beyond = (xs > truth + 0.1) & (xs < 3.2)
-    assert len(set(row[(xs > 0.2) & (xs < truth - 0.1)])) == 1
-    assert set(row[beyond]).isdisjoint(row[(xs > 0.2) & (xs < truth - 0.1)])
+    beyond = (xs > exact + 0.1) & (xs < 3.2)
+    assert len(set(row[(xs > 0.2) & (xs < exact - 0.1)])) == 1
+    assert set(row[beyond]).isdisjoint(row[(xs > 0.2) & (xs < exact - 0.1)])
 
 
 @pytest.mark.slow
@@ -246,8 +246,8 @@ def test_forced_friction_is_den_hartogs():
             friction = orbit.parameters["f"]
             if friction < 0.99 * found["first_stop"](W):
                 assert "s" not in orbit.itinerary
-                truth = found["amplitude"](W, friction)
-                assert found["largest"](orbit) == pytest.approx(truth, rel=1e-10)
+                exact = found["amplitude"](W, friction)
+                assert found["largest"](orbit) == pytest.approx(exact, rel=1e-10)
                 seen += 1
             elif friction > 1.01 * found["first_stop"](W):
                 assert "s" in orbit.itinerary
@@ -270,10 +270,10 @@ def test_curves_of_the_pushed_block_in_closed_form():
         elif curve.kind == "adding-sliding":
             assert np.abs(push - np.abs(amplitude - 1)).max() < 1e-11
     top = math.hypot(1, 2.5 * math.tanh(math.pi / 4) + 0.5)
-    wanted = [(0, 1), (1.4338290190161366, 2.4338290190161366), (0, top)]
+    expected = [(0, 1), (1.4338290190161366, 2.4338290190161366), (0, top)]
     assert len(points) == 4
     for point in points:
-        assert min(np.abs(np.abs(point) - one).max() for one in wanted) < 1e-9
+        assert min(np.abs(np.abs(point) - one).max() for one in expected) < 1e-9
     assert found["regions"][0.0, 3.2] == "+ -" and found["regions"][1.1, 1.0] == "+ s"
 
 
@@ -367,8 +367,8 @@ def test_the_oscillator_grazes_where_its_free_response_reaches_the_wall():
     assert found["grazing"].parameter == pytest.approx(size, rel=1e-12)
     x, forces = found["many"].sample_x[..., 0], found["forces"]
     last = forces > 4.55
-    truth = [found["strobed"](0)(found["single"][float(force)]) for force in forces[last]]
-    assert np.abs(x[last] - np.array(truth)[:, None]).max() < 1e-6
+    exact = [found["strobed"](0)(found["single"][float(force)]) for force in forces[last]]
+    assert np.abs(x[last] - np.array(exact)[:, None]).max() < 1e-6
     before = forces < 0.99 * size
     free = (forces / (1 - 2.2**2 + 0.22j)).real[before]
     assert np.abs(x[before] - free[:, None]).max() < 1e-6

@@ -36,7 +36,7 @@ def done():
     return notebooks.run(PAGE)
 
 
-def test_a_picture_is_drawn_where_the_page_asks_for_one(done):
+def test_a_picture_is_drawn_where_the_page_requests_one(done):
     assert [bool(cell.pictures) for cell in done] == [False, True, False, False]
     assert done[1].pictures["png"].startswith(b"\x89PNG")
     page = notebooks.with_pictures(PAGE, "name")

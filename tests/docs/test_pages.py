@@ -24,14 +24,14 @@ BLOCK = re.compile(
 SAME = doctest.NORMALIZE_WHITESPACE
 
 
-def check_block(name, line, source, wanted, namespace):
+def check_block(name, line, source, required, namespace):
     """Run one block and compare what it prints."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         exec(compile("\n" * (line - 1) + source, name, "exec"), namespace)
-    if wanted is not None:
-        agrees = doctest.OutputChecker().check_output(wanted, printed.getvalue(), SAME)
-        assert agrees, f"{name}:{line}: expected\n{wanted}\nprinted\n{printed.getvalue()}"
+    if required is not None:
+        agrees = doctest.OutputChecker().check_output(required, printed.getvalue(), SAME)
+        assert agrees, f"{name}:{line}: expected\n{required}\nprinted\n{printed.getvalue()}"
 
 
 @pytest.mark.slow_cases("branches", "coming_from", "golf", "recipes", "start", "trades")

@@ -89,14 +89,14 @@ def run(seed: int, counts: Counts, tol: float = 1e-10) -> None:
             counts.left_out += 1
             continue
         found = ns.simulate(system, [1.0, 0.0, 0.0], T_END, parameters={"h": level}, tol=tol)
-        met = np.array([e.t for e in found.events if e.kind == "reset"])
+        reached = np.array([e.t for e in found.events if e.kind == "reset"])
         counts.runs += 1
         counts.passages += len(true)
-        if len(met) != len(true) or found.x[-1, 2] != len(true):
+        if len(reached) != len(true) or found.x[-1, 2] != len(true):
             counts.wrong += 1
-            print(f"seed {seed}, level {level!r}: {len(met)} passages of {len(true)}")
+            print(f"seed {seed}, level {level!r}: {len(reached)} passages of {len(true)}")
         elif len(true):
-            counts.worst = max(counts.worst, float(np.abs(met - true).max()))
+            counts.worst = max(counts.worst, float(np.abs(reached - true).max()))
 
 
 def main(shapes: int, seed: int = 0, tol: float = 1e-10) -> Counts:

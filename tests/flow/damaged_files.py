@@ -197,11 +197,11 @@ def _with_tree(parts, text):
 
 def replaced(rng, tree, junk=JUNK):
     """Change one part of a tree: another value, left out, doubled."""
-    places = _places(tree, [])[1:]
+    points = _places(tree, [])[1:]
     leaves = (
-        [p for p in places if not any(q[:-1] == p for q in places)] if len(places) < 3000 else []
+        [p for p in points if not any(q[:-1] == p for q in points)] if len(points) < 3000 else []
     )
-    chosen = leaves if leaves and rng.random() < 0.5 else places
+    chosen = leaves if leaves and rng.random() < 0.5 else points
     if not chosen:
         return
     *road, last = chosen[rng.integers(len(chosen))]

@@ -3,7 +3,7 @@
     python -m tests.flow.instrumented sanitize [what pytest takes]
     python -m tests.flow.instrumented uncovered [what pytest takes]
 
-Unless told otherwise both run the fast tests of ``tests/flow``. The second prints the lines of ``DECISIONS``
+By default both run the fast tests of ``tests/flow``. The second prints the lines of ``DECISIONS``
 that were not run, or of the files named by ``NONSMOOTH_UNCOVERED`` (names with commas between).
 """
 

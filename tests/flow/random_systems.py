@@ -291,10 +291,10 @@ def _without_rattle(events: list[tuple[float, str, str]]) -> list[tuple[float, s
     ]
 
 
-def difference(problem: Problem, truth: Outcome, run: Any, tol: float = TOLERANCE) -> str:
-    """What differs between a run and the truth, or an empty string."""
-    events, true = _without_rattle(package_events(run, problem)), _without_rattle(truth.events)
-    if truth.status == run.status.name == "ENDLESS_JUMPS":  # counted further there
+def difference(problem: Problem, exact: Outcome, run: Any, tol: float = TOLERANCE) -> str:
+    """The difference between a run and the reference solution, or an empty string."""
+    events, true = _without_rattle(package_events(run, problem)), _without_rattle(exact.events)
+    if exact.status == run.status.name == "ENDLESS_JUMPS":  # counted further there
         events = events[: len(true)]
     # the mode is that after the last jump of an instant
     words = [(what, mode) if mode else (what, None) for _, what, mode in true]
@@ -308,20 +308,20 @@ def difference(problem: Problem, truth: Outcome, run: Any, tol: float = TOLERANC
             min(len(words), len(got)),
         )
         return f"event {k}: true {true[k : k + 2]}, came {events[k : k + 2]}, {run.status.name}"
-    if run.status.name != truth.status:
-        return f"status: true {truth.status}, came {run.status.name} at {run.t[-1]:.6g}"
-    if truth.status == "ENDLESS_JUMPS":
+    if run.status.name != exact.status:
+        return f"status: true {exact.status}, came {run.status.name} at {run.t[-1]:.6g}"
+    if exact.status == "ENDLESS_JUMPS":
         return ""
     # when a contact closes is a limit of impacts, which the integrator extrapolates
     weight = [0.1 if what == "mode" and mode.endswith("c") else 1.0 for _, what, mode in events]
     pairs = zip(true, events, weight, strict=True)
     late = max([w * abs(a[0] - b[0]) for a, b, w in pairs], default=0.0)
-    error = float(np.max(np.abs(run.x[-1] - truth.x) / (1 + np.abs(truth.x))))
+    error = float(np.max(np.abs(run.x[-1] - exact.x) / (1 + np.abs(exact.x))))
     if max(late, error) <= 10 * tol:
         return ""
     moved = follow(replace(problem, start=nudged(problem)))
-    growth = float(np.max(np.abs(moved.x - truth.x))) / 1e-7
-    if moved.status == truth.status and max(late, error) <= 10 * tol * max(1.0, growth):
+    growth = float(np.max(np.abs(moved.x - exact.x))) / 1e-7
+    if moved.status == exact.status and max(late, error) <= 10 * tol * max(1.0, growth):
         return ""
     return f"digits: state {error:.2g}, times {late:.2g}, errors of the start grow by {growth:.2g}"
 
@@ -346,15 +346,15 @@ def wrong_side(problem: Problem, run: Any) -> str:
 def compare(seed: int, more: bool = True) -> tuple[str, str, frozenset[str]]:
     """Verdict (right, undecided, wrong: what), status of the integrator, kinds."""
     problem, kinds = draw(seed, more)
-    truth = follow(problem)
-    if truth.trouble:
-        return "undecided: " + truth.trouble, "", kinds
+    exact = follow(problem)
+    if exact.trouble:
+        return "undecided: " + exact.trouble, "", kinds
     try:
         run = ns.simulate(package_system(problem), problem.start, problem.t_end, tol=TOLERANCE)
     except (TypeError, ns.DefinitionError) as error:
-        return f"refused: {str(error)[:80]}", truth.status, kinds
-    found = difference(problem, truth, run) or wrong_side(problem, run)
-    return (f"wrong: {found}" if found else "right"), truth.status, kinds
+        return f"refused: {str(error)[:80]}", exact.status, kinds
+    found = difference(problem, exact, run) or wrong_side(problem, run)
+    return (f"wrong: {found}" if found else "right"), exact.status, kinds
 
 
 def main(count: int, first: int = 0) -> None:

@@ -100,8 +100,8 @@ def test_super_twisting_control_rests_at_its_limit():
     run = ns.simulate(system, [1.0, 0.5], 10.0)
     assert run.status is ns.Status.REACHED_END and np.abs(run.x[-1]).max() < 1e-12
     (rest,) = events(run, "rest")
-    met = np.array([e.x[1] for e in events(run, "crossing")])
-    np.testing.assert_allclose(met[:6], met[0] * (-ratio) ** np.arange(6), atol=1e-6)
+    crossed = np.array([e.x[1] for e in events(run, "crossing")])
+    np.testing.assert_allclose(crossed[:6], crossed[0] * (-ratio) ** np.arange(6), atol=1e-6)
     first = run.events[0]
     left = abs(first.x[1]) * (1 + ratio) / (k2 * (1 - ratio))
     # v decides by sqrt|s|, and s is known to 1e-10
@@ -117,8 +117,8 @@ def test_a_root_on_one_of_several_surfaces_is_passed_as_on_one():
     beside = ns.FilippovSystem.from_expression([x, v, w], [*control, -0.3 * ca.sign(w)])
     run = ns.simulate(beside, [1.0, 0.5, 5.0], 10.0)
     assert run.status is ns.Status.REACHED_END and np.abs(run.x[-1][:2]).max() < 1e-12
-    met, expected = events(run, "crossing"), events(alone, "crossing")
-    for one, other in zip(met[:6], expected[:6], strict=True):
+    crossed, expected = events(run, "crossing"), events(alone, "crossing")
+    for one, other in zip(crossed[:6], expected[:6], strict=True):
         assert one.t == pytest.approx(other.t, abs=1e-8)
         assert one.x[:2] == pytest.approx(other.x, abs=1e-6)
         assert one.x[2] == pytest.approx(5.0 - 0.3 * one.t)
@@ -176,7 +176,7 @@ def _rounded_steps(start, step, end):
 
 @pytest.mark.parametrize("offset", [0.0, 1e6, 1e8])
 @pytest.mark.parametrize(("direction", "speed"), [(-1, -1.0), (0, -1.0), (0, 1.0), (1, 1.0)])
-def test_a_stop_at_the_end_of_a_step_is_met(offset, direction, speed):
+def test_a_stop_at_the_end_of_a_step_is_reached(offset, direction, speed):
     """Steps of max_step end where the stop is, on either side of it by rounding, or on it."""
     y = ca.SX.sym("y")
     system = ns.FilippovSystem([y], field=[speed], stops=[ns.Stop(y - offset, direction)])
@@ -205,7 +205,7 @@ def test_a_ball_does_not_fall_through_the_floor_at_the_end_of_a_step(step):
         assert run.x[:, 0].min() > -1e-15
 
 
-def test_a_run_goes_on_from_where_its_sliding_ended():
+def test_a_run_continues_from_where_its_sliding_ended():
     """Whatever rounding of terms that cancel leaves of a rate that is zero there."""
     a, u = ca.SX.sym("a"), 1000 * x
     large = 7.3 * ca.cos(u) - 7.2 * kap * ca.cos(u)

@@ -76,9 +76,9 @@ def desingularised(sigma, nu, starts, direction):
         f1, f2 = fields(sigma, nu, x)
         radius = np.linalg.norm(x, axis=0)
         closest = np.minimum(closest, radius)
-        met = (("s", radius < 1e-7 * RADIUS), ("z2", f1[0] >= 0), ("z3", f2[0] <= 0),
+        crossed = (("s", radius < 1e-7 * RADIUS), ("z2", f1[0] >= 0), ("z3", f2[0] <= 0),
                ("far", radius > 6 * RADIUS))  # fmt: skip
-        for name, here in met:
+        for name, here in crossed:
             end[go & here & (end == "")] = name
     raise AssertionError("no end")
 

@@ -107,13 +107,13 @@ def test_a_parameter_given_twice_is_refused():
     ],
 )
 @pytest.mark.parametrize("system", [None, "system", [X, Y]], ids=repr)
-def test_a_system_is_asked_for_where_there_is_none(call, system):
+def test_a_system_is_requested_where_there_is_none(call, system):
     with pytest.raises(ns.DefinitionError, match="system"):
         call(system)
 
 
 @pytest.mark.parametrize("time", ["a", 0.5 + 1j, [True]], ids=repr)
-def test_dense_output_is_asked_at_real_times(time):
+def test_dense_output_takes_real_times(time):
     with pytest.raises(ns.PointError, match="time"):
         ns.simulate(SYSTEM, [3.0, 0.0], 1.0)(time)
 
@@ -186,7 +186,7 @@ def test_other_wrong_arguments(call, message):
 
 
 def test_a_first_run_loads_no_masked_arrays():
-    """NumPy loads them when asked, which takes as long as a third of a first run."""
+    """NumPy loads them on demand, which takes a third of the time of a first run."""
     code = (
         "import sys, casadi as ca, numpy, nonsmooth as ns\n"
         "before = 'numpy.ma' in sys.modules\n"

@@ -108,7 +108,7 @@ def test_known_attractors_come_first_and_labels_survive_a_file(tmp_path):
     assert list(again.axes) == ["x", "v"]
 
 
-def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_store(tmp_path, monkeypatch):
+def test_an_interrupted_search_keeps_its_labels_and_continues_from_a_store(tmp_path, monkeypatch):
     grid = {"x": np.linspace(-3, 3, 9), "v": np.linspace(-2, 2, 6)}
     space = Search._sample.__globals__
     plain, calls, last = space["ensemble"], [], 10**6
@@ -120,17 +120,17 @@ def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_store(tmp_pat
         return plain(*args, **options)
 
     monkeypatch.setitem(space, "ensemble", ensemble)
-    truth = ns.basins(WELL, grid, t_end=160.0, work=QUIET)
+    exact = ns.basins(WELL, grid, t_end=160.0, work=QUIET)
     last, calls = len(calls), []
     work = ns.Work(threads=1, progress=False, store=tmp_path / "saved")
     cut = ns.basins(WELL, grid, t_end=160.0, work=work)
     assert not cut.complete and "interrupted" in repr(cut)
     decided = cut.labels != 0
     assert 0 < decided.sum() < cut.labels.size
-    assert np.array_equal(cut.labels[decided], truth.labels[decided])
+    assert np.array_equal(cut.labels[decided], exact.labels[decided])
     monkeypatch.setitem(space, "ensemble", plain)
     again = ns.basins(WELL, grid, t_end=160.0, work=work)
-    assert again.complete and np.array_equal(again.labels, truth.labels)
+    assert again.complete and np.array_equal(again.labels, exact.labels)
 
 
 @pytest.mark.parametrize(

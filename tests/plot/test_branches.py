@@ -39,8 +39,8 @@ def test_every_solution_is_on_a_line_and_every_event_on_a_marker(takens):
     ax = ns.plot.branch(takens).axes[0]
     lines = [line for line in ax.lines if not str(line.get_gid()).startswith("event")]
     drawn = {(float(u), float(v)) for line in lines for u, v in zip(*line.get_data(), strict=True)}
-    wanted = {(v, s.point[0]) for v, s in zip(takens.values, takens.solutions, strict=True)}
-    assert wanted < drawn
+    expected = {(v, s.point[0]) for v, s in zip(takens.values, takens.solutions, strict=True)}
+    assert expected < drawn
     assert_allclose([u - v + v**2 for u, v in drawn], 0.0, atol=1e-9)  # nothing between is made up
     for event in takens.events:
         (mark,) = [line for line in ax.lines if line.get_gid() == f"event {event.kind}"]

@@ -172,9 +172,9 @@ def test_special_points_are_those_of_python_s_scan():
     answers = script(SCAN, dict(web=str(WEB), module=driver.module(), cases=cases))
     for (system, box), answer in zip(PLANES, answers, strict=True):
         scan = PlaneScan.of(system, {}, Box.read(box))
-        wanted = special(scan)
-        assert len(wanted) == len(answer["marks"]) > 0
-        for kind, name, point in wanted:
+        expected = special(scan)
+        assert len(expected) == len(answer["marks"]) > 0
+        for kind, name, point in expected:
             near = min(answer["marks"], key=lambda m: np.linalg.norm(np.subtract(m["x"], point)))
             assert near["type"] == kind and near["x"] == pytest.approx(point, abs=1e-8)
             assert near["kind"] == name if kind == "fold" else name in near["kind"]

@@ -30,13 +30,13 @@ def gap(box, points):
 
 def test_names_of_neighbours_do_not_meet(axes):
     labels = Labels(axes)
-    places = [(0.5, 0.5), (0.52, 0.5), (0.5, 0.53), (0.98, 0.98), (0.02, 0.01)]
-    for k, place in enumerate(places):
+    positions = [(0.5, 0.5), (0.52, 0.5), (0.5, 0.53), (0.98, 0.98), (0.02, 0.01)]
+    for k, place in enumerate(positions):
         axes.plot(*place, "o", color="black", markersize=6)
         labels.name(f"a point with number {k}", place)
     found = boxes(axes, labels)
     frame = axes.get_window_extent()
-    for k, (box, place) in enumerate(zip(found, axes.transData.transform(places), strict=True)):
+    for k, (box, place) in enumerate(zip(found, axes.transData.transform(positions), strict=True)):
         assert not any(box.overlaps(other) for other in found[k + 1 :])
         assert frame.contains(*box.p0) and frame.contains(*box.p1)
         assert 2.0 < gap(box, place[None]) < 26.0
@@ -120,15 +120,15 @@ def test_names_of_two_sets_do_not_meet(axes):
 
 def test_names_of_two_points_side_by_side_are_not_taken_for_each_other(axes):
     """Each is closer to its own point, and no line to a point passes another."""
-    places = np.array([(0.5, 0.5), (0.53, 0.5)])
+    positions = np.array([(0.5, 0.5), (0.53, 0.5)])
     axes.plot([0, 0.5], [0.5, 0.5], color="black", linewidth=3.4)
     for y in np.linspace(0.52, 0.98, 12):
         axes.plot([0.5, 1.0], [0.5, y], color="black")
-    axes.plot(*places.T, "s", color="black", markersize=8, linestyle="none")
+    axes.plot(*positions.T, "s", color="black", markersize=8, linestyle="none")
     labels = Labels(axes)
-    for text, place in zip(("a stable node", "an invisible fold"), places, strict=True):
+    for text, place in zip(("a stable node", "an invisible fold"), positions, strict=True):
         labels.name(text, place)
-    points = axes.transData.transform(places)
+    points = axes.transData.transform(positions)
     for k, box in enumerate(boxes(axes, labels)):
         assert gap(box, points[k : k + 1]) <= gap(box, points[1 - k : 2 - k])
         assert not box.contains(points[0, 0] - 60, points[0, 1])  # the thick line is not hidden

@@ -1,4 +1,4 @@
-"""Colours that appear together are told apart by deuteranopes too; what is saved has TrueType fonts."""
+"""Colours that appear together differ for deuteranopes too; saved figures have TrueType fonts."""
 
 from itertools import combinations, pairwise
 
@@ -76,7 +76,7 @@ PAIRS["law"] = [(COLOURS[a], COLOURS[b]) for a, b in pairwise(LAW)]
 
 @pytest.mark.parametrize("eye", [np.eye(3), DEUTERANOPIA], ids=["most", "deuteranopia"])
 @pytest.mark.parametrize("name", PAIRS)
-def test_colours_that_appear_together_are_told_apart(name, eye):
+def test_colours_that_appear_together_are_distinct(name, eye):
     assert {pair for pair in PAIRS[name] if apart(*pair, eye) < 15.0} == set()
 
 
@@ -106,8 +106,8 @@ def test_fonts_are_true_type_whatever_the_settings(name, kind, tmp_path):
     assert dict(matplotlib.rcParams) == before
     content = (tmp_path / f"picture.{kind}").read_bytes()
     fonts = {"pdf": (b"/Type3", b"/CIDFontType2"), "ps": (b"/FontType 3", b"/FontType 42")}
-    unwanted, wanted = fonts[kind]
-    assert unwanted not in content and wanted in content
+    unwanted, expected = fonts[kind]
+    assert unwanted not in content and expected in content
 
 
 BLOCK = ns.FilippovSystem(

@@ -70,7 +70,7 @@ def test_a_number_of_orbits_is_whole(orbits):
         ns.plot.sliding_portrait(system, (-1, 1, -1, 1), orbits=orbits)
 
 
-def test_a_sliding_portrait_has_the_title_and_the_legend_that_were_asked_for():
+def test_a_sliding_portrait_has_the_title_and_the_legend_that_were_requested():
     system = ns.textbook.two_fold("VV-C1").system
     figure = ns.plot.sliding_portrait(system, (-1, 1, -1, 1), orbits=0, legend=False, title="mine")
     assert figure.axes[0].get_title() == "mine"
@@ -90,7 +90,7 @@ def test_branches_of_different_parameters_are_not_drawn_in_one_picture():
 
 
 def test_an_equilibrium_behind_the_surface_is_drawn_as_a_virtual_one():
-    """(0, a) is on its own side for a > 0 only; the pseudo-equilibrium goes on where it ends."""
+    """(0, a) is on its own side for a > 0 only; the pseudo-equilibrium continues where it ends."""
     system = ns.FilippovSystem(
         [x, y], surface=y, above=[-x, a - y], below=[-1 - x, 1], parameters={a: 1.0}
     )
@@ -116,7 +116,7 @@ def test_a_plane_of_an_orbit_has_two_states():
     assert ns.plot.periodic_orbit(orbit, legend=False).axes[0].get_legend() is None
 
 
-def test_a_legend_is_left_out_where_it_is_not_wanted():
+def test_a_legend_is_left_out_on_request():
     at, b = ca.SX.sym("at"), ca.SX.sym("b")
     system = ns.FilippovSystem(
         [x, y],

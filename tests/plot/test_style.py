@@ -46,7 +46,7 @@ def test_an_arrowhead_is_at_its_share_of_the_length_and_points_ahead(at):
     assert ahead @ ([1, 0] if 4 * at <= 1 else [0, 1]) > 0
 
 
-def test_lengths_are_measured_in_the_units_of_the_axes_where_asked():
+def test_lengths_are_measured_in_the_units_of_the_axes_on_request():
     ax = Figure().add_subplot()
     style.arrowhead(ax, [[0, 0], [1, 0], [1, 300]], 0.5, style.BLACK, scale=(1, 300))
     (patch,) = arrowheads(ax)

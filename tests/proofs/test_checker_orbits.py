@@ -83,7 +83,7 @@ SLOW = [name for name in ORBITS if name not in QUICK]
 
 @pytest.mark.parametrize("names", [QUICK, pytest.param(SLOW, marks=pytest.mark.slow)])
 def test_orbits_from_boxes_and_for_ranges_are_checked(names, tmp_path):
-    """Crossing, sliding, exits, stops, impacts, resets, a surface met while another slides."""
+    """Crossing, sliding, exits, stops, impacts, resets, a surface reached while another slides."""
     paths = []
     for name in names:
         paths.append(tmp_path / f"{name}.json")
@@ -158,10 +158,10 @@ def holds(record):
         run = ns.simulate(
             system, at[:n], float(Fraction(record["duration"])), parameters=values, rtol=1e-11
         )
-        met = [e for e in run.events if e.kind != "end"]
-        if len(met) != len(record["events"]):
+        reached = [e for e in run.events if e.kind != "end"]
+        if len(reached) != len(record["events"]):
             return False
-        for e, claim in zip(met, record["events"], strict=True):
+        for e, claim in zip(reached, record["events"], strict=True):
             words = (e.kind, e.mode_before, e.mode_after)
             if words != (claim["kind"], claim["before"], claim["after"]) or not (
                 inside(e.t, claim["t"]) and all(map(inside, e.x_after, claim["x"]))

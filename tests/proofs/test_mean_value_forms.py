@@ -103,15 +103,15 @@ def test_the_time_of_a_zero_is_a_function_on_the_set(checker):
     unit = checker["intervals"].whole(1).a
     x, v = forms.States([iv.of("9/10", "11/10"), iv.of("-2", "-9/5")], True).values
     time = zeros.first_zero([x, v], unit, 0)
-    truth = Fraction(9, 20), Fraction(11, 18)
-    assert Fraction(time.a, unit) <= truth[0] and truth[1] <= Fraction(time.b, unit)
-    assert (time.b - time.a) / unit < 1.2 * float(truth[1] - truth[0])
-    met = zeros.passed([x, v], time)
-    assert met.a <= 0 <= met.b
+    exact = Fraction(9, 20), Fraction(11, 18)
+    assert Fraction(time.a, unit) <= exact[0] and exact[1] <= Fraction(time.b, unit)
+    assert (time.b - time.a) / unit < 1.2 * float(exact[1] - exact[0])
+    reached = zeros.passed([x, v], time)
+    assert reached.a <= 0 <= reached.b
     narrow = [iv.of("99/100", "101/100"), iv.of("-191/100", "-189/100")]
     c = list(forms.States(narrow, True).values)
     other = zeros.passed(c, zeros.first_zero(c, unit, 0))
-    assert other.b - other.a < (met.b - met.a) / 50  # of second order: ten times narrower
+    assert other.b - other.a < (reached.b - reached.a) / 50  # of second order: ten times narrower
     with pytest.raises(zeros.UnsureError):
         zeros.first_zero([x, v], unit // 2, 0)  # some pass it, some do not yet
     assert zeros.first_zero([x, v], unit // 3, 0) is None

@@ -16,9 +16,9 @@ BOX = [(-1, 1)] * 3
 
 
 @given(st.fractions(-1000, 1000), st.fractions(0, 10), st.integers(0, 30), st.integers(0, 25))
-def test_what_is_printed_holds_the_enclosure(low, width, shift, places):
+def test_what_is_printed_holds_the_enclosure(low, width, shift, points):
     ends = low, low + width / 10**shift
-    value = ns.proofs.Enclosure(rounded(ends[0], places, -1), rounded(ends[1], places, 1))
+    value = ns.proofs.Enclosure(rounded(ends[0], points, -1), rounded(ends[1], points, 1))
     middle, _, radius = str(value).partition(" +- ")
     m, r = Fraction(middle), Fraction(radius or 0)
     assert m - r <= Fraction(value.low) and Fraction(value.high) <= m + r

@@ -241,10 +241,10 @@ def compass():
     leg, part, mass, hip, g = 1.0, 0.5, 5.0, 10.0, 9.81
     swing, stand, rates = ca.SX.sym("n"), ca.SX.sym("s"), ca.SX.sym("rate", 2)
     angles, at = ca.vertcat(swing, stand), leg * ca.vertcat(-ca.sin(stand), ca.cos(stand))
-    places = [at / 2, at, at + part * ca.vertcat(ca.sin(swing), -ca.cos(swing))]
+    points = [at / 2, at, at + part * ca.vertcat(ca.sin(swing), -ca.cos(swing))]
     masses = [mass, hip, mass]
-    height = sum(own * place[1] for own, place in zip(masses, places, strict=True))
-    speeds = [ca.jtimes(place, angles, rates) for place in places]
+    height = sum(own * place[1] for own, place in zip(masses, points, strict=True))
+    speeds = [ca.jtimes(place, angles, rates) for place in points]
     energy = sum(own * ca.sumsqr(speed) / 2 for own, speed in zip(masses, speeds, strict=True))
     momentum = ca.gradient(energy, rates)
     force = ca.gradient(energy - g * height, angles) - ca.jtimes(momentum, angles, rates)
@@ -636,10 +636,10 @@ def arm():
     """Three links of length 1 with masses 1 at their ends: the system, and its law for numbers."""
     angles, rates, torques = (ca.SX.sym(name, 3) for name in ("th", "om", "l"))
     turned = ca.cumsum(angles)
-    places = ca.vertcat(ca.cumsum(ca.sin(turned)), -ca.cumsum(ca.cos(turned)))
-    slopes = ca.jacobian(places, angles)
+    points = ca.vertcat(ca.cumsum(ca.sin(turned)), -ca.cumsum(ca.cos(turned)))
+    slopes = ca.jacobian(points, angles)
     mass = ca.mtimes(slopes.T, slopes)
-    weight = 9.81 * ca.gradient(ca.sum1(places[3:]), angles)
+    weight = 9.81 * ca.gradient(ca.sum1(points[3:]), angles)
     momentum = ca.mtimes(mass, rates)
     inertia = ca.jtimes(momentum, angles, rates) - ca.gradient(ca.dot(rates, momentum), angles) / 2
     law = ca.solve(mass, -inertia - weight - ca.DM(HELD) * torques)

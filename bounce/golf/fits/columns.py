@@ -87,17 +87,17 @@ def read_rows(
 ) -> Rows:
     """Read the columns ``name [unit]`` of a file row by row, also under other headings; a bad row keeps its error."""
     titles, cells = _csv(Path(path))
-    places = [(*_title(title), k) for k, title in enumerate(titles)]
-    there = [name for name, _, _ in places]
+    positions = [(*_title(title), k) for k, title in enumerate(titles)]
+    there = [name for name, _, _ in positions]
     known = {
         heading: name
         for name in kinds
         for heading in [one for one in (name, *headings.get(name, ())) if one in there][:1]
     }
-    places = [(known[name], unit, k) for name, unit, k in places if name in known]
-    rest = {titles[k]: k for k in range(len(titles)) if k not in [place[2] for place in places]}
-    _require_each_once([(name, titles[k]) for name, _, k in places])
-    _in_si([(name, unit, titles[k]) for name, unit, k in places], kinds)
+    positions = [(known[name], unit, k) for name, unit, k in positions if name in known]
+    rest = {titles[k]: k for k in range(len(titles)) if k not in [place[2] for place in positions]}
+    _require_each_once([(name, titles[k]) for name, _, k in positions])
+    _in_si([(name, unit, titles[k]) for name, unit, k in positions], kinds)
     if not cells:
         raise DataError("data: the table has no rows. Give at least one.")
     rows = []
@@ -105,10 +105,10 @@ def read_rows(
         others = {title: row[k] if k < len(row) else "" for title, k in rest.items()}
         try:
             _require_length(row, titles)
-            rows.append(Row({n: _number(row[k], titles[k]) for n, _, k in places}, "", others))
+            rows.append(Row({n: _number(row[k], titles[k]) for n, _, k in positions}, "", others))
         except ValueError as wrong:
             rows.append(Row({}, str(wrong), others))
-    return Rows(rows, titles, {name: unit for name, unit, _ in places})
+    return Rows(rows, titles, {name: unit for name, unit, _ in positions})
 
 
 def _in_si(read: list[tuple[str, str | None, str]], kinds: Mapping[str, str]) -> bool:

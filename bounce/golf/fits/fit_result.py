@@ -58,7 +58,7 @@ class FitResult(ns.tables.Tabular):
         Parameters whose 95 % interval ends where the sum of squares has hardly risen: it is too
         narrow, and :meth:`profile` has one that is not.
     search : Profile
-        The search that :meth:`profile` goes on with.
+        The search that :meth:`profile` continues with.
     """
 
     model: Model

@@ -69,7 +69,7 @@ def fit(
         infinite within a factor of 4 of the model's value), or these.
     polish : int, optional
         How many of the best points the least squares takes its first dozen steps from, besides the
-        model's own values; it goes on from the best. By default 3 for a contact model, 10 for a law.
+        model's own values; it continues from the best. By default 3 for a contact model, 10 for a law.
     seed : int, optional
         Of the draws.
     bad_rows : {"raise", "leave out"}, optional
@@ -133,7 +133,7 @@ def fit(
         )
     runs = {k: problem.solve(points[k], low, high, 12) for k in _bar(best, progress)}
     winner = min(runs, key=lambda k: float(runs[k].cost))
-    if runs[winner].status == 0:  # go on from the best of the first steps
+    if runs[winner].status == 0:  # continue from the best of the first steps
         runs[winner] = problem.solve(runs[winner].x, low, high, 200)
     for k, run in runs.items():
         fitted = problem.named(run.x)

@@ -58,7 +58,7 @@ blown.set(
 blown.set(xlim=(-180, 180), ylim=(0, 1))
 directions = ns.local.limit_directions(block, [0.0, 0.0])
 paths.plot([], [], label="a = 0.6 c: comes to rest", **RESTS)
-paths.plot([], [], label="a = 1.5 c: goes on", **GOES)
+paths.plot([], [], label="a = 1.5 c: continues", **GOES)
 paths.plot(0, 0, "k.", zorder=5)
 paths.set(xlabel="$h_1$", ylabel="$h_2$", xlim=(-1.1, 2.1), ylim=(-1.2, 1.6))
 paths.legend(loc="upper left", frameon=False, fontsize=8)

@@ -60,9 +60,9 @@ ax.plot(
     ms=5.5,
     zorder=5,
 )
-places = [(0.0, 0.4), (0.0, 1.6), (1.1, 1.0), (-1.1, 1.0), (2.4, 0.8), (-2.4, 0.8), (0.0, 3.2)]
-places += [(1.6, 3.3), (-1.6, 3.3)]
-regions = {place: attractor(*place) for place in places}
+positions = [(0.0, 0.4), (0.0, 1.6), (1.1, 1.0), (-1.1, 1.0), (2.4, 0.8), (-2.4, 0.8), (0.0, 3.2)]
+positions += [(1.6, 3.3), (-1.6, 3.3)]
+regions = {place: attractor(*place) for place in positions}
 for (push, amplitude), itinerary in regions.items():
     ax.text(push, amplitude, itinerary, ha="center", va="center", fontsize=11, family="monospace")
 ax.set(xlabel="steady push m", ylabel="amplitude A", xlim=plane[0], ylim=(0.0, 4.0))

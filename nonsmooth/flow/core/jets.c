@@ -140,7 +140,7 @@ static void mode_series(Run *r, Expansion *e, const int32_t *start) {
   next_states(r, e, 0);
   if (slides) keep_rates(r, e);
   for (int32_t l = 0; l < t->inputs; l++) {
-    int i = t->place[l];
+    int i = t->index[l];
     s[t->input[l] + 1] = i < r->n ? e->states[(int64_t)i * stride + 1] : 0;
     for (int k = 2; i >= r->s->dimension && k <= order; k++) s[t->input[l] + k] = 0;
   }
@@ -150,13 +150,13 @@ static void mode_series(Run *r, Expansion *e, const int32_t *start) {
     if (slides) {
       follow_layer(r, e, k, start);
       inputs_of(r, e, k);
-      for (int32_t l = t->states; l < t->inputs; l++) s[t->input[l] + k] = r->input[t->place[l]];
+      for (int32_t l = t->states; l < t->inputs; l++) s[t->input[l] + k] = r->input[t->index[l]];
       series_rules(t, &t->loop_late, k, k, stride, s);
     }
     if (k == order) break;
     if (r->has_roots) next_states(r, e, k);
     for (int32_t l = 0; l < t->states; l++) {
-      int i = t->place[l];
+      int i = t->index[l];
       s[t->input[l] + k + 1] = r->has_roots ? e->states[(int64_t)i * stride + k + 1] : row_of(r, i)[k] * PART[k + 1];
     }
   }

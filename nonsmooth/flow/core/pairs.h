@@ -121,7 +121,7 @@ static void series_pairs(const Series *t, const List *list, int stride, const do
   for (int32_t l = 0; l < t->inputs; l++) {
     int32_t row = t->input[l];
     if (!t->rule[row / stride].paired) continue;
-    Pair value = pair_sum(start, (Pair){x[t->place[l]], 0});
+    Pair value = pair_sum(start, (Pair){x[t->index[l]], 0});
     s[row] = value.high;
     low[row / stride] = value.low;
   }

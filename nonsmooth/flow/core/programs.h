@@ -32,7 +32,7 @@ typedef struct {
   int32_t size, terms, inputs, states, outputs, timed; /* states: inputs that are states, the first ones */
   const Rule *rule;
   const Term *term;
-  const int32_t *input, *place, *output; /* rows of inputs, and their indices in the vector */
+  const int32_t *input, *index, *output; /* rows of inputs, and their indices in the vector */
   List still, values, moving, later, late, early, loop, loop_late, before, after;
 } Series;
 
@@ -263,7 +263,7 @@ static void series_rules(const Series *t, const List *list, int first, int last,
 
 /* Coefficients k of the inputs. */
 static void series_inputs(const Series *t, int k, const double *x, double *s) {
-  for (int32_t l = 0; l < t->inputs; l++) s[t->input[l] + k] = x[t->place[l]];
+  for (int32_t l = 0; l < t->inputs; l++) s[t->input[l] + k] = x[t->index[l]];
 }
 
 /* Functions of an argument of two numbers (pairs.h). */
@@ -275,7 +275,7 @@ static int has_pair_rule(int op) { return op == OP_sin || op == OP_cos || op == 
 static void series_rounding(const Series *t, double size, int32_t time, double time_size, double start, const double *s,
                             double *error) {
   for (int32_t l = 0; l < t->inputs; l++) {
-    int is_time = t->place[l] == time;
+    int is_time = t->index[l] == time;
     double value = s[t->input[l]] - (is_time ? start : 0);
     error[t->input[l]] = size > 0 ? (is_time ? time_size : size) + fabs(value) : 0;
   }

@@ -271,6 +271,6 @@ _FIELDS: dict[str, Callable[[FilippovSystem, Options, Run], Any]] = {
     "implicit": lambda s, o, run: messages.NO_IMPLICIT if s.sets else messages.IMPLICIT,
     "differing": lambda s, o, run: " and ".join(_differing(s, run)),
     "modes": lambda s, o, run: ", ".join(repr(s.spelled(mode)) for mode in run.several),
-    "place": lambda s, o, run: messages.PLACES[len(_differing(s, run)) > 1],
+    "situation": lambda s, o, run: messages.SITUATIONS[len(_differing(s, run)) > 1],
     "delay": lambda s, o, run: messages.DELAYS[len(_differing(s, run)) > 1],
 }

@@ -98,10 +98,10 @@ def series_structure(s: Series, n: int, order: int, kept: list[NDArray[Any]]) ->
     for table, names in ((rule, "wabc"), (term, "ab")):
         for name in names:
             table[name] *= stride
-    arrays = (rule, term, s.input * stride, s.place, s.outputs * stride)
+    arrays = (rule, term, s.input * stride, s.index, s.outputs * stride)
     lists = [s.lists[name] for name in LISTS]
     kept += (*arrays, *lists)
-    states, paired = int((s.place < n).sum()), int(rule["paired"].any())
+    states, paired = int((s.index < n).sum()), int(rule["paired"].any())
     sizes = (len(rule), len(term), len(s.input), states, len(s.outputs), paired)
     own = [structure("List")(len(a), 0, a.ctypes.data) for a in lists]
     return structure("Series")(*sizes, *[a.ctypes.data for a in arrays], *own)
@@ -452,9 +452,9 @@ class Interpreter:
         parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
         library().table_read(table, address(parent), address(mode), None)
         # Chunks of an ensemble have the same modes.
-        met, known = self._met(table).tobytes(), self._last_spelled
-        if known[0] != met:
-            self._last_spelled = known = met, self._all_spelled(table)
+        reached, known = self._modes_of(table).tobytes(), self._last_spelled
+        if known[0] != reached:
+            self._last_spelled = known = reached, self._all_spelled(table)
         return words_of(parent, mode, known[1], nodes)
 
     def _all_spelled(self, table: int) -> list[str]:
@@ -467,8 +467,8 @@ class Interpreter:
 
     def _modes(self, table: int) -> list[str]:
         """Modes of a table, by number."""
-        met, width, known = self._met(table).tobytes(), self._width, self._known_modes
-        rows = [met[k : k + width] for k in range(0, len(met), width)] if width else [b""]
+        reached, width, known = self._modes_of(table).tobytes(), self._width, self._known_modes
+        rows = [reached[k : k + width] for k in range(0, len(reached), width)] if width else [b""]
         if len(known) > _KNOWN:
             known.clear()
         return [known.get(row) or known.setdefault(row, self._letters_of(row)) for row in rows]
@@ -481,12 +481,12 @@ class Interpreter:
             letters, np.frombuffer(row[width:])[len(self.system.definition.discrete) :]
         )
 
-    def _met(self, table: int) -> NDArray[np.int8]:
+    def _modes_of(self, table: int) -> NDArray[np.int8]:
         """Modes of a table, as bytes."""
         width, count = self._width, library().table_modes(table)
-        met = np.empty(count * width + 1, np.int8)
-        library().table_read(table, None, None, address(met))
-        return met[:-1].reshape(count, width)
+        reached = np.empty(count * width + 1, np.int8)
+        library().table_read(table, None, None, address(reached))
+        return reached[:-1].reshape(count, width)
 
     def _labels(self, table: int) -> list[tuple[float, ...]]:
         """Values of the discrete states in the modes of the run; empty without any."""
@@ -494,7 +494,7 @@ class Interpreter:
         if not count:
             return []
         width = self.system.surface_count + len(self.system.impacts)
-        values = np.ascontiguousarray(self._met(table)[:, width:]).view(np.float64)
+        values = np.ascontiguousarray(self._modes_of(table)[:, width:]).view(np.float64)
         return [*map(tuple, values[:, :count].tolist())]
 
     def _spelled(self, signs: list[int]) -> str:

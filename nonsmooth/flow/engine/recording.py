@@ -75,7 +75,7 @@ def _layout(
         shape = shapes.get(name, ())
         arrays[name] = kind, dtype, shape, used
         used += rooms[kind] * math.prod(shape) * np.dtype(dtype).itemsize
-    return arrays, [place for *_, place in arrays.values()], used
+    return arrays, [offset for *_, offset in arrays.values()], used
 
 
 class Output:
@@ -88,14 +88,14 @@ class Output:
             max(a, min(own, most)) for a, own in zip(_FIRST, given, strict=True)
         )
         self._rooms: Rooms = steps, points, events
-        self._arrays, places, size = _layout(*self._sizes, self._rooms)
+        self._arrays, positions, size = _layout(*self._sizes, self._rooms)
         self._block = np.empty(size, np.uint8)
         self._grown: dict[str, NDArray[Any]] = {}
         first = address(self._block) or 0
-        self._point_to((0, 0, 0), [first + place for place in places])
+        self._point_to((0, 0, 0), [first + offset for offset in positions])
 
-    def _point_to(self, counts: Sequence[int], places: Sequence[int]) -> None:
-        self.pointer = ctypes.byref(structure("Output")(*counts, *self._rooms, *places))
+    def _point_to(self, counts: Sequence[int], positions: Sequence[int]) -> None:
+        self.pointer = ctypes.byref(structure("Output")(*counts, *self._rooms, *positions))
 
     def written(self, counts: Sequence[int]) -> Arrays:
         """The written arrays; a copy where most of a large block would be unused."""
@@ -146,8 +146,8 @@ class Written:
         self._block, self._arrays, self.counts = block, arrays, counts
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        kind, dtype, shape, place = self._arrays[name]
-        return np.ndarray((self.counts[kind], *shape), dtype, self._block, place)
+        kind, dtype, shape, offset = self._arrays[name]
+        return np.ndarray((self.counts[kind], *shape), dtype, self._block, offset)
 
 
 Arrays = Written | dict[str, NDArray[Any]]

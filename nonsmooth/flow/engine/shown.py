@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem
-from ...model.definition.tables.pieces import places_of
+from ...model.definition.tables.pieces import first_surfaces
 
 #: Reasons of which ``where`` is a function.
 _OF_FUNCTIONS = (
@@ -30,7 +30,7 @@ class Shown:
             t.element: list(accumulate([i >= 0 for i in t.shown], initial=0)) for t in self.tables
         }
         #: The number of each function, of a table that of its first breakpoint.
-        *first, count = places_of(system.written)
+        *first, count = first_surfaces(system.written)
         self.functions = [*first, *range(count, count + len(system.impacts))]
 
     def with_cells(self, p: Array) -> Array:

@@ -37,9 +37,9 @@ class SmoothProgram:
         self.watched = watched = len(series.outputs) - n - count
         rules = series_structure(series, n, order, self._kept)
         self._kept += [derivatives.row, derivatives.column]
-        places = structure("Entries")(count, 0, *[a.ctypes.data for a in self._kept[-2:]])
+        positions = structure("Entries")(count, 0, *[a.ctypes.data for a in self._kept[-2:]])
         sizes = (n, watched, order, groups, starts, columns)
-        self._c = structure("Field")(*sizes, address(self._kept[0]), rules, places)
+        self._c = structure("Field")(*sizes, address(self._kept[0]), rules, positions)
         self.pointer = ctypes.addressof(self._c)
         self.work = int(library().field_work(self.pointer))
 
@@ -128,13 +128,13 @@ class LegsProgram:
         every = count * parameters if by_leg else parameters
         sizes = [every + 1, count * self.width, count, count * self.width, count * self.width]
         sizes += [count * results, max([*(f.work for f in fields), *(e.work for e in own)])]
-        places = np.cumsum([0, *sizes]).tolist()
-        self._places, self._count, self._parameters = places, count, every
+        positions = np.cumsum([0, *sizes]).tolist()
+        self._offsets, self._count, self._parameters = positions, count, every
         pointers = (ctypes.addressof(self._pointers), ctypes.addressof(self._events))
         self._c = structure("Legs")(
-            count, self.width, results, parameters if by_leg else 0, *places[1:7], *pointers
+            count, self.width, results, parameters if by_leg else 0, *positions[1:7], *pointers
         )
-        self._pointer, self._size = ctypes.addressof(self._c), int(places[-1])
+        self._pointer, self._size = ctypes.addressof(self._c), int(positions[-1])
 
     def __call__(
         self, z: Array, p: Array, durations: Array, tol: float, most_steps: int
@@ -145,7 +145,7 @@ class LegsProgram:
         failed = library().run_legs(
             self._pointer, memory.ctypes.data, tol, most_steps, ctypes.byref(left)
         )
-        at, count = self._places, self._count
+        at, count = self._offsets, self._count
         kept = memory[at[1] : at[6]].copy()  # the work array is many times as large
         ends, before, after, results = (
             kept[at[k] - at[1] : at[k + 1] - at[1]].reshape(count, -1) for k in (1, 3, 4, 5)
@@ -153,7 +153,7 @@ class LegsProgram:
         return IntegratedLegs(ends, before, after, results, failed, left.value)
 
     def _given(self, z: Array, p: Array, durations: Array) -> tuple[Array, list[Array]]:
-        memory, at = np.empty(self._size), self._places
+        memory, at = np.empty(self._size), self._offsets
         parts = [memory[at[k] : at[k + 1]] for k in range(6)]
         parts[0][: self._parameters] = p.ravel()
         parts[1][:] = z.ravel()

@@ -56,13 +56,13 @@ static inline double start_of(const Given *g, int64_t i, int k, int64_t *left) {
     double low = g->values[k], part = (double)(split_mix(g->seed, (uint64_t)(ND * (g->first + i) + k)) >> 11);
     return sum(low, product(sum(g->values[ND + k], -low), part * (1.0 / 9007199254740992.0)));
   }
-  int64_t place = 0, before = 0, length = g->lengths[k];
+  int64_t slot = 0, before = 0, length = g->lengths[k];
   if (length) {
-    place = *left % length;
+    slot = *left % length;
     *left /= length;
   }
   for (int j = 0; j < k; j++) before += g->lengths[j] ? g->lengths[j] : 1;
-  return g->values[before + place];
+  return g->values[before + slot];
 }
 
 static inline void store(Lanes *s, Work *w, int, int status) {
@@ -249,24 +249,24 @@ KERNEL parameters(int64_t count, int64_t size, const double *p, double *q) {
 /* Reductions on the device ------------------------------------------------------------------------ */
 
 /* Index of a code in a hash table of a power of two entries, 0 for an empty one; -1 if there is no room. */
-static inline int64_t place_of(int64_t code, int64_t size, Count *keys) {
+static inline int64_t slot_of(int64_t code, int64_t size, Count *keys) {
   Count key = (Count)code + 1, at = key * 0x9e3779b97f4a7c15ULL >> 20;
   for (int64_t tried = 0; tried < size && tried < LONGEST_SEARCH; tried++, at++) {
-    int64_t place = (int64_t)(at & (Count)(size - 1));
-    Count found = keys[place] == key ? key : atomicCAS(keys + place, 0ULL, key);
-    if (found == 0 || found == key) return place;
+    int64_t slot = (int64_t)(at & (Count)(size - 1));
+    Count found = keys[slot] == key ? key : atomicCAS(keys + slot, 0ULL, key);
+    if (found == 0 || found == key) return slot;
   }
   return -1;
 }
 
 /* Replace itineraries by indices of the table; count steps and events of runs that ended on the device. */
 KERNEL numbered(int64_t count, const int8_t *status, const int32_t *kinds, const int32_t *steps, const int64_t *code,
-                int64_t size, Count *keys, int32_t *place, Count *totals) {
+                int64_t size, Count *keys, int32_t *slot, Count *totals) {
   int64_t stride = (int64_t)gridDim.x * blockDim.x, all_steps = 0, all_events = 0;
   for (int64_t i = (int64_t)blockIdx.x * blockDim.x + threadIdx.x; i < count; i += stride) {
-    place[i] = 0;
+    slot[i] = 0;
     if (status[i] == FALL_BACK) continue;
-    place[i] = (int32_t)place_of(code[i], size, keys);
+    slot[i] = (int32_t)slot_of(code[i], size, keys);
     all_steps += steps[i];
     for (int k = 0; k < LAST_KIND; k++) all_events += kinds[i * SIMPLE_KINDS + k];
   }
@@ -283,12 +283,12 @@ KERNEL outcomes(int64_t count, const double *x, const double *t, const int8_t *s
   double *own = sums + thread * 2 * (ND + 1);
   for (int64_t i = thread; i < count; i += stride) {
     if (status[i] == FALL_BACK) continue;
-    int64_t place = place_of(code[i], size, keys);
-    if (place < 0) {
+    int64_t slot = slot_of(code[i], size, keys);
+    if (slot < 0) {
       rest[atomicAdd(rest_count, 1ULL)] = i;
       continue;
     }
-    atomicAdd(counts + place, 1ULL);
+    atomicAdd(counts + slot, 1ULL);
     atomicAdd(statuses + status[i], 1ULL);
     if (status[i] != REACHED_END && status[i] != STOPPED) continue;
     for (int k = 0; k <= ND; k++) {

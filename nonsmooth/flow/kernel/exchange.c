@@ -111,7 +111,7 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   m->itinerary = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
 }
 
-/* Returns the pool where a lane goes on. */
+/* Returns the pool where a lane continues. */
 static int unpack(Lanes *s, const Work *w, int l, const Packed *a) {
   const Suspended *m = &a->m;
   Past *past = past_of(s, l);

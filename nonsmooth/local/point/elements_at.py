@@ -37,7 +37,7 @@ def acts(system: FilippovSystem, x: Array, p: Array, mode: str | None, tol: floa
 
 @dataclass(frozen=True)
 class Situation:
-    """Letters at a point and the element that may change there; None where no one may."""
+    """Letters at a point and the element that may change there; None where none may."""
 
     mode: str
     element: int | None
@@ -159,7 +159,7 @@ class _Numbers:
         distinct = {tuple(one.tolist()) for one, _ in solved}
         if not distinct:
             raise PointError(
-                f"point {self.x.tolist()}: no motion goes on there, neither with closed conditions and contacts nor with open "
+                f"point {self.x.tolist()}: no motion continues there, neither with closed conditions and contacts nor with open "
                 "ones (Painleve's paradox, or a negative load). Check the friction and the loads."
             )
         between = {i for _, zeros in solved for i in zeros if i in self.system.algebraic}
@@ -176,9 +176,9 @@ class _Numbers:
             return Situation(self.spelled(next(iter(distinct))), None)
         names = " and ".join(self.name(i) for i in {*on, *touched, *between})
         raise PointError(
-            f"point {self.x.tolist()}: it is on {names or 'no mode'} at once, and the letters that go on there are "
+            f"point {self.x.tolist()}: it is on {names or 'no mode'} at once, and the admissible letters there are "
             f"{sorted({self.spelled(one) for one in distinct})}. Give mode=, one letter for each element, in which all "
-            "but one are chosen; simulate says how the motion goes on."
+            "but one are chosen; simulate continues the motion."
         )
 
     def _may_close(self, i: int) -> bool:

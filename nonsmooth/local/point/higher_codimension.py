@@ -1,4 +1,4 @@
-"""Limit directions of sets of codimension two and three: the directions in which orbits come and go.
+"""Limit directions of sets of codimension two and three: the directions in which orbits arrive and leave.
 
 Near a set h = 0 with a vector multiplier h' = a - M lambda, lambda = h/|h|. Orbits reach it or leave it
 along limit directions u, (M + s) u = a with |u| = 1; s is the rate r' of r = |h|. Where |M^-1 a| < 1 all
@@ -43,7 +43,7 @@ class LimitDirection:
     rate : float
         $r'$ of $r = |h|$ along it: negative where orbits arrive.
     attracting : bool
-        Whether nearby directions of h turn towards this one: all orbits close by that come or go do so
+        Whether nearby directions of h turn towards this one: all neighbouring orbits that arrive or leave do so
         along it. Other directions belong to single orbits.
     """
 

@@ -1,6 +1,6 @@
-"""Intersections of surfaces: the modes in which the motion can go on, and whether sliding attracts.
+"""Intersections of surfaces: admissible modes, and whether sliding attracts.
 
-At a point of k surfaces the rates are w_i = grad h_i . f(x, lambda). A mode can go on if a surface that is
+At a point of k surfaces the rates are w_i = grad h_i . f(x, lambda). A mode is admissible if a surface that is
 left upward has lambda_i = +1 and w_i > 0, one that is left downward lambda_i = -1 and w_i < 0, and one that
 slides w_i = 0 with lambda_i between: a box-constrained complementarity problem.
 
@@ -52,7 +52,7 @@ _NEUTRAL = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Continuation:
-    """A mode in which the motion can go on.
+    """An admissible mode.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Continuation:
     eigenvalues : ndarray
         Of the layer problem of those that slide: all with negative real part where it attracts.
     slack : float
-        How far the mode is from being impossible: the least of $1 - abs(lambda_i)$ and of the angles
+        Distance of the mode from being inadmissible: the least of $1 - abs(lambda_i)$ and of the angles
         between the motion and the surfaces that it leaves.
     """
 
@@ -97,7 +97,7 @@ class Intersection:
         (round a point of the plane, by the return map to second order), ``"unstable across"`` (the layer
         problem grows), ``"not shown"``, or ``""`` where not all of its surfaces can slide.
     distance : float
-        To the nearest change of the modes that can go on.
+        To the nearest change of the admissible modes.
     complete : bool
         Whether all modes are known: by trying them, or because one solution was shown to be the only one.
     """
@@ -111,7 +111,7 @@ class Intersection:
 
     @property
     def sliding(self) -> Continuation | None:
-        """Sliding along all surfaces of the intersection, if that can go on."""
+        """Sliding along all surfaces of the intersection, if it is admissible."""
         whole = [c for c in self.continuations if all(c.mode[i] == "s" for i in self.surfaces)]
         return whole[0] if whole else None
 
@@ -119,7 +119,7 @@ class Intersection:
         names = " = ".join(f"h{i}" for i in self.surfaces)
         modes = ", ".join(c.mode for c in self.continuations) or "none"
         tail = f"; sliding along it: {self.attraction}" if self.attraction else ""
-        return f"{names} = 0 at {self.point.tolist()}: modes that can go on: {modes}{tail}."
+        return f"{names} = 0 at {self.point.tolist()}: admissible modes: {modes}{tail}."
 
 
 @with_discrete_states_held
@@ -132,7 +132,7 @@ def intersection(
     t: float = 0.0,
     tol: float = TOLERANCE,
 ) -> Intersection:
-    """Say in which modes the motion can go on from a point where surfaces meet.
+    """Find the admissible modes at a point where surfaces meet.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def intersection(
     Returns
     -------
     Intersection
-        The modes that can go on from the point, and what attracts.
+        The admissible modes from the point, and what attracts.
 
     Raises
     ------
@@ -228,7 +228,7 @@ class Meeting:
         return self.layer.at(self.x, multipliers, self.p)
 
     def intersection(self) -> Intersection:
-        """Find all modes that can go on."""
+        """Find all admissible modes."""
         candidates, complete = self._candidates
         slacks = [(self._slack(lam, mode), mode, lam) for mode, lam in candidates]
         going = [self._continuation(mode, lam, s) for s, mode, lam in slacks if s >= 0.0]
@@ -283,7 +283,7 @@ class Meeting:
                 yield mode, lam
 
     def _dependent(self) -> Array | None:
-        """Multipliers of least norm that hold all surfaces, where their matrix is singular; None if there are none."""
+        """Multipliers of least norm that keep all surfaces, where their matrix is singular; None if there are none."""
         none = self._with(np.zeros(len(self.surfaces)))
         at = self.at(none)
         a, m = at.rates[self.surfaces], at.rates_l[np.ix_(self.surfaces, self.surfaces)]
@@ -305,7 +305,7 @@ class Meeting:
         return values
 
     def _slack(self, lam: Array, mode: str) -> float:
-        """Least of what keeps a mode possible; negative where it is not."""
+        """Least margin of the conditions of an admissible mode; negative where it is inadmissible."""
         found = self.at(lam)
         sizes = np.linalg.norm(found.h_x, axis=1) * np.linalg.norm(found.field)
         slack = []
@@ -353,7 +353,7 @@ class Meeting:
         return "unstable across" if growth > _NEUTRAL * np.abs(m).max() else "not shown"
 
     def _return_map(self) -> tuple[float, float] | None:
-        """How an orbit comes back that runs once round a point of the plane: ratio and bend."""
+        """Return map of an orbit around a point of the plane: ratio and bend."""
         rates, slopes, sizes = [], [], []
         for quadrant in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
             found = self.at(self._with(np.array(quadrant, float)))

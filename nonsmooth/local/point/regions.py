@@ -17,7 +17,7 @@ from .surface_point import TOLERANCE, LocalSurface, Numbers, on_surface, surface
 
 
 class Region(Enum):
-    """What the two fields do at a point of the surface; above is $h > 0$ with $F1$.
+    """Region of a surface at a point, by the two fields; above is $h > 0$ with $F1$.
 
     Examples
     --------
@@ -82,8 +82,8 @@ def region(
     On the boundary of a condition or contact ``ATTRACTING`` where it is closed or hit, ``CROSSING_UP`` where a
     motion leaves it. On a set $h = 0$ with a vector multiplier $h' = a - M lambda$: ``SLIDING`` where $|M^-1 a| < 1$, so that
     $lambda = M^-1 a$ keeps the motion on it; ``CROSSING`` where $|M^-1 a| > 1$ (see
-    :func:`limit_directions`), ``BOUNDARY`` between; ``MIXED`` where M has a negative direction, or
-    none in which it attracts.
+    :func:`limit_directions`), ``BOUNDARY`` between; ``MIXED`` where M is indefinite, or has no attracting
+    direction.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from ..point.surface_point import SIDES, Side
 
-#: Nearest to half a turn that the time round the equilibrium is looked for, relative to it.
+#: Least distance of the time around the equilibrium from half a turn in the search, relative to it.
 _NEAREST = 1e-13
 
 #: Longest time on the side of a node.

@@ -52,7 +52,7 @@ from .search import search
 
 @dataclass(frozen=True, eq=False)
 class BoundaryEquilibrium(Tabular):
-    """An equilibrium of one field on the surface, and the bifurcation that it is.
+    """An equilibrium of one field on the surface, and its bifurcation.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ def boundary_equilibrium(
     Returns
     -------
     BoundaryEquilibrium
-        The equilibrium on the surface, with what the linearisations say.
+        The equilibrium on the surface, with its class from the linearisations.
 
     Raises
     ------
@@ -407,7 +407,7 @@ def find_boundary_equilibrium(
     Returns
     -------
     BoundaryBifurcation
-        The point and the value of the parameter, with what the bifurcation is.
+        The point, the value of the parameter and the class of the bifurcation.
 
     Raises
     ------

@@ -135,7 +135,7 @@ def find_equilibrium(
     ----------
     system, parameters, surface, mode
         As in :func:`region`; the point need not be on the surface. A smooth system has none. With complementarity
-        conditions, constraints or closed contacts ``mode`` has all letters, also those of what slides or is closed;
+        conditions, constraints or closed contacts ``mode`` has all letters, also those of sliding and closed elements;
         without the letters of contacts these are open.
     near : array_like (n,)
         Where the search starts.
@@ -193,7 +193,7 @@ def find_equilibrium(
 
 
 def needs_mode(system: FilippovSystem, mode: str | None) -> bool:
-    """Whether a mode has to name what slides and what is closed, or does so."""
+    """Whether a mode must have letters of sliding and closed elements, or has them."""
     if system.complementarity or system.constraints:
         return True
     return bool(system.impacts) and mode is not None and len(mode) > len(system.entries)

@@ -25,7 +25,7 @@ from ...model import (
     real_array,
 )
 from ...model.checks import positive
-from ...notebook import card, quadrants
+from ...notebook import quadrants, representation
 from ...solvers.newton import solve_many
 from ...tables import Tabular
 from ..checks import require_generic
@@ -41,7 +41,7 @@ from .search import Found, search, unknowns
 class TwoFold(Tabular):
     """A generic two-fold, its normal form and its class.
 
-    ``print(fold)`` says what it means. Coordinates $(z1, z2, z3)$, times and the matrix are those of
+    ``print(fold)`` explains it. Coordinates $(z1, z2, z3)$, times and the matrix are those of
     ``normal_form``: sliding is attracting where $z2, z3 > 0$ and repelling where $z2, z3 < 0$.
 
     Attributes
@@ -176,7 +176,7 @@ class TwoFold(Tabular):
         return description(self)
 
     def _repr_html_(self) -> str:
-        """How a notebook shows the two-fold: its class, its numbers, and what follows from them."""
+        """Notebook representation: class, numbers, and their meaning."""
         real = [float(s.real) for s in self.slopes if abs(s.imag) < 1e-12 * (1 + abs(s.real))]
         rows = (
             ("point", np.array2string(self.point, precision=6)),
@@ -184,8 +184,11 @@ class TwoFold(Tabular):
             ("canards", _counted(self.canards)),
             ("faux canards", _counted(self.faux_canards)),
         )
-        meaning = card("", [("", self.classification.determinism)])
-        return card(f"{self.kind} two-fold, class {self.label}", rows, quadrants(real)) + meaning
+        meaning = representation("", [("", self.classification.determinism)])
+        return (
+            representation(f"{self.kind} two-fold, class {self.label}", rows, quadrants(real))
+            + meaning
+        )
 
     def __repr__(self) -> str:
         return f"TwoFold({self.label}, {self.kind}, point={self.point.tolist()})"
@@ -338,27 +341,29 @@ class Chart:
             )
         if target.shape[-1] == 2:
             target = np.concatenate([np.zeros((*target.shape[:-1], 1)), target], axis=-1)
-        wanted, n = target.reshape(-1, 3), self._dimension
+        required, n = target.reshape(-1, 3), self._dimension
 
         def equations(x: Array, which: NDArray[np.int64]) -> tuple[Array, Array]:
             many, scales = self.where.many(self._extended(x)), self.scales
-            return many.values * scales - wanted[which], many.gradients[:, :, :n] * scales[:, None]
+            return many.values * scales - required[which], many.gradients[:, :, :n] * scales[
+                :, None
+            ]
 
-        starts = np.tile(self.point[:n], (len(wanted), 1))
+        starts = np.tile(self.point[:n], (len(required), 1))
         x, converged = solve_many(equations, starts, tol=positive(tol, "tol"))
         for k in np.flatnonzero(~converged):
-            x[k] = self._one(wanted[k], tol, max_iterations)
+            x[k] = self._one(required[k], tol, max_iterations)
         return x.reshape(*target.shape[:-1], n)
 
-    def _one(self, wanted: Array, tol: float, max_iterations: int) -> Array:
+    def _one(self, required: Array, tol: float, max_iterations: int) -> Array:
         """Search with damping, where full steps diverged."""
 
         def equations(x: Array) -> tuple[Array, Array]:
             numbers = self.where.at(x)
-            values = np.array([numbers.h, *numbers.lie]) * self.scales - wanted
+            values = np.array([numbers.h, *numbers.lie]) * self.scales - required
             return values, numbers.gradients * self.scales[:, None]
 
-        n, what = self._dimension, f"state at z = {wanted.tolist()}"
+        n, what = self._dimension, f"state at z = {required.tolist()}"
         found = search(
             equations, self.point, range(n), tol=tol, max_iterations=max_iterations, what=what
         )
@@ -413,7 +418,7 @@ def description(fold: TwoFold) -> str:
     if fold.coincident_fields:
         lines.append(
             "The two fields coincide at s: Delta = 0, the sliding flow is smooth through s and a "
-            "run along it goes on."
+            "run along it continues."
         )
     lines.append(c.determinism)
     if fold.system.dimension > 3 and 1.0 in (c.canards, c.faux_canards):

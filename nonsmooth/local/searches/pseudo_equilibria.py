@@ -120,7 +120,7 @@ def find_pseudo_equilibrium(
     ----------
     system, parameters, surface, mode
         As in :func:`region`; the point need not be on the surface. A ``mode`` with several ``s``, such
-        as ``"ss+"``, looks on the intersection of those surfaces.
+        as ``"ss+"``, searches the intersection of those surfaces.
     near : array_like (n,)
         Where the search starts.
     tol : float, optional
@@ -296,7 +296,7 @@ def sliding_expansion(where: LocalSurface, numbers: Numbers) -> tuple[float, flo
 
 # where several surfaces meet ---------------------------------------------------------------------
 
-#: What sliding does across the intersection, as one surface would name it.
+#: Stability of sliding across the intersection, in the terms of one surface.
 _REGIONS = {
     "attracting": Region.ATTRACTING,
     "spiralling in": Region.ATTRACTING,

@@ -179,22 +179,22 @@ class Switches:
         kept: list[Switch | Curves] = [s for s in self.all if ca.depends_on(f, s.lam)]
         kept += [t for t in self.tables if ca.depends_on(f, ca.vertcat(*t.values))]
         kept.sort(key=lambda s: self._states_of(s.h))
-        place = {id(s): i for i, s in enumerate(kept)}
+        index = {id(s): i for i, s in enumerate(kept)}
         elements = list[Table]()
         for own in (t for t in kept if isinstance(t, Curves)):
             sides = [
-                tuple((place[id(self.all[i])], s) for i, s in pairs if id(self.all[i]) in place)
+                tuple((index[id(self.all[i])], s) for i, s in pairs if id(self.all[i]) in index)
                 for pairs in own.sides
             ]
             lines = [
-                (place[id(s)], *_line(s.form, own.form)) for s in kept if isinstance(s, Switch)
+                (index[id(s)], *_line(s.form, own.form)) for s in kept if isinstance(s, Switch)
             ]
             zeros = [
                 (-shift / factor, i, 1 if factor > 0 else -1)
                 for i, factor, shift in lines
                 if factor
             ]
-            elements.append(twins_of(Table(place[id(own)], tuple(own.curves), tuple(sides)), zeros))
+            elements.append(twins_of(Table(index[id(own)], tuple(own.curves), tuple(sides)), zeros))
         return kept, elements
 
     def _states_of(self, h: ca.SX) -> tuple[int, ...]:

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...notebook import Markup, card
+from ...notebook import Markup, representation
 from ..cache import CAPACITY, Cache, Content
 from ..calls import call
 from ..checks import real
@@ -389,7 +389,7 @@ class FilippovSystem:
     # notebook and print ------------------------------------------------------------------------
 
     def _repr_html_(self) -> str:
-        """How a notebook shows the system: states, fields, surfaces and parameters, typeset."""
+        """Notebook representation: states, fields, surfaces and parameters, typeset."""
         rows: list[tuple[str, object]] = [("states", ", ".join(self.state_names))]
         own = self.definition
         parts = (own.extended_states, own.parameters, own.multipliers, own.reactions)
@@ -413,7 +413,7 @@ class FilippovSystem:
         rows += [("stops", ", ".join(n for n, _ in self.stops))]
         rows += [("resets", ", ".join(n for n, _ in self.resets))]
         rows += [("impacts", ", ".join(self.impacts))]
-        return card("FilippovSystem", rows)
+        return representation("FilippovSystem", rows)
 
     def __repr__(self) -> str:
         parts = [

@@ -64,14 +64,14 @@ class ImpactInSpace(EventMap):
             )
             after, _ = self._phase(pushed, letters[size:], back, none)
         else:
-            wanted = {**none, contact: -d.restitutions[contact] * rates[contact]}
-            after, _ = self._phase(x, letters, none, wanted)
+            target = {**none, contact: -d.restitutions[contact] * rates[contact]}
+            after, _ = self._phase(x, letters, none, target)
         element = len(system.entries) + contact
         super().__init__(system, x, d.gaps[contact], Guard("impact", contact, 0, element), after)
         self._build(ca.densify(after), d.gaps[contact], x, system.parameter_symbols)
 
     def _phase(
-        self, x: ca.SX, letters: str, before: dict[int, ca.SX], wanted: dict[int, ca.SX]
+        self, x: ca.SX, letters: str, before: dict[int, ca.SX], target: dict[int, ca.SX]
     ) -> tuple[ca.SX, dict[int, ca.SX]]:
         """State after impulses at a state, and those of the contacts; ``before``: impulses that give friction a bound too."""
         own, at = self._parties, len(self._unknowns)
@@ -111,7 +111,7 @@ class ImpactInSpace(EventMap):
             else:
                 self._margins.append(after if letter == "+" else -after)
         for j, letter in zip(own.contacts, contacts, strict=True):
-            missing = rates[row] - wanted[j]
+            missing = rates[row] - target[j]
             self._margins.append(impulses[j] if letter == "c" else missing)
             if letter == "c":
                 self._equations.append(missing)

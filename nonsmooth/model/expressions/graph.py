@@ -214,13 +214,13 @@ def depends_on(nodes: Sequence[Node], variable: Sequence[bool]) -> list[bool]:
 
 
 def reached(
-    arguments: Sequence[Sequence[int]], wanted: Sequence[bool], roots: Sequence[int]
+    arguments: Sequence[Sequence[int]], required: Sequence[bool], roots: Sequence[int]
 ) -> list[int]:
-    """Return what some nodes follow from, in order, as far as it is wanted."""
+    """Return the nodes from which some nodes follow, in order, as far as they are required."""
     found, pending = set[int](), list(roots)
     while pending:
         j = pending.pop()
-        if j not in found and wanted[j]:
+        if j not in found and required[j]:
             found.add(j)
             pending += arguments[j]
     return sorted(found)

@@ -109,12 +109,12 @@ def _bent(
     outputs: Sequence[ca.SX], x: ca.SX, unknowns: ca.SX, time: ca.SX, moves: bool
 ) -> list[list[bool]]:
     """The same of several, in unknowns too where these move."""
-    places = {s.element_hash(): i for i, s in enumerate(ca.vertsplit(x))}
-    known = {*places, *(s.element_hash() for s in ca.vertsplit(unknowns))}
+    positions = {s.element_hash(): i for i, s in enumerate(ca.vertsplit(x))}
+    known = {*positions, *(s.element_hash() for s in ca.vertsplit(unknowns))}
     symbols = ca.symvar(ca.vertcat(*map(ca.vec, outputs)))
     others = ca.vertcat(*[s for s in symbols if s.element_hash() not in known])
     nodes, rows = instructions([x, unknowns, others], outputs)
     kinds = evaluate(
-        nodes, _Kinds(places.get(time.element_hash()) if time.numel() else None, moves)
+        nodes, _Kinds(positions.get(time.element_hash()) if time.numel() else None, moves)
     )
     return [[kinds[j] is _Kind.BENT for j in row] for row in rows]

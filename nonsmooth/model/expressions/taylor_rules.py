@@ -180,11 +180,11 @@ def touched(rules: Sequence[Rule], states: int) -> list[int]:
     return [j for j, yes in enumerate(entered(rules, lambda k: k >= states)) if yes]
 
 
-def entered(rules: Sequence[Rule], wanted: Callable[[int], bool]) -> list[bool]:
+def entered(rules: Sequence[Rule], target: Callable[[int], bool]) -> list[bool]:
     """Return whether each rule depends on some of the inputs of the moving vector."""
     found = [False] * len(rules)
     for _ in range(2):  # a sine and its cosine refer to each other
         for j, rule in enumerate(rules):
-            own = rule.source[0] == 0 and wanted(rule.source[1])
+            own = rule.source[0] == 0 and target(rule.source[1])
             found[j] = found[j] or own or any(found[a] for a in rule.args)
     return found

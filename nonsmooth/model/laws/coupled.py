@@ -85,17 +85,17 @@ def _distance(h: ca.SX, own: ca.SX, x: ca.SX, field: ca.SX) -> int:
     """Number of derivatives after which the sparsity alone lets the unknowns ``own`` enter."""
     moved = [bool(ca.depends_on(f, own)) for f in ca.vertsplit(field)]
     reads = [ca.symvar(f) for f in ca.vertsplit(field)]
-    place = {symbol.element_hash(): k for k, symbol in enumerate(ca.vertsplit(x))}
-    states = _places(ca.symvar(h), place)
+    index = {symbol.element_hash(): k for k, symbol in enumerate(ca.vertsplit(x))}
+    states = _indices(ca.symvar(h), index)
     for order in range(1, _MOST + 1):
         if any(moved[i] for i in states):
             return order
-        states |= {j for i in states for j in _places(reads[i], place)}
+        states |= {j for i in states for j in _indices(reads[i], index)}
     return _MOST + 1
 
 
-def _places(symbols: Sequence[ca.SX], place: dict[int, int]) -> set[int]:
-    return {place[s.element_hash()] for s in symbols if s.element_hash() in place}
+def _indices(symbols: Sequence[ca.SX], index: dict[int, int]) -> set[int]:
+    return {index[s.element_hash()] for s in symbols if s.element_hash() in index}
 
 
 def _vanishes(column: ca.SX, h: ca.SX, x: ca.SX) -> bool:
@@ -119,7 +119,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     for members in system.entries:  # a set has one factor
         if members[0] in (*system.half_lines, *system.joints, *system.definition.breakpoints):
             continue
-        places = [(row, i) for i in members for row in columns[:, i].sparsity().row()]
+        positions = [(row, i) for i in members for row in columns[:, i].sparsity().row()]
         entries = [e for i in members for e in columns[:, i].nonzeros()]
         column = ca.vertcat(*entries)
         if ca.depends_on(column, lam) or not ca.depends_on(column, variables):
@@ -127,7 +127,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
         if len(members) == 1:  # terms that vanish with h do not act in sliding
             h = system.definition.surfaces[members[0]]
             acts = [not vanishes for vanishes in that_vanish_on(entries, h, x)]
-            places = [own for own, is_there in zip(places, acts, strict=True) if is_there]
+            positions = [own for own, is_there in zip(positions, acts, strict=True) if is_there]
             entries = [e for e, is_there in zip(entries, acts, strict=True) if is_there]
         if not entries:
             continue
@@ -142,7 +142,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
             field = ca.SX(field)
             for i in members:
                 factors[i], unknowns[i] = factor, ca.SX.sym(f"nu{i}")
-            for (row, i), entry in zip(places, reduced, strict=True):
+            for (row, i), entry in zip(positions, reduced, strict=True):
                 field[row] += unknowns[i] * entry  # lambda_i is 0 while the surface slides
     return field, factors, unknowns
 
@@ -419,8 +419,8 @@ class Coupled:
     @property
     def _values_held(self) -> dict[int, tuple[float, ...]]:
         """Fixed values of entries of ``moving`` in modes."""
-        n, m, places = self.system.extended_dimension, self._surfaces, self.moving.numel()
-        held: dict[int, tuple[float, ...]] = dict.fromkeys(range(n + m, places), (0.0,))
+        n, m, positions = self.system.extended_dimension, self._surfaces, self.moving.numel()
+        held: dict[int, tuple[float, ...]] = dict.fromkeys(range(n + m, positions), (0.0,))
         for i in range(m):
             signs: tuple[float, ...] = () if i in self.system.set_of else (1.0, -1.0)
             if i in self.system.half_lines:

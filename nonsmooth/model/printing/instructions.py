@@ -57,7 +57,7 @@ class Series:
     rule: NDArray[np.void]
     term: NDArray[np.void]
     input: Integers
-    place: Integers
+    index: Integers
     outputs: Integers
     lists: Mapping[str, Integers]
     rules: Sequence[Rule]
@@ -249,9 +249,9 @@ def derived_series_of(coupled: Coupled) -> tuple[Series, Series, Entries]:
     program = _rules_of(inputs, coupled.awake(outputs))
     of_sets, time = {n + i for i in coupled.system.set_of}, _time_of(coupled)
     held = {n + i for i, own in enumerate(coupled.scaled) if own} - of_sets
-    wanted, rows = range(len(outputs) - 1), program.rows[-1]
+    target, rows = range(len(outputs) - 1), program.rows[-1]
     every = _series(
-        program, wanted, lambda k: k not in held, lambda k: n <= k < size, time, more=rows
+        program, target, lambda k: k not in held, lambda k: n <= k < size, time, more=rows
     )
     follow = lambda k: k in of_sets
     own = [
@@ -259,13 +259,13 @@ def derived_series_of(coupled: Coupled) -> tuple[Series, Series, Entries]:
         for j, k in zip(rows, entries.column.tolist(), strict=True)
         if not n <= k < size or follow(k)
     ]
-    free = _series(program, wanted[:-1], lambda k: k < n or follow(k), follow, time, more=own)
+    free = _series(program, target[:-1], lambda k: k < n or follow(k), follow, time, more=own)
     return every, free, entries
 
 
 def _series(
     program: _Rules,
-    wanted: Sequence[int],
+    target: Sequence[int],
     moves: Callable[[int], bool],
     unknown: Callable[[int], bool],
     time: int | None = None,
@@ -281,7 +281,7 @@ def _series(
     is_input = [rule.rule == "input" and rule.source[0] == 0 for rule in rules]
     is_time = [rule.source == (0, time) for rule in rules]
     arguments = [rule.args for rule in rules]
-    roots = [j for k in wanted for j in rows[k]]
+    roots = [j for k in target for j in rows[k]]
     found = reached(arguments, change, [*roots, *more])
     # Constant nodes have later coefficients, zeros, only where they are read.
     read = [*roots, *(a for j in found if rules[j].rule == "atan2" for a in rules[j].args)]
@@ -291,7 +291,7 @@ def _series(
     rule, second = _written(rules, term["kind"], moving, _lines(rules, still, is_time), needed)
     rule["paired"] = _paired([rule.rule for rule in rules], arguments, is_time)
     later = [j for j in sorted(needed) if not is_input[j] and j not in second]
-    looped = set(reached(arguments, change, [j for k in wanted if k < 2 for j in rows[k]]))
+    looped = set(reached(arguments, change, [j for k in target if k < 2 for j in rows[k]]))
     before = {j for j in later if timed[j] and not varied[j]}
     after = {*later} - looped - before
     before, after = (
@@ -316,7 +316,7 @@ def _series(
         rule=rule,
         term=term,
         input=_integers([j for _, j in inputs]),
-        place=_integers([k for k, _ in inputs]),
+        index=_integers([k for k, _ in inputs]),
         outputs=_integers([j for row in rows for j in row]),
         lists={name: _integers(own) for name, own in lists.items()},
         rules=program.plain,
@@ -337,14 +337,14 @@ def _written(
     made, begin, second = [], 0, set[int]()
     for j, rule in enumerate(rules):
         name, args, numbers = rule.rule, rule.args, rule.numbers
-        places = (begin, begin, begin, begin)
+        positions = (begin, begin, begin, begin)
         if name == "sum":
             end = begin + len(numbers)
             name, first, last = _sum_named(kinds[begin:end].tolist())
-            args, numbers, places = (), (), (begin, begin + first, begin + last, end)
+            args, numbers, positions = (), (), (begin, begin + first, begin + last, end)
             begin = end
         elif name == "input":
-            args, places = (), (rule.source[1],) * 4
+            args, positions = (), (rule.source[1],) * 4
         elif name == "integral":
             name = "turn" if lines[args[0]] else name
             if args[1] == j + 1 in needed and rules[j + 1].args == (args[0], j):
@@ -355,7 +355,7 @@ def _written(
             at_rest = (s for s, a in zip(_SPECIAL[name], args, strict=True) if s and not moving[a])
             name = next(at_rest, name)
         own = numbers_of[rule.rule], numbers_of[name], operations.get(_operation(rule), 0), j
-        made.append((*own, *(*args, 0, 0, 0)[:3], 0, *places, *(*numbers, 0.0, 0.0)[:2]))
+        made.append((*own, *(*args, 0, 0, 0)[:3], 0, *positions, *(*numbers, 0.0, 0.0)[:2]))
     return np.array(made, RULE), second
 
 
@@ -400,9 +400,9 @@ def _operation(rule: Rule) -> str:
 
 
 def _reached(
-    arguments: Sequence[Sequence[int]], wanted: Sequence[bool], roots: Sequence[int]
+    arguments: Sequence[Sequence[int]], target: Sequence[bool], roots: Sequence[int]
 ) -> Integers:
-    return _integers(reached(arguments, wanted, roots))
+    return _integers(reached(arguments, target, roots))
 
 
 def _is_still(rule: Rule) -> bool:
@@ -432,8 +432,8 @@ def sparse_entries(matrix: ca.SX) -> tuple[ca.SX, Entries]:
 
 def _by_rows(matrix: ca.SX) -> tuple[ca.SX, Entries]:
     """The same, row after row."""
-    nonzeros, places = sparse_entries(matrix.T)
-    return nonzeros, Entries(places.column, places.row)
+    nonzeros, positions = sparse_entries(matrix.T)
+    return nonzeros, Entries(positions.column, positions.row)
 
 
 def _moving_slopes(coupled: Coupled) -> tuple[Integers, Integers, ca.SX]:
@@ -464,8 +464,8 @@ def _components(gradient: Entries, rows: int) -> Integers:
     return _integers([root(i) for i in range(rows)])
 
 
-def _where(flags: Sequence[bool], wanted: bool) -> Integers:
-    return _integers([j for j, flag in enumerate(flags) if flag == wanted])
+def _where(flags: Sequence[bool], target: bool) -> Integers:
+    return _integers([j for j, flag in enumerate(flags) if flag == target])
 
 
 def _integers(values: Sequence[int] | NDArray[np.generic]) -> Integers:

@@ -331,7 +331,7 @@ class OfInstructions:
     def _dense(self, entries: Terms, of: Entries, rows: int, columns: int) -> list[Term | None]:
         """A matrix from its entries."""
         matrix: list[Term | None] = [None] * (rows * columns)
-        places = of.row.tolist(), of.column.tolist()
-        for value, i, j in zip(entries[: len(of.row)], *places, strict=True):
+        positions = of.row.tolist(), of.column.tolist()
+        for value, i, j in zip(entries[: len(of.row)], *positions, strict=True):
             matrix[i * columns + j] = value
         return matrix

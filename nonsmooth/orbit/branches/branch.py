@@ -25,7 +25,7 @@ from ...model import (
     PointError,
     real,
 )
-from ...notebook import card
+from ...notebook import representation
 from ...solvers.continuation import (
     Arc,
     Curve,
@@ -72,7 +72,7 @@ _ADVICE = {
     BranchEnd.EVENT: "Nothing continues the branch beyond its last event, or through=False.",
     BranchEnd.PERIOD_DIVERGES: "The period grows without bound: a homoclinic orbit is near.",
     BranchEnd.STEP_TOO_SMALL: "Steps became too short: the solutions end here, or the equations do.",
-    BranchEnd.TOO_MANY_POINTS: "Raise max_points to go on.",
+    BranchEnd.TOO_MANY_POINTS: "Raise max_points to continue.",
     BranchEnd.FAILED: "An error was raised.",
     BranchEnd.INTERRUPTED: "Interrupted; the branch has the points computed so far.",
 }
@@ -140,12 +140,12 @@ class BranchEvent(Tabular):
         return f"BranchEvent({self.kind!r}, {self.parameter:.10g}, {self.far_side})"
 
 
-def _beside(choices: Sequence[tuple[Any, Point]], wanted: float) -> list[Any]:
+def _beside(choices: Sequence[tuple[Any, Point]], target: float) -> list[Any]:
     """The solution next to an event, in the first itinerary that is admissible there."""
     for (curve, point), (_, far) in zip(choices, reversed(choices), strict=True):
         try:
-            guess = curve.toward(point.u, wanted, float(far.u[-1]))
-            found = curve.solution_at(guess, wanted)
+            guess = curve.toward(point.u, target, float(far.u[-1]))
+            found = curve.solution_at(guess, target)
         except NonsmoothError:
             continue
         if not getattr(found, "is_virtual", getattr(found, "status", "") == "virtual"):
@@ -225,25 +225,25 @@ class Branch(Tabular):
         --------
         __getitem__ : the only one, or the first.
         """
-        wanted = real(value, "value", expected="a finite number", advice="Give one.")
+        target = real(value, "value", expected="a finite number", advice="Give one.")
         found = []
         for k in range(len(self) - 1):
             (curve, a), (other, b) = self.nodes[k], self.nodes[k + 1]
             va, vb = curve.value(a.u), other.value(b.u)
-            if not min(va, vb) <= wanted <= max(va, vb) or va == vb:
+            if not min(va, vb) <= target <= max(va, vb) or va == vb:
                 continue
             if curve is not other:  # beside an event: first in the itinerary beyond it
                 before = any(event.point is b for event in self.events)
                 ways = [(curve, a), (other, b)] if before else [(other, b), (curve, a)]
-                found += [] if wanted in (va, vb) else _beside(ways, wanted)
+                found += [] if target in (va, vb) else _beside(ways, target)
                 continue
-            if wanted == va and k and self.nodes[k - 1][0] is curve:
+            if target == va and k and self.nodes[k - 1][0] is curve:
                 continue  # found as the end of the step before
-            guess = a.u + (wanted - va) / (vb - va) * (b.u - a.u)
-            found.append(curve.solution_at(guess, wanted))
+            guess = a.u + (target - va) / (vb - va) * (b.u - a.u)
+            found.append(curve.solution_at(guess, target))
         if not found:
             raise PointError(
-                f"value: the branch has no solution at {self.parameter} = {wanted:.10g}. It reaches "
+                f"value: the branch has no solution at {self.parameter} = {target:.10g}. It reaches "
                 f"[{self.values.min():.10g}, {self.values.max():.10g}]: widen the bounds of the continuation."
             )
         return found
@@ -267,13 +267,13 @@ class Branch(Tabular):
         ).rstrip()
 
     def _repr_html_(self) -> str:
-        """How a notebook shows the branch: its range, its ends, its events."""
+        """Notebook representation: range, ends and events."""
         rows = [
             (self.parameter, f"{self.values.min():.10g} to {self.values.max():.10g}"),
             ("ends", f"{self.ends[0]} and {self.ends[1]}"),
             *((f"{e.parameter:.10g}", f"{e.kind}; {e.far_side}") for e in self.events),
         ]
-        return card(f"Branch of {len(self)} points", rows)
+        return representation(f"Branch of {len(self)} points", rows)
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{e.kind} {e.parameter:.6g}" for e in self.events)

@@ -47,12 +47,12 @@ def chatter_end(
     i = min(closed, key=lambda k: float(durations[k]), default=-1)
     if i < 0 or not durations[i] < _TIMES[1] * period:
         return None
-    place, values, nearest = count * n + i, list[float](), u
+    index, values, nearest = count * n + i, list[float](), u
     jacobian = equations(u)[1]
     for time in _TIMES[::-1] * period:
         if time < durations[i]:
             continue
-        found = _closed_for(u, jacobian, place, time, scale, equations)
+        found = _closed_for(u, jacobian, index, time, scale, equations)
         if found is None:  # so near to the end impacts may seem to end early
             values = []
             continue
@@ -66,17 +66,17 @@ def chatter_end(
 def _closed_for(
     u: Array,
     jacobian: Array,
-    place: int,
+    index: int,
     time: float,
     scale: Array,
     equations: Callable[[Array], tuple[Array, Array]],
 ) -> tuple[Array, Array] | None:
-    """The orbit of the branch on which the unknown at a place is a time, with derivatives near it; None where Newton's
+    """The orbit of the branch on which one unknown is a time, with derivatives near it; None where Newton's
     method fails."""
-    row, values, size = np.eye(1, u.size, place), np.zeros(u.size - 1), np.inf
+    row, values, size = np.eye(1, u.size, index), np.zeros(u.size - 1), np.inf
     try:
         for _ in range(_MOST_STEPS):
-            right = np.append(values, u[place] - time)
+            right = np.append(values, u[index] - time)
             step = np.linalg.solve(np.vstack([jacobian, row]) * scale, right) * scale
             u, before, size = u - step, size, float(np.abs(step / scale).max())
             if size < _SMALL or 0.5 * before < size < _LEAST:

@@ -325,7 +325,7 @@ class _PseudoEquilibriumCurve(Equilibria):
         numbers = self.local_surface(u).at(u[: self.n])
         found = {"alpha = 0": u[self.n], "alpha = 1": 1 - u[self.n]}
         switches = self.local_surface(u).switches(u[: self.n])
-        found.update({name: float(switches[j]) for name, j in self._met.items()})
+        found.update({name: float(switches[j]) for name, j in self._surfaces.items()})
         found["two-fold"] = float(numbers.lie[1] - numbers.lie[0])
         if self.n > 2 and found["two-fold"] != 0:
             found["Hopf"] = self.hopf(u)
@@ -338,17 +338,17 @@ class _PseudoEquilibriumCurve(Equilibria):
 
     def faults(self, u: Array) -> list[str]:
         tests, mode = self.tests(Point(u, np.zeros(u.size))), self.where.mode
-        signs = {name: -1.0 if mode[j] == "-" else 1.0 for name, j in self._met.items()}
+        signs = {name: -1.0 if mode[j] == "-" else 1.0 for name, j in self._surfaces.items()}
         signs |= dict.fromkeys(_ALPHA, 1.0)
         return [name for name, sign in signs.items() if sign * tests[name] < -VIRTUAL]
 
     @property
-    def _met(self) -> dict[str, int]:
+    def _surfaces(self) -> dict[str, int]:
         """Other surfaces by the names of their tests."""
         return {f"intersection {j}": j for j in self.where.others}
 
     def ends(self, name: str) -> bool:
-        return name in _ALPHA or name in self._met
+        return name in _ALPHA or name in self._surfaces
 
     def describe(self, u: Array) -> Any:
         return pseudo_equilibrium_at(self.local_surface(u), Found(u[: self.n]))
@@ -356,10 +356,8 @@ class _PseudoEquilibriumCurve(Equilibria):
     def event(self, zero: Zero) -> BranchEvent | None:
         if zero.name in _ALPHA:
             return self.boundary(zero, _ALPHA[zero.name])
-        if zero.name in self._met:
-            verdict = (
-                f"it reaches surface {self._met[zero.name]}: not followed onto the intersection"
-            )
+        if zero.name in self._surfaces:
+            verdict = f"it reaches surface {self._surfaces[zero.name]}: not followed onto the intersection"
             return self.described(zero, "intersection", far_side=FarSide("", verdict))
         if zero.name == "two-fold":
             numbers = self.local_surface(zero.point.u).at(zero.point.u[: self.n])

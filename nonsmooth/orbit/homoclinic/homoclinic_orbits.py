@@ -195,8 +195,8 @@ def _nearest(run: Trajectory, mode: str, here: Spectrum) -> Departure | None:
             back = away[k] < _CLOSE * peak and away[k - 1] >= away[k] <= away[k + 1]
             if back and part.leg.mode == mode:
                 first = int(np.argmax(away[:k]))
-                wanted = np.sqrt(away[first] * away[k])  # on the way back, before it turns away
-                k = first + int(np.argmin(np.abs(away[first : k + 1] - wanted)))
+                required = np.sqrt(away[first] * away[k])  # on the way back, before it turns away
+                k = first + int(np.argmin(np.abs(away[first : k + 1] - required)))
                 chain[-1] = replace(part, leg=Leg(mode), duration=float(times[k]) - part.t)
                 return _in_parts(run, chain, here, float(away[k]), peak)
     return None
@@ -339,7 +339,7 @@ class Connection(Tabular):
 
     @property
     def fold(self) -> Array | None:
-        """Where the orbit first leaves the surface; None if it does not slide before."""
+        """The point at which the orbit first leaves the surface; None if it does not slide before."""
         finite = isinstance(self.loop, PseudoSaddleLoop)
         return self.legs[self._free].start if self._free or finite else None
 

@@ -456,8 +456,8 @@ class PseudoSaddleLoop(Loop):
             list(self.free),
             self.parameters_at(u),
         )
-        place = self.chained
-        at, alpha, last = u[place : place + n], float(u[place + n]), len(self.legs) - 1
+        first = self.chained
+        at, alpha, last = u[first : first + n], float(u[first + n]), len(self.legs) - 1
         values = np.zeros(u.size - k + 1)
         jacobian = np.zeros((values.size, u.size))
         for row, condition in enumerate(self._fold):
@@ -469,17 +469,17 @@ class PseudoSaddleLoop(Loop):
         values[rows] = flow.end - at
         jacobian[rows, last * n : (last + 1) * n] = flow.by_start
         jacobian[rows, len(self.legs) * n + last] = flow.rate
-        jacobian[rows, place : place + n] = -np.eye(n)
+        jacobian[rows, first : first + n] = -np.eye(n)
         jacobian[rows, -k:] = flow.by_parameters
         row += n
         e = surface_map(self.system, 0)(at, p)
-        values[row], jacobian[row, place : place + n] = e.value, e.gradient
+        values[row], jacobian[row, first : first + n] = e.value, e.gradient
         jacobian[row, -k:] = e.by_parameters[free]
         (f1, x1, p1), (f2, x2, p2) = (f.copied(at, p) for f in self._fields)
         rows = slice(row + 1, row + 1 + n)
         values[rows] = ((1 - alpha) * f1 + alpha * f2)[:, 0]
-        jacobian[rows, place : place + n] = (1 - alpha) * x1 + alpha * x2
-        jacobian[rows, place + n] = (f2 - f1)[:, 0]
+        jacobian[rows, first : first + n] = (1 - alpha) * x1 + alpha * x2
+        jacobian[rows, first + n] = (f2 - f1)[:, 0]
         jacobian[rows, -k:] = ((1 - alpha) * p1 + alpha * p2)[:, free]
         return values, jacobian
 

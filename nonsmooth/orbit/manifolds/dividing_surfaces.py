@@ -176,7 +176,7 @@ class StartCurve(Curve):
     itinerary : str
         One letter for each leg.
     out : callable, optional
-        The reason to end the curve at a start; empty to go on.
+        The reason to end the curve at a start; empty to continue.
     tol : float, optional
         Error of a point, in scaled coordinates.
     """
@@ -434,7 +434,7 @@ def require_event(
         raise DegenerateError(
             f"of: at the two-fold {fold.point.round(9).tolist()} the function of the event {until!r} is "
             f"{at.value:.3g}, and its zeros make the angle {angle:.3g} with those at which both fields have "
-            "the same component across the surface; both must be 0. Drop until where orbits go on."
+            "the same component across the surface; both must be 0. Drop until where orbits continue."
         )
 
 
@@ -636,7 +636,7 @@ class _TwoFoldPassages:
     ):
         self.system, self.sheet, self.start, self.scale = system, sheet, start, scale
         self.duration, self.parameters, self.tol = duration, parameters, tol
-        self._met: dict[str, Meeting] = {}
+        self._meetings: dict[str, Meeting] = {}
 
     def passage(self, u: Array, itinerary: str) -> Passage:
         """The orbit from a start."""
@@ -660,7 +660,7 @@ class _TwoFoldPassages:
         entry = run.events[legs - 2] if legs > 1 else None
         leaves = run.events[legs - 1]
         start = (run.t[0], run.x[0]) if entry is None else (entry.t, entry.x_after)
-        self._met[itinerary] = self.sheet.guess(start[1], leaves.x, leaves.t - start[0])
+        self._meetings[itinerary] = self.sheet.guess(start[1], leaves.x, leaves.t - start[0])
 
     def _fixed(self, itinerary: str, until: object) -> FixedItinerary:
         return FixedItinerary(
@@ -682,16 +682,16 @@ class _TwoFoldPassages:
             by_start = fixed.derivative(arrival)[1] @ slope
             x, entry = arrival.x, arrival.t
             fault = arrival.fault or self._entry_violation(itinerary, x)
-        met = self.sheet.meet(x, self._met.get(itinerary))
-        self._met[itinerary] = met
+        reached = self.sheet.meet(x, self._meetings.get(itinerary))
+        self._meetings[itinerary] = reached
         return Passage(
-            met.fold,
-            entry + met.duration + met.left,
+            reached.fold,
+            entry + reached.duration + reached.left,
             entry,
-            met.gap,
+            reached.gap,
             np.full(2, np.nan),
-            fault or met.fault,
-            (met.slope @ by_start)[None, :],
+            fault or reached.fault,
+            (reached.slope @ by_start)[None, :],
         )
 
     def _entry_violation(self, itinerary: str, x: Array) -> str:
@@ -975,7 +975,7 @@ class _Search:
                 a, b = corners[i, j], corners.get(other_key, corners[i, j])
                 if _last_side(one) * _last_side(other) >= 0 or self._crossed(a, b):
                     continue
-                curve = self._met((a, one), (b, other))
+                curve = self._crossing((a, one), (b, other))
                 if curve:
                     self.traced += [arc.points for arc in curve]
                     yield curve
@@ -984,7 +984,7 @@ class _Search:
         """Whether a curve that was traced crosses the edge between two corners."""
         return any(_crosses(points, a, b) for points in self.traced)
 
-    def _met(self, one: tuple[Array, str], other: tuple[Array, str]) -> list[DividingArc]:
+    def _crossing(self, one: tuple[Array, str], other: tuple[Array, str]) -> list[DividingArc]:
         """The curve that crosses an edge; none where sides do not change at a two-fold."""
         edge = (other[0] - one[0]) / self.plane.scale
         across = np.array([-edge[1], edge[0]]) / float(

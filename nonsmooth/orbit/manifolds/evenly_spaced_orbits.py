@@ -110,7 +110,7 @@ class Spacing:
         cells = [(int(a), int(b)) for a, b in np.floor(np.vstack([dense, at[-1:]]))]
         return cells, [*index.tolist(), len(at) - 1]
 
-    def until_met(self, curve: Array) -> Array:
+    def until_contact(self, curve: Array) -> Array:
         """Part of a curve until it rests or touches another or itself, or a little beside another."""
         self.thins = False
         first: dict[tuple[int, int], int] = {}
@@ -160,7 +160,7 @@ def evenly_spaced(
 
     def along(start: Array, ahead: bool) -> tuple[Array, bool]:
         spacing.thins = False
-        return follow(start, ahead, spacing.until_met), spacing.thins
+        return follow(start, ahead, spacing.until_contact), spacing.thins
 
     for start in np.random.default_rng(0).permutation(box.middles(count)):
         if not spacing.free(start):

@@ -174,12 +174,12 @@ class Follower:
         if whole >= length:
             whole, end = length, "length"
         count = max(1, round(whole / self.spacing))
-        wanted = whole * np.arange(count + 1) / count if whole < length else None
-        if wanted is None:
-            wanted = np.minimum(self.spacing * np.arange(count + 1), whole)
-            wanted[-1] = whole
+        target = whole * np.arange(count + 1) / count if whole < length else None
+        if target is None:
+            target = np.minimum(self.spacing * np.arange(count + 1), whole)
+            target[-1] = whole
         rising = np.concatenate([[True], np.diff(s) > 0.0])
-        times = np.interp(wanted, s[rising], t[rising])
+        times = np.interp(target, s[rising], t[rising])
         sign = 1.0 if self.ahead else -1.0
         modes = [p.mode or "o" for p in run.segments if p.t_start <= times[-1]]
         return Arc(run(times), sign * times, " ".join(modes), end)
@@ -260,8 +260,8 @@ def _direction(orbit: PeriodicOrbit, stable: bool) -> tuple[float, Array, Array,
     for step in maps:
         whole = step @ whole
     found, vectors = np.linalg.eig(whole)
-    wanted = orbit.floquet.of_map[outside][0]
-    k = int(np.argmin(np.abs(found - wanted)))
+    target = orbit.floquet.of_map[outside][0]
+    k = int(np.argmin(np.abs(found - target)))
     v = vectors[:, k].real
     free = [i for i, leg in enumerate(problem.legs) if "s" not in leg.mode] or range(len(maps))
     best = max(free, key=lambda i: float(at.durations[i]))

@@ -124,7 +124,7 @@ class PlaneOrbits:
 
 
 def _mode_at_end(run: Trajectory) -> str | None:
-    """Mode in which a run goes on, where its last state is on the surface; else None."""
+    """Mode in which a run continues, where its last state is on the surface; else None."""
     mode, on_event = run.events[-1].mode_after, False
     if len(run.events) > 1:
         on_event = run.events[-2].t == run.t[-1]

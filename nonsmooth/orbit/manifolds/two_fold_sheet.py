@@ -166,7 +166,7 @@ class TwoFoldSheet:
             gap, lift = gap + shrink * float(step[n + 1]), lift + shrink * float(step[n + 2])
             length = float(np.linalg.norm(np.append(step[:n], step[n + 1]))) / self.size
             if shrink == 1.0 and (length <= _LAST or (length <= _NOISE and length >= 0.25 * last)):
-                return self._met(point, fold, duration, gap, across, matrix)
+                return self._meeting_at(point, fold, duration, gap, across, matrix)
             last = length
         raise ConvergenceError(
             f"two-fold: Newton's method found no orbit from {np.array2string(point, precision=6)} that "
@@ -174,7 +174,7 @@ class TwoFoldSheet:
             point=point,
         )
 
-    def _met(
+    def _meeting_at(
         self, point: Array, fold: Array, duration: float, gap: float, across: Array, matrix: Array
     ) -> Meeting:
         n = point.size

@@ -71,14 +71,14 @@ class DividedProblem(BoundaryProblem):
         return replace(self.whole, legs=tuple(legs))
 
     @cached_property
-    def _places(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    def _parts(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
         """The leg of each part, the first and the last part of each leg."""
         ends = np.cumsum(self.parts)
         return np.repeat(np.arange(len(self.parts)), self.parts), ends - self.parts, ends - 1
 
     def _spread(self, u: Array) -> Array:
         """Unknowns of the problem of the parts."""
-        (leg, first, _), (starts, durations) = self._places, self.split(u)
+        (leg, first, _), (starts, durations) = self._parts, self.split(u)
         every = np.empty((leg.size, self.dimension))
         inside = np.setdiff1d(np.arange(leg.size), first)
         every[first], every[inside] = starts, u[: self._inner].reshape(-1, self.dimension)
@@ -87,7 +87,7 @@ class DividedProblem(BoundaryProblem):
     def evaluate(
         self, u: Array, p: Array, chosen: tuple[int, ...] = (), tol: float = TOLERANCE
     ) -> Evaluation:
-        leg, first, last = self._places
+        leg, first, last = self._parts
         at, (starts, durations) = (
             self._of_parts.evaluate(self._spread(u), p, chosen, tol),
             self.split(u),
@@ -119,7 +119,7 @@ class DividedProblem(BoundaryProblem):
         return u[at : at + n], at, t - j / k * durations[i], j / k
 
     def parts_of(self, i: int) -> range:
-        _, first, last = self._places
+        _, first, last = self._parts
         return range(int(first[i]), int(last[i]) + 1)
 
 

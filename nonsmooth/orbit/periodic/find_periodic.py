@@ -291,12 +291,12 @@ def _closed_orbit(
     return problem, *found, solver.iterations
 
 
-def _require_multiplicity(problem: BoundaryProblem, wanted: int | None) -> None:
+def _require_multiplicity(problem: BoundaryProblem, target: int | None) -> None:
     """Refuse an orbit that takes another number of periods of the forcing."""
     found = problem.periods * (1 if problem.symmetry is None else 2)
-    if wanted is not None and abs(found - wanted) > 0.25:
+    if target is not None and abs(found - target) > 0.25:
         raise ConvergenceError(
-            f"periodic orbit: multiplicity = {wanted} was requested, but the orbit closes after {found:g} of the "
+            f"periodic orbit: multiplicity = {target} was requested, but the orbit closes after {found:g} of the "
             "forcing's periods. Start closer to the orbit, or leave multiplicity= out."
         )
 

@@ -13,7 +13,7 @@ from ...flow.names import described
 from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
 from ...model import Array, FilippovSystem, ParameterError, Surfaces
-from ...notebook import card, circle
+from ...notebook import circle, representation
 from ...tables import Table, Tabular, stacked
 from ..runs.guards import violations_of_legs, watch
 from ..runs.legs import Leg, integrate_leg, shown_itinerary
@@ -286,7 +286,7 @@ class PeriodicOrbit(Tabular):
             ("multipliers", ", ".join(_number(m) for m in self.multipliers)),
             ("virtual", "; ".join(self.faults)),
         )
-        return card("PeriodicOrbit", rows, circle(self.multipliers))
+        return representation("PeriodicOrbit", rows, circle(self.multipliers))
 
     def __repr__(self) -> str:
         return f"PeriodicOrbit(period {self.period:.10g}, {len(self.legs)} legs, {self.stability})"
@@ -337,10 +337,10 @@ def _violation_of_run(problem: BoundaryProblem, at: Evaluation, p: Array) -> lis
         system, start[:n], t + float(at.durations.sum()), t_start=t, parameters=named(system, p)
     )
     found = [event.name for event in run.events if event.kind != "end"]
-    wanted = [one.name(system) for leg in legs for one in (leg, *leg.further)]
-    if found == wanted:
+    target = [one.name(system) for leg in legs for one in (leg, *leg.further)]
+    if found == target:
         return []
-    return [f"a run from the middle of leg 1 has the events {found} instead of {wanted}"]
+    return [f"a run from the middle of leg 1 has the events {found} instead of {target}"]
 
 
 def _margins(orbit: PeriodicOrbit) -> list[Margin]:

@@ -236,8 +236,8 @@ def _eigenvector(orbit: PeriodicOrbit) -> Array:
             "orbit: it belongs to a family of periodic orbits (the multiplier 1 twice), so that the phase after a "
             "kick is not determined to first order. Change a parameter until the orbit is isolated."
         )
-    wanted = np.concatenate([np.zeros(n), [1.0 / speed]])
-    found = np.linalg.lstsq(rows, wanted, rcond=_FAMILY)[0]
+    target = np.concatenate([np.zeros(n), [1.0 / speed]])
+    found = np.linalg.lstsq(rows, target, rcond=_FAMILY)[0]
     return np.asarray(found / units)
 
 
@@ -278,10 +278,10 @@ def _parts(
         x = part.end[:n]
         states.append(x)
         speeds.append(part.rate[:n])
-    wanted = orbit.evaluation.flows.end[k, :n]
-    if not np.abs(x - wanted).max() <= _SAME_END * (1.0 + float(np.abs(wanted).max())):
+    target = orbit.evaluation.flows.end[k, :n]
+    if not np.abs(x - target).max() <= _SAME_END * (1.0 + float(np.abs(target).max())):
         raise DegenerateError(
-            f"leg {k + 1}: expected the end {wanted.tolist()}, received {x.tolist()} in {count} parts. Its "
+            f"leg {k + 1}: expected the end {target.tolist()}, received {x.tolist()} in {count} parts. Its "
             "multipliers are not determined by the state; give fewer samples."
         )
     speeds.insert(0, orbit.evaluation.flows.before[k, :n])

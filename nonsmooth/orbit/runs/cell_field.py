@@ -14,7 +14,7 @@ from .cells import cells_of
 
 @dataclass(frozen=True)
 class _OfMode:
-    """What is read of the motion of a mode."""
+    """Data of the motion of a mode."""
 
     system: FilippovSystem
     mode: str

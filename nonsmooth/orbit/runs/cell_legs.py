@@ -20,9 +20,9 @@ class CellLegs:
         cells = cells_of(system)
         self._rows = np.array([cells.parameters(np.zeros(0), leg.mode) for leg in legs])
         self._legs = LegIntegrator(cells.system, [cells.leg(leg) for leg in legs], chosen, True)
-        places = [cells.breakpoint(leg.mode, leg.element) for leg in legs]
+        positions = [cells.breakpoint(leg.mode, leg.element) for leg in legs]
         #: The events' functions at breakpoints: sides times what the arguments are above levels.
-        self._sides, self._levels = np.array(places).T
+        self._sides, self._levels = np.array(positions).T
 
     def _parameters(self, p: Array) -> Array:
         return np.hstack([np.tile(p, (len(self._rows), 1)), self._rows])

@@ -28,7 +28,7 @@ class Cells:
         #: Of each table parameters of the cells, its entry, and its breakpoints that are surfaces.
         self._rows = {i: t.values() for i, t in self.tables.items()}
         self._entries = {i: self.system.entry_of(i) for i in self.tables}
-        self._places = {
+        self._breakpoints = {
             i: np.flatnonzero(np.array(t.shown) >= 0).tolist() for i, t in self.tables.items()
         }
         #: Where letters of each entry and contact begin in modes that are shown.
@@ -84,7 +84,7 @@ class Cells:
         own = -1 if element < 0 else self.element(element)
         for i, entry in self._entries.items():
             if own == entry:
-                level = self.tables[i].levels[self._places[i][element - self._first[entry]]]
+                level = self.tables[i].levels[self._breakpoints[i][element - self._first[entry]]]
                 return (1.0 if mode[element] == "+" else -1.0), level
         return 1.0, 0.0
 
@@ -96,7 +96,7 @@ class Cells:
     def cell(self, table: Table, mode: str) -> int:
         """The cell of a table in a mode that is shown."""
         above = self._above(table, mode)
-        found = self._places[table.element][above - 1] + 1 if above else 0
+        found = self._breakpoints[table.element][above - 1] + 1 if above else 0
         for k, i, sign in table.twins:
             if mode[self._first[self.system.entry_of(i)]] == "-+"[sign > 0]:
                 found = max(found, k + 1)
@@ -106,14 +106,14 @@ class Cells:
         """Of the function of each table the breakpoints beside the cell of a mode that is shown, with their guards."""
         found = dict[int, list[tuple[float, Guard]]]()
         for i, t in self.tables.items():
-            above, places, first = self._above(t, mode), self._places[i], self._entries[i]
+            above, positions, first = self._above(t, mode), self._breakpoints[i], self._entries[i]
             own = [(above - 1, 1)] * (above > 0) + [(above, -1)] * (above < t.count)
             guards = [
                 Guard("surface", self._shown.entries[j][0], side, j)
                 for k, side in own
                 for j in (self._first[first] + k,)
             ]
-            found[i] = [(t.levels[places[k]], g) for (k, _), g in zip(own, guards, strict=True)]
+            found[i] = [(t.levels[positions[k]], g) for (k, _), g in zip(own, guards, strict=True)]
         return found
 
     def parameters(self, p: Array, mode: str) -> Array:

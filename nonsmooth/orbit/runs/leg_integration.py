@@ -292,7 +292,7 @@ class LegIntegrator:
         self._fill(flows, i, leg.at_event(self.system, part.end, p))
 
     def _reached(self, flows: LegFlows, found: CarriedLegs, i: int, p: Array) -> AtEvent:
-        """The end of a leg at a set: the motion goes on over the whole duration as it reaches the set."""
+        """The end of a leg at a set: the motion continues over the whole duration as it reaches the set."""
         n, members = flows.after.shape[1], self.system.entries[self.legs[i].element]
         end, rate = flows.end[i, :n], flows.rate[i, :n]
         h = [surface_map(self.system, k)(end, p).value for k in members]

@@ -215,16 +215,16 @@ def poincare(
     require_system(system, sets=True, complementarity=True, joints=True)
     count, t_start = whole(count, "count"), real(t_start, "t_start")
     if isinstance(section, Section):
-        wanted = replace(section, count=count, skip=section.skip + whole(skip, "skip", least=0))
+        target = replace(section, count=count, skip=section.skip + whole(skip, "skip", least=0))
     else:
-        wanted = _section(system, section, direction, skip, count)
+        target = _section(system, section, direction, skip, count)
     t_end = t_start + _ENDLESS
-    period = None if isinstance(wanted.at, str) else read_period(system, wanted.at)
+    period = None if isinstance(target.at, str) else read_period(system, target.at)
     if period is not None:
         length = float(periods(period, system.parameter_vector(parameters)))
-        wanted = replace(wanted, at=length, direction=0)
-        t_end = t_start + length * (wanted.skip + wanted.every * count + 0.5)
-    system, wanted = sectioned(system, wanted)
+        target = replace(target, at=length, direction=0)
+        t_end = t_start + length * (target.skip + target.every * count + 0.5)
+    system, target = sectioned(system, target)
     rtol, atol = tolerances(tol, rtol, atol)
     run = simulate(
         system,
@@ -236,11 +236,11 @@ def poincare(
         atol=atol,
         max_steps=max_steps,
         max_events=max_events,
-        at=wanted,
+        at=target,
     )
     assert run.sample_t is not None and run.sample_x is not None
-    met = np.isfinite(run.sample_t)
-    return PoincareOrbit(run.sample_x[met], run.sample_t[met], run, wanted)
+    reached = np.isfinite(run.sample_t)
+    return PoincareOrbit(run.sample_x[reached], run.sample_t[reached], run, target)
 
 
 def _section(

@@ -30,9 +30,9 @@ from .variation import (
     Passage,
     Sensitivity,
     along,
-    discrete_places,
+    discrete_indices,
+    numbers_of,
     passages,
-    places_of,
     sample_times,
 )
 
@@ -213,7 +213,7 @@ def gradient(
         value, *rest = one_sided(run, side, values).tolist()
         by_p = dict(zip(names, rest[system.dimension :], strict=True))
         return Gradient(value, np.array(rest[: system.dimension]), by_p)
-    chosen = places_of(run, names)
+    chosen = numbers_of(run, names)
     parts = _legs(run, chosen)
     if samples is None:
         states = _end(parts)[None]
@@ -297,7 +297,7 @@ def vjp(
     (array([0.]), array([-1.]))
     """
     n = _require_run(run).system.dimension
-    chosen = places_of(run, _names(run, wrt))
+    chosen = numbers_of(run, _names(run, wrt))
     if cotangent is None and samples is None:
         raise OptionError("cotangent is missing. Give it, or samples=.")
     row = np.zeros(n) if cotangent is None else real_array(cotangent, "cotangent")
@@ -402,7 +402,7 @@ def _pulled_through(
         every += row @ parts[0].held.by_parameters
         row = row @ parts[0].held.by_state
     row = row.copy()
-    row[discrete_places(system)] = 0.0
+    row[discrete_indices(system)] = 0.0
     by_parameters = every[some] if last.back else every[some] + own
     return row[: system.dimension], by_parameters
 

@@ -297,7 +297,7 @@ class Passage:
         return row
 
 
-def discrete_places(system: FilippovSystem) -> slice:
+def discrete_indices(system: FilippovSystem) -> slice:
     """Where the discrete states are among the states: nothing has a derivative by them."""
     return slice(system.dimension - len(system.definition.discrete), system.dimension)
 
@@ -680,7 +680,7 @@ def sample_times(run: Trajectory) -> Array:
     return found
 
 
-def places_of(run: Trajectory, names: Sequence[str]) -> tuple[int, ...]:
+def numbers_of(run: Trajectory, names: Sequence[str]) -> tuple[int, ...]:
     """Numbers of parameters by their names."""
     known = {name: k for k, name in enumerate(run.system.parameter_names)}
     return tuple(known[name] for name in names)
@@ -689,12 +689,12 @@ def places_of(run: Trajectory, names: Sequence[str]) -> tuple[int, ...]:
 def along(run: Trajectory, names: Sequence[str]) -> Sensitivity:
     """Derivatives of a run by its start and by parameters."""
     system, n = run.system, run.system.dimension
-    chosen, at = places_of(run, names), sample_times(run)
+    chosen, at = numbers_of(run, names), sample_times(run)
     parts = passages(run, chosen, at)
     dx, dp = np.eye(system.extended_dimension), np.zeros((system.extended_dimension, len(chosen)))
     if (held := parts[0].held) is not None:
         dx, dp = held.by_state, held.by_parameters[:, list(chosen)]
-    dx[:, discrete_places(system)] = 0.0
+    dx[:, discrete_indices(system)] = 0.0
     times, by_start, by_parameters = list[float](), list[Array](), list[Array]()
     sampled = list[tuple[Array, Array]]()
     end_x, end_p, last = np.zeros(len(dx)), np.zeros(len(chosen)), (dx, dp)

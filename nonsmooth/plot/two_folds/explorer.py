@@ -55,6 +55,6 @@ def _data() -> dict[str, Any]:
             kind: [(label, polygon.round(4).tolist()) for label, polygon in areas(kind)]
             for kind in SIGMA
         },
-        places={kind: label_points(kind) for kind in SIGMA},
+        positions={kind: label_points(kind) for kind in SIGMA},
         cases=[(name, kinds[sigma], nu) for name, (sigma, nu) in CASES.items()],
     )

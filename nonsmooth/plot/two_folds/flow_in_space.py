@@ -398,7 +398,7 @@ class _Scene:
         color = color or style.FIELDS[side]
         dashes = "-" if side == "+" else (0, (3.5, 1.3))
         order = self.ABOVE if side == "+" else self.BELOW
-        begin, end = np.abs(curve[[0, -1], 0]) > 1e-9  # it goes on above or below what is drawn
+        begin, end = np.abs(curve[[0, -1], 0]) > 1e-9  # it continues above or below what is drawn
         thins = (bool(begin), bool(end))
         mode = side if gid == "arc" else ""
         looks: Any = {"dashes": dashes, "gid": gid, "thins": thins, "mode": mode}

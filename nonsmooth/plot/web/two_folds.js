@@ -163,7 +163,7 @@
     );
     const lines = curves(state.folds);
     parts.push(...lines.map((line) => map.path(line.points, { class: line.look })));
-    for (const [label, place] of Object.entries(given.places[state.folds])) {
+    for (const [label, place] of Object.entries(given.positions[state.folds])) {
       parts.push(map.label(place, label, { class: "name halo" }));
     }
     map.layer.replaceChildren(...parts);

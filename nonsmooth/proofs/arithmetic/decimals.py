@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from .enclosure import Enclosure, places_of, rounded
+from .enclosure import Enclosure, decimals_of, rounded
 from .flint import arb
 from .intervals import ends
 
@@ -16,7 +16,7 @@ def enclosure(a: arb) -> Enclosure:
         text = rounded(low, low.denominator.bit_length() - 1, 0)
         return Enclosure(text, text)
     width = high - low if high > low else abs(low) / 2**200
-    places = places_of(width) + 2
+    places = decimals_of(width) + 2
     return Enclosure(rounded(low, places, -1), rounded(high, places, 1))
 
 
@@ -38,7 +38,7 @@ def inner(box: arb, core: arb) -> Enclosure:
     """Decimals inside a box and around what it surely holds, as short as they can be."""
     # What holds in the box holds in what is written, where existence in ``core`` is proven.
     (low, high), (first, last) = ends(box), ends(core)
-    places = max(0, places_of(high - low))
+    places = max(0, decimals_of(high - low))
     while True:
         a, b = rounded(low, places, 1), rounded(high, places, -1)
         if low <= Fraction(a) <= first and last <= Fraction(b) <= high:

@@ -60,7 +60,7 @@ class Enclosure:
         low, high = self.ends
         if low == high:
             return self.low
-        places = places_of((high - low) / 2) + 1
+        places = decimals_of((high - low) / 2) + 1
         middle = rounded((low + high) / 2, places, 0)
         wide = max(high - Fraction(middle), Fraction(middle) - low)
         return f"{middle} +- {_two_digits(wide)}"
@@ -71,13 +71,13 @@ class Enclosure:
 
 def _two_digits(width: Fraction) -> str:
     """A positive number with two digits, rounded up."""
-    places = places_of(width) + 1
+    places = decimals_of(width) + 1
     while (digits := math.ceil(width * Fraction(10) ** places)) > 99:
         places -= 1
     return f"{Decimal(digits).scaleb(-places):.1e}".replace(".0e", "e")
 
 
-def places_of(width: Fraction) -> int:
+def decimals_of(width: Fraction) -> int:
     """Decimals at which a positive width shows one digit."""
     if width <= 0:
         return 0

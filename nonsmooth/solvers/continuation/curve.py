@@ -64,7 +64,7 @@ class Curve:
 
     Examples
     --------
-    The unit circle, from its rightmost point once round:
+    The unit circle, one turn from its rightmost point:
 
     >>> import nonsmooth as ns
     >>> class Circle(ns.continuation.Curve):
@@ -567,8 +567,8 @@ class _Segment:
         middle, width = low / (low - high), 0.5
         point: Point | None = None
         for _ in range(3):
-            wanted = middle + width * np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-            pairs = [(w, p) for w in wanted.tolist() if (p := self.at(w)) is not None]
+            required = middle + width * np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+            pairs = [(w, p) for w in required.tolist() if (p := self.at(w)) is not None]
             least = 1e-9 * (
                 abs(low) + abs(high)
             )  # not on a crossing branch, where the test is zero

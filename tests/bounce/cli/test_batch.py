@@ -1,4 +1,4 @@
-"""Rows of a table are written as they are computed, an interrupted table goes on, a wrong row costs no other."""
+"""Rows of a table are written as they are computed, an interrupted table continues, a wrong row costs no other."""
 
 import csv
 import io
@@ -56,7 +56,7 @@ def test_a_row_is_in_the_file_before_the_next_is_computed(command, table, tmp_pa
 
 
 @pytest.mark.parametrize("cut", [0, 7])
-def test_an_interrupted_table_goes_on_to_the_same_file(command, table, tmp_path, stopped, cut):
+def test_an_interrupted_table_continues_to_the_same_file(command, table, tmp_path, stopped, cut):
     out, whole = tmp_path / "out.csv", tmp_path / "whole.csv"
     command("launch", "--input", table(), "--output", whole)
     stopped(at=4)
@@ -156,7 +156,7 @@ def _echo(name):
     return "launch" if name == "launch" else "landing"
 
 
-def test_a_table_of_nothing_but_errors_goes_on_too(command, tmp_path):
+def test_a_table_of_nothing_but_errors_continues_too(command, tmp_path):
     path, out = tmp_path / "rows.csv", tmp_path / "out.csv"
     path.write_text(HEAD + "fast,11,2700\n")
     command("launch", "--input", path, "--output", out)

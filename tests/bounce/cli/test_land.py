@@ -71,7 +71,7 @@ def test_shot_on_a_contact_model_and_through_air(command):
         "--units si --speed 28.5 --angle 37.3deg --spin 2094rpm",
     ],
 )
-def test_units_are_said_or_those_of_the_system(command, words):
+def test_units_are_given_or_those_of_the_system(command, words):
     report = json.loads(command("land", *words.split(), "--json")[1])
     us = "us" in words.split()
     assert report["lift_off"]["speed"] * (0.44704 if us else 1.0) == pytest.approx(SPEED, rel=1e-4)

@@ -31,15 +31,17 @@ def test_map_pictures(command, tmp_path, show):
     assert "S+ R S-: slips forward, rolls, slips in reverse\n" in out and "sign of" not in out
 
 
-def test_a_map_is_drawn_in_the_units_asked_for(command, tmp_path, monkeypatch):
-    asked = []
+def test_a_map_is_drawn_in_the_requested_units(command, tmp_path, monkeypatch):
+    requested = []
     drawn = bounce.plot.outcome_map
     monkeypatch.setattr(
-        bounce.plot, "outcome_map", lambda *a, **k: asked.append(drawn(*a, **k)) or asked[-1]
+        bounce.plot,
+        "outcome_map",
+        lambda *a, **k: requested.append(drawn(*a, **k)) or requested[-1],
     )
     over = ["--over", "speed=40mph:80mph:12", "--over", "angle=20deg:60deg:9"]
     code, *_ = command("map", *over, "--units", "us", "--output", tmp_path / "map.png")
-    ax = asked[0].axes[0]
+    ax = requested[0].axes[0]
     assert code == 0 and ax.get_xlabel() == "landing speed (mph)"
     assert ax.get_xlim() == pytest.approx((40.0, 80.0))
     with pytest.raises(ns.OptionError, match="speeds"):

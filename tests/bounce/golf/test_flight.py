@@ -38,8 +38,8 @@ def test_no_coefficients_is_the_parabola(u, v, slope):
     out = bounce.golf.flight(launch, air=constant(0.0), slope=slope)
     exact = bounce.golf.flight(launch, slope=slope)
     got = [out.time, out.range, out.height, out.landing.xdot, out.landing.ydot]
-    want = [exact.time, exact.range, exact.height, exact.landing.xdot, exact.landing.ydot]
-    assert got == pytest.approx(want, rel=1e-9, abs=1e-9)
+    required = [exact.time, exact.range, exact.height, exact.landing.xdot, exact.landing.ydot]
+    assert got == pytest.approx(required, rel=1e-9, abs=1e-9)
 
 
 def test_vertical_throw_with_quadratic_drag():

@@ -18,7 +18,7 @@ def landing(speed, angle, rpm):
 
 
 @pytest.mark.parametrize("name", TURFS)
-def test_every_turf_knows_its_range(name):
+def test_every_turf_has_its_range(name):
     law = TURFS[name].law
     assert law.covers.source
     with warnings.catch_warnings():

@@ -111,7 +111,7 @@ def test_bisection_by_simulation_finds_the_same_spin(curve):
     "eta", [0.5, 2.0, *(pytest.param(eta, marks=pytest.mark.slow) for eta in (1.0, 1.3))]
 )
 def test_forward_slip_on_one_side_and_reverse_slip_on_the_other(eta):
-    """Also where the curve goes on through itineraries such as + - s, + s + and - +."""
+    """Also where the curve continues through itineraries such as + - s, + s + and - +."""
     model = TURF.replace(eta=eta)
     curve = bounce.dividing_curve(model, step=0.4, reach=2.0)
     assert curve.complete

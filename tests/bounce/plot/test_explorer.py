@@ -114,9 +114,9 @@ def test_thousands_of_bounces_are_python_s(browser, page):
     """Lift-offs to 1e-9, and how many bounces have which itinerary."""
     cases = random_cases(4000)
     browser.open(page)
-    asked = [({**values, "load": load}, landing) for values, load, landing in cases]
+    requested = [({**values, "load": load}, landing) for values, load, landing in cases]
     seen = {}
-    for (values, load, landing), answer in zip(cases, browser.run(BOUNCE, asked), strict=True):
+    for (values, load, landing), answer in zip(cases, browser.run(BOUNCE, requested), strict=True):
         fault, itinerary, time, lift_off, of_many = answer
         model = bounce.KelvinVoigt(**values, load=load)
         try:
@@ -126,9 +126,9 @@ def test_thousands_of_bounces_are_python_s(browser, page):
             seen["none"] = seen.get("none", 0) + 1
             continue
         assert itinerary == of_many == shot.itinerary, (values, load, landing)
-        wanted = [shot.time, *(getattr(shot.lift_off, n) for n in lift_off)]
+        expected = [shot.time, *(getattr(shot.lift_off, n) for n in lift_off)]
         got = [time, *lift_off.values()]
-        assert got == pytest.approx(wanted, abs=1e-9), (values, load, landing)
+        assert got == pytest.approx(expected, abs=1e-9), (values, load, landing)
         seen[itinerary] = seen.get(itinerary, 0) + 1
     assert {"+", "-", "+ -", "- s +", "+ s -", "s"} <= set(seen)
     assert len(seen) > 40 and sum(seen.values()) > 3_950 and seen["none"] < 800
@@ -154,9 +154,9 @@ def test_the_course_of_a_bounce_is_python_s(browser, page):
         state, forces = shot(inner), shot.forces(inner)
         columns = dict(zip(("x", "xdot", "y", "ydot", "omega"), state.T, strict=True))
         columns |= dict(load=forces.load, friction=forces.friction, slip=state[:, 1] + state[:, 4])
-        for name, wanted in columns.items():
+        for name, expected in columns.items():
             got = [p[name] for p in points[1:-1]]
-            np.testing.assert_allclose(got, wanted, atol=1e-8, err_msg=name)
+            np.testing.assert_allclose(got, expected, atol=1e-8, err_msg=name)
 
 
 @pytest.mark.slow
@@ -175,8 +175,8 @@ def test_any_model_has_its_page(browser, tmp_path, name):
     for landing, (fault, itinerary, time, lift_off, of_many) in zip(landings, answers, strict=True):
         shot = bounce.simulate(model, **landing)
         assert not fault and itinerary == of_many == shot.itinerary
-        wanted = [shot.time, *(getattr(shot.lift_off, n) for n in lift_off)]
-        assert [time, *lift_off.values()] == pytest.approx(wanted, abs=1e-9)
+        expected = [shot.time, *(getattr(shot.lift_off, n) for n in lift_off)]
+        assert [time, *lift_off.values()] == pytest.approx(expected, abs=1e-9)
     assert browser.errors() == {} and browser.unnamed() == []
 
 
@@ -229,11 +229,11 @@ def test_map_is_that_of_python(browser, page, load):
     browser.open(page)
     got = browser.run(MAP, surface_of(model), -1.0, [3, 6], 24, 1e-3)
     over = {"xdot": got["xdot"], "omega": got["omega"]}
-    wanted = bounce.outcome_map(model, over, tol=1e-11)
+    expected = bounce.outcome_map(model, over, tol=1e-11)
     names = np.array([*got["regions"], ""])[np.array(got["code"]).reshape(24, 24)]
-    assert np.array_equal(names, np.array([*wanted.regions, ""])[wanted.code])
+    assert np.array_equal(names, np.array([*expected.regions, ""])[expected.code])
     for entry in got["shares"]:
-        assert entry["share"] == pytest.approx(wanted.share()[entry["name"]])
+        assert entry["share"] == pytest.approx(expected.share()[entry["name"]])
     for name, room in zip(got["regions"], got["rooms"], strict=True):
         i, j = got["xdot"].index(room["xdot"]), got["omega"].index(room["omega"])
         assert names[j, i] == name and room["room"] >= 1
@@ -357,8 +357,8 @@ return [words.length, met];
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_enlarged_end_lies_on_no_curve(browser, page, width, sign):
     browser.open(page, width, hash=f"xdot={0.6 * sign}&omega={0.9 * sign}")
-    count, met = browser.run(COVERED)
-    assert count >= 2 and met == []
+    count, reached = browser.run(COVERED)
+    assert count >= 2 and reached == []
 
 
 @pytest.mark.slow
@@ -404,7 +404,7 @@ def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
 
 
 @pytest.mark.browser
-def test_a_ball_that_stays_is_said_in_words(browser, page):
+def test_a_ball_that_stays_is_reported(browser, page):
     browser.open(page, hash="d2=1&G=0.5&ydot=-0.1")
     seen = browser.run(SHOWN)
     assert seen["verdict"] == "No lift-off" and "the ball stays in the ground" in seen["story"]

@@ -14,8 +14,8 @@ from tests.proofs.checking import run
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
 
 
-def holds(enclosure, truth):
-    return mpmath.mpf(enclosure.low) <= truth <= mpmath.mpf(enclosure.high)
+def holds(enclosure, exact):
+    return mpmath.mpf(enclosure.low) <= exact <= mpmath.mpf(enclosure.high)
 
 
 def test_the_time_of_lift_off_is_that_of_the_closed_form():
@@ -26,9 +26,9 @@ def test_the_time_of_lift_off_is_that_of_the_closed_form():
         w = mpmath.sqrt(1 - d * d)
         y = lambda t: -mpmath.exp(-d * t) * mpmath.sin(w * t) / w
         load = lambda t: -2 * d * mpmath.diff(y, t) - y(t)
-        truth = mpmath.findroot(load, 2.95)
-        assert holds(proof.time, truth) and proof.time.radius < 1e-16
-        assert holds(proof.orbit.end["ydot"], mpmath.diff(y, truth))
+        exact = mpmath.findroot(load, 2.95)
+        assert holds(proof.time, exact) and proof.time.radius < 1e-16
+        assert holds(proof.orbit.end["ydot"], mpmath.diff(y, exact))
     assert proof.proven and proof.outcome == "forward" and proof.itinerary == "+ s +"
     assert "lifts off with forward slip" in str(proof)
 

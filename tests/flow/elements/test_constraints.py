@@ -144,9 +144,9 @@ def test_a_mechanism_moves_as_its_index_reduction(mechanism):
 def test_a_table_hangs_on_parallel_links(links):
     """Three or more depend on one another; the table swings as a pendulum without turning (one link: turned fast)."""
     turn, spin = ca.SX.sym("turn"), ca.SX.sym("spin")
-    f, places = ca.SX.sym("f", links), np.linspace(-1, 1, links) if links > 1 else [0.0]
+    f, positions = ca.SX.sym("f", links), np.linspace(-1, 1, links) if links > 1 else [0.0]
     force, moment, constraints = ca.SX.zeros(2), ca.SX(0), []
-    for k, place in enumerate(places):
+    for k, place in enumerate(positions):
         arm = place * ca.vertcat(ca.cos(turn), ca.sin(turn))
         link = ca.vertcat(x, y) + arm - ca.vertcat(place, 0)
         constraints.append(ns.Constraint(ca.dot(link, link) - 1, reaction=f[k], name=f"link{k}"))
@@ -161,8 +161,8 @@ def test_a_table_hangs_on_parallel_links(links):
     px, py, pu, pv = placed((a, w))
     run = ns.simulate(table, [px, py, 0, pu, pv, 0], 6.0, tol=1e-11)
     assert run.status is ns.Status.REACHED_END, run.message
-    want = placed(ns.simulate(by_angle(), [a, w], 6.0, tol=1e-11).x[-1])
-    np.testing.assert_allclose(run.x[-1, [0, 1, 3, 4]], want, atol=1e-8)
+    required = placed(ns.simulate(by_angle(), [a, w], 6.0, tol=1e-11).x[-1])
+    np.testing.assert_allclose(run.x[-1, [0, 1, 3, 4]], required, atol=1e-8)
     np.testing.assert_allclose(run.x[-1, [2, 5]], 0.0, atol=1e-8)
 
 
@@ -209,13 +209,13 @@ def test_a_moving_pivot_drives_the_bob():
 def test_friction_at_a_pivot_stops_the_swing(drag):
     system, plain = pendulum(drag), by_angle(drag)
     run = ns.simulate(system, placed((0.0, 2.0)), 12.0, tol=1e-11)
-    want = ns.simulate(plain, [0.0, 2.0], 12.0, tol=1e-11)
+    required = ns.simulate(plain, [0.0, 2.0], 12.0, tol=1e-11)
     assert run.status is ns.Status.REACHED_END, run.message
-    assert [mode[:1] for mode in run.itinerary.split()] == want.itinerary.split()
+    assert [mode[:1] for mode in run.itinerary.split()] == required.itinerary.split()
     np.testing.assert_allclose(
-        [e.t for e in run.events], [e.t for e in want.events], rtol=1e-8, atol=1e-8
+        [e.t for e in run.events], [e.t for e in required.events], rtol=1e-8, atol=1e-8
     )
-    np.testing.assert_allclose(run.x[-1], placed(want.x[-1]), atol=1e-8)
+    np.testing.assert_allclose(run.x[-1], placed(required.x[-1]), atol=1e-8)
 
 
 @pytest.mark.parametrize("law", ["newton", "moreau", "poisson"])
@@ -225,10 +225,10 @@ def test_a_bob_strikes_a_wall_through_its_rod(law):
     own = ns.Impact(angle - (2 * np.pi - np.arccos(-0.4)), restitution=0.6)
     start = (2 * np.pi - 0.1, 0.0)
     run = ns.simulate(pendulum(impacts=wall), placed(start), 20.0, tol=1e-11)
-    want = ns.simulate(by_angle(impacts=own), start, 20.0, tol=1e-11)
+    required = ns.simulate(by_angle(impacts=own), start, 20.0, tol=1e-11)
     assert run.status is ns.Status.REACHED_END, run.message
-    assert [e.kind for e in run.events] == [e.kind for e in want.events]
-    np.testing.assert_allclose(run.x[-1], placed(want.x[-1]), atol=1e-7)
+    assert [e.kind for e in run.events] == [e.kind for e in required.events]
+    np.testing.assert_allclose(run.x[-1], placed(required.x[-1]), atol=1e-7)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
@@ -249,14 +249,14 @@ def test_a_bob_comes_to_rest_on_a_floor_and_is_lifted(restitution):
         time=t,
     )
     run = ns.simulate(system, placed((0.3, 0.0)), 10.0, tol=1e-11)
-    want = ns.simulate(plain, [0.3, 0.0], 10.0, tol=1e-11)
+    required = ns.simulate(plain, [0.3, 0.0], 10.0, tol=1e-11)
     assert run.status is ns.Status.REACHED_END, run.message
     assert [e.kind for e in run.events if e.kind != "impact"] == ["contact", "release", "end"][
         restitution == 0 :
     ]
-    for event, true in zip(run.events[-2:], want.events[-2:], strict=True):
+    for event, true in zip(run.events[-2:], required.events[-2:], strict=True):
         assert abs(event.t - true.t) < 1e-9
-    np.testing.assert_allclose(run.x[-1], placed(want.x[-1]), atol=1e-7)
+    np.testing.assert_allclose(run.x[-1], placed(required.x[-1]), atol=1e-7)
 
 
 def test_kicks_along_the_rod_are_taken_and_others_refused():
@@ -265,8 +265,8 @@ def test_kicks_along_the_rod_are_taken_and_others_refused():
     across = ns.Reset(x, {u: u + 0.1, v: v + 0.1}, 1, name="kick")
     plain = ns.Reset(angle + np.pi / 2, {rate: rate + turn}, 1, name="kick")
     run = ns.simulate(pendulum(resets=along), placed((-2.5, 0.0)), 6.0, tol=1e-11)
-    want = ns.simulate(by_angle(resets=plain), [-2.5, 0.0], 6.0, tol=1e-11)
-    np.testing.assert_allclose(run.x[-1], placed(want.x[-1]), atol=1e-8)
+    required = ns.simulate(by_angle(resets=plain), [-2.5, 0.0], 6.0, tol=1e-11)
+    np.testing.assert_allclose(run.x[-1], placed(required.x[-1]), atol=1e-8)
     lost = ns.simulate(pendulum(resets=across), placed((-2.5, 0.0)), 6.0)
     assert lost.status is ns.Status.INCONSISTENT
     assert "Rate of the function of 'rod' is -0.1" in lost.message
@@ -299,7 +299,7 @@ def test_a_system_with_constraints_keeps_its_definition():
         np.testing.assert_allclose(end, ns.simulate(system, start, 5.0).x[-1], atol=1e-12)
 
 
-def test_a_run_goes_on_from_its_events():
+def test_a_run_continues_from_its_events():
     system = pendulum(0.2)
     whole = ns.simulate(system, placed((0.0, 2.0)), 10.0)
     first = ns.simulate(system, placed((0.0, 2.0)), 3.0)
@@ -336,10 +336,10 @@ def test_derivatives_are_those_by_the_angle():
     )
     start = np.array([2 * np.pi - 0.1, -0.3])
     run = ns.simulate(system, placed(start), 5.0, tol=1e-11)
-    want = ns.simulate(plain, start, 5.0, tol=1e-11)
-    assert [e.kind for e in run.events] == [e.kind for e in want.events]
+    required = ns.simulate(plain, start, 5.0, tol=1e-11)
+    assert [e.kind for e in run.events] == [e.kind for e in required.events]
     assert "impact" in [e.kind for e in run.events] and "crossing" in [e.kind for e in run.events]
-    a, w = want.x[-1]
+    a, w = required.x[-1]
     outer = np.array(
         [[-np.sin(a), 0], [np.cos(a), 0], [-w * np.cos(a), -np.sin(a)], [-w * np.sin(a), np.cos(a)]]
     )
@@ -347,7 +347,7 @@ def test_derivatives_are_those_by_the_angle():
     inner = np.array(
         [[-np.sin(a), 0], [np.cos(a), 0], [-w * np.cos(a), -np.sin(a)], [-w * np.sin(a), np.cos(a)]]
     )
-    found, true = ns.sensitivity(run), ns.sensitivity(want)
+    found, true = ns.sensitivity(run), ns.sensitivity(required)
     np.testing.assert_allclose(found.dx_dp, outer @ true.dx_dp, atol=1e-8)
     np.testing.assert_allclose(found.dx_dx0 @ inner, outer @ true.dx_dx0, atol=1e-8)
 
@@ -375,9 +375,9 @@ def test_orbits_and_their_multipliers_are_those_by_the_angle(drag, e):
         **own,
     )
     starts = ((system, placed((-1.5, 0))), (plain, [-1.5, 0]))
-    found, want = (ns.periodic_orbit(s, ns.simulate(s, start, 150.0)) for s, start in starts)
-    assert found.stability == want.stability == "asymptotically stable"
-    np.testing.assert_allclose(found.multipliers, [*want.multipliers, 0.0, 0.0], atol=1e-9)
+    found, required = (ns.periodic_orbit(s, ns.simulate(s, start, 150.0)) for s, start in starts)
+    assert found.stability == required.stability == "asymptotically stable"
+    np.testing.assert_allclose(found.multipliers, [*required.multipliers, 0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(found.trajectory.x[-1], found.start, atol=1e-9)
     branch = ns.continue_orbit(found, "a", bounds=(0.48, 0.52))
     assert not branch.events and {end.name for end in branch.ends} == {"REACHED_BOUND"}
@@ -385,7 +385,7 @@ def test_orbits_and_their_multipliers_are_those_by_the_angle(drag, e):
 
 @pytest.mark.parametrize("law", ["newton", "poisson"])
 def test_constraints_that_are_given_twice_change_nothing(law):
-    """Impulses act through both; derivatives ask for one of them."""
+    """Impulses act through both; derivatives need one of them."""
     wall = ns.Impact(x + 0.4, restitution=0.6, name="wall", law=law)
     twice = ns.FilippovSystem(
         [x, y, u, v],
@@ -544,8 +544,8 @@ def test_friction_in_space_holds_and_releases_along_a_joint(wire, start):
     free, plain, placed_at = _on_a_wire(*WIRES[wire])
     place = lambda z: np.concatenate([ca.DM(part).full().ravel() for part in placed_at(*z)])
     run = ns.simulate(free, place(start), 6.0, tol=1e-10)
-    want = ns.simulate(plain, start, 6.0, tol=1e-10)
+    required = ns.simulate(plain, start, 6.0, tol=1e-10)
     assert run.status is ns.Status.REACHED_END, run.message
-    np.testing.assert_allclose(run.x[-1], place(want.x[-1]), atol=1e-9)
-    ends = [e.t for e in want.events if e.kind != "crossing"]
+    np.testing.assert_allclose(run.x[-1], place(required.x[-1]), atol=1e-9)
+    ends = [e.t for e in required.events if e.kind != "crossing"]
     np.testing.assert_allclose([e.t for e in run.events if e.kind != "crossing"], ends, atol=1e-9)

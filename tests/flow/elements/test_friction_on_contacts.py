@@ -105,7 +105,7 @@ def test_a_table_falls_on_four_feet_and_slides_on(velocity):
     np.testing.assert_allclose(run.x[-1, 2:], 0.0, atol=1e-10)
 
 
-def test_what_is_not_determined_is_said():
+def test_what_is_not_determined_is_reported():
     """On four feet that slip in different directions the motion depends on how they share the load."""
     run = ns.simulate(table(0.3, FOUR), [*[0] * 6, 1, 0.4, 0, 0, 0, 3], 1.0)
     assert run.status is ns.Status.NON_UNIQUE
@@ -127,7 +127,7 @@ def test_components_with_different_loads_are_refused():
 @pytest.mark.parametrize("arm", [0.1, 0.3, 1.0])
 @pytest.mark.parametrize("mu", [0.2, 0.6])
 def test_a_tripod_that_is_pulled_beside_its_centre_turns_as_costs_least_power(mu, arm):
-    """Its friction is not determined while it holds."""
+    """Its friction is not determined while it sticks."""
     t, rate, (x, y) = ca.SX.sym("t"), 20 * mu, np.transpose(THREE)
     system = table(mu, THREE, pull=(rate * t, 0), turn=-arm * rate * t, time=t)
     run = ns.simulate(system, [0] * 12, 0.8)
@@ -227,7 +227,7 @@ def test_a_block_in_a_groove_leaves_when_no_loads_hold_it(walls, load, itinerary
 @pytest.mark.parametrize("side", [0.0, 0.5])
 @pytest.mark.parametrize(("angle", "mu"), [(0.7, 0.2), (0.7, 0.5), (1.0, 0.2), (1.0, 0.5)])
 def test_a_block_in_a_groove_holds_as_long_as_any_loads_can_hold_it(angle, mu, side):
-    """Friction across the groove presses it against both walls: the most that holds is 1/sqrt(1 - k^2) of what slides."""
+    """Friction across the groove presses it against both walls: at rest its limit is 1/sqrt(1 - k^2) of that in sliding."""
     t, limit = ca.SX.sym("t"), mu * G / np.cos(angle)
     run = ns.simulate(groove([(angle, mu)] * 2, (limit * t, side, -G), t), [0] * 6, 2.0)
     assert run.status is ns.Status.REACHED_END and run.itinerary == "sscc **cc"

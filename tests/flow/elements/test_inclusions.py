@@ -1,4 +1,4 @@
-"""The law of elements against cases whose truth was found without the library."""
+"""The law of elements against reference solutions found without the library."""
 
 import itertools
 import pickle
@@ -25,25 +25,25 @@ def test_a_case_is_as_known(data):
 
 
 def check(case: Case) -> None:
-    data, truth = case.data, case.data["truth"]
+    data, exact = case.data, case.data["truth"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         run = case.run()
-    if "t_lost" in truth:
+    if "t_lost" in exact:
         assert run.status is ns.Status.INTERSECTION, run.message
         lost = run.events[-2] if len(run.events) > 1 else None
         assert lost is not None and lost.kind == "stability"
-        assert run.t[-1] == pytest.approx(float(truth["t_lost"]), abs=1e-8)
-    elif "k_limit" in truth:
+        assert run.t[-1] == pytest.approx(float(exact["t_lost"]), abs=1e-8)
+    elif "k_limit" in exact:
         assert run.facts.depends_on_widths
-        stable = float(truth["trace"]) > 0
+        stable = float(exact["trace"]) > 0
         assert run.status is (ns.Status.REACHED_END if stable else ns.Status.INTERSECTION)
-    elif "accelerations" in truth:
-        want = np.array(truth["accelerations"], float)
+    elif "accelerations" in exact:
+        expected = np.array(exact["accelerations"], float)
         found = accelerations(run)
-        assert (run.status is ns.Status.NON_UNIQUE) == (len(want) > 1), run.message
-        assert found.shape == want.shape, run.message
-        assert abs(found - want[np.lexsort(want.T[::-1].round(7))]).max() < 1e-9
+        assert (run.status is ns.Status.NON_UNIQUE) == (len(expected) > 1), run.message
+        assert found.shape == expected.shape, run.message
+        assert abs(found - expected[np.lexsort(expected.T[::-1].round(7))]).max() < 1e-9
     elif data.get("expect") == "NON_UNIQUE":
         assert run.status is ns.Status.NON_UNIQUE, run.message
     else:
@@ -183,12 +183,12 @@ def test_accelerations_of_a_body_are_those_of_all_letters(seed):
         "normal_angles": rng.uniform(0, 6.28, count).round(2).tolist(),
         "load": (4 * rng.normal(size=3)).round(1).tolist(),
     }
-    want = motions_of(body)
+    expected = motions_of(body)
     run = Case(body).run()
-    assert (run.status is ns.Status.NON_UNIQUE) == (len(want) > 1), run.message
+    assert (run.status is ns.Status.NON_UNIQUE) == (len(expected) > 1), run.message
     found = accelerations(run)
-    assert found.shape == want.shape
-    assert abs(found - want[np.lexsort(want.T[::-1].round(7))]).max() < 1e-7
+    assert found.shape == expected.shape
+    assert abs(found - expected[np.lexsort(expected.T[::-1].round(7))]).max() < 1e-7
 
 
 @pytest.mark.parametrize("above", [1e-9, 1e-11, 1e-12, -1e-12, -1e-11, -1e-9])

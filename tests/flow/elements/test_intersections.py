@@ -30,7 +30,7 @@ def test_bilinear_law_leaves_the_intersection_at_its_closed_form():
 
 
 @pytest.mark.parametrize("damping", [0.5, 0.0, -0.5])
-def test_orbits_round_an_intersection_that_no_layer_attracts_to(damping):
+def test_orbits_around_an_intersection_that_no_layer_attracts_to(damping):
     """x' = -sgn y - c x, y' = sgn x - c y: squares for c = 0, which only a bend of second order closes in on."""
     system = ns.FilippovSystem(
         [x, y],
@@ -56,7 +56,7 @@ def test_curved_intersection_does_not_drift(turns):
     np.testing.assert_allclose(run.x[-1], [1.0, 0.0, 0.0], atol=1e-8)
 
 
-def test_nonlinear_multipliers_need_the_word():
+def test_nonlinear_multipliers_need_hidden_true():
     with pytest.raises(ns.DefinitionError, match="hidden=True"):
         ns.FilippovSystem([x], field=[lam**3], multipliers=lam, surface=x)
 

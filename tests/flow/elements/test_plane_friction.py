@@ -147,7 +147,7 @@ def test_a_mode_to_start_in():
                 run(_puck(), [0, 0, 0, 0], 2.0, start_mode=mode)
 
 
-def test_a_start_off_a_set_goes_on_from_a_surface_that_repels():
+def test_a_start_off_a_set_continues_from_a_surface_that_repels():
     # A puck of known stopping time beside z' = sign z, which may go either way from z = 0.
     x, z = plane.columns("v1", "v2"), ca.SX.sym("z")
     lam, one = ca.vertcat(*plane.columns("l1", "l2")), ca.SX.sym("one")
@@ -167,7 +167,7 @@ def test_a_start_off_a_set_goes_on_from_a_surface_that_repels():
         assert found.itinerary == f"*{letter} s{letter}"
         assert found.events[0].t == pytest.approx(2.0, abs=1e-11)
         assert found.x[-1] == pytest.approx([0.0, 0.0, z_end], abs=1e-11)
-    held = run(start, "*s")  # the surface does not meet the puck, and goes on as it is
+    held = run(start, "*s")  # the surface does not meet the puck, and continues as it is
     assert held.itinerary == "*s ss" and held.status == ns.Status.REACHED_END
     assert held.x[-1] == pytest.approx(np.zeros(3), abs=1e-11)
     for mode in ("s+", "ss"):
@@ -227,7 +227,7 @@ def test_what_is_no_set_is_refused():
         lambda system: ns.local.sliding_branches(system, [0, 0, 0, 0]),
     ],
 )
-def test_what_knows_surfaces_only_says_so(question):
+def test_functions_of_surfaces_refuse_sets(question):
     with pytest.raises(ns.DefinitionError, match="multipliers"):
         question(_puck())
 
@@ -359,7 +359,7 @@ PULLS = [
     # A direction of slip has no series where the load grows from zero.
     [(*case, load) for case in PULLS for load in ((1,) if case[1] == 0 else (1, T, T**2))],
 )
-def test_a_set_is_held_or_left_by_the_first_order_that_says_so(pull, leaves, load, skew):
+def test_the_first_deciding_order_keeps_or_leaves_a_set(pull, leaves, load, skew):
     h, lam = ca.SX.sym("h", 2), ca.SX.sym("lam", 2)
     m = ca.DM([[1, skew], [skew, 1]])
     field = load * ca.mtimes(m, ca.vertcat(*pull) - lam)

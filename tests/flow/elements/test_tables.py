@@ -201,13 +201,13 @@ def test_derivatives_are_those_with_a_surface_for_each_breakpoint(name):
     system = SYSTEMS[name]
     run = ns.simulate(system, [0.8, 0.4], 3.0, tol=1e-12, t_eval=np.linspace(0.1, 2.9, 8))
     other = replace(run, system=system.of_breakpoints)
-    found, truth = ns.sensitivity(run), ns.sensitivity(other)
+    found, exact = ns.sensitivity(run), ns.sensitivity(other)
     assert len(found.event_times) == len(run.events) - 1 > 0
-    size = 1 + abs(truth.dx_dx0).max()
+    size = 1 + abs(exact.dx_dx0).max()
     for of in ("dx_dx0", "event_times", "dt_dx0", "dsample_dx0"):
-        np.testing.assert_allclose(getattr(found, of), getattr(truth, of), atol=1e-11 * size)
-    assert found.nearest == truth.nearest
-    np.testing.assert_allclose(found.clearance, truth.clearance, rtol=1e-9)
+        np.testing.assert_allclose(getattr(found, of), getattr(exact, of), atol=1e-11 * size)
+    assert found.nearest == exact.nearest
+    np.testing.assert_allclose(found.clearance, exact.clearance, rtol=1e-9)
     rows = [1.0, 0.5], np.random.default_rng(1).normal(size=(8, 2))
     pulled = [ns.vjp(one, rows[0], samples=rows[1])[0] for one in (run, other)]
     np.testing.assert_allclose(*pulled, atol=1e-11 * size)
@@ -232,11 +232,11 @@ def test_derivatives_through_a_thousand_breakpoints(order):
 def test_exponents_and_returns_pass_breakpoints():
     system = SYSTEMS["a spring"]
     both = system, system.of_breakpoints
-    found, truth = (
+    found, exact = (
         ns.lyapunov_spectrum(one, [0.8, 0.4], 20.0, tol=1e-11, progress=False) for one in both
     )
-    np.testing.assert_allclose(found.exponents, truth.exponents, atol=1e-8)
-    np.testing.assert_allclose(found.sum_check, truth.sum_check, atol=1e-8)
+    np.testing.assert_allclose(found.exponents, exact.exponents, atol=1e-8)
+    np.testing.assert_allclose(found.sum_check, exact.sum_check, atol=1e-8)
     returns = [ns.orbit.poincare(one, "h4", [0.8, 0.4], count=3, tol=1e-12) for one in both]
     np.testing.assert_allclose(*[one.jacobian(2) for one in returns], atol=1e-9)
 

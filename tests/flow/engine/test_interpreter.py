@@ -177,7 +177,7 @@ def test_zero_over_zero_is_no_number(f):
 
 
 def test_terms_that_a_mode_leaves_out():
-    """Beside what slides and what does not; functions of the other sides have no values on the way."""
+    """Beside sliding and other surfaces; functions of the other sides have no values on the way."""
     z, w = ca.SX.sym("z"), ca.SX.sym("w")
     grows = ca.sign(x) * ca.sqrt(0.01 + ca.fabs(x))
     empties = -ca.if_else(z > 0.25, ca.sqrt(z), 0.5)

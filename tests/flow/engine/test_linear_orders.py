@@ -50,7 +50,7 @@ def test_grazing_is_seen_on_one_side_only(gap):
         start = [0.1 + np.cos(phase), -np.sin(phase)]
         clear = ns.simulate(oscillator(x - 1.1 - gap), start, 40.0, tol=1e-12)
         assert len(clear.events) == 1 and clear.status is ns.Status.REACHED_END
-        met = ns.simulate(oscillator(x - 1.1 + gap), start, 2 * np.pi, tol=1e-12)
+        reached = ns.simulate(oscillator(x - 1.1 + gap), start, 2 * np.pi, tol=1e-12)
         expected = 2 * np.pi - phase - np.arccos(1.0 - gap)
-        assert met.events[0].kind == "crossing"
-        assert abs(met.events[0].t - expected) < 1e-12 / np.sqrt(gap) + 1e-12
+        assert reached.events[0].kind == "crossing"
+        assert abs(reached.events[0].t - expected) < 1e-12 / np.sqrt(gap) + 1e-12

@@ -110,7 +110,7 @@ def test_starts_and_parameters_broadcast(system):
 
 
 @needs_compiler
-def test_not_finite_is_reported_and_the_rest_goes_on(system, starts):
+def test_not_finite_is_reported_and_the_rest_continues(system, starts):
     bad = starts.copy()
     bad[5, 0], bad[123, 1], bad[299] = np.nan, np.inf, -np.inf
     many, good = ensemble(system, bad, 5.0), ensemble(system, starts, 5.0)
@@ -227,7 +227,7 @@ def press():
 @needs_compiler
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_interrupt_from_the_keyboard_is_heard_inside_a_chunk(endless, keyboard, monkeypatch):
-    monkeypatch.setattr(chunks.run_chunk, "__defaults__", (None, press))  # asked between bursts
+    monkeypatch.setattr(chunks.run_chunk, "__defaults__", (None, press))  # called between bursts
     with pytest.raises(KeyboardInterrupt):
         ensemble(*endless, **LONG, work=Work(chunk=50, threads=1))
 

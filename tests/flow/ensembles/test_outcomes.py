@@ -54,10 +54,10 @@ def test_on_the_processor(system):
 
 
 @needs_compiler
-@pytest.mark.parametrize("places", [pytest.param(kernel.PLACES, marks=pytest.mark.slow), 2])
-def test_on_a_card(system, monkeypatch, places):
+@pytest.mark.parametrize("points", [pytest.param(kernel.TABLE_SIZE, marks=pytest.mark.slow), 2])
+def test_on_a_card(system, monkeypatch, points):
     """With room for two itineraries in the card's table the other runs are counted here."""
-    monkeypatch.setattr(kernel, "PLACES", places)
+    monkeypatch.setattr(kernel, "TABLE_SIZE", points)
     shim = Shim(fused=False)
     monkeypatch.setattr(on_device, "machine_for", lambda device: shim)
     options = dict(t_end=4.0, tol=1e-5, device="cuda", work=ns.Work(chunk=130))

@@ -373,7 +373,7 @@ def test_the_room_of_all_rows_is_taken_before_the_first_is_computed(tmp_path, mo
 
 @needs_reserving
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT])
-def test_a_disk_without_room_is_told_at_once(code, whole, tmp_path, monkeypatch, counted):
+def test_a_disk_without_room_is_reported_at_once(code, whole, tmp_path, monkeypatch, counted):
     def full(*args):
         raise OSError(code, os.strerror(code))
 

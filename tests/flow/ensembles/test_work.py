@@ -99,7 +99,7 @@ def test_new_work_is_given_as_soon_as_one_result_is_taken():
     assert sorted(taken) == list(range(30))
 
 
-def test_what_is_finished_is_taken_before_an_error_is_told():
+def test_what_is_finished_is_taken_before_an_error_is_reported():
     def submit(number):
         future = Future()
         if number == 2:

@@ -112,12 +112,12 @@ def listed(run):
 
 def same(events, expected, order):
     """Compare events with those of the case, one by one."""
-    for event, wanted in zip(events, expected, strict=True):
-        assert event.name == wanted["name"] and event.kind == wanted["kind"]
-        assert close(event.t, wanted["t"]), (event, wanted)
+    for event, required in zip(events, expected, strict=True):
+        assert event.name == required["name"] and event.kind == required["kind"]
+        assert close(event.t, required["t"]), (event, required)
         for states, key in ((event.x, "x"), (event.x_after, "x_after")):
             for value, name in zip(states, order, strict=True):
-                assert close(value, wanted[key][name]), (event, wanted)
+                assert close(value, required[key][name]), (event, required)
 
 
 def check(case, events, run, order):
@@ -129,7 +129,7 @@ def check(case, events, run, order):
         return
     shown = case["events"]
     if case["events_shown"] == "all":
-        assert [event.name for event in events] == [wanted["name"] for wanted in shown]
+        assert [event.name for event in events] == [required["name"] for required in shown]
         same(events, shown, order)
     else:
         same(events[:20], shown[:20], order)

@@ -220,7 +220,7 @@ def test_an_event_that_is_true_at_the_start_and_happens_later_is_not_named():
 
 
 @pytest.mark.parametrize("cut", range(1, 7))
-def test_a_run_cut_amid_an_instant_goes_on(cut):
+def test_a_run_cut_amid_an_instant_continues(cut):
     system = neurons(push=0.6)
     whole = ns.simulate(system, [0.0, 0.5, 0.4], 4.0)
     part = ns.simulate(system, [0.0, 0.5, 0.4], 4.0, max_events=cut)
@@ -231,7 +231,7 @@ def test_a_run_cut_amid_an_instant_goes_on(cut):
         assert np.allclose(rest.x[-1], whole.x[-1], rtol=0, atol=1e-9)
 
 
-def test_a_saved_run_goes_on(tmp_path):
+def test_a_saved_run_continues(tmp_path):
     part = ns.simulate(neurons(push=0.6), [0.0, 0.5, 0.4], 4.0, max_events=2)
     part.save(tmp_path / "part")
     loaded = ns.load(tmp_path / "part")

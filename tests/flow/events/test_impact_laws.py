@@ -12,7 +12,7 @@ from tests.differences import require
 LAWS = ("newton", "moreau", "poisson")
 
 
-def velocities(normals, tangents, weight, v, wanted, mu, base):
+def velocities(normals, tangents, weight, v, expected, mu, base):
     """All v+ with n v+ >= wanted perp p >= 0 and |p_t| <= mu (base + p), which opposes the slip."""
     found = []
     for letters in itertools.product("of", "+-s" if mu else "0", repeat=len(normals)):
@@ -21,7 +21,7 @@ def velocities(normals, tangents, weight, v, wanted, mu, base):
             n, t, side = normals[k], tangents[k], {"+": -mu, "-": mu}.get(slip, 0.0)
             start = start + weight @ t * base[k] * side
             rows += [n] * (normal == "f") + [t] * (slip == "s")
-            right += [wanted[k]] * (normal == "f") + [0.0] * (slip == "s")
+            right += [expected[k]] * (normal == "f") + [0.0] * (slip == "s")
             forces += [n + side * t] * (normal == "f") + [t] * (slip == "s")
         matrix = np.array(rows).reshape(-1, 3) @ weight @ np.array(forces).reshape(-1, 3).T
         p = np.linalg.lstsq(matrix, np.array(right) - np.array(rows).reshape(-1, 3) @ start)[0]
@@ -31,7 +31,7 @@ def velocities(normals, tangents, weight, v, wanted, mu, base):
         holds, left, taken = True, list(p), np.zeros(len(normals))
         for k, (normal, slip) in enumerate(zip(letters[::2], letters[1::2], strict=True)):
             taken[k] = left.pop(0) if normal == "f" else 0.0
-            holds &= taken[k] >= -1e-9 and normals[k] @ after >= wanted[k] - 1e-9
+            holds &= taken[k] >= -1e-9 and normals[k] @ after >= expected[k] - 1e-9
             if slip == "s":
                 holds &= abs(left.pop(0)) <= mu * (base[k] + taken[k]) + 1e-9
             elif slip in "+-":
@@ -45,8 +45,8 @@ def struck(law, normals, tangents, weight, v, e, mu):
     """The velocities after an impact, all that the law allows."""
     rate, none = normals @ v, np.zeros(len(normals))
     if law == "moreau":
-        wanted = np.where(rate < 0, -e * rate, 0.0)
-        return [own for own, _ in velocities(normals, tangents, weight, v, wanted, mu, none)]
+        expected = np.where(rate < 0, -e * rate, 0.0)
+        return [own for own, _ in velocities(normals, tangents, weight, v, expected, mu, none)]
     found = []
     for between, taken in velocities(normals, tangents, weight, v, none, mu, none):
         moved = between + weight @ normals.T @ (e * taken)
@@ -98,11 +98,11 @@ def test_two_contacts_struck_at_once_are_as_all_letters_say(law, mu, seed):
     normals, tangents, inertia, v = random_body(seed, 2)
     e = np.array([0.7, 0.3])
     weight = np.diag([1.0, 1.0, 1 / inertia])
-    want = struck(law, normals, tangents, weight, v, e, mu)
+    expected = struck(law, normals, tangents, weight, v, e, mu)
     run = ns.simulate(body(law, normals, tangents, inertia, e, mu), [0, 0, 0, *v], 1e-9)
     first = run.events[0]
     assert first.kind == "impact" and first.t == 0.0
-    assert min(abs(first.x_after[3:] - own).max() for own in want) < 1e-9
+    assert min(abs(first.x_after[3:] - own).max() for own in expected) < 1e-9
     energy = lambda u: u @ np.linalg.solve(weight, u)
     assert law == "poisson" or energy(first.x_after[3:]) <= energy(v) + 1e-12
 

@@ -122,7 +122,7 @@ def test_a_curved_wall_pushes_along_its_normal():
     assert swing.itinerary == "c" and abs(swing.x[-1, 0] - np.sin(pendulum.x[-1, 0])) < 1e-8
 
 
-def test_a_reaction_whose_direction_cannot_be_seen_is_asked_for():
+def test_a_reaction_whose_direction_cannot_be_seen_is_requested():
     """A point that moves at speed v in the direction q before a wall: the gap's rate is v cos q."""
     with pytest.raises(ns.DefinitionError, match="reaction of 'impact'"):
         ns.FilippovSystem([x, q, v], field=[v * ca.cos(q), 1, 0], impacts=ns.Impact(1 - x))
@@ -163,7 +163,7 @@ def test_a_pile_of_three_falls_and_comes_to_rest(e):
 
 
 def test_a_neighbour_is_not_behind_by_the_error_of_a_root():
-    """While one gap chatters the others are met within the tolerance, from all sides."""
+    """While one gap chatters the others are reached within the tolerance, from all sides."""
     system = pile(2, 0.5)
     for k in range(6):
         start = [0.1 + 0.07 * k, 0.75 + 0.05 * k, 0.1 * k, -0.3 * k, 0.3 * k, -0.2]

@@ -40,12 +40,12 @@ def test_an_autonomous_motion_does_not_depend_on_when_it_begins(name, t_start):
 @pytest.mark.parametrize(
     ("name", "t_start"), [*((name, 1.7e9) for name in SYSTEMS), ("oscillator", 1e15)]
 )
-def test_dense_output_and_samples_are_at_the_times_that_were_asked_for(name, t_start):
+def test_dense_output_and_samples_are_at_the_times_that_were_requested(name, t_start):
     """Steps that begin at an event begin between two numbers."""
     system, start = SYSTEMS[name]
-    asked = np.arange(1, 20) * 0.25  # numbers of their own at both starts
-    early = ns.simulate(system, start, 5.0)(asked)
-    times = t_start + asked
+    requested = np.arange(1, 20) * 0.25  # numbers of their own at both starts
+    early = ns.simulate(system, start, 5.0)(requested)
+    times = t_start + requested
     late = ns.simulate(system, start, t_start + 5.0, t_start=t_start, t_eval=times)
     assert np.abs(late.sample_x - early).max() < 1e-11
     assert np.abs(late(times) - early).max() < 1e-11

@@ -229,7 +229,7 @@ def test_sections_beside_a_set_of_codimension_two() -> None:
         ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at=ns.Section("h0", direction=1))
 
 
-def test_more_hits_than_any_run_has_are_not_met() -> None:
+def test_more_hits_than_any_run_has_are_not_reached() -> None:
     """Numbers beyond those of C, where they became others, and zero."""
     relay = ns.FilippovSystem([x, v], surface=v, above=[v, -x - 0.1], below=[v, -x + 0.1])
     run = lambda at: ns.simulate(relay, [1.05, 0.0], 10.0, at=at)

@@ -128,7 +128,7 @@ class Mechanism:
     def fits(
         self, q: np.ndarray, v: np.ndarray, mode: tuple[int, ...], touching: np.ndarray
     ) -> bool:
-        """Whether a mode of the touching contacts goes on from here."""
+        """Whether a mode of the touching contacts continues from here."""
         n, mu = len(mode), self.friction
         a, reaction, friction = self.solve(q, v, mode)
         gap = self.normals(q) @ a + self.bias(q, v)[:n]

@@ -53,7 +53,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class Table:
-    """A curve of straight lines, that go on beyond its ends."""
+    """A curve of straight lines, that continue beyond its ends."""
 
     argument: str
     xs: list[float]

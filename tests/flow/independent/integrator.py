@@ -3,7 +3,7 @@
 It shares nothing with the package: the midpoint rule extrapolated to the step size zero (Gragg 1965;
 Hairer, Norsett & Wanner 1993, sec. II.9) steps all systems together, each with its own step size. A
 guard that is negative at the end of a step is approached by shortening the step. At an event every
-combination of letters is tried, and the one whose rates agree with it goes on.
+combination of letters is tried, and the one whose rates agree with it continues.
 """
 
 from __future__ import annotations

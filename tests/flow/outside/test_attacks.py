@@ -70,8 +70,8 @@ def test_derivatives_of_rest_on_a_curve():
         parameters={a: 1.0},
     )  # fmt: skip
     found = ns.sensitivity(ns.simulate(curve, [0.0, 1.0, 0.0], 1.0))
-    wanted = [[math.cos(1)], [math.cos(1) - math.sin(1)], [1]]
-    np.testing.assert_allclose(found.dx_dp, wanted, rtol=0, atol=1e-9)
+    expected = [[math.cos(1)], [math.cos(1) - math.sin(1)], [1]]
+    np.testing.assert_allclose(found.dx_dp, expected, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("values", ["now", "trigger"])

@@ -85,7 +85,7 @@ def test_states_that_are_not_finite_end_the_run(many):
 
 
 def test_a_run_ends_where_derivatives_of_large_states_are_no_numbers():
-    """x grows like exp(3 t): at 1e307 the steps of a point without derivatives went on for minutes."""
+    """x grows like exp(3 t): at 1e307 the steps of a point without derivatives continued for minutes."""
     system = ns.FilippovSystem([x, y], surface=x, above=[y + x, 3 * y], below=[y + x, 3 * y])
     start, least = [1.0, 0.3], np.log(1e300) / 3
     run = ns.simulate(system, start, 1000.0, max_steps=2000)

@@ -121,7 +121,7 @@ def test_error_falls_in_proportion_to_the_tolerance(name):
     assert 0.85 < slope < 1.25
 
 
-def test_slip_at_separation_is_met_to_its_digits():
+def test_slip_at_separation_is_reached_to_its_digits():
     final = run("impact", 1e-13).x[-1]
     assert final[1] + final[4] == pytest.approx(-0.0340870447107, abs=5e-14)
 

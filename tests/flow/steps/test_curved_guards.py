@@ -19,7 +19,7 @@ SINES = {"time": (ca.sin(t), [1, 0]), "state": (ca.sin(x), [1, 0]), "oscillator"
 
 @pytest.mark.parametrize("tol", [1e-6, 1e-10, 1e-12])
 @pytest.mark.parametrize("of", SINES)
-def test_passages_of_a_sine_are_met_once_and_in_time(tol, of):
+def test_passages_of_a_sine_are_reached_once_and_in_time(tol, of):
     """Zeros of sin(t) - h are asin(h) + 2 pi n, however long a step the field allows."""
     guard, field = SINES[of]
     kick = ns.Reset(guard - h, [x, v, kicks + 1], direction=1)
@@ -30,12 +30,12 @@ def test_passages_of_a_sine_are_met_once_and_in_time(tol, of):
         true = true[(true > 1e-6) & (true < 20.0)]
         start = [0.0, 1.0, 0.0]
         run = ns.simulate(system, start, 20.0, parameters={"h": level}, tol=tol)
-        met = resets_of(run)
-        assert len(met) == len(true) and run.x[-1, 2] == len(true)
-        assert np.abs(met - true).max() < (100 * tol if of == "oscillator" else 2e-14)
+        reached = resets_of(run)
+        assert len(reached) == len(true) and run.x[-1, 2] == len(true)
+        assert np.abs(reached - true).max() < (100 * tol if of == "oscillator" else 2e-14)
 
 
-def test_a_section_is_met_once_a_passage():
+def test_a_section_is_sampled_once_a_passage():
     fine = np.linspace(0, 20.0, 400_001)
     dense = np.cos(fine) + np.sin(3.1 * fine)
     system = ns.FilippovSystem([x, v], field=[v, -x], time=t)
@@ -57,7 +57,7 @@ def test_a_flat_top_is_passed_once_up_and_once_down():
 
 
 @pytest.mark.parametrize("tol", [1e-6, 1e-8, 1e-10])
-def test_a_section_that_changes_nothing_is_met_once_a_passage(tol):
+def test_a_section_that_changes_nothing_is_sampled_once_a_passage(tol):
     """The 40th return of a pendulum with a curved section, by DOP853 with steps of 0.1."""
     pendulum = ns.FilippovSystem([x, v], field=[v, -1.3 * ca.sin(x) + 0.1 * (1 - x * x) * v])
     section = ca.sin(1.1 * x + 0.7 * v) - 0.9
@@ -67,7 +67,7 @@ def test_a_section_that_changes_nothing_is_met_once_a_passage(tol):
 
 
 @pytest.mark.parametrize("tol", [1e-6, 1e-10])
-def test_a_restart_where_a_stop_ended_goes_on(tol):
+def test_a_restart_where_a_stop_ended_continues(tol):
     """The state that a stop leaves is on its zero to rounding, so that the next passage is the next event."""
     guard = ca.sin(1.1 * x + 0.7 * v) - h
     system = ns.FilippovSystem([x, v], field=[v, -x], parameters={h: 0.0}, stops=ns.Stop(guard))
@@ -105,8 +105,8 @@ def test_impacts_on_a_shaken_table_are_in_time(w):
         assert abs(first - true) < 1e-14
 
 
-def test_guards_of_one_zero_are_met_at_one_time():
-    """Three ways to write a zero: polished, they cannot be told apart, and the stop is served first."""
+def test_guards_of_one_zero_are_reached_at_one_time():
+    """Three ways to write a zero: polished, they coincide, and the stop fires first."""
     at = 0.7
     guards = [ca.sin(t) - np.sin(at), ca.exp(x) - np.exp(at), x - at]
     for first in range(3):

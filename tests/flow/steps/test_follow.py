@@ -76,8 +76,8 @@ def test_sliding_along_a_corner_is_followed_with_both_multipliers():
     )
     run = ns.flow.follow(system, [0.0, 0.0, 0.0], 1.5, mode="ss", watch=[q - 1], tol=1e-12)
     assert run.x[-1, 2] == pytest.approx(4 * np.tan(1.5 / 4), abs=1e-10)
-    (met,) = [e for e in run.events if e.kind == "zero" and e.name == "f0"]
-    assert met.t == pytest.approx(4 * np.arctan(0.25), abs=1e-10)
+    (reached,) = [e for e in run.events if e.kind == "zero" and e.name == "f0"]
+    assert reached.t == pytest.approx(4 * np.arctan(0.25), abs=1e-10)
     back = ns.flow.follow(system, run.x[-1], 0.0, t_start=1.5, mode="ss", tol=1e-12)
     np.testing.assert_allclose(back.x[-1], 0.0, atol=1e-10)
 

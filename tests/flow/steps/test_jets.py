@@ -131,10 +131,10 @@ def test_jets_are_those_of_the_expression_as_it_stands():
     )
     force = -(2 * p * (1 + z**2) * (1 - y) * z) - q**2 * (1 - y) * x
     field = ca.vertcat(z, force, -y + p * force)
-    wanted = ca.Function("f", [states, c], [lie_series(force, field, states, 6)])
+    required = ca.Function("f", [states, c], [lie_series(force, field, states, 6)])
     at = [0.3, -0.2, 0.7], [0.4, 0.9]
     got = jets_of(field, force, states, c, 6)(*at)[3]
-    assert got == pytest.approx(np.array(wanted(*at)).ravel(), rel=1e-12, abs=1e-13)
+    assert got == pytest.approx(np.array(required(*at)).ravel(), rel=1e-12, abs=1e-13)
 
 
 SPECIAL = [0.0, 1.0, -1.0, 0.5, -2.5, 3.0, 1000.0, -1000.0, 1e308, math.inf, -math.inf, math.nan]

@@ -103,8 +103,8 @@ def test_zeros_of_a_sum(motion):
             continue
         judged += 1
         direction, sign = choose.choice([-1, 0, 1]), (-1) ** (len(terms) - 1)
-        wanted = expected([(zero, True) for zero in real[0]], sign, direction)
-        times = [float(MOTIONS[motion][2](zero)) for zero in wanted]
+        required = expected([(zero, True) for zero in real[0]], sign, direction)
+        times = [float(MOTIONS[motion][2](zero)) for zero in required]
         guard = sum(float(a) * x**k for k, a in enumerate(terms[::-1]))
         assert passes(guard, motion, direction) == pytest.approx(times, abs=1e-6, rel=0), seed
     assert judged > 3

@@ -103,8 +103,8 @@ def test_operations_are_proven(op):
     system = ns.FilippovSystem([x, y, p], field=[1, 1, of(op, x, y)])
     proof = ns.certify_orbit(system, [*ELSEWHERE.get(op, START), 0], T_END)
     assert proof.proven
-    (low, high), truth = proof.end["p"].ends, integral(op)
-    assert low - 1e-15 <= truth <= high + 1e-15 and high - low < 1e-12
+    (low, high), exact = proof.end["p"].ends, integral(op)
+    assert low - 1e-15 <= exact <= high + 1e-15 and high - low < 1e-12
 
 
 @pytest.mark.parametrize("op", NOT_SMOOTH)

@@ -306,11 +306,11 @@ def test_the_paradox_of_painleve_has_no_motion():
     assert found.kind == "closed"
     expected = 1 / (1 + 3 * math.cos(1) * (math.cos(1) - math.sin(1)))
     assert found.evidence["multiplier"] == pytest.approx(expected, rel=1e-12)
-    with pytest.raises(ns.PointError, match="no motion goes on there"):
+    with pytest.raises(ns.PointError, match="no motion continues there"):
         ns.classify(rod.system, rod.start, parameters={"mu": 2.0})
 
 
-def test_a_point_off_the_surface_beside_a_closed_diode_is_told_where_the_surface_is():
+def test_a_point_off_the_surface_beside_a_closed_diode_is_refused_with_the_nearest_one():
     boost = ns.textbook.boost_converter()
     with pytest.raises(
         ns.PointError, match=r"nearest point of the surface is about \[0.0, 3.5, 0.3\]"

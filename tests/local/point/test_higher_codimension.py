@@ -129,7 +129,7 @@ def test_friction_that_misses_a_direction_attracts_from_none_along_it(a, m, expe
     assert ns.region(system, np.zeros(len(a))) is ns.Region[expected]
 
 
-def test_beside_a_surface_the_side_is_known_or_asked_for():
+def test_beside_a_surface_the_side_is_known_or_required():
     v, lam = (ca.vertcat(ca.SX.sym(n + "1"), ca.SX.sym(n + "2")) for n in ("v", "l"))
     z, switch = ca.SX.sym("z"), ca.SX.sym("switch")
     system = ns.FilippovSystem(

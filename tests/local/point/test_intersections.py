@@ -1,4 +1,4 @@
-"""Where surfaces meet, the modes that can go on, the attraction of sliding and pseudo-equilibria are those of
+"""Where surfaces meet, the admissible modes, the attraction of sliding and pseudo-equilibria are those of
 closed forms, of difference quotients and of runs."""
 
 import casadi as ca
@@ -47,7 +47,7 @@ def test_modes_that_can_go_on_and_attraction(name):
     assert sorted(m.mode for m in found.continuations) == sorted(modes) and found.complete
     assert found.attraction == attraction and found.surfaces == (0, 1)
     assert ns.classify(system, [0.0, 0.0]).kind == kind
-    assert ("modes that can go on: " + ", ".join(m.mode for m in found.continuations)) in str(found)
+    assert ("admissible modes: " + ", ".join(m.mode for m in found.continuations)) in str(found)
 
 
 def test_a_search_finds_the_rest_of_twisting_stable():
@@ -55,17 +55,17 @@ def test_a_search_finds_the_rest_of_twisting_stable():
     assert found.stable and found.kind == "stable pseudo-node"
 
 
-def test_a_point_on_another_surface_is_told_so():
+def test_a_point_on_another_surface_is_refused():
     with pytest.raises(ns.PointError, match=r"one on surface 1\. Give surface=1"):
         ns.classify(plane(y, -3 * a - b), [0.3, 0.0])
     assert ns.classify(plane(y, -3 * a - b), [0.3, 0.0], surface=1).label == "crossing down"
 
 
-NOT_RUN = ("a centre", "twisting out")  # rest goes on in both, and so do orbits that leave
+NOT_RUN = ("a centre", "twisting out")  # rest continues in both, and so do orbits that leave
 
 
 @pytest.mark.parametrize("name", [n for n in CASES if len(CASES[n][1]) == 1 and n not in NOT_RUN])
-def test_a_run_goes_on_in_the_only_mode(name):
+def test_a_run_continues_in_the_only_mode(name):
     system, (mode,), attraction, _ = CASES[name]
     run = ns.simulate(system, [0.0, 0.0], 1.0)
     if attraction == "spiralling out":

@@ -10,7 +10,7 @@ SYSTEM = ns.FilippovSystem([x, y], surface=y, above=[-x - y, x - y], below=[1, 1
 
 
 @pytest.mark.parametrize(
-    "ask",
+    "call",
     [
         lambda side: ns.local.fold(SYSTEM, [0, 0], side=side),
         lambda side: ns.find_fold(SYSTEM, [0, 0], side=side),
@@ -20,9 +20,9 @@ SYSTEM = ns.FilippovSystem([x, y], surface=y, above=[-x - y, x - y], below=[1, 1
     ],
 )
 @pytest.mark.parametrize("side", ["above", "below", "s", "", 1, 0])
-def test_other_words_are_refused(ask, side):
+def test_other_words_are_refused(call, side):
     with pytest.raises(ns.DefinitionError, match="side"):
-        ask(side)
+        call(side)
 
 
 def test_results_carry_the_letter():

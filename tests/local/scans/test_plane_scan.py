@@ -100,7 +100,7 @@ def test_equilibria_are_found_and_named_on_their_own_side_only(matrix, kind):
         assert_allclose(np.abs(p.eigenvectors(found)), [[0, 1], [1, 0]], atol=1e-12)
 
 
-def test_curved_surfaces_are_met_to_rounding():
+def test_curved_surfaces_are_reached_to_rounding():
     p = plane([y - 0.3 * x, -x - 0.3 * y], [y + x, y - x], x**2 + y**2 - 1)
     (curve,) = p.curves
     assert_allclose(np.hypot(*curve.T), 1, atol=1e-14)
@@ -117,8 +117,8 @@ def test_pieces_cover_the_surface_and_are_what_they_say():
     for piece in pieces:
         at = piece.points[1:-1, 0]
         l1, l2 = np.sin(3 * at), np.cos(2 * at)
-        want = {"attracting": (l1 < 0) & (l2 > 0), "repelling": (l1 > 0) & (l2 < 0)}
-        assert np.all(want.get(piece.kind, l1 * l2 > 0))
+        expected = {"attracting": (l1 < 0) & (l2 > 0), "repelling": (l1 > 0) & (l2 < 0)}
+        assert np.all(expected.get(piece.kind, l1 * l2 > 0))
 
 
 def test_an_equilibrium_on_the_frame_is_inside():
@@ -138,7 +138,7 @@ def test_without_the_surface_there_is_nothing_on_it():
     assert p.curves == [] and p.pieces == [] and p.folds == [] and p.pseudo_equilibria == []
 
 
-def test_where_a_field_is_undefined_the_scan_goes_on():
+def test_where_a_field_is_undefined_the_scan_continues():
     p = plane([ca.sqrt(x), y - x], [1, 1], box=(-1.0, 1.0, -1.0, 1.0))
     assert all(e.side == "+" for e in p.equilibria)
     assert len(p.curves) == 1

@@ -43,8 +43,8 @@ def test_tangents_are_the_derivative_of_the_inverse(case):
 @pytest.mark.parametrize("case", CASES)
 def test_states_have_the_coordinates_they_were_found_for(case):
     fold = CASES[case]()
-    wanted = 0.05 * np.random.default_rng(0).uniform(-1, 1, size=(20, 3))
-    assert_allclose(fold.coordinates(fold.point_at(wanted)), wanted, atol=1e-13)
+    expected = 0.05 * np.random.default_rng(0).uniform(-1, 1, size=(20, 3))
+    assert_allclose(fold.coordinates(fold.point_at(expected)), expected, atol=1e-13)
     assert_allclose(fold.coordinates(fold.point), 0, atol=1e-13)
 
 

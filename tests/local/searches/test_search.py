@@ -23,7 +23,7 @@ def test_held_coordinates_keep_their_value():
     assert found.distance == pytest.approx(2.0 - found.x[2])
 
 
-def test_where_a_search_fails_the_whole_point_is_told():
+def test_where_a_search_fails_the_whole_point_is_reported():
     start = np.array([0.3, 2.0, 0.2])
     with pytest.raises(ns.ConvergenceError) as caught:
         search(sphere, start, [2], tol=1e-12, max_iterations=30, what="sphere")

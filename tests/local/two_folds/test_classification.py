@@ -34,13 +34,13 @@ def fates(matrix, angles):
         z[:, open_] = step @ z[:, open_]
         radius = np.hypot(*z)
         closest[open_] = np.minimum(closest[open_], radius[open_])
-        for name, met in (
+        for name, reached in (
             ("z2", z[0] <= 0),
             ("z3", z[1] <= 0),
             ("s", radius < 1e-25),
             ("far", radius > 1e6),
         ):
-            end[open_ & met & (end == "")] = name
+            end[open_ & reached & (end == "")] = name
     raise AssertionError("no end")
 
 

@@ -27,8 +27,8 @@ def test_sectors_that_connect_to_the_two_fold_agree_with_the_decision_table(labe
 def test_exponential_is_exact_for_focus_node_and_jordan_block():
     for matrix in ([[0.3, -2], [1, 0.1]], [[-3, -1], [1, -0.5]], [[0.5, -1], [1, -1.5]]):
         for r in (-1.3, 0.0, 2.0):
-            want = expm(np.array(matrix) * r)
-            assert_allclose(exponential(matrix, r), want, rtol=1e-12, atol=1e-13)
+            expected = expm(np.array(matrix) * r)
+            assert_allclose(exponential(matrix, r), expected, rtol=1e-12, atol=1e-13)
 
 
 def test_time_to_leave_the_quadrant_is_exact():

@@ -48,7 +48,7 @@ def order(found, widths):
     [(CROSSING, [0.0, -0.5], 2.0), (SLIDING, [0.0, 0.2], 1.0)],
     ids=["crossing", "attracting sliding"],
 )
-def test_first_order_where_the_future_is_unique(system, start, t_end, transition):
+def test_first_order_where_the_solution_is_unique(system, start, t_end, transition):
     widths = [1e-2, 1e-3, 1e-4]
     found = errors(system, start, t_end, transition, widths)
     assert order(found, widths) == pytest.approx(1.0, abs=0.1)

@@ -55,7 +55,7 @@ def test_each_expression_has_its_own_answer_and_without_time_sines_are_bent() ->
 
 @pytest.mark.parametrize("omega", [0.05, 1.0, 37.0])
 def test_forced_linear_runs_keep_the_tolerance_though_no_step_is_checked(omega: float) -> None:
-    """x'' + x = cos(omega t) and a stop that is met between, against the closed form."""
+    """x'' + x = cos(omega t) and a stop that is reached between, against the closed form."""
     x = ca.SX.sym("x", 2)
     t = ca.SX.sym("t")
     end = 0.5 + 0.1 * ca.cos(3 * t)

@@ -140,8 +140,8 @@ def test_a_ball_on_a_table_folds_and_doubles_on_closed_forms():
         curve = ns.continue_bifurcation(event, ("A", "r"), bounds=[(0.1, 2), (0.5, 0.9)])
         A, r = curve.values.T
         fold = np.pi * (1 - r) / (1 + r)
-        wanted = fold if event.kind == "fold" else np.hypot(fold, 2 * (1 + r * r) / (1 + r) ** 2)
-        assert np.abs(A - wanted).max() < 1e-11 and len(curve) > 10
+        expected = fold if event.kind == "fold" else np.hypot(fold, 2 * (1 + r * r) / (1 + r) ** 2)
+        assert np.abs(A - expected).max() < 1e-11 and len(curve) > 10
         assert curve.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
 
 

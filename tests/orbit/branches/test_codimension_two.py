@@ -228,10 +228,10 @@ def test_the_tongue_of_a_forced_neuron():
         (o.legs[0].t % 1.9, float(o.multipliers[0].real))
         for o in branch.at(float(values["A used"]))
     )
-    truth = [
+    exact = [
         [float(v) for v in row] for row in values["firing phases and multipliers (two orbits)"]
     ]
-    assert np.abs(np.array(found) - truth).max() < 1e-11
+    assert np.abs(np.array(found) - exact).max() < 1e-11
     (fold,) = (e for e in branch.events if e.kind == "fold")
     assert fold.parameter == pytest.approx(float(values["A at the edge, T=1.9"]), abs=1e-14)
     curve = ns.continue_bifurcation(fold, ("A", "T"), bounds=[(0.0, 2.0), (1.0, 3.0)])

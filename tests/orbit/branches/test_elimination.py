@@ -33,9 +33,9 @@ def test_the_solution_is_that_of_a_dense_solver(borders):
         )
         matrix = matrix * rng.uniform(0.5, 2.0, matrix.shape[1])  # scaled columns
         right = rng.normal(size=len(matrix))
-        wanted = np.linalg.solve(matrix, right)
+        expected = np.linalg.solve(matrix, right)
         small = eliminated(problem, matrix, right)
-        assert np.abs(small.solution() - wanted).max() < 1e-9 * np.abs(wanted).max()
+        assert np.abs(small.solution() - expected).max() < 1e-9 * np.abs(expected).max()
         assert small.matrix.shape == (problem.dimension + k,) * 2
 
 

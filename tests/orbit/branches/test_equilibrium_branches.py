@@ -240,7 +240,7 @@ def test_a_pseudo_equilibrium_that_meets_another_surface_ends_there():
 
 
 def test_equilibria_of_a_continuous_field_go_on_or_meet_on_its_surface():
-    """x' = mu - |x|: +mu and -mu meet at 0; with a spring of 4 beyond 1 the equilibrium goes on as (mu + 3)/4."""
+    """x' = mu - |x|: +mu and -mu meet at 0; with a spring of 4 beyond 1 the equilibrium continues as (mu + 3)/4."""
     x, v, mu = (ca.SX.sym(s) for s in ("x", "v", "mu"))
     fold = ns.FilippovSystem.from_expression([x, v], [mu - ca.fabs(x), -v], parameters={mu: 0.5})
     branch = ns.continue_equilibrium(fold, [0.5, 0.0], "mu", bounds=(-1, 1))

@@ -278,8 +278,8 @@ def test_asymmetric_orbits_separate_as_the_coefficient_of_the_pitchfork_predicts
     assert errors[1] < 0.3 * errors[0] < 0.003
     # from orbits without the symmetry, and from symmetric ones that were not solved for as halves
     for near in (parted.at(event.parameter + 0.01)[0], ns.periodic_orbit(system, run)):
-        met = ns.continue_orbit(near, "F", bounds=(2.25, 2.45)).events
-        again = next(e for e in met if abs(e.parameter - event.parameter) < 1e-4)
+        reached = ns.continue_orbit(near, "F", bounds=(2.25, 2.45)).events
+        again = next(e for e in reached if abs(e.parameter - event.parameter) < 1e-4)
         assert again.kind == "pitchfork" and again.orbit.symmetric
         assert again.parameter == pytest.approx(event.parameter, abs=1e-7)
         assert again.far_side.verdict == event.far_side.verdict

@@ -112,8 +112,8 @@ def test_neimark_sacker():
     assert event.parameter == digits("I4", "d_NS")
     assert event.orbit.multipliers.sum().real == digits("I4", "trace")
     pair = CASES["I4"]["multipliers"][0]
-    wanted = np.arctan2(abs(float(pair["im"])), float(pair["re"]))
-    assert abs(event.coefficients["angle"] - wanted) < 1e-11
+    expected = np.arctan2(abs(float(pair["im"])), float(pair["re"]))
+    assert abs(event.coefficients["angle"] - expected) < 1e-11
 
 
 def test_grazing_sliding_that_leads_to_chaos():
@@ -361,7 +361,7 @@ def test_an_event_at_which_the_equations_are_singular_is_where_the_branch_is_los
     assert branch[1e-3].period == pytest.approx(orbit.period, rel=1e-11)
 
 
-def test_through_is_a_truth_value():
+def test_through_is_a_boolean():
     half = ns.periodic_orbit(scalar_relay(), [0.5])
     with pytest.raises(ns.OptionError, match="through"):
         ns.continue_orbit(half, "A", bounds=(1.0, 4.0), through="no")
@@ -464,7 +464,7 @@ def test_a_leg_that_does_not_exist_beyond_a_bifurcation_ends_no_branch():
     assert branch.reasons[0] == "The parameter reached its bound." and "Hopf" in branch.reasons[1]
 
 
-def test_what_is_raised_at_an_event_is_said_at_it(monkeypatch):
+def test_what_is_raised_at_an_event_is_reported_at_it(monkeypatch):
     def raises(self, zero):
         raise ns.DegenerateError("no such event")
 

@@ -52,8 +52,8 @@ def test_tori_in_two_parameters_lie_on_the_closed_form(rotations):
     event = rotations.events[1]
     curve = ns.continue_bifurcation(event, ("a", "e"), bounds=[(-1, 2), (-0.5, 1)])
     a, e = curve.values.T
-    wanted = 0.49 + e * (0.6 + 0.7 * a - 0.343 / 3) / (1 + 0.7 * e)
-    assert np.abs(a - wanted).max() < 1e-11
+    expected = 0.49 + e * (0.6 + 0.7 * a - 0.343 / 3) / (1 + 0.7 * e)
+    assert np.abs(a - expected).max() < 1e-11
     assert curve.solution(3).residual < 1e-11
 
 
@@ -165,8 +165,8 @@ def test_lorenz_orbits_lose_their_symmetry_at_a_pitchfork():
     assert abs(whole.period - half.period) < 1e-10
     branches = [ns.continue_orbit(orbit, "r", bounds=(150, 163)) for orbit in (whole, half)]
     assert [kinds(branch) for branch in branches] == [["pitchfork"], ["pitchfork"]]
-    places = [branch.events[0].parameter for branch in branches]
-    assert abs(places[0] - places[1]) < 1e-8 and abs(places[0] - 154.4) < 0.1  # Sparrow 1982
+    points = [branch.events[0].parameter for branch in branches]
+    assert abs(points[0] - points[1]) < 1e-8 and abs(points[0] - 154.4) < 0.1  # Sparrow 1982
     split = ns.continue_orbit(branches[1].events[0], "r", bounds=(150, 163))
     orbit = split[151.0]
     assert abs(orbit.period / half.period - 1) < 0.1

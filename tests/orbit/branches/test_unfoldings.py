@@ -174,7 +174,7 @@ def peaked():
 
 @pytest.mark.parametrize("k", [1.2, 2.0])
 def test_a_corner_that_adds_legs_is_passed_from_either_side(k):
-    """The branch goes on in the itinerary that simulations have, and its multipliers jump as stated."""
+    """The branch continues in the itinerary that simulations have, and its multipliers jump as stated."""
     system = peaked()
     run = ns.simulate(system, [0.0, 0.0], 100.0, parameters={"k": k})
     branch = ns.continue_orbit(

@@ -171,7 +171,7 @@ def test_a_loop_with_a_closed_form(a: float) -> None:
 def test_an_interrupted_search_returns_the_orbit_that_it_has(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Its parameter has an error of the second power, or more, of where it ends; the truth is 0."""
+    """Its parameter has an error of the second power, or more, of where it ends; the exact value is 0."""
     system, errors = sandstede(-0.2), []
     for count in range(4):
         with monkeypatch.context() as patch:

@@ -86,7 +86,7 @@ def test_three_states_cut_at_a_height():
     # on the canard L2 - L1 = (SLOPE - 1) Y, so time and Y are proportional
     rate = SLOPE - 0.3
     assert slides.t[1:] - entry == pytest.approx((y + entry) * (1 - SLOPE) / rate, abs=1e-7)
-    assert slides.points[-1, 1] == 1.0  # the box is met exactly
+    assert slides.points[-1, 1] == 1.0  # the box is reached exactly
 
 
 @pytest.mark.slow
@@ -186,10 +186,10 @@ def test_gaps_have_their_derivatives():
         point = on_surface(point + near.gap * near.across)
         near = sheet.meet(point, near)
     assert abs(near.gap) < 1e-12
-    met = sheet.meet(point, near)
+    reached = sheet.meet(point, near)
     for way in where.at(point).tangents.T:
         one, other = (sheet.meet(on_surface(point + d * way), near).gap for d in (h, -h))
-        assert (one - other) / (2 * h) == pytest.approx(met.slope @ way, abs=1e-9)
+        assert (one - other) / (2 * h) == pytest.approx(reached.slope @ way, abs=1e-9)
 
 
 def test_backward_the_same_surface_divides_what_leaves():
@@ -369,7 +369,7 @@ def test_invalid_planes_of_starts_raise():
 
 
 @pytest.mark.slow
-def test_a_curve_goes_on_where_starts_change_sides():
+def test_a_curve_continues_where_starts_change_sides():
     """On either side of it orbits leave the two-fold to different sides, also where it meets the surface."""
     system, fold = plain()
     start = lambda a, b: [a, b, 0.6 - 0.3 * b]

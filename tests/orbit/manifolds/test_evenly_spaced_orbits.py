@@ -29,7 +29,7 @@ def test_a_curve_ends_where_another_has_been():
     up = np.column_stack([np.full(50, 1.0), np.linspace(0, 1, 50)])
     spacing.add(up)
     across = np.column_stack([np.linspace(0, 2, 400), np.full(400, 0.5)])
-    kept = spacing.until_met(across)
+    kept = spacing.until_contact(across)
     assert 0.9 < kept[-1, 0] < 1.01
     assert not spacing.free([1.02, 0.5]) and spacing.free([1.3, 0.5])
 
@@ -37,7 +37,7 @@ def test_a_curve_ends_where_another_has_been():
 def test_a_curve_ends_where_it_has_been_itself():
     spacing, turns = Spacing(BOX, 12), np.linspace(0, 6 * np.pi, 3000)
     circle = np.column_stack([1 + 0.6 * np.cos(turns), 0.5 + 0.3 * np.sin(turns)])
-    kept = spacing.until_met(circle)
+    kept = spacing.until_contact(circle)
     assert 1000 < len(kept) < 1300  # one turn
 
 
@@ -75,10 +75,10 @@ def lines_to_a_node(rests):
     spacing, s = Spacing(box, 12, rests=rests), np.exp(-np.linspace(0, 9, 4000))
     first, second = (np.column_stack([0.9 * s, c * s**2]) for c in (0.5, 0.7))
     spacing.add(first)
-    return spacing.until_met(second)
+    return spacing.until_contact(second)
 
 
-def test_a_curve_goes_on_beside_another_until_they_are_one_line():
+def test_a_curve_continues_beside_another_until_they_are_one_line():
     kept = lines_to_a_node([])
     gap = 0.2 * (kept[-1, 0] / 0.9) ** 2 / 2  # in units of the box
     assert 0 < gap < 1 / 200
@@ -87,22 +87,22 @@ def test_a_curve_goes_on_beside_another_until_they_are_one_line():
 def test_a_curve_that_comes_to_an_equilibrium_ends_in_it():
     spacing = Spacing(BOX, 12, rests=[np.array([1.0, 0.5])])
     s = np.exp(-np.linspace(0, 9, 400))
-    kept = spacing.until_met(np.column_stack([1.0 + 0.9 * s, np.full(400, 0.5)]))
+    kept = spacing.until_contact(np.column_stack([1.0 + 0.9 * s, np.full(400, 0.5)]))
     assert_allclose(kept[-1], [1.0, 0.5], atol=0)
     away = np.column_stack([np.linspace(1.0, 2.0, 100), np.full(100, 0.5)])
-    assert len(spacing.until_met(away)) == 100  # it starts there
+    assert len(spacing.until_contact(away)) == 100  # it starts there
 
 
 def test_a_curve_that_stays_beside_another_thins_out_there():
     box = Box(0.0, 4.0, 0.0, 2.0)
     line, spacing = np.linspace(0, 4, 800), Spacing(box, 12)
     spacing.add(np.column_stack([line, np.full(800, 1.0)]))
-    kept = spacing.until_met(np.column_stack([line, np.maximum(1.4 - line, 1.015)]))
+    kept = spacing.until_contact(np.column_stack([line, np.maximum(1.4 - line, 1.015)]))
     assert spacing.thins
     assert 0.3 < kept[-1, 0] < 1.0  # where they came close, and a little on
-    spacing.until_met(np.column_stack([line, np.full(800, 1.4)]))
+    spacing.until_contact(np.column_stack([line, np.full(800, 1.4)]))
     assert not spacing.thins  # far from it all the way
-    meets = spacing.until_met(np.column_stack([line, 1.4 - 0.4 * line]))
+    meets = spacing.until_contact(np.column_stack([line, 1.4 - 0.4 * line]))
     assert not spacing.thins and meets[-1, 1] == pytest.approx(1.0, abs=0.01)
 
 

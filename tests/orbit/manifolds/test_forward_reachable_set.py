@@ -79,7 +79,7 @@ def test_leaving_speeds_are_those_of_the_two_fields(up, down, t_end):
         np.testing.assert_allclose(end, [drift * departure.t + a, b], atol=1e-9)
 
 
-def test_sliding_ends_at_an_invisible_fold_and_goes_on():
+def test_sliding_ends_at_an_invisible_fold_and_continues():
     """L1 = 1 - x falls to 0 at x = 1, where F2 takes over: unique from there."""
     system = ns.FilippovSystem([x, z], surface=z, above=[1, 1 - x], below=[1, -1])
     funnel = ns.orbit.funnel(system, [0.0, 0.0], 3.0, samples=11)
@@ -161,7 +161,7 @@ def test_one_canard_of_a_visible_two_fold():
     assert funnel.first_up.itinerary == "+" and funnel.first_down.itinerary == "-"
 
 
-def test_the_canard_goes_on_where_it_arrived():
+def test_the_canard_continues_where_it_arrived():
     """From Da along the canard, through s, into Dr: simulate stops at s, the funnel continues."""
     system = two_fold((1, -1), (0.5, 0.5))
     run = ns.simulate(system, [0.0, 0.5, 0.5], 4.0)
@@ -372,7 +372,7 @@ def test_a_planar_two_fold_is_left_by_sliding_at_the_mean_of_both_fields():
         np.testing.assert_allclose(end, expected, atol=1e-8)
 
 
-def test_a_planar_visible_invisible_fold_has_one_future():
+def test_a_planar_visible_invisible_fold_has_one_continuation():
     """L1 = x and L2 = 2 x: nothing slides, and only the orbit above is there for t > 0."""
     system = ns.FilippovSystem([x, z], surface=z, above=[1, x], below=[2, 2 * x])
     funnel = ns.orbit.funnel(system, [0.0, 0.0], 2.0, samples=9)

@@ -45,8 +45,8 @@ def test_thresholds_of_the_double_well_are_on_the_orbits_through_its_fold():
             # close to v = 0 the curve is a parabola in v
             near = slice(k - 3, k + 5)
             thresholds.append(np.polyval(np.polyfit(w[near], p[near], 4), 0.0))
-    truth = [float(value) for value in CASES["B2"]["thresholds"]]
-    assert sorted(thresholds)[:3] == pytest.approx(truth, abs=1e-9)
+    exact = [float(value) for value in CASES["B2"]["thresholds"]]
+    assert sorted(thresholds)[:3] == pytest.approx(exact, abs=1e-9)
 
 
 def test_the_homoclinic_orbit_leaves_by_the_fold_and_ends_at_the_pseudo_saddle():

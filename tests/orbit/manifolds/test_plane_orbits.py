@@ -150,14 +150,14 @@ def test_every_orbit_goes_to_where_it_ends():
     rests = [e.point for e in [*flow.scan.equilibria, *flow.scan.pseudo_equilibria]]
     ends = list(ends_in_the_box(flow, curves, rests))
     assert len(curves) > 20 and len(ends) > 15
-    assert all(abs(end[1] - 1.06) < 1e-7 or met for end, met in ends)
+    assert all(abs(end[1] - 1.06) < 1e-7 or reached for end, reached in ends)
 
 
 def test_orbits_end_in_a_node_and_spirals_in_a_focus():
     for field in ([-x, -2 * y], [y - 0.8 * x, -x - 0.8 * y]):
         flow = orbits(field, field, surface=y + 1.9, t_end=1e3)
         ends = list(ends_in_the_box(flow, [o.curve for o in flow.spaced(6)], [np.zeros(2)]))
-        assert len(ends) > 5 and all(met for _, met in ends)
+        assert len(ends) > 5 and all(reached for _, reached in ends)
         assert sum(bool(np.all(np.abs(end) < 1e-12)) for end, _ in ends) > 2
 
 

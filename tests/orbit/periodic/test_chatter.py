@@ -10,7 +10,7 @@ import nonsmooth as ns
 from tests.orbit.runs.test_limits import CASES, TABLE
 
 y, v, s, u, t, r, F, k, R = (ca.SX.sym(name) for name in "y v s u t r F k R".split())
-#: A ball on a mass that a spring and a force move: what a limit of impacts does not lose goes on.
+#: A ball on a mass that a spring and a force move: what a limit of impacts does not lose continues.
 MASS = ns.FilippovSystem(
     [s, u, y, v],
     field=[u, -k * s - 0.3 * u + F * ca.cos(2 * t) - 0.2 * R, v, R - 1],

@@ -44,7 +44,7 @@ def test_an_orbit_is_found_again_from_beside_it_to_rounding(name):
     assert orbit.residual < 1e-13
 
 
-def test_a_leg_that_does_not_come_to_its_event_is_told():
+def test_a_leg_that_does_not_come_to_its_event_is_reported():
     system, _, given = friction()
     with pytest.raises(ns.ConvergenceError, match=r"leg 1 \(s, ended by"):
         ns.periodic_orbit(
@@ -163,7 +163,7 @@ def test_multiplicity_of_a_run_and_of_one_mode() -> None:
     assert ns.periodic_orbit(system, run, multiplicity=1).period == pytest.approx(4 * np.pi)
 
 
-def test_a_branch_goes_on_where_a_block_sticks_anywhere():
+def test_a_branch_continues_where_a_block_sticks_anywhere():
     """One block slips under its force, the other one sticks wherever it is: the multiplier 1 of its position."""
     x, v, y, w, t, force = symbols("x v y w t force")
     one, two = ns.Friction(v, load=1, kinetic=0.2), ns.Friction(w, load=1, kinetic=0.6)
@@ -184,8 +184,8 @@ def test_a_branch_goes_on_where_a_block_sticks_anywhere():
     assert np.abs(orbit.multipliers - 1.0).min() < 1e-9
     branch = ns.continue_orbit(orbit, "force", bounds=(0.7, 1.0))
     assert not branch.events and [end.name for end in branch.ends] == ["REACHED_BOUND"] * 2
-    places = [node.start[2] for node in branch.orbits]
-    assert np.ptp(places) < 1e-9
+    points = [node.start[2] for node in branch.orbits]
+    assert np.ptp(points) < 1e-9
 
 
 @pytest.mark.parametrize("law", ["relay", "friction"])
@@ -227,12 +227,12 @@ def test_an_orbit_is_found_to_all_digits_where_a_state_is_almost_zero(half, simu
     rises = lambda t, u: u[1] - np.log(0.5)
     rises.direction = 1
     start = np.log([0.87, 0.5])
-    truth = solve_ivp(
+    exact = solve_ivp(
         field, (-1, 500), start, method="DOP853", rtol=1e-13, atol=1e-13, events=rises
     )
     run = ns.simulate(system, [0.5, 0.5], 600.0, parameters=values)
     orbit = ns.periodic_orbit(system, run if simulated else [0.5, 0.5], parameters=values)
-    assert orbit.period == pytest.approx(np.diff(truth.t_events[0])[-1], rel=1e-11)
+    assert orbit.period == pytest.approx(np.diff(exact.t_events[0])[-1], rel=1e-11)
 
 
 def test_a_family_at_one_value_of_the_parameter_has_no_folds():

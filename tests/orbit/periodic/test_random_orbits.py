@@ -82,8 +82,8 @@ def test_multipliers_are_those_of_the_return_map_with_40_digits(seed: int) -> No
                 for s in (1, -1)
             ]
             columns.append([float((a - b) / (2 * h)) for a, b in zip(*ends, strict=True)])
-    truth = np.linalg.eigvals(np.array(columns).T)
-    for value in truth:
+    exact = np.linalg.eigvals(np.array(columns).T)
+    for value in exact:
         assert np.abs(orbit.multipliers - value).min() < 1e-11
     size = np.linalg.det(np.array(columns))
     assert abs(np.prod(orbit.multipliers) - size) < 1e-11

@@ -25,7 +25,7 @@ from nonsmooth.orbit.runs.legs import Leg, integrate_leg, leg_name
         (Guard("stop", 0, 1, 0), "end"),
     ],
 )
-def test_a_guard_is_told_as_the_condition_that_holds(guard, words):
+def test_a_guard_is_described_by_its_condition(guard, words):
     x, v, lam, kap = (ca.SX.sym(name) for name in ("x", "v", "lam", "kap"))
     system = ns.FilippovSystem(
         [x, v],

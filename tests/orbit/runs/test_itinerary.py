@@ -56,7 +56,7 @@ def test_words_that_do_not_fit_are_refused(block: ns.FilippovSystem) -> None:
         ns.orbit.FixedItinerary(block, "s", until="lambda0 = 1", t_max=1.0).arrive([0.0, 1.0])
 
 
-def test_a_word_without_modes_is_refused(block: ns.FilippovSystem) -> None:
+def test_an_itinerary_without_modes_is_refused(block: ns.FilippovSystem) -> None:
     for word in ("", []):
         with pytest.raises(ns.OptionError, match="itinerary"):
             ns.orbit.FixedItinerary(block, word, until="h0")

@@ -63,9 +63,9 @@ def test_limits_have_the_derivatives_of_closed_forms(tol: float) -> None:
         for key, expected in given["values"].items():
             if not key.startswith("d"):
                 continue
-            wanted = key.split("/d(")[1].split(")")[0].replace("0", "")
-            wanted = names if wanted == "..." else wanted.split(",")
-            columns = [names.index(name) for name in wanted]
+            required = key.split("/d(")[1].split(")")[0].replace("0", "")
+            required = names if required == "..." else required.split(",")
+            columns = [names.index(name) for name in required]
             if key.startswith("dx_end"):
                 assert not found.dx_dx0.any()
                 continue

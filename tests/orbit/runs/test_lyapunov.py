@@ -22,10 +22,10 @@ def test_doubling_of_an_angle_by_squaring():
     clock, pull = ns.Clock(1.0, map=[u**2 - v**2, 2 * u * v]), (1 - u**2 - v**2) / 2
     system = ns.FilippovSystem([u, v], field=[u * pull, v * pull], clocks=clock)
     found = ns.lyapunov_spectrum(system, [math.cos(0.7), math.sin(0.7), 0.0], t_end=320.0)
-    truth = [float(value) for value in CASES["L2"]["spectrum"]]
-    assert np.allclose(found.exponents, truth, rtol=0, atol=1e-9)
+    exact = [float(value) for value in CASES["L2"]["spectrum"]]
+    assert np.allclose(found.exponents, exact, rtol=0, atol=1e-9)
     assert np.all(found.errors < 1e-7) and found.t == pytest.approx(288.0)
-    assert found.sum_check == pytest.approx(sum(truth), abs=1e-9)
+    assert found.sum_check == pytest.approx(sum(exact), abs=1e-9)
     assert math.isnan(found.dimension)  # volumes grow: the circle is no attractor of all directions
 
 
@@ -44,12 +44,12 @@ def test_relay_oscillator_contracts_as_its_damping():
         [x, v], surface=v, above=[v, 1 - x - 0.2 * v], below=[v, -1 - x - 0.2 * v]
     )
     (case,) = (c for c in json.loads(_MORE.read_text()) if c["id"] == "LY3")
-    truth = [float(value) for value in case["values"]["exponents"]]
+    exact = [float(value) for value in case["values"]["exponents"]]
     found = ns.lyapunov_spectrum(system, case["start"], t_end=1000.0)
-    assert np.all(np.abs(found.exponents - truth) < 4 * found.errors) and found.errors.max() < 1e-3
+    assert np.all(np.abs(found.exponents - exact) < 4 * found.errors) and found.errors.max() < 1e-3
     orbit = ns.periodic_orbit(system, case["start"])
     exponents = np.log(np.abs(orbit.multipliers)) / orbit.period
-    assert np.allclose(exponents, truth, rtol=0, atol=1e-12)
+    assert np.allclose(exponents, exact, rtol=0, atol=1e-12)
 
 
 def test_sum_of_forced_friction_is_that_of_its_closed_form():

@@ -54,7 +54,7 @@ def closed_form(x0, v0, a, mu, k, L, c, r, T, e):
 
 
 @pytest.fixture(scope="module")
-def truth():
+def exact():
     """Values and derivatives of the speed at the stop and of the times, by start and parameters."""
     with mp.workdps(40):
         given = [mp.mpf(value) for value in (*START.values(), *VALUES.values())]
@@ -84,8 +84,8 @@ def run():
     return found
 
 
-def test_derivatives_have_the_digits_of_the_closed_form(run, truth):
-    speed, times, slopes = truth
+def test_derivatives_have_the_digits_of_the_closed_form(run, exact):
+    speed, times, slopes = exact
     assert run.x[-1, 1] == pytest.approx(speed, rel=1e-13)
     s = ns.sensitivity(run)
     assert s.event_times == pytest.approx(times, rel=1e-13)
@@ -96,10 +96,10 @@ def test_derivatives_have_the_digits_of_the_closed_form(run, truth):
     np.testing.assert_allclose(s.dt_end_dp, slopes[-1, 2:], rtol=1e-12, atol=1e-13)
 
 
-def test_the_gradient_is_the_same_row(run, truth):
+def test_the_gradient_is_the_same_row(run, exact):
     system = run.system
     speed = system.definition.states[1]
     found = ns.gradient(run, speed)
-    np.testing.assert_allclose(found.x0[:2], truth[2][0, :2], rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(found.x0[:2], exact[2][0, :2], rtol=1e-12, atol=1e-13)
     by_name = [found.parameters[name] for name in VALUES]
-    np.testing.assert_allclose(by_name, truth[2][0, 2:], rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(by_name, exact[2][0, 2:], rtol=1e-12, atol=1e-13)

@@ -168,12 +168,12 @@ def swing(a0: float, tol: float, r: float = 0.5) -> tuple[ns.Trajectory, float]:
 
 
 @pytest.mark.parametrize("tol", [1e-8, 1e-10])
-@pytest.mark.parametrize("ask", [ns.sensitivity, lambda run: ns.vjp(run, [1.0, 0.0])])
-def test_an_impact_that_a_run_has_by_its_error_alone_is_a_graze(tol, ask) -> None:
+@pytest.mark.parametrize("call", [ns.sensitivity, lambda run: ns.vjp(run, [1.0, 0.0])])
+def test_an_impact_that_a_run_has_by_its_error_alone_is_a_graze(tol, call) -> None:
     run, _ = swing(1.0, tol)
     assert run.events[0].name == "reset"  # by rounding; the exact orbit touches the wall
     with pytest.raises(ns.DegenerateError, match="grazing"):
-        ask(run)
+        call(run)
 
 
 @pytest.mark.parametrize(
@@ -271,7 +271,7 @@ def test_events_of_one_name_across_kinds_have_their_own_derivatives(kind) -> Non
     assert again == system and again.impacts == system.impacts
 
 
-def test_the_order_in_which_two_surfaces_of_position_are_met_makes_a_corner():
+def test_the_order_in_which_two_surfaces_of_position_are_reached_makes_a_corner():
     """Case corner_product: the derivatives beside it differ by D (n_y/L_y - n_x/L_x)."""
     cases = json.loads(Path("tests/cases/continuous_switching.json").read_text())
     case = next(c for c in cases if c["id"] == "corner_product")

@@ -23,9 +23,9 @@ def test_every_object_of_a_portrait_is_drawn_and_explained():
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x", "y")
     assert ax.get_xlim() == (0.0, 1.2) and ax.get_ylim() == (0.3, 1.5)
     kinds = {line.get_gid() for line in ax.lines}
-    want = {"attracting", "crossing", "orbit", "separatrix", "fold orbit", "visible fold",
+    expected = {"attracting", "crossing", "orbit", "separatrix", "fold orbit", "visible fold",
             "invisible fold", "stable pseudo-node", "pseudo-saddle", "unstable focus"}  # fmt: skip
-    assert want <= kinds
+    assert expected <= kinds
     legend = {text.get_text() for text in ax.get_legend().get_texts()}
     assert {"sliding, attracting", "crossing", "orbits", "separatrices"} <= legend
     named = {text.get_text() for text in ax.findobj(Text)}
@@ -65,9 +65,9 @@ def test_orbits_that_wind_out_of_a_focus_are_followed_to_it():
     # half a turn of x'' - 2 d x' + x = 1 makes its amplitude exp(pi d / sqrt(1 - d^2)) times as large
     turns = np.flatnonzero(before[1:-2, 1] * before[2:-1, 1] < 0) + 1
     sizes = np.abs(before[turns, 0] - 1.0)
-    want = np.exp(np.pi * damping / np.sqrt(1 - damping**2))
+    expected = np.exp(np.pi * damping / np.sqrt(1 - damping**2))
     assert len(turns) > 15
-    assert_allclose(sizes[4:-1] / sizes[3:-2], want, rtol=0.02)
+    assert_allclose(sizes[4:-1] / sizes[3:-2], expected, rtol=0.02)
 
 
 def test_given_starts_and_parameters_are_used():
@@ -116,7 +116,7 @@ def test_other_systems_and_boxes_are_refused():
 
 
 @pytest.mark.slow
-def test_an_orbit_that_goes_on_beside_another_thins_out():
+def test_an_orbit_that_continues_beside_another_thins_out():
     pendulum = ns.FilippovSystem(
         [x, y], surface=y, above=[y, -ca.sin(x) - 0.3], below=[y, -ca.sin(x) + 0.3]
     )
@@ -169,7 +169,7 @@ def test_each_value_of_a_discrete_state_has_a_panel_in_which_orbits_end_at_its_e
         assert curve.sum(axis=1).max() < 1.0 + 1e-6
         assert np.ptp(np.hypot(*curve.T)) < 1e-6
     assert not _curves(right, "event on") and _curves(right, "event off")
-    for curve in _curves(right, "orbit"):  # none goes on where x falls through -1
+    for curve in _curves(right, "orbit"):  # none continues where x falls through -1
         sides = np.sign(curve[np.abs(curve[:, 0] + 1) > 1e-6, 0] + 1)
         assert np.all(np.diff(sides)[np.diff(sides) != 0] > 0)
     belt = ns.FilippovSystem(  # its surface, with a fold at x = 2, is drawn where there is motion

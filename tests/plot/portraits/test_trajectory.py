@@ -45,8 +45,8 @@ def test_events_are_marked_where_they_are(run):
     ax = panel(ns.plot.trajectory(run), "x")
     for kind in {event.kind for event in run.events}:
         marks = next(line for line in ax.lines if line.get_gid() == f"event {kind}")
-        want = [(event.t, event.x[0]) for event in run.events if event.kind == kind]
-        assert_allclose(np.column_stack(marks.get_data()), want)
+        expected = [(event.t, event.x[0]) for event in run.events if event.kind == kind]
+        assert_allclose(np.column_stack(marks.get_data()), expected)
         assert marks.get_marker() != "None"
 
 

@@ -84,7 +84,7 @@ def test_each_class_is_named_in_its_area():
 
 
 @pytest.mark.slow
-def test_the_atlas_draws_what_it_is_asked_for(tmp_path):
+def test_the_atlas_draws_the_requested_pages(tmp_path):
     before = dict(matplotlib.rcParams)
     figure = ns.plot.two_fold_atlas(["II-C", "mix-S"])
     assert dict(matplotlib.rcParams) == before

@@ -91,10 +91,10 @@ def test_classes_and_numbers_are_those_of_the_decision_table(browser, page, fold
     assert len(answers) == 10_000
     labels = set()
     for pair, (*words, numbers) in zip(nu.tolist(), answers, strict=True):
-        wanted_words, wanted = expected(folds, tuple(pair))
+        wanted_words, required = expected(folds, tuple(pair))
         assert words == wanted_words, pair
         got = [number(v) for v in numbers]
-        np.testing.assert_allclose(got, wanted, rtol=1e-12, atol=1e-300, err_msg=str(pair))
+        np.testing.assert_allclose(got, required, rtol=1e-12, atol=1e-300, err_msg=str(pair))
         labels.add(words[0])
     plain = {row for row in labels if not row.startswith("boundary")}
     assert plain == ({"mix-0", "mix-S", "mix-C", "mix-F"} if folds in ("VI", "IV") else plain)

@@ -45,11 +45,13 @@ def check_random_expressions(seed, graphs, samples):
             point = np.clip(point, low, high)
             with mpmath.workdps(DIGITS):
                 try:
-                    truth = [v for row in program(Exact(list(map(mpmath.mpf, point)))) for v in row]
+                    reference = [
+                        v for row in program(Exact(list(map(mpmath.mpf, point)))) for v in row
+                    ]
                 except Undefined:
                     continue
                 compared += 1
-                for value, enclosure, interval in zip(truth, flat, arrays, strict=True):
+                for value, enclosure, interval in zip(reference, flat, arrays, strict=True):
                     near = slack * (1 + abs(value))
                     assert interval.low - near <= value <= interval.high + near, f
                     if enclosure.is_finite() and enclosure.abs_upper() < 1e30:  # no gigabytes
@@ -98,9 +100,9 @@ def test_constants_are_not_folded():
     program = program_of(0.1 * (0.3 * x * x), [x])
     with precision(200):
         ((_,), (slope,)) = program(Enclosures([[arb(1)]]))
-        truth = 2 * exact(0.1) * exact(0.3)
+        reference = 2 * exact(0.1) * exact(0.3)
         low, high = ends(slope)
-    assert low <= truth <= high
+    assert low <= reference <= high
     assert not low <= exact(0.06) <= high
 
 

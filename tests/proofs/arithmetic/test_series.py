@@ -24,7 +24,7 @@ ONE = (
         "erfinv",
     ),
 )
-PLACES = ((-1, 1), (-2, -1), (0, 1), (0.5, 1.5), (-1.5, -0.5), (1.5, 1.6), (0, 0))
+ENDS = ((-1, 1), (-2, -1), (0, 1), (0.5, 1.5), (-1.5, -0.5), (1.5, 1.6), (0, 0))
 
 
 def moving(low, high, slope):
@@ -35,8 +35,8 @@ def moving(low, high, slope):
 def test_where_a_value_is_unknown_no_coefficient_is_known(op):
     with length(6):
         arithmetic = Series([], "stored")
-        for a in PLACES:
-            for b in PLACES if op in TWO else PLACES[:1]:
+        for a in ENDS:
+            for b in ENDS if op in TWO else ENDS[:1]:
                 args = [moving(*a, 1), moving(*b, 0.5)][: 1 + (op in TWO)]
                 found = arithmetic.apply(op, args)
                 finite = [found[k].is_finite() for k in range(ctx.cap)]
@@ -54,10 +54,10 @@ def test_coefficients_are_those_of_mpmath(op):
     start = {"acosh": 1.75}.get(op, 0.375)
     function = named.get(op) or getattr(mpmath, op)
     with mpmath.workdps(60):
-        truth = mpmath.taylor(lambda s: function(start + s / 2 + s * s / 4), 0, 6)
+        exact = mpmath.taylor(lambda s: function(start + s / 2 + s * s / 4), 0, 6)
     with length(7):
         found = Series([], "stored").apply(op, [arb_series([start, 0.5, 0.25])])
-        for k, value in enumerate(truth):
+        for k, value in enumerate(exact):
             assert abs(mpmath.mpf(float(found[k].mid())) - value) < 1e-12
             assert float(found[k].rad()) < 1e-12
 

@@ -11,8 +11,8 @@ from nonsmooth.proofs.orbits.itinerary import OrbitEnclosure
 x, v, w = (ca.SX.sym(s) for s in ("x", "v", "w"))
 
 
-def holds(enclosure, truth):
-    return mpmath.mpf(enclosure.low) <= truth <= mpmath.mpf(enclosure.high)
+def holds(enclosure, exact):
+    return mpmath.mpf(enclosure.low) <= exact <= mpmath.mpf(enclosure.high)
 
 
 def test_stick_slip_has_the_events_of_the_closed_form():
@@ -38,9 +38,9 @@ def test_a_nonlinear_orbit_agrees_with_mpmath_at_30_digits():
     with mpmath.workdps(30):
         f = lambda t, y: [y[1], (1 - y[0] ** 2) * y[1] - mpmath.sin(y[0])]
         end = mpmath.odefun(f, 0, [mpmath.mpf("0.5"), mpmath.mpf(0)])(1)
-        for value, truth in zip(orbit.end.values(), end, strict=True):
+        for value, exact in zip(orbit.end.values(), end, strict=True):
             assert value.radius < 1e-30
-            assert abs(mpmath.mpf(value.low) - truth) < mpmath.mpf(10) ** -24
+            assert abs(mpmath.mpf(value.low) - exact) < mpmath.mpf(10) ** -24
 
 
 @pytest.mark.slow_cases("2", "3")
@@ -181,7 +181,7 @@ def test_what_is_given_wrongly_is_refused():
         ns.certify_orbit(s, [np.nan, 1], t_end=1)
 
 
-def test_a_start_on_the_surface_is_told_exactly():
+def test_a_start_on_the_surface_is_recognised_exactly():
     s = ns.FilippovSystem([x, v], surface=v - 0.1 * x, above=[1, -1], below=[1, 2 - x])
     orbit = ns.certify_orbit(s, ["3/10", "3/100"], t_end=1, numbers="written")
     assert orbit.proven and orbit.itinerary == "s"

@@ -11,8 +11,8 @@ x, y, u, v, t = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t"))
 a, b, r = (ca.SX.sym(s) for s in ("a", "b", "r"))
 
 
-def holds(enclosure, truth):
-    return mpmath.mpf(enclosure.low) <= truth <= mpmath.mpf(enclosure.high)
+def holds(enclosure, exact):
+    return mpmath.mpf(enclosure.low) <= exact <= mpmath.mpf(enclosure.high)
 
 
 def test_a_bouncing_ball_has_the_impacts_of_the_closed_form():
@@ -37,9 +37,9 @@ def test_a_shaken_table_agrees_with_the_simulation():
     )
     orbit = ns.certify_orbit(table, ["0.5", 0], t_end=1.5)
     run = ns.simulate(table, [0.5, 0.0], t_end=1.5, rtol=1e-13, atol=1e-14)
-    met = [e for e in run.events if e.kind == "impact"]
-    assert orbit.proven and len(orbit.events) == len(met) >= 3
-    for event, other in zip(orbit.events, met, strict=True):
+    reached = [e for e in run.events if e.kind == "impact"]
+    assert orbit.proven and len(orbit.events) == len(reached) >= 3
+    for event, other in zip(orbit.events, reached, strict=True):
         assert event.t.middle == pytest.approx(other.t, abs=1e-10)
     assert [e.middle for e in orbit.end.values()][:2] == pytest.approx(list(run.x[-1]), abs=1e-9)
 
@@ -63,8 +63,8 @@ def test_what_impacts_may_not_be_proven_says_why():
     assert ns.certify_orbit(dead, [0, 1], t_end=1).proven
 
 
-def test_a_start_on_a_wall_is_met_at_once_and_not_passed():
-    """A reset with a direction is met at its zero; one without leaves the side unsaid."""
+def test_a_start_on_a_wall_is_reached_at_once_and_not_passed():
+    """A reset with a direction fires at its zero; one without does not determine the side."""
     for direction, start in ((-1, -1), (0, 1), (0, -1), (-1, 0)):
         wall = ns.Reset(x, [x, -0.5 * v], direction=direction, name="wall")
         drop = ns.FilippovSystem([x, v], field=[v, -2], resets=[wall])
@@ -94,11 +94,13 @@ def test_two_surfaces_agree_with_the_simulation(seed):
     assert orbit.events, orbit
     last = orbit.t.middle
     run = ns.simulate(system, start, t_end=last, rtol=1e-12, atol=1e-13)
-    met = [e for e in run.events if e.kind in ("crossing", "entry", "exit") and e.t < last - 1e-9]
-    assert [(e.kind, e.mode_after) for e in met] == [
+    reached = [
+        e for e in run.events if e.kind in ("crossing", "entry", "exit") and e.t < last - 1e-9
+    ]
+    assert [(e.kind, e.mode_after) for e in reached] == [
         (e.kind, e.after) for e in orbit.events if e.t.middle < last - 1e-9
     ]
-    for event, other in zip(orbit.events, met, strict=False):
+    for event, other in zip(orbit.events, reached, strict=False):
         assert event.t.middle == pytest.approx(other.t, abs=1e-8)
     if not orbit.proven:
         assert "several surfaces at once" in orbit.why, orbit.why
@@ -156,7 +158,7 @@ def test_a_jump_keeps_a_block_on_its_belt_where_it_leaves_the_surface_alone():
 
 
 def test_an_event_that_some_orbits_meet_after_the_end_is_not_claimed():
-    """Starts from -0.4 to -0.1: back to -1 at 0, which is met again after 1, from 1.1 to 1.4."""
+    """Starts from -0.4 to -0.1: back to -1 at 0, which is reached again after 1, from 1.1 to 1.4."""
     clock = ns.FilippovSystem([x], field=[1], resets=[ns.Reset(x, [-1], 1, "tick")])
     for end, proven, ticks in (("1.05", True, 1), ("1.3", False, 1), ("1.5", True, 2)):
         orbit = ns.certify_orbit(clock, [("-0.4", "-0.1")], t_end=end)

@@ -125,8 +125,8 @@ def closed_form(orbit):
     return sum(found[n:]), sorted(multipliers, key=abs, reverse=True)
 
 
-def holds(enclosure, truth, slack=1e-19):
-    return mpmath.mpf(enclosure.low) - slack <= truth <= mpmath.mpf(enclosure.high) + slack
+def holds(enclosure, exact, slack=1e-19):
+    return mpmath.mpf(enclosure.low) - slack <= exact <= mpmath.mpf(enclosure.high) + slack
 
 
 @pytest.mark.slow_cases("van der Pol", "third order")

@@ -31,9 +31,9 @@ def test_the_teixeira_singularity_is_proven_exactly():
     assert proof.values["nu1"].low == proof.values["nu1"].high == "-2"
     with mpmath.workdps(60):
         for name, sign in (("eigenvalue_low", -1), ("eigenvalue_high", 1)):
-            truth = (-3 + sign * mpmath.sqrt(5)) / 2
+            reference = (-3 + sign * mpmath.sqrt(5)) / 2
             value = proof.values[name]
-            assert mpmath.mpf(value.low) <= truth <= mpmath.mpf(value.high)
+            assert mpmath.mpf(value.low) <= reference <= mpmath.mpf(value.high)
             assert value.radius < 1e-30
     assert "exactly one two-fold" in str(proof) and "infinitely many" in str(proof)
 
@@ -47,7 +47,7 @@ def test_the_teixeira_singularity_is_proven_exactly():
         ([-y, 1, -2], [z, -0.5 + 1e-9, 1], "II-F"),
     ],
 )
-def test_classes_beside_a_boundary_are_told_apart(above, below, label):
+def test_classes_beside_a_boundary_are_distinct(above, below, label):
     proof = proven(flat(above, below), near=(0.0, 0.0, 0.0))
     assert proof.proven and proof.label == label
 
@@ -62,8 +62,8 @@ def test_classes_are_those_of_the_table(signs):
         proof = proven(system, near=(0.0, 0.0, 0.0))
         table = ns.two_folds.classify_two_fold(signs, (nu1, nu2))
         assert proof.proven and proof.label == table.label
-        for name, truth in (("nu1", nu1), ("nu2", nu2)):
-            assert float(proof.values[name].low) <= truth <= float(proof.values[name].high)
+        for name, reference in (("nu1", nu1), ("nu2", nu2)):
+            assert float(proof.values[name].low) <= reference <= float(proof.values[name].high)
 
 
 TRANSCENDENTAL = flat(
@@ -89,9 +89,9 @@ def test_a_transcendental_two_fold_agrees_with_mpmath():
     with m.workdps(100):
         a, b, c, d = (m.mpf(v) for v in (0.1, 0.4, 0.6, 0.2))
         root = m.findroot(equations, (0.257, -0.62, 0.016))
-        for value, truth in zip(proof.point.values(), root, strict=True):
+        for value, reference in zip(proof.point.values(), root, strict=True):
             assert value.radius < 1e-40
-            assert m.mpf(value.low) <= truth <= m.mpf(value.high)
+            assert m.mpf(value.low) <= reference <= m.mpf(value.high)
 
 
 def test_folded_constants_do_not_make_a_false_theorem():
@@ -105,8 +105,8 @@ def test_folded_constants_do_not_make_a_false_theorem():
     proof = ns.certify(fold, hold=["q"], width=1e-40)
     from fractions import Fraction
 
-    truth = 1 / (Fraction(0.1) * Fraction(0.3))
-    assert proof.proven and truth in proof.point["z"]
+    reference = 1 / (Fraction(0.1) * Fraction(0.3))
+    assert proof.proven and reference in proof.point["z"]
     folded = 1 / Fraction(0.1 * 0.3)
     assert folded not in proof.point["z"]
 

@@ -127,8 +127,8 @@ def test_a_jump_with_a_finite_derivative_is_not_passed_over():
         for box in ((-1.0, 1.0), (-0.9, 1.1), (-1e-3, 1.0)):
             system = flat(ca.atan2(x, -1) - offset, y)
             everything = ns.prove_all(system, [box, *BOX[1:]])
-            truth = np.tan(np.pi - abs(offset)) * np.sign(offset)  # where it is on that side
-            inside = offset != 0.0 and box[0] < truth < box[1]
+            reference = np.tan(np.pi - abs(offset)) * np.sign(offset)  # where it is on that side
+            inside = offset != 0.0 and box[0] < reference < box[1]
             assert len(everything.zeros) <= inside
             assert len(everything.zeros) == inside or not everything.complete
             for proof in everything.zeros:  # and no box of uniqueness reaches over the jump

@@ -73,6 +73,6 @@ def test_what_is_no_number_is_refused_with_the_words_that_were_given(value):
         ns.certify(found, system=system, parameters={"p": value})
 
 
-def test_a_point_that_does_not_know_its_system_asks_for_it():
+def test_a_point_without_its_system_needs_one():
     with pytest.raises(ns.OptionError, match="system"):
         ns.certify(ns.local.find_fold(CUSP, [0, 0, 0]))

@@ -67,7 +67,7 @@ def traced(ends, last=(), most=24):
     ]
 
 
-def test_a_curve_ends_where_nothing_follows_where_it_closes_and_where_it_is_told():
+def test_a_curve_ends_where_nothing_follows_where_it_closes_and_on_request():
     ends = [[1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]
     assert traced(ends) == ends
     assert traced([*ends, [1.0, 1e-9], [9.0, 9.0]]) == [*ends, [1.0, 1e-9]]

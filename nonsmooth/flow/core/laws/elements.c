@@ -28,10 +28,10 @@ static void project_to(Run *r, const int32_t *which, int count, const double *le
   for (int iteration = 0; count && iteration < 3; iteration++) {
     int any = 0, k = 0;
     const double *h = surface_values(r, r->x);
-    int32_t *place = r->pending, *kept = place + all + more;
-    for (int i = 0; i < all + more; i++) place[i] = -1;
+    int32_t *row_at = r->pending, *kept = row_at + all + more;
+    for (int i = 0; i < all + more; i++) row_at[i] = -1;
     for (int i = 0; i < count; i++) {
-      place[which[i]] = i;
+      row_at[which[i]] = i;
       residual[i] = (which[i] < all ? h[which[i]] : hidden_value(r, which[i] - all, h)) - (level ? level[i] : 0);
       any |= residual[i] != 0;
     }
@@ -40,10 +40,10 @@ static void project_to(Run *r, const int32_t *which, int count, const double *le
     for (int q = 0; q < g->count; q++) {
       double slope = out_of(&r->s->surfaces, r->heights, all + q);
       if (g->column[q] >= nd) continue;
-      if (place[g->row[q]] >= 0) rows[(int64_t)place[g->row[q]] * r->n + g->column[q]] = slope;
+      if (row_at[g->row[q]] >= 0) rows[(int64_t)row_at[g->row[q]] * r->n + g->column[q]] = slope;
       for (int i = 0; i < more; i++)
         for (int j = 0; j < r->equations.count && r->equations.own[i] == g->row[q]; j++) {
-          int to = place[all + r->equations.row[j]];
+          int to = row_at[all + r->equations.row[j]];
           if (to >= 0) rows[(int64_t)to * r->n + g->column[q]] += weights_of(r)[(more + r->equations.row[j]) * more + i] * slope;
         }
     }

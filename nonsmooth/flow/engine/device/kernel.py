@@ -135,10 +135,10 @@ class Kernel:
         with self.lock:
             machine, (kernels, _), count = self.machine, self.compiled, given.size
             memory, left = self.start(given, at)
-            keys, totals = np.zeros(PLACES, np.int64), np.zeros(2, np.int64)
-            there = [machine.write(keys), self.memory("place", 4 * count), machine.write(totals)]
+            keys, totals = np.zeros(TABLE_SIZE, np.int64), np.zeros(2, np.int64)
+            there = [machine.write(keys), self.memory("slot", 4 * count), machine.write(totals)]
             arrays = [memory[name] for name in ("status", "kinds", "steps", "code")]
-            machine.launch(kernels, "numbered", [count, *arrays, PLACES, *there])
+            machine.launch(kernels, "numbered", [count, *arrays, TABLE_SIZE, *there])
             for name in _READ:
                 if name in memory:
                     machine.read(memory[name], getattr(out, name))
@@ -200,10 +200,10 @@ class Kernel:
         code = np.empty(len(out.t), np.int64)
         self.machine.read(memory, code)
         rows = np.flatnonzero(out.itinerary < 0)
-        more, place = np.unique(code[rows], return_inverse=True)
-        out.itinerary[rows] = PLACES + place
+        more, slot = np.unique(code[rows], return_inverse=True)
+        out.itinerary[rows] = TABLE_SIZE + slot
         modes = self.system.modes
-        return words | {PLACES + k: word_of(c, modes) for k, c in enumerate(more.tolist())}
+        return words | {TABLE_SIZE + k: word_of(c, modes) for k, c in enumerate(more.tolist())}
 
 
 class Reduction:
@@ -215,8 +215,8 @@ class Reduction:
         self._arrays: dict[str, NDArray[Any]] = {
             "histogram": np.zeros((n + 1, bins.count), np.int64),
             "sums": np.zeros((machine.blocks * machine.threads, n + 1, 2)),
-            "keys": np.zeros(PLACES, np.int64),
-            "counts": np.zeros(PLACES, np.int64),
+            "keys": np.zeros(TABLE_SIZE, np.int64),
+            "counts": np.zeros(TABLE_SIZE, np.int64),
             "status": np.zeros(len(Status), np.int64),
         }
         self._there = {name: machine.write(array) for name, array in self._arrays.items()}
@@ -231,7 +231,7 @@ class Reduction:
             number = np.zeros(1, np.int64)
             rest = [machine.write(number), kernel.memory("rest", 8 * count)]
             results = [memory[name] for name in ("x", "t", "status", "code")]
-            sums = [there["histogram"], there["sums"], PLACES]
+            sums = [there["histogram"], there["sums"], TABLE_SIZE]
             table = [there[name] for name in ("keys", "counts", "status")]
             arguments = [count, *results, *self._ranges, *sums, *table, *rest]
             machine.launch(kernel.compiled[0], "outcomes", arguments)
@@ -251,8 +251,8 @@ class Reduction:
         made = Chunk.empty(number, system, False)
         made.x[:], made.t[:], made.status[:] = whole.x[rows], whole.t[rows], whole.status[rows]
         made.kinds[:] = 0
-        more, place = np.unique(code[rows], return_inverse=True)
-        made.itinerary[:] = place
+        more, slot = np.unique(code[rows], return_inverse=True)
+        made.itinerary[:] = slot
         made.rename({k: word_of(c, system.modes) for k, c in enumerate(more.tolist())})
         return made
 
@@ -273,7 +273,7 @@ class Reduction:
 
 
 #: Different itineraries that a card counts at once, a power of two.
-PLACES = 1 << 14
+TABLE_SIZE = 1 << 14
 
 #: Results, in the order in which the kernel takes them; those that have their names in a chunk.
 _ORDER = ("x", "t", "status", "kinds", "steps", "code", "at_x", "at_t", "left")

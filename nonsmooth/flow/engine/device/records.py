@@ -68,7 +68,7 @@ def continued(
     to_end: bool,
     workers: int,
 ) -> Records:
-    """Let the driver make a step of each run, or all to its end; return those that go on, in ``records`` too.
+    """Let the driver make a step of each run, or all to its end; return those that continue, in ``records`` too.
 
     ``out`` has the events at which they are kept, and gets the results of the others. Numbers of the returned records
     are rows of ``out``.

@@ -138,7 +138,7 @@ def by_pieces(d: Definition) -> Definition:
     return replace(d, parameters=ca.vertcat(p, *cells), field=field, defaults=defaults, tables=())
 
 
-def places_of(d: Definition) -> list[int]:
+def first_surfaces(d: Definition) -> list[int]:
     """The first surface of each function where breakpoints are surfaces, and their number."""
     counts = {table.element: table.count for table in d.tables}
     return [*accumulate((counts.get(i, 1) for i in range(d.surfaces.numel())), initial=0)]
@@ -146,9 +146,9 @@ def places_of(d: Definition) -> list[int]:
 
 def beyond_cells(d: Definition, signs: Sequence[float]) -> set[int]:
     """Surfaces of breakpoints that are not adjacent to the cell given by signs: others are reached before them."""
-    places, found = places_of(d), set[int]()
+    positions, found = first_surfaces(d), set[int]()
     for table in d.tables:
-        first = places[table.element]
+        first = positions[table.element]
         own = signs[first : first + table.count]
         above = own.count(1)
         if own[:above].count(1) == above and own.count(-1) == table.count - above:
@@ -158,12 +158,14 @@ def beyond_cells(d: Definition, signs: Sequence[float]) -> set[int]:
 
 def in_cells(d: Definition, signs: Sequence[float]) -> ca.SX | None:
     """The field where surfaces and breakpoints have signs; None where these are of no cell."""
-    places, (_, values), found = places_of(d), _parted(d), list[ca.SX]()
+    positions, (_, values), found = first_surfaces(d), _parted(d), list[ca.SX]()
     elements = {table.element for table in d.tables}
-    own = [signs[k] if i not in elements else 0.0 for i, k in enumerate(places[:-1])]
+    own = [signs[k] if i not in elements else 0.0 for i, k in enumerate(positions[:-1])]
     for table in d.tables:
-        above = {k: signs[places[table.element] + i] for k, i in enumerate(table.shown) if i >= 0}
-        above |= {k: sign * signs[places[i]] for k, i, sign in table.twins}
+        above = {
+            k: signs[positions[table.element] + i] for k, i in enumerate(table.shown) if i >= 0
+        }
+        above |= {k: sign * signs[positions[i]] for k, i, sign in table.twins}
         cell = max((k + 1 for k, sign in above.items() if sign == 1), default=0)
         if any(sign != (1 if k < cell else -1) for k, sign in above.items()):
             return None
@@ -198,8 +200,8 @@ def by_breakpoints(d: Definition) -> Definition:
             d.field, ca.vertcat(*[value for own in values for value in own]), ca.vertcat(*found)
         )
 
-    places = places_of(d)
-    breakpoints = [places[table.element] + i for table in d.tables for i in range(table.count)]
+    positions = first_surfaces(d)
+    breakpoints = [positions[table.element] + i for table in d.tables for i in range(table.count)]
     laws = tuple(
         name
         for law, own in zip(d.laws, shown, strict=True)

@@ -50,15 +50,15 @@ def test_gradient_is_that_of_differences():
 
 @pytest.mark.slow
 def test_coverage():
-    """Of 40 fits, a 90 % interval holds the truth in 36 +- 6 (three standard deviations)."""
+    """Of 40 fits, a 90 % interval contains the exact value in 36 +- 6 (three standard deviations)."""
     law = bounce.laws.TiltedBounce(mu=0.25, restitution=0.4, tilt=0.2)
     hits = []
     for seed in range(40):
         found = bounce.golf.fit(
             law, synthetic(law, 40, 0.02, seed), parameters=["mu", "restitution", "tilt"], starts=0
         )
-        truth = dict(mu=0.25, restitution=0.4, tilt=0.2)
-        hits += [[low <= truth[n] <= high for n, (low, high) in found.interval(0.9).items()]]
+        reference = dict(mu=0.25, restitution=0.4, tilt=0.2)
+        hits += [[low <= reference[n] <= high for n, (low, high) in found.interval(0.9).items()]]
     counts = np.sum(hits, axis=0)
     assert np.all(np.abs(counts - 36) <= 6), counts
 
@@ -187,7 +187,7 @@ def wild(seed):
 
 
 @pytest.mark.parametrize("seed", [0, 15, 23, 34])
-def test_a_parameter_that_the_data_do_not_determine_is_said_so(seed):
+def test_a_parameter_that_the_data_do_not_determine_is_reported(seed):
     law = bounce.laws.TURFS["natural"].law
     with pytest.warns(bounce.golf.IdentifiabilityWarning, match="mu") as caught:
         found = bounce.golf.fit(law, wild(seed), parameters=["mu", "restitution", "tilt"])

@@ -133,7 +133,7 @@ def test_a_column_twice_is_refused_and_named(tmp_path):
 
 
 def test_a_frame_with_a_column_twice_is_refused():
-    """It iterates over titles; asked for one that it has twice, it gives both columns."""
+    """It iterates over titles; for one that occurs twice it gives both columns."""
 
     class Frame:
         def __iter__(self):

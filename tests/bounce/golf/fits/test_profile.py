@@ -1,4 +1,4 @@
-"""An interval of a fit that is too narrow is told, and its profile reaches as far as the data allow."""
+"""An interval of a fit that is too narrow gives a warning, and its profile extends as far as the data allow."""
 
 import pickle
 import warnings
@@ -26,7 +26,7 @@ def gentle(seed, size=0.1, noise=0.001):
 
 
 @pytest.mark.parametrize("seed", [36, 53])
-def test_an_interval_that_misses_the_truth_is_told(seed):
+def test_an_interval_that_misses_the_exact_value_is_reported(seed):
     with pytest.warns(bounce.golf.IdentifiabilityWarning, match="mu"):
         found = bounce.golf.fit(TURF.replace(mu=0.4), gentle(seed), parameters=["mu"], starts=4)
     low, high = found.interval()["mu"]

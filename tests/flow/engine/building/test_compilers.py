@@ -1,4 +1,4 @@
-"""A compiler that exists but fails is told once, and the next one does the work; without another one that is an error."""
+"""A compiler that fails gives one warning, and the next one is used; without another one that is an error."""
 
 import importlib.util
 import os
@@ -69,10 +69,10 @@ def test_the_next_compiler_is_used(stub, monkeypatch):
     real = shutil.which("cc", path=os.defpath + ":/usr/local/bin") or shutil.which("gcc")
     program(stub[0] / "gcc", f'#!/bin/sh\nPATH=/usr/local/bin:/usr/bin:/bin exec {real} "$@"\n')
     assert [os.path.basename(c[0]) for c in compilers()[:2]] == ["cc", "gcc"]
-    with pytest.warns(CompilerWarning, match="(?s)compiler.*cc") as told:
+    with pytest.warns(CompilerWarning, match="(?s)compiler.*cc") as reported:
         assert build(SOURCE).answer() == 42
         assert build(SOURCE.replace("42", "43")).answer() == 43
-    assert len(told) == 1 and stub[1] in str(told[0].message)
+    assert len(reported) == 1 and stub[1] in str(reported[0].message)
 
 
 RUN = """
@@ -92,7 +92,7 @@ for work in (lambda: ns.simulate(system, [1.0, 0.0], 1.0), lambda: ns.ensemble(s
         assert type(error).__name__ == "CompilerError", error
         said.append(str(error))
     else:
-        raise AssertionError("a compiler that fails was not told")
+        raise AssertionError("no warning of a compiler that fails")
 print(said[0])
 """
 
@@ -109,8 +109,8 @@ def test_without_another_compiler_a_run_says_what_to_install(stub, tmp_path):
         capture_output=True,
         text=True,
     )
-    told = [k for k in done.stderr.splitlines() if not k.startswith("nonsmooth: compiling")]
-    assert done.returncode == 0 and told == [], done.stderr
+    reported = [k for k in done.stderr.splitlines() if not k.startswith("nonsmooth: compiling")]
+    assert done.returncode == 0 and reported == [], done.stderr
     assert stub[1] in done.stdout and "pip install ziglang" in done.stdout
     assert str(stub[0] / "cc") in done.stdout  # which one is at fault
     assert list((tmp_path / "cache").glob("*.so")) == []
@@ -140,7 +140,7 @@ def test_a_long_compilation_says_so_on_stderr(quiet, said, monkeypatch, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_compilation_without_a_place_for_words(monkeypatch):
+def test_a_compilation_without_stderr(monkeypatch):
     monkeypatch.setattr(build_module, "_QUIET", 0.0)
     monkeypatch.setattr(sys, "stderr", None)
     assert build(SOURCE).answer() == 42

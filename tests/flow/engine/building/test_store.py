@@ -43,10 +43,10 @@ def entry(cache, source=SOURCE):
 
 def plant(cache, tmp_path, name=None):
     """A library that says where it was loaded, sealed as ours is, under the name of ours."""
-    told = tmp_path / "told"
+    reported = tmp_path / "told"
     text = (
         "#include <stdio.h>\n__attribute__((constructor)) static void told(void)"
-        f'{{ FILE *f = fopen("{told}", "w"); if (f) fclose(f); }}\n{SOURCE}'
+        f'{{ FILE *f = fopen("{reported}", "w"); if (f) fclose(f); }}\n{SOURCE}'
     )
     work = tmp_path / "attacker"
     work.mkdir(mode=0o700)
@@ -54,7 +54,7 @@ def plant(cache, tmp_path, name=None):
     compile_library(text, find_compiler(), made)
     target = name or entry(cache)
     os.replace(made, target)
-    return target, told
+    return target, reported
 
 
 def test_the_folder_and_its_entries_are_for_the_owner_whatever_the_umask(tmp_path, monkeypatch):
@@ -72,11 +72,11 @@ def test_the_folder_and_its_entries_are_for_the_owner_whatever_the_umask(tmp_pat
 @pytest.mark.parametrize("open_to", [0o777, 0o770, 0o775, 0o722, 0o1777])
 def test_nothing_is_loaded_from_a_folder_that_others_can_write(open_to, cache, tmp_path):
     cache.mkdir()
-    _, told = plant(cache, tmp_path)
+    _, reported = plant(cache, tmp_path)
     cache.chmod(open_to)
     with pytest.warns(CompilerWarning, match=f"mode {open_to:04o}"):
         assert build(SOURCE).answer() == 42
-    assert not told.exists() and mode(cache) == open_to
+    assert not reported.exists() and mode(cache) == open_to
 
 
 def give_away(folder, monkeypatch):
@@ -94,11 +94,11 @@ def give_away(folder, monkeypatch):
 
 def test_nothing_is_loaded_from_a_folder_of_another_user(cache, tmp_path, monkeypatch):
     cache.mkdir(mode=0o700)
-    _, told = plant(cache, tmp_path)
+    _, reported = plant(cache, tmp_path)
     give_away(cache, monkeypatch)
     with pytest.warns(CompilerWarning, match="user 12345"):
         assert build(SOURCE).answer() == 42
-    assert not told.exists()
+    assert not reported.exists()
 
 
 @pytest.mark.parametrize("open_to", [0o777, 0o772])
@@ -129,30 +129,32 @@ def test_a_group_of_nobody_else_may_write_the_folders_above(tmp_path, monkeypatc
 @pytest.mark.parametrize("open_to", [0o660, 0o606, 0o666, 0o620])
 def test_an_entry_that_others_can_write_is_built_again(open_to, cache, tmp_path):
     cache.mkdir(mode=0o700)
-    planted, told = plant(cache, tmp_path)
+    planted, reported = plant(cache, tmp_path)
     planted.chmod(open_to)
     assert build(SOURCE).answer() == 42
-    assert not told.exists() and mode(planted) == 0o600
+    assert not reported.exists() and mode(planted) == 0o600
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives away")
 def test_an_entry_of_another_user_is_built_again(cache, tmp_path):
     cache.mkdir(mode=0o700)
-    planted, told = plant(cache, tmp_path)
+    planted, reported = plant(cache, tmp_path)
     os.chown(planted, 12345, 12345)
     assert build(SOURCE).answer() == 42
-    assert not told.exists() and planted.stat().st_uid == 0
+    assert not reported.exists() and planted.stat().st_uid == 0
 
 
 def test_a_link_in_the_place_of_an_entry_is_not_followed(cache, tmp_path):
     cache.mkdir(mode=0o700)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
-    planted, told = plant(cache, tmp_path, elsewhere / entry(cache).name)
+    planted, reported = plant(cache, tmp_path, elsewhere / entry(cache).name)
     content = planted.read_bytes()
     entry(cache).symlink_to(planted)
     assert build(SOURCE).answer() == 42
-    assert not told.exists() and planted.read_bytes() == content and not entry(cache).is_symlink()
+    assert (
+        not reported.exists() and planted.read_bytes() == content and not entry(cache).is_symlink()
+    )
 
 
 def test_an_entry_under_the_name_of_another_is_built_again(cache):

@@ -30,7 +30,7 @@ def block_on_a_belt():
 
 
 def ends(machine, system, x, options, p=None, at=None):
-    """Results of a machine, without what it hands over."""
+    """Results of a machine, without runs that fall back to the driver."""
     chunk = Chunk.empty(len(x), system, at is not None)
     p = system.parameter_vector() if p is None else p
     kernel = Kernel(system, options.order, machine)

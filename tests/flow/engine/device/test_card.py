@@ -1,4 +1,4 @@
-"""What drives a card asks cuda-core for what it needs and no more, in its words; the card here is this processor."""
+"""The driver of a GPU uses cuda-core as documented, and no more than it needs; the GPU here is this processor."""
 
 import ctypes
 from types import SimpleNamespace

@@ -51,12 +51,12 @@ def plain_lanes(system, x, p, options, at, monkeypatch):
 
 
 def compared(system, x, options, machine, monkeypatch, at=None, p=None):
-    """Trajectories that neither hands over: both results, and how many there are."""
+    """Trajectories without a fallback in either: both results, and their number."""
     x = np.concatenate([x, np.full((len(x), int(system.time_dependent)), options.t_start)], axis=1)
     p = system.parameter_vector() if p is None else p
     one = ends(machine, system, x, options, p, at)
     two = plain_lanes(system, x, p, options, at, monkeypatch)
-    # What is not clear is handed over by the kernel, and made here for a step by the driver.
+    # Undecided steps of the kernel fall back to the driver, which makes them here.
     done = one.status != FALL_BACK
     words = [[c.words[k] for k in c.itinerary[done]] for c in (one, two)]
     assert words[0] == words[1]
@@ -173,7 +173,7 @@ def test_runs_go_on_where_the_card_left_them(name, random, monkeypatch):
     for one in ("x", "t", "event_x", "event_t"):
         np.testing.assert_allclose(getattr(there, one), getattr(here, one), rtol=0, atol=1e-5)
     assert np.isfinite(there.event_t).sum() > 10
-    # Which runs go on together changes nothing.
+    # Which runs continue together changes nothing.
     pieces = ns.ensemble(system, x, device="cuda", work=ns.Work(chunk=7, threads=3), **options)
     assert np.array_equal(pieces.x, there.x, equal_nan=True)
     assert np.array_equal(pieces.event_t, there.event_t, equal_nan=True)
@@ -181,7 +181,7 @@ def test_runs_go_on_where_the_card_left_them(name, random, monkeypatch):
 
 
 def test_launches_are_bounded(system, monkeypatch):
-    """What a launch has no steps for goes on in the next one, to the same bits."""
+    """What a launch has no steps for continues in the next one, to the same bits."""
     p, found = system.parameter_vector(), []
     for steps in (10**6, 1, 3):
         shim = Shim(fused=False)
@@ -208,7 +208,7 @@ def test_codes_beyond_the_table(system, as_card, monkeypatch):
     options = dict(t_end=3.0, tol=1e-5)
     whole = ns.ensemble(system, STARTS, device="cuda", **options)
     counted = ns.outcomes(system, STARTS, device="cuda", ranges={"x": (-1, 1)}, **options)
-    monkeypatch.setattr(kernel_module, "PLACES", 2)
+    monkeypatch.setattr(kernel_module, "TABLE_SIZE", 2)
     few = ns.ensemble(system, STARTS, device="cuda", **options)
     assert few.itinerary.tolist() == whole.itinerary.tolist()
     again = ns.outcomes(system, STARTS, device="cuda", ranges={"x": (-1, 1)}, **options)

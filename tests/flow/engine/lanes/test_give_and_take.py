@@ -1,4 +1,4 @@
-"""A step that is not clear to lanes is made by the driver, and the run goes on in its lane."""
+"""A step that is not clear to lanes is made by the driver, and the run continues in its lane."""
 
 import casadi as ca
 import numpy as np

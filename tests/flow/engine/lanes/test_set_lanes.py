@@ -149,7 +149,7 @@ def test_an_ensemble_depends_on_no_neighbour(monkeypatch):
     rolls = np.array(["* s" in word for word in whole.itinerary])
     assert np.array_equal(np.isfinite(whole.event_t), rolls)
     slip = whole.event_x[rolls][:, 4:6]
-    assert not slip.any()  # the set is met to the last bit
+    assert not slip.any()  # the set is reached to the last bit
 
 
 def test_ends_and_starts_that_are_not_finite():
@@ -238,11 +238,11 @@ def test_where_sets_are_reached_and_left_is_known_to_the_tolerance(monkeypatch, 
     fast = run(tol)
     assert (fine.engine, fast.engine) == ("core", "lanes")
     assert np.array_equal(fast.itinerary, fine.itinerary)
-    met = np.isfinite(fine.event_t)
-    size = 1 + np.abs(fine.event_x[met]).max(axis=1)
-    error = np.abs(fast.event_x - fine.event_x)[met].max(axis=1) / size
-    late = np.abs(fast.event_t - fine.event_t)[met] / (1 + fine.event_t[met])
-    assert met.sum() > 100
+    reached = np.isfinite(fine.event_t)
+    size = 1 + np.abs(fine.event_x[reached]).max(axis=1)
+    error = np.abs(fast.event_x - fine.event_x)[reached].max(axis=1) / size
+    late = np.abs(fast.event_t - fine.event_t)[reached] / (1 + fine.event_t[reached])
+    assert reached.sum() > 100
     assert max(error.max(), late.max()) < 2 * tol
 
 

@@ -20,15 +20,18 @@ import casadi as ca
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.orbit import Branch, BranchEnd, PeriodicOrbit
+from nonsmooth.orbit import Branch, BranchEnd, BranchEvent, PeriodicOrbit
 
 from .problems import Array
 
 Made = tuple[ns.FilippovSystem, Array, float]
 
-#: Seconds for a system; nodes that are simulated; relative errors of closure and of multipliers; growth of
-#: derivatives along an orbit beyond which rounding decides a simulation of it.
-LIMIT, NODES, CLOSURE, DIFFERENCE, LOST = 60, 10, 1e-7, 1e-4, 1e13
+#: Processor seconds for a system; nodes that are simulated; relative errors of closure and of multipliers.
+LIMIT, NODES, CLOSURE, DIFFERENCE = 60, 10, 1e-7, 1e-4
+
+#: Growth of derivatives along an orbit beyond which it is simulated in parts, and how many; relative distance of an
+#: orbit from a touch within which rounding decides whether a simulation has it.
+GROWS, PARTS, TOUCH = 1e3, 40, 1e-5
 
 #: Ends of a branch that say nothing of its orbits.
 NAMELESS = (BranchEnd.STEP_TOO_SMALL, BranchEnd.FAILED)
@@ -161,28 +164,33 @@ CLASSES: dict[str, Callable[[np.random.Generator], Made]] = {
 }
 
 
-def inside(orbit: PeriodicOrbit) -> tuple[Array, float]:
-    """A state inside the first leg, and its time."""
-    run = orbit.trajectory
-    t = float(run.t[0]) + 0.37 * orbit.legs[0].duration
-    return np.asarray(run(t))[: orbit.system.dimension], t if orbit.system.time_dependent else 0.0
+def parts(orbit: PeriodicOrbit, count: int) -> list[tuple[float, Array, Array]]:
+    """Begin of each of equal parts of a period, from inside a leg that slides on nothing if there is one, and states."""
+    run, n, period = orbit.trajectory, orbit.system.dimension, orbit.period
+    leg = next((leg for leg in orbit.legs if not {"s", "c"} & set(leg.mode)), orbit.legs[0])
+    first = leg.t - float(run.t[0]) + 0.37 * leg.duration
+    times = float(run.t[0]) + (first + period * np.arange(count + 1) / count) % period
+    states = [np.asarray(run(t))[:n] for t in times]
+    return list(zip(times.tolist(), states[:-1], states[1:], strict=False))
 
 
-def moved(orbit: PeriodicOrbit, x: Array, t: float, tol: float) -> ns.Trajectory:
-    """The motion over a period."""
-    values, end = orbit.parameters, t + orbit.period
-    return ns.simulate(orbit.system, x, end, t_start=t, parameters=values, tol=tol)
+def moved(orbit: PeriodicOrbit, x: Array, t: float, span: float, tol: float) -> ns.Trajectory:
+    """The motion over a time."""
+    return ns.simulate(orbit.system, x, t + span, t_start=t, parameters=orbit.parameters, tol=tol)
 
 
-def differences(orbit: PeriodicOrbit, x: Array, t: float) -> Array:
-    """Eigenvalues of the derivative of the motion over a period, by central differences of fourth order."""
-    slopes = list[Array]()
-    for h in (1e-5, 5e-6):
-        ends = [
-            moved(orbit, x + s * h * e, t, 1e-13).x[-1] for e in np.eye(x.size) for s in (1.0, -1.0)
-        ]
-        slopes.append((np.array(ends[::2]) - ends[1::2]) / (2 * h))
-    return np.asarray(np.linalg.eigvals((4 * slopes[1] - slopes[0]).T / 3))
+def differences(orbit: PeriodicOrbit, count: int) -> Array:
+    """Eigenvalues of the derivative of the motion over a period, by central differences of fourth order over parts."""
+    n = orbit.system.dimension
+    whole, span = np.eye(n), orbit.period / count
+    for t, x, _ in parts(orbit, count):
+        slopes = list[Array]()
+        for h in (1e-5, 5e-6):
+            near = [x + s * h * e for e in np.eye(n) for s in (1.0, -1.0)]
+            ends = [moved(orbit, y, t, span, 1e-13).x[-1] for y in near]
+            slopes.append((np.array(ends[::2]) - ends[1::2]) / (2 * h))
+        whole = (4 * slopes[1] - slopes[0]).T / 3 @ whole
+    return np.asarray(np.linalg.eigvals(whole))
 
 
 def _kinds(kinds: Sequence[str]) -> Counter[str]:
@@ -194,9 +202,19 @@ def _events(orbit: PeriodicOrbit) -> Counter[str]:
     return _kinds([leg.kind for leg in orbit.legs])
 
 
-def errors_on(branch: Branch) -> list[str]:
+def _growth(orbit: PeriodicOrbit) -> float:
+    """Of derivatives along the orbit, as beside a saddle, and over its period."""
+    on_the_way = np.abs(orbit.evaluation.flows.by_start).max()
+    return float(max(1.0, on_the_way, np.abs(orbit.multipliers).max()))
+
+
+def _near(orbit: PeriodicOrbit) -> float:
+    return min((abs(margin.relative) for margin in orbit.margins), default=1.0)
+
+
+def errors_on(branch: Branch, counts: Counter[str]) -> list[str]:
     """Errors on a branch, as sentences."""
-    found, count = list[str](), len(branch)
+    found, size = list[str](), len(branch)
     events = {event.parameter for event in branch.events}
     beside = [event.parameter for event in branch.events if event.kind in BESIDE]
     for orbit in branch.orbits:
@@ -204,58 +222,88 @@ def errors_on(branch: Branch) -> list[str]:
             _ = orbit.multipliers, orbit.stability
         except ns.NonsmoothError as error:
             found.append(f"a node that raises: {error}")
-    for k in range(0, count, max(1, count // NODES)):
-        orbit = branch.orbits[k]
-        if not np.isfinite(orbit.multipliers).all() or branch.values[k] in events:
+    for k in range(0, size, max(1, size // NODES)):
+        orbit, value = branch.orbits[k], branch.values[k]
+        if not np.isfinite(orbit.multipliers).all() or value in events:
+            counts["nodes at events, not simulated"] += 1
             continue
-        near = min((abs(m.relative) for m in orbit.margins), default=1.0)
-        at, (x, t) = f"at {branch.values[k]:.6g}", inside(orbit)
-        growth = float(np.abs(orbit.evaluation.flows.by_start).max())  # as beside a saddle
-        if growth > LOST or any(abs(branch.values[k] - q) < 1e-3 for q in beside):
-            continue
-        run = moved(orbit, x, t, 1e-12)
+        decided = _near(orbit) > TOUCH and all(abs(value - q) >= 1e-3 for q in beside)
+        counts["nodes simulated" if decided else "nodes simulated but for a part"] += 1
+        wrong = _missed(orbit, decided)
+        found += [f"at {value:.6g} {orbit.itinerary}: {wrong}"] if wrong else []
+    return found + false_events(branch, counts) + _of_multipliers(branch, counts)
+
+
+def _missed(orbit: PeriodicOrbit, decided: bool) -> str:
+    """How the motion misses the orbit; where rounding decides how it goes on, in more than one part of the period."""
+    count = 1 if decided and _growth(orbit) < GROWS else PARTS
+    wrong, own = list[str](), Counter[str]()
+    for t, x, end in parts(orbit, count):
+        run = moved(orbit, x, t, orbit.period / count, 1e-12)
+        own += _kinds([e.kind for e in run.events if e.t > t + 1e-9 * orbit.period])
+        missed = float(np.abs(run.x[-1] - end).max()) / (1 + float(np.abs(x).max()))
         if not run.status.complete:
-            if near > 1e-5:
-                found.append(f"{at} {orbit.itinerary}: simulation ends {run.status}")
+            wrong.append(f"simulation ends {run.status}")
+        elif missed > CLOSURE:
+            wrong.append(f"does not close by {missed:.1e}")
+    if decided and not wrong and own != _events(orbit):
+        return f"simulation has {dict(own)}"
+    return "; ".join(wrong) if len(wrong) > (not decided) else ""
+
+
+def _of_multipliers(branch: Branch, counts: Counter[str]) -> list[str]:
+    """Multipliers of an orbit that are not those of differences: the first from the middle that has no event beside it."""
+    middle = len(branch) // 2
+    for orbit in sorted(branch.orbits, key=lambda o: abs(branch.orbits.index(o) - middle)):
+        own, growth = orbit.multipliers, _growth(orbit)
+        if not np.isfinite(own).all() or orbit.is_virtual or not _near(orbit) >= 1e-3:
             continue
-        missed = float(np.abs(run.x[-1] - x).max()) / (1 + float(np.abs(x).max()))
-        largest = max(1.0, float(np.abs(orbit.multipliers).max()))
-        if missed > CLOSURE * largest + 1e-11 * growth and near > 1e-5:
-            found.append(f"{at} {orbit.itinerary}: does not close by {missed:.1e} of {largest:.1e}")
-        elif largest < 1e3 and near > 1e-5:
-            own = _kinds([e.kind for e in run.events if e.t > t + 1e-9 * orbit.period])
-            if own != _events(orbit):
-                found.append(f"{at} {orbit.itinerary}: simulation has {dict(own)}")
-    return found + false_events(branch) + _of_multipliers(branch.orbits[count // 2])
-
-
-def _of_multipliers(orbit: PeriodicOrbit) -> list[str]:
-    if "s" in orbit.legs[0].mode or orbit.system.definition.discrete or orbit.is_virtual:
+        if all({"s", "c"} & set(leg.mode) for leg in orbit.legs):
+            continue
+        largest = float(np.abs(own).max())
+        lost = growth > 1e4  # all but the largest
+        if lost and largest < 1e-3 * growth:
+            continue
+        counts["branches with multipliers by differences"] += 1
+        values = differences(orbit, PARTS if lost else 1)
+        compared = own[np.abs(own) >= largest * (1 - 1e-9)] if lost else own
+        apart = max(float(np.abs(values - m).min()) for m in compared)
+        if apart > DIFFERENCE * max(1.0, largest):
+            return [f"multipliers {own.round(6)} are {values.round(6)} by differences"]
         return []
-    near = min((abs(m.relative) for m in orbit.margins), default=1.0)
-    own = orbit.multipliers
-    growth = float(np.abs(orbit.evaluation.flows.by_start).max())  # on the way
-    if near < 1e-3 or not np.abs(own).max() < 1e3 or growth > 1e4:
-        return []
-    values = differences(orbit, *inside(orbit))
-    apart = max(float(np.abs(values - m).min()) for m in own)
-    if apart > DIFFERENCE * max(1.0, float(np.abs(own).max())):
-        return [f"multipliers {own.round(6)} are {values.round(6)} by differences"]
     return []
 
 
-def false_events(branch: Branch) -> list[str]:
-    """Events at which nothing happens between the nodes beside them."""
+def false_events(branch: Branch, counts: Counter[str]) -> list[str]:
+    """Events at which nothing happens between the nodes beside them, or no multiplier is on the unit circle."""
     found = list[str]()
     positions = {id(p): k for k, (_, p) in enumerate(branch.nodes)}
     for event in branch.events:
         k = positions.get(id(event.point), 0)
+        if event.kind in SMOOTH:
+            found += _off_circle(event, counts)
         if event.kind in SMOOTH or not 0 < k < len(branch) - 1:
             continue
         before, after = branch.orbits[k - 1], branch.orbits[k + 1]
         if _events(before) == _events(after) and "corner" not in event.kind:
             found.append(f"{event.kind} at {event.parameter:.8g} changes nothing")
     return found
+
+
+def _off_circle(event: BranchEvent, counts: Counter[str]) -> list[str]:
+    """A smooth bifurcation whose orbit has no multiplier on the unit circle, beside the one of the period."""
+    orbit = event.orbit
+    values = orbit.multipliers
+    if not np.abs(values).max() < 1e4:
+        counts["smooth events of orbits with a multiplier above 1e4, not checked"] += 1
+        return []
+    if not orbit.system.time_dependent:
+        values = np.delete(values, np.argmin(np.abs(values - 1.0)))
+    at = -1.0 if event.kind in ("period doubling", "pitchfork") else 1.0
+    off = np.abs(values) - 1.0 if event.kind == "Neimark-Sacker" else values - at
+    counts["smooth events checked"] += 1
+    away = float(np.abs(off).min(initial=np.inf))
+    return [f"{event.kind} at {event.parameter:.8g}: multipliers {values}"] if away > 1e-3 else []
 
 
 def branch_of(kind: str, seed: int) -> tuple[Branch | None, str]:
@@ -273,17 +321,17 @@ def branch_of(kind: str, seed: int) -> tuple[Branch | None, str]:
 
 def checked(kind: str, seed: int, counts: Counter[str]) -> Branch | None:
     """The branch of a seed, with what is wrong printed and counted."""
-    signal.alarm(LIMIT)
+    signal.setitimer(signal.ITIMER_PROF, LIMIT)
     try:
         branch, reason = branch_of(kind, seed)
-        wrong = [] if branch is None else errors_on(branch)
+        wrong = [] if branch is None else errors_on(branch, counts)
     except KeyboardInterrupt:
         branch, reason, wrong = None, f"longer than {LIMIT} s", [f"takes longer than {LIMIT} s"]
     except ns.NonsmoothError as error:
         branch, reason = None, f"raises {type(error).__name__}"
         wrong = [f"{reason}: {error}"]
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
     for text in wrong:
         print(kind, seed, text[:300], flush=True)
     counts["WRONG"] += len(wrong)
@@ -296,7 +344,7 @@ def main(numbers: Sequence[int] = (), classes: Sequence[str] = ()) -> Counter[st
     """Check equally many branches of each class, 200 from seed 0 on by default; counts of what was found."""
     counts, began, chosen = Counter[str](), time.perf_counter(), classes or tuple(CLASSES)
     count, first = [*numbers, *(200, 0)[len(numbers) :]]
-    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.signal(signal.SIGPROF, signal.default_int_handler)
     warnings.simplefilter("ignore")
     for kind in chosen:
         seed = first

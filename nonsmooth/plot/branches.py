@@ -39,6 +39,7 @@ MARKERS = {
     "grazing of a jumping force": ("v", style.YELLOW),
     "corner": ("d", "white"),
     "end of complete chatter": ("<", style.VERMILLION),
+    "plastic impact": (">", style.VERMILLION),
     "homoclinic": ("*", style.BLACK),
 }
 _OTHER = ("X", "white")

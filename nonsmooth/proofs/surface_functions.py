@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, get_args
 
 from ..model import DefinitionError, FilippovSystem, OptionError, ParameterError
 from .arithmetic.flint import arb
 from .arithmetic.instructions import ExpressionGraph
 from .arithmetic.intervals import Numbers, between, enclose, exact, exact_range
-from .proof import READ
 
 #: A parameter's value, or the ends of an interval of values.
 Range = Any
@@ -143,7 +142,7 @@ def parameter_ranges(
     system: FilippovSystem, given: Mapping[Any, Range] | None, numbers: Numbers
 ) -> list[tuple[Any, Any]]:
     """Ends of the intervals of all parameters, as exact fractions."""
-    if numbers not in READ:
+    if numbers not in get_args(Numbers):
         raise OptionError(f"numbers={numbers!r} is not 'stored' or 'written'. See certify.")
     intervals: dict[str, tuple[Any, Any]] = {}
     for key, value in (given or {}).items():

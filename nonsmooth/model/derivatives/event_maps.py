@@ -291,11 +291,11 @@ def jumped(system: FilippovSystem, element: int, letters: str) -> tuple[ca.SX, c
 
 
 def keeps_zero(system: FilippovSystem, surface: int, reset: int) -> bool:
-    """Whether the map of a reset leads to zeros of a switching function from its zeros."""
+    """Whether the map of a reset leads to zeros of a switching function, or with -1 of its own, from its zeros."""
     d = system.definition
 
     def build() -> bool:
-        h = d.open_surfaces[surface]
+        h = d.open_surfaces[surface] if surface >= 0 else d.guards[len(d.stops) + reset]
         after = ca.substitute(h, d.states, d.maps[:, reset])
         return bool(ca.is_equal(h, after, 10)) or vanish_on([after], h, d.extended_states)
 

@@ -216,14 +216,16 @@ def _follow(departure: Departure, **options: Any) -> list[Piece]:
         except (NonsmoothError, np.linalg.LinAlgError):
             return None
 
-    found = pieces(
-        departure,
-        partial(_traced, **options),
-        following,
-        last=lambda arc: arc.end in _WHOLE,
-        apart=0.0,
-    )
-    every = [(cast("EventCurve | ConnectionCurve", at.curve), arc) for at, arc in found]
+    every, most = list[Piece](), options.pop("most")
+
+    def follow(at: Departure) -> Arc:
+        left = most - sum(len(arc.points) - 1 for _, arc in every)  # pieces share their ends
+        return _traced(at, most=left, **options)
+
+    for at, arc in pieces(
+        departure, follow, following, last=lambda arc: arc.end in _WHOLE, apart=0.0
+    ):
+        every.append((cast("EventCurve | ConnectionCurve", at.curve), arc))
     curve, arc = every[-1]
     if arc.end in _DIVISIBLE and isinstance(curve, EventCurve):
         arc.end = curve.comes_to(arc.points[-1].u) or arc.end

@@ -370,6 +370,10 @@ class BranchCurve(Curve):
         """Why doubles do not resolve the curve beyond a point; empty if not known."""
         return ""
 
+    def diverges(self, u: Array) -> str:
+        """Why the period of orbits grows without bound where they can be followed no further; empty if it does not."""
+        return ""
+
     def again(self, u: Array, tangent: Array | None = None) -> Departure | None:
         """The same curve from a point of it with better equations; None if there are none."""
         return None
@@ -522,15 +526,20 @@ class _Half:
         curve, point = self.nodes[-1]
         try:
             last = curve.ending(point.u, self.end)
-            said = "" if last is not None else curve.unresolved(point.u)
+            beside = "" if last is not None else curve.diverges(point.u)
+            said = "" if last is not None or beside else curve.unresolved(point.u)
         except (NonsmoothError, np.linalg.LinAlgError):
             return
-        self.reason = said or self.reason
+        self.reason = beside or said or self.reason
         if last is not None:
             self.events.append(last)
-            diverges = last.kind in ("homoclinic", "infinite period at a boundary node")
-            self.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT
+            self.end = BranchEnd.PERIOD_DIVERGES if last.kind in _DIVERGES else BranchEnd.EVENT
+        elif beside:
+            self.end = BranchEnd.PERIOD_DIVERGES
 
+
+#: Events to which the period diverges.
+_DIVERGES = ("homoclinic", "infinite period at a boundary node")
 
 #: Ends of an arc behind which no other itinerary follows.
 _WHOLE = ("bound", "closed", "interrupted", "points")
@@ -552,7 +561,7 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
             departure.rows,
             departure.tangent,
             step=options["step"],
-            most=options["max_points"],
+            most=options["max_points"] - max(0, len(half.nodes) - 1),  # pieces share their ends
             bounds=[(len(departure.rows[-1]) - 1, low, high)],
             report=options["report"],
         )
@@ -628,8 +637,9 @@ def _event(curve: BranchCurve, zero: Zero) -> BranchEvent | None:
 
 def _sentence(name: str, half: _Half) -> str:
     """Why a branch ends."""
-    if half.end in (BranchEnd.EVENT, BranchEnd.PERIOD_DIVERGES) and half.events:
-        last = half.events[-1]
+    last = half.events[-1] if half.events else None
+    diverges = half.end is BranchEnd.PERIOD_DIVERGES
+    if last is not None and (last.kind in _DIVERGES if diverges else half.end is BranchEnd.EVENT):
         return (
             f"At {name} = {last.parameter:.10g} there is an event, {last.kind} ({last.far_side})."
         )

@@ -106,7 +106,7 @@ def condition_row(
             y = states_at(problem.system, leg.mode, x, q)
             first = first_terms(guarded_field(problem.system, leg.mode), y, q)[1]
             rows = _starting(problem.system, i, leg, before)
-            found = {test.name: (float(first[k, order]), test) for k, order, test in rows}
+            found = {test.name: (_at_start(first[k], order, test), test) for k, order, test in rows}
             rate, test = found.get(condition.name, (np.nan, condition))
             return _through(problem.system, before, leg, test, rate, x, q)
         return touching(problem.system, problem.legs[i], condition, x, duration, q)[1]
@@ -166,7 +166,7 @@ class _Tests:
             first = begin[len(begin) - len(self.inside[i]) :].tolist()
             found.append((self.durations[i], durations[i]))
             for k, order, condition in self.starts[i]:
-                rate, last = first[k][order], self.legs[i - 1]
+                rate, last = _at_start(first[k], order, condition), self.legs[i - 1]
                 rate = _through(self.system, last, self.legs[i], condition, rate, at.starts[i], p)
                 found.append((condition, rate))
             own, sign, others = self.ends[i]
@@ -214,6 +214,9 @@ def _order(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> int |
     """Order at which a guard is positive after the event of the leg before; None without a test."""
     if _changes(system, guard, before, leg):
         return None
+    if guard.kind == "reset" == before.kind and guard.element == before.element:
+        plain = guard.side and system.definition.plain
+        return 1 if plain and keeps_zero(system, -1, before.element) else None
     # A crossing leaves the guard zero and its rate positive. After an exit or release the rate is zero
     # too, and its positive second derivative is the transversality of that event.
     if guard.kind not in ("surface", "exit", "impact", "release"):
@@ -227,6 +230,14 @@ def _order(system: FilippovSystem, guard: Guard, before: Leg, leg: Leg) -> int |
     if guard.kind == "impact" and guard.ends(before.kind, before.element, before.side):
         return None
     return 0
+
+
+def _at_start(terms: Sequence[float], order: int, condition: Condition) -> float:
+    """Term of a guard where a leg begins; of a reset on whose surface that is, where the leg bends to it again."""
+    guard = condition.guard
+    if guard is None or guard.kind != "reset":
+        return float(terms[order])
+    return float(guard.side * terms[1]) if guard.side * terms[2] > 0.0 else math.nan
 
 
 #: Points at which hidden dynamics is sampled, a polynomial of the degree of which agrees with it.

@@ -99,7 +99,7 @@ def continue_orbit(
         Largest step where the branch bends, relative to the width of the bounds and to the size of
         the orbit.
     max_points : int, optional
-        Largest number of points of each piece.
+        Largest number of points on each side of the start.
     through : bool, optional
         Whether to change the itinerary and continue beyond events that end it.
     progress : bool, optional
@@ -121,7 +121,7 @@ def continue_orbit(
         point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
         ``"adding-sliding"``, ``"impact grazing"``, ``"grazing of a soft switch"``,
         ``"grazing of a jumping force"``, ``"grazing, escaping"``, ``"corner"``, ``"two-fold"``,
-        ``"end of complete chatter"``; ``"Hopf"`` where orbits without events shrink to an equilibrium, ``"boundary equilibrium"`` (with its
+        ``"end of complete chatter"``, ``"plastic impact"`` where the restitution vanishes; ``"Hopf"`` where orbits without events shrink to an equilibrium, ``"boundary equilibrium"`` (with its
         class) or ``"two-fold"`` where others shrink to a point of a surface, ``"focus-centre-limit cycle"``,
         ``"homoclinic"`` and ``"infinite period at a boundary node"``.
 

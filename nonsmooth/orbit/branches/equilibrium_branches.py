@@ -433,7 +433,7 @@ def continue_equilibrium(
         Largest step where the branch bends, relative to the width of the bounds and to the size of
         the states.
     max_points : int, optional
-        Largest number of points of each piece.
+        Largest number of points on each side of the start.
     through : bool, optional
         Whether to continue beyond a boundary equilibrium with the pseudo-equilibria, or equilibria,
         that end there too.

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from ...local.searches.equilibria import find_equilibrium
-from ...local.searches.pseudo_equilibria import find_pseudo_equilibrium
-from ...model import Array, NonsmoothError
+from ...local import Equilibrium, PseudoEquilibrium
+from ...model import Array, DefinitionError, NonsmoothError
 from ...solvers.continuation import Point
-from ..homoclinic.homoclinic_orbits import Connection, connection_of, find_homoclinic
+from ..homoclinic.homoclinic_orbits import Connection, connection_of, find_homoclinic, saddle_at
 from ..homoclinic.loops import Loop
 from ..periodic.orbit import PeriodicOrbit
 from ..runs.legs import integrate_leg
@@ -19,6 +17,9 @@ from .branch import BranchCurve, BranchEvent, FarSide
 
 #: Largest distance of the parameters of a periodic and a homoclinic orbit, relative to the bounds.
 _SAME = 0.05
+
+#: Distance of an orbit from a saddle, relative to its size, at which it is close to a homoclinic orbit.
+_PASSES = 1e-3
 
 
 class ConnectionCurve(BranchCurve):
@@ -81,32 +82,41 @@ def event_of(connection: Connection) -> BranchEvent:
 
 def homoclinic_end(orbit: PeriodicOrbit, parameter: str, width: float) -> BranchEvent | None:
     """The homoclinic orbit that a long periodic orbit is close to; None if none is found."""
-    system, value = orbit.system, orbit.parameters[parameter]
-    if system.time_dependent or system.coupled or system.surface_count > 1:
-        return None
-    mode, x = _slowest(orbit)
-    given: dict[str, Any] = {"parameters": orbit.parameters}
+    given = orbit.parameters
     try:
-        saddle: Any = x
-        if mode == "s":
-            saddle = find_pseudo_equilibrium(system, x, **given)
-        elif mode:
-            saddle = find_equilibrium(system, x, side=mode, **given)  # type: ignore[arg-type]
-        found = find_homoclinic(system, saddle, parameter, parameters=orbit.parameters)
+        saddle = _saddle_beside(orbit)[0]
+        found = find_homoclinic(orbit.system, saddle, parameter, parameters=given)
     except NonsmoothError:
         return None
-    return event_of(found) if abs(found.value - value) < _SAME * width else None
+    return event_of(found) if abs(found.value - given[parameter]) < _SAME * width else None
 
 
-def _slowest(orbit: PeriodicOrbit) -> tuple[str, Array]:
-    """Mode and state at the slowest point of an orbit."""
-    p, n, best = orbit.parameter_vector, orbit.system.dimension, (np.inf, "", orbit.start)
+def passed_saddle(orbit: PeriodicOrbit, size: float) -> str:
+    """That an orbit of a size passes close to a saddle, as beside a homoclinic orbit; empty if it does not."""
+    try:
+        saddle, near = _saddle_beside(orbit)
+    except NonsmoothError:
+        return ""
+    if not near < _PASSES * size:
+        return ""
+    return f"The orbit passes within {near:.1e} of the saddle {saddle.point.tolist()}."
+
+
+def _saddle_beside(orbit: PeriodicOrbit) -> tuple[Equilibrium | PseudoEquilibrium, float]:
+    """The saddle next to the slowest point of an orbit, and its distance from there."""
+    system, p, best, near = orbit.system, orbit.parameter_vector, np.inf, orbit.start
+    if system.time_dependent or system.coupled or system.surface_count > 1:
+        raise DefinitionError(
+            "system: such saddles have no homoclinic orbits that are searched for."
+        )
+    n = system.dimension
     for leg, x, duration in zip(
         orbit.problem.legs, orbit.evaluation.starts, orbit.evaluation.durations, strict=True
     ):
         for part in np.linspace(0.0, 1.0, 41):
-            flow = integrate_leg(orbit.system, leg, x, float(part * duration), p)
+            flow = integrate_leg(system, leg, x, float(part * duration), p)
             speed = float(np.linalg.norm(flow.rate[:n]))
-            if speed < best[0]:
-                best = (speed, leg.mode, flow.end[:n])
-    return best[1], best[2]
+            if speed < best:
+                best, near = speed, flow.end[:n]
+    saddle = saddle_at(system, near, p)[1]
+    return saddle, float(np.abs(saddle.point - near).max())

@@ -127,7 +127,7 @@ _TANGENT = 1e-7
 _BOTH = 1e-9
 
 SOFT, FORCE = "grazing of a soft switch", "grazing of a jumping force"
-CHATTER_END = "end of complete chatter"
+CHATTER_END, PLASTIC = "end of complete chatter", "plastic impact"
 
 #: Grazing of a soft switch by the orbits of a centre, at whose value of the parameter all of these exist.
 CENTRE = "focus-centre-limit cycle"
@@ -279,6 +279,8 @@ def _longer(
     if kind == "corner" and at.what == "start" and at.guard is not None:
         if is_condition(before.problem, at.guard) and at.guard.kind == "surface":
             return closed_before(editor, i, at.guard, p)
+        if at.guard.kind == "reset":
+            return _again(editor, i, p)
         return round_corner(editor, i, at.guard, p)
     if at.guard is None or at.what != "interior" or kind == "grazing, escaping":
         return None
@@ -364,7 +366,7 @@ def _shorter(
     ):
         return never_closed(before, at.leg, p)
     if kind == "corner" and at.what == "duration":
-        cut = cut_corner(before, at.leg, p)
+        cut = _once(before, at.leg, p) or cut_corner(before, at.leg, p)
         if cut is not None:
             return cut
     turned = _turned(before, at.leg, p)
@@ -396,6 +398,35 @@ def _shorter(
 def _stays(y: Array, after: Array) -> bool:
     """Whether an event that is touched leaves the state, so that orbits with and without it are neighbours."""
     return bool(np.abs(after - y[: after.size]).max() <= _NEIGHBOURS * (1.0 + np.abs(y).max()))
+
+
+def _again(editor: LegEditor, i: int, p: Array) -> ChangedItinerary | None:
+    """The reset before leg ``i``, which leads to its own surface, happens once more; None where it moves the state."""
+    again, x = replace(editor.legs[i - 1], mode=editor.legs[i].mode), editor.starts[i]
+    if not _stays(x, again.at_event(editor.problem.system, x, p).after):
+        return None
+    editor.insert(i, again, x)
+    return editor.done(i)
+
+
+def _once(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | None:
+    """A reset that happens again at once, left out; None where it is another one, or moves the state."""
+    editor, first = LegEditor(before.problem, before.u, before.origin), before.problem.legs[i - 1]
+    leg, x = editor.legs[i], editor.starts[i]
+    if (
+        not first.kind == leg.kind == "reset"
+        or first.element != leg.element
+        or len(editor.legs) < 2
+    ):
+        return None
+    flow = integrate_leg(before.problem.system, leg, x, editor.durations[i], p)
+    if not _stays(flow.end, leg.at_event(before.problem.system, flow.end, p).after):
+        return None
+    editor.remove(i)
+    i %= len(editor.legs)
+    guards = guarded_field(before.problem.system, editor.legs[i].mode).motion.guards
+    guard = next(g for g in guards if g.kind == "reset" and g.element == leg.element)
+    return editor.done(test=Condition("start", i, guard))
 
 
 def _missed(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | None:

@@ -42,10 +42,9 @@ from .chatter_end import chatter_end
 from .conditions import COST, USER, Condition, condition_row, conditions_of, is_smooth
 from .event_curves import OWN_ENDS, degenerate_tests
 from .family_ends import extent, hopf_point, node_end, surface_end
-from .homoclinic_curves import homoclinic_end
+from .homoclinic_curves import homoclinic_end, passed_saddle
 from .itinerary_changes import (
     CENTRE,
-    CHATTER_END,
     SOFT,
     ChangedItinerary,
     changed_itinerary,
@@ -385,9 +384,10 @@ class OrbitCurve(OrbitEquations):
             return shrunk
         chatter = chatter_end(self.problem, u, self.scale, self.equations)
         if chatter is not None:
-            value, near = chatter
-            side = FarSide("", VERDICTS[CHATTER_END])
-            return BranchEvent(CHATTER_END, value, self.describe(near), side, curve=self)
+            kind, value, near = chatter
+            return BranchEvent(
+                kind, value, self.describe(near), FarSide("", VERDICTS[kind]), curve=self
+            )
         for verb in ("ends at", "passes"):
             if self._at_two_fold(u, _REACHED, inside=verb == "passes"):
                 verdict = f"a slide {verb} a two-fold, beyond which its continuation is not unique"
@@ -395,9 +395,13 @@ class OrbitCurve(OrbitEquations):
                 return self._event("two-fold", self, point, "", FarSide("", verdict))
         name, width = self.system.parameter_names[self.free[-1]], float(self.widths[-1])
         node = node_end(self.describe(u), name, width)
-        if node is not None or (end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u)):
+        long = end is BranchEnd.PERIOD_DIVERGES or self._steep(u) or self.diverges(u)
+        if node is not None or not long:
             return node
         return homoclinic_end(self.describe(u), name, width)
+
+    def diverges(self, u: Array) -> str:
+        return passed_saddle(self.describe(u), self._sizes(u)[0])
 
     def _at_two_fold(self, u: Array, part: float, inside: bool = False) -> bool:
         """Whether a slide ends at a two-fold, or comes to one ``inside`` its leg."""
@@ -563,6 +567,11 @@ class OrbitCurve(OrbitEquations):
         # times.
         small = [self.known[zero.name]]
         small += [self.known[n] for n in zero.together if n != zero.name and not is_smooth(n)]
+        # An event without effect that is touched is so by the legs before and behind it too.
+        of, count = lambda c: (c.guard.kind, c.guard.element), len(self.problem.legs)
+        ends = [(c.leg, of(c)) for c in small if c.what == "transversality"]
+        ends += [((leg + 1) % count, guard) for leg, guard in ends]
+        small = [c for c in small if c.what != "interior" or (c.leg, of(c)) not in ends]
         first = min(small, key=lambda c: _PRIORITY.index(c.what))
         kin = [c for c in small if c.what == first.what and c is not first]
         return sorted([first, *kin], key=lambda c: -c.leg)
@@ -584,6 +593,8 @@ class OrbitCurve(OrbitEquations):
     def _smooth_event(self, zero: Zero) -> BranchEvent | None:
         if zero.name == "fold" and not self._turns(zero.point.u):
             return None
+        if zero.name == "branch point" and self._shrunk(zero.point.u, _SMALL) is not None:
+            return None  # all multipliers tend to 1
         if zero.name == "Hopf":
             return self._hopf(zero.point.u)
         at, p = self.evaluation(zero.point.u), self.parameters_at(zero.point.u)

@@ -42,6 +42,7 @@ VERDICTS = {
     "focus-centre-limit cycle": "the cycle is born from the largest orbit of a centre",
     "grazing of a jumping force": "the return map has a square root: stability is lost at once",
     "end of complete chatter": "the contact opens before impacts have accumulated: finitely many follow",
+    "plastic impact": "the impacts after the first vanish: beyond, the contact closes at once",
     "grazing, escaping": "the orbit leaves along the other field: nothing continues it",
     "two-fold": "the orbit passes a two-fold, where its continuation may not be unique",
     "corner": "two events at one time, {one} and {other}; the itinerary beyond is not known here: "
@@ -69,9 +70,11 @@ def far_side(
             return FarSide(
                 itinerary, _verdict(numbers, "with and without sliding"), ReadOnly(numbers)
             )
-        jumps = test.guard is not None and test.guard.kind in ("impact", "reset", "surface")
-        if kind in _ROOTS and test.what == "interior" and jumps:
+        passed = "" if test.guard is None else test.guard.kind
+        if kind in _ROOTS and test.what == "interior" and passed in ("impact", "reset", "surface"):
             return _root(problem, kind, test, at, p, itinerary)
+        if kind == "corner" and beyond is not None and passed == "reset":
+            return FarSide(itinerary, _SMOOTH)  # a reset that happens again changes nothing
         if kind == "corner" and beyond is not None:
             numbers = _orders(problem, at, beyond, p)
             return FarSide(itinerary, _verdict(numbers, "with either order"), ReadOnly(numbers))
@@ -93,6 +96,8 @@ def _root(
     numbers = impact_numbers(problem, test, at, p)
     if "n.A.w" not in numbers:
         return FarSide(itinerary, VERDICTS[kind], ReadOnly(numbers))
+    if numbers["n.A.w"] == 0.0:  # a reset that changes nothing there
+        return FarSide(itinerary, _SMOOTH, ReadOnly(numbers))
     if numbers["n.(I - A)^-1.A.w"] > 0.0:
         what = "the visit" if kind == FORCE else "the impact"
         verdict = f"nonsmooth fold: the orbits with and without {what} meet and vanish"

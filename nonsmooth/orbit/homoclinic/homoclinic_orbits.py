@@ -68,7 +68,7 @@ class Departure:
     size: float  # largest distance from the saddle
 
 
-def _saddle_at(
+def saddle_at(
     system: FilippovSystem, saddle: object, p: Array
 ) -> tuple[str, Equilibrium | PseudoEquilibrium]:
     """The saddle nearest to a given one or a point, and its mode."""
@@ -484,7 +484,7 @@ def find_homoclinic(
     if guess is not None:
         given[parameter] = guess
     p, index = system.parameter_vector(given), names.index(parameter)
-    mode, at = _saddle_at(system, saddle, p)
+    mode, at = saddle_at(system, saddle, p)
     if isinstance(at, PseudoEquilibrium) and system.dimension == 2:
         side, legs, starts, durations = _flight_to(system, at, p)
         loop = PseudoSaddleLoop(system, legs, (index,), p, side)

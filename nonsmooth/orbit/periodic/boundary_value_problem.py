@@ -189,6 +189,11 @@ class BoundaryProblem:
         """The problem with undivided legs."""
         return self
 
+    @property
+    def of_parts(self) -> BoundaryProblem:
+        """The same orbit with the parts of divided legs as its legs."""
+        return self
+
     def parts_of(self, i: int) -> range:
         """The parts of a leg among those of all legs."""
         return range(i, i + 1)

@@ -63,7 +63,7 @@ class DividedProblem(BoundaryProblem):
         return (sum(self.parts) - len(self.parts)) * self.dimension
 
     @cached_property
-    def _of_parts(self) -> BoundaryProblem:
+    def of_parts(self) -> BoundaryProblem:
         """The same orbit with the parts as its legs."""
         legs = [
             part for leg, k in zip(self.legs, self.parts, strict=True) for part in _parts(leg, k)
@@ -82,14 +82,14 @@ class DividedProblem(BoundaryProblem):
         every = np.empty((leg.size, self.dimension))
         inside = np.setdiff1d(np.arange(leg.size), first)
         every[first], every[inside] = starts, u[: self._inner].reshape(-1, self.dimension)
-        return self._of_parts.pack(every, (durations / self.parts)[leg])
+        return self.of_parts.pack(every, (durations / self.parts)[leg])
 
     def evaluate(
         self, u: Array, p: Array, chosen: tuple[int, ...] = (), tol: float = TOLERANCE
     ) -> Evaluation:
         leg, first, last = self._parts
         at, (starts, durations) = (
-            self._of_parts.evaluate(self._spread(u), p, chosen, tol),
+            self.of_parts.evaluate(self._spread(u), p, chosen, tol),
             self.split(u),
         )
         count, n = leg.size, self.dimension
@@ -174,7 +174,7 @@ def divided(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryProbl
     units = whole.scales(plain)[:n]
     known = [x[None] for x in starts]
     if isinstance(problem, DividedProblem):
-        every = problem._of_parts.split(problem._spread(u))[0]
+        every = problem.of_parts.split(problem._spread(u))[0]
         known = [every[list(problem.parts_of(i))] for i in range(len(starts))]
     parts, inner = list[int](), list[Array]()
     for leg, nodes, duration in zip(whole.legs, known, durations, strict=True):

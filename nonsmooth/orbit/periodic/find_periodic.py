@@ -251,6 +251,9 @@ def _of_neutral_family(orbit: PeriodicOrbit, most: int, budget: _Budget) -> Peri
         begun = equations_of(system, (leg,), x[None], np.array([span]), 0.0, None, None, p)
         try:
             problem, u, at, count = _closed_orbit(begun.problem, begun.unknowns, p, most, budget)
+            part, once = prime_period(problem.whole, problem.undivided(u), p)
+            if part is not problem.whole:
+                problem, u, at, count = _closed_orbit(part, once, p, most, budget)
         except (ConvergenceError, DegenerateError):
             continue
         faults = tuple(violations_of(problem, at, p))
@@ -274,7 +277,7 @@ def _closed_orbit(
         found = solver.solve(guess, most, damped)
         if not to_divide(problem, found[1]):
             return problem, *found, solver.iterations
-        parts, start = divided(problem, guess, p)
+        parts, start = divided(problem, found[0], p)
     except ConvergenceError:
         parts, start = divided(problem, guess, p) if damped else (problem, guess)
         if parts is problem:

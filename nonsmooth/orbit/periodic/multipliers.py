@@ -58,10 +58,15 @@ class Multipliers:
             passages(self.at.flows.ended, *events_of(self.problem, self.at))
         except DegenerateError as error:
             return str(error)
-        finite = np.isfinite(self.at.flows.by_start).all() and all(
-            np.isfinite(factor.matrix).all() for factor in self._product.factors
+        along = np.abs((self.at.parts or self.at).flows.by_start).max(initial=1.0)
+        maps = event_maps(self.problem, self.at)
+        with np.errstate(over="ignore", invalid="ignore"):
+            sizes = [np.abs(own).max(initial=1.0) * along for own in maps]
+        return (
+            ""
+            if np.isfinite([along, *sizes]).all()
+            else "derivatives along the orbit are beyond the range of numbers"
         )
-        return "" if finite else "derivatives along the orbit are beyond the range of numbers"
 
     @cached_property
     def logarithms(self) -> NDArray[np.complex128]:

@@ -136,14 +136,14 @@ class PeriodicOrbit(Tabular):
     @cached_property
     def legs(self) -> tuple[OrbitLeg, ...]:
         """Legs of the whole orbit, in order."""
+        return self._legs_of(self.problem, self.evaluation)
+
+    def _legs_of(self, problem: BoundaryProblem, at: Evaluation) -> tuple[OrbitLeg, ...]:
         n, result = self.system.dimension, list[OrbitLeg]()
-        forced = self.system.time_dependent
-        t = float(self.evaluation.starts[0, n]) if forced else 0.0
+        t = float(at.starts[0, n]) if self.system.time_dependent else 0.0
         flips = (None, self.problem.symmetry) if self.symmetric else (None,)
         for flip in flips:
-            for leg, x, duration in zip(
-                self.problem.legs, self.evaluation.starts, self.evaluation.durations, strict=True
-            ):
+            for leg, x, duration in zip(problem.legs, at.starts, at.durations, strict=True):
                 start = x[:n]
                 if flip is not None:
                     start = flip @ start
@@ -167,7 +167,8 @@ class PeriodicOrbit(Tabular):
     @cached_property
     def trajectory(self) -> Trajectory:
         """One period as a run, with dense output."""
-        return orbit_run(self.system, self.parameters, self.legs)
+        legs = self._legs_of(self.problem.of_parts, self.evaluation.parts or self.evaluation)
+        return orbit_run(self.system, self.parameters, legs)
 
     # stability ----------------------------------------------------------------------------------
 

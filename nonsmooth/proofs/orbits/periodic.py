@@ -23,7 +23,7 @@ from ..arithmetic.eigenvalues import eigenvalues, numbered
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.equations import Equations, column
 from ..arithmetic.flint import arb, arb_mat, ctx
-from ..arithmetic.intervals import Numbers, ends
+from ..arithmetic.intervals import Numbers, ends, radius
 from ..arithmetic.krawczyk import Zero, identity
 from ..proof import READ, Classification, UnprovenError, intervals, listed, paragraph
 from ..record import interval, motion_of, text, zero_record
@@ -405,9 +405,11 @@ def _forcing(orbit: PeriodicOrbit, modes: Modes, ranges: Sequence[Any]) -> tuple
     value = modes.constant(span, ranges)
     if value < 0:
         span, value = modes.graph.apply("neg", [span]), -value
-    ratio = orbit.period / float(value.mid()) if value > 0 else 0.0
-    count = round(ratio) if value > 0 else 0
-    if not count or abs(ratio - count) > _NEAR:
+    if not value > 0:
+        raise UnprovenError("the period of the forcing is not finite for all of these parameters")
+    ratio, share = orbit.period / float(value.mid()), radius(value) / float(value.mid())
+    count = round(ratio)
+    if not count or abs(ratio / count - 1) > _NEAR + 2 * share:
         raise UnprovenError(
             f"the orbit takes {ratio:.9g} of the periods of the forcing, {value.str(12)}, not a whole number; "
             'frequencies such as 0.1 and 0.3 have a rational ratio with numbers="written"'

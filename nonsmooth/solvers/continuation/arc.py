@@ -120,11 +120,12 @@ def trace(
     try:
         tracing.begin(rows, tangent, step / 10 if first is None else first)
         while not arc.end:
+            if len(arc.points) >= most:
+                arc.end = "points"
+                break
             tracing.advance()
             if report is not None and arc.points:
                 report(arc.points[-1])
-            if len(arc.points) >= most and not arc.end:
-                arc.end = "points"
     except KeyboardInterrupt:
         arc.end = "interrupted"
     except (ConvergenceError, DegenerateError, PointError, np.linalg.LinAlgError) as error:

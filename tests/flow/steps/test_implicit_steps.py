@@ -78,7 +78,7 @@ def actuator(**more):
 def test_explicit_steps_report_what_limits_them():
     run = ns.simulate(actuator(), [0.0, 0.0, 1.5], 10.0, method="taylor", max_steps=500)
     assert run.status is ns.Status.TOO_MANY_STEPS and run.facts.implicit_steps == 0
-    assert "a decay rate of about" in run.message and "method='auto'" in run.message
+    assert "A decay rate of about" in run.message and "method='auto'" in run.message
     with pytest.raises(ns.OptionError, match="method is 'radau'"):
         ns.simulate(actuator(), [0.0, 0.0, 1.5], 10.0, method="radau")
 

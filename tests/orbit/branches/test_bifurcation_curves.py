@@ -289,6 +289,11 @@ def test_legs_are_divided_along_a_curve():
     curve = ns.continue_bifurcation(event, ("c", "d"), bounds=[(2, 20), (0.08, 0.2)], step=0.1)
     assert curve.ends == (BranchEnd.REACHED_BOUND,) * 2 and not curve.special
     assert np.abs(curve.values[:, 0] - [top(one) for one in curve.values[:, 1]]).max() < 1e-11
+    few = ns.continue_bifurcation(
+        event, ("c", "d"), bounds=[(2, 20), (0.08, 0.2)], step=0.1, max_points=20
+    )
+    assert few.values[19] == pytest.approx([event.parameter, 0.1], rel=1e-12)
+    assert few.ends[0] is BranchEnd.TOO_MANY_POINTS
 
 
 @pytest.mark.parametrize(

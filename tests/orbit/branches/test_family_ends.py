@@ -2,10 +2,16 @@
 closed form, by that name."""
 
 import casadi as ca
+import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 import nonsmooth as ns
 from nonsmooth.local.searches.boundary_equilibria import fold_orbit_landing
+from nonsmooth.orbit.branches import homoclinic_curves
+from nonsmooth.orbit.branches.branch import _Half
+from nonsmooth.orbit.branches.continue_orbit import curve_of
+from nonsmooth.solvers.continuation import Point
 
 X, Y, MU, NU = (ca.SX.sym(name) for name in ("x", "y", "mu", "nu"))
 GROWTH = 0.1
@@ -127,3 +133,59 @@ def test_a_slide_that_comes_to_a_two_fold_inside_ends_its_branch_there(slope, sh
     branch = ns.continue_orbit(orbit, "mu", bounds=(-0.3, 0.6))
     assert [event.kind for event in branch.events] == ["two-fold"]
     assert abs(branch.events[0].parameter) < 1e-12 and "unique" in branch.reasons[0]
+
+
+@pytest.mark.parametrize("located", [True, False])
+def test_a_branch_lost_where_folds_accumulate_at_a_saddle_focus_ends_at_its_homoclinic_orbit(
+    located, monkeypatch
+):
+    """A saddle-focus with a reset to z = mu + x/2: orbits of period T have mu = exp(-0.8 T) - x(T)/2 (Shilnikov)."""
+    z, (fall, turn, rise) = ca.SX.sym("z"), (0.4, 1.5, 0.8)
+    back = ns.Reset(z - 1, [1 + 0.2 * X, 0.3 * Y, MU + 0.5 * X], direction=1, name="back")
+    field = [-fall * X - turn * Y, turn * X - fall * Y, rise * z]
+    system = ns.FilippovSystem([X, Y, z], field=field, resets=[back], parameters={MU: 0.1})
+
+    def closed(period):
+        c, s = np.exp(-fall * period) * np.array([np.cos(turn * period), np.sin(turn * period)])
+        move, jump = np.array([[c, -s], [s, c]]), np.diag([0.2, 0.3])
+        begin = np.linalg.solve(np.eye(2) - jump @ move, [1.0, 0.0])
+        return begin, np.exp(-rise * period) - 0.5 * (move @ begin)[0]
+
+    fold = minimize_scalar(lambda T: closed(T)[1], bracket=(36.5, 37.6, 39.6), tol=1e-12).x
+    begin, mu = closed(fold)
+    start, given = [*begin, np.exp(-rise * fold)], {"mu": mu}
+    orbit = ns.periodic_orbit(system, start, itinerary=[("", "back")], parameters=given)
+    curve, rows = curve_of(orbit, (0,))
+    if not located:
+
+        def refuse(*_, **__):
+            raise ns.ConvergenceError("none was found")
+
+        monkeypatch.setattr(homoclinic_curves, "find_homoclinic", refuse)
+    half = _Half([(curve, Point(rows[0], np.zeros(5)))], end=ns.orbit.BranchEnd.STEP_TOO_SMALL)
+    half.name_end()
+    assert half.end is ns.orbit.BranchEnd.PERIOD_DIVERGES
+    assert [event.kind for event in half.events] == ["homoclinic"] * located
+    assert all(abs(event.parameter) < 1e-15 for event in half.events)
+    assert located or "saddle [" in half.reason
+
+
+def test_no_branch_point_is_reported_where_orbits_shrink_to_a_two_fold():
+    """All multipliers of a relay's orbits tend to 1 at q = (2 b1 + c1)/p1, where L1 = L2."""
+    rows = [[-2.97, -0.07, 0.19, -0.72, -0.9], [0.43, -1.36, -1.13, -0.18, 0.23]]
+    rows += [[0.19, 0.03, -2.67, -1.19, -0.48], [1.17, -1.02, 0.28, -0.83, 0.81]]
+    rows += [[-1.0, -0.6, -0.63, 2.01, -0.72]]
+    b, c = ca.DM([-0.42, 0.54, 0.11, -1.04, 0.53]), ca.DM([-0.02, 0.02, -0.05, -0.09, -0.39])
+    states, push = ca.SX.sym("x", 5), ca.DM([-0.35, 0.14, 0.05, -0.25, 0.11])
+    field = ca.DM(rows) @ states
+    system = ns.FilippovSystem(
+        ca.vertsplit(states),
+        surface=states[0] - 0.2 * MU,
+        above=ca.vertsplit(field - b - c + MU * push),
+        below=ca.vertsplit(field + b),
+        parameters={MU: 1.0},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5] * 5, 150.0))
+    branch = ns.continue_orbit(orbit, "mu", bounds=(0.9, 3.0), step=0.02)
+    assert [event.kind for event in branch.events] == ["fold", "cycle from a two-fold"]
+    assert branch.events[1].parameter == pytest.approx(0.86 / 0.35, rel=1e-12)

@@ -4,6 +4,8 @@ orbits beyond it are those that a search finds there."""
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq, fsolve
 
 import nonsmooth as ns
 from nonsmooth.orbit.branches import orbit_branches
@@ -74,6 +76,13 @@ def test_the_branch_can_stop_at_the_event():
     branch = ns.continue_orbit(orbit, "A", bounds=(1.5, 3.0), through=False)
     assert branch.ends == (ns.orbit.BranchEnd.EVENT, ns.orbit.BranchEnd.REACHED_BOUND)
     assert abs(branch.values[0] - number("F1", "A_crossing_sliding")) < 1e-12
+
+
+def test_points_are_counted_on_each_side_of_the_start_through_events(forced):
+    start = ns.periodic_orbit(forced.orbits[-1].system, [0.5])
+    branch = ns.continue_orbit(start, "A", bounds=(0.5, 3.0), step=0.01, max_points=30)
+    assert kinds(branch) == ["crossing-sliding"] and branch.values[29] == start.parameters["A"]
+    assert branch.ends[0] is ns.orbit.BranchEnd.TOO_MANY_POINTS
 
 
 @pytest.mark.parametrize("inside", [True, False])
@@ -474,3 +483,41 @@ def test_what_is_raised_at_an_event_is_reported_at_it(monkeypatch):
     branch = ns.continue_orbit(orbit, "A", bounds=(1.7, 3.0))
     assert kinds(branch) == ["unclassified"] and "no such event" in branch.reasons[0]
     assert len(branch) > 10 and branch.ends[0] is ns.orbit.BranchEnd.EVENT
+
+
+def test_a_reset_that_changes_nothing_is_added_and_left_out():
+    """A relay with hysteresis, u = 1 below -q and -1 above q, whose output c x passes -q again shortly after."""
+    rows = [[-1.4, -0.4, -0.41, -0.74], [0.12, -0.29, 1.3, -1.86]]
+    A = np.array([*rows, [0.01, 0.74, -0.74, -0.91], [0.68, 1.71, -0.32, -0.83]])
+    b, c = np.array([0.77, 0.52, 0.86, 1.21]), np.array([0.54, -0.71, -0.07, 0.36])
+    far, one = -np.linalg.solve(A, b), np.eye(4)
+
+    def start(half):  # the other half is the mirror image
+        return np.linalg.solve(one + expm(A * half), (expm(A * half) - one) @ far)
+
+    def later(half, t):
+        return expm(A * t) @ (start(half) - far) + far
+
+    def touch(v):
+        return c @ (later(*v) - start(v[0])), c @ (A @ later(*v) + b)
+
+    corner = brentq(lambda half: c @ (A @ start(half) + b), 1.2, 1.6, xtol=1e-15)
+    touching = fsolve(touch, [1.247, 0.398], xtol=1e-12)[0]
+    *x, u, q = symbols("x0 x1 x2 x3 u q")
+    out, rate = (
+        ca.dot(ca.DM(c), ca.vertcat(*x)),
+        ca.vertsplit(ca.DM(A) @ ca.vertcat(*x) + ca.DM(b) * u),
+    )
+    off = ns.Reset(out - q, [*x, -1], direction=1, name="off")
+    on = ns.Reset(out + q, [*x, 1], direction=-1, name="on")
+    system = ns.FilippovSystem([*x, u], field=[*rate, 0], resets=[off, on], parameters={q: 0.3})
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.1, 0.1, 0.1, 0.1, 1.0], 100.0))
+    branch = ns.continue_orbit(orbit, "q", bounds=(0.05, 0.6))
+    assert kinds(branch) == ["grazing of a reset", "corner"]
+    found = [event.parameter for event in branch.events]
+    expected = [-c @ start(touching), -c @ start(corner)]
+    assert found == pytest.approx(expected, abs=1e-10)
+    assert all("persistence" in event.far_side.verdict for event in branch.events)
+    assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
+    for value in (0.1, 0.16, 0.175, 0.2):
+        assert len(branch[value].legs) == (4 if found[0] < value < found[1] else 2)

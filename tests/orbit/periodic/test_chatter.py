@@ -81,3 +81,13 @@ def test_a_branch_ends_where_chatter_is_complete_no_longer(name: str) -> None:
     assert event.kind == "end of complete chatter"
     assert event.parameter == pytest.approx(end, rel=2e-7)
     assert all(z.stability == "superstable" for z in branch.solutions)
+
+
+@pytest.mark.parametrize("start", [0.02, 1e-3])
+def test_a_branch_ends_where_the_first_impact_closes_the_contact(start: float) -> None:
+    given = {"parameters": {"r": start}, "tol": 1e-12}
+    orbit = ns.periodic_orbit(TABLE, ns.simulate(TABLE, [0.9, 0.0], 9.0, t_start=0.2, **given))
+    branch = ns.continue_orbit(orbit, "r", bounds=(0.0, 0.03))
+    assert [event.kind for event in branch.events] == ["plastic impact"]
+    assert abs(branch.events[0].parameter) < 1e-7
+    assert branch.ends == (ns.orbit.BranchEnd.EVENT, ns.orbit.BranchEnd.REACHED_BOUND)

@@ -198,6 +198,8 @@ def test_orbits_of_a_neutral_family_are_named_as_such_also_where_it_touches_a_su
         friction = ns.Friction(v - b, load=1, kinetic=0.4)
         given = {"field": [v, friction.force - x], "surfaces": [friction]}
     system = ns.FilippovSystem([x, v], parameters={b: 0.3}, **given)
+    from_state = ns.periodic_orbit(system, [start, 0.0])
+    assert from_state.itinerary == "-" and from_state.period == pytest.approx(2 * np.pi, rel=1e-12)
     orbit = ns.periodic_orbit(system, ns.simulate(system, [start, 0.0], 100.0))
     assert orbit.itinerary == "-" and orbit.period == pytest.approx(2 * np.pi, rel=1e-12)
     assert np.abs(orbit.multipliers - 1.0).max() < 1e-9
@@ -245,3 +247,17 @@ def test_a_family_at_one_value_of_the_parameter_has_no_folds():
     branch = ns.continue_orbit(orbit, "damping", bounds=(-0.3, 0.6))
     assert [event.kind for event in branch.events] == ["grazing-sliding", "Hopf"]
     assert max(abs(event.parameter) for event in branch.events) < 1e-12
+
+
+def test_the_run_of_an_orbit_follows_it_where_derivatives_grow():
+    """A relay oscillator with a passenger, whose derivatives grow by exp(8 pi) along a leg."""
+    x, v, w = symbols("x v w")
+    rate = [v, ca.sign(v) - x - 0.2 * v, 8 * w + v]
+    system = ns.FilippovSystem.from_expression([x, v, w], rate)
+    q = np.exp(-0.1 * np.pi / np.sqrt(0.99))
+    far = (1 + q) / (1 - q)
+    orbit = ns.periodic_orbit(system, [-far, 0.0, -0.113], itinerary=["+", "-"])
+    ends = [event.x for event in orbit.trajectory.events]
+    assert orbit.start[0] == pytest.approx(-far, rel=1e-12)
+    assert np.abs(ends[0] - orbit.legs[1].start).max() < 1e-10
+    assert np.abs(ends[1] - orbit.start).max() < 1e-10

@@ -267,6 +267,17 @@ def test_periods_of_forcings_follow_from_their_instructions(expression):
     assert abs(float(period.mid())) == pytest.approx(PERIODS[expression] * mpmath.pi, rel=1e-15)
 
 
+def test_the_period_of_a_forcing_may_have_a_range():
+    system = forced(-x + ca.sin(d * t), parameters={d: 2.0})
+    orbit = ns.periodic_orbit(system, guess=[0.0])
+    proof = ns.certify(orbit, parameters={"d": ("2", "2.001")})
+    assert proof.proven and all(
+        holds(proof.values["period"], 2 * mpmath.pi / w) for w in (2, 2.0005, 2.001)
+    )
+    zero = ns.certify(orbit, parameters={"d": (-1, 1)})
+    assert not zero.exists and "is not finite" in str(zero).replace("\n ", "")
+
+
 @pytest.mark.slow
 def test_a_theorem_holds_for_all_values_of_a_parameter():
     orbit = ns.periodic_orbit(relay(d), guess=[-6.38, 0.01])

@@ -159,7 +159,7 @@ def test_where_feet_slip_in_many_directions_their_loads_must_be_determined():
     assert run.status is ns.Status.NON_UNIQUE and run.events[-1].t > 0.5
 
 
-def groove(walls, load, time):
+def groove(walls, load, time=None):
     """A block of unit mass between two walls, each an angle and a coefficient of friction."""
     q, w, n = ca.SX.sym("q", 3), ca.SX.sym("w", 3), ca.SX.sym("n", 2)
     force, gaps, slips, multipliers = ca.vertcat(*load), [], [], []
@@ -236,3 +236,38 @@ def test_a_block_in_a_groove_holds_as_long_as_any_loads_can_hold_it(angle, mu, s
         assert abs(run.events[0].t - release) < 1e-7
         speed = limit * (1 - (release - 1) ** 2) / 2
         np.testing.assert_allclose(run.x[-1, 3:], [speed, 0, 0], atol=1e-6)
+
+
+WEDGED = [
+    ([(0.6881, 1.0), (1.1232, 1.0)], (18.273, 1.576), 0.0, "sscc **cc"),
+    ([(0.8921, 1.0), (1.0350, 0.1)], (9.861, 0.999), 0.0, "sscc **cc"),
+    ([(1.0935, 0.6), (0.8683, 1.0)], (19.521, 0.0), -2.0, "sscc **cc"),
+    ([(1.1, 1.0), (1.1, 1.0)], (-25.0, 2.0), 0.0, "sscc **cc"),
+    ([(0.9073, 1.0), (0.7535, 1.0)], (13.0, 7.086), 0.0, "sscc"),
+    ([(1.1, 1.0), (1.1, 1.0)], (20.0, 2.0), 2.0, "sscc"),
+    ([(0.3, 0.5), (0.3, 0.5)], (8.0, 0.0), 0.0, "**cc"),
+]
+
+
+@pytest.mark.parametrize(("walls", "load", "speed", "modes"), WEDGED)
+def test_a_block_wedged_at_rest_may_also_slide(walls, load, speed, modes):
+    """A squeeze of any size holds it; in sliding friction is along the groove, and loads balance the force across."""
+    (one, mu), (two, nu) = walls
+    across = [[np.sin(one), -np.sin(two)], [np.cos(one), np.cos(two)]]
+    friction = np.dot(np.linalg.solve(across, [-load[1], G]), [mu, nu])
+    system, stop = (
+        groove(walls, (*load, -G)),
+        speed and -speed / (load[0] - np.sign(speed) * friction),
+    )
+    run = ns.simulate(system, [0, 0, 0, speed, 0, 0], stop + 1)
+    faster, begin = load[0] - np.sign(load[0]) * friction, speed * stop / 2
+    runs = {mode: run for mode in [modes] if " " not in mode}
+    if not runs:
+        assert run.status is ns.Status.NON_UNIQUE and abs(run.t[-1] - stop) < 1e-9
+        assert " ".join(sorted((c.mode for c in run.continuations), reverse=True)) == modes
+        runs = {m: ns.simulate(system, run.x[-1], 1.0, start_mode=m) for m in modes.split()}
+    for mode, after in runs.items():
+        rate = faster if "*" in mode else 0.0
+        assert after.status is ns.Status.REACHED_END and after.itinerary.split()[-1] == mode
+        np.testing.assert_allclose(after.x[-1, [0, 3]], [begin + rate / 2, rate], atol=1e-9)
+        np.testing.assert_allclose(after.x[-1, [1, 2, 4, 5]], 0.0, atol=1e-9)

@@ -549,7 +549,7 @@ static int relax_from(const Block *k, double *nu, double most, double *work, int
  * the one without friction as the bounds grow; 0 where there is none. */
 static int slip_beside(const Block *k, const double *held, double *nu, double *work, int32_t *pivot) {
   int n = k->size, slips = 0;
-  double *bound = work, *share = bound + n, *rest = share + (int64_t)n * n, most = largest_of(held, n), terms;
+  double *bound = work, *next = bound + n, *share = next + n, *rest = share + (int64_t)n * n, most = largest_of(held, n), terms;
   Block part = *k;
   part.b = bound;
   part.share = share;
@@ -561,16 +561,18 @@ static int slip_beside(const Block *k, const double *held, double *nu, double *w
     for (int i = 0; i < n; i++) bound[i] = k->b[i] * step / GROWTHS;
     for (int i = 0; i < n * n; i++) share[i] = k->share[i] * step / GROWTHS;
     if (step == 0 ? !relax_from(&part, nu, most, rest, pivot) : !polish(&part, nu, most, rest, pivot)) return 0;
+    memcpy(next, nu, sizeof(double) * n);
     slips = 0;
-    for (int i = 0; i < n; i++) slips |= span_of(k, i) > 0 && class_of_vector(&part, i, nu, 0) == ABOVE;
-    if (!slips) return 0;
-    for (int i = 0; i < n && step == 0; i++) { /* the first friction has the direction of slip */
+    for (int i = 0; i < n; i++) { /* the next friction is in the direction of slip */
       double w[3], u[3];
-      if (span_of(k, i) <= 0) continue;
+      if (span_of(k, i) <= 0 || class_of_vector(&part, i, nu, 0) != ABOVE) continue;
+      slips = 1;
       for (int q = 0; q < k->span[i]; q++) w[q] = rate_of(&part, i + q, nu, &terms);
       unit_of(w, k->span[i], u);
-      for (int q = 0; q < k->span[i]; q++) nu[i + q] = bound_of(k, i, nu) / GROWTHS * u[q];
+      for (int q = 0; q < k->span[i] && step < GROWTHS; q++) next[i + q] = bound_of(k, i, nu) * (step + 1) / GROWTHS * u[q];
     }
+    if (!slips) return 0;
+    memcpy(nu, next, sizeof(double) * n);
   }
   return 1;
 }

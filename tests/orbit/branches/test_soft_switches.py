@@ -1,19 +1,13 @@
 """Orbits that begin to touch a surface on which nothing slides: the branch goes through, as closed forms say."""
 
-import json
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.periodic_cases import cases_of
 
-CASES = {
-    case["id"]: case
-    for case in json.loads(Path("tests/cases/continuous_switching.json").read_text())
-}
-
+CASES = cases_of("cases/continuous_switching.json")
 x, v, t, size, l1, l2 = (ca.SX.sym(n) for n in ("x", "v", "t", "A", "l1", "l2"))
 TOUCH = float(CASES["soft_touch"]["values"]["A_touch"])
 FREE = size * ca.cos(0.8 * t) - 0.1 * v - x

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import pickle
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -13,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import nonsmooth as ns
-from tests.orbit.periodic_cases import CASES
+from tests.orbit.periodic_cases import CASES, cases_of
 
 
 def throw() -> ns.FilippovSystem:
@@ -273,8 +271,7 @@ def test_events_of_one_name_across_kinds_have_their_own_derivatives(kind) -> Non
 
 def test_the_order_in_which_two_surfaces_of_position_are_reached_makes_a_corner():
     """Case corner_product: the derivatives beside it differ by D (n_y/L_y - n_x/L_x)."""
-    cases = json.loads(Path("tests/cases/continuous_switching.json").read_text())
-    case = next(c for c in cases if c["id"] == "corner_product")
+    case = cases_of("cases/continuous_switching.json")["corner_product"]
     symbols = {s: ca.SX.sym(s) for s in (*case["system"]["states"], "l1", "l2")}
     names = ("states", "field", "surfaces", "multipliers")
     states, field, surfaces, multipliers = (

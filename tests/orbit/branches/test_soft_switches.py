@@ -107,18 +107,13 @@ def test_a_jerk_system_beside_its_closed_form():
     assert times == pytest.approx(sorted(map(float, doubling["durations"])), abs=1e-8)
 
 
-def test_a_force_that_jumps_at_the_wall_has_a_square_root():
-    """A preload: at the touch the orbit is no longer continued, and the event says why."""
-    orbit = ns.periodic_orbit(stop(5 * (x - 1) + 0.2), [0.0, 0.0])
-    branch = ns.continue_orbit(orbit, "A", bounds=(0.2, 0.4))
-    event = branch.events[0]
-    assert event.kind == "grazing of a jumping force" and "square root" in event.far_side.verdict
-    assert event.parameter == pytest.approx(TOUCH, abs=1e-13)
-
-
-def test_a_force_that_pulls_through_the_wall_lets_nothing_return():
-    """At the touch the free block is pulled back with 1.12; beyond it with 3 to the other side."""
-    orbit = ns.periodic_orbit(stop(5 * (x - 1) - 3.0), [0.0, 0.0])
+@pytest.mark.parametrize(
+    ("jump", "kind", "words"),
+    [(0.2, "grazing of a jumping force", "square root"), (-3.0, "grazing, escaping", "")],
+)
+def test_a_force_that_jumps_at_the_wall_ends_the_orbit(jump, kind, words):
+    """A preload, and a pull of 3 to the other side where the free block is pulled back with 1.12."""
+    orbit = ns.periodic_orbit(stop(5 * (x - 1) + jump), [0.0, 0.0])
     event = ns.continue_orbit(orbit, "A", bounds=(0.2, 0.4)).events[0]
-    assert event.kind == "grazing, escaping"
+    assert event.kind == kind and words in event.far_side.verdict
     assert event.parameter == pytest.approx(TOUCH, abs=1e-13)

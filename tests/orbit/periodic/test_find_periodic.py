@@ -31,14 +31,6 @@ def test_a_leg_that_does_not_come_to_its_event_is_reported():
         ns.periodic_orbit(system, [0.0, 0.0], **{**given, "parameters": {"f": 1.6}})
 
 
-def test_a_smooth_orbit_without_events_is_found():
-    x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    r = x**2 + y**2
-    system = ns.FilippovSystem([x, y], field=[y + x * (1 - r), -x + y * (1 - r)])
-    orbit = ns.periodic_orbit(system, [1.0, 0.1])
-    assert orbit.period == pytest.approx(2 * np.pi, rel=1e-13)
-
-
 def test_an_orbit_at_other_parameters_leads_to_the_one_there_and_too_few_iterations_to_none():
     system, start, given = GUESSES["friction"]
     orbit = ns.periodic_orbit(system, start, **given)

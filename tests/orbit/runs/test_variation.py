@@ -42,7 +42,7 @@ def test_gradients_through_crossing_impact_and_entry_are_the_closed_forms() -> N
     assert s.event_times == pytest.approx([float(t) for t in values["event_times"]], rel=1e-13)
 
 
-x, y, v, w, t, a, b, lam, other = (ca.SX.sym(s) for s in "x y v w t a b lam other".split())
+x, y, v, t, a, b = (ca.SX.sym(s) for s in "x y v t a b".split())
 
 
 @settings(deadline=None, max_examples=4)
@@ -100,16 +100,6 @@ def test_a_run_without_a_regular_end_raises() -> None:
     focus = ns.FilippovSystem([x, y], surface=y, above=[1, -x], below=[-1, -x])
     run = ns.simulate(focus, [-1.0, 0.5], 90.0, max_events=3)
     with pytest.raises(ns.DegenerateError, match="TOO_MANY_EVENTS"):
-        ns.sensitivity(run)
-
-
-def test_a_corner_raises() -> None:
-    both = ns.FilippovSystem(
-        [x, y], surfaces=[x, y], multipliers=[lam, other], field=[1 + 0.1 * lam, 1 + 0.2 * other]
-    )
-    run = ns.simulate(both, [-0.9, -0.8], 3.0)
-    assert run.itinerary == "-- ++"
-    with pytest.raises(ns.DegenerateError, match="corner"):
         ns.sensitivity(run)
 
 

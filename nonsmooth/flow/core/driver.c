@@ -143,6 +143,25 @@ static int can_start(Run *r) {
   return holds;
 }
 
+/* Unknowns of the motion in an asked mode that does not determine them; whether there is one. */
+static int unknowns_by_law(Run *r, const int8_t *letter) {
+  Decision *d = r->decision;
+  r->equations.is_raw = 1;
+  if (begin_law(r, letter, 0, 0)) {
+    memset(d->is_touched, 1, d->count);
+    explore(r, d, 0, 0);
+  }
+  r->equations.is_raw = 0;
+  for (int q = 0; q < d->motions && r->status == RUNNING; q++) {
+    letters_of_motion(r, d, d->motion + q, r->chosen.letter);
+    if (memcmp(r->chosen.letter, letter, r->width)) continue;
+    choose_motion(r, d, d->motion + q);
+    memcpy(r->unknowns, r->chosen.unknowns, sizeof(double) * r->width);
+    return r->status == RUNNING;
+  }
+  return 0;
+}
+
 static void start_in(Run *r, const int8_t *asked) {
   int8_t *letter = r->start;
   for (int i = 0; i < r->width; i++) {
@@ -154,10 +173,11 @@ static void start_in(Run *r, const int8_t *asked) {
   if (r->s->sets) idle_sets(r, letter, 0);
   memcpy(r->letter, letter, r->width);
   enter_mode(r);
-  if (r->s->joints) find_dependent(r, &r->now, r->letter, r->unknowns);
-  int found = find_unknowns(r, &r->now);
+  if (r->s->joints || r->s->sets) find_dependent(r, &r->now, r->letter, r->unknowns);
+  int by_law = r->s->sets && r->active_count && r->dependent == r->mode && unknowns_by_law(r, letter);
+  int found = by_law ? 1 : r->status == RUNNING ? find_unknowns(r, &r->now) : 1;
   if (found != 1) { finish(r, NON_UNIQUE, START_SOLUTIONS, found); return; }
-  if (!can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
+  if (r->status == RUNNING && !can_start(r)) finish(r, NON_UNIQUE, IMPOSSIBLE_START, 0);
 }
 
 /* The time scale: in it the states change by their own size at the rates of the start. */

@@ -159,16 +159,25 @@ def test_where_feet_slip_in_many_directions_their_loads_must_be_determined():
     assert run.status is ns.Status.NON_UNIQUE and run.events[-1].t > 0.5
 
 
-def groove(walls, load, time):
-    """A block of unit mass between two walls, each an angle and a coefficient of friction."""
-    q, w, n = ca.SX.sym("q", 3), ca.SX.sym("w", 3), ca.SX.sym("n", 2)
-    force, gaps, slips, multipliers = ca.vertcat(*load), [], [], []
-    for k, (angle, mu) in enumerate(walls):
-        c, s, lam = np.cos(angle), (2 * k - 1) * np.sin(angle), ca.SX.sym(f"lam{k}", 2)
-        gaps.append(ns.Impact(c * q[2] - s * q[1], reaction=n[k], name=f"wall{k}"))
-        slips.append(ca.vertcat(w[0], c * w[1] + s * w[2]))
+def groove(walls, load, time=None, ends=(0.0,)):
+    """A block of unit mass between two walls, each an angle and a coefficient of friction; with two ends, a rod."""
+    size, count = 3 * len(ends), 2 * len(ends)
+    q, w, n = ca.SX.sym("q", size), ca.SX.sym("w", size), ca.SX.sym("n", count)
+    turn, spin = (q[3:], w[3:]) if size > 3 else (ca.SX.zeros(3), ca.SX.zeros(3))
+    force, gaps, slips, multipliers = ca.vertcat(*load, *[0] * (size - 3)), [], [], []
+    for i, (end, (k, (angle, mu))) in enumerate(itertools.product(ends, enumerate(walls))):
+        c, s, lam = np.cos(angle), (2 * k - 1) * np.sin(angle), ca.SX.sym(f"lam{i}", 2)
+        up, across, arm = ca.DM([0, -s, c]), ca.DM([0, c, s]), ca.DM([end, 0.3 * s, -0.3 * c])
+        speed, push = (
+            w[:3] + ca.cross(spin, arm),
+            up - mu * (ca.DM([1, 0, 0]) * lam[0] + across * lam[1]),
+        )
+        gaps.append(
+            ns.Impact(ca.dot(up, q[:3] + ca.cross(turn, arm)), reaction=n[i], name=f"wall{i}")
+        )
+        slips.append(ca.vertcat(speed[0], ca.dot(across, speed)))
         multipliers.append(lam)
-        force += n[k] * ca.vertcat(-mu * lam[0], -s - mu * c * lam[1], c - mu * s * lam[1])
+        force += n[i] * ca.vertcat(push, 10 * ca.cross(arm, push))[:size]
     return ns.FilippovSystem(
         [*ca.vertsplit(q), *ca.vertsplit(w)],
         field=[*ca.vertsplit(w), *ca.vertsplit(force)],
@@ -236,3 +245,42 @@ def test_a_block_in_a_groove_holds_as_long_as_any_loads_can_hold_it(angle, mu, s
         assert abs(run.events[0].t - release) < 1e-7
         speed = limit * (1 - (release - 1) ** 2) / 2
         np.testing.assert_allclose(run.x[-1, 3:], [speed, 0, 0], atol=1e-6)
+
+
+ROD = (-0.6, 0.6)
+
+
+@pytest.mark.parametrize(
+    ("walls", "load", "speed", "ends", "modes"),
+    [
+        ([(0.6881, 1.0), (1.1232, 1.0)], (18.273, 1.576), 0.0, (0.0,), "sscc **cc"),
+        ([(0.8921, 1.0), (1.0350, 0.1)], (9.861, 0.999), 0.0, (0.0,), "sscc **cc"),
+        ([(1.0935, 0.6), (0.8683, 1.0)], (19.521, 0.0), -2.0, (0.0,), "sscc **cc"),
+        ([(1.1, 1.0), (1.1, 1.0)], (-25.0, 2.0), 0.0, (0.0,), "sscc **cc"),
+        ([(0.6881, 1.0), (1.1232, 1.0)], (18.273, 1.576), 0.0, ROD, "sscc **cc"),
+        ([(0.6881, 1.0), (1.1232, 1.0)], (15.0, 1.576), 0.0, ROD, "sscc"),
+        ([(0.9073, 1.0), (0.7535, 1.0)], (13.0, 7.086), 0.0, (0.0,), "sscc"),
+        ([(1.1, 1.0), (1.1, 1.0)], (20.0, 2.0), 2.0, (0.0,), "sscc"),
+        ([(0.3, 0.5), (0.3, 0.5)], (8.0, 0.0), 0.0, (0.0,), "**cc"),
+    ],
+)
+def test_a_body_wedged_at_rest_may_also_slide(walls, load, speed, ends, modes):
+    """A squeeze of any size holds it; in sliding friction is along the groove, and loads balance the force across."""
+    (one, mu), (two, nu) = walls
+    across = [[np.sin(one), -np.sin(two)], [np.cos(one), np.cos(two)]]
+    friction = np.dot(np.linalg.solve(across, [-load[1], G]), [mu, nu])
+    size, modes = 3 * len(ends), ["".join(c * len(ends) for c in m) for m in modes.split()]
+    system = groove(walls, (*load, -G), ends=ends)
+    stop = speed and -speed / (load[0] - np.sign(speed) * friction)
+    run = ns.simulate(system, [*[0] * size, speed, *[0] * (size - 1)], stop + 1)
+    faster, begin = load[0] - np.sign(load[0]) * friction, speed * stop / 2
+    runs = {modes[0]: run}
+    if len(modes) > 1:
+        assert run.status is ns.Status.NON_UNIQUE and abs(run.t[-1] - stop) < 1e-9
+        assert [c.mode for c in run.continuations] == modes
+        runs = {m: ns.simulate(system, run.x[-1], 1.0, start_mode=m) for m in modes}
+    for mode, after in runs.items():
+        rate, end = faster if "*" in mode else 0.0, np.zeros(2 * size)
+        end[[0, size]] = begin + rate / 2, rate
+        assert after.status is ns.Status.REACHED_END and after.itinerary.split()[-1] == mode
+        np.testing.assert_allclose(after.x[-1], end, atol=1e-9)

@@ -12,7 +12,8 @@ enum { UNDECIDED, AT_TOP, AT_BOTTOM, INSIDE, ABOVE, BELOW };
 /* The position of nu in a trial: inside its set with w = 0, or at a bound. */
 enum { HELD, TOP, BOTTOM };
 
-enum { MOST_TRIED = 8, TRIED = 1 << MOST_TRIED, DIODES_TRIED = 1 << 12, MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4, LIMITS = 6 };
+enum { MOST_TRIED = 8, TRIED = 1 << MOST_TRIED, DIODES_TRIED = 1 << 12, MOST_SOLUTIONS = 16, MOST_FOUND = 64, COVERINGS = 4 };
+enum { SOLUTIONS_ROOM = MOST_SOLUTIONS * MOST_ENUMERATED, LIMITS = 6, GROWTHS = 8 }; /* growths: steps of a continuation */
 
 /* One block of coupled elements, with copies of its part of the law at one order. */
 typedef struct {
@@ -542,6 +543,38 @@ static int relax_from(const Block *k, double *nu, double most, double *work, int
     }
   }
   return finite_all(nu, n) && (!k->is_coupled || change <= TIED * most);
+}
+
+/* Where all vectors are held: another solution, in which some slip and friction is against their slip. It is followed from
+ * the one without friction as the bounds grow; 0 where there is none. */
+static int slip_beside(const Block *k, const double *held, double *nu, double *work, int32_t *pivot) {
+  int n = k->size, slips = 0;
+  double *bound = work, *next = bound + n, *share = next + n, *rest = share + (int64_t)n * n, most = largest_of(held, n), terms;
+  Block part = *k;
+  part.b = bound;
+  part.share = share;
+  for (int i = 0; i < n; i++) {
+    if (k->state[i] != UNDECIDED || (span_of(k, i) > 0 && class_of_vector(k, i, held, 0) == ABOVE)) return 0;
+    nu[i] = k->is_contact[i] ? held[i] : 0;
+  }
+  for (int step = 0; step <= GROWTHS; step++) {
+    for (int i = 0; i < n; i++) bound[i] = k->b[i] * step / GROWTHS;
+    for (int i = 0; i < n * n; i++) share[i] = k->share[i] * step / GROWTHS;
+    if (step == 0 ? !relax_from(&part, nu, most, rest, pivot) : !polish(&part, nu, most, rest, pivot)) return 0;
+    memcpy(next, nu, sizeof(double) * n);
+    slips = 0;
+    for (int i = 0; i < n; i++) { /* the next friction is in the direction of slip */
+      double w[3], u[3];
+      if (span_of(k, i) <= 0 || class_of_vector(&part, i, nu, 0) != ABOVE) continue;
+      slips = 1;
+      for (int q = 0; q < k->span[i]; q++) w[q] = rate_of(&part, i + q, nu, &terms);
+      unit_of(w, k->span[i], u);
+      for (int q = 0; q < k->span[i] && step < GROWTHS; q++) next[i + q] = bound_of(k, i, nu) * (step + 1) / GROWTHS * u[q];
+    }
+    if (!slips) return 0;
+    memcpy(nu, next, sizeof(double) * n);
+  }
+  return 1;
 }
 
 /* Whether w is zero with nu inside all bounds, to rounding. */

@@ -479,6 +479,13 @@ static double find_tight(const Block *b, double *nu, double part) {
   return sqrt(part);
 }
 
+/* Whether vectors of a block were not held before: what sticks stays so as loads change. */
+static int comes_to_rest(const Run *r, const Decision *d, const Block *b) {
+  int rests = 0;
+  for (int i = 0; i < b->size; i++) rests |= b->span[i] > 0 && r->letter[d->own[b->own[i]]] != 0;
+  return rests && !d->is_imposed;
+}
+
 /* Solutions of a block at an order; if the previous unknowns are one, the guard decides its element. */
 static int solutions_of(Run *r, Decision *d, int order, int which, double *found, int8_t *class) {
   Block b = part_of_law(d, order, which);
@@ -498,6 +505,8 @@ static int solutions_of(Run *r, Decision *d, int order, int which, double *found
   }
   count = n == 1 ? solve_single(&b, found)
                  : solve_block_of_many(&b, certificate_of(d, &b, which), position, found, d->work, d->pivot);
+  if (count == 1 && order == 0 && b.span && b.is_coupled && 2 * n <= SOLUTIONS_ROOM && comes_to_rest(r, d, &b))
+    count += slip_beside(&b, found, found + n, d->work, d->pivot);
   if (n > MOST_ENUMERATED && d->proved[which] == NOTHING && order == 0) r->facts |= UNPROVED;
   if (b.span && d->proved[which] == NOTHING && !d->is_imposed) refuse_negative(r, &b);
   for (int q = 0; q < count; q++) {
@@ -750,8 +759,8 @@ static int leave_limit(Decision *d, int which, int order) {
 static void explore(Run *r, Decision *d, int order, int which) {
   int k = d->count;
   Expansion *e = &r->trial;
-  double found[MOST_SOLUTIONS * MOST_ENUMERATED];
-  int8_t class[MOST_SOLUTIONS * MOST_ENUMERATED];
+  double found[SOLUTIONS_ROOM];
+  int8_t class[SOLUTIONS_ROOM];
   while (d->motions < SEVERAL) {
     if (which == d->blocks) {
       int open = 0, more = order < (d->branches ? COMPARED : 0) - 1;
@@ -781,7 +790,7 @@ static void explore(Run *r, Decision *d, int order, int which) {
       which++;
       continue;
     }
-    int n = d->first[which + 1] - d->first[which], is_large = n > MOST_ENUMERATED;
+    int n = d->first[which + 1] - d->first[which], is_large = 2 * n > SOLUTIONS_ROOM;
     double *nu = is_large ? d->large : found;
     int8_t *to = is_large ? d->large_class : class;
     int count = solutions_of(r, d, order, which, nu, to);

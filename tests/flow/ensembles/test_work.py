@@ -131,7 +131,7 @@ def failing(number):
 )
 def test_what_is_finished_is_taken_before_an_error_is_reported(submit, error, least, most):
     taken = []
-    with pytest.raises(error, match="number two|broken"):
+    with pytest.raises(error, match=r"number two|broken"):
         for number, _ in work_of(submit):
             taken.append(number)
     assert least <= set(taken) <= most and len(taken) == len(set(taken))

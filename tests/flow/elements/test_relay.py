@@ -21,29 +21,6 @@ def switches(run):
     return [e for e in run.events if e.kind == "crossing"]
 
 
-@pytest.mark.parametrize(
-    ("start", "mode", "word"),
-    [
-        (0.5, None, "-"),
-        (0.5, "-", "-"),
-        (0.5, "+", "+"),
-        (-1.5, None, "-"),
-        (1.5, None, "+"),
-        (1.0, None, "+"),
-        (1.0, "+", "+"),
-        (-1.0, "+", "-"),
-        (-1.0, None, "-"),
-    ],
-)
-def test_a_start_between_the_thresholds_is_off_unless_its_mode_is_given(start, mode, word):
-    """On a threshold to which the motion goes the relay switches at once."""
-    run = ns.simulate(thermostat(), [start], 0.01, start_mode=mode)
-    assert run.segments[-1].mode == word and run.status is ns.Status.REACHED_END
-    sign = 1 if word == "+" else -1
-    expected = -2 * sign + (start + 2 * sign) * np.exp(-0.01)
-    assert run.x[-1, 0] == pytest.approx(expected, abs=1e-12)
-
-
 def test_a_start_beyond_a_threshold_has_its_letter():
     assert ns.simulate(thermostat(), [1.5], 0.1, start_mode="-").status is ns.Status.NON_UNIQUE
     many = ns.ensemble(thermostat(), [[1.5], [0.5]], 0.1, start_mode="+")

@@ -6,11 +6,14 @@ import pytest
 from matplotlib.figure import Figure
 
 import nonsmooth as ns
-from tests.orbit.test_hybrid_automata import thermostat as room
 
 x, v, q, g, k, c = (ca.SX.sym(s) for s in ("x", "v", "q", "g", "k", "c"))
 UP = ns.Reset(x - 1, {q: 1}, 1, level=True, when=q == 0, name="up")
 DOWN = ns.Reset(x + 1, {q: 0}, -1, level=True, when=q == 1, name="down")
+
+
+def room():
+    return ns.textbook.thermostat().system
 
 
 def pushed():

@@ -1,8 +1,9 @@
-"""Cases of ``tests/data/orbits.json`` by their names: reference values, parameters and systems."""
+"""Cases of reference by their names, and systems: ``CASES`` are the values of ``tests/data/orbits.json``."""
 
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,21 @@ import casadi as ca
 
 import nonsmooth as ns
 
-_DATA = json.loads((Path(__file__).parents[1] / "data" / "orbits.json").read_text())
-CASES: dict[str, dict[str, Any]] = {case["id"]: case["values"] for case in _DATA}
-PARAMETERS: dict[str, dict[str, Any]] = {case["id"]: case.get("parameters", {}) for case in _DATA}
+
+def cases_of(path: str) -> dict[str, dict[str, Any]]:
+    """All of a file of cases, in a folder of the tests."""
+    text = (Path(__file__).parents[1] / path).read_text(encoding="utf-8")
+    return {case["id"]: case for case in json.loads(text)}
+
+
+def values_of(path: str) -> dict[str, dict[str, Any]]:
+    return {name: case["values"] for name, case in cases_of(path).items()}
+
+
+CASES = values_of("data/orbits.json")
+PARAMETERS = {
+    name: case.get("parameters", {}) for name, case in cases_of("data/orbits.json").items()
+}
 
 
 def kinds(branch: ns.orbit.Branch) -> list[str]:
@@ -27,6 +40,27 @@ def relay() -> ns.FilippovSystem:
     return ns.textbook.multi_sliding_relay().system
 
 
+def relay_oscillator() -> ns.FilippovSystem:
+    """Closed form: the amplitude is f (1 + q)/(1 - q) with the factor q of half a turn."""
+    x, v, d, f = symbols("x v d f")
+    free = -x - 2 * d * v
+    given = {"above": [v, free + f], "below": [v, free - f], "parameters": {d: 0.1, f: 1.0}}
+    return ns.FilippovSystem([x, v], surface=v, **given)
+
+
+def weakening_friction(x: Any = None, v: Any = None) -> ns.FilippovSystem:
+    """A block on a belt whose friction falls with the slip, in symbols of its own or given ones."""
+    x, v = (x, v) if x is not None else symbols("x v")
+    slip, drop = v - 0.5, lambda s: 1 / (1 + 2 * s)
+    sides = {"above": [v, -x - drop(slip)], "below": [v, -x + drop(-slip)]}
+    return ns.FilippovSystem([x, v], surface=slip, **sides)
+
+
+def double_well() -> ns.FilippovSystem:
+    x, v, lam = symbols("x v lam")
+    return ns.FilippovSystem([x, v], surface=x, multipliers=lam, field=[v, lam - x - 0.2 * v])
+
+
 def stick_slip() -> ns.FilippovSystem:
     x, v, f, k, b = symbols("x v f k b")
     return ns.FilippovSystem(
@@ -39,25 +73,11 @@ def stick_slip() -> ns.FilippovSystem:
 
 
 def welander() -> ns.FilippovSystem:
-    T, S, a, b, eps = symbols("T S a b eps")
-    return ns.FilippovSystem(
-        [T, S],
-        surface=S - a * T - eps,
-        above=[1 - 6 * T, b * (1 - S) - 5 * S],
-        below=[1 - T, b * (1 - S)],
-        parameters={a: 0.8, b: 0.5, eps: -0.01},
-    )
+    return ns.textbook.welander_box().system
 
 
 def fused_focus() -> ns.FilippovSystem:
-    x, y, al, r = symbols("x y al r")
-    return ns.FilippovSystem(
-        [x, y],
-        surface=y,
-        above=[1, -x],
-        below=[-1, -(x - al) - r * (x - al) ** 2],
-        parameters={al: -0.03, r: -1},
-    )
+    return ns.textbook.pseudo_hopf().system
 
 
 def scalar_relay() -> ns.FilippovSystem:
@@ -124,3 +144,19 @@ def friction_oscillator() -> ns.FilippovSystem:
 
 def walker() -> ns.FilippovSystem:
     return ns.textbook.simplest_walker().system
+
+
+#: Orbits by their itineraries, one leg in R^4 and halves of symmetric ones: system, start, options.
+GUESSES: dict[str, tuple[ns.FilippovSystem, list[float], dict[str, Any]]] = {
+    "walker": (
+        walker(),
+        [0.20, -0.20, 0.40, (1 - math.cos(0.40)) * -0.20],
+        {"itinerary": [("", "heelstrike")]},
+    ),
+    "friction": (
+        forced_friction(),
+        [1.44, 0.0],
+        {"itinerary": "s -", "symmetry": "odd", "parameters": {"f": 0.6}, "t_start": 0.64},
+    ),
+    "relay": (relay(), [0.0, 1.0, 2.57], {"itinerary": ["+", "s"] * 7, "symmetry": "odd"}),
+}

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.periodic_cases import values_of, weakening_friction
 
 x, v, t = (ca.SX.sym(s) for s in ("x", "v", "t"))
 QUIET = ns.Work(threads=1, progress=False)
 AXIS = np.linspace(-1.9, 2.1, 5)
 GRID = {"x": AXIS, "v": AXIS}
-_DATA = json.loads((Path(__file__).parents[1] / "cases" / "orbits_2.json").read_text())
-KICKED = next(case["values"] for case in _DATA if case["id"] == "BA1")
+KICKED = values_of("cases/orbits_2.json")["BA1"]
 
 
 def kicked():
@@ -30,11 +28,7 @@ def van_der_pol():
 
 
 def belt():
-    slip = v - 0.5
-    drop = lambda s: 1 / (1 + 2 * s)
-    return ns.FilippovSystem(
-        [x, v], surface=slip, above=[v, -x - drop(slip)], below=[v, -x + drop(-slip)]
-    )
+    return weakening_friction(x, v)
 
 
 def logistic(r):

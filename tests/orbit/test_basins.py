@@ -8,10 +8,10 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.basins import Search
-from tests.orbit.periodic_cases import CASES
+from tests.orbit.periodic_cases import CASES, double_well
 
 x, y, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "t", "lam"))
-WELL = ns.FilippovSystem([x, v], surface=x, multipliers=lam, field=[v, lam - x - 0.2 * v])
+WELL = double_well()
 QUIET = ns.Work(threads=1, progress=False)
 
 

@@ -11,14 +11,6 @@ x, y, v, q, g, t = (ca.SX.sym(s) for s in ("x", "y", "v", "q", "g", "t"))
 a, b, c = (ca.SX.sym(s) for s in ("a", "b", "c"))
 
 
-def thermostat():
-    on = ns.Reset(x - 18, {q: 1}, -1, level=True, when=q == 0, name="on")
-    off = ns.Reset(x - 22, {q: 0}, 1, level=True, when=q == 1, name="off")
-    return ns.FilippovSystem(
-        [x], field=[a * q - x], discrete={q: (0, 1)}, resets=[on, off], parameters={a: 30.0}
-    )
-
-
 def converter(*more):
     """A buck converter whose current is kept within a band: i' = q E - v, v' = (i - v)/2."""
     i, out, width, supply = (ca.SX.sym(s) for s in ("i", "out", "width", "supply"))
@@ -34,7 +26,7 @@ def converter(*more):
 
 
 def test_the_orbit_of_a_thermostat_has_its_multipliers_in_the_temperature():
-    system = thermostat()
+    system = ns.textbook.thermostat().system
     run = ns.simulate(system, [20.0, 0], 10.0)
     assert run.itinerary.startswith("q=0 q=1 q=0")
     orbit = ns.periodic_orbit(system, run)
@@ -47,7 +39,8 @@ def test_the_orbit_of_a_thermostat_has_its_multipliers_in_the_temperature():
 
 
 def test_a_branch_of_a_thermostat_ends_where_the_heat_does_not_suffice():
-    orbit = ns.periodic_orbit(thermostat(), ns.simulate(thermostat(), [20.0, 0], 10.0))
+    system = ns.textbook.thermostat().system
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [20.0, 0], 10.0))
     branch = ns.continue_orbit(orbit, "a", bounds=(10.0, 60.0))
     assert branch.ends[0] is not branch.ends[1] and not branch.events
     assert branch.ends[0].name == "PERIOD_DIVERGES" and branch.values.min() < 22.2
@@ -145,13 +138,7 @@ def test_a_relay_that_is_odd_has_half_orbits():
 def test_two_neurons_that_inhibit_each_other_fire_in_turn():
     """After a spike the other is at u - e; the half map is u -> I (1 - (I - 1)/(I - u + e))."""
     current, kick = 1.3, 0.1
-    spikes = [
-        ns.Reset(x - 1, {x: 0, y: y - b}, 1, name="first"),
-        ns.Reset(y - 1, {y: 0, x: x - b}, 1, name="second"),
-    ]
-    system = ns.FilippovSystem(
-        [x, y], field=[a - x, a - y], resets=spikes, parameters={a: 1.3, b: 0.1}
-    )
+    system = ns.textbook.integrate_and_fire_pair().system
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 0.4], 60.0))
     u = 0.5
     for _ in range(200):
@@ -163,12 +150,8 @@ def test_two_neurons_that_inhibit_each_other_fire_in_turn():
 
 
 def test_a_gear_slows_the_approach_to_rest():
-    up = ns.Reset(x - (0.5 + g), {g: g + 1}, 1, level=True, when=g <= 2, name="up")
-    down = ns.Reset(x - 0.5 * g, {g: g - 1}, -1, level=True, when=g >= 2, name="down")
-    system = ns.FilippovSystem(
-        [x], field=[(a - x) / g], discrete={g: (1, 2, 3)}, resets=[up, down], parameters={a: 4.0}
-    )
-    assert ns.find_equilibrium(system, [4.0, 3]).eigenvalues[0] == pytest.approx(-1 / 3)
+    found = ns.find_equilibrium(ns.textbook.gearbox().system, [4.0, 3])
+    assert found.eigenvalues[0] == pytest.approx(-1 / 3)
 
 
 def test_nothing_has_a_derivative_by_a_discrete_state():

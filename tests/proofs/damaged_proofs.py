@@ -14,11 +14,11 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 
 import nonsmooth as ns
 from tests.flow.damaged_files import JUNK, cut, flipped, replaced
+from tests.proofs.systems import BALL, PLANE, TEIXEIRA
 
 CHECKER = Path(__file__).parents[2] / "checker"
 MORE = (
@@ -40,14 +40,10 @@ class LongError(BaseException):
 
 def originals():
     """Texts of saved proofs: a two-fold, a list of folds, a range in pieces, an orbit with impacts."""
-    x, y, z, v = (ca.SX.sym(s) for s in "xyzv")
-    system = ns.FilippovSystem([x, y, z], surface=x, above=[-y, 1, -2], below=[z, -1, 1 + 0.1 * y])
-    ball = ns.FilippovSystem([y, v], field=[v, -1], impacts=ns.Impact(y, restitution=0.5))
-    plane = ns.FilippovSystem([x, y], surface=y, above=[y - x, x**2 - 2], below=[1, 1])
     proofs = [
-        ns.certify(ns.find_two_fold(system, near=(0, 0.1, -0.1))),
-        ns.prove_all(plane, [(-2, 2), (-1, 1)], "fold"),
-        ns.certify_orbit(ball, [1, 0], 2),
+        ns.certify(ns.find_two_fold(TEIXEIRA, near=(0, 0.1, -0.1))),
+        ns.prove_all(PLANE, [(-2, 2), (-1, 1)], "fold"),
+        ns.certify_orbit(BALL, [1, 0], 2),
     ]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "proof.json"

@@ -9,23 +9,10 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from tests.proofs.checking import CHECKER, run
+from tests.proofs.checking import CHECKER, checked, run, run_records
+from tests.proofs.systems import PLANE, TEIXEIRA, TRANSCENDENTAL, x, y, z
 
-x, y, z = (ca.SX.sym(s) for s in "xyz")
-
-
-def proof_of(above, below, surface, near, **options):
-    system = ns.FilippovSystem([x, y, z], surface=surface, above=above, below=below)
-    return ns.certify(ns.find_two_fold(system, near=near), **options)
-
-
-TRANSCENDENTAL = proof_of(
-    [1 + ca.exp(-y), ca.cos(z) - 0.4, ca.sin(2 * x) + ca.exp(y) / 2 - 0.6],
-    [-1 + 0.2 * x, 1 + y * y, ca.atan(x - 0.3) + ca.log(1 + y * y + x * x) + 0.2 * y - 0.3],
-    z + 0.1 * ca.sin(x * y),
-    (0.257, -0.62, 0.016),
-    width=1e-30,
-)
+PROOF = ns.certify(ns.find_two_fold(TRANSCENDENTAL, near=(0.257, -0.62, 0.016)), width=1e-30)
 
 
 def test_the_checker_imports_nothing_of_the_prover():
@@ -37,13 +24,14 @@ def test_the_checker_imports_nothing_of_the_prover():
 
 
 def test_proofs_of_every_kind_are_checked(tmp_path):
-    mostly = proof_of([-y, 1, -2], [z, -1, 1 + 0.1 * y], x, (0, 0.1, -0.1))
-    many = proof_of(
-        [ca.sqrt(1 + y) - ca.tanh(z) - 1, ca.atan2(1 + z, 2), ca.asinh(z) - 2],
-        [z + y**3 / 3, -1, ca.erf(y) + ca.cosh(z) + (1 + y) ** 1.5],
-        x,
-        (0.0, 0.01, 0.01),
+    mostly = ns.certify(ns.find_two_fold(TEIXEIRA, near=(0, 0.1, -0.1)))
+    functions = ns.FilippovSystem(
+        [x, y, z],
+        surface=x,
+        above=[ca.sqrt(1 + y) - ca.tanh(z) - 1, ca.atan2(1 + z, 2), ca.asinh(z) - 2],
+        below=[z + y**3 / 3, -1, ca.erf(y) + ca.cosh(z) + (1 + y) ** 1.5],
     )
+    many = ns.certify(ns.find_two_fold(functions, near=(0.0, 0.01, 0.01)))
     n, lam = z - 0.3 * y * y, ca.SX.sym("lam")
     f, g = [y, 1, -1], [1, 0.5, 0.25 * y]
     coulomb = ns.FilippovSystem(
@@ -53,13 +41,10 @@ def test_proofs_of_every_kind_are_checked(tmp_path):
         field=[a - lam * 0.7 * n * b for a, b in zip(f, g, strict=True)],
     )
     same = ns.certify(ns.find_two_fold(coulomb, near=(0.0, 0.1, 0.1)))
-    plane = ns.FilippovSystem([x, y], surface=y, above=[y - x, x**2 - 2], below=[1, 1])
-    fold = ns.certify(ns.local.find_fold(plane, [1.4, 0.0]), system=plane)
-    for k, proof in enumerate((TRANSCENDENTAL, mostly, many, same, fold)):
+    fold = ns.certify(ns.local.find_fold(PLANE, [1.4, 0.0]), system=PLANE)
+    for proof in (PROOF, mostly, many, same, fold):
         assert proof.proven, proof
-        path = tmp_path / f"{k}.json"
-        proof.save(path)
-        code, words = run(path)
+        code, words = checked(proof, tmp_path / "proof.json")
         assert code == 0 and "checked: exactly one" in words, words
         assert "class" in words or "visible" in words
     assert "F1 = F2" in str(same)
@@ -86,11 +71,8 @@ def altered(record):
 
 @pytest.mark.parametrize("k", range(7))
 def test_false_statements_are_not_checked(k, tmp_path):
-    record = json.loads(json.dumps(TRANSCENDENTAL.record))
-    what, false = list(altered(record))[k]
-    path = tmp_path / "false.json"
-    path.write_text(json.dumps({"proofs": [false]}))
-    code, words = run(path)
+    what, false = list(altered(json.loads(json.dumps(PROOF.record))))[k]
+    code, words = run_records([false], tmp_path)
     assert code == 1 and "NOT CHECKED" in words, (what, words)
 
 
@@ -108,9 +90,7 @@ def test_every_two_fold_of_random_systems_is_checked(tmp_path):
         system = ns.FilippovSystem([x, y, z], surface=z, above=[1, 1, first], below=[1, -1, second])
         found = ns.prove_all(system, [(-1.5, 1.5), (-1.5, 1.5), (-1, 1)])
         records += [p.record for p in found.zeros if p.proven]
-    path = tmp_path / "all.json"
-    path.write_text(json.dumps({"proofs": records}))
-    code, words = run(path)
+    code, words = run_records(records, tmp_path)
     assert len(records) > 10 and code == 0, words
 
 
@@ -142,11 +122,9 @@ CRAFTED = {
 
 @pytest.mark.parametrize("what", CRAFTED)
 def test_crafted_records_are_refused_in_words(what, tmp_path):
-    record = json.loads(json.dumps(TRANSCENDENTAL.record))
+    record = json.loads(json.dumps(PROOF.record))
     CRAFTED[what](record)
-    path = tmp_path / "crafted.json"
-    path.write_text(json.dumps({"proofs": [record]}))
-    code, words = run(path)
+    code, words = run_records([record], tmp_path)
     assert code == 1 and "NOT CHECKED: CheckError" in words and "Traceback" not in words, words
 
 

@@ -7,16 +7,12 @@ import casadi as ca
 import pytest
 
 import nonsmooth as ns
-from tests.proofs.checking import run
+from tests.proofs.checking import checked, run
+from tests.proofs.systems import BALL, FOLD, drop, x, y, z
 
-x, y, z, p, q = (ca.SX.sym(s) for s in "xyzpq")
+p, q = ca.SX.sym("p"), ca.SX.sym("q")
 BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]
 FLAT = [(-1.5, 1.5), (-1, 1)]
-
-
-def checked(proof, path):
-    proof.save(path)
-    return run(path)
 
 
 def altered(path, change):
@@ -156,20 +152,9 @@ def test_points_of_a_mode_are_checked_to_be_there(tmp_path):
 
 def orbits():
     """A crossing, impacts, and resets with a stop that is passed the other way at first."""
-    v = ca.SX.sym("v")
-    fold = ns.FilippovSystem([x, y, z], surface=x, above=[-y, 1, -2], below=[z, -1, 1])
-    ball = ns.FilippovSystem([y, v], field=[v, -1], impacts=ns.Impact(y, restitution=0.5))
-    drop = ns.FilippovSystem(
-        [x, v],
-        surface=x - 100,
-        above=[v, 0],
-        below=[v, -2],
-        resets=[ns.Reset(x, [x, -0.5 * v], direction=-1, name="floor")],
-        stops=[ns.Stop(x - 0.75, 1, "high")],
-    )
-    yield fold, [1, 0, 0], 3, "+ -"
-    yield ball, [1, 0], 3, "o"
-    yield drop, [1, 0], "1.25", "-"
+    yield FOLD, [1, 0, 0], 3, "+ -"
+    yield BALL, [1, 0], 3, "o"
+    yield drop(ns.Stop(x - 0.75, 1, "high")), [1, 0], "1.25", "-"
 
 
 @pytest.mark.slow_cases("0", "2")

@@ -10,8 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from tests.proofs.checking import run
-
-x, y, z, u, v, a, b, mu, t = (ca.SX.sym(s) for s in ("x", "y", "z", "u", "v", "a", "b", "mu", "t"))
+from tests.proofs.systems import BALL, BELT, FOLD, SPIN, STICK, TABLE, TWO, drop, v, x
 
 
 def checked(paths):
@@ -22,38 +21,12 @@ def checked(paths):
     return [": checked:" in line for line in lines], lines
 
 
-STICK = ns.FilippovSystem(
-    [x, v], surface=v - 0.5, above=[v, -x - mu], below=[v, mu - x], parameters={mu: 1.0}
-)
 PENDULUM = ns.FilippovSystem(
     [x, v], surface=v - 0.1, above=[v, -ca.sin(x) - 0.3], below=[v, -ca.sin(x) + 0.3]
 )
-SPIN = ns.FilippovSystem([x, y], field=[y, -x], stops=[ns.Stop(y, 1, "turn")])
-FOLD = ns.FilippovSystem([x, y, z], surface=x, above=[-y, 1, -2], below=[z, -1, 1])
-BALL = ns.FilippovSystem([y, v], field=[v, -1], impacts=ns.Impact(y, restitution=0.5))
-TABLE = ns.FilippovSystem(
-    [y, v], field=[v, -9.81], impacts=ns.Impact(y - 0.05 * ca.sin(7 * t), 0.8), time=t
-)
-DROP = ns.FilippovSystem(
-    [x, v],
-    surface=x - 100,
-    above=[v, 0],
-    below=[v, -2],
-    resets=[ns.Reset(x, [x, -0.5 * v], direction=-1, name="floor")],
-    stops=[ns.Stop(v - 0.75, -1, "slow")],
-)
+DROP = drop(ns.Stop(v - 0.75, -1, "slow"))
 WALL = ns.FilippovSystem(  # the jump puts v = 0, so that it is not on the wall any more
     [x, v], field=[1, 0 * x], resets=[ns.Reset(x - 1 + v**2, [x, 0 * v], 1, "wall")]
-)
-TWO = ns.FilippovSystem(
-    [u, y], field=[0.25 - (1 + 0.5 * b) * a, 0.5], surfaces=[u, y], multipliers=[a, b]
-)
-BELT = ns.FilippovSystem(
-    [x, v, y, u],
-    field=[v, -x - 0.5 * a, u, -1],
-    surface=v - 0.25,
-    multipliers=a,
-    impacts=ns.Impact(y, restitution=0.5),
 )
 ORBITS = {
     "stick": (STICK, [(-0.01, 0.01), (-0.005, 0.005)], 2, {}, "- s"),

@@ -10,12 +10,9 @@ import pytest
 import bounce
 import nonsmooth as ns
 from tests.proofs.checking import run
+from tests.proofs.systems import holds
 
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
-
-
-def holds(enclosure, exact):
-    return mpmath.mpf(enclosure.low) <= exact <= mpmath.mpf(enclosure.high)
 
 
 def test_the_time_of_lift_off_is_that_of_the_closed_form():

@@ -1,8 +1,5 @@
 """Surfaces on which nothing slides: touches, rest and boundary equilibria, and nothing that needs sliding."""
 
-import json
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -16,9 +13,10 @@ from nonsmooth.local.scans.plane_scan import PlaneScan
 from nonsmooth.local.scans.surface_scan import SurfaceScan
 from nonsmooth.local.searches.boundary_cycles import born_cycle
 from tests.drawing import at_most
+from tests.orbit.periodic_cases import cases_of
 
 x, y, z, v, mu = (ca.SX.sym(s) for s in ("x", "y", "z", "v", "mu"))
-CASES = json.loads(Path("tests/cases/continuous_switching.json").read_text())
+CASES = cases_of("cases/continuous_switching.json").values()
 
 
 def _sides(above, below, states=(x, v), surface=x, **more):

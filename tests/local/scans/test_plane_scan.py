@@ -19,16 +19,9 @@ def plane(above, below, surface=y, box=(-2.03, 2.0, -2.0, 2.01)):
     return PlaneScan.of(system, {}, Box(*box))
 
 
-def harvest(level):
-    a, d, effort, b = 0.3556, 0.0444, 0.2067, 0.3
-    psi = a * x / (b + x)
-    prey = x * (1 - x) - psi * y
-    return ns.FilippovSystem(
-        [x, y],
-        surface=y - level,
-        above=[prey, psi * y - d * y - effort * y],
-        below=[prey, psi * y - d * y],
-    )
+def harvest(level, *limits):
+    system = ns.textbook.harvested_prey_predator().system
+    return PlaneScan.of(system, {"alpha": level}, Box(*limits))
 
 
 @pytest.mark.parametrize("box", [(-4.0, 4.0, -4.0, 4.0), (-3.9, 4.0, -4.1, 4.3)])
@@ -46,7 +39,7 @@ def test_relay_slides_between_its_folds_into_a_pseudo_node(box):
 
 def test_harvested_prey_has_the_folds_of_the_literature():
     # problem 7: folds of the field below on x2 = alpha
-    p = PlaneScan.of(harvest(0.95), {}, Box(0.0, 1.2, 0.3, 1.5))
+    p = harvest(0.95, 0.0, 1.2, 0.3, 1.5)
     above, below = p.folds
     assert (above.side, above.kind) == ("+", "invisible")
     assert (below.side, below.kind) == ("-", "visible")
@@ -149,7 +142,7 @@ def test_an_equilibrium_on_the_surface_is_no_fold_and_no_pseudo_equilibrium():
     to the digits of a rounded level; far from it a fold, visible or not."""
     level = 0.801355280327832
     for off in (0.0, 1e-7, -1e-7):
-        p = PlaneScan.of(harvest(level + off), {}, Box(0.0, 1.1, 0.3, 1.3))
+        p = harvest(level + off, 0.0, 1.1, 0.3, 1.3)
         (node,) = p.boundary_equilibria
         assert (node.side, node.status, node.kind) == ("+", "boundary", "stable node")
         assert_allclose(node.point, [0.7208612440191388, level], atol=1e-6)
@@ -157,6 +150,6 @@ def test_an_equilibrium_on_the_surface_is_no_fold_and_no_pseudo_equilibrium():
         assert p.equilibria == p.pseudo_equilibria == []
         assert [piece.kind for piece in p.pieces] == ["crossing", "attracting", "crossing"]
     for off, kind in ((0.02, "invisible"), (-0.02, "visible")):
-        p = PlaneScan.of(harvest(level + off), {}, Box(0.0, 1.1, 0.3, 1.3))
+        p = harvest(level + off, 0.0, 1.1, 0.3, 1.3)
         assert p.boundary_equilibria == []
         assert [f.kind for f in p.folds if f.side == "+"] == [kind]

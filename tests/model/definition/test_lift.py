@@ -153,14 +153,8 @@ def same_runs(lifted, written, start, t_end):
 
 def test_stick_slip_with_a_speed_that_weakens_friction():
     """Leine's oscillator: fabs in the denominator is continuous, so there is one reading."""
-    force = ca.sign(0.2 - y) / (1 + 3 * ca.fabs(y - 0.2))
-    system = lift([x, y], [y, -x + force])
-    written = ns.FilippovSystem(
-        [x, y],
-        surface=0.2 - y,
-        above=[y, -x + 1 / (1 + 3 * (0.2 - y))],
-        below=[y, -x - 1 / (1 + 3 * (y - 0.2))],
-    )
+    force = ca.sign(y - 0.2) / (1 + 3 * ca.fabs(y - 0.2))
+    system, written = lift([x, y], [y, -x - force]), ns.textbook.leine_stick_slip().system
     assert [s.hidden for s in system.lifted] == [False]
     run = same_runs(system, written, [0.0, 0.0], 30.0)
     sticks = [e.t for e in run.events if e.kind == "entry"]
@@ -174,16 +168,9 @@ def test_harvest_with_if_else():
     system = lift(
         [x, y],
         [common[0], common[1] - ca.if_else(y > level, effort * y, 0)],
-        parameters={level: 1.0},
+        parameters={level: 0.9},
     )
-    written = ns.FilippovSystem(
-        [x, y],
-        surface=y - level,
-        above=[common[0], common[1] - effort * y],
-        below=common,
-        parameters={level: 1.0},
-    )
-    same_runs(system, written, [0.3, 0.6], 60.0)
+    same_runs(system, ns.textbook.harvested_prey_predator().system, [0.3, 0.6], 60.0)
 
 
 # report and refusals ---------------------------------------------------------------------------

@@ -1,8 +1,6 @@
 """The class of a surface, beside classes by hand, and under changes that leave it as it is."""
 
-import json
 import re
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -12,13 +10,14 @@ from hypothesis import strategies as st
 
 import nonsmooth as ns
 from tests.drawing import at_most
+from tests.orbit.periodic_cases import cases_of
 
 x, y, z, v, w, k, c, l1, l2 = (
     ca.SX.sym(s) for s in ("x", "y", "z", "v", "w", "k", "c", "l1", "l2")
 )
 
-CASES = json.loads(Path("tests/cases/continuous_switching.json").read_text())
-CLASSES = {case["id"]: case for case in CASES if case["id"].startswith("class")}
+CASES = cases_of("cases/continuous_switching.json")
+CLASSES = {name: case for name, case in CASES.items() if name.startswith("class")}
 
 
 def _read(text, symbols):

@@ -5,9 +5,7 @@ CT1, CT5 and CT7 of ``tests/cases/orbits_2.json``; the other rows are of closed 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -16,10 +14,9 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit import BifurcationCurve, BranchEnd
-from tests.orbit.periodic_cases import symbols
+from tests.orbit.periodic_cases import symbols, values_of
 
-_FILE = Path(__file__).parents[2] / "cases" / "orbits_2.json"
-CASES = {case["id"]: case["values"] for case in json.loads(_FILE.read_text())}
+CASES = values_of("cases/orbits_2.json")
 x, y, t, s, a, b = symbols("x y t s a b")
 
 #: Values and residual of a curve: the parameters are its columns.

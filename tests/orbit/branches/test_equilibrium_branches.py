@@ -7,7 +7,7 @@ import pytest
 
 import nonsmooth as ns
 
-x, y, z, mu, nu = (ca.SX.sym(s) for s in ("x", "y", "z", "mu", "nu"))
+x, y, z, mu, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "mu", "a", "b"))
 
 
 def planar(above, below, value=0.0, surface=y):
@@ -16,9 +16,25 @@ def planar(above, below, value=0.0, surface=y):
     )
 
 
+def relays(field, value):
+    """A relay on each axis."""
+    given = {"surfaces": [x, y], "multipliers": [a, b], "parameters": {mu: value}}
+    return ns.FilippovSystem([x, y], field=field, **given)
+
+
+def named(branch):
+    return [(event.kind, round(event.parameter, 10) + 0.0) for event in branch.events]
+
+
+FOLDED = planar([mu - x**2, 1 - y], [1, 1], 0.5)
+
+
+def folded():
+    return ns.continue_equilibrium(FOLDED, [0.7, 1.0], "mu", bounds=(-1, 1))
+
+
 def test_fold_of_equilibria():
-    system = planar([mu - x**2, 1 - y], [1, 1], 0.5)
-    branch = ns.continue_equilibrium(system, [0.7, 1.0], "mu", bounds=(-1, 1))
+    branch = folded()
     (event,) = branch.events
     assert event.kind == "fold" and abs(event.parameter) < 1e-13
     assert [e.kind for e in branch.at(0.25)] == ["saddle", "stable node"]
@@ -44,9 +60,8 @@ SADDLE = ([[1, 0], [1, -2]], 2.0)
 
 @pytest.mark.parametrize(("matrix", "pull"), [FOCUS, SADDLE])
 def test_boundary_equilibrium_is_the_one_that_is_found_and_classified(matrix, pull):
-    a = np.array(matrix, dtype=float)
     offset = ca.vertcat(x, y - (mu - 1))
-    system = planar(ca.vertsplit(ca.DM(a) @ offset), [1, pull], 1.5)
+    system = planar(ca.vertsplit(ca.DM(matrix) @ offset), [1, pull], 1.5)
     found = ns.find_boundary_equilibrium(system, [0, 0], vary="mu")
     local = ns.local.boundary_equilibrium(system, found.point, parameters=found.parameters)
     branch = ns.continue_equilibrium(system, [0, 0.5], "mu", bounds=(0.5, 2))
@@ -68,8 +83,7 @@ def test_boundary_equilibrium_is_the_one_that_is_found_and_classified(matrix, pu
 
 
 def test_from_a_pseudo_equilibrium_through_the_boundary_to_the_equilibrium():
-    a = ca.DM(FOCUS[0])
-    system = planar(ca.vertsplit(a @ ca.vertcat(x, y - (mu - 1))), [1, 1], 0.7)
+    system = planar(ca.vertsplit(ca.DM(FOCUS[0]) @ ca.vertcat(x, y - (mu - 1))), [1, 1], 0.7)
     near = ns.find_pseudo_equilibrium(system, [0, 0]).point
     branch = ns.continue_equilibrium(system, near, "mu", bounds=(0.5, 2), side=None)
     assert [e.kind for e in branch.events] == ["boundary equilibrium"]
@@ -81,35 +95,30 @@ def test_from_a_pseudo_equilibrium_through_the_boundary_to_the_equilibrium():
 
 def test_pseudo_saddle_node_in_three_dimensions_and_hopf_of_the_sliding_flow():
     """The sliding flow on z = 0 is given: (mu - x^2, -y), and a focus of trace 2 mu."""
-    flow = [mu - x**2, -y]
-    system = ns.FilippovSystem(
-        [x, y, z], surface=z, above=[*flow, -1], below=[*flow, 1], parameters={mu: 0.5}
-    )
-    branch = ns.continue_equilibrium(system, [0.7, 0, 0], "mu", bounds=(-1, 1), side=None)
-    assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [
-        ("pseudo-saddle-node", 0.0)
-    ]
-    flow = [mu * x - 2 * y, 2 * x + mu * y]
-    system = ns.FilippovSystem(
-        [x, y, z], surface=z, above=[*flow, -1], below=[*flow, 1], parameters={mu: 0.5}
-    )
-    (event,) = ns.continue_equilibrium(system, [0, 0, 0], "mu", bounds=(-1, 1), side=None).events
-    assert event.kind == "Hopf" and abs(event.coefficients["frequency"] - 2) < 1e-12
+    rows = ([mu - x**2, -y], [0.7, 0, 0]), ([mu * x - 2 * y, 2 * x + mu * y], [0, 0, 0])
+    events = []
+    for flow, near in rows:
+        system = ns.FilippovSystem(
+            [x, y, z], surface=z, above=[*flow, -1], below=[*flow, 1], parameters={mu: 0.5}
+        )
+        branch = ns.continue_equilibrium(system, near, "mu", bounds=(-1, 1), side=None)
+        events += branch.events
+    assert [event.kind for event in events] == ["pseudo-saddle-node", "Hopf"]
+    assert abs(events[0].parameter) < 1e-12
+    assert abs(events[1].coefficients["frequency"] - 2) < 1e-12
 
 
 def test_a_pitchfork_is_a_branch_point():
     system = planar([x * (mu - x**2), 1 - y], [1, 1], -0.5)
     branch = ns.continue_equilibrium(system, [0, 1], "mu", bounds=(-1, 1))
-    assert [(e.kind, round(e.parameter, 10) + 0.0) for e in branch.events] == [
-        ("branch point", 0.0)
-    ]
+    assert named(branch) == [("branch point", 0.0)]
 
 
 def test_pseudo_equilibrium_through_a_two_fold_changes_from_repelling_to_attracting():
     """det(F1, F2) = 2 x + mu on y = 0, so x = -mu/2, L1 = -mu/2 = -L2 and alpha = 1/2."""
     system = planar([1, x], [-1, x + mu], -0.5)
     branch = ns.continue_equilibrium(system, [0.2, 0], "mu", bounds=(-1, 1), side=None)
-    assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [("two-fold", 0.0)]
+    assert named(branch) == [("two-fold", 0.0)] and abs(branch.events[0].parameter) < 1e-12
     assert np.abs(branch[0.6].point - [-0.3, 0]).max() < 1e-13
     assert (branch[-0.6].region, branch[0.6].region) == (ns.Region.REPELLING, ns.Region.ATTRACTING)
 
@@ -126,15 +135,13 @@ def test_pseudo_equilibrium_through_a_two_fold_changes_from_repelling_to_attract
     ],
 )
 def test_bad_input(change, error, words):
-    system = planar([mu - x**2, 1 - y], [1, 1], 0.5)
     given = {"near": [0.7, 1.0], "parameter": "mu", "bounds": (-1, 1)} | change
     with pytest.raises(error, match=words):
-        ns.continue_equilibrium(system, **given)
+        ns.continue_equilibrium(FOLDED, **given)
 
 
 def test_a_value_that_the_branch_does_not_reach():
-    system = planar([mu - x**2, 1 - y], [1, 1], 0.5)
-    branch = ns.continue_equilibrium(system, [0.7, 1.0], "mu", bounds=(-1, 1))
+    branch = folded()
     with pytest.raises(ns.PointError, match="reaches"):
         branch.at(-0.5)
     assert "fold" in str(branch) and "fold" in repr(branch) and "fold" in repr(branch.events)
@@ -179,22 +186,14 @@ def test_the_manifolds_of_a_smooth_saddle_are_followed():
 
 def two_relays(value=1.5):
     """The equilibrium of ++ is at (mu, 2 - mu): on y = 0 at mu = 2, on x = 0 at mu = 0."""
-    a, b = ca.SX.sym("a"), ca.SX.sym("b")
-    return ns.FilippovSystem(
-        [x, y],
-        surfaces=[x, y],
-        multipliers=[a, b],
-        field=[mu + 1 - a - x, 3 - mu - b - y],
-        parameters={mu: value},
-    )
+    return relays([mu + 1 - a - x, 3 - mu - b - y], value)
 
 
 def test_boundary_equilibria_on_either_of_two_surfaces():
     branch = ns.continue_equilibrium(two_relays(), [1.5, 0.5], "mu", bounds=(-0.5, 2.5))
-    assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [
-        ("boundary equilibrium", 0.0),
-        ("boundary equilibrium", 2.0),
-    ]
+    assert [event.kind for event in branch.events] == ["boundary equilibrium"] * 2
+    values = [event.parameter for event in branch.events]
+    np.testing.assert_allclose(values, [0.0, 2.0], rtol=0, atol=1e-12)
     modes = [s.mode for s in branch.solutions]
     assert modes[0] == "s+" and modes[-1] == "+s" and "++" in modes
     assert np.abs(branch[-0.25].point - [0, 2.25]).max() < 1e-12
@@ -204,18 +203,9 @@ def test_boundary_equilibria_on_either_of_two_surfaces():
 
 
 def test_a_cycle_around_an_equilibrium_between_two_surfaces_has_its_mode():
-    a, b = ca.SX.sym("a"), ca.SX.sym("b")
     u, v = x - 1, y - 1
-    system = ns.FilippovSystem(
-        [x, y],
-        surfaces=[x, y],
-        multipliers=[a, b],
-        field=[
-            mu * u - 3 * v - u * (u**2 + v**2) + (1 - a),
-            3 * u + mu * v - v * (u**2 + v**2) + (1 - b),
-        ],
-        parameters={mu: -0.1},
-    )
+    growth = mu - u**2 - v**2
+    system = relays([growth * u - 3 * v + (1 - a), 3 * u + growth * v + (1 - b)], -0.1)
     (event,) = ns.continue_equilibrium(system, [1, 1], "mu", bounds=(-0.2, 0.5)).events
     cycle = ns.continue_orbit(event, "mu", bounds=(-0.2, 0.5))[0.25]
     assert cycle.itinerary == "++" and cycle.period == pytest.approx(2 * np.pi / 3, rel=1e-12)
@@ -224,24 +214,15 @@ def test_a_cycle_around_an_equilibrium_between_two_surfaces_has_its_mode():
 def test_a_pseudo_equilibrium_that_meets_another_surface_ends_there():
     """On x = 0 the sliding flow rests at y = mu while y > 0."""
     with_mode = dict(side=None, surface=0, mode="s+")
-    a, b = ca.SX.sym("a"), ca.SX.sym("b")
-    system = ns.FilippovSystem(
-        [x, y],
-        surfaces=[x, y],
-        multipliers=[a, b],
-        field=[-a, mu - y - b + 1],
-        parameters={mu: 1.0},
-    )
+    system = relays([-a, mu - y - b + 1], 1.0)
     branch = ns.continue_equilibrium(system, [0.0, 1.0], "mu", bounds=(-0.5, 2), **with_mode)
-    assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [
-        ("intersection", 0.0)
-    ]
+    assert named(branch) == [("intersection", 0.0)] and abs(branch.events[0].parameter) < 1e-12
     assert branch.ends[0] is ns.orbit.BranchEnd.EVENT
 
 
 def test_equilibria_of_a_continuous_field_go_on_or_meet_on_its_surface():
     """x' = mu - |x|: +mu and -mu meet at 0; with a spring of 4 beyond 1 the equilibrium continues as (mu + 3)/4."""
-    x, v, mu = (ca.SX.sym(s) for s in ("x", "v", "mu"))
+    v = y
     fold = ns.FilippovSystem.from_expression([x, v], [mu - ca.fabs(x), -v], parameters={mu: 0.5})
     branch = ns.continue_equilibrium(fold, [0.5, 0.0], "mu", bounds=(-1, 1))
     (event,) = branch.events
@@ -260,14 +241,7 @@ def test_equilibria_of_a_continuous_field_go_on_or_meet_on_its_surface():
 
 
 def test_an_equilibrium_ends_where_a_force_jumps():
-    x, v, mu = (ca.SX.sym(s) for s in ("x", "v", "mu"))
-    preload = ns.FilippovSystem(
-        [x, v],
-        surface=x - 1,
-        above=[v, mu - x - v - 1],
-        below=[v, mu - x - v],
-        parameters={mu: 0.5},
-    )
+    preload = planar([y, mu - x - y - 1], [y, mu - x - y], 0.5, surface=x - 1)
     branch = ns.continue_equilibrium(preload, [0.5, 0.0], "mu", bounds=(0, 5), side="-")
     assert [e.kind for e in branch.events] == ["boundary equilibrium"]
     assert branch.ends[1].name == "EVENT" and branch.values.max() == pytest.approx(1.0)

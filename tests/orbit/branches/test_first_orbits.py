@@ -1,20 +1,14 @@
 """Branches that begin at events have the orbits of closed forms, and end at those events again."""
 
-import json
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.branches.homoclinic_curves import event_of
-from tests.orbit.periodic_cases import kinds, symbols
+from tests.orbit.periodic_cases import kinds, symbols, values_of
 
-VALUES = {
-    case["id"]: case["values"]
-    for case in json.loads(Path("tests/cases/continuous_switching.json").read_text())
-}
+VALUES = values_of("cases/continuous_switching.json")
 x, y, z, v, w, e, q, mu, l1, l2 = symbols("x y z v w e q mu l1 l2")
 
 

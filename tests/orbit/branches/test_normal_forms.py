@@ -21,6 +21,12 @@ def ticking(states, maps, **parameters):
     )
 
 
+def turning(growth, parameters, speed=2):
+    """r' = growth r in the plane, and a rotation."""
+    field = [growth * X - speed * Y, growth * Y + speed * X]
+    return ns.FilippovSystem([X, Y], field=field, parameters=parameters)
+
+
 def fixed(system, point):
     return ns.periodic_orbit(system, [*point, 0.0], itinerary=[("", "tick")])
 
@@ -201,10 +207,7 @@ def test_a_curve_of_hopf_points_has_its_bautin_point():
     mu = -nu^2/4 where nu > 0."""
     mu, nu = symbols("mu nu")
     square = X * X + Y * Y
-    growth = mu + nu * square - square**2
-    system = ns.FilippovSystem(
-        [X, Y], field=[growth * X - 2 * Y, growth * Y + 2 * X], parameters={mu: -0.3, nu: 0.5}
-    )
+    system = turning(mu + nu * square - square**2, {mu: -0.3, nu: 0.5})
     branch = ns.continue_equilibrium(system, [0.0, 0.0], "mu", bounds=(-1, 1))
     (event,) = branch.events
     assert event.far_side.verdict.endswith("(subcritical)")
@@ -222,17 +225,14 @@ def test_a_curve_of_hopf_points_has_its_bautin_point():
 def test_a_hopf_point_without_its_cubic_term_has_no_direction(cubic, size):
     """r' = r (mu + c r^2 - r^4) with r in units of ``size``: of c = 0 nothing says whether cycles are stable."""
     square = (X * X + Y * Y) / size**2
-    growth = R + cubic * square - square**2
-    system = ns.FilippovSystem(
-        [X, Y], field=[growth * X - 2 * Y, growth * Y + 2 * X], parameters={R: -0.3}
-    )
+    system = turning(R + cubic * square - square**2, {R: -0.3})
     (event,) = ns.continue_equilibrium(system, [0.0, 0.0], "r", bounds=(-1, 1)).events
     words = "degenerate to rounding" if cubic == 0.0 else "subcritical" if cubic > 0 else "stable)"
     assert event.kind == "Hopf" and words in event.far_side.verdict
 
 
 def test_a_linear_centre_is_degenerate():
-    system = ns.FilippovSystem([X, Y], field=[R * X - 3 * Y, 3 * X + R * Y], parameters={R: -0.4})
+    system = turning(R, {R: -0.4}, speed=3)
     (event,) = ns.continue_equilibrium(system, [0.0, 0.0], "r", bounds=(-1, 1)).events
     assert event.far_side.verdict.endswith("imaginary axis: degenerate to rounding")
 

@@ -318,27 +318,6 @@ def test_three_equal_thirds_of_a_forcing_period_are_no_shorter_orbit():
     assert len(orbit.legs) == 12 and abs(orbit.period - 2 * np.pi) < 1e-12
 
 
-def test_a_corner_of_two_surfaces_is_passed_and_a_touch_of_one_is_named():
-    x, v, t, k, l1, l2 = symbols("x v t k l1 l2")
-    system = ns.FilippovSystem(
-        [x, v],
-        surfaces=[x - 1, v - k],
-        multipliers=[l1, l2],
-        field=[v, -x - 0.2 * v + ca.cos(t) - 0.1 * l1 - 0.15 * l2],
-        time=t,
-        parameters={k: 3.0},
-    )
-    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 0.0], 200.0))
-    branch = ns.continue_orbit(orbit, "k", bounds=(3.0, 6.5))
-    assert kinds(branch) == ["corner", "crossing-sliding", "switching-sliding", "grazing-sliding"]
-    corner, event = branch.events[0], branch.events[-1]
-    states = corner.orbit.evaluation.starts[:, :2] - [1.0, corner.parameter]
-    assert np.abs(states).max(axis=1).min() < 1e-9  # both surfaces at one time
-    assert [len(branch[corner.parameter + d].legs) for d in (-1e-3, 1e-3)] == [4, 4]
-    top = event.orbit.trajectory(np.linspace(*event.orbit.trajectory.t[[0, -1]], 4001))[:, 1].max()
-    assert abs(top - event.parameter) < 1e-5 and event.far_side.verdict == "persistence"
-
-
 @pytest.mark.slow
 def test_an_event_at_the_first_leg_of_a_half_orbit_is_that_of_its_own_mode():
     """The slide that ends at w = 31.63 begins the half; before it is the mirror image of the last leg."""
@@ -378,12 +357,8 @@ def test_through_is_a_boolean():
 
 def test_adding_sliding_is_where_it_is_from_the_singular_side_too():
     """Points across a step that are far from it are other orbits: they once put the event at A = 117."""
-    x, t, A, k = (ca.SX.sym(s) for s in ("x", "t", "A", "k"))
-    drive = A * ca.cos(t)
-    relay = ns.FilippovSystem(
-        [x], surface=x, above=[drive - k], below=[drive + k], parameters={A: 2.5, k: 1}, time=t
-    )
-    branch = ns.continue_orbit(ns.periodic_orbit(relay, [-1.3]), "A", bounds=(0.8, 2.6))
+    orbit = ns.periodic_orbit(scalar_relay(), [-1.3])
+    branch = ns.continue_orbit(orbit, "A", bounds=(0.8, 2.6))
     found = {event.kind: event.parameter for event in branch.events}
     assert found == pytest.approx(
         {"adding-sliding": 1.0, "crossing-sliding": np.hypot(1.0, np.pi / 2)}, rel=1e-12

@@ -13,36 +13,23 @@ from nonsmooth.flow.engine import find_compiler
 from nonsmooth.model.derivatives.variational import guarded_field
 from nonsmooth.orbit.branches import conditions
 from nonsmooth.orbit.branches.orbit_branches import OrbitCurve
+from tests.orbit.periodic_cases import GUESSES, forced_friction
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 
-def walker():
-    """One leg in R^4, whose reset and guard have parameters."""
-    start = [0.20, -0.20, 0.40, (1 - np.cos(0.40)) * -0.20]
-    system = ns.textbook.simplest_walker().system
-    return ns.periodic_orbit(system, start, itinerary=[("", "heelstrike")]), system.parameter_names
-
-
-def friction():
-    """Half an orbit; the period of the forcing has a parameter."""
-    system = ns.textbook.forced_dry_friction().system
-    given = {"symmetry": "odd", "parameters": {"f": 0.6}, "t_start": 0.64}
-    return ns.periodic_orbit(system, [1.44, 0.0], itinerary="s -", **given), ("f",)
+def guessed(name):
+    """The walker's reset and guard have parameters, and so has the period of the friction's forcing."""
+    system, start, given = GUESSES[name]
+    names = {"walker": system.parameter_names, "friction": ("f",), "relay": ("w",)}[name]
+    return ns.periodic_orbit(system, start, **given), names
 
 
 def whole_friction():
     """Both halves."""
-    system = ns.textbook.forced_dry_friction().system
+    system = forced_friction()
     run = ns.simulate(system, [1.5, 0.0], 100.0, parameters={"f": 0.6})
     return ns.periodic_orbit(system, run), ("f",)
-
-
-def relay():
-    """Half an orbit of fourteen legs."""
-    system = ns.textbook.multi_sliding_relay().system
-    start, modes = [0.0, 1.0, 2.57], ["+", "s"] * 7
-    return ns.periodic_orbit(system, start, itinerary=modes, symmetry="odd"), ("w",)
 
 
 def bounces():
@@ -61,13 +48,7 @@ def bounces():
     return orbit, ("a", "r")
 
 
-CASES = {
-    "walker": walker,
-    "bounces": bounces,
-    "friction": friction,
-    "whole": whole_friction,
-    "relay": relay,
-}
+OTHERS = {"bounces": bounces, "whole": whole_friction}
 
 
 def curve_of(orbit, name):
@@ -76,10 +57,9 @@ def curve_of(orbit, name):
     return curve, np.append(orbit.unknowns, p[free[0]])
 
 
-@pytest.fixture(params=CASES)
+@pytest.fixture(params=[*GUESSES, *OTHERS])
 def orbit_and_names(request):
-    orbit, names = CASES[request.param]()
-    return orbit, names
+    return OTHERS[request.param]() if request.param in OTHERS else guessed(request.param)
 
 
 def test_derivatives_of_the_equations_are_those_of_differences(orbit_and_names):
@@ -119,7 +99,7 @@ def test_a_branch_by_a_parameter_of_a_reset_ends_at_its_fold():
 
 def test_a_guess_without_a_solution_has_none():
     """The walker's gait ends in a fold below the slope 0."""
-    orbit, _ = walker()
+    orbit, _ = guessed("walker")
     curve, u = curve_of(orbit, orbit.system.parameter_names[0])
     guess, axis = u.copy(), np.eye(u.size)[-1]
     guess[-1] = -0.5

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit import BranchEnd
-from tests.orbit.periodic_cases import symbols
+from tests.orbit.periodic_cases import relay_oscillator, symbols, values_of
 
-_FILE = Path(__file__).parents[2] / "cases" / "orbits_2.json"
-CASES = {case["id"]: case["values"] for case in json.loads(_FILE.read_text())}
-x, v, t, d, f, W, c = symbols("x v t d f W c")
-
-RELAY = ns.FilippovSystem(
-    [x, v],
-    surface=v,
-    above=[v, f - x - 2 * d * v],
-    below=[v, -f - x - 2 * d * v],
-    parameters={d: 0.1, f: 1.0},
-)
+CASES = values_of("cases/orbits_2.json")
+RELAY = relay_oscillator()
+x, v = ca.vertsplit(RELAY.extended_states)
+t, W, c = symbols("t W c")
 LINEAR = ns.FilippovSystem(
     [x, v], field=[v, ca.cos(W * t) - x - c * v], time=t, parameters={W: 0.5, c: 0.4}
 )

@@ -212,11 +212,12 @@ def test_an_orbit_without_events_is_found_behind_a_transient_with_some():
         assert orbit.multipliers[1].real == pytest.approx(np.exp(-0.16 * np.pi), rel=1e-10)
 
 
-@pytest.mark.parametrize("size", [1e-10, 1e-5, 1e10])
+@pytest.mark.parametrize("size", [1e-10, 1e-5, 1.0, 1e10])
 def test_an_orbit_is_no_point_because_its_states_are_small(size):
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     circle = lambda s: (1 - (x / s) ** 2 - (y / s) ** 2) / 10
     system = ns.FilippovSystem([x, y], field=[y + x * circle(size), -x + y * circle(size)])
     orbit = ns.periodic_orbit(system, [1.1 * size, 0.0])
     assert np.hypot(*orbit.start) == pytest.approx(size, rel=1e-9)
+    assert orbit.period == pytest.approx(2 * np.pi, rel=1e-13)
     assert orbit.multipliers[1].real == pytest.approx(np.exp(-0.4 * np.pi), rel=1e-8)

@@ -1,19 +1,13 @@
 """Orbits that begin to touch a surface on which nothing slides: the branch goes through, as closed forms say."""
 
-import json
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.periodic_cases import cases_of
 
-CASES = {
-    case["id"]: case
-    for case in json.loads(Path("tests/cases/continuous_switching.json").read_text())
-}
-
+CASES = cases_of("cases/continuous_switching.json")
 x, v, t, size, l1, l2 = (ca.SX.sym(n) for n in ("x", "v", "t", "A", "l1", "l2"))
 TOUCH = float(CASES["soft_touch"]["values"]["A_touch"])
 FREE = size * ca.cos(0.8 * t) - 0.1 * v - x
@@ -113,18 +107,13 @@ def test_a_jerk_system_beside_its_closed_form():
     assert times == pytest.approx(sorted(map(float, doubling["durations"])), abs=1e-8)
 
 
-def test_a_force_that_jumps_at_the_wall_has_a_square_root():
-    """A preload: at the touch the orbit is no longer continued, and the event says why."""
-    orbit = ns.periodic_orbit(stop(5 * (x - 1) + 0.2), [0.0, 0.0])
-    branch = ns.continue_orbit(orbit, "A", bounds=(0.2, 0.4))
-    event = branch.events[0]
-    assert event.kind == "grazing of a jumping force" and "square root" in event.far_side.verdict
-    assert event.parameter == pytest.approx(TOUCH, abs=1e-13)
-
-
-def test_a_force_that_pulls_through_the_wall_lets_nothing_return():
-    """At the touch the free block is pulled back with 1.12; beyond it with 3 to the other side."""
-    orbit = ns.periodic_orbit(stop(5 * (x - 1) - 3.0), [0.0, 0.0])
+@pytest.mark.parametrize(
+    ("jump", "kind", "words"),
+    [(0.2, "grazing of a jumping force", "square root"), (-3.0, "grazing, escaping", "")],
+)
+def test_a_force_that_jumps_at_the_wall_ends_the_orbit(jump, kind, words):
+    """A preload, and a pull of 3 to the other side where the free block is pulled back with 1.12."""
+    orbit = ns.periodic_orbit(stop(5 * (x - 1) + jump), [0.0, 0.0])
     event = ns.continue_orbit(orbit, "A", bounds=(0.2, 0.4)).events[0]
-    assert event.kind == "grazing, escaping"
+    assert event.kind == kind and words in event.far_side.verdict
     assert event.parameter == pytest.approx(TOUCH, abs=1e-13)

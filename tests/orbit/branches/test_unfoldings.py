@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from tests.orbit.periodic_cases import symbols
+from tests.orbit.periodic_cases import kinds, symbols
 
 X, V, T = symbols("x v t")
 
@@ -77,6 +77,16 @@ def branch():
     return ns.continue_orbit(orbit, "k", bounds=(3.0, 6.5))
 
 
+def test_a_corner_of_two_surfaces_is_passed_and_a_touch_of_one_is_named(branch):
+    assert kinds(branch) == ["corner", "crossing-sliding", "switching-sliding", "grazing-sliding"]
+    corner, event = branch.events[0], branch.events[-1]
+    states = corner.orbit.evaluation.starts[:, :2] - [1.0, corner.parameter]
+    assert np.abs(states).max(axis=1).min() < 1e-9  # both surfaces at one time
+    assert [len(branch[corner.parameter + d].legs) for d in (-1e-3, 1e-3)] == [4, 4]
+    top = event.orbit.trajectory(np.linspace(*event.orbit.trajectory.t[[0, -1]], 4001))[:, 1].max()
+    assert abs(top - event.parameter) < 1e-5
+
+
 def test_a_touch_of_one_of_two_surfaces_has_the_multipliers_of_both_sides(branch):
     event = branch.events[-1]
     numbers = event.coefficients
@@ -129,10 +139,10 @@ def test_doubled_orbits_between_two_doublings_are_followed_once():
     )
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3, 0.5], 600.0))
     branch = ns.continue_orbit(orbit, "A", bounds=(0.05, 3.0))
-    kinds = [event.kind for event in branch.events]
     # of the subcritical doubled orbits A falls, of those beyond it rises: they turn
     doubling, switching = "period doubling", "switching-sliding"
-    assert kinds == [doubling, switching, "fold", switching, doubling] and len(branch) < 100
+    assert kinds(branch) == [doubling, switching, "fold", switching, doubling]
+    assert len(branch) < 100
     turn = branch.events[2]
     assert turn.parameter < branch.events[1].parameter
     assert np.abs(turn.orbit.multipliers - 1).min() < 1e-8

@@ -9,7 +9,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.orbit.manifolds.invariant_manifolds import Follower
 from tests.orbit.interrupts import interrupt
-from tests.orbit.periodic_cases import CASES, PARAMETERS
+from tests.orbit.periodic_cases import CASES, PARAMETERS, double_well
 
 x, y, z, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "z", "v", "t", "lam"))
 
@@ -34,7 +34,7 @@ def test_smooth_saddle_and_its_curves_through_a_switch():
 
 def test_thresholds_of_the_double_well_are_on_the_orbits_through_its_fold():
     """B2: the orbits that come to the visible-visible two-fold divide the basins."""
-    well = ns.FilippovSystem([x, v], surface=x, multipliers=lam, field=[v, lam - x - 0.2 * v])
+    well = double_well()
     found = ns.manifold(
         well, ns.local.fold_fold(well, [0.0, 0.0]), length=30.0, spacing=0.001, tol=1e-13
     )

@@ -141,11 +141,8 @@ def ends_in_the_box(flow, curves, rests):
 @pytest.mark.slow
 def test_every_orbit_goes_to_where_it_ends():
     """Predator and prey with a threshold: to sliding, to rest, to another orbit or out of the box."""
-    a, d, effort, b = 0.3556, 0.0444, 0.2067, 0.3
-    psi = a * x / (b + x)
-    prey = x * (1 - x) - psi * y
-    above, below = [prey, psi * y - d * y - effort * y], [prey, psi * y - d * y]
-    flow = orbits(above, below, surface=y - 1.06, box=(0.0, 1.1, 0.3, 1.4))
+    system = ns.textbook.harvested_prey_predator().system
+    flow = PlaneOrbits(PlaneScan.of(system, {"alpha": 1.06}, Box(0.0, 1.1, 0.3, 1.4)), None)
     curves = [orbit.curve for orbit in flow.spaced()]
     rests = [e.point for e in [*flow.scan.equilibria, *flow.scan.pseudo_equilibria]]
     ends = list(ends_in_the_box(flow, curves, rests))

@@ -8,31 +8,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
-from tests.orbit.periodic_cases import stick_slip, symbols
+from tests.orbit.periodic_cases import GUESSES, stick_slip, symbols
 
 
-def walker():
-    start = [0.20, -0.20, 0.40, (1 - np.cos(0.40)) * -0.20]
-    return ns.textbook.simplest_walker().system, start, {"itinerary": [("", "heelstrike")]}
-
-
-def friction():
-    given = {"symmetry": "odd", "parameters": {"f": 0.6}, "t_start": 0.64}
-    system = ns.textbook.forced_dry_friction().system
-    return system, [1.44, 0.0], {"itinerary": "s -", **given}
-
-
-def relay():
-    system = ns.textbook.multi_sliding_relay().system
-    return system, [0.0, 1.0, 2.57], {"itinerary": ["+", "s"] * 7, "symmetry": "odd"}
-
-
-CASES = {"walker": walker, "friction": friction, "relay": relay}
-
-
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", GUESSES)
 def test_an_orbit_is_found_again_from_beside_it_to_rounding(name):
-    system, start, given = CASES[name]()
+    system, start, given = GUESSES[name]
     orbit = ns.periodic_orbit(system, start, **given)
     scales = orbit.problem.scales(orbit.unknowns)
     beside = np.array(start) + 1e-6 * scales[: len(start)]
@@ -45,23 +26,13 @@ def test_an_orbit_is_found_again_from_beside_it_to_rounding(name):
 
 
 def test_a_leg_that_does_not_come_to_its_event_is_reported():
-    system, _, given = friction()
+    system, _, given = GUESSES["friction"]
     with pytest.raises(ns.ConvergenceError, match=r"leg 1 \(s, ended by"):
-        ns.periodic_orbit(
-            system, [0.0, 0.0], **{**given, "parameters": {"f": 1.6}, "itinerary": "s -"}
-        )
-
-
-def test_a_smooth_orbit_without_events_is_found():
-    x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    r = x**2 + y**2
-    system = ns.FilippovSystem([x, y], field=[y + x * (1 - r), -x + y * (1 - r)])
-    orbit = ns.periodic_orbit(system, [1.0, 0.1])
-    assert orbit.period == pytest.approx(2 * np.pi, rel=1e-13)
+        ns.periodic_orbit(system, [0.0, 0.0], **{**given, "parameters": {"f": 1.6}})
 
 
 def test_an_orbit_at_other_parameters_leads_to_the_one_there_and_too_few_iterations_to_none():
-    system, start, given = friction()
+    system, start, given = GUESSES["friction"]
     orbit = ns.periodic_orbit(system, start, **given)
     there = ns.periodic_orbit(system, orbit, parameters={"f": 0.7})
     back = ns.periodic_orbit(system, there, parameters={"f": 0.6})
@@ -146,7 +117,7 @@ def test_what_is_refused_in_words(system, guess, options, error, words) -> None:
 
 def test_an_orbit_of_a_family_is_named() -> None:
     """Two springs: every start has the period 3 pi/2."""
-    springs = ns.FilippovSystem([x, v], surface=x, above=[v, -4 * x], below=[v, -x])
+    springs = ns.textbook.bilinear_oscillator().system
     orbit = ns.periodic_orbit(springs, [1.0, 0.0], progress=True)
     assert orbit.period == pytest.approx(1.5 * np.pi, rel=1e-13)
     assert "one of a family" in str(orbit) and not orbit.is_virtual

@@ -9,8 +9,9 @@ import scipy.linalg as sl
 
 import nonsmooth as ns
 from nonsmooth.orbit import master_stability
+from tests.orbit.periodic_cases import relay_oscillator, values_of, weakening_friction
 
-from .test_phase_response import VALUES, relay, stick_slip
+VALUES = values_of("cases/orbits_2.json")
 
 
 def relay_map(orbit, kappa, slope):
@@ -29,7 +30,7 @@ def relay_map(orbit, kappa, slope):
 @pytest.mark.parametrize("symmetry", [None, -np.eye(2)])
 def test_relay_oscillators(symmetry):
     given = {} if symmetry is None else {"symmetry": symmetry}
-    system = relay()
+    system = relay_oscillator()
     orbit = ns.periodic_orbit(system, [-6.4, 0.01], **given)
     x, v = ca.vertsplit(system.extended_states)
     kappa = np.array([0.0, 0.2, 0.1j, 5.0, -0.05])
@@ -71,10 +72,10 @@ def pair_of(system, rows, strength):
 @pytest.mark.parametrize(
     ("build", "start", "strength"),
     [
-        (relay, [-6.4, 0.01], -0.1),
-        (relay, [-6.4, 0.01], 0.3),
-        (stick_slip, [1.0, 0.0], 0.05),
-        (stick_slip, [1.0, 0.0], -0.05),
+        (relay_oscillator, [-6.4, 0.01], -0.1),
+        (relay_oscillator, [-6.4, 0.01], 0.3),
+        (weakening_friction, [1.0, 0.0], 0.05),
+        (weakening_friction, [1.0, 0.0], -0.05),
     ],
 )
 def test_runs_of_pairs_part_or_meet_as_the_exponent_says(build, start, strength):
@@ -119,7 +120,7 @@ def test_spikes_of_a_coupled_variable_make_synchrony_unstable():
 
 
 def test_refusals():
-    system = relay()
+    system = relay_oscillator()
     x, v = ca.vertsplit(system.extended_states)
     orbit = ns.periodic_orbit(system, [-6.4, 0.01])
     for coupling in ([v], v, 3, [0, v, v]):

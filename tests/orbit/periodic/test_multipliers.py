@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -12,13 +9,9 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.orbit.periodic import multipliers
 from nonsmooth.orbit.periodic.cyclic_qr import Factor, Product
+from tests.orbit.periodic_cases import values_of
 
-CASES = {
-    case["id"]: case["values"]
-    for case in json.loads((Path(__file__).parents[2] / "cases" / "orbits_2.json").read_text())
-}
-
-
+CASES = values_of("cases/orbits_2.json")
 DAMPING = ca.SX.sym("d")
 
 

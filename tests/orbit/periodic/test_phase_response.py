@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -12,25 +10,9 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit import phase_response
+from tests.orbit.periodic_cases import relay_oscillator, values_of, weakening_friction
 
-_DATA = json.loads((Path(__file__).parents[2] / "cases" / "orbits_2.json").read_text())
-VALUES = {case["id"]: case["values"] for case in _DATA}
-
-
-def relay(**options):
-    x, v, d = (ca.SX.sym(n) for n in ("x", "v", "d"))
-    free = -x - 2 * d * v
-    fields = {"above": [v, free + 1], "below": [v, free - 1]}
-    return ns.FilippovSystem([x, v], surface=v, parameters={d: 0.1}, **fields, **options)
-
-
-def stick_slip():
-    x, v = ca.SX.sym("x"), ca.SX.sym("v")
-    drop = lambda s: 1 / (1 + 2 * s)
-    belt = v - 0.5
-    return ns.FilippovSystem(
-        [x, v], surface=belt, above=[v, -x - drop(belt)], below=[v, -x + drop(-belt)]
-    )
+VALUES = values_of("cases/orbits_2.json")
 
 
 def shift_of(orbit, x, time, turns=12):
@@ -53,7 +35,7 @@ def kicked_shift(orbit, response, t, kick, size=1e-5):
 @pytest.mark.parametrize("symmetry", [None, -np.eye(2)])
 def test_relay_oscillator(symmetry):
     given = {} if symmetry is None else {"symmetry": symmetry}
-    orbit = ns.periodic_orbit(relay(), [-6.4, 0.01], **given)
+    orbit = ns.periodic_orbit(relay_oscillator(), [-6.4, 0.01], **given)
     response = phase_response(orbit)
     start = float(VALUES["PR2"]["start (t=0)"][0])
     begin = next(leg.t for leg in orbit.legs if leg.mode == "+")
@@ -69,7 +51,7 @@ def test_relay_oscillator(symmetry):
 
 
 def test_rows_are_the_responses_at_their_times():
-    orbit = ns.periodic_orbit(stick_slip(), [1.0, 0.0])
+    orbit = ns.periodic_orbit(weakening_friction(), [1.0, 0.0])
     response = phase_response(orbit, samples=40)
     assert response.t[0] == 0.0 and abs(response.t[-1] - orbit.period) < 1e-14
     inside = np.flatnonzero(np.diff(response.t) > 0)[1::5]
@@ -118,7 +100,7 @@ def test_units_of_time_and_state_do_not_matter(time, length):
     run = ns.simulate(system, start, 40 * time, rtol=1e-12, atol=small)
     orbit = ns.periodic_orbit(system, run)
     response = phase_response(orbit)
-    reference = phase_response(ns.periodic_orbit(relay(), [-6.4, 0.01]))
+    reference = phase_response(ns.periodic_orbit(relay_oscillator(), [-6.4, 0.01]))
     ours, theirs = (
         next(leg.t for leg in r.orbit.legs if leg.mode == mode)
         for r, mode in ((response, "+" if length > 0 else "-"), (reference, "+"))
@@ -129,14 +111,14 @@ def test_units_of_time_and_state_do_not_matter(time, length):
 
 @pytest.mark.parametrize("t", [0.3, 2.9, 4.8])
 def test_kicks_of_a_relay_oscillator_shift_the_phase(t):
-    orbit = ns.periodic_orbit(relay(), [-6.4, 0.01], parameters={"d": 0.3})
+    orbit = ns.periodic_orbit(relay_oscillator(), [-6.4, 0.01], parameters={"d": 0.3})
     response = phase_response(orbit)
     for kick in np.eye(2):
         assert abs(kicked_shift(orbit, response, t, kick) - response(t) @ kick) < 1e-5
 
 
 def test_slide_and_both_sides_of_it():
-    orbit = ns.periodic_orbit(stick_slip(), [1.0, 0.0])
+    orbit = ns.periodic_orbit(weakening_friction(), [1.0, 0.0])
     response = phase_response(orbit)
     slide = next(leg for leg in orbit.legs if leg.mode == "s")
     t = slide.t + 0.4 * slide.duration
@@ -173,8 +155,8 @@ def test_period_by_a_parameter_is_the_response_to_it():
 def test_refusals():
     t, x, v = (ca.SX.sym(n) for n in ("t", "x", "v"))
     with pytest.raises(ns.OptionError, match="PeriodicOrbit"):
-        phase_response(relay())
-    orbit = ns.periodic_orbit(relay(), [-6.4, 0.01])
+        phase_response(relay_oscillator())
+    orbit = ns.periodic_orbit(relay_oscillator(), [-6.4, 0.01])
     with pytest.raises(ns.OptionError, match="samples"):
         phase_response(orbit, samples=1)
     forced = ns.FilippovSystem(

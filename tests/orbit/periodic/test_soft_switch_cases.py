@@ -1,21 +1,16 @@
 """Orbits of reference of systems on whose surfaces nothing slides: they close, with their multipliers."""
 
-import json
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.periodic_cases import cases_of
 
 CASES = {
-    case["id"]: case
-    for case in json.loads(Path("tests/cases/continuous_switching.json").read_text())
-    if case["start"]
-    and case["t_end"]
-    and "mu" not in case["start"][-1]
-    and case["id"] != "dcm_ramp_0.3"
+    name: case
+    for name, case in cases_of("cases/continuous_switching.json").items()
+    if case["start"] and case["t_end"] and "mu" not in case["start"][-1] and name != "dcm_ramp_0.3"
 }
 PARAMETERS = ("A", "w", "I", "al", "a", "q")
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.periodic_cases import values_of
 
-CASES = {
-    case["id"]: case
-    for case in json.loads((Path(__file__).parents[2] / "cases" / "samples.json").read_text())
-}
+CASES = values_of("cases/samples.json")
 x, y, v, w, t, a, b, r, k, lam = (ca.SX.sym(s) for s in "x y v w t a b r k lam".split())
 
 
@@ -27,7 +22,7 @@ def test_a_bouncing_ball_has_the_derivatives_of_the_closed_form_at_its_samples()
     ball = ns.FilippovSystem(
         [y, v], field=[v, -g], impacts=ns.Impact(y, restitution=r), parameters={r: 0.8, g: 2.0}
     )
-    values = CASES["SE1"]["values"]
+    values = CASES["SE1"]
     run = ns.simulate(ball, [1.0, 0.5], 7.0, t_eval=numbers(values["times"]), tol=1e-14)
     found = ns.sensitivity(run)
     assert np.abs(run.sample_x - numbers(values["x(t)"])).max() < 1e-13
@@ -60,7 +55,7 @@ def network(count: int, rng: np.random.Generator) -> ns.FilippovSystem:
 
 
 def test_a_network_has_the_gradient_of_the_reference() -> None:
-    values = CASES["SE4"]["values"]
+    values = CASES["SE4"]
     system = network(3, np.random.default_rng(0))
     parts = [numbers(values[n]) for n in "WVb"]
     p = np.concatenate([part.T.ravel() for part in parts])

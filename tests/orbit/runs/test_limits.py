@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.periodic_cases import cases_of
 
-PATH = Path(__file__).parents[2] / "cases" / "chatter.json"
-CASES = {case["id"]: case for case in json.loads(PATH.read_text())}
+CASES = cases_of("cases/chatter.json")
 y, v, z, u, s, t, a, b, g, r, A, w, mu, k, l1, l2, R = (
     ca.SX.sym(name) for name in "y v z u s t a b g r A w mu k l1 l2 R".split()
 )

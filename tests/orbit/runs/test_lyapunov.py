@@ -1,8 +1,6 @@
 """Lyapunov exponents are those of closed forms: chaotic maps in flows, forced friction, linear decay."""
 
-import json
 import math
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -11,9 +9,8 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.orbit.runs import lyapunov
 from tests.orbit.interrupts import interrupt
-from tests.orbit.periodic_cases import CASES, PARAMETERS
+from tests.orbit.periodic_cases import CASES, PARAMETERS, cases_of, relay_oscillator
 
-_MORE = Path(__file__).parents[2] / "cases" / "orbits_2.json"
 x, y, u, v, t, f, lam = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t", "f", "lam"))
 
 
@@ -40,10 +37,8 @@ def test_chebyshev_map_at_the_ticks_of_a_clock():
 
 def test_relay_oscillator_contracts_as_its_damping():
     """LY3: saltation adds d to the divergence -2 d."""
-    system = ns.FilippovSystem(
-        [x, v], surface=v, above=[v, 1 - x - 0.2 * v], below=[v, -1 - x - 0.2 * v]
-    )
-    (case,) = (c for c in json.loads(_MORE.read_text()) if c["id"] == "LY3")
+    system = relay_oscillator()
+    case = cases_of("cases/orbits_2.json")["LY3"]
     exact = [float(value) for value in case["values"]["exponents"]]
     found = ns.lyapunov_spectrum(system, case["start"], t_end=1000.0)
     assert np.all(np.abs(found.exponents - exact) < 4 * found.errors) and found.errors.max() < 1e-3

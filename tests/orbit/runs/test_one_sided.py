@@ -39,6 +39,7 @@ def passed(modes: list[tuple[int, int]]) -> np.ndarray:
 @pytest.mark.parametrize("first", [0, 1])
 def test_at_a_corner_each_order_of_events_has_its_derivative(first: int) -> None:
     run = ns.simulate(CORNER, -field(-1, -1), 3.0)
+    assert run.itinerary == "-- ++"
     with pytest.raises(ns.DegenerateError, match="corner"):
         ns.sensitivity(run)
     side = np.eye(2)[first]  # the one that is ahead is first

@@ -7,17 +7,13 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.proofs.orbits.itinerary import OrbitEnclosure
+from tests.proofs.systems import STICK, drop, holds, t, v, x
 
-x, v, w = (ca.SX.sym(s) for s in ("x", "v", "w"))
-
-
-def holds(enclosure, exact):
-    return mpmath.mpf(enclosure.low) <= exact <= mpmath.mpf(enclosure.high)
+w = ca.SX.sym("w")
 
 
 def test_stick_slip_has_the_events_of_the_closed_form():
-    s = ns.FilippovSystem([x, v], surface=v - 0.5, above=[v, -x - 1], below=[v, 1 - x])
-    orbit = ns.certify_orbit(s, [0, 0], t_end=5)
+    orbit = ns.certify_orbit(STICK, [0, 0], t_end=5)
     assert orbit.proven and orbit.itinerary == "- s -"
     with mpmath.workdps(40):
         # Slip x = 1 - cos t until sin t = 1/2; stick until x = 1.
@@ -91,13 +87,12 @@ def test_no_more_digits_are_lost_than_the_flow_loses(t_end, bits, width):
 
 @pytest.mark.slow
 def test_boxes_hold_the_orbits_from_their_points():
-    s = ns.FilippovSystem([x, v], surface=v - 0.5, above=[v, -x - 1], below=[v, 1 - x])
     box = [(-0.01, 0.01), (-0.005, 0.005)]
-    orbit = ns.certify_orbit(s, box, t_end=2)
+    orbit = ns.certify_orbit(STICK, box, t_end=2)
     assert (orbit.proven and orbit.itinerary == "- s -") or orbit.itinerary == "- s"
     rng = np.random.default_rng(3)
     for start in rng.uniform(*np.array(box).T, size=(8, 2)):
-        point = ns.certify_orbit(s, list(start), t_end=2)
+        point = ns.certify_orbit(STICK, list(start), t_end=2)
         assert point.itinerary == orbit.itinerary
         for name, value in point.end.items():
             assert orbit.end[name].ends[0] <= value.ends[0]
@@ -106,23 +101,12 @@ def test_boxes_hold_the_orbits_from_their_points():
 
 
 def test_resets_stops_and_time():
-    t = ca.SX.sym("t")
-
-    def drop(speed):
-        return ns.FilippovSystem(
-            [x, v],
-            surface=x - 100,
-            above=[v, 0],
-            below=[v, -2],
-            resets=[ns.Reset(x, [x, -0.5 * v], direction=-1, name="floor")],
-            stops=[ns.Stop(v - speed, 1, "fast")],
-        )
-
-    orbit = ns.certify_orbit(drop(1.25), [1, 0], t_end=1.75)  # comes back with half its speed
+    slow, fast = (drop(ns.Stop(v - speed, 1, "fast")) for speed in (0.75, 1.25))
+    orbit = ns.certify_orbit(fast, [1, 0], t_end=1.75)  # comes back with half its speed
     kinds = [e.kind for e in orbit.events]
     assert orbit.proven and kinds[0] == "reset" and holds(orbit.events[0].t, mpmath.mpf(1))
     # A jump that leads across a stop fires it: that is not proven.
-    assert not ns.certify_orbit(drop(0.75), [1, 0], t_end=1.75).proven
+    assert not ns.certify_orbit(slow, [1, 0], t_end=1.75).proven
     forced = ns.FilippovSystem(
         [x],
         surface=x - 2,
@@ -142,8 +126,7 @@ def test_a_graze_a_two_fold_and_a_wide_box_are_not_proven():
     for near, itinerary in ((1 + 1e-9, "+"), (1 - 1e-9, "+ s +")):
         orbit = ns.certify_orbit(graze, [-1, near], t_end=1.5)
         assert orbit.itinerary.startswith(itinerary)
-    s = ns.FilippovSystem([x, v], surface=v - 0.5, above=[v, -x - 1], below=[v, 1 - x])
-    wide = ns.certify_orbit(s, [(-2, 3), (-1, 2)], t_end=2)
+    wide = ns.certify_orbit(STICK, [(-2, 3), (-1, 2)], t_end=2)
     assert not wide.proven and wide.why
 
 
@@ -208,7 +191,6 @@ def test_a_guard_is_not_followed_over_its_jump():
 
 
 def test_an_interrupt_ends_the_proof_with_what_was_proven(monkeypatch):
-    s = ns.FilippovSystem([x, v], surface=v - 0.5, above=[v, -x - 1], below=[v, 1 - x])
     orbit = OrbitEnclosure
     step_through, calls = orbit.step_through, []
 
@@ -219,5 +201,5 @@ def test_an_interrupt_ends_the_proof_with_what_was_proven(monkeypatch):
         return step_through(self)
 
     monkeypatch.setattr(orbit, "step_through", interrupted)
-    orbit = ns.certify_orbit(s, [0, 0], t_end=3)
+    orbit = ns.certify_orbit(STICK, [0, 0], t_end=3)
     assert len(calls) == 2 and orbit.why == "interrupted" and not orbit.proven

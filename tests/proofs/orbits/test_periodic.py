@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 import nonsmooth as ns
 from nonsmooth.proofs.orbits.forcing import forcing_period
 from nonsmooth.proofs.orbits.modes import Modes
-from tests.proofs.checking import CHECKER, run
+from tests.proofs.checking import CHECKER, checked, run_records
+from tests.proofs.systems import holds
 
 x, v, y, z, d, a, b, t = (ca.SX.sym(s) for s in ("x", "v", "y", "z", "d", "a", "b", "t"))
 
@@ -125,10 +126,6 @@ def closed_form(orbit):
     return sum(found[n:]), sorted(multipliers, key=abs, reverse=True)
 
 
-def holds(enclosure, exact, slack=1e-19):
-    return mpmath.mpf(enclosure.low) - slack <= exact <= mpmath.mpf(enclosure.high) + slack
-
-
 @pytest.mark.slow_cases("van der Pol", "third order")
 @pytest.mark.parametrize("name", AFFINE)
 def test_piecewise_affine_orbits_have_the_closed_form(name):
@@ -138,10 +135,12 @@ def test_piecewise_affine_orbits_have_the_closed_form(name):
         proof = ns.certify(orbit)
         period, multipliers = closed_form(orbit)
         assert proof.proven and proof.label == "asymptotically stable", proof
-        assert holds(proof.values["period"], period) and proof.values["period"].radius < 1e-15
+        assert (
+            holds(proof.values["period"], period, 1e-19) and proof.values["period"].radius < 1e-15
+        )
         for k in range(2, orbit.system.dimension + 1):
             value = proof.values[f"multiplier{k}"]
-            assert value.radius < 1e-13 and any(holds(value, m.real) for m in multipliers)
+            assert value.radius < 1e-13 and any(holds(value, m.real, 1e-19) for m in multipliers)
 
 
 PASSENGERS = [-40 * y + x, 5 * z + v]  # LM1 of the reference cases: multipliers from 2e-110 to 5e13
@@ -272,7 +271,7 @@ def test_the_period_of_a_forcing_may_have_a_range():
     orbit = ns.periodic_orbit(system, guess=[0.0])
     proof = ns.certify(orbit, parameters={"d": ("2", "2.001")})
     assert proof.proven and all(
-        holds(proof.values["period"], 2 * mpmath.pi / w) for w in (2, 2.0005, 2.001)
+        holds(proof.values["period"], 2 * mpmath.pi / w, 1e-19) for w in (2, 2.0005, 2.001)
     )
     zero = ns.certify(orbit, parameters={"d": (-1, 1)})
     assert not zero.exists and "is not finite" in str(zero).replace("\n ", "")
@@ -285,8 +284,8 @@ def test_a_theorem_holds_for_all_values_of_a_parameter():
     assert proof.proven, proof
     for d_ in (0.1, 0.1001, 0.1002):
         w = mpmath.sqrt(1 - d_ * d_)
-        assert holds(proof.values["period"], 2 * mpmath.pi / w)
-        assert holds(proof.values["multiplier2"], mpmath.exp(-2 * mpmath.pi * d_ / w))
+        assert holds(proof.values["period"], 2 * mpmath.pi / w, 1e-19)
+        assert holds(proof.values["multiplier2"], mpmath.exp(-2 * mpmath.pi * d_ / w), 1e-19)
 
 
 def moved(orbit, **changes):
@@ -327,9 +326,8 @@ def test_what_is_given_wrongly_is_refused():
 
 
 def test_the_checker_proves_the_orbit_again(tmp_path):
-    path = tmp_path / "orbit.json"
-    ns.certify(ns.periodic_orbit(relay(0.1), guess=[-6.38, 0.01])).save(path)
-    code, words = run(path)
+    proof = ns.certify(ns.periodic_orbit(relay(0.1), guess=[-6.38, 0.01]))
+    code, words = checked(proof, tmp_path / "orbit.json")
     assert code == 0 and "checked: exactly one periodic orbit" in words and "stable" in words
 
 
@@ -366,9 +364,7 @@ def test_orbits_are_checked_and_altered_ones_are_not(tmp_path):
         [HEAT, [0.625, 1.0]],
     )
     records = [ns.certify(ns.periodic_orbit(s, guess=g)).record for s, g in orbits]
-    true, false = tmp_path / "true.json", tmp_path / "false.json"
-    true.write_text(json.dumps({"proofs": records}))
-    code, words = run(true)
+    code, words = run_records(records, tmp_path)
     assert code == 0 and words.count("checked: exactly one") == len(records), words
     wrong = [*altered(json.loads(json.dumps(records[-1])))]
     friction = records[-2]
@@ -376,8 +372,7 @@ def test_orbits_are_checked_and_altered_ones_are_not(tmp_path):
     nodes = [["const", "2"] if n == ["const", "3"] else n for n in friction["graph"]["nodes"]]
     tangent = [["tan", *n[1:]] if n[0] == "cos" else n for n in friction["graph"]["nodes"]]
     wrong += [{**friction, "graph": {**friction["graph"], "nodes": n}} for n in (nodes, tangent)]
-    false.write_text(json.dumps({"proofs": wrong}))
-    words = run(false)[1]
+    words = run_records(wrong, tmp_path)[1]
     assert words.count("NOT CHECKED") == len(wrong), words
 
 

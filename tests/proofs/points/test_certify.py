@@ -9,19 +9,15 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.proofs.systems import PLANE, TEIXEIRA, TRANSCENDENTAL, x, y, z
 
-x, y, z = (ca.SX.sym(s) for s in "xyz")
 
-
-def flat(above, below, surface=x, **more):
-    return ns.FilippovSystem([x, y, z], surface=surface, above=above, below=below, **more)
+def flat(above, below, **more):
+    return ns.FilippovSystem([x, y, z], surface=x, above=above, below=below, **more)
 
 
 def proven(system, near=(0.0, 0.1, -0.1), **options):
     return ns.certify(ns.find_two_fold(system, near=near), **options)
-
-
-TEIXEIRA = flat([-y, 1, -2], [z, -1, 1 + 0.1 * y])
 
 
 def test_the_teixeira_singularity_is_proven_exactly():
@@ -64,13 +60,6 @@ def test_classes_are_those_of_the_table(signs):
         assert proof.proven and proof.label == table.label
         for name, reference in (("nu1", nu1), ("nu2", nu2)):
             assert float(proof.values[name].low) <= reference <= float(proof.values[name].high)
-
-
-TRANSCENDENTAL = flat(
-    [1 + ca.exp(-y), ca.cos(z) - 0.4, ca.sin(2 * x) + ca.exp(y) / 2 - 0.6],
-    [-1 + 0.2 * x, 1 + y * y, ca.atan(x - 0.3) + ca.log(1 + y * y + x * x) + 0.2 * y - 0.3],
-    surface=z + 0.1 * ca.sin(x * y),
-)
 
 
 def test_a_transcendental_two_fold_agrees_with_mpmath():
@@ -174,9 +163,8 @@ def test_coincident_fields_are_proven_by_algebra():
 
 
 def test_folds_equilibria_and_pseudo_equilibria():
-    s = ns.FilippovSystem([x, y], surface=y, above=[y - x, x**2 - 2], below=[1, 1])
-    fold = ns.local.find_fold(s, [1.4, 0.0])
-    proof = ns.certify(fold, system=s, width=1e-25)
+    fold = ns.local.find_fold(PLANE, [1.4, 0.0])
+    proof = ns.certify(fold, system=PLANE, width=1e-25)
     assert proof.label == "invisible" and proof.point["x"].radius < 1e-25
     s = ns.FilippovSystem([x, y], surface=y, above=[y - x, 1 - 2 * y], below=[1, 1])
     proof = ns.certify(ns.find_equilibrium(s, [1.0, 1.0]), system=s)

@@ -180,21 +180,3 @@ def test_events_end_where_the_field_has_no_series(kind, phase):
     times = [event.t for event in run.events if event.kind == kind]
     zeros = [math.exp(-math.pi * (k + 0.5) - phase) for k in range(-1, len(times))]
     assert times == pytest.approx([1 - at for at in zeros if at < 1][: len(times)], abs=1e-12)
-
-
-@pytest.mark.parametrize("power", [1, 2])
-@pytest.mark.parametrize("restitution", [0.3, 0.5, 0.8])
-def test_resets_that_come_to_rest_have_moved_the_other_states_by_their_whole_sum(
-    restitution, power
-):
-    """Each passage of zero, from the speeds 1, e, e^2, ..., adds a power of its speed: a geometric series."""
-    passes = ns.Reset(y, {v: restitution * v, w: w + ca.fabs(v) ** power}, 0)
-    switched = ns.FilippovSystem(
-        [y, v, w], surfaces=[y], multipliers=[lam], field=[v, -lam, 0], resets=[passes]
-    )
-    run = ns.simulate(switched, [0.5, 0.0, 0.0], 20.0)
-    assert run.status is ns.Status.REACHED_END and run.itinerary.endswith("s")
-    np.testing.assert_allclose(run.x[-1], [0, 0, 1 / (1 - restitution**power)], atol=1e-13)
-    assert abs(run.events[-2].t - 1 - 2 * restitution / (1 - restitution)) < 1e-13
-    many = ns.ensemble(switched, np.tile([0.5, 0.0, 0.0], (70, 1)), 20.0)
-    assert np.array_equal(many.x, np.tile(run.x[-1], (70, 1)))

@@ -25,6 +25,7 @@ def test_sliding_on_two_surfaces_ends_where_the_layer_loses_stability():
     for start in np.random.default_rng(1).uniform(-1, 0.9, 20):
         run = losing_stability(start)
         assert run.status == ns.Status.INTERSECTION and abs(run.t[-1] + start - 1) < 1e-9
+        assert [event.kind for event in run.events] == ["stability", "end"]
     assert losing_stability(-0.5, max_step=0.3).status == ns.Status.INTERSECTION
 
 

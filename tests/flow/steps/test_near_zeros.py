@@ -127,24 +127,3 @@ def test_a_multiple_zero_that_is_written_out_says_how_well_it_is_located(power, 
     assert error < said < 10 * (power * 2**-50) ** (1 / power)
     error, said = at_one(x - 1)
     assert error < 1e-15 and said == 0
-
-
-@pytest.mark.parametrize(
-    ("power", "start", "count"), [(2, 1.0, 1), (2, 0.0, 1), (4, 1.0, 1), (2, 1.0, 2), (2, 0.0, 2)]
-)
-def test_friction_that_is_reached_where_it_just_holds(power, start, count):
-    """The load is at the limit of friction at t = 1, without a slope, and the slip (1 - t)^(p + 1) ends there."""
-    t, v, lam = ca.SX.sym("t"), ca.SX.sym("v", count), ca.SX.sym("lam", count)
-    load, begins = 1 - (power + 1) * (t - 1) ** power, 1.0 - start
-    slip = ns.FilippovSystem(
-        [*ca.vertsplit(v)],
-        field=[load - lam[0], *[-lam[k] for k in range(1, count)]],
-        surfaces=[v if count > 1 else v[0]],
-        multipliers=[lam if count > 1 else lam[0]],
-        time=t,
-    )
-    run = ns.simulate(slip, [start] + [0.0] * (count - 1), 2.0, t_start=begins, tol=1e-11)
-    assert run.status is ns.Status.REACHED_END, run.message
-    held = (2 / (power + 1)) ** (1 / power)  # the load is at the other limit
-    assert run.x[-1, 0] == pytest.approx(2 * (1 - held) - (1 - held ** (power + 1)), abs=1e-9)
-    assert run.events[-2].kind == "exit" and run.events[-2].t == pytest.approx(1 + held, abs=1e-9)

@@ -79,15 +79,15 @@ def test_nothing_is_loaded_from_a_folder_that_others_can_write(open_to, cache, t
     assert not reported.exists() and mode(cache) == open_to
 
 
-def give_away(folder, monkeypatch):
-    """Let a folder belong to another user."""
+def give_away(folder, monkeypatch, place=4, number=12345):
+    """Let a folder belong to another user, or to a group by its place in what is known of a file."""
     real, foreign = os.lstat, os.lstat(folder).st_ino
 
     def lstat(path, **options):
         facts = real(path, **options)
         if facts.st_ino != foreign:
             return facts
-        return os.stat_result([*facts[:4], 12345, *facts[5:]])
+        return os.stat_result([*facts[:place], number, *facts[place + 1 :]])
 
     monkeypatch.setattr(os, "lstat", lstat)
 
@@ -334,19 +334,11 @@ def test_a_group_is_private_if_it_is_named_after_its_only_member(
 
     monkeypatch.setattr(grp, "getgrgid", group)
     monkeypatch.setattr(pwd, "getpwuid", user)
-    above, real = tmp_path / "above", os.lstat
+    above = tmp_path / "above"
     above.mkdir()
     above.chmod(0o775)
-    inode = os.lstat(above).st_ino
-
-    def lstat(path, **options):
-        facts = real(path, **options)
-        if facts.st_ino != inode:
-            return facts
-        return os.stat_result([*facts[:5], 100, *facts[6:]])
-
     monkeypatch.setenv("NONSMOOTH_CACHE", str(above / "cache"))
-    monkeypatch.setattr(os, "lstat", lstat)
+    give_away(above, monkeypatch, 5, 100)
     if private:
         assert store.usable_folder() == above / "cache"
     else:

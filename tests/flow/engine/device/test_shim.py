@@ -43,6 +43,17 @@ def as_card(monkeypatch, shim):
     monkeypatch.setattr(on_device, "machine_for", lambda device: shim)
 
 
+def agree(there, here, digits):
+    """Itineraries and events are equal, and numbers to some digits."""
+    assert there.itinerary.tolist() == here.itinerary.tolist()
+    assert np.array_equal(there.status, here.status)
+    for kind, count in here.events.items():
+        assert np.array_equal(there.events[kind], count), kind
+    for name in ("x", "t", "event_x", "event_t"):
+        pair = getattr(there, name), getattr(here, name)
+        np.testing.assert_allclose(*pair, rtol=0, atol=digits, err_msg=name)
+
+
 def plain_lanes(system, x, p, options, at, monkeypatch):
     """What four lanes say without fused operations."""
     monkeypatch.setattr(engine, "FLAGS", (*engine.FLAGS, "-ffp-contract=off"))
@@ -85,12 +96,7 @@ def test_an_ensemble_there_is_the_ensemble_here(system, as_card):
     x[7] = np.nan
     there = ns.ensemble(system, x, device="cuda", **options)
     here = ns.ensemble(system, x, **options)
-    assert np.array_equal(there.itinerary, here.itinerary)
-    assert np.array_equal(there.status, here.status)
-    for kind, count in here.events.items():
-        assert np.array_equal(there.events[kind], count), kind
-    for name in ("x", "t", "event_x", "event_t"):
-        np.testing.assert_allclose(getattr(there, name), getattr(here, name), rtol=0, atol=1e-8)
+    agree(there, here, 1e-8)
 
 
 @pytest.mark.parametrize(
@@ -166,12 +172,7 @@ def test_runs_go_on_where_the_card_left_them(name, random, monkeypatch):
     shim = Shim(random=random)
     monkeypatch.setattr(on_device, "machine_for", lambda device: shim)
     there = ns.ensemble(system, x, device="cuda", **options)
-    assert there.itinerary.tolist() == here.itinerary.tolist()
-    assert np.array_equal(there.status, here.status)
-    for kind, count in here.events.items():
-        assert np.array_equal(there.events[kind], count), kind
-    for one in ("x", "t", "event_x", "event_t"):
-        np.testing.assert_allclose(getattr(there, one), getattr(here, one), rtol=0, atol=1e-5)
+    agree(there, here, 1e-5)
     assert np.isfinite(there.event_t).sum() > 10
     # Which runs continue together changes nothing.
     pieces = ns.ensemble(system, x, device="cuda", work=ns.Work(chunk=7, threads=3), **options)

@@ -8,7 +8,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.manifolds.invariant_manifolds import Follower
-from tests.orbit.interrupts import interrupt
+from tests.orbit.interrupts import interrupt, watch_progress
 from tests.orbit.manifolds.test_dividing import SLOPE, plain
 from tests.orbit.periodic_cases import CASES, PARAMETERS, double_well
 from tests.proofs.systems import TEIXEIRA
@@ -171,18 +171,7 @@ def test_an_interrupted_second_sheet_leaves_the_first_one(monkeypatch, sheets, m
 
 
 def test_orbits_of_a_manifold_are_counted(monkeypatch):
-    counted = []
-
-    class Bar:
-        def update(self, count=1):
-            counted.append(count)
-
-        def close(self):
-            counted.append("closed")
-
-    options = []
-    module = sys.modules[ns.manifold.__module__]
-    monkeypatch.setattr(module, "progress_bar", lambda *given: options.append(given) or Bar())
+    counted, options = watch_progress(monkeypatch, sys.modules[ns.manifold.__module__])
     system = ns.FilippovSystem([x, y], surface=x + 5, above=[x, -y], below=[x, -y + 0 * x])
     saddle = ns.find_equilibrium(system, [0.1, 0.1])
     ns.manifold(system, saddle, length=1.0, progress=True)

@@ -10,7 +10,7 @@ import nonsmooth as ns
 from nonsmooth.orbit.basins import Search
 from tests.orbit.periodic_cases import CASES, double_well
 
-x, y, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "t", "lam"))
+x, v, t, lam = (ca.SX.sym(s) for s in ("x", "v", "t", "lam"))
 WELL = double_well()
 QUIET = ns.Work(threads=1, progress=False)
 

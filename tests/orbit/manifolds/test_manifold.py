@@ -13,7 +13,7 @@ from tests.orbit.manifolds.test_dividing import SLOPE, plain
 from tests.orbit.periodic_cases import CASES, PARAMETERS, double_well
 from tests.proofs.systems import TEIXEIRA
 
-x, y, z, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "z", "v", "t", "lam"))
+x, y, z = (ca.SX.sym(s) for s in "xyz")
 
 
 def test_smooth_saddle_and_its_curves_through_a_switch():

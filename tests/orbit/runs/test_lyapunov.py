@@ -18,7 +18,7 @@ from tests.orbit.periodic_cases import (
     stick_slip,
 )
 
-x, y, u, v, t, f, lam = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t", "f", "lam"))
+x, y, u, v = (ca.SX.sym(s) for s in "xyuv")
 
 
 def test_doubling_of_an_angle_by_squaring():

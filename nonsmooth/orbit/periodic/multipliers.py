@@ -177,23 +177,26 @@ class Multipliers:
     def _parts(self) -> list[list[tuple[Array, Array]]]:
         """Derivatives (S, N) of the parts of each leg, by starts in units of the orbit, and fields at their ends."""
         at, result = self.at.parts or self.at, list[list[tuple[Array, Array]]]()
+        scaled = at.flows.by_start * self._units
+        even = self._even(scaled)
         for i, leg in enumerate(self.problem.legs):
             result.append([])
             for k in self.problem.parts_of(i):
-                whole = at.flows.by_start[k] * self._units, at.flows.rate[k]
-                even = bool(leg.repeats) or self._even(whole[0])
-                start, duration = at.starts[k], float(at.durations[k])
-                result[-1] += [whole] if even else self._cut(leg, start, duration, whole)
+                whole, start = (scaled[k], at.flows.rate[k]), at.starts[k]
+                duration = float(at.durations[k])
+                as_one = leg.repeats or even[k]
+                result[-1] += [whole] if as_one else self._cut(leg, start, duration, whole)
         return result
 
-    def _even(self, part: Array) -> bool:
-        """Whether derivatives (S, N) do not grow too differently."""
+    def _even(self, parts: Array) -> NDArray[np.bool_]:
+        """Whether derivatives (..., S, N) do not grow too differently."""
         if self.problem.system.sets:  # their null space is lost, however short the leg is
-            return True
-        moved = part[: self._units.size] / self._units[:, None]
-        sizes = np.linalg.svd(moved, compute_uv=False)
+            return np.ones(parts.shape[:-2], bool)
+        sizes = np.linalg.svd(
+            parts[..., : self._units.size, :] / self._units[:, None], compute_uv=False
+        )
         count = self._count + 1  # discrete states do not move
-        return bool(sizes[0] <= _STIFF * sizes[count - 1])
+        return np.asarray(sizes[..., 0] <= _STIFF * sizes[..., count - 1])
 
     def _cut(
         self, leg: Leg, x: Array, duration: float, whole: tuple[Array, Array], halvings: int = 1
@@ -216,7 +219,10 @@ class Multipliers:
 
 def _across(field: Array) -> Array:
     """Orthonormal basis (n, n - 1) of the directions across a field."""
-    return np.asarray(np.linalg.qr(field[:, None], mode="complete")[0][:, 1:])
+    # columns of a Householder reflection
+    v = field / (float(np.linalg.norm(field)) or 1.0)
+    v[0] += math.copysign(1.0, v[0])
+    return np.asarray(np.eye(len(v))[:, 1:] - np.outer(v, v[1:] / abs(v[0])))
 
 
 def event_maps(problem: BoundaryProblem, at: Evaluation) -> Array:

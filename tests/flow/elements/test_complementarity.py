@@ -31,55 +31,28 @@ BRIDGE = (
     [[0, 0], [0, 0], [-1, 0], [1, 0]],
     [[0.5, 0.5, -1, 0], [0.5, 0.5, 0, -1], [1, 0, 0, 0], [0, 1, 0, 0]],
 )
+LOAD, PAIR = driven([[-0.1]], [0]), [[1, 1], [0, 0], [0, 0]]
+ONE, SIDE_BY_SIDE = (LOAD, [[1], *SOURCE], [[1, -1, 0]]), (LOAD, PAIR, [[1, -1, 0]] * 2)
+DOUBLER = (
+    driven([[0, 0], [0, -0.02]], [0, 0]),
+    [[-1, 1], [0, 1], [0, 0], [0, 0]],
+    [[-1, 0, 1, 0], [1, 1, -1, 0]],
+)
+#: Matrices, voltages and currents at the start with a driving sine, and the degree of the conditions.
 CIRCUITS = {
     "four diodes on a resonator": (BRIDGE, [1.0, 0.0], 0),
     "four diodes from a voltage of zero": (BRIDGE, [0.0, 1.0], 0),
-    "peak rectifier": ((driven([[-0.1]], [0]), [[1], *SOURCE], [[1, -1, 0]], [[0]]), [0, 0, 1], 1),
-    "peak rectifier with a resistance": (
-        (driven([[-0.1]], [0]), [[1], *SOURCE], [[1, -1, 0]], [[0.1]]),
-        [0, 0, 1],
-        0,
-    ),
-    "two diodes side by side": (
-        (driven([[-0.1]], [0]), [[1, 1], [0, 0], [0, 0]], [[1, -1, 0]] * 2, 0.1 * np.ones((2, 2))),
-        [0, 0, 1],
-        0,
-    ),
-    "two ideal diodes side by side": (
-        (driven([[-0.1]], [0]), [[1, 1], [0, 0], [0, 0]], [[1, -1, 0]] * 2, np.zeros((2, 2))),
-        [0, 0, 1],
-        1,
-    ),
+    "peak rectifier": ((*ONE, [[0]]), [0, 0, 1], 1),
+    "peak rectifier with a resistance": ((*ONE, [[0.1]]), [0, 0, 1], 0),
+    "two diodes side by side": ((*SIDE_BY_SIDE, 0.1 * np.ones((2, 2))), [0, 0, 1], 0),
+    "two ideal diodes side by side": ((*SIDE_BY_SIDE, np.zeros((2, 2))), [0, 0, 1], 1),
     "full wave with a filter": (
-        (
-            driven([[-0.1]], [0]),
-            [[1, 1], [0, 0], [0, 0]],
-            [[1, -1, 0], [1, 1, 0]],
-            np.zeros((2, 2)),
-        ),
+        (LOAD, PAIR, [[1, -1, 0], [1, 1, 0]], np.zeros((2, 2))),
         [0, 0, 1],
         1,
     ),
-    "voltage doubler": (
-        (
-            driven([[0, 0], [0, -0.02]], [0, 0]),
-            [[-1, 1], [0, 1], [0, 0], [0, 0]],
-            [[-1, 0, 1, 0], [1, 1, -1, 0]],
-            np.zeros((2, 2)),
-        ),
-        [0, 0, 0, 1],
-        1,
-    ),
-    "voltage doubler with resistances": (
-        (
-            driven([[0, 0], [0, -0.02]], [0, 0]),
-            [[-1, 1], [0, 1], [0, 0], [0, 0]],
-            [[-1, 0, 1, 0], [1, 1, -1, 0]],
-            0.05 * np.eye(2),
-        ),
-        [0, 0, 0, 1],
-        0,
-    ),
+    "voltage doubler": ((*DOUBLER, np.zeros((2, 2))), [0, 0, 0, 1], 1),
+    "voltage doubler with resistances": ((*DOUBLER, 0.05 * np.eye(2)), [0, 0, 0, 1], 0),
     "coil behind a diode": (
         (driven([[-1]], [1]), [[1], *SOURCE], [[1, 0, 0]], [[0]]),
         [0, 0, 1],

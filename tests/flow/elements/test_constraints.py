@@ -14,23 +14,23 @@ angle, rate = ca.SX.sym("angle"), ca.SX.sym("rate")
 ROD = (x**2 + y**2 - 1) / 2
 
 
-def pendulum(drag=0.0, **others):
-    """A bob of unit mass on a rod, with dry friction ``drag`` at the pivot if it is given."""
-    force = [-drag * lam * -y, -drag * lam * x]
+def pendulum(drag=0.0, torque=0.0, gravity=1.0, **others):
+    """A bob of unit mass on a rod, with a torque and dry friction ``drag`` at the pivot if it is given."""
+    turn = torque - drag * lam
     friction = {"surfaces": [x * v - y * u], "multipliers": [lam]} if drag else {}
     return ns.FilippovSystem(
         [x, y, u, v],
-        field=[u, v, r * x + force[0], r * y - 1 + force[1]],
+        field=[u, v, r * x - turn * y, r * y - gravity + turn * x],
         constraints=ns.Constraint(ROD, reaction=r, name="rod"),
         **friction,
         **others,
     )
 
 
-def by_angle(drag=0.0, **others):
+def by_angle(drag=0.0, torque=0.0, gravity=1.0, **others):
     """The same pendulum by its angle from the horizontal."""
     friction = {"surfaces": [rate], "multipliers": [lam]} if drag else {}
-    field = [rate, -ca.cos(angle) - drag * lam]
+    field = [rate, torque - gravity * ca.cos(angle) - drag * lam]
     return ns.FilippovSystem([angle, rate], field=field, **friction, **others)
 
 
@@ -234,20 +234,9 @@ def test_a_bob_strikes_a_wall_through_its_rod(law):
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_bob_comes_to_rest_on_a_floor_and_is_lifted(restitution):
     """The floor y = -1/2 carries it until a load that turns it upwards has grown."""
-    lift = 0.1 * t
-    system = ns.FilippovSystem(
-        [x, y, u, v],
-        field=[u, v, r * x - lift * y, r * y - 1 + lift * x],
-        constraints=ns.Constraint(ROD, reaction=r),
-        impacts=ns.Impact(y + 0.5, restitution=restitution),
-        time=t,
-    )
-    plain = ns.FilippovSystem(
-        [angle, rate],
-        field=[rate, lift - ca.cos(angle)],
-        impacts=ns.Impact(angle + np.pi / 6, restitution=restitution),
-        time=t,
-    )
+    floor, own = (ns.Impact(h, restitution=restitution) for h in (y + 0.5, angle + np.pi / 6))
+    system = pendulum(torque=0.1 * t, impacts=floor, time=t)
+    plain = by_angle(torque=0.1 * t, impacts=own, time=t)
     run = ns.simulate(system, placed((0.3, 0.0)), 10.0, tol=1e-11)
     required = ns.simulate(plain, [0.3, 0.0], 10.0, tol=1e-11)
     assert run.status is ns.Status.REACHED_END, run.message
@@ -317,39 +306,20 @@ def test_derivatives_are_those_by_the_angle():
     g = ca.SX.sym("g")
     wall = ns.Impact(x + 0.4, restitution=0.6, name="wall")
     own = ns.Impact(angle - (2 * np.pi - np.arccos(-0.4)), restitution=0.6, name="wall")
-    system = ns.FilippovSystem(
-        [x, y, u, v],
-        field=[u, v, r * x + 0.1 * lam * y, r * y - g - 0.1 * lam * x],
-        surfaces=[x * v - y * u],
-        multipliers=[lam],
-        constraints=ns.Constraint(ROD, reaction=r),
-        impacts=wall,
-        parameters={g: 1.0},
-    )
-    plain = ns.FilippovSystem(
-        [angle, rate],
-        field=[rate, -g * ca.cos(angle) - 0.1 * lam],
-        surfaces=[rate],
-        multipliers=[lam],
-        impacts=own,
-        parameters={g: 1.0},
-    )
+    system = pendulum(0.1, gravity=g, impacts=wall, parameters={g: 1.0})
+    plain = by_angle(0.1, gravity=g, impacts=own, parameters={g: 1.0})
     start = np.array([2 * np.pi - 0.1, -0.3])
     run = ns.simulate(system, placed(start), 5.0, tol=1e-11)
     required = ns.simulate(plain, start, 5.0, tol=1e-11)
     assert [e.kind for e in run.events] == [e.kind for e in required.events]
     assert "impact" in [e.kind for e in run.events] and "crossing" in [e.kind for e in run.events]
-    a, w = required.x[-1]
-    outer = np.array(
+    outer, inner = (
         [[-np.sin(a), 0], [np.cos(a), 0], [-w * np.cos(a), -np.sin(a)], [-w * np.sin(a), np.cos(a)]]
-    )
-    a, w = start
-    inner = np.array(
-        [[-np.sin(a), 0], [np.cos(a), 0], [-w * np.cos(a), -np.sin(a)], [-w * np.sin(a), np.cos(a)]]
+        for a, w in (required.x[-1], start)
     )
     found, true = ns.sensitivity(run), ns.sensitivity(required)
-    np.testing.assert_allclose(found.dx_dp, outer @ true.dx_dp, atol=1e-8)
-    np.testing.assert_allclose(found.dx_dx0 @ inner, outer @ true.dx_dx0, atol=1e-8)
+    np.testing.assert_allclose(found.dx_dp, np.dot(outer, true.dx_dp), atol=1e-8)
+    np.testing.assert_allclose(found.dx_dx0 @ inner, np.dot(outer, true.dx_dx0), atol=1e-8)
 
 
 @pytest.mark.parametrize(("drag", "e"), [(0.1, 0.5), pytest.param(0, None, marks=pytest.mark.slow)])
@@ -357,23 +327,9 @@ def test_orbits_and_their_multipliers_are_those_by_the_angle(drag, e):
     """A forced pendulum with dry friction and a wall; each function that is held adds a zero multiplier."""
     a = ca.SX.sym("a")
     push, own = a * ca.cos(t), {"time": t, "parameters": {a: 0.5}}
-    torque = push - 0.2 * (x * v - y * u) - drag * lam
-    friction = lambda slip: {"surfaces": [slip], "multipliers": [lam]} if drag else {}
-    system = ns.FilippovSystem(
-        [x, y, u, v],
-        field=[u, v, r * x - torque * y, r * y - 1 + torque * x],
-        constraints=ns.Constraint(ROD, reaction=r),
-        impacts=ns.Impact(x + 0.2, restitution=e) if e else (),
-        **friction(x * v - y * u),
-        **own,
-    )
-    plain = ns.FilippovSystem(
-        [angle, rate],
-        field=[rate, push - ca.cos(angle) - 0.2 * rate - drag * lam],
-        impacts=ns.Impact(angle + np.arccos(-0.2), restitution=e) if e else (),
-        **friction(rate),
-        **own,
-    )
+    wall = lambda gap: {"impacts": ns.Impact(gap, restitution=e) if e else ()}
+    system = pendulum(drag, push - 0.2 * (x * v - y * u), **wall(x + 0.2), **own)
+    plain = by_angle(drag, push - 0.2 * rate, **wall(angle + np.arccos(-0.2)), **own)
     starts = ((system, placed((-1.5, 0))), (plain, [-1.5, 0]))
     found, required = (ns.periodic_orbit(s, ns.simulate(s, start, 150.0)) for s, start in starts)
     assert found.stability == required.stability == "asymptotically stable"

@@ -9,17 +9,19 @@ import nonsmooth as ns
 
 G, B, H = 9.81, 0.5, 1.0
 INERTIA = (B**2 + H**2) / 3
+SLOW = pytest.mark.slow
+LAWS = ["newton", "moreau", "poisson"]
 x, y, th, u, v, w, t = (ca.SX.sym(name) for name in ("x", "y", "th", "u", "v", "w", "t"))
 
 
-def box(mu, feet=(-1, 1), law="newton", pull=0.0):
+def box(mu, feet=(-1, 1), law="newton", pull=0.0, height=H):
     """A box on feet at these parts of its half width."""
     count = len(feet)
     r, lam = ca.SX.sym("r", count), ca.SX.sym("lam", count)
     gaps, slips, force, moment = [], [], ca.SX([0, 0]), 0
     for k, side in enumerate(feet):
         arm = ca.vertcat(
-            side * B * ca.cos(th) + H * ca.sin(th), side * B * ca.sin(th) - H * ca.cos(th)
+            side * B * ca.cos(th) + height * ca.sin(th), side * B * ca.sin(th) - height * ca.cos(th)
         )
         push = ca.vertcat(-mu * lam[k] * r[k], r[k])
         gaps.append(ns.Impact(y + arm[1], reaction=r[k], name=f"foot{k}", law=law))
@@ -28,7 +30,7 @@ def box(mu, feet=(-1, 1), law="newton", pull=0.0):
         moment += arm[0] * push[1] - arm[1] * push[0]
     return ns.FilippovSystem(
         [x, y, th, u, v, w],
-        field=[u, v, w, force[0] + pull, force[1] - G, moment / INERTIA],
+        field=[u, v, w, force[0] + pull, force[1] - G, 3 * moment / (B**2 + height**2)],
         surfaces=slips,
         multipliers=ca.vertsplit(lam),
         impacts=gaps,
@@ -76,10 +78,6 @@ def test_a_box_that_grips_tips_on_its_front_foot():
     np.testing.assert_allclose(run.x[-1], end, atol=1e-8)
 
 
-SLOW = pytest.mark.slow
-LAWS = ["newton", "moreau", "poisson"]
-
-
 @pytest.mark.parametrize(
     "feet", [(-1, 1), (-1, 0, 1), (-1, -1, 1, 1), pytest.param((-1, -0.4, 0.4, 1), marks=SLOW)]
 )
@@ -100,3 +98,20 @@ def test_a_box_falls_flat_on_four_feet(law):
     assert first.kind == "impact" and abs(first.t - np.sqrt(0.4 / G)) < 1e-11
     assert abs(first.x_after[3:]).max() < 1e-11  # friction takes the speed, within the impact
     np.testing.assert_allclose(run.x[-1, 3:], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_rocking_block_keeps_the_share_of_its_speed_that_housner_found(law):
+    """A block that rocks about one edge and strikes with the other: w+ = (1 - 3/2 sin^2 a) w- (Housner 1963)."""
+    h, tilt = 2.0, 0.1  # turned about the left edge, which stays at the origin
+    c, s, square = np.cos(tilt), np.sin(tilt), B**2 + h**2
+    start = [B * c - h * s, B * s + h * c, tilt, 0, 0, 0]
+    run = ns.simulate(box(5.0, law=law, height=h), start, 3.0)
+    assert run.status is ns.Status.REACHED_END, run.message
+    strikes = [event for event in run.events if event.kind == "impact"]
+    assert len(strikes) >= 3
+    for event in strikes[:3]:
+        share = event.x_after[5] / event.x[5]
+        np.testing.assert_allclose(share, 1 - 1.5 * B**2 / square, atol=1e-9)
+    energy = 2 / 3 * square * strikes[0].x[5] ** 2
+    np.testing.assert_allclose(energy, G * (start[1] - h), rtol=1e-9)

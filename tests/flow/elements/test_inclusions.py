@@ -46,16 +46,6 @@ def test_widths_are_part_of_a_system():
         ring((1.0, -1.0))
 
 
-def test_multipliers_that_are_not_determined_may_not_act_elsewhere():
-    """Both relays act on u alone: their sum is determined, and z follows one of them."""
-    u, z, l1, l2 = (ca.SX.sym(name) for name in ("u", "z", "l1", "l2"))
-    for acts, status in ((0, ns.Status.REACHED_END), (1, ns.Status.NON_UNIQUE)):
-        system = ns.FilippovSystem(
-            [u, z], field=[0.5 - l1 - l2, acts * l1], surfaces=[u, u], multipliers=[l1, l2]
-        )
-        assert ns.simulate(system, [0.0, 0.0], 1.0).status is status
-
-
 @pytest.mark.parametrize("count", [24, 60])
 def test_many_balls_land_and_are_let_go_together(count):
     """They fall with z - 2, land at one instant, and leave when z passes 2."""
@@ -209,44 +199,3 @@ def test_both_lower_contacts_of_a_slider_crank_open_at_one_instant():
         -14.6168908684568787,
     ]
     assert run.x[-1, :5] == pytest.approx(end, rel=1e-8, abs=1e-8)
-
-
-@pytest.mark.parametrize("above", [1e-9, 1e-11, 1e-12, -1e-12, -1e-11, -1e-9])
-def test_one_element_decides_by_all_that_is_above_rounding(above):
-    """v' = (1 + above - l) u: with l = 1 the rate on the far side is ``above`` u, and decides."""
-    u, v, multiplier = (ca.SX.sym(s) for s in ("u", "v", "l"))
-    system = ns.FilippovSystem(
-        [u, v], field=[1, (1 + above - multiplier) * u], surfaces=[v], multipliers=[multiplier]
-    )
-    run = ns.simulate(system, [1.0, -1.0], 3.0)
-    assert run.itinerary == ("- +" if above > 0 else "- s")
-    np.testing.assert_allclose(run.x[-1, 0], 4.0, rtol=1e-12)
-
-
-@pytest.mark.parametrize(("turn", "letters"), [(1, "--"), (-1, "+-")])
-def test_the_multiplier_of_a_far_surface_makes_no_two_fold(turn, letters):
-    """h0' = -turn y/2 + m + 1 with m = -1 far below h1 = 0: h0'' = -turn (3/2 + l/2)/2 has one sign."""
-    x, y, own, far = (ca.SX.sym(s) for s in "xylm")
-    system = ns.FilippovSystem(
-        [x, y],
-        field=[-turn * y / 2 + far + 1, 1.5 + own / 2],
-        surfaces=[x, y - 5],
-        multipliers=[own, far],
-    )
-    run = ns.simulate(system, [0.0, 0.0], 0.3)
-    speed = 1.0 if turn > 0 else 2.0
-    assert run.itinerary == letters
-    np.testing.assert_allclose(run.x[-1], [-turn * speed * 0.0225, 0.3 * speed], atol=1e-13)
-
-
-def test_the_multiplier_of_a_far_surface_leaves_two_motions_where_both_fields_lead_away():
-    """h0'' = -(3/2 - 5/2 l)/2 is 1/2 above and -2 below: both motions leave."""
-    x, y, own, far = (ca.SX.sym(s) for s in "xylm")
-    system = ns.FilippovSystem(
-        [x, y],
-        field=[-y / 2 + far + 1, 1.5 - 2.5 * own],
-        surfaces=[x, y - 5],
-        multipliers=[own, far],
-    )
-    run = ns.simulate(system, [0.0, 0.0], 0.3)
-    assert run.status is ns.Status.NON_UNIQUE and run.t[-1] == 0.0

@@ -7,17 +7,17 @@ import pytest
 import nonsmooth as ns
 
 x, y, z, w, lam, kap, b = (ca.SX.sym(s) for s in ("x", "y", "z", "w", "lam", "kap", "b"))
+BILINEAR = ns.FilippovSystem(
+    [x, y, z],
+    field=[-lam + z / 2, -kap + z / 4, 1 + lam * kap / 2],
+    multipliers=[lam, kap],
+    surfaces=[x, y],
+)
 
 
 def test_bilinear_law_leaves_the_intersection_at_its_closed_form():
     """x1' = -s1 + x3/2, x2' = -s2 + x3/4, x3' = 1 + s1 s2/2: s1 = 1 at t = 4 atan(1/2)."""
-    system = ns.FilippovSystem(
-        [x, y, z],
-        field=[-lam + z / 2, -kap + z / 4, 1 + lam * kap / 2],
-        multipliers=[lam, kap],
-        surfaces=[x, y],
-    )
-    run = ns.simulate(system, [0.0, 0.0, 0.0], 2.5, tol=1e-13)
+    run = ns.simulate(BILINEAR, [0.0, 0.0, 0.0], 2.5, tol=1e-13)
     assert run.itinerary == "ss +s"
     assert run.events[0].kind == "exit"
     assert run.events[0].t == pytest.approx(4 * np.arctan(0.5), abs=1e-12)
@@ -67,20 +67,14 @@ def test_the_ambiguity_of_the_exit_is_reported():
     x1 leaves when x3 = 2; x3' ranges over [1/2 + 3 x3/8, 3/2 - x3/8] on the way, so the extreme
     times are 8 log(6/5) and (8/3) log(5/2), and the bilinear law is in between.
     """
-    system = ns.FilippovSystem(
-        [x, y, z],
-        field=[-lam + z / 2, -kap + z / 4, 1 + lam * kap / 2],
-        multipliers=[lam, kap],
-        surfaces=[x, y],
-    )
     for height in (0.0, 0.7, 1.9):
-        low, high = ns.local.intersection_range(system, [0.0, 0.0, height], of=z)
+        low, high = ns.local.intersection_range(BILINEAR, [0.0, 0.0, height], of=z)
         assert low == pytest.approx(0.5 + 3 * height / 8, abs=1e-12)
         assert high == pytest.approx(1.5 - height / 8, abs=1e-12)
         assert low <= 1 + height**2 / 16 <= high
     extremes = 8 * np.log(1.2), 8 / 3 * np.log(2.5)
     np.testing.assert_allclose(extremes, [1.45857245435163701, 2.44344195166441351], rtol=1e-15)
-    run = ns.simulate(system, [0.0, 0.0, 0.0], 2.5)
+    run = ns.simulate(BILINEAR, [0.0, 0.0, 0.0], 2.5)
     assert extremes[0] < run.events[0].t < extremes[1]
 
 

@@ -41,21 +41,6 @@ def test_a_multiplier_jumps_from_a_fold_to_the_next_root():
     assert run.x[-1, 2] == pytest.approx(lower + upper, abs=1e-10)
 
 
-def test_static_friction_above_kinetic_lets_go_at_its_maximum():
-    """A driven block with friction lam (1 + c (1 - lam^2)) breaks away 19 times, each time at 1.1."""
-    force, speed = 1.3, 0.3
-    c = 0.683612466405776  # (2/3) (1 + c) sqrt((1 + c)/(3 c)) = 1.1
-    top = (2 / 3) * (1 + c) * np.sqrt((1 + c) / (3 * c))
-    drive = force * ca.cos(speed * t)
-    field = [y, -0.1 * y - x + drive - lam * (1 + c * (1 - lam**2))]
-    system = ns.FilippovSystem([x, y], surface=y, multipliers=lam, field=field, time=t, hidden=True)
-    run = ns.simulate(system, [0.0, 1.0], 200.0, tol=1e-11)
-    assert run.status is REACHED
-    left = [abs(force * np.cos(speed * e.t) - e.x[0]) for e in run.events if e.kind == "exit"]
-    assert len(left) == 19
-    np.testing.assert_allclose(left, top, rtol=0, atol=1e-11)
-
-
 @pytest.mark.parametrize("count", [2, 3, 4])
 def test_products_of_multipliers_are_solved_together(count):
     """Each surface slides with lam_i = a_i + lam_1 ... lam_n / 4, which one point of [-1, 1]^n solves."""

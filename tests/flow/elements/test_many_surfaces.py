@@ -16,22 +16,25 @@ from ..independent import blocks
 from ..independent.integrator import Run
 
 
-def chain(k):
-    """The chain of ``independent.blocks``."""
+def row(k, force, belt=0.0, coupling=1.0, **others):
+    """Blocks in a row, joined by springs, each with a force of its place, speed and multiplier, and a surface."""
     q, v, lam = (ca.SX.sym(name, k) for name in ("q", "v", "lam"))
-    force = [
-        -blocks.SPRING * q[i]
-        - blocks.friction(k)[i] * lam[i]
-        + blocks.FALL * (v[i] - blocks.BELT)
-        + blocks.COUPLING * sum(q[j] - q[i] for j in (i - 1, i + 1) if 0 <= j < k)
-        for i in range(k)
-    ]
+    joined = [coupling * sum(q[j] - q[i] for j in (i - 1, i + 1) if 0 <= j < k) for i in range(k)]
     return ns.FilippovSystem(
         [*ca.vertsplit(q), *ca.vertsplit(v)],
-        field=[*ca.vertsplit(v), *force],
-        surfaces=[v[i] - blocks.BELT for i in range(k)],
+        field=[*ca.vertsplit(v), *[force(i, q[i], v[i], lam[i]) + joined[i] for i in range(k)]],
+        surfaces=[v[i] - belt for i in range(k)],
         multipliers=ca.vertsplit(lam),
+        **others,
     )
+
+
+def chain(k):
+    """The chain of ``independent.blocks``."""
+    force = lambda i, q, v, lam: (
+        -blocks.SPRING * q - blocks.friction(k)[i] * lam + blocks.FALL * (v - blocks.BELT)
+    )
+    return row(k, force, blocks.BELT, blocks.COUPLING)
 
 
 @pytest.mark.parametrize(
@@ -58,17 +61,7 @@ def test_blocks_agree_with_an_independent_integrator(k):
 def test_a_long_chain_keeps_its_symmetry():
     """Equal blocks that start at rest in a mirror image of themselves stay one, event by event."""
     k = 12
-    q, v, lam = (ca.SX.sym(name, k) for name in ("q", "v", "lam"))
-    force = [
-        -0.1 * q[i] - lam[i] + sum(q[j] - q[i] for j in (i - 1, i + 1) if 0 <= j < k)
-        for i in range(k)
-    ]
-    system = ns.FilippovSystem(
-        [*ca.vertsplit(q), *ca.vertsplit(v)],
-        field=[*ca.vertsplit(v), *force],
-        surfaces=[v[i] - 0.3 for i in range(k)],
-        multipliers=ca.vertsplit(lam),
-    )
+    system = row(k, lambda i, q, v, lam: -0.1 * q - lam, 0.3)
     half = 0.1 * np.array([3.0, 1.0, 4.0, 1.0, 5.0, 9.0])
     run = ns.simulate(system, [*half, *half[::-1], *[0.0] * k], 30.0)
     assert run.status is ns.Status.REACHED_END and len(run.events) > 5
@@ -78,21 +71,9 @@ def test_a_long_chain_keeps_its_symmetry():
 
 
 def forced_chain(k):
-    """Blocks in a row, pushed in time, with a friction that depends on where they are."""
-    q, v, lam, t = *(ca.SX.sym(name, k) for name in ("q", "v", "lam")), ca.SX.sym("t")
-    force = [
-        sum(q[j] - q[i] for j in (i - 1, i + 1) if 0 <= j < k)
-        + 0.1 * ca.sin(t + i)
-        - (1 + 0.2 * ca.tanh(q[i])) * lam[i]
-        for i in range(k)
-    ]
-    return ns.FilippovSystem(
-        [*ca.vertsplit(q), *ca.vertsplit(v)],
-        field=[*ca.vertsplit(v), *force],
-        surfaces=ca.vertsplit(v),
-        multipliers=ca.vertsplit(lam),
-        time=t,
-    )
+    """Blocks that are pushed in time, with a friction that depends on where they are."""
+    t = ca.SX.sym("t")
+    return row(k, lambda i, q, v, lam: 0.1 * ca.sin(t + i) - (1 + 0.2 * ca.tanh(q)) * lam, time=t)
 
 
 def test_a_program_is_generated_in_proportion_to_its_graph():

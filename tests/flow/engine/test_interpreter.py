@@ -71,24 +71,6 @@ WALLS = ns.FilippovSystem(
 )
 
 
-def test_a_root_says_where_it_ends():
-    root = ns.FilippovSystem([x], field=[-1 - ca.sqrt(x)])  # at zero when t = 2 - 2 log 2
-    run = ns.simulate(root, [1.0], 1.0)
-    assert run.status is ns.Status.STEP_TOO_SMALL
-    assert "just after t = 0.61370564" in run.message
-
-
-def test_where_more_modes_hold_they_are_named():
-    """Repelling sliding on one of two surfaces: both sides can continue."""
-    a, b = ca.SX.sym("a"), ca.SX.sym("b")
-    system = ns.FilippovSystem(
-        [x, y], field=[a, 1 - 2 * b], surfaces=[x, y - 9], multipliers=[a, b]
-    )
-    run = ns.simulate(system, [0.0, 0.0], 1.0)
-    assert run.status is ns.Status.NON_UNIQUE
-    assert all(mode in run.message for mode in ("+-", "--"))
-
-
 def test_ensembles_are_the_runs_one_by_one():
     starts = np.array([[0.5, 0.0], [1.0, 0.5], [np.nan, 0.0], [-1.0, 0.0]])
     many = ns.ensemble(TABLE, starts, 3.0, t_eval=[0.5, 1.0], at_event=("impact", 2))
@@ -174,18 +156,6 @@ def test_zero_over_zero_is_no_number(f):
     assert run.status is ns.Status.NOT_FINITE and run.t[-1] == 0.0
     many = ns.ensemble(system, np.zeros((70, 2)), 1.0)
     assert {ns.Status(s) for s in many.status} == {ns.Status.NOT_FINITE}
-
-
-def test_terms_that_a_mode_leaves_out():
-    """Beside sliding and other surfaces; functions of the other sides have no values on the way."""
-    z, w = ca.SX.sym("z"), ca.SX.sym("w")
-    grows = ca.sign(x) * ca.sqrt(0.01 + ca.fabs(x))
-    empties = -ca.if_else(z > 0.25, ca.sqrt(z), 0.5)
-    made = ns.FilippovSystem.from_expression([x, z, w], [grows, empties, -ca.sign(w)])
-    run = ns.simulate(made, [0.005, 1.0, 0.5], 3.0)
-    exact = [(np.sqrt(0.015) + 1.5) ** 2 - 0.01, 0.25 - 0.5 * 2.0, 0.0]
-    assert run.status == ns.Status.REACHED_END
-    np.testing.assert_allclose(run.x[-1], exact, atol=1e-9)
 
 
 def test_quotients_whose_divisors_overflow():

@@ -86,12 +86,3 @@ def test_derivatives_of_a_map_of_the_state_at_its_trigger(values):
         return
     with pytest.raises(ns.DegenerateError, match="trigger"):
         ns.sensitivity(ns.simulate(system, [0.0, 0.5], 1.4))
-
-
-def test_ticks_at_late_times():
-    late, end = 1.7e9, 0.0
-    system = ns.FilippovSystem([x], field=[-x], clocks=ns.Clock(0.3, {x: x + 1}))
-    run = ns.simulate(system, [0.0, 0.0], late + 1, t_start=late)
-    for _ in range(3):
-        end = end * math.exp(-0.3) + 1
-    np.testing.assert_allclose(run.x[-1], [end * math.exp(-0.1), 0.1], rtol=0, atol=1e-10)

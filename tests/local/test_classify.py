@@ -5,12 +5,12 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth import textbook
-from nonsmooth.local import classify
+from nonsmooth.local import boundary_equilibrium, classify, fold_fold
 
-X, Y, Z = (ca.SX.sym(s) for s in "xyz")
-
-
+X, Y, Z, T = (ca.SX.sym(s) for s in "xyzt")
 PLANE = ns.FilippovSystem([X, Y], surface=Y, above=[1, X], below=[1, 1])
+SPACE = ns.FilippovSystem([X, Y, Z], surface=X, above=[Y, 1, 0], below=[1, 0, 0])
+MOVING = ns.FilippovSystem([X, Y], surface=Y, above=[ca.cos(T), -1], below=[1, 1], time=T)
 
 
 def test_classify_in_three_dimensions():
@@ -46,17 +46,31 @@ def test_two_folds_near_a_boundary_are_degenerate():
         assert found.distance == pytest.approx(2 * eps, abs=1e-15)
 
 
-def test_messages():
-    with pytest.raises(ns.PointError, match=r"point.*surface"):
-        classify(PLANE, [1.0, 0.5])
-    with pytest.raises(ns.OptionError, match="margin"):
-        classify(PLANE, [0.0, 0.0], margin=-1.0)
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: classify(PLANE, [1.0, 0.5]), ns.PointError, "point.*surface"),
+        (lambda: classify(PLANE, [0.0, 0.0], margin=-1.0), ns.OptionError, "margin"),
+        (lambda: fold_fold(PLANE, [0.0, 0.0]), ns.PointError, "fold-fold"),
+        (lambda: fold_fold(SPACE, [0.0, 0.0, 0.0]), ns.DefinitionError, "fold-fold.*3 states"),
+        (lambda: boundary_equilibrium(PLANE, [0.0, 0.0]), ns.PointError, "point.*equilibrium"),
+        (
+            lambda: ns.find_boundary_equilibrium(PLANE, [0, 0], vary="mu"),
+            ns.DefinitionError,
+            "vary",
+        ),
+        (lambda: ns.find_equilibrium(PLANE, [0.0, 0.0]), ns.ConvergenceError, "equilibrium of F1"),
+        (lambda: ns.find_equilibrium(MOVING, [0.0, 0.0]), ns.DefinitionError, "time"),
+    ],
+)
+def test_points_that_are_not_what_is_requested_are_refused(call, error, message):
+    with pytest.raises(error, match=message):
+        call()
 
 
 def test_time_and_hidden_dynamics():
-    t, lam = ca.SX.sym("t"), ca.SX.sym("lam")
-    moving = ns.FilippovSystem([X, Y], surface=Y, above=[ca.cos(t), -1], below=[1, 1], time=t)
-    assert classify(moving, [0.0, 0.0], t=1.0).label == "attracting sliding"
+    lam = ca.SX.sym("lam")
+    assert classify(MOVING, [0.0, 0.0], t=1.0).label == "attracting sliding"
     hidden = ns.FilippovSystem(
         [X, Y], surface=Y, multipliers=lam, field=[1, -(lam**3)], hidden=True
     )

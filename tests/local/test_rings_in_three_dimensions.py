@@ -13,26 +13,12 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.local import find_two_fold
+from tests.local.two_folds.test_classification import ANGLES, EXAMPLES, VV
 
-VV, II, VI, IV = (1, -1), (-1, 1), (1, 1), (-1, -1)
 RADIUS = 0.02
-ANGLES = (np.arange(120) + 0.5) * np.pi / 240
 QUADRATIC = np.random.default_rng(7).normal(size=(2, 3, 3, 3)) * 0.5
 
-CASES = [
-    (VV, (2, 1), "VV-F"),
-    (VV, (0.5, 0.5), "VV-C1"),
-    (VV, (-2, -1), "VV-C1"),
-    (II, (-2, -1), "II-C"),
-    (II, (-0.5, -0.5), "II-F"),
-    (VI, (-3, -0.5), "mix-C"),
-    (VI, (0.5, 3), "mix-F"),
-    (VI, (-1.5, 1.5), "mix-S"),
-    (VI, (0, 0.5), "mix-0"),
-    (VI, (2, -2), "mix-0"),
-    (IV, (-0.5, -3), "mix-C"),
-    (IV, (1.5, -1.5), "mix-S"),
-]
+CASES = [EXAMPLES[k][:3] for k in (0, 1, 2, 5, 6, 9, 10, 11, 12, 13, 14, 16)]
 
 
 def fields(sigma, nu, x):

@@ -1,4 +1,4 @@
-"""Ctrl-C at a given call of a function."""
+"""Ctrl-C at a given call of a function, and what a progress bar is given."""
 
 
 def interrupt(monkeypatch, owner, name, calls, *, once=False):
@@ -12,3 +12,18 @@ def interrupt(monkeypatch, owner, name, calls, *, once=False):
         return plain(*args, **options)
 
     monkeypatch.setattr(owner, name, counted)
+
+
+def watch_progress(monkeypatch, module):
+    """What a module gives its progress bars: the options, and the parts until they are closed."""
+    parts, options = [], []
+
+    class Bar:
+        def update(self, part=1):
+            parts.append(part)
+
+        def close(self):
+            parts.append("closed")
+
+    monkeypatch.setattr(module, "progress_bar", lambda *given: options.append(given) or Bar())
+    return parts, options

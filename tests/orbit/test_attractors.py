@@ -140,15 +140,18 @@ def test_a_point_and_a_cycle_that_never_meets_the_section(section):
         above=[x * (4 - r2) - 5 * v, v * (4 - r2) + 5 * x],
         below=[-x - v, x - v],
     )
-    found = ns.basins(system, GRID, 40.0, section=section, work=QUIET)
-    inside = AXIS[:, None] ** 2 + AXIS**2 < 1
-    rest = int(found.labels[2, 2])
+    axis = np.linspace(-3, 3, 12)
+    found = ns.basins(system, {"x": axis, "v": axis}, 40.0, section=section, work=QUIET)
+    inside = axis[:, None] ** 2 + axis**2 < 1
+    rest = int(found.labels[6, 6])
+    assert found.fractions[rest] == inside.mean()
     assert np.array_equal(found.labels == rest, inside) and set(np.unique(found.labels)) == {1, 2}
     assert found.attractors[rest - 1].kind == "point"
     assert np.abs(found.attractors[rest - 1].points).max() < 1e-9
     other = found.attractors[2 - rest]
     assert other.kind == ("cycle" if section is v else "recurrent")
     assert np.abs(np.hypot(*other.points.T) - 2.0).max() < 1e-6
+    assert section is v or len(other.points) > 5
 
 
 @pytest.mark.parametrize("section", [None, pytest.param(v, marks=SLOW)])

@@ -10,7 +10,7 @@ import nonsmooth as ns
 from nonsmooth.orbit.basins import Search
 from tests.orbit.periodic_cases import CASES, double_well
 
-x, y, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "t", "lam"))
+x, v, t, lam = (ca.SX.sym(s) for s in ("x", "v", "t", "lam"))
 WELL = double_well()
 QUIET = ns.Work(threads=1, progress=False)
 
@@ -29,28 +29,6 @@ def test_thresholds_of_the_double_well_to_rounding_by_narrowing_the_grid():
             if high - low < 1e-9:
                 break
         assert low - 1e-10 < threshold < high + 1e-10
-
-
-@pytest.mark.slow
-def test_a_repelling_circle_divides_rest_from_a_cycle():
-    r2 = x**2 + y**2
-    system = ns.FilippovSystem(
-        [x, y],
-        surface=r2 - 1,
-        above=[x * (4 - r2) - 5 * y, y * (4 - r2) + 5 * x],
-        below=[-x - y, x - y],
-    )
-    axis = np.linspace(-3, 3, 12)
-    found = ns.basins(system, {"x": axis, "y": axis}, t_end=40.0, work=QUIET)
-    inside = axis[:, None] ** 2 + axis**2 < 1
-    rest = int(found.labels[6, 6])
-    assert np.array_equal(found.labels == rest, inside) and set(np.unique(found.labels)) == {1, 2}
-    assert np.allclose(found.attractors[rest - 1].points, 0.0, atol=1e-6)
-    cycle = found.attractors[2 - rest].points
-    assert np.allclose(np.hypot(*cycle.T), 2.0, atol=1e-6) and len(cycle) > 5
-    assert found.fractions[rest] == inside.mean()
-    crossing = ns.basins(system, {"x": axis, "y": axis}, t_end=40.0, section=y, work=QUIET)
-    assert np.array_equal(crossing.labels == crossing.labels[6, 6], inside)
 
 
 def test_forced_systems_are_sampled_after_each_period():

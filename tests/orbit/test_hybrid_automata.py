@@ -7,8 +7,7 @@ from scipy.linalg import expm
 
 import nonsmooth as ns
 
-x, y, v, q, g, t = (ca.SX.sym(s) for s in ("x", "y", "v", "q", "g", "t"))
-a, b, c = (ca.SX.sym(s) for s in ("a", "b", "c"))
+x, v, q, g, a, b = (ca.SX.sym(s) for s in "xvqgab")
 
 
 def converter(*more):

@@ -18,9 +18,9 @@ import numpy as np
 
 import nonsmooth as ns
 from tests.flow.damaged_files import JUNK, cut, flipped, replaced
+from tests.proofs.checking import CHECKER
 from tests.proofs.systems import BALL, PLANE, TEIXEIRA
 
-CHECKER = Path(__file__).parents[2] / "checker"
 MORE = (
     "1e999999999",
     "1/0",

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
-CHECKER = Path(__file__).parents[2] / "checker"
+from tests.proofs.checking import CHECKER
 
 
 @pytest.fixture(scope="module")

@@ -18,9 +18,6 @@ from nonsmooth.local.searches.boundary_equilibria import fold_orbit_landing
 X, Y, Z = (ca.SX.sym(s) for s in "xyz")
 
 
-PLANE = ns.FilippovSystem([X, Y], surface=Y, above=[1, X], below=[1, 1])
-
-
 @pytest.mark.parametrize(
     ("side", "quantity", "near", "kind", "label"),
     [
@@ -111,12 +108,3 @@ def test_a_pseudo_equilibrium_at_infinity_is_degenerate():
     found = boundary_equilibrium(system, [1.0, 0.0])
     assert found.label == "degenerate" and found.margins["s"] == 0.0
     assert found.margins["fold orbit meets the pseudo-saddle"] == 1.0
-
-
-def test_messages():
-    with pytest.raises(ns.PointError, match=r"point.*equilibrium"):
-        boundary_equilibrium(PLANE, [0.0, 0.0])
-    with pytest.raises(ns.DefinitionError, match="vary"):
-        find_boundary_equilibrium(PLANE, [0.0, 0.0], vary="mu")
-    with pytest.raises(ns.DefinitionError, match="side"):
-        find_boundary_equilibrium(PLANE, [0.0, 0.0], vary="mu", side="below")

@@ -6,10 +6,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.local import find_all, find_equilibrium
 
-X, Y, Z = (ca.SX.sym(s) for s in "xyz")
-
-
-PLANE = ns.FilippovSystem([X, Y], surface=Y, above=[1, X], below=[1, 1])
+X, Y = ca.SX.sym("x"), ca.SX.sym("y")
 
 
 def test_equilibria_from_many_starts():
@@ -24,17 +21,6 @@ def test_equilibria_from_many_starts():
     }  # fmt: skip
     centre = find_equilibrium(system, [0.9, 0.1])
     assert (centre.status, centre.kind) == ("real", "degenerate")  # a centre: no real part
-
-
-def test_messages():
-    with pytest.raises(ns.DefinitionError, match="side"):
-        find_equilibrium(PLANE, [0.0, 0.0], side="left")
-    with pytest.raises(ns.ConvergenceError, match="equilibrium of F1"):
-        find_equilibrium(PLANE, [0.0, 0.0])
-    t = ca.SX.sym("t")
-    moving = ns.FilippovSystem([X, Y], surface=Y, above=[ca.cos(t), -1], below=[1, 1], time=t)
-    with pytest.raises(ns.DefinitionError, match="time"):
-        find_equilibrium(moving, [0.0, 0.0])
 
 
 def test_an_equilibrium_behind_a_contact_is_virtual():

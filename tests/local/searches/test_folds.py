@@ -129,9 +129,7 @@ def test_explicit_time():
     [
         (lambda s: fold(s, [0.5, 0]), ns.PointError, "L1 = 0.5"),
         (lambda s: fold(s, [0.5, 0.1]), ns.PointError, "h = 0.1"),
-        (lambda s: fold(s, [0, 0], side="left"), ns.DefinitionError, "side.*'left'"),
         (lambda s: fold(s, [0, 0], max_order=1), ns.DefinitionError, "max_order"),
-        (lambda s: find_fold(s, [0, 0], side="above"), ns.DefinitionError, "side.*'above'"),
         (lambda s: find_fold(s, [0, math.nan]), ns.PointError, "finite"),
         (lambda s: find_fold(s, [0, 0, 0]), ns.PointError, "point.*shape"),
         (lambda s: find_fold(s, [0, 0], hold="x"), ns.DefinitionError, "free states"),

@@ -40,6 +40,13 @@ def test_pseudo_hopf_node():
     assert relay.eigenvalues == pytest.approx([-2.0])
 
 
+def test_the_fused_focus_of_the_pseudo_hopf_bifurcation():
+    problem = textbook.pseudo_hopf()
+    found = ns.local.fold_fold(problem.system, [0.0, 0.0], parameters={"al": 0.0})
+    assert found.label == "II2"
+    assert found.numbers["stability"] == pytest.approx(2 / 3)  # -2 r/3: the cycle is stable
+
+
 def random_system(n, rng):
     """A pseudo-equilibrium at the origin of h = x1 + quadratic, with random smooth fields."""
     x = ca.vertcat(*[ca.SX.sym(f"x{i}") for i in range(n)])

@@ -2,7 +2,6 @@
 
 import math
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given
@@ -17,13 +16,6 @@ from nonsmooth.local.two_folds import (
     max_flights,
     return_matrix,
 )
-
-
-def system(sigma, nu):
-    x, y, z = (ca.SX.sym(s) for s in "xyz")
-    return ns.FilippovSystem(
-        [x, y, z], surface=x, above=[-y, -sigma[0], nu[0]], below=[z, nu[1], sigma[1]]
-    )
 
 
 def flights(z, nu, most=2000):
@@ -74,7 +66,7 @@ numbers = st.floats(-3, 3)
 @pytest.mark.slow
 @given(numbers, numbers, st.floats(-2, -0.01), st.floats(-2, 2))
 def test_flights_are_orbits_of_the_normal_form(n1, n2, down, other):
-    nu, s = (n1, n2), system((-1, 1), (n1, n2))
+    nu, s = (n1, n2), ns.textbook.two_fold((-1, 1), (n1, n2)).system
     run = ns.flow.follow(s, [0, down, other], 2 * abs(down), mode="+")
     np.testing.assert_allclose(run.x[-1], [0, *flight_above([down, other], nu)], atol=1e-12)
     run = ns.flow.follow(s, [0, other, down], 2 * abs(down), mode="-")

@@ -6,6 +6,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.branches.homoclinic_curves import event_of
+from tests.orbit.branches import test_soft_switches as soft
 from tests.orbit.periodic_cases import kinds, symbols, values_of
 
 VALUES = values_of("cases/continuous_switching.json")
@@ -132,17 +133,8 @@ def test_periods_diverge_at_the_boundary_nodes_of_a_neuron():
 
 @pytest.mark.parametrize(("beyond", "multiplier"), [(1e-3, -46.67), (1e-5, -4598.22)])
 def test_visits_beyond_a_force_that_jumps(beyond, multiplier):
-    t, size = ca.SX.sym("t"), ca.SX.sym("A")
-    free = size * ca.cos(0.8 * t) - 0.1 * v - x
-    stop = ns.FilippovSystem(
-        [x, v],
-        surface=x - 1,
-        above=[v, free - 5 * (x - 1) - 0.2],
-        below=[v, free],
-        parameters={size: 0.2},
-        time=t,
-    )
-    touch = ns.continue_orbit(ns.periodic_orbit(stop, [0, 0]), "A", bounds=(0.2, 0.4)).events[0]
+    orbit = ns.periodic_orbit(soft.stop(5 * (soft.x - 1) + 0.2), [0, 0])
+    touch = ns.continue_orbit(orbit, "A", bounds=(0.2, 0.4)).events[0]
     assert touch.kind == "grazing of a jumping force" and "persistence" in touch.far_side.verdict
     assert touch.coefficients["psi"] == pytest.approx(0.252461, abs=1e-6)
     root = beyond / touch.coefficients["psi"]  # of the depth: the free orbit would reach 1 + beyond

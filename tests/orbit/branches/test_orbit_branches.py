@@ -35,12 +35,15 @@ def digits(case, name):
     return pytest.approx(number(case, name), rel=1e-12, abs=0)
 
 
+def crossing():
+    system = scalar_relay()
+    return ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
+
+
 @pytest.fixture(scope="module")
 def forced():
     """x' = A cos t - k sgn x from crossing orbits through sliding ones to rest."""
-    system = scalar_relay()
-    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
-    return ns.continue_orbit(orbit, "A", bounds=(0.8, 3.0))
+    return ns.continue_orbit(crossing(), "A", bounds=(0.8, 3.0))
 
 
 def test_crossing_sliding_and_adding_sliding_of_a_forced_relay(forced):
@@ -71,9 +74,7 @@ def test_an_orbit_that_slides_all_the_time_is_superstable(forced):
 
 
 def test_the_branch_can_stop_at_the_event():
-    system = scalar_relay()
-    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
-    branch = ns.continue_orbit(orbit, "A", bounds=(1.5, 3.0), through=False)
+    branch = ns.continue_orbit(crossing(), "A", bounds=(1.5, 3.0), through=False)
     assert branch.ends == (ns.orbit.BranchEnd.EVENT, ns.orbit.BranchEnd.REACHED_BOUND)
     assert abs(branch.values[0] - number("F1", "A_crossing_sliding")) < 1e-12
 
@@ -201,8 +202,7 @@ def test_impact_grazing_of_a_forced_oscillator_from_either_side(hits):
 
 @pytest.mark.parametrize("calls", [1, 2, 3, 4, 5, 40, 90])
 def test_an_interrupt_returns_what_was_computed(monkeypatch, calls):
-    system = scalar_relay()
-    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
+    orbit = crossing()
     interrupt(monkeypatch, type(orbit.problem), "evaluate", calls - 1, once=True)
     branch = ns.continue_orbit(orbit, "A", bounds=(0.8, 3.0), progress=True)
     assert ns.orbit.BranchEnd.INTERRUPTED in branch.ends
@@ -452,8 +452,7 @@ def test_what_is_raised_at_an_event_is_reported_at_it(monkeypatch):
     def raises(self, zero):
         raise ns.DegenerateError("no such event")
 
-    system = scalar_relay()
-    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
+    orbit = crossing()
     monkeypatch.setattr(orbit_branches.OrbitCurve, "event", raises)
     branch = ns.continue_orbit(orbit, "A", bounds=(1.7, 3.0))
     assert kinds(branch) == ["unclassified"] and "no such event" in branch.reasons[0]

@@ -7,6 +7,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.orbit.manifolds.two_fold_sheet import TwoFoldSheet
 from tests.orbit.interrupts import interrupt
+from tests.proofs.systems import TEIXEIRA
 
 X, Y, Z, W = (ca.SX.sym(name) for name in "XYZW")
 
@@ -59,19 +60,19 @@ def require_closed_form(found, old, tol=1e-12):
     assert kinds == {"grazing", "two-fold"}
 
 
-@pytest.mark.slow
-def test_three_states_cut_at_a_height():
+def plain():
     above, below = base()
     system = ns.FilippovSystem([X, Y, Z], surface=X, above=above, below=below)
-    fold = ns.find_two_fold(system, near=[0.0, 0.01, 0.01])
-    found = ns.manifold(
-        system,
-        fold,
-        starts=lambda a, b: [0.3, a, b],
-        box=[(-2, -0.5), (-1, 1)],
-        duration=6.0,
-        spacing=0.2,
-    )
+    return system, ns.find_two_fold(system, near=[0.0, 0.01, 0.01])
+
+
+#: Starts at the height 0.3.
+CUT = {"starts": lambda a, b: [0.3, a, b], "duration": 6.0}
+
+
+@pytest.mark.slow
+def test_three_states_cut_at_a_height():
+    found = ns.manifold(*plain(), **CUT, box=[(-2, -0.5), (-1, 1)], spacing=0.2)
     require_closed_form(found, lambda x: x)
     assert [(a.itinerary, a.begin, a.end) for a in found.arcs] == [
         ("+", "bound", "junction"),
@@ -214,11 +215,7 @@ def test_backward_the_same_surface_divides_what_leaves():
 
 def test_curves_along_a_coordinate_are_found_too():
     """Edges of cells meet them at right angles: the arc that touches has one speed at the start."""
-    system, fold = plain()
-    start = lambda a, b: [0.3, a, b]
-    found = ns.manifold(
-        system, fold, starts=start, box=[(-1.2, -0.5), (-1, -0.7)], duration=6.0, spacing=0.4
-    )
+    found = ns.manifold(*plain(), **CUT, box=[(-1.2, -0.5), (-1, -0.7)], spacing=0.4)
     (arc,) = found.arcs
     assert (arc.itinerary, arc.begin, arc.end) == ("+", "bound", "bound")
     assert np.abs(arc.points[:, 0] - TOUCHES).max() < 1e-13
@@ -238,17 +235,15 @@ def opening():
     return system, ns.find_two_fold(system, near=[0.0, 0.0, 1.0])
 
 
+OPENED = {"starts": lambda a, b: [a, b, 0.0], "duration": 5.0, "until": "open", "spacing": 0.4}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("computed", [False, True])
 def test_orbits_that_end_where_both_fields_agree(computed):
-    system, fold = opening()
-    start = lambda a, b: [a, b, 0.0]
-    if computed:
-        start = ns.orbit.ComputedStarts(lambda u: (7.0, [*u, 0.0]))
-    box = [(-1.1, 1.03), (-2.07, 2.0)]
-    found = ns.manifold(
-        system, fold, starts=start, box=box, duration=5.0, until="open", spacing=0.4
-    )
+    starts = ns.orbit.ComputedStarts(lambda u: (7.0, [*u, 0.0]))
+    given = OPENED | ({"starts": starts} if computed else {})
+    found = ns.manifold(*opening(), **given, box=[(-1.1, 1.03), (-2.07, 2.0)])
     kinds = {arc.itinerary for arc in found.arcs}
     assert kinds == {"+", "+ s", "- s", "-"}
     for arc in found.arcs:
@@ -265,17 +260,8 @@ def test_orbits_that_end_where_both_fields_agree(computed):
 
 
 def test_a_curve_is_followed_from_points_of_it():
-    system, fold = opening()
-    found = ns.manifold(
-        system,
-        fold,
-        starts=lambda a, b: [a, b, 0.0],
-        box=[(-1.0, 1.0), (-2.0, 2.0)],
-        duration=5.0,
-        until="open",
-        spacing=0.4,
-        begin=[("s", (0.0, -0.5)), ("+ s", (0.1, -0.5)), ("+ s", (0.2, -0.5))],
-    )
+    begin = [("s", (0.0, -0.5)), ("+ s", (0.1, -0.5)), ("+ s", (0.2, -0.5))]
+    found = ns.manifold(*opening(), **OPENED, box=[(-1.0, 1.0), (-2.0, 2.0)], begin=begin)
     assert [(arc.itinerary, arc.end) for arc in found.arcs] == [("+ s", "junction"), ("+", "bound")]
     assert found.arcs[0].points[:3, 0].tolist() == [0.0, 0.1, 0.2]
     assert found.junctions == pytest.approx(np.array([[0.75, -0.5]]), abs=1e-11)
@@ -304,20 +290,11 @@ def test_invalid_events_of_dividing_surfaces_raise():
 # interruption and refusals ---------------------------------------------------------------------------
 
 
-def plain():
-    above, below = base()
-    system = ns.FilippovSystem([X, Y, Z], surface=X, above=above, below=below)
-    return system, ns.find_two_fold(system, near=[0.0, 0.01, 0.01])
-
-
 @pytest.mark.parametrize("calls", [20, pytest.param(40, marks=pytest.mark.slow)])
 def test_an_interrupted_curve_keeps_its_points(monkeypatch, calls):
     system, fold = plain()
-    given = dict(
-        starts=lambda a, b: [0.3, a, b], box=[(-2, -0.5), (-1, 1)], duration=6.0, spacing=0.2
-    )
     interrupt(monkeypatch, TwoFoldSheet, "meet", calls)
-    found = ns.manifold(system, fold, **given)
+    found = ns.manifold(system, fold, **CUT, box=[(-2, -0.5), (-1, 1)], spacing=0.2)
     assert not found.complete and "interrupted" in repr(found)
     assert sum(len(arc.points) for arc in found.arcs) > 3
     for arc in found.arcs:
@@ -327,15 +304,7 @@ def test_an_interrupted_curve_keeps_its_points(monkeypatch, calls):
 
 
 def test_curves_are_saved(tmp_path):
-    system, fold = plain()
-    found = ns.manifold(
-        system,
-        fold,
-        starts=lambda a, b: [0.3, a, b],
-        box=[(-1.5, -0.9), (-0.5, 0.5)],
-        duration=6.0,
-        spacing=0.5,
-    )
+    found = ns.manifold(*plain(), **CUT, box=[(-1.5, -0.9), (-0.5, 0.5)], spacing=0.5)
     found.save(tmp_path / "curves")
     again = ns.load(tmp_path / "curves")
     assert repr(again) == repr(found)
@@ -344,7 +313,7 @@ def test_curves_are_saved(tmp_path):
 
 def test_invalid_planes_of_starts_raise():
     system, fold = plain()
-    good = dict(starts=lambda a, b: [0.3, a, b], box=[(-2, -0.5), (-1, 1)], duration=6.0)
+    good = {**CUT, "box": [(-2, -0.5), (-1, 1)]}
     with pytest.raises(ns.OptionError, match="starts"):
         ns.manifold(system, fold, **{**good, "starts": [[0.3, 0, 0]]})
     with pytest.raises(ns.OptionError, match="starts"):
@@ -361,11 +330,9 @@ def test_invalid_planes_of_starts_raise():
         ns.manifold(system, ns.local.fold(system, [0.0, 0.0, -1.0]), **good)
     with pytest.raises(ns.DegenerateError, match=r"starts.*dividing surface"):
         ns.manifold(system, fold, **{**good, "box": [(1, 2), (1, 2)]})
-    teixeira = ns.FilippovSystem(
-        [X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1, 1 + 0.1 * Y]
-    )
+    fold = ns.find_two_fold(TEIXEIRA, near=[0.0, 0.1, -0.1])
     with pytest.raises(ns.DegenerateError, match="canard"):
-        ns.manifold(teixeira, ns.find_two_fold(teixeira, near=[0.0, 0.1, -0.1]), **good)
+        ns.manifold(TEIXEIRA, fold, **good)
 
 
 @pytest.mark.slow

@@ -15,9 +15,7 @@ SGN = ns.FilippovSystem([x], surface=x, above=[1], below=[-1])
 
 
 def two_fold(sigma, nu):
-    return ns.FilippovSystem(
-        [x, y, z], surface=x, above=[-y, -sigma[0], nu[0]], below=[z, nu[1], sigma[1]]
-    )
+    return ns.textbook.two_fold(sigma, nu).system
 
 
 def continuous(run):

@@ -8,10 +8,12 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.manifolds.invariant_manifolds import Follower
-from tests.orbit.interrupts import interrupt
+from tests.orbit.interrupts import interrupt, watch_progress
+from tests.orbit.manifolds.test_dividing import SLOPE, plain
 from tests.orbit.periodic_cases import CASES, PARAMETERS, double_well
+from tests.proofs.systems import TEIXEIRA
 
-x, y, z, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "z", "v", "t", "lam"))
+x, y, z = (ca.SX.sym(s) for s in "xyz")
 
 
 def test_smooth_saddle_and_its_curves_through_a_switch():
@@ -94,12 +96,18 @@ def test_a_surface_of_a_saddle_in_space():
     assert (np.linalg.norm(flat.mean(axis=1), axis=1) < 0.1).any()
 
 
-def test_the_surface_that_ends_on_a_sliding_curve():
-    """Sliding on z = 0 has a saddle at 0 with W^s: x = 0; fields (x, -y, -+1) keep x = 0."""
+@pytest.fixture(scope="module")
+def sheets():
+    """Orbits of both fields end on the line that slides to 0: one sheet above it, one below."""
     system = ns.FilippovSystem([x, y, z], surface=z, above=[x, -y, -1], below=[x, -y, 1])
     saddle = ns.find_pseudo_equilibrium(system, [0.1, 0.1, 0.0])
+    return system, saddle, ns.manifold(system, saddle, length=0.8, spacing=0.2)
+
+
+def test_the_surface_that_ends_on_a_sliding_curve(sheets):
+    """Sliding on z = 0 has a saddle at 0 with W^s: x = 0; fields (x, -y, -+1) keep x = 0."""
+    system, saddle, found = sheets
     assert saddle.kind == "pseudo-saddle"
-    found = ns.manifold(system, saddle, length=0.8, spacing=0.2)
     assert found.dimension == 2 and np.abs(found.points[:, 0]).max() < 1e-9
     assert found.points[:, 2].max() > 0.5 and found.points[:, 2].min() < -0.5
     assert {arc.itinerary for arc in found.arcs} == {"+", "-"}
@@ -151,33 +159,19 @@ def test_an_interrupted_first_curve_is_kept_as_far_as_it_was_followed(monkeypatc
 
 
 @pytest.mark.parametrize("more", [0, 1, 5])
-def test_an_interrupted_second_sheet_leaves_the_first_one(monkeypatch, more):
-    """Orbits of both fields end on the line that slides to 0: one sheet above it, one below."""
-    system = ns.FilippovSystem([x, y, z], surface=z, above=[x, -y, -1], below=[x, -y, 1])
-    saddle = ns.find_pseudo_equilibrium(system, [0.1, 0.1, 0.0])
-    whole = ns.manifold(system, saddle, length=0.8, spacing=0.2)
+def test_an_interrupted_second_sheet_leaves_the_first_one(monkeypatch, sheets, more):
+    system, saddle, whole = sheets
     above = sum(arc.itinerary == "+" for arc in whole.arcs)
     interrupt(monkeypatch, Follower, "arc", above + more)
     found = ns.manifold(system, saddle, length=0.8, spacing=0.2)
     assert not found.complete and whole.complete and found.dimension == 2
-    sheets = [arc.itinerary for arc in found.arcs]
-    assert sheets.count("+") == above and sheets.count("-") == (more if more > 1 else 0)
+    named = [arc.itinerary for arc in found.arcs]
+    assert named.count("+") == above and named.count("-") == (more if more > 1 else 0)
     assert found.triangles.max() < len(found.points)
 
 
 def test_orbits_of_a_manifold_are_counted(monkeypatch):
-    counted = []
-
-    class Bar:
-        def update(self, count=1):
-            counted.append(count)
-
-        def close(self):
-            counted.append("closed")
-
-    options = []
-    module = sys.modules[ns.manifold.__module__]
-    monkeypatch.setattr(module, "progress_bar", lambda *given: options.append(given) or Bar())
+    counted, options = watch_progress(monkeypatch, sys.modules[ns.manifold.__module__])
     system = ns.FilippovSystem([x, y], surface=x + 5, above=[x, -y], below=[x, -y + 0 * x])
     saddle = ns.find_equilibrium(system, [0.1, 0.1])
     ns.manifold(system, saddle, length=1.0, progress=True)
@@ -277,19 +271,12 @@ def test_a_negative_multiplier_has_a_moebius_band():
     assert count > 100
 
 
-def passing() -> ns.FilippovSystem:
-    """Two visible folds; sliding is (y, z)' = [[-0.3, 1], [1, 0.5]] (y, z) but for a factor."""
-    return ns.FilippovSystem([X, Y, Z], surface=X, above=[Y, 1, 0.5], below=[Z, 0.3, -1.0])
-
-
 def test_the_surface_that_divides_orbits_passing_a_two_fold():
-    system = passing()
-    fold = ns.find_two_fold(system, near=[0.0, 0.01, 0.01])
+    system, fold = plain()
     found = ns.manifold(system, fold, length=1.0, spacing=0.1)
-    slope = 0.4 - np.sqrt(1.16)  # of the eigenvector of 0.1 - sqrt(1.16)
     for arc in found.arcs:
         start, t = arc.points[0], arc.t
-        assert abs(start[2] - slope * start[1]) < 1e-7 and abs(start[0]) < 1e-12
+        assert abs(start[2] - SLOPE * start[1]) < 1e-7 and abs(start[0]) < 1e-12
         height, bend = (start[1], 1.0) if arc.itinerary[0] == "+" else (start[2], -1.0)
         assert np.abs(arc.points[:, 0] - height * t - bend * t * t / 2).max() < 1e-9
     # a second method: beside it orbits slide and leave to either side, on it they come to s
@@ -304,11 +291,8 @@ def test_the_surface_that_divides_orbits_passing_a_two_fold():
 
 @pytest.mark.slow
 def test_what_leaves_a_canard_is_a_surface_too():
-    system = passing()
-    fold = ns.find_two_fold(system, near=[0.0, 0.01, 0.01])
-    found = ns.manifold(system, fold, stable=False, length=1.0, spacing=0.2)
-    slope = 0.4 - np.sqrt(1.16)
-    assert all(abs(a.points[0, 2] - slope * a.points[0, 1]) < 1e-7 for a in found.arcs)
+    found = ns.manifold(*plain(), stable=False, length=1.0, spacing=0.2)
+    assert all(abs(a.points[0, 2] - SLOPE * a.points[0, 1]) < 1e-7 for a in found.arcs)
     assert all(a.t[-1] > 0 and a.points[0, 1] >= 0 for a in found.arcs)
 
 
@@ -317,9 +301,6 @@ def test_orbits_and_two_folds_without_a_surface_raise():
     cycle = ns.periodic_orbit(relaxing, ns.simulate(relaxing, [2.0, 0.0], 40.0))
     with pytest.raises(ns.DegenerateError, match="three dimensions"):
         ns.manifold(relaxing, cycle, length=1.0)
-    teixeira = ns.FilippovSystem(
-        [X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1, 1 + 0.1 * Y]
-    )
-    fold = ns.find_two_fold(teixeira, near=[0.0, 0.1, -0.1])
+    fold = ns.find_two_fold(TEIXEIRA, near=[0.0, 0.1, -0.1])
     with pytest.raises(ns.DegenerateError, match="canard"):
-        ns.manifold(teixeira, fold, length=1.0)
+        ns.manifold(TEIXEIRA, fold, length=1.0)

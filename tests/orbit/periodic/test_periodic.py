@@ -333,19 +333,8 @@ def test_an_orbit_that_rests_on_a_shaken_table() -> None:
 def test_multipliers_agree_with_the_return_map_in_forty_digits() -> None:
     rng = np.random.default_rng(3)
     for _ in range(3):
-        a, b, k = (
-            0.8 + 0.05 * rng.uniform(-1, 1),
-            0.5 + 0.05 * rng.uniform(-1, 1),
-            5 + rng.uniform(),
-        )
-        T, S = ca.SX.sym("T"), ca.SX.sym("S")
-        system = ns.FilippovSystem(
-            [T, S],
-            surface=S - a * T + 0.01,
-            above=[1 - (1 + k) * T, b * (1 - S) - k * S],
-            below=[1 - T, b * (1 - S)],
-        )
-        orbit = ns.periodic_orbit(system, [0.4, 0.3])
+        a, b, k = rng.uniform([0.75, 0.45, 5.0], [0.85, 0.55, 6.0])
+        orbit = ns.periodic_orbit(welander(), [0.4, 0.3], parameters={"a": a, "b": b, "k": k})
         (x0,) = [leg.start[0] for leg in orbit.legs if leg.mode == "+"]
         with mp.workdps(40):
             slope = mp.diff(partial(_returned, a=a, b=b, k=k, orbit=orbit), x0)

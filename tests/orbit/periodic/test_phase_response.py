@@ -62,14 +62,8 @@ def test_rows_are_the_responses_at_their_times():
 
 
 def test_integrate_and_fire():
-    v, current = ca.SX.sym("v"), ca.SX.sym("I")
-    system = ns.FilippovSystem(
-        [v],
-        field=[current - v],
-        resets=ns.Reset(v - 1, [0.0], direction=1),
-        parameters={current: 1.2},
-    )
-    orbit = ns.periodic_orbit(system, [0.3])
+    system = ns.textbook.integrate_and_fire().system
+    orbit = ns.periodic_orbit(system, [0.3], parameters={"I": 1.2})
     response = phase_response(orbit)
     begin = orbit.legs[0].duration if orbit.legs[0].start[0] > 1e-9 else 0.0
     for t in (0.0, 0.4, 1.5):

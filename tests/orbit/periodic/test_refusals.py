@@ -9,41 +9,30 @@ from nonsmooth.orbit.periodic.boundary_value_problem import BoundaryProblem
 from tests.orbit.periodic_cases import forced_friction, scalar_relay, stick_slip, walker, welander
 
 X, Y = ca.SX.sym("x"), ca.SX.sym("y")
+EARLY = r"guess.*leg 2 \(s, ended by lambda0 = 1\)"
+NO_FRICTION = {"parameters": {"f": 0.0}}
+
+
+def damped():
+    return ns.FilippovSystem([X, Y], field=[Y, -X - Y / 2])
 
 
 @pytest.mark.parametrize(
-    ("solve", "error", "message"),
+    ("build", "guess", "options", "error", "message"),
     [
-        (lambda: (forced_friction(), [1.5, 0.0], {"period": -2.0}), ns.OptionError, "period"),
-        (lambda: (forced_friction(), [1.5, 0.0], {"period": 3.3}), ns.OptionError, "period.*3.3"),
-        (lambda: (forced_friction(), [1.5, 0.0], {"period": "x"}), ns.OptionError, "period.*'x'"),
-        (
-            lambda: (walker(), [0.2, -0.2, 0.4, -0.0158], {"itinerary": [("", "toe")]}),
-            ns.OptionError,
-            "itinerary.*'toe'",
-        ),
-        (lambda: (welander(), [0.4, 0.3], {"max_iterations": 0}), ns.OptionError, "max_iterations"),
-        (
-            lambda: (ns.FilippovSystem([X, Y], field=[Y, -X - Y / 2]), [1.0, 0.0], {}),
-            ns.ConvergenceError,
-            "shrank.*equilibrium",
-        ),
-        (
-            lambda: (stick_slip(), [1.0, 0.5], {"itinerary": "- s +"}),
-            ns.ConvergenceError,
-            r"guess.*leg 2 \(s, ended by lambda0 = 1\)",
-        ),
-        (
-            lambda: (stick_slip(), [1.0, 0.5], {"itinerary": "- s", "parameters": {"f": 0.0}}),
-            ns.DegenerateError,
-            "leg 2.*two-fold",
-        ),
+        (forced_friction, [1.5, 0.0], {"period": -2.0}, ns.OptionError, "period"),
+        (forced_friction, [1.5, 0.0], {"period": 3.3}, ns.OptionError, "period.*3.3"),
+        (forced_friction, [1.5, 0.0], {"period": "x"}, ns.OptionError, "period.*'x'"),
+        (walker, [0.2, -0.2, 0.4, -0.0158], {"itinerary": [("", "toe")]}, ns.OptionError, "itinerary.*'toe'"),
+        (welander, [0.4, 0.3], {"max_iterations": 0}, ns.OptionError, "max_iterations"),
+        (damped, [1.0, 0.0], {}, ns.ConvergenceError, "shrank.*equilibrium"),
+        (stick_slip, [1.0, 0.5], {"itinerary": "- s +"}, ns.ConvergenceError, EARLY),
+        (stick_slip, [1.0, 0.5], {"itinerary": "- s", **NO_FRICTION}, ns.DegenerateError, "leg 2.*two-fold"),
     ],
-)
-def test_errors_name_the_leg_and_the_cause(solve, error, message) -> None:
-    system, guess, options = solve()
+)  # fmt: skip
+def test_errors_name_the_leg_and_the_cause(build, guess, options, error, message) -> None:
     with pytest.raises(error, match=message):
-        ns.periodic_orbit(system, guess, **options)
+        ns.periodic_orbit(build(), guess, **options)
 
 
 @pytest.mark.parametrize("start", [1e6, 1e8, 1e10, 1e14])
@@ -96,11 +85,8 @@ def test_invalid_attractors_raise(points) -> None:
 
 @pytest.mark.parametrize("start", [1e300, -1e17])
 def test_a_state_whose_motion_is_lost_in_rounding_is_no_orbit(start) -> None:
-    t = ca.SX.sym("t")
-    drive = 2.5 * ca.cos(t)
-    relay = ns.FilippovSystem([X], surface=X, above=[drive - 1], below=[drive + 1], time=t)
     with pytest.raises(ns.ConvergenceError, match="rounding"):
-        ns.periodic_orbit(relay, [start])
+        ns.periodic_orbit(scalar_relay(), [start])
 
 
 @pytest.mark.parametrize("offset", [1e6, 1e9])
@@ -256,37 +242,26 @@ def curve(**given):
     return type("Mine", (Circle,), given)()
 
 
+CURVES = [
+    ({"equations": lambda self, u: None}, "curve.equations"),
+    ({"equations": lambda self, u: u @ u}, "curve.equations"),
+    ({"equations": lambda self, u: (u, np.eye(2))}, r"curve.equations.*\(1, 2\)"),
+    ({"parameter": 7}, "curve.parameter"),
+    ({"scale": np.array([1.0, 0.0])}, "curve.scale"),
+    ({"tests": lambda self, point: [0.5]}, r"curve.tests.*\[0.5\]"),
+    ({"tests": lambda self, point: {"half": "a"}}, "curve.tests.*'half'"),
+    ({"tests": lambda self, point: {3: 0.5}, "exact": False}, "curve.tests.*3"),
+    ({"tests": lambda self, point: {"x": point.u}}, "under"),
+]
+
+
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [
         ({"curve": None}, ns.DefinitionError, "curve"),
         ({"curve": Circle}, ns.DefinitionError, "curve"),
         ({"curve": ns.continuation.Curve()}, ns.DefinitionError, "curve.*equations"),
-        ({"curve": curve(equations=lambda self, u: None)}, ns.DefinitionError, "curve.equations"),
-        ({"curve": curve(equations=lambda self, u: u @ u)}, ns.DefinitionError, "curve.equations"),
-        (
-            {"curve": curve(equations=lambda self, u: (u, np.eye(2)))},
-            ns.DefinitionError,
-            r"curve.equations.*\(1, 2\)",
-        ),
-        ({"curve": curve(parameter=7)}, ns.DefinitionError, "curve.parameter"),
-        ({"curve": curve(scale=np.array([1.0, 0.0]))}, ns.DefinitionError, "curve.scale"),
-        (
-            {"curve": curve(tests=lambda self, point: [0.5])},
-            ns.DefinitionError,
-            r"curve.tests.*\[0.5\]",
-        ),
-        (
-            {"curve": curve(tests=lambda self, point: {"half": "a"})},
-            ns.DefinitionError,
-            "curve.tests.*'half'",
-        ),
-        (
-            {"curve": curve(tests=lambda self, point: {3: 0.5}, exact=False)},
-            ns.DefinitionError,
-            "curve.tests.*3",
-        ),
-        ({"curve": curve(tests=lambda self, point: {"x": point.u})}, ns.DefinitionError, "under"),
+        *(({"curve": curve(**own)}, ns.DefinitionError, words) for own, words in CURVES),
         ({"rows": []}, ns.PointError, "rows"),
         ({"rows": None}, ns.PointError, "rows"),
         ({"rows": ["ab"]}, ns.PointError, "rows"),

@@ -39,10 +39,6 @@ TWISTING = ns.FilippovSystem(
 )
 
 
-def numbers(case: str, key: str) -> np.ndarray:
-    return np.array(CASES[case]["values"][key], float)
-
-
 def at_limit(run: ns.Trajectory) -> int:
     return next(k for k, e in enumerate(run.events) if e.kind in ("contact", "rest"))
 

@@ -9,9 +9,16 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.orbit.runs import lyapunov
 from tests.orbit.interrupts import interrupt
-from tests.orbit.periodic_cases import CASES, PARAMETERS, cases_of, relay_oscillator
+from tests.orbit.periodic_cases import (
+    CASES,
+    PARAMETERS,
+    cases_of,
+    forced_friction,
+    relay_oscillator,
+    stick_slip,
+)
 
-x, y, u, v, t, f, lam = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t", "f", "lam"))
+x, y, u, v = (ca.SX.sym(s) for s in "xyuv")
 
 
 def test_doubling_of_an_angle_by_squaring():
@@ -49,15 +56,8 @@ def test_relay_oscillator_contracts_as_its_damping():
 
 def test_sum_of_forced_friction_is_that_of_its_closed_form():
     """D1: no sticking; the volume shrinks at the reversals only."""
-    p, values = PARAMETERS["D1"], CASES["D1"]
-    W = float(p["W"])
-    system = ns.FilippovSystem(
-        [x, v],
-        surface=v,
-        multipliers=lam,
-        field=[v, float(p["F"]) * ca.cos(W * t) - x - float(p["f"]) * lam],
-        time=t,
-    )
+    values, W = CASES["D1"], float(PARAMETERS["D1"]["W"])
+    system = forced_friction()
     period, at = float(values["period"]), float(values["phase"])
     # the orbit turns at x0 when W t = phase, in one of the two senses of the angle
     starts = [(float(values["x0"]), sign * at / W) for sign in (1, -1)]
@@ -75,13 +75,7 @@ def test_sum_of_forced_friction_is_that_of_its_closed_form():
 
 def test_an_entry_to_sliding_loses_a_direction_for_good():
     """A block carried by a belt to its slip and back: one direction is lost, one is the flow's."""
-    belt = ns.FilippovSystem(
-        [x, v],
-        surface=v - 0.5,
-        above=[v, -x - 1 + 0.2 * (v - 0.5)],
-        below=[v, -x + 1 - 0.2 * (0.5 - v)],
-    )
-    found = ns.lyapunov_spectrum(belt, [0.2, 0.5], t_end=200.0, progress=False)
+    found = ns.lyapunov_spectrum(stick_slip(), [0.2, 0.5], t_end=200.0, progress=False)
     assert abs(found.exponents[0]) < 0.02 and found.exponents[1] == -math.inf
     assert math.isnan(found.sum_check) and "-inf" in str(found)
 

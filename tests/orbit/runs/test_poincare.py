@@ -7,18 +7,15 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from tests.orbit.periodic_cases import CASES, PARAMETERS
+from tests.orbit.periodic_cases import CASES, welander
 
-x, y, v, t, k0, s0, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "t", "T", "S", "lam"))
+x, y, v, t, k0, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "t", "T", "lam"))
 
 
 def test_welanders_box_returns_with_its_period_and_multiplier():
     """R5: from a start off the orbit; the derivative of a return has the orbit's multiplier and 0."""
-    p, values = PARAMETERS["R5"], CASES["R5"]
-    surface = -p["a"] * k0 + s0 - p["eps"]
-    half = lambda k: [1 - k0 - k * k0, 0.5 * (1 - s0) - k * s0]
-    box = ns.FilippovSystem([k0, s0], surface=surface, above=half(5), below=half(0))
-    found = ns.orbit.poincare(box, "h0", [0.87, 0.69], count=25, tol=1e-13)
+    values = CASES["R5"]
+    found = ns.orbit.poincare(welander(), "h0", [0.87, 0.69], count=25, tol=1e-13)
     assert np.diff(found.t)[-1] == pytest.approx(float(values["period"]), rel=1e-10)
     assert np.allclose(found.points[-1][0], float(values["T_end_k0"]), rtol=1e-9)
     multipliers = np.sort(np.abs(np.linalg.eigvals(found.jacobian(24))))

@@ -87,6 +87,7 @@ def main(count, seed=0):
                 with contextlib.redirect_stdout(words):
                     code = program.main([str(path)])
                 counts["checked" if code == 0 else "not checked"] += 1
+                assert code == 0 or "NOT CHECKED" in words.getvalue()
             except LongError:
                 counts["long"] += 1
             except BaseException:
@@ -94,7 +95,6 @@ def main(count, seed=0):
                 raise
             finally:
                 signal.setitimer(signal.ITIMER_REAL, 0.0)
-            assert code == 0 or "NOT CHECKED" in words.getvalue()
     print(count, "proofs:", ", ".join(f"{name} {n}" for name, n in sorted(counts.items())))
 
 

@@ -227,20 +227,20 @@ def test_keys_sliders_and_the_address(browser, page):
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
 
-    browser.open(page, hash="p=0.5,0.2&x=0.4,-0.2&t=12&box=-1,1,-1,1")
+    browser.open(page, hash="p=0.5,0.2&x=0.4,-0.2003&t=12&box=-1,1,-1,1")
     seen = browser.run(READY)
-    run = ns.simulate(BELT, [0.4, -0.2], 12.0, parameters={"belt": 0.5, "friction": 0.2})
+    run = ns.simulate(BELT, [0.4, -0.2003], 12.0, parameters={"belt": 0.5, "friction": 0.2})
     assert seen["word"] == run.itinerary and state_of(seen) == pytest.approx(run.x[-1], abs=1e-6)
     browser.run("document.querySelector('.handle').focus()")
     handle = browser.driver.find_element(By.CSS_SELECTOR, ".handle")
     handle.send_keys(Keys.SHIFT, Keys.ARROW_LEFT * 2)
     seen = browser.run(READY)
-    assert seen["say"] == "x 0.3, v -0.2" and "&x=0.3,-0.2&" in seen["hash"]
+    assert seen["say"] == "x 0.3, v -0.2003" and "&x=0.3,-0.2003&" in seen["hash"]
     browser.driver.find_element(By.ID, "p-0-range").send_keys(Keys.ARROW_RIGHT * 5)
     seen = browser.run(READY)
     (belt,) = re.findall(r"p=([\d.]+),0.2", seen["hash"])
     assert float(belt) > 0.5
-    run = ns.simulate(BELT, [0.3, -0.2], 12.0, parameters={"belt": float(belt), "friction": 0.2})
+    run = ns.simulate(BELT, [0.3, -0.2003], 12.0, parameters={"belt": float(belt), "friction": 0.2})
     assert seen["word"] == run.itinerary and state_of(seen) == pytest.approx(run.x[-1], abs=1e-6)
     browser.driver.find_element(By.ID, "reset").click()
     assert "p=0.3,0.4&x=0,0&t=30" in browser.run(READY)["hash"]

@@ -243,8 +243,8 @@ const Page = (() => {
       if (!move) return;
       const { step } = given; // which may follow the plane's ranges
       const by = step * (event.shiftKey ? 10 : 1);
-      // to multiples of the step, so that going and coming back meet
-      set(clamp(get().map((v, k) => Math.round((v + by * move[k]) / step) * step)));
+      // the coordinate that moves to multiples of the step, so that steps back and forth cancel
+      set(clamp(get().map((v, k) => (move[k] ? Math.round((v + by * move[k]) / step) * step : v))));
       event.preventDefault();
     });
     return () => {

@@ -139,9 +139,11 @@ class Event:
 
     Attributes
     ----------
-    kind : {"crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "jump", "zero", "end"}
+    kind : {"crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "jump", "stability", \
+"rest", "rest_below", "zero", "end"}
         ``entry`` and ``exit`` are of sliding; contacts and complementarity conditions close (``contact``) and open
-        (``release``); ``jump`` leads from a forbidden state; ``zero`` is a zero found by ``follow``.
+        (``release``); ``jump`` leads from a forbidden state; ``stability`` is lost by sliding on several surfaces;
+        a relay in a position comes to ``rest``; ``zero`` is one of ``flow.follow``.
     t : float
         Time of the event.
     x : ndarray (n,)

@@ -43,7 +43,7 @@ ADVICE: dict[Status, str] = {
     Status.NON_UNIQUE: "The motion is not unique from here; continue from the last state with "
     "start_mode= and one of the modes.",
     Status.ACCUMULATION: "Events accumulate in finite time (Zeno); continue from the limit with "
-    "the mode that is admissible there.",
+    "the mode that is admissible there. If a Reset stands for a contact, declare an Impact: it comes to rest.",
     Status.INTERSECTION: "At this intersection of surfaces Filippov's convention with independent "
     "multipliers has no stable motion; check the fields around the last state.",
     Status.INCONSISTENT: "A constraint cannot hold here: the state is behind it, or no reaction (or "

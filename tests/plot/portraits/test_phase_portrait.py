@@ -11,9 +11,17 @@ from numpy.testing import assert_allclose
 import nonsmooth as ns
 from nonsmooth.local.scans.box import Box
 from nonsmooth.local.scans.plane_scan import PlaneScan
-from tests.local.scans.test_plane_scan import harvest
 
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
+
+
+def harvest(level):
+    """Predators y that are harvested above a level (as the textbook's, without parameters)."""
+    grazed = 0.3556 * x / (0.3 + x) * y
+    prey, predators = x * (1 - x) - grazed, grazed - 0.0444 * y
+    return ns.FilippovSystem(
+        [x, y], surface=y - level, above=[prey, predators - 0.2067 * y], below=[prey, predators]
+    )
 
 
 @pytest.mark.slow

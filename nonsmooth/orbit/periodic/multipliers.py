@@ -220,7 +220,8 @@ class Multipliers:
 def _across(field: Array) -> Array:
     """Orthonormal basis (n, n - 1) of the directions across a field."""
     # columns of a Householder reflection
-    v = field / (float(np.linalg.norm(field)) or 1.0)
+    v = field / (float(np.abs(field).max()) or 1.0)  # whose square does not overflow
+    v /= float(np.linalg.norm(v)) or 1.0
     v[0] += math.copysign(1.0, v[0])
     return np.asarray(np.eye(len(v))[:, 1:] - np.outer(v, v[1:] / abs(v[0])))
 

@@ -85,7 +85,7 @@ __all__ = [
 ]
 
 
-ns.tables.add_views(globals(), __all__)
+ns.result_tables.add_views(globals(), __all__)
 
 
 def __getattr__(name: str) -> Any:

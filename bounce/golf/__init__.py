@@ -69,4 +69,4 @@ __all__ = [
     "tour_differences",
 ]
 
-ns.tables.add_views(globals(), __all__)
+ns.result_tables.add_views(globals(), __all__)

@@ -139,11 +139,11 @@ class Run(Generic[S]):
     cautions: tuple[str, ...] = ()
     side: float = 0.0
 
-    def _tables(self) -> dict[str, ns.tables.Table]:
+    def _tables(self) -> dict[str, ns.result_tables.ResultTable]:
         bounces, glides = {"bounce": len(self.bounces)}, {"glide": len(self.glides)}
         return {
-            "bounces": ns.tables.stacked(self.bounces, bounces),
-            "glides": ns.tables.stacked(self.glides, glides),
+            "bounces": ns.result_tables.stacked(self.bounces, bounces),
+            "glides": ns.result_tables.stacked(self.glides, glides),
         }
 
     @property

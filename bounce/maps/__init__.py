@@ -26,4 +26,4 @@ __all__ = [
     "winding_number",
 ]
 
-ns.tables.add_views(globals(), __all__)
+ns.result_tables.add_views(globals(), __all__)

@@ -74,7 +74,7 @@ class Arc:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DividingCurve(ns.tables.Tabular):
+class DividingCurve(ns.result_tables.Tabular):
     """Landings ``(xdot, omega)`` that lift off without slip, at one normal speed.
 
     Attributes
@@ -100,7 +100,7 @@ class DividingCurve(ns.tables.Tabular):
     mirrored: bool
     tol: float
 
-    def _tables(self) -> dict[str, ns.tables.Table]:
+    def _tables(self) -> dict[str, ns.result_tables.ResultTable]:
         parts = [
             {
                 "kind": np.full(len(arc.points), arc.kind, object),
@@ -110,7 +110,7 @@ class DividingCurve(ns.tables.Tabular):
             }
             for arc in (*self.arcs, *self.reverse)
         ]
-        return {"points": ns.tables.joined("arc", parts)}
+        return {"points": ns.result_tables.joined("arc", parts)}
 
     @property
     def two_fold(self) -> Array:
@@ -315,7 +315,7 @@ def dividing_curve(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DividingSurface(ns.tables.Tabular):
+class DividingSurface(ns.result_tables.Tabular):
     """$H_F = 0$ in the space of landings (xdot, ydot, $omega$), as curves at several normal speeds.
 
     Attributes
@@ -326,9 +326,9 @@ class DividingSurface(ns.tables.Tabular):
 
     curves: tuple[DividingCurve, ...]
 
-    def _tables(self) -> dict[str, ns.tables.Table]:
+    def _tables(self) -> dict[str, ns.result_tables.ResultTable]:
         parts = [curve._tables()["points"].columns for curve in self.curves]
-        return {"points": ns.tables.joined("curve", parts)}
+        return {"points": ns.result_tables.joined("curve", parts)}
 
     @property
     def ydot(self) -> Array:

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OutcomeMap(ns.tables.Tabular):
+class OutcomeMap(ns.result_tables.Tabular):
     """Outcomes over a rectangle of two inputs or parameters.
 
     The first name varies along the last axis (horizontal in a picture), the second along the first.
@@ -53,7 +53,7 @@ class OutcomeMap(ns.tables.Tabular):
     spin: Array
     extrapolated: NDArray[np.bool_] | None = None
 
-    def _tables(self) -> dict[str, ns.tables.Table]:
+    def _tables(self) -> dict[str, ns.result_tables.ResultTable]:
         axes = dict(zip(reversed(self.names), reversed(self.axes), strict=True))
         return {"lift_offs": self.lift_offs._over(axes)}
 

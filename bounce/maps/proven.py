@@ -21,7 +21,7 @@ _Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class ProvenMap(ns.tables.Tabular):
+class ProvenMap(ns.result_tables.Tabular):
     """Boxes of landings with what is proven about all bounces from each.
 
     Attributes
@@ -47,14 +47,14 @@ class ProvenMap(ns.tables.Tabular):
     itinerary: tuple[str, ...]
     interrupted: bool = False
 
-    def _tables(self) -> dict[str, ns.tables.Table]:
+    def _tables(self) -> dict[str, ns.result_tables.ResultTable]:
         sides = ("xdot_low", "xdot_high", "omega_low", "omega_high")
         columns: dict[str, Any] = dict(zip(sides, self.boxes.T, strict=True))
         columns |= {
             "outcome": np.array(OUTCOMES, object)[self.outcome],
             "itinerary": self.itinerary,
         }
-        return {"boxes": ns.tables.Table({"box": len(self.boxes)}, columns)}
+        return {"boxes": ns.result_tables.ResultTable({"box": len(self.boxes)}, columns)}
 
     @property
     def area(self) -> dict[str, float]:

@@ -52,7 +52,7 @@ _ADVICE = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LiftOffs(AlongTheGround, ns.tables.Tabular):
+class LiftOffs(AlongTheGround, ns.result_tables.Tabular):
     """Lift-offs, each array of the broadcast shape ``(...)`` of the landings.
 
     In 3-D ``xdot``, ``omega``, ``x`` and ``slip`` are arrays (..., 2), forward and to the right, as in
@@ -85,17 +85,19 @@ class LiftOffs(AlongTheGround, ns.tables.Tabular):
     itinerary_code: NDArray[np.int32]
     slip: Array = None  # type: ignore[assignment]
 
-    def _tables(self) -> dict[str, ns.tables.Table]:
+    def _tables(self) -> dict[str, ns.result_tables.ResultTable]:
         axes = {f"landing_{k}": size for k, size in enumerate(self.time.shape)}
         return {"lift_offs": self._over(axes)}
 
-    def _over(self, axes: Mapping[str, Any]) -> ns.tables.Table:
+    def _over(self, axes: Mapping[str, Any]) -> ns.result_tables.ResultTable:
         """The lift-offs as a table over the axes of the landings."""
         names = ("xdot", "ydot", "omega", "x", "y", "time", "slip")
         columns = {name: ("direction", getattr(self, name)) for name in names}
         status = np.array([str(s) for s in sorted(BounceStatus)], dtype=object)[self.status]
         plain = {"status": status, "itinerary": self.itinerary}
-        return ns.tables.Table(axes, columns | plain, {"direction": ("forward", "right")})
+        return ns.result_tables.ResultTable(
+            axes, columns | plain, {"direction": ("forward", "right")}
+        )
 
     def __post_init__(self) -> None:
         if self.slip is None:

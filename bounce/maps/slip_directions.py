@@ -51,7 +51,7 @@ class Vortex(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SlipMap(ns.tables.Tabular):
+class SlipMap(ns.result_tables.Tabular):
     """Slip at lift-off over a rectangle of spins, ``omega[0]`` along the last axis.
 
     Attributes
@@ -75,7 +75,7 @@ class SlipMap(ns.tables.Tabular):
     omega: tuple[Array, Array]
     lift_offs: LiftOffs
 
-    def _tables(self) -> dict[str, ns.tables.Table]:
+    def _tables(self) -> dict[str, ns.result_tables.ResultTable]:
         return {
             "lift_offs": self.lift_offs._over({"omega_1": self.omega[1], "omega_0": self.omega[0]})
         }

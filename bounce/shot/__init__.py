@@ -9,4 +9,4 @@ from .state import State
 
 __all__ = ["BounceProof", "Forces", "Phase", "Sensitivity", "State"]
 
-ns.tables.add_views(globals(), __all__)
+ns.result_tables.add_views(globals(), __all__)

@@ -81,7 +81,7 @@ class Shot(Generic[Model, Along]):
     approach: ns.Trajectory | None
     tol: float
 
-    def _tables(self) -> dict[str, ns.tables.Table]:
+    def _tables(self) -> dict[str, ns.result_tables.ResultTable]:
         return self.trajectory._tables()
 
     @property

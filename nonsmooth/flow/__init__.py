@@ -22,7 +22,7 @@ The contract of events (``tests/flow/test_runs.py`` and ``events/test_event_case
    ``max_jumps`` jumps at one instant end the run: ENDLESS_JUMPS.
 """
 
-from ..tables import add_views
+from ..result_tables import add_views
 from .ensembles.ensemble import ensemble
 from .ensembles.lazy_starts import Grid, RandomStarts
 from .ensembles.outcomes import Outcomes, outcomes

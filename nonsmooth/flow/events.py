@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array
-from ..tables import Table
+from ..result_tables import ResultTable
 from .saving import savable
 
 T = TypeVar("T")
@@ -321,11 +321,11 @@ class Events(LazySequence[Event]):
         kind = np.int64 if attribute in ("element", "side") else np.object_
         return np.array(values, kind)[self.codes]
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         names = ("kind", "name", "element", "side", "mode_before", "mode_after")
         columns = {"t": self.t, **{name: self.column(name) for name in names}}
         states = {"x": self.x, "x_after": self.x_after}
-        return {"events": Table({"event": len(self)}, columns | states)}
+        return {"events": ResultTable({"event": len(self)}, columns | states)}
 
     def _size(self) -> int:
         return len(self.t)
@@ -467,10 +467,10 @@ class Segments(LazySequence[Segment]):
             return [ShownMode(s.mode, s.discrete) for s in objects[:most]]
         return [self.modes[k] for k in self.codes[:most].tolist()]
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         names = ("t_start", "t_end", "first", "last")
         columns = {"mode": [one.mode for one in self]} | {n: getattr(self, n) for n in names}
-        return {"segments": Table({"segment": len(self)}, columns)}
+        return {"segments": ResultTable({"segment": len(self)}, columns)}
 
     def _size(self) -> int:
         return len(self.codes)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..model import Array, FilippovSystem
 from ..notebook import representation
-from ..tables import Table
+from ..result_tables import ResultTable
 from .constants import KINDS, SIMPLE_KINDS
 from .saving import Savable
 from .status import Status
@@ -202,7 +202,7 @@ class Ensemble(
         """Whether each run reached its end or a stop."""
         return (self.status == Status.REACHED_END) | (self.status == Status.STOPPED)
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         axes: dict[str, Any] = {f"start_{k}": size for k, size in enumerate(self.t.shape)}
         labels = {"state": self.state_names} if self.state_names else {}
         columns = {
@@ -212,12 +212,14 @@ class Ensemble(
             "itinerary": self.itinerary,
         }
         counts = {f"{kind}_count": number for kind, number in self.events.items()}
-        tables = {"ends": Table(axes, columns | counts, labels)}
+        tables = {"ends": ResultTable(axes, columns | counts, labels)}
         if self.event_x is not None:
-            tables["events"] = Table(axes, {"t": self.event_t, "x": self.event_x}, labels)
+            tables["events"] = ResultTable(axes, {"t": self.event_t, "x": self.event_x}, labels)
         if self.sample_t is not None:
             samples = axes | {"sample": self.sample_t.shape[-1]}
-            tables["samples"] = Table(samples, {"t": self.sample_t, "x": self.sample_x}, labels)
+            tables["samples"] = ResultTable(
+                samples, {"t": self.sample_t, "x": self.sample_x}, labels
+            )
         return tables
 
     def _named_status(self) -> NDArray[np.object_]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..model import Array, FilippovSystem, OptionError, PointError, real_array
 from ..notebook import lines, representation
-from ..tables import Table
+from ..result_tables import ResultTable
 from .events import Events, Segments, ShownMode
 from .names import shown_mode
 from .other_names import ATTRIBUTES
@@ -298,16 +298,16 @@ class Trajectory(
                 f"dense=False kept no polynomials of this run, which {what} needs. Simulate with dense=True."
             )
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         labels = {"state": self.system.state_names}
         events = self.events._tables()["events"]
         tables = {
-            "points": Table({"t": self.t}, {"x": self.x}, labels),
-            "events": Table(events.index, events.columns, labels),
+            "points": ResultTable({"t": self.t}, {"x": self.x}, labels),
+            "events": ResultTable(events.index, events.columns, labels),
         }
         if self.sample_t is not None:
             samples = {"sample": ("t", self.sample_t)}
-            tables["samples"] = Table(samples, {"x": self.sample_x}, labels)
+            tables["samples"] = ResultTable(samples, {"x": self.sample_x}, labels)
         return tables
 
     def _missing(self, what: str) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 
 from ..model import DefinitionError, FilippovSystem
-from ..tables import library
+from ..result_tables import library
 
 __all__ = ["expression", "system"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model import FilippovSystem
-from ..tables import library
+from ..result_tables import library
 from .runs import Runs, parameters_of
 
 if TYPE_CHECKING:

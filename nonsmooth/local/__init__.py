@@ -1,7 +1,7 @@
 """Analysis at points of surfaces, without time stepping: regions, folds, two-folds, equilibria."""
 
 from ..model import mode_field
-from ..tables import add_views
+from ..result_tables import add_views
 from . import two_folds
 from .classify import LocalObject, classify
 from .point.higher_codimension import LimitDirection, limit_directions

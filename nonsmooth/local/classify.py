@@ -26,7 +26,7 @@ from ..model import (
     require_system,
 )
 from ..model.checks import positive
-from ..tables import Tabular
+from ..result_tables import Tabular
 from .checks import MARGIN, require_linear
 from .discrete_states import with_discrete_states_held
 from .point.elements_at import acts

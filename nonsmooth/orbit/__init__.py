@@ -1,7 +1,7 @@
 """Derivatives of runs, periodic and homoclinic orbits, their branches, manifolds and basins."""
 
+from ..result_tables import add_views
 from ..solvers import continuation
-from ..tables import add_views
 from .basins import Attractor, Basins, attractors, basins
 from .branches.bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifurcation
 from .branches.branch import Branch, BranchEnd, BranchEvent, FarSide

@@ -44,7 +44,7 @@ from ..model import (
     require_system,
     whole,
 )
-from ..tables import Table, Tabular, joined
+from ..result_tables import ResultTable, Tabular, joined
 from .periodic.find_periodic import periodic_orbit
 from .periodic.orbit import PeriodicOrbit
 
@@ -686,7 +686,7 @@ class Basins(Savable, labels="...", starts="... n nan", axes="*"):
     state_names: tuple[str, ...] = ()
     complete: bool = True
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         named = bool(self.axes)
         axes = self.axes if named else {f"start_{k}": m for k, m in enumerate(self.labels.shape)}
         columns = {"label": self.labels} | ({} if named else {"x": self.starts})
@@ -694,7 +694,7 @@ class Basins(Savable, labels="...", starts="... n nan", axes="*"):
         parts = [{"kind": k, "x": a.points} for k, a in zip(kinds, self.attractors, strict=True)]
         labels = {"state": self.state_names} if self.state_names else {}
         attractors = joined("attractor", parts, self.state_names)
-        return {"starts": Table(axes, columns, labels), "attractors": attractors}
+        return {"starts": ResultTable(axes, columns, labels), "attractors": attractors}
 
     @property
     def fractions(self) -> dict[int, float]:

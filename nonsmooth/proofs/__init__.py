@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..model.errors import MissingError
-from ..tables import add_views
+from ..result_tables import add_views
 from .arithmetic.enclosure import Enclosure
 from .orbits.orbit_proof import OrbitProof, ProvenEvent
 from .points.census import Census, Undecided

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from ..model import OptionError
-from ..tables import add_views
+from ..result_tables import add_views
 from .control import abs_brake, drill_string, super_twisting, tank_cascade, twisting
 from .converters import boost_converter, diode_bridge, resonant_converter
 from .friction import dry_friction, leine_stick_slip, stick_slip_exponential

@@ -27,7 +27,7 @@ class IdentifiabilityWarning(UserWarning):
 
 
 @dataclass(frozen=True, repr=False)
-class FitResult(ns.tables.Tabular):
+class FitResult(ns.result_tables.Tabular):
     """Fitted parameters and what they leave.
 
     Attributes
@@ -75,14 +75,16 @@ class FitResult(ns.tables.Tabular):
     narrow: tuple[str, ...] = ()
     search: Profile | None = field(default=None, compare=False)
 
-    def _tables(self) -> dict[str, ns.tables.Table]:
+    def _tables(self) -> dict[str, ns.result_tables.ResultTable]:
         low, high = zip(*self.interval().values(), strict=True)
         columns = {"value": [*self.values.values()], "error": [*self.errors.values()]}
         fitted = {"parameter": [*self.values]}
         rows = {"row": self.measurements.rows}
         return {
-            "parameters": ns.tables.Table(fitted, columns | {"low": low, "high": high}),
-            "residuals": ns.tables.Table(rows, self.residuals),
+            "parameters": ns.result_tables.ResultTable(
+                fitted, columns | {"low": low, "high": high}
+            ),
+            "residuals": ns.result_tables.ResultTable(rows, self.residuals),
         }
 
     @property

@@ -32,7 +32,7 @@ _KINDS = {**_KIND, **{_PREFIX + name: kind for name, kind in _KIND.items()}}
 
 
 @dataclass(frozen=True)
-class Measurements(ns.tables.Tabular):
+class Measurements(ns.result_tables.Tabular):
     """Bounces as speeds: spins are surface speeds (spin times radius).
 
     Attributes
@@ -55,10 +55,10 @@ class Measurements(ns.tables.Tabular):
     si: bool
     left_out: tuple[tuple[int, str], ...]
 
-    def _tables(self) -> dict[str, ns.tables.Table]:
+    def _tables(self) -> dict[str, ns.result_tables.ResultTable]:
         landing = dict(zip(("xdot", "ydot", "omega"), self.landing.T, strict=True))
         lift_off = {f"lift_off_{name}": values for name, values in self.lift_off.items()}
-        return {"rows": ns.tables.Table({"row": self.rows}, landing | lift_off)}
+        return {"rows": ns.result_tables.ResultTable({"row": self.rows}, landing | lift_off)}
 
     def keep(self, rows: NDArray[np.bool_], reasons: Mapping[int, str]) -> Measurements:
         """Return a part of the rows.

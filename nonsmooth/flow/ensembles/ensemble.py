@@ -31,7 +31,7 @@ from .work import Work, checked_work, run_all, size_of_chunk
 #: systems with a set, which take longer to compile.
 _FEW, _FEW_WITH_SETS = 64, 4000
 
-#: Seconds that all trajectories must take one by one for that compilation, of some seconds, to be worth its time.
+#: Least time of an ensemble in the driver, in seconds by estimate, for which lanes are compiled.
 _WORTH = 0.05
 
 #: The work of at least this many trajectories is estimated from three of them, of fewer from one.

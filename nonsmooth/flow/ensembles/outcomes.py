@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, require_system, whole
-from ...tables import Table, Tabular
+from ...result_tables import ResultTable, Tabular
 from ..engine.device.kernel import Bins, Reduced
 from ..options import Options
 from ..results import Chunk
@@ -52,17 +52,19 @@ class Outcomes(Tabular):
     edges: dict[str, Array]
     histogram: dict[str, NDArray[np.int64]]
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         counted = lambda found: {"count": list(found.values())}
         states = {"mean": list(self.mean.values()), "std": list(self.std.values())}
         tables = {
-            "states": Table({"state": list(self.mean)}, states),
-            "status": Table({"status": [str(s) for s in self.status]}, counted(self.status)),
-            "itineraries": Table({"itinerary": list(self.itineraries)}, counted(self.itineraries)),
+            "states": ResultTable({"state": list(self.mean)}, states),
+            "status": ResultTable({"status": [str(s) for s in self.status]}, counted(self.status)),
+            "itineraries": ResultTable(
+                {"itinerary": list(self.itineraries)}, counted(self.itineraries)
+            ),
         }
         for name, edges in self.edges.items():
             columns = {"low": edges[:-1], "high": edges[1:], "count": self.histogram[name]}
-            tables[name] = Table({f"{name}_bin": len(edges) - 1}, columns)
+            tables[name] = ResultTable({f"{name}_bin": len(edges) - 1}, columns)
         return tables
 
 

@@ -42,14 +42,14 @@ static void point_to(Packed *a, Past *past) {
   a->m.near = a->m.drop = 0;
 }
 
-/* A surface's runs may be sampled at times. */
+/* Set the time of a run's next sample; infinite if there is none. */
 static void await_sample(Lanes *s, const Work *w, int l) {
   const Batch *b = w->b;
   int64_t kept = past_of(s, l)->kept;
   LANE(s->due, l) = b->times && kept < b->room ? b->times[LANE_I(s->index, l) * b->times_stride + kept] : INFINITY;
 }
 
-/* The sample that is due, at a time of a step with these series of degree P, or 0 of those of the states alone. */
+/* Store the sample that is due: the polynomials of the states, of a degree, at a time since the start of the step. */
 static void keep_sample(Lanes *s, Work *w, int l, const T *series, int degree, double at) {
   int64_t row = LANE_I(s->index, l) * w->b->room + past_of(s, l)->kept++;
   w->b->sample_t[row] = LANE(s->due, l);

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...model import FilippovSystem, NonsmoothError, OptionError, instruction_form
 from ...model.schema import CLASSES, Validator, savable
-from ...tables import Tabular
+from ...result_tables import Tabular
 from ..status import Status
 from . import archive, files
 

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
-from ...tables import Tabular
+from ...result_tables import Tabular
 from ..checks import (
     MARGIN,
     parameter_index,

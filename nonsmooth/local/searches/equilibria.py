@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, Parameters, call
 from ...model.derivatives.mode_derivatives import mode_equations
-from ...tables import Tabular
+from ...result_tables import Tabular
 from ..checks import require_autonomous
 from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import (

@@ -26,8 +26,8 @@ from ...model import (
 )
 from ...model.checks import positive
 from ...notebook import quadrants, representation
+from ...result_tables import Tabular
 from ...solvers.newton import solve_many
-from ...tables import Tabular
 from ..checks import require_generic
 from ..discrete_states import with_discrete_states_held
 from ..point.regions import coincide

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, require_system
 from ...model.checks import positive
-from ...tables import Tabular
+from ...result_tables import Tabular
 from ..checks import MARGIN, relative_difference, require_generic
 from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import LocalSurface, Numbers, on_surface, surface_at

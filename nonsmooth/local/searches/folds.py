@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
-from ...tables import Tabular
+from ...result_tables import Tabular
 from ..checks import require_generic
 from ..discrete_states import with_discrete_states_held
 from ..point.surface_point import (

@@ -23,7 +23,7 @@ from ...model import (
     PointError,
     layer_of,
 )
-from ...tables import Tabular
+from ...result_tables import Tabular
 from ..checks import require_autonomous, require_generic, require_linear
 from ..discrete_states import with_discrete_states_held
 from ..point.intersections import Meeting

@@ -11,7 +11,7 @@ Examples
 [0.585786, 3.414214]
 """
 
-from ...tables import add_views
+from ...result_tables import add_views
 from .classification import Boundary, Classification, Slopes, classify_two_fold
 from .flights import (
     accumulation_time,

@@ -23,8 +23,8 @@ from ...model import (
     whole,
 )
 from ...model.checks import positive
+from ...result_tables import ResultTable, Tabular, stacked
 from ...solvers.continuation import Arc, Curve, Departure, Zero, directions, pieces, trace
-from ...tables import Table, Tabular, stacked
 from ..homoclinic.homoclinic_orbits import Connection
 from .branch import DIVIDE, BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of
 from .codimension_two import CodimensionTwo, leaving, special_point
@@ -75,11 +75,11 @@ class BifurcationCurve(Tabular):
     ends: tuple[BranchEnd, BranchEnd]
     nodes: tuple[Node, ...]
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         columns = dict(zip(self.parameters, self.values.T, strict=True))
         special = {"special": len(self.special)}
         return {
-            "points": Table({"point": len(self.values)}, columns),
+            "points": ResultTable({"point": len(self.values)}, columns),
             "special": stacked(self.special, special),
         }
 

@@ -26,6 +26,7 @@ from ...model import (
     real,
 )
 from ...notebook import representation
+from ...result_tables import ResultTable, Tabular, stacked
 from ...solvers.continuation import (
     Arc,
     Curve,
@@ -36,7 +37,6 @@ from ...solvers.continuation import (
     pieces,
     trace,
 )
-from ...tables import Table, Tabular, stacked
 
 
 class BranchEnd(Enum):
@@ -183,7 +183,7 @@ class Branch(Tabular):
     reasons: tuple[str, str] = ("", "")
     nodes: tuple[tuple[Any, Point], ...] = ()
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         names = self.nodes[0][0].system.state_names if self.nodes else ()
         found = [e.parameter for e in self.events]
         events = {
@@ -192,7 +192,7 @@ class Branch(Tabular):
         }
         return {
             "points": stacked(self.solutions, {self.parameter: self.values}, names),
-            "events": Table({"event": len(found)}, {self.parameter: found, **events}),
+            "events": ResultTable({"event": len(found)}, {self.parameter: found, **events}),
         }
 
     @property

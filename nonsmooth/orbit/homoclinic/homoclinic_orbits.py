@@ -32,8 +32,8 @@ from ...model import (
     require_continuous,
     require_system,
 )
+from ...result_tables import ResultTable, Tabular, stacked
 from ...solvers.newton import Equations, converge, solve
-from ...tables import Table, Tabular, stacked
 from ..periodic.orbit import OrbitLeg, named
 from ..periodic.orbit_run import orbit_run
 from ..runs.legs import Leg, Stretch, stretches
@@ -324,7 +324,7 @@ class Connection(Tabular):
     unknowns: Array
     complete: bool = True
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         return {"legs": stacked(self.legs, {"leg": len(self.legs)}, self.system.state_names)}
 
     @property

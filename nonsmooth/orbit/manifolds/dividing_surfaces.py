@@ -37,6 +37,7 @@ from ...model import (
     StartMap,
 )
 from ...model.derivatives.event_maps import function_map
+from ...result_tables import ResultTable, joined
 from ...solvers.continuation import (
     Arc,
     Curve,
@@ -50,7 +51,6 @@ from ...solvers.continuation import (
     pieces,
     trace,
 )
-from ...tables import Table, joined
 from ..runs.guards import change_violation
 from ..runs.itinerary import Arrival, FixedItinerary, leg_between, read_word
 from .two_fold_sheet import Meeting, TwoFoldSheet
@@ -789,7 +789,7 @@ class DividingCurves(Savable, point="n"):
     curves: list[list[DividingArc]]
     complete: bool = True
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         names = ("points", "entry", "t", "decided")
         parts = [{name: getattr(arc, name) for name in names} for arc in self.arcs]
         return {"points": joined("arc", parts)}

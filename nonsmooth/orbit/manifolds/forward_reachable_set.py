@@ -31,7 +31,7 @@ from ...model import (
     real_array,
     require_system,
 )
-from ...tables import Table, Tabular, joined, stacked
+from ...result_tables import ResultTable, Tabular, joined, stacked
 from .canards import Path, Slider, paths_from
 
 
@@ -94,7 +94,7 @@ class Funnel(Tabular):
     two_fold: TwoFold | None = None
     past: Trajectory | None = field(default=None)
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         parts = [{"t": run.t, "x": run.x} for run in self.trajectories]
         members = {"run": len(self.departures)}
         return {

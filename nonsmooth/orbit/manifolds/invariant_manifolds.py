@@ -37,7 +37,7 @@ from ...model import (
     reversed_system,
     whole,
 )
-from ...tables import Table, joined
+from ...result_tables import ResultTable, joined
 from ..periodic.multipliers import leg_maps
 from ..periodic.orbit import PeriodicOrbit
 from ..runs.legs import integrate_leg
@@ -420,12 +420,12 @@ class Manifold(Savable, point="n", points="k n | 0 0", triangles="q 3 <points"):
     triangles: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     complete: bool = True
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         tables = {"points": joined("arc", [{"t": arc.t, "x": arc.points} for arc in self.arcs])}
         if len(self.triangles):
-            tables["vertices"] = Table({"vertex": len(self.points)}, {"x": self.points})
+            tables["vertices"] = ResultTable({"vertex": len(self.points)}, {"x": self.points})
             corners = {"vertex": ("corner", self.triangles)}
-            tables["triangles"] = Table({"triangle": len(self.triangles)}, corners)
+            tables["triangles"] = ResultTable({"triangle": len(self.triangles)}, corners)
         return tables
 
     def __repr__(self) -> str:

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, ConvergenceError, DegenerateError, OptionError
 from ...model.derivatives.given_functions import Coupling
-from ...tables import Table, Tabular
+from ...result_tables import ResultTable, Tabular
 from ..runs.legs import integrate_leg
 from ..runs.saltation import saltations
 from .multipliers import events_of
@@ -71,10 +71,13 @@ class MasterStability(Tabular):
     exponents: Array
     period: float
 
-    def _tables(self) -> dict[str, Table]:
-        columns = {"kappa": self.kappa, "exponent": self.exponents}
-        columns["multipliers"] = ("multiplier", self.multipliers)  # type: ignore[assignment]
-        return {"nodes": Table({"node": len(self.kappa)}, columns)}
+    def _tables(self) -> dict[str, ResultTable]:
+        columns = {
+            "kappa": self.kappa,
+            "exponent": self.exponents,
+            "multipliers": ("multiplier", self.multipliers),
+        }
+        return {"nodes": ResultTable({"node": len(self.kappa)}, columns)}
 
     @property
     def stable(self) -> NDArray[np.bool_]:

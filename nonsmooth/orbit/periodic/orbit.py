@@ -14,7 +14,7 @@ from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
 from ...model import Array, FilippovSystem, ParameterError, Surfaces
 from ...notebook import circle, representation
-from ...tables import Table, Tabular, stacked
+from ...result_tables import ResultTable, Tabular, stacked
 from ..runs.guards import violations_of_legs, watch
 from ..runs.legs import Leg, integrate_leg, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation, mirrored
@@ -100,10 +100,12 @@ class PeriodicOrbit(Tabular):
 
     row: ClassVar[tuple[str, ...]] = ("period", "start", "itinerary", "stability", "multipliers")
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         names = self.system.state_names
         legs = stacked(self.legs, {"leg": len(self.legs)}, names)
-        multipliers = Table({"multiplier": len(self.multipliers)}, {"value": self.multipliers})
+        multipliers = ResultTable(
+            {"multiplier": len(self.multipliers)}, {"value": self.multipliers}
+        )
         return {**self.trajectory._tables(), "legs": legs, "multipliers": multipliers}
 
     # properties ---------------------------------------------------------------------------------

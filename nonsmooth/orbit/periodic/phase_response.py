@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from ...model import Array, DegenerateError, OptionError, PointError
-from ...tables import Table, Tabular
+from ...result_tables import ResultTable, Tabular
 from ..runs.legs import integrate_leg
 from ..runs.saltation import saltations
 from ..runs.saltation_matrix import saltation_matrix
@@ -65,9 +65,11 @@ class PhaseResponse(Tabular):
     leg: Array
     error: float
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         columns = {"x": self.x, "z": self.z, "leg": self.leg}
-        return {"points": Table({"t": self.t}, columns, {"state": self.orbit.system.state_names})}
+        return {
+            "points": ResultTable({"t": self.t}, columns, {"state": self.orbit.system.state_names})
+        }
 
     def __call__(self, t: float) -> Array:
         """Phase response (n,) at a time, of any size; at an event that after it.

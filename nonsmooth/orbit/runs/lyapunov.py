@@ -32,7 +32,7 @@ from ...model import (
     require_system,
     whole,
 )
-from ...tables import Table
+from ...result_tables import ResultTable
 from .legs import Leg, LegFlow, Stretch, stretches
 from .limits import limits_of
 from .saltation import Saltation
@@ -102,12 +102,12 @@ class LyapunovSpectrum(
     sum_check: float
     complete: bool = True
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         columns = {"exponent": self.exponents, "error": self.errors}
         blocks = {"exponent": ("direction", self.blocks)}
         return {
-            "directions": Table({"direction": len(self.exponents)}, columns),
-            "blocks": Table({"block": len(self.blocks)}, blocks),
+            "directions": ResultTable({"direction": len(self.exponents)}, columns),
+            "blocks": ResultTable({"block": len(self.blocks)}, blocks),
         }
 
     @property

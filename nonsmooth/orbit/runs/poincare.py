@@ -25,7 +25,7 @@ from ...model import (
     require_system,
     whole,
 )
-from ...tables import Table
+from ...result_tables import ResultTable
 from .legs import LegFlow, Stretch, carry_leg, stretches
 from .saltation import Saltation
 from .sensitivity import sensitivity
@@ -56,9 +56,9 @@ class PoincareOrbit(Savable, points="m n", t="m"):
     run: Trajectory
     section: Section
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         columns, labels = {"t": self.t, "x": self.points}, {"state": self.run.system.state_names}
-        return {"points": Table({"return": len(self.t)}, columns, labels)}
+        return {"points": ResultTable({"return": len(self.t)}, columns, labels)}
 
     def jacobian(self, k: int, since: int | None = None) -> Array:
         """Derivative of a return by an earlier one.

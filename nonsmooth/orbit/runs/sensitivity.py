@@ -23,7 +23,7 @@ from ...model import (
     require_system,
 )
 from ...model.derivatives.given_functions import cost_over
-from ...tables import Tabular
+from ...result_tables import Tabular
 from .legs import parameters_of
 from .one_sided import Side, one_sided
 from .variation import (

@@ -30,7 +30,7 @@ from ...model import (
 )
 from ...model.derivatives.event_maps import AtEvent
 from ...model.laws.motion import rests_on
-from ...tables import Table, Tabular
+from ...result_tables import ResultTable, Tabular
 from .cells import cells_of
 from .guards import watch
 from .legs import (
@@ -609,19 +609,19 @@ class Sensitivity(Tabular):
     dsample_dx0: Array | None = None
     dsample_dp: Array | None = None
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         states = self.run.system.state_names
         labels = {"start": states, "parameter": self.names}
         by = lambda name, x0, p: {f"{name}_dx0": ("start", x0), f"{name}_dp": ("parameter", p)}
         times = {"t": self.event_times, **by("dt", self.dt_dx0, self.dt_dp)}
         tables = {
-            "end": Table({"state": states}, by("dx", self.dx_dx0, self.dx_dp), labels),
-            "events": Table({"event": len(self.event_times)}, times, labels),
+            "end": ResultTable({"state": states}, by("dx", self.dx_dx0, self.dx_dp), labels),
+            "events": ResultTable({"event": len(self.event_times)}, times, labels),
         }
         if self.dsample_dx0 is not None:
             rows = {"sample": ("t", self.run.sample_t), "state": states}
             columns = by("dx", self.dsample_dx0, self.dsample_dp)
-            tables["samples"] = Table(rows, columns, labels)
+            tables["samples"] = ResultTable(rows, columns, labels)
         return tables
 
     @cached_property

@@ -10,7 +10,7 @@ piece to piece are traced by :func:`pieces`. An interrupt (Ctrl-C) returns what 
 Sources: Keller 1977 (pseudo-arclength); Allgower & Georg 1990; Kuznetsov 2004, ch. 10.
 """
 
-from ...tables import add_views
+from ...result_tables import add_views
 from ..newton import Secant, Values, converge
 from .arc import Arc, ahead, trace
 from .curve import Curve, Point, Zero

@@ -37,7 +37,7 @@ def library(name: str, what: str, extra: str = "tables") -> Any:
 
 
 @dataclass(frozen=True)
-class Table:
+class ResultTable:
     """Columns over the same rows.
 
     Attributes
@@ -113,7 +113,9 @@ class Table:
             coordinates |= {a: list(self.labels[a]) for a in more if a in self.labels}
 
 
-def stacked(results: Sequence[Any], index: Mapping[str, Any], states: Sequence[str] = ()) -> Table:
+def stacked(
+    results: Sequence[Any], index: Mapping[str, Any], states: Sequence[str] = ()
+) -> ResultTable:
     """A row for each of several results: short attributes that all of them have (:attr:`Tabular.row`)."""
     columns = dict[str, Any]()
     rows = [dict(_flat(result)) for result in results]
@@ -125,7 +127,7 @@ def stacked(results: Sequence[Any], index: Mapping[str, Any], states: Sequence[s
             continue
         of_states = name in _STATES and np.size(values[0]) == len(states)
         columns[name] = ("state" if of_states else f"{_singular(name)}_number", values)
-    return Table(index, columns, {"state": states} if states else {})
+    return ResultTable(index, columns, {"state": states} if states else {})
 
 
 def _row(result: Any) -> Sequence[str]:
@@ -162,14 +164,16 @@ def _singular(name: str) -> str:
     return name[:-1] if name.endswith("s") and not name.endswith(("us", "is")) else name
 
 
-def joined(name: str, parts: Sequence[Mapping[str, Any]], states: Sequence[str] = ()) -> Table:
+def joined(
+    name: str, parts: Sequence[Mapping[str, Any]], states: Sequence[str] = ()
+) -> ResultTable:
     """The points of several curves, with the number of the curve from 0."""
     columns = {
         key: np.concatenate([part[key] for part in parts]) for key in (parts[0] if parts else ())
     }
     sizes = [len(next(iter(part.values()))) for part in parts]
     columns = {name: np.repeat(np.arange(len(parts)), sizes), **columns}
-    return Table({"point": sum(sizes)}, columns, {"state": states} if len(states) else {})
+    return ResultTable({"point": sum(sizes)}, columns, {"state": states} if len(states) else {})
 
 
 class Tabular:
@@ -178,13 +182,15 @@ class Tabular:
     #: Attributes in its row of a table; the public fields if there are none.
     row: ClassVar[tuple[str, ...]] = ()
 
-    def _tables(self) -> dict[str, Table]:
+    def _tables(self) -> dict[str, ResultTable]:
         """Tables by name, the first of which is the usual one."""
         names = getattr(getattr(self, "system", self), "state_names", ())
         tables = {"values": stacked([self], {"result": 1}, names)}
         for name, array in _flat(self):
             if np.ndim(array) > 1 or np.size(array) > _LONG:
-                tables[name] = Table({f"{name}_row": len(array)}, {name: (f"{name}_column", array)})
+                tables[name] = ResultTable(
+                    {f"{name}_row": len(array)}, {name: (f"{name}_column", array)}
+                )
         return tables
 
     def _attributes(self) -> dict[str, Any]:

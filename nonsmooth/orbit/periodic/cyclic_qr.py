@@ -39,9 +39,11 @@ class Factor:
 
     def image(self, basis: Array) -> Array:
         """Orthonormal basis of the image of some directions (n, r)."""
+        if not basis.shape[1] or (self.beside is None and len(basis) == basis.shape[1]):
+            return basis  # all directions, or none
         moved = self.matrix @ basis
-        if self.beside is None or not basis.shape[1]:
-            return np.linalg.qr(moved)[0] if basis.shape[1] else basis
+        if self.beside is None:
+            return _decomposed(moved)[0]
         size = math.sqrt(float(np.vdot(carried := self.beside @ basis, carried)))
         u, sizes, _ = np.linalg.svd(moved, full_matrices=False)
         return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), size)])
@@ -73,7 +75,7 @@ class Product:
         for _ in range(_PASSES):
             first, triangles = basis, list[Array]()
             for factor in self.factors:
-                basis, triangle = np.linalg.qr(factor.matrix @ basis)
+                basis, triangle = _decomposed(factor.matrix @ basis)
                 triangles.append(triangle)
             turned = first.T @ basis
             if np.abs(np.tril(turned, -1)).max() < _SEPARATE:
@@ -102,6 +104,17 @@ class Product:
         lost = np.exp(np.minimum([*found.real[n:], *other.real[n:]], 0.0)).max(initial=0.0)
         apart = np.exp(np.minimum(found.real[:n], 0.0)) * np.abs(found.real[:n] - other.real[:n])
         return 10.0 * float(max(apart.max(initial=0.0), lost))
+
+
+def _decomposed(matrix: Array) -> tuple[Array, Array]:
+    """QR decomposition; of one column by its length."""
+    largest = float(np.abs(matrix).max()) if matrix.shape[1] == 1 else 0.0
+    if not 0.0 < largest < math.inf:
+        q, r = np.linalg.qr(matrix)
+        return q, r
+    matrix = matrix / largest  # whose square does not overflow
+    size = math.sqrt(float(np.vdot(matrix, matrix)))
+    return matrix / size, np.array([[largest * size]])
 
 
 def _like(matrix: Array) -> Array:

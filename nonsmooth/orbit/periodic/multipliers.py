@@ -221,9 +221,11 @@ def _across(field: Array) -> Array:
     """Orthonormal basis (n, n - 1) of the directions across a field."""
     # columns of a Householder reflection
     v = field / (float(np.abs(field).max()) or 1.0)  # whose square does not overflow
-    v /= float(np.linalg.norm(v)) or 1.0
+    v /= math.sqrt(float(v @ v)) or 1.0
     v[0] += math.copysign(1.0, v[0])
-    return np.asarray(np.eye(len(v))[:, 1:] - np.outer(v, v[1:] / abs(v[0])))
+    found: Array = np.multiply.outer(v, v[1:] / -abs(v[0]))
+    found.reshape(-1)[len(v) - 1 :: len(v)] += 1.0  # below the diagonal
+    return found
 
 
 def event_maps(problem: BoundaryProblem, at: Evaluation) -> Array:
@@ -269,8 +271,8 @@ def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
 
 def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
     """Sizes of states and time; of states that are zero where all legs begin by how far these lead."""
-    n, own = problem.dimension, problem.system.dimension
-    units = problem.scales(problem.pack(at.starts, at.durations))[:n]
+    own = problem.system.dimension
+    units = np.array(problem.sizes(at.starts, at.durations)[0])
     if problem.system.time_dependent:
         ways = np.abs(at.flows.rate[: len(at.durations), :own] * at.durations[:, None]).max(
             initial=0.0

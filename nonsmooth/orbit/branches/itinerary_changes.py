@@ -250,7 +250,7 @@ def soft_switch(problem: BoundaryProblem, leg: Leg, surface: int) -> str:
     found = problem.system.switching(surface, mode=mode)
     if found.slides:
         return ""
-    return FORCE if found.kind == "velocity continuous" and found.order == 0 else SOFT
+    return FORCE if found.force_jumps else SOFT
 
 
 def changed_itinerary(

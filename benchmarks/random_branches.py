@@ -265,7 +265,7 @@ def _of_multipliers(branch: Branch, counts: Counter[str]) -> list[str]:
         if lost and largest < 1e-3 * growth:
             continue
         counts["branches with multipliers by differences"] += 1
-        values = differences(orbit, PARTS if lost else 1)
+        values = differences(orbit, PARTS if lost else 4 if growth > GROWS else 1)
         compared = own[np.abs(own) >= largest * (1 - 1e-9)] if lost else own
         apart = max(float(np.abs(values - m).min()) for m in compared)
         if apart > DIFFERENCE * max(1.0, largest):

@@ -191,7 +191,7 @@ _STEEP = 30.0
 #: the branch is lost.
 _TINY, _SMALL = 1e-4, 1e-2
 
-#: L of the other field where a slide ends, relative to its gradient and the state, at the last step to a two-fold.
+#: L of the other field where a slide ends, relative to its gradient and the orbit, at the last step to a two-fold.
 _REACHED = 1e-5
 
 #: Part of its largest value on a branch below which this L may be rounding.
@@ -435,7 +435,7 @@ class OrbitCurve(OrbitEquations):
                 state = integrate_leg(self.system, leg, x, near.t, p).end
                 k = near.guard.element
                 ends = [replace(leg, kind="exit", element=k, side=s) for s in (1, -1)]
-            if all(at_two_fold(self.system, end, state, p, part) for end in ends):
+            if all(at_two_fold(self.system, end, state, p, at.starts, part) for end in ends):
                 return True
         return False
 

@@ -155,7 +155,7 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     if test.what == "end":
         return "two-fold"
     if test.what == "transversality":
-        if at_two_fold(problem.system, leg, at.flows.end[i], p):
+        if at_two_fold(problem.system, leg, at.flows.end[i], p, at.starts):
             return "two-fold"
         return {
             "impact": "impact grazing",
@@ -195,7 +195,11 @@ def _grazed(
         )[0]
         y = integrate_leg(problem.system, leg, at.starts[test.leg], t, p).end
         ends = replace(leg, kind="exit", element=guard.element, side=guard.side)
-        return "two-fold" if at_two_fold(problem.system, ends, y, p, _BOTH) else "adding-sliding"
+        return (
+            "two-fold"
+            if at_two_fold(problem.system, ends, y, p, at.starts, _BOTH)
+            else "adding-sliding"
+        )
     if is_condition(problem, guard):
         return _touch(
             problem,

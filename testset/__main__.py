@@ -21,12 +21,14 @@ from typing import Any
 
 from .peers import PEERS
 from .problem import CASES, Problem, cases
-from .worker import LIMIT, OURS
+from .worker import OURS
 
 ROOT = CASES.parents[1]
 FOLDER = ROOT / "build" / "testset"
 #: Errors above this are wrong; of tools at a tolerance of 1e-10, and of first-order time steps.
 WRONG = 1e-3
+#: Processor seconds of a tool for one problem, with what it compiles.
+LIMIT = 60.0
 OVER = f"over {LIMIT:.0f} s"
 #: Results are valid as long as these stay.
 SOURCES = ("modes", "peers", "problem", "worker")
@@ -50,7 +52,9 @@ def version(python: str, module: str) -> str:
     return asked.stdout.strip()
 
 
-def solve(python: str, tool: str, own: list[dict[str, Any]], path: Path, key: str) -> None:
+def solve(
+    python: str, tool: str, own: list[dict[str, Any]], path: Path, key: str, limit: float = LIMIT
+) -> None:
     """Complete the results of a tool; a new process takes over where one ended on a problem."""
     kept = json.loads(path.read_text()) if path.exists() else {}
     keys = {
@@ -59,7 +63,7 @@ def solve(python: str, tool: str, own: list[dict[str, Any]], path: Path, key: st
     found = {name: kept[name] for name in keys if kept.get(name, {}).get("key") == keys[name]}
     while left := [name for name in keys if name not in found]:
         worker = subprocess.Popen(
-            [python, "-m", "testset.worker", tool],
+            [python, "-m", "testset.worker", tool, str(limit)],
             cwd=ROOT,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

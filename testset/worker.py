@@ -1,4 +1,7 @@
-"""Solve problems with one tool: ``python -m testset.worker TOOL``, names of problems in, a line of JSON for each out."""
+"""Solve problems with one tool: ``python -m testset.worker TOOL LIMIT``, names in, a line of JSON for each out.
+
+The process ends on a problem that takes more than LIMIT processor seconds.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,6 @@ from .modes import NotForModes
 from .problem import Problem, cases
 
 OURS = "nonsmooth"
-#: Processor seconds of one problem, with what it compiles; the process ends there.
-LIMIT = 60.0
 
 
 def outcome(tool: str, data: dict[str, Any]) -> dict[str, Any]:
@@ -47,7 +48,7 @@ def main() -> None:
     warnings.simplefilter("ignore")
     every = {data["id"]: data for data in cases()}
     for name in sys.stdin.read().split():
-        signal.setitimer(signal.ITIMER_PROF, LIMIT)
+        signal.setitimer(signal.ITIMER_PROF, float(sys.argv[2]))
         found = outcome(sys.argv[1], every[name])
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         print(json.dumps(found), file=answers, flush=True)

@@ -250,7 +250,7 @@
 
   const moveHandle = Page.draggable(map, {
     name: "Landing: speed and spin",
-    step: 0.05,
+    steps: [0.05, 0.05],
     get: () => [state.xdot, state.omega],
     set: ([xdot, omega]) => set({ xdot, omega }),
     say: () => `speed ${text(state.xdot)}, spin ${text(state.omega)}`,

@@ -241,10 +241,11 @@ const Page = (() => {
     handle.addEventListener("keydown", (event) => {
       const move = ARROWS[event.key];
       if (!move) return;
-      const { step } = given; // which may follow the plane's ranges
-      const by = step * (event.shiftKey ? 10 : 1);
+      const { steps } = given; // which may follow the plane's ranges
+      const far = event.shiftKey ? 10 : 1;
       // the coordinate that moves to multiples of the step, so that steps back and forth cancel
-      set(clamp(get().map((v, k) => (move[k] ? Math.round((v + by * move[k]) / step) * step : v))));
+      const moved = (v, k) => Math.round(v / steps[k] + far * move[k]) * steps[k];
+      set(clamp(get().map((v, k) => (move[k] ? moved(v, k) : v))));
       event.preventDefault();
     });
     return () => {

@@ -475,7 +475,7 @@
   });
   const moveHandle = Page.draggable(map, {
     name: "ν₁ and ν₂",
-    step: 0.05,
+    steps: [0.05, 0.05],
     get: () => state.nu,
     set: (nu) => set({ nu }),
     say: () => `ν₁ = ${text(state.nu[0])}, ν₂ = ${text(state.nu[1])}`,

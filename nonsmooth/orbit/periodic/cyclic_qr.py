@@ -24,6 +24,9 @@ _LOST = 1e-12
 #: Passes through all factors. Eigenvalues that these do not separate differ by no more than a factor of 12.
 _PASSES = 12
 
+#: Rounding of a factor, relative to its norm.
+_ROUNDED = 16.0 * 2.0**-52
+
 #: Coupling of columns below which eigenvalues are separate.
 _SEPARATE = 1e-13
 
@@ -67,11 +70,9 @@ class Product:
                 return basis
 
     @cached_property
-    def logarithms(self) -> NDArray[np.complex128]:
-        """Logarithms (r,) of the eigenvalues that are not zero, those of the largest first."""
+    def _triangles(self) -> tuple[Array, list[Array]]:
+        """The product is similar to the first (r, r) after those of the list, which are triangular."""
         basis = self.basis
-        if not basis.shape[1]:
-            return np.zeros(0, complex)
         for _ in range(_PASSES):
             first, triangles = basis, list[Array]()
             for factor in self.factors:
@@ -80,7 +81,14 @@ class Product:
             turned = first.T @ basis
             if np.abs(np.tril(turned, -1)).max() < _SEPARATE:
                 break
-        found = _of_blocks(turned, triangles)
+        return turned, triangles
+
+    @cached_property
+    def logarithms(self) -> NDArray[np.complex128]:
+        """Logarithms (r,) of the eigenvalues that are not zero, those of the largest first."""
+        if not self.basis.shape[1]:
+            return np.zeros(0, complex)
+        found = _of_blocks(*self._triangles)
         return found[np.lexsort((found.imag, -found.real.round(12)))]
 
     @property
@@ -95,7 +103,8 @@ class Product:
     @property
     def error(self) -> float:
         """Error of the eigenvalues, relative to those beyond 1, estimated by the transposed factors in reverse order."""
-        # the difference does not include the rounding of the factors themselves, which is ten times as large
+        # the difference does not include the rounding of the factors themselves, which is ten times as large, and at
+        # least that of their entries
         found = self.logarithms
         other = self.reversed.logarithms if found.size else found
         n = min(
@@ -103,7 +112,19 @@ class Product:
         )  # directions that only one of them loses are as small as that
         lost = np.exp(np.minimum([*found.real[n:], *other.real[n:]], 0.0)).max(initial=0.0)
         apart = np.exp(np.minimum(found.real[:n], 0.0)) * np.abs(found.real[:n] - other.real[:n])
-        return 10.0 * float(max(apart.max(initial=0.0), lost))
+        return max(10.0 * float(max(apart.max(initial=0.0), lost)), self._rounding)
+
+    @property
+    def _rounding(self) -> float:
+        """Error of the eigenvalues, relative to those beyond 1, by the rounding of the factors."""
+        if not self.logarithms.size:
+            return 0.0
+        kept = np.abs([np.diagonal(triangle) for triangle in self._triangles[1]])
+        sizes = np.array([np.linalg.norm(factor.matrix) for factor in self.factors])
+        parts = _ROUNDED * np.linalg.norm(
+            sizes[:, None] / kept, axis=0
+        )  # independent of each other
+        return float((parts * np.exp(np.minimum(np.log(kept).sum(axis=0), 0.0))).max())
 
 
 def _decomposed(matrix: Array) -> tuple[Array, Array]:

@@ -65,7 +65,8 @@ typedef struct {
   int64_t *kinds;
   double *x;
   double *unknowns; /* of a set that is left: its direction, then h; not given back */
-  int8_t *letter, *side; /* side: of stops */
+  int8_t *letter, *side; /* side: of guards of events that are located, doubled where they begin at a zero */
+  double *motion, *jumped; /* of a restart, besides the state; of the last events; or none where all events are stops */
   Recent *past;
   int32_t drop, itinerary, status; /* drop: first coefficients of the first guard that vanish */
   int32_t near; /* 1 close to a set, 2 if its guard fell: the set is treated instead of a step */

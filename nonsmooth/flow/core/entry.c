@@ -245,12 +245,21 @@ static int is_apart(Run *r, int f) {
   return length_of(h + f, k) > CLOSE * scale_of_set(r, f, scales_of);
 }
 
-/* Whether lanes can continue: no event is due, no zeros coincide, and only a surface's guard has known zeros. */
-static int is_plain(Run *r) {
+/* Zeros at which the guard of a row may begin in lanes; ``events``: whether they know those of events. */
+static int most_zeros(const Run *r, int row, int events) {
+  int kind = r->now.kind[row];
+  if (is_atom(kind) && r->now.side[row] == UNWATCHED) return r->order + 1;
+  if (kind == IMPACT_GUARD || is_atom(kind)) return events;
+  return row || r->s->sets ? 0 : 2;
+}
+
+/* Whether lanes can continue: no event is due, no zeros coincide, and the known ones are those that lanes know. */
+static int is_plain(Run *r, const Suspended *m) {
   if (r->instant.running || r->due_impact >= 0 || r->hold < INFINITY) return 0;
-  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m || r->s->sets ? 0 : 2)) return 0;
+  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > most_zeros(r, row, m->motion != 0)) return 0;
   EACH_SET(r, f) if (!is_apart(r, f)) return 0;
-  for (int j = 0; j < r->s->stops; j++) if (!r->instant.side[j]) return 0;
+  for (int a = 0; a < r->s->rules.atoms; a++) if (r->s->rules.way[a] != UNWATCHED && !r->instant.side[a]) return 0;
+  for (int j = r->m; j < r->width; j++) if (has_law(r, j, CONTACT_LAW) && r->letter[j] == 0) return 0;
   return 1;
 }
 
@@ -260,6 +269,17 @@ static int is_plain(Run *r) {
   OF(segment_steps, segment_steps) OF(itinerary, itinerary) OF(history, history) OF(hits, hits) OF(kept, kept)
 #define TAKEN(here, there) r->here = m->there;
 #define GIVEN(here, there) m->there = r->here;
+
+/* Rows of the guards of events that are located: those of stops and resets, then gaps; their number. */
+static int located_rows(const Run *r, int32_t *row) {
+  int count = 0;
+  for (int a = 0; a < r->s->rules.atoms; a++) if (r->s->rules.way[a] != UNWATCHED) row[count++] = r->now.atoms + a;
+  for (int k = 0; k < r->now.atoms; k++) if (r->now.kind[k] == IMPACT_GUARD) row[count++] = k;
+  return count;
+}
+
+/* Kinds of events that lanes count, or keep for the driver. */
+static int kinds_of(const Suspended *m) { return m->motion ? KINDS : SIMPLE_KINDS - 1; }
 
 /* The number of a mode's letters in the driver's table is that of lanes. */
 static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Suspended *m) {
@@ -285,17 +305,27 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   r->mode = r->now.mode;
   r->shown = r->segment_mode = shown_number(r, r->letter);
   r->drop[0] = m->drop;
-  memcpy(r->instant.side, m->side, r->s->stops);
-  memcpy(r->instant.view, m->side, r->s->stops);
-  memset(r->instant.residual, 0, sizeof(double) * r->s->stops);
-  memset(r->instant.pending, 0, r->s->rules.triggers);
-  memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
+  if (m->motion) {
+    read_motion(r, m->motion);
+    r->jumped = m->jumped;
+  } else {
+    memset(r->instant.residual, 0, sizeof(double) * r->s->stops);
+    memset(r->instant.pending, 0, r->s->rules.triggers);
+  }
+  int32_t row[r->now.rows + 1];
+  for (int k = located_rows(r, row) - 1; k >= 0; k--) {
+    int atom = row[k] - r->now.atoms, side = m->side[k];
+    if (atom >= 0) r->instant.side[atom] = r->instant.view[atom] = (int8_t)sign_of(side);
+    if (abs(side) > 1) r->drop[row[k]] = 1;
+  }
+  memcpy(r->kinds, m->kinds, sizeof(int64_t) * kinds_of(m));
   r->length = m->length;
   if (m->length > 0) r->length_mode = r->mode;
   for (int k = 0; k < HISTORY && k < m->history; k++) {
     int64_t pattern = m->past[k].pattern;
-    Guard guard = {(int)(pattern >> 32 & 255), (int)(int32_t)pattern, 0};
-    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(pattern >> 40), guard};
+    int64_t kinds = (pattern - (int32_t)pattern) >> 32;
+    Guard guard = {(int)(kinds & 255), (int)(int32_t)pattern, 0};
+    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(kinds >> 8), guard};
   }
 }
 
@@ -312,8 +342,13 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
   if (r->s->timed) m->x[r->n - 1] = r->t;
   memcpy(m->letter, r->letter, r->width);
   m->drop = r->drop[0];
-  memcpy(m->side, r->instant.side, r->s->stops);
-  memcpy(m->kinds, r->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
+  int32_t row[r->now.rows + 1];
+  for (int k = located_rows(r, row) - 1; k >= 0; k--) {
+    int atom = row[k] - r->now.atoms, side = atom < 0 ? 1 : r->instant.side[atom];
+    m->side[k] = (int8_t)(r->drop[row[k]] ? 2 * side : side);
+  }
+  if (m->motion) write_motion(r, m->motion);
+  memcpy(m->kinds, r->kinds, sizeof(int64_t) * kinds_of(m));
   m->length = r->length_mode == r->mode ? r->length : 0;
   for (int64_t k = first; k < r->history; k++)
     m->past[k % HISTORY] = (Recent){r->past[k % HISTORY].interval, r->past[k % HISTORY].pattern};
@@ -321,7 +356,7 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
 }
 
 static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Suspended *m) {
-  while (r->status == RUNNING && (r->t >= r->o.t_end || !is_plain(r))) step(r); /* lanes do not decide a mode at the end */
+  while (r->status == RUNNING && (r->t >= r->o.t_end || !is_plain(r, m))) step(r); /* lanes do not decide a mode at the end */
   give(r, b, i, m);
 }
 
@@ -330,6 +365,7 @@ void core_begin(void *run, const Batch *b, const Options *o, int64_t i, Suspende
   static const Output none;
   Run *r = run;
   m->history = m->hits = m->kept = 0;
+  if (m->motion) r->jumped = m->jumped;
   sample_into(r, b, i);
   run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, 0, b->t0, 0);
   go_on_until_plain(r, b, i, m);
@@ -357,9 +393,10 @@ void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended
  * off a set and on it. */
 Tree *lanes_tree(Run *r) {
   const int8_t surface[] = {1, -1, 0}, set[] = {OFF, 0};
-  for (int k = 0; k < (!r->width ? 1 : r->s->sets ? 2 : 3); k++) {
-    memset(r->start, r->s->sets ? set[k] : surface[k], r->width);
-    mode_number(r->table, r->start);
+  for (int k = 0; k < (!r->m ? 1 : r->s->sets ? 2 : 3); k++) {
+    memset(r->start, r->s->sets ? set[k] : surface[k], r->m);
+    memset(r->start + r->m, 1, r->c);
+    numbered(r, r->start, 0);
   }
   return &r->table->tree;
 }

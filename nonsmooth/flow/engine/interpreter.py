@@ -36,7 +36,7 @@ from .arrays import (
     options_of,
     words_of,
 )
-from .building.codegen import interpreter_order
+from .building.codegen import interpreter_order, width_of_motion
 from .library import core_library
 from .recording import LOOSE, Output, Recorder, Rooms, rooms_of
 from .shown import Shown
@@ -277,15 +277,13 @@ class Interpreter:
             "value_at": _ends(values),
         }
         atoms, keeps = d.guards.numel(), any(rule.at_trigger for rule in d.rules)
-        width = 1 + (5 + 4 * atoms + len(conditions) + 3 * len(d.clocks)) * (atoms > 0)
-        width += len(conditions) * self.system.extended_dimension * keeps
         numbers = {
             "atoms": atoms,
             "triggers": len(conditions),
             "clocks": len(d.clocks),
             "discrete": len(d.discrete),
             "keeps": int(keeps),
-            "width": width,
+            "width": width_of_motion(self.system),
             "value": self._at(np.array([*chain(*values), 0.0], float)),
         }
         return self._filled("Rules", tables | numbers)

@@ -35,7 +35,14 @@ typedef struct {
 static void point_to(Packed *a, Past *past) {
   a->m.x = a->x;
   a->m.unknowns = a->unknowns;
+#if EVENTS
+  a->m.kinds = past->kinds;
+  a->m.motion = past->motion;
+  a->m.jumped = past->jumped;
+#else
   a->m.kinds = a->kinds;
+  a->m.motion = 0;
+#endif
   a->m.letter = a->letter;
   a->m.side = a->side;
   a->m.past = past->event;
@@ -96,8 +103,9 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   const Past *past = past_of(s, l);
   write_mode(s, l, m);
   UNROLL for (int i = 0; i < N; i++) a->x[i] = LANE(s->x[i], l);
-  for (int k = 0; k < LAST_KIND; k++) a->kinds[k] = LANE_I(s->kinds[k], l);
+  for (int k = 0; k < LAST_KIND; k++) m->kinds[k] = LANE_I(s->kinds[k], l);
   for (int j = 0; j < STOPS; j++) a->side[j] = LANE_I(s->above_stop[j], l) ? 1 : -1;
+  for (int j = 0; EVENTS && j < STOPS; j++) if (LANE_I(s->from_zero[j], l)) a->side[j] *= 2;
   m->t = LANE(s->t, l);
   m->since = LANE(s->since, l);
   m->length = LANE(s->length, l);
@@ -116,8 +124,9 @@ static int unpack(Lanes *s, const Work *w, int l, const Packed *a) {
   const Suspended *m = &a->m;
   Past *past = past_of(s, l);
   UNROLL for (int i = 0; i < N; i++) LANE(s->x[i], l) = a->x[i];
-  for (int k = 0; k < LAST_KIND; k++) LANE_I(s->kinds[k], l) = a->kinds[k];
+  for (int k = 0; k < LAST_KIND; k++) LANE_I(s->kinds[k], l) = m->kinds[k];
   for (int j = 0; j < STOPS; j++) LANE_I(s->above_stop[j], l) = -(int64_t)(a->side[j] > 0);
+  for (int j = 0; EVENTS && j < STOPS; j++) LANE_I(s->from_zero[j], l) = -(int64_t)(abs(a->side[j]) == 2);
   LANE(s->t, l) = m->t;
   LANE(s->since, l) = m->since;
   LANE(s->length, l) = m->length;
@@ -144,9 +153,12 @@ static void keep_end(Lanes *s, Work *w, int l, int status) {
   UNROLL for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
   b->t[i] = LANE(s->t, l);
   b->itinerary[i] = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
-  int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
+  int32_t *kinds = b->kinds + i * b->kinds_width;
   UNROLL for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
-  kinds[LAST_KIND] = status == REACHED_END;
+#if EVENTS
+  for (int64_t k = LAST_KIND; k < b->kinds_width - 1; k++) kinds[k] = (int32_t)past_of(s, l)->kinds[k];
+#endif
+  kinds[b->kinds_width - 1] = status == REACHED_END;
 }
 
 INLINE void keep_event(const Lanes *s, Work *w, int kind, I which) {

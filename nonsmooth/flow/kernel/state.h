@@ -22,7 +22,7 @@
 #define FIRST_STOP (SLOTS - STOPS)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 2 * MOST_MODES)
-#define LETTERS M1
+#define LETTERS (M + CONTACTS > 0 ? M + CONTACTS : 1)
 #if SET
 #define LAST_TERM(mode) ((mode) == GOING ? 1.0 : 2.0) /* size of the last two terms in units of the tolerance */
 #define BEFORE_LAST(mode) ((mode) == GOING ? 1.0 : 10.0)
@@ -66,6 +66,7 @@ typedef struct {
   I index, base;
   OWN(T, q, NQ); /* prepared from the parameters */
   double size; /* of states at which both tolerances are equal */
+  I from_zero[STOPS + 1]; /* with EVENTS: whether the step begins at a zero of the guard of a stop */
 #if RARE_CASES_HERE
   Past *past; /* of each lane, or of each ``own`` */
   Log *log; /* of a surface's events */
@@ -95,6 +96,7 @@ typedef struct {
 #else
   I drop, slides, above;
 #endif
+  I from_zero[STOPS + 1];
   Guards v;
 } Step;
 

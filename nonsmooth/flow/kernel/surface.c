@@ -211,6 +211,7 @@ INLINE void undo_mode(Lanes *s, const Step *e, I which) {
 static void write_mode(const Lanes *s, int l, Suspended *m) {
   recall(s, l);
   m->letter[0] = LANE_I(s->slides, l) ? 0 : LANE_I(s->above, l) ? 1 : -1;
+  for (int k = M; k < LETTERS; k++) m->letter[k] = 1; /* an open contact */
   m->drop = (int32_t)LANE_I(s->drop, l);
 }
 

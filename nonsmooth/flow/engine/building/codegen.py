@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....model import FilippovSystem, coupled_of
+from ....model import FilippovSystem, coupled_of, with_stops
 from ....model.printing.programs import lanes_program
 from ....model.printing.set_program import set_program
 from ...options import Options
@@ -14,18 +14,41 @@ _MOST_LINEAR = 22
 
 def supports_lanes(system: FilippovSystem) -> bool:
     """Whether lanes can be generated: one surface at most, or one set of constant slopes."""
+    if not has_events(system):
+        return supports_device(system)
+    if system.sets or system.surface_count > 1 or not _has_plain_laws(system):
+        return False
+    return not (system.surface_count and (system.definition.discrete or coupled_of(system).carriers[0]))
+
+
+def has_events(system: FilippovSystem) -> bool:
+    """Whether a system has events that the driver makes: all but stops at a guard that is passed."""
+    return bool(system.resets or system.impacts or not system.definition.plain)
+
+
+def supports_device(system: FilippovSystem) -> bool:
+    """Whether a kernel can be generated: all events are stops at a guard that is passed."""
+    if has_events(system) or not _has_plain_laws(system):
+        return False
     if system.sets:
         alone = len(system.sets) == 1 and system.surface_count == len(system.sets[0])
         coupled = coupled_of(system)
-        return alone and coupled.affine and not coupled.slope_moves.any() and _is_plain(system)
-    return system.surface_count <= 1 and _is_plain(system)
+        return alone and coupled.affine and not coupled.slope_moves.any()
+    return system.surface_count <= 1
 
 
-def _is_plain(system: FilippovSystem) -> bool:
-    """Whether all events are stops at a guard, without conditions, and multipliers enter linearly."""
-    others = system.resets or system.impacts or any(system.nonlinear) or system.remembering
-    others = others or system.complementarity or system.constraints
-    return not (others or system.written.tables) and system.definition.plain
+def _has_plain_laws(system: FilippovSystem) -> bool:
+    """Whether multipliers enter linearly, and all are those of surfaces and sets."""
+    others = any(system.nonlinear) or system.remembering or system.written.tables
+    return not (others or system.complementarity or system.constraints)
+
+
+def width_of_motion(system: FilippovSystem) -> int:
+    """Numbers that a restart needs besides the state."""
+    d = system.definition
+    atoms, conditions = d.guards.numel(), sum(len(rule.triggers) for rule in d.rules)
+    keeps = conditions * system.extended_dimension * any(rule.at_trigger for rule in d.rules)
+    return 1 + (atoms > 0) * (5 + 4 * atoms + conditions + 3 * len(d.clocks) + keeps)
 
 
 def interpreter_order(system: FilippovSystem, options: Options) -> int:
@@ -67,6 +90,9 @@ def _step_texts(system: FilippovSystem) -> list[str]:
 
 def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
     """Definitions that the lanes' text needs before it, and the functions of a system."""
+    events, contacts, width = has_events(system), len(system.impacts), width_of_motion(system)
+    own = len(system.stops) if system.definition.plain else 0
+    system = with_stops(system) if events else system
     of = coupled_of(system)
     program, shape = set_program(of, order) if system.sets else lanes_program(system, order)
     m, directions = system.surface_count, listed(d for _, d in system.stops) or 0
@@ -83,6 +109,10 @@ def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
         "TIMED": int(system.time_dependent),
         "SLOTS": len(shape.affine),
         "STOPS": len(system.stops),
+        "CLEAR_STOPS": own,
+        "EVENTS": int(events),
+        "CONTACTS": contacts,
+        "MOTION": width,
         "CANCELLED": int(cancelled),
         "ROWS": len(shape.rows),
         "GUARDS": len(shape.slots),

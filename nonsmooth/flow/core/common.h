@@ -70,6 +70,7 @@ typedef struct {
   Recent *past;
   int32_t drop, itinerary, status; /* drop: first coefficients of the first guard that vanish */
   int32_t near; /* 1 close to a set, 2 if its guard fell: the set is treated instead of a step */
+  int32_t arrived; /* number of the guard of an event that is at its zero, from 1: the event is made instead of a step */
 } Suspended;
 
 /* The driver as lanes call it: a run, and functions that begin it or make a step. */

@@ -378,6 +378,19 @@ static void read_kept(Run *r, const Batch *b, int64_t i) {
   memcpy(r->at_x, b->at_x + i * r->s->dimension, sizeof(double) * r->s->dimension);
 }
 
+/* Make the event of a guard that lanes have integrated to its zero. */
+static void make_event(Run *r, int located) {
+  int32_t row[r->now.rows + 1];
+  located_rows(r, row);
+  int at = row[located - 1], atom = at - r->now.atoms;
+  r->falls = 0;
+  memset(r->instant.passing, 0, r->s->rules.atoms);
+  if (atom < 0) { serve_between(r, at); return; }
+  if (clock_of(r, atom) < 0) expand(r, r->letter, r->x, r->unknowns, &r->e);
+  r->instant.passing[atom] = 1;
+  arrive(r, &r->e, 0, -1);
+}
+
 /* Make the step that the lanes cannot decide. */
 void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m) {
   Run *r = run;
@@ -385,6 +398,7 @@ void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended
   read_kept(r, b, i);
   if (m->since == 0 && m->history) see_limit(r); /* the last event was a lane's */
   if (r->status == RUNNING && m->near) near_set(r, 0, m->near == 2);
+  else if (r->status == RUNNING && m->arrived) make_event(r, m->arrived);
   else if (r->status == RUNNING) step(r);
   go_on_until_plain(r, b, i, m);
 }

@@ -46,7 +46,7 @@ static void point_to(Packed *a, Past *past) {
   a->m.letter = a->letter;
   a->m.side = a->side;
   a->m.past = past->event;
-  a->m.near = a->m.drop = 0;
+  a->m.near = a->m.drop = a->m.arrived = 0;
 }
 
 /* Set the time of a run's next sample; infinite if there is none. */
@@ -114,6 +114,7 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   m->events = LANE_I(s->events, l);
   m->segment_steps = m->steps - LANE_I(s->entered, l);
   m->history = past->count;
+  if (EVENTS) m->arrived = (int32_t)LANE_I(s->arrived, l);
   m->hits = past->hits;
   m->kept = past->kept;
   m->itinerary = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));

@@ -373,7 +373,7 @@ INLINE void expand_step(Lanes *s, Work *w, Step *e, int mode) {
 #endif
   e->last = time_of(e, h) >= left;
   e->unclear = ~finite;
-#if RARE_CASES_HERE && !SET
+#if RARE_CASES_HERE && M == 1
   I after = (s->since == 0) & (s->events > BLOCKS);
   if (any(after)) e->unclear |= watch_limit(s, e->c, e->allowed, after);
 #endif
@@ -414,11 +414,25 @@ OUTLINED void undo_step(Lanes *s, const Step *e, I which) {
   undo_mode(s, e, which);
 }
 
-/* Make the step; returns undecided lanes. */
+/* Lanes at an event where another guard is small; values of all guards there. */
+OUTLINED I crowded_lanes(const Lanes *s, const Step *e, int mode, I which, T *value) {
+  I crowded = NONE;
+  for (int j = 0; j < SLOTS; j++) {
+    const T *g = e->g[j];
+    T size = ABS(g[P]);
+    value[j] = g[P];
+    for (int k = P - 1; k >= 0; k--) { value[j] = value[j] * e->dt + g[k]; size = size * e->dt + ABS(g[k]); }
+    I other = e->slot != j + 1;
+    if (M > 0 && j == 1) other &= has_second(s, mode);
+    crowded |= which & other & ~(I)(ABS(value[j]) > CROWDED * size);
+  }
+  return crowded;
+}
+
+/* Make the step; returns undecided lanes, and those at events that the driver makes. */
 INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   const Options *o = limits(w);
   I unclear = e->unclear | by_chance(s, w);
-  if (STOPS > CLEAR_STOPS) unclear |= e->slot > FIRST_STOP + CLEAR_STOPS;
 #if SET
   if (mode == ON && any(e->slot == 1)) polish_slip(e);
 #endif
@@ -437,12 +451,15 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   s->steps += 1;
   unclear |= ~finite_lanes(s);
   unclear |= land(s, w, e, mode, s->live & ~unclear);
+  T at_event[S1];
+  I arrived = EVENTS ? e->slot > FIRST_STOP + CLEAR_STOPS : NONE;
+  if (any(arrived)) unclear |= crowded_lanes(s, e, mode, arrived, at_event);
   unclear &= s->live;
   if (any(unclear)) {
     undo_step(s, e, unclear);
     s->steps += unclear;
   }
-  I live = s->live & ~unclear, stopped = live & (e->slot > FIRST_STOP);
+  I live = s->live & ~unclear, stopped = live & (e->slot > FIRST_STOP) & ~arrived;
 #if RARE_CASES_HERE && !SET
   I due = live & (s->due < e->t + e->dt);
   if (any(due)) keep_samples(s, w, e, due);
@@ -450,15 +467,20 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
 #if STOPS > 0
   for (int j = 0; j < STOPS; j++)
     s->above_stop[j] = (s->above_stop[j] & ~live) | ((I)(value_of_stop(e->g, j, e->from_zero) > 0) & live);
+  for (int j = 0; EVENTS && j < STOPS; j++) {
+    I other = live & arrived & (e->slot != FIRST_STOP + 1 + j);
+    s->above_stop[j] = (s->above_stop[j] & ~other) | ((I)(at_event[FIRST_STOP + j] > 0) & other);
+  }
   if (any(stopped)) count(s, w, STOP, stopped);
 #endif
+  if (EVENTS) s->arrived = live & arrived & (e->slot - FIRST_STOP);
   s->t = SELECT(live & e->last, BC(o->t_end), s->t);
   finish_lanes(s, w, stopped, STOPPED);
   finish_lanes(s, w, e->last & live & (e->slot == 0), REACHED_END);
 #if SET
   if (any(e->gone & live)) send(s, w, e->gone & live, mode == AWAY ? NEAR_SET : mode == ON ? GOING : AWAY);
 #endif
-  return unclear;
+  return EVENTS ? unclear | s->arrived != 0 : unclear;
 }
 
 #if SET

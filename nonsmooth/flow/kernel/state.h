@@ -67,6 +67,7 @@ typedef struct {
   OWN(T, q, NQ); /* prepared from the parameters */
   double size; /* of states at which both tolerances are equal */
   I from_zero[STOPS + 1]; /* with EVENTS: whether the step begins at a zero of the guard of a stop */
+  I arrived; /* with EVENTS: number of the guard whose event is due, or 0 */
 #if RARE_CASES_HERE
   Past *past; /* of each lane, or of each ``own`` */
   Log *log; /* of a surface's events */

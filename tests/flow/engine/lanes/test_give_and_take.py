@@ -81,11 +81,8 @@ def sampled():
     one, two = ns.Clock(0.7, {z: -2 * x - y}, name="sample"), ns.Clock(0.4, name="carrier")
     duty = two.phase - 0.2 - 0.1 * ca.tanh(z)
     above, below = [y, -x - 0.4, 0], [y, -x + z, 0]
-    return (
-        ns.FilippovSystem([x, y, z], surface=duty, above=above, below=below, clocks=[one, two]),
-        9.0,
-        1.0,
-    )
+    rest = {"clocks": [one, two], "stops": ns.Stop(x - 1.2)}
+    return ns.FilippovSystem([x, y, z], surface=duty, above=above, below=below, **rest), 9.0, 1.0
 
 
 def heating():
@@ -190,13 +187,6 @@ def test_parameters_of_each_start(monkeypatch):
     lanes.random = 3
     scalar = interpreter_for(system, options).run_many(start, p, options, (1, 1))
     same(lanes.run_many(start, p, options, (1, 1)), scalar, 1e-7)
-
-
-def test_stops_with_conditions_are_not_for_lanes():
-    half = {"when": y > 0}, {"level": True}, {"initially": True}
-    for more in ({}, *half):
-        system = ns.FilippovSystem([x, y], field=[y, -x], stops=[ns.Stop(x - 1, 1, **more)])
-        assert (lanes_for(system, Options(t_end=1.0)) is None) == bool(more)
 
 
 @pytest.mark.parametrize("base", [1.05, 2.0, 50.0])

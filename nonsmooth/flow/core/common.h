@@ -61,7 +61,7 @@ static inline int shrink_alike(const double *block) {
 /* The data of a run between two steps: lanes pass it to the driver for a step that they cannot decide. */
 typedef struct {
   double t, since, length, shortened; /* since: the last event; length of the step before in this mode, or 0 */
-  int64_t steps, events, segment_steps, history, hits, kept; /* hits: of the section; kept: samples */
+  int64_t steps, events, segment_steps, history, seen, hits, kept; /* seen: history in the driver; hits: of the section; kept: samples */
   int64_t *kinds;
   double *x;
   double *unknowns; /* of a set that is left: its direction, then h; not given back */

@@ -353,6 +353,7 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
   for (int64_t k = first; k < r->history; k++)
     m->past[k % HISTORY] = (Recent){r->past[k % HISTORY].interval, r->past[k % HISTORY].pattern};
   GOES_ON(GIVEN)
+  m->seen = m->history;
 }
 
 static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Suspended *m) {
@@ -396,7 +397,7 @@ void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended
   Run *r = run;
   take(r, b, o, i, m);
   read_kept(r, b, i);
-  if (m->since == 0 && m->history) see_limit(r); /* the last event was a lane's */
+  if (m->since == 0 && m->history != m->seen) see_limit(r); /* the last event was a lane's */
   if (r->status == RUNNING && m->near) near_set(r, 0, m->near == 2);
   else if (r->status == RUNNING && m->arrived) make_event(r, m->arrived);
   else if (r->status == RUNNING) step(r);

@@ -42,7 +42,7 @@ static int load(Lanes *s, Work *w, int l, I mine) {
   LANE_I(s->own, l) = w->spare[--w->spares];
 #endif
   Past *past = past_of(s, l);
-  past->count = past->steps = past->hits = past->kept = 0;
+  past->count = past->seen = past->steps = past->hits = past->kept = 0;
   await_sample(s, w, l);
   past->row = s->row;
   past->shortened = 0;

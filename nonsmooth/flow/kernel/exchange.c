@@ -114,6 +114,7 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   m->events = LANE_I(s->events, l);
   m->segment_steps = m->steps - LANE_I(s->entered, l);
   m->history = past->count;
+  m->seen = past->seen;
   if (EVENTS) m->arrived = (int32_t)LANE_I(s->arrived, l);
   m->hits = past->hits;
   m->kept = past->kept;
@@ -136,6 +137,7 @@ static int unpack(Lanes *s, const Work *w, int l, const Packed *a) {
   LANE_I(s->events, l) = m->events;
   LANE_I(s->entered, l) = m->steps - m->segment_steps;
   past->count = m->history;
+  past->seen = m->seen;
   past->hits = m->hits;
   past->kept = m->kept;
   await_sample(s, w, l);

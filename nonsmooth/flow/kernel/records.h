@@ -1,11 +1,11 @@
 /* Data common to all kinds of lanes on a CPU: itineraries as nodes of a tree, starts that are not finite, the last events. */
 #define MEMORY 256
 
-/* Data of a trajectory for the driver: the last events, up to a row of a log; halved steps, up to a step; hits of a section,
+/* Data of a trajectory for the driver: the last events, up to a row of a log, and their number when it ended; halved steps, up to a step; hits of a section,
  * samples; what only the driver changes. */
 typedef struct {
   Recent event[HISTORY];
-  int64_t count, row, steps, hits, kept;
+  int64_t count, seen, row, steps, hits, kept;
   double shortened;
 #if EVENTS
   int64_t kinds[KINDS];

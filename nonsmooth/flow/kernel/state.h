@@ -1,19 +1,22 @@
-/* W trajectories together, for systems of at most one surface, or of one set of codimension two or three, without resets.
+/* W trajectories together, for systems of at most one surface, or of one set of codimension two or three.
  *
  * Each lane holds one trajectory and is refilled when it ends. Common operations run for all lanes at once: expansion,
  * step size, roots, projection, clear decisions. The driver makes steps with rare cases (tangency, repelling sliding, ties,
- * accumulating events, limits, points that are not finite). No lane's result depends on its neighbours.
+ * accumulating events, limits, points that are not finite), and the events of resets, impacts and conditions, whose guards
+ * end the steps of lanes as those of stops (EVENTS). No lane's result depends on its neighbours.
  *
  * Modes of a surface are masks: one jet expands them all. The modes off a set, on it and leaving it have a jet and a pool of
  * lanes each; a fourth pool is for states near it. A trajectory waits until all lanes of a pool are filled (fewer run only
  * when no start is left).
  *
- * The generated text defines, besides what common.h needs: N states with time, ND without, M surfaces,
- * TIMED whether time is a state, W, GROUPS, SLOTS guards (surface or exit to +, exit to -, stops; of a set its guard,
- * friction's limit, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], AFFINE_MODES[3] (above, below, sliding; or off the
- * set, on it, leaving it), LINEAR whether all are, CANCELLED, CURVED, OWN_STATE[M], states that a set's functions are (NAMED:
- * whether they are), prepare(p, q), surface_values, stop_values; ROW[ROWS] of the field and SLOT[GUARDS] of the series
- * are not affine; and the functions of programs.py or set_program.py in nonsmooth/model/printing.
+ * The generated text defines, besides what common.h needs: N states with time, ND without, M surfaces, TIMED whether
+ * time is a state, W, GROUPS, EVENTS (as above), CLEAR_STOPS stops without conditions, the first of STOPS guards of
+ * events, CONTACTS gaps, the last, MOTION (size of the driver's data), SLOTS guards (surface or exit to +, exit to -,
+ * stops; of a set its guard, friction's limit, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], AFFINE_MODES[3] (above,
+ * below, sliding; or off the set, on it, leaving it), LINEAR whether all are, CANCELLED, CURVED, OWN_STATE[M], states
+ * that a set's functions are (NAMED: whether they are), prepare(p, q), surface_values, stop_values; ROW[ROWS] of the
+ * field and SLOT[GUARDS] of the series are not affine; and the functions of programs.py or set_program.py in
+ * nonsmooth/model/printing.
  */
 #define SET (M > 1)
 #define S1 (SLOTS > 0 ? SLOTS : 1)

@@ -18,7 +18,9 @@ def supports_lanes(system: FilippovSystem) -> bool:
         return supports_device(system)
     if system.sets or system.surface_count > 1 or not _has_plain_laws(system):
         return False
-    return not (system.surface_count and (system.definition.discrete or coupled_of(system).carriers[0]))
+    return not (
+        system.surface_count and (system.definition.discrete or coupled_of(system).carriers[0])
+    )
 
 
 def has_events(system: FilippovSystem) -> bool:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import find_compiler, interpreter_for, lanes_for
+from nonsmooth.flow.engine import find_compiler, interpreter_for
 from nonsmooth.flow.engine import lanes as engine
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
@@ -70,7 +70,9 @@ def kicks():
     above, below = [y, -x - 0.1], [y, -x + 0.1]
     resets, stops = [wall, kick], [ns.Stop(y + 0.04 * x + 1.6, -1)]
     return (
-        ns.FilippovSystem([x, y], surface=y - 0.2, above=above, below=below, resets=resets, stops=stops),
+        ns.FilippovSystem(
+            [x, y], surface=y - 0.2, above=above, below=below, resets=resets, stops=stops
+        ),
         9.0,
         1.0,
     )
@@ -138,7 +140,9 @@ def same(one, two, digits):
             np.testing.assert_allclose(*pair, rtol=0, atol=digits, err_msg=name)
 
 
-@pytest.mark.slow_cases(*[f"{w}-{f.__name__}" for f in EVENTS for w in (1, 8)])
+@pytest.mark.slow_cases(
+    *("4-kicks", "4-heating", *[f"{w}-{f.__name__}" for f in EVENTS for w in (1, 8)])
+)
 @pytest.mark.parametrize("name", SYSTEMS)
 @pytest.mark.parametrize("width", [1, 4, 8])
 def test_steps_made_by_the_driver_at_random(width, name, monkeypatch):

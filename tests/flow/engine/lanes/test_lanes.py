@@ -190,6 +190,12 @@ def test_every_operation():
     assert agree(system, [0.4, 0.9], options, {"p": 1.5}, 1e-9) is Status.REACHED_END
 
 
+def test_a_state_with_a_parameter_and_no_surface():
+    x, a = ca.SX.sym("x"), ca.SX.sym("a")
+    system = FilippovSystem([x], field=[a - x], parameters={a: 2.0}, stops=Stop(x - 1))
+    assert "jet(" in lanes_source(system, 6, 8)
+
+
 def test_functions_of_one_side_are_not_evaluated_on_the_other():
     """The root of the side above has no argument below, where all runs end."""
     x, y = ca.SX.sym("x"), ca.SX.sym("y")

@@ -69,6 +69,7 @@ typedef struct {
   double *motion, *jumped; /* of a restart, besides the state; of the last events; or none where all events are stops */
   Recent *past;
   int32_t drop, itinerary, status; /* drop: first coefficients of the first guard that vanish */
+  int32_t driven; /* whether the driver makes the events at surfaces too */
   int32_t near; /* 1 close to a set, 2 if its guard fell: the set is treated instead of a step */
   int32_t arrived; /* number of the guard of an event that is at its zero, from 1: the event is made instead of a step */
 } Suspended;

@@ -245,22 +245,32 @@ static int is_apart(Run *r, int f) {
   return length_of(h + f, k) > CLOSE * scale_of_set(r, f, scales_of);
 }
 
-/* Zeros at which the guard of a row may begin in lanes; ``events``: whether they know those of events. */
-static int most_zeros(const Run *r, int row, int events) {
+/* Rows of the guards of events that are located: those of stops and resets, then surfaces, if they are the driver's, and gaps;
+ * their number. */
+static int located_rows(const Run *r, const Suspended *m, int32_t *row) {
+  int count = 0;
+  for (int a = 0; a < r->s->rules.atoms; a++) if (r->s->rules.way[a] != UNWATCHED) row[count++] = r->now.atoms + a;
+  for (int k = 0; k < r->now.atoms; k++)
+    if (r->now.kind[k] == IMPACT_GUARD || (m->driven && r->now.kind[k] == SURFACE_GUARD)) row[count++] = k;
+  return count;
+}
+
+/* Zeros at which the guard of a row may begin in lanes. */
+static int most_zeros(const Run *r, const Suspended *m, int row) {
   int kind = r->now.kind[row];
   if (is_atom(kind) && r->now.side[row] == UNWATCHED) return r->order + 1;
-  if (kind == IMPACT_GUARD || is_atom(kind)) return events;
-  return row || r->s->sets ? 0 : 2;
+  if (kind == IMPACT_GUARD || is_atom(kind)) return m->motion != 0;
+  return m->driven ? 1 : row || r->s->sets ? 0 : 2;
 }
 
 /* Whether lanes can continue: no event is due, no zeros coincide, and the known ones are those that lanes know. */
 static int is_plain(Run *r, const Suspended *m) {
   if (r->instant.running || r->due_impact >= 0 || r->hold < INFINITY) return 0;
-  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > most_zeros(r, row, m->motion != 0)) return 0;
+  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > most_zeros(r, m, row)) return 0;
   EACH_SET(r, f) if (!is_apart(r, f)) return 0;
   for (int a = 0; a < r->s->rules.atoms; a++) if (r->s->rules.way[a] != UNWATCHED && !r->instant.side[a]) return 0;
-  for (int j = r->m; j < r->width; j++) if (has_law(r, j, CONTACT_LAW) && r->letter[j] == 0) return 0;
-  return 1;
+  for (int j = m->driven ? 0 : r->m; j < r->width; j++) if (r->letter[j] == 0) return 0;
+  return !m->driven || r->now.atoms == r->width; /* each surface has its guard */
 }
 
 /* The data of a run between two steps, here and in lanes. */
@@ -269,14 +279,6 @@ static int is_plain(Run *r, const Suspended *m) {
   OF(segment_steps, segment_steps) OF(itinerary, itinerary) OF(history, history) OF(hits, hits) OF(kept, kept)
 #define TAKEN(here, there) r->here = m->there;
 #define GIVEN(here, there) m->there = r->here;
-
-/* Rows of the guards of events that are located: those of stops and resets, then gaps; their number. */
-static int located_rows(const Run *r, int32_t *row) {
-  int count = 0;
-  for (int a = 0; a < r->s->rules.atoms; a++) if (r->s->rules.way[a] != UNWATCHED) row[count++] = r->now.atoms + a;
-  for (int k = 0; k < r->now.atoms; k++) if (r->now.kind[k] == IMPACT_GUARD) row[count++] = k;
-  return count;
-}
 
 /* Kinds of events that lanes count, or keep for the driver. */
 static int kinds_of(const Suspended *m) { return m->motion ? KINDS : SIMPLE_KINDS - 1; }
@@ -313,7 +315,7 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
     memset(r->instant.pending, 0, r->s->rules.triggers);
   }
   int32_t row[r->now.rows + 1];
-  for (int k = located_rows(r, row) - 1; k >= 0; k--) {
+  for (int k = located_rows(r, m, row) - 1; k >= 0; k--) {
     int atom = row[k] - r->now.atoms, side = m->side[k];
     if (atom >= 0) r->instant.side[atom] = r->instant.view[atom] = (int8_t)sign_of(side);
     if (abs(side) > 1) r->drop[row[k]] = 1;
@@ -327,6 +329,16 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
     Guard guard = {(int)(kinds & 255), (int)(int32_t)pattern, 0};
     r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(kinds >> 8), guard};
   }
+}
+
+/* Whether the guard of a row begins at a zero that the motion leaves. */
+static int leaves_zero(Run *r, int row) {
+  int i = r->now.index[row];
+  if (r->drop[row] || r->now.kind[row] != SURFACE_GUARD || degree_of(r, i) < 2) return r->drop[row];
+  const double *h = surface_values(r, r->x), *scale = surface_scales(r, r->x);
+  int rate = element(r, i)->lower;
+  if (!(fabs(h[i]) <= ON_SURFACE * scale[i] && fabs(h[rate]) > ON_SURFACE * scale[rate])) return 0;
+  return h[rate] * r->letter[i] > 0;
 }
 
 /* Return a run to the lanes, or store its end. */
@@ -343,9 +355,9 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
   memcpy(m->letter, r->letter, r->width);
   m->drop = r->drop[0];
   int32_t row[r->now.rows + 1];
-  for (int k = located_rows(r, row) - 1; k >= 0; k--) {
-    int atom = row[k] - r->now.atoms, side = atom < 0 ? 1 : r->instant.side[atom];
-    m->side[k] = (int8_t)(r->drop[row[k]] ? 2 * side : side);
+  for (int k = located_rows(r, m, row) - 1; k >= 0; k--) {
+    int atom = row[k] - r->now.atoms, side = atom < 0 ? r->letter[r->now.index[row[k]]] : r->instant.side[atom];
+    m->side[k] = (int8_t)(leaves_zero(r, row[k]) ? 2 * side : side);
   }
   if (m->motion) write_motion(r, m->motion);
   memcpy(m->kinds, r->kinds, sizeof(int64_t) * kinds_of(m));
@@ -380,10 +392,10 @@ static void read_kept(Run *r, const Batch *b, int64_t i) {
 }
 
 /* Make the event of a guard that lanes have integrated to its zero. */
-static void make_event(Run *r, int located) {
+static void make_event(Run *r, const Suspended *m) {
   int32_t row[r->now.rows + 1];
-  located_rows(r, row);
-  int at = row[located - 1], atom = at - r->now.atoms;
+  located_rows(r, m, row);
+  int at = row[m->arrived - 1], atom = at - r->now.atoms;
   r->falls = 0;
   memset(r->instant.passing, 0, r->s->rules.atoms);
   if (atom < 0) { serve_between(r, at); return; }
@@ -399,7 +411,7 @@ void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended
   read_kept(r, b, i);
   if (m->since == 0 && m->history != m->seen) see_limit(r); /* the last event was a lane's */
   if (r->status == RUNNING && m->near) near_set(r, 0, m->near == 2);
-  else if (r->status == RUNNING && m->arrived) make_event(r, m->arrived);
+  else if (r->status == RUNNING && m->arrived) make_event(r, m);
   else if (r->status == RUNNING) step(r);
   go_on_until_plain(r, b, i, m);
 }

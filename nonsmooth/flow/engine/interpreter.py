@@ -36,7 +36,7 @@ from .arrays import (
     options_of,
     words_of,
 )
-from .building.codegen import interpreter_order, width_of_motion
+from .building.codegen import driver_decides, interpreter_order, width_of_motion
 from .library import core_library
 from .recording import LOOSE, Output, Recorder, Rooms, rooms_of
 from .shown import Shown
@@ -389,7 +389,7 @@ class Interpreter:
         return int(status)
 
     def seconds(self, x: Array, p: Array, options: Options) -> float | None:
-        """About how long a run takes, from its first steps; None if it takes implicit ones soon."""
+        """About how long the steps of a run take that lanes could make; None if it takes implicit ones soon."""
         # By what a step has to do, not by the clock: what is decided by it has to be the same again.
         few = replace(options, max_steps=min(options.max_steps, _PROBED), hits=None)
         if not np.isfinite(x).all():
@@ -399,7 +399,10 @@ class Interpreter:
             return None
         done = (float(run.t[-1]) - options.t_start) / (options.t_end - options.t_start)
         steps = len(run.t) / (max(done, 1e-9) if run.status == Status.TOO_MANY_STEPS else 1.0)
-        return steps * (_OF_STEP + _OF_TERM * (series.size + series.terms))
+        closed = "sc" if driver_decides(self.system) else "c"
+        made = [not set(closed) & set(mode) for mode in run.letters]
+        share = np.mean(np.array(made)[run.written["step_mode"]]) if len(run.starts) else 1.0
+        return float(steps * share) * (_OF_STEP + _OF_TERM * (series.size + series.terms))
 
     def _checked(self, motion: Array) -> Array:
         """Data of a run or event for a restart, if it is of this system."""

@@ -47,6 +47,7 @@ static void point_to(Packed *a, Past *past) {
   a->m.side = a->side;
   a->m.past = past->event;
   a->m.near = a->m.drop = a->m.arrived = 0;
+  a->m.driven = SURFACES > 0;
 }
 
 /* Set the time of a run's next sample; infinite if there is none. */
@@ -121,6 +122,15 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   m->itinerary = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
 }
 
+/* The multipliers of surfaces are parameters of a lane. */
+static void prepare_mode(Lanes *s, const Work *w, int l, const int8_t *letter) {
+  double p[PARAMETERS + SURFACES + 1], q[NQ];
+  memcpy(p, w->b->p + LANE_I(s->index, l) * w->b->p_stride, sizeof(double) * PARAMETERS);
+  for (int k = 0; k < SURFACES; k++) p[PARAMETERS + k] = letter[k];
+  prepare(p, q);
+  for (int k = 0; k < NQ; k++) LANE(s->q[k], l) = q[k];
+}
+
 /* Returns the pool where a lane continues. */
 static int unpack(Lanes *s, const Work *w, int l, const Packed *a) {
   const Suspended *m = &a->m;
@@ -143,6 +153,7 @@ static int unpack(Lanes *s, const Work *w, int l, const Packed *a) {
   await_sample(s, w, l);
   LANE_I(s->base, l) = m->itinerary;
   LANE_I(s->code, l) = 0;
+  if (SURFACES) prepare_mode(s, w, l, m->letter);
   return read_mode(s, l, m);
 }
 

@@ -414,7 +414,7 @@ OUTLINED void undo_step(Lanes *s, const Step *e, I which) {
   undo_mode(s, e, which);
 }
 
-/* Lanes at an event where another guard is small; values of all guards there. */
+/* Lanes at an event, or at the end of the run, where another guard is small; values of all guards there. */
 OUTLINED I crowded_lanes(const Lanes *s, const Step *e, int mode, I which, T *value) {
   I crowded = NONE;
   for (int j = 0; j < SLOTS; j++) {
@@ -453,7 +453,8 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   unclear |= land(s, w, e, mode, s->live & ~unclear);
   T at_event[S1];
   I arrived = EVENTS ? e->slot > FIRST_STOP + CLEAR_STOPS : NONE;
-  if (any(arrived)) unclear |= crowded_lanes(s, e, mode, arrived, at_event);
+  I tested = EVENTS ? arrived | (e->last & (e->slot == 0)) : NONE; /* ticks are exact, phases are not */
+  if (any(tested)) unclear |= crowded_lanes(s, e, mode, tested, at_event);
   unclear &= s->live;
   if (any(unclear)) {
     undo_step(s, e, unclear);

@@ -9,6 +9,7 @@ typedef struct {
   double shortened;
 #if EVENTS
   int64_t kinds[KINDS];
+  int8_t letter[SURFACES + 1];
   double motion[MOTION], jumped[HISTORY * N];
 #endif
 } Past;

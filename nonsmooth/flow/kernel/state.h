@@ -11,7 +11,7 @@
  *
  * The generated text defines, besides what common.h needs: N states with time, ND without, M surfaces, TIMED whether
  * time is a state, W, GROUPS, EVENTS (as above), CLEAR_STOPS stops without conditions, the first of STOPS guards of
- * events, CONTACTS gaps, the last, MOTION (size of the driver's data), SLOTS guards (surface or exit to +, exit to -,
+ * events, SURFACES at which the driver decides, then CONTACTS gaps, the last of them; PARAMETERS; MOTION (size of the driver's data), SLOTS guards (surface or exit to +, exit to -,
  * stops; of a set its guard, friction's limit, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], AFFINE_MODES[3] (above,
  * below, sliding; or off the set, on it, leaving it), LINEAR whether all are, CANCELLED, CURVED, OWN_STATE[M], states
  * that a set's functions are (NAMED: whether they are), prepare(p, q), surface_values, stop_values; ROW[ROWS] of the
@@ -25,7 +25,7 @@
 #define FIRST_STOP (SLOTS - STOPS)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 2 * MOST_MODES)
-#define LETTERS (M + CONTACTS > 0 ? M + CONTACTS : 1)
+#define LETTERS (M + SURFACES + CONTACTS > 0 ? M + SURFACES + CONTACTS : 1)
 #if SET
 #define LAST_TERM(mode) ((mode) == GOING ? 1.0 : 2.0) /* size of the last two terms in units of the tolerance */
 #define BEFORE_LAST(mode) ((mode) == GOING ? 1.0 : 10.0)

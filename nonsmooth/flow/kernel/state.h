@@ -1,9 +1,10 @@
-/* W trajectories together, for systems of at most one surface, or of one set of codimension two or three.
+/* W trajectories together, for systems of surfaces, or of one set of codimension two or three.
  *
  * Each lane holds one trajectory and is refilled when it ends. Common operations run for all lanes at once: expansion,
- * step size, roots, projection, clear decisions. The driver makes steps with rare cases (tangency, repelling sliding, ties,
- * accumulating events, limits, points that are not finite), and the events of resets, impacts and conditions, whose guards
- * end the steps of lanes as those of stops (EVENTS). No lane's result depends on its neighbours.
+ * step size, roots, projection, clear decisions at one surface or set. The driver makes steps with rare cases (tangency,
+ * repelling sliding, ties, accumulating events, limits, points that are not finite). With EVENTS it makes all events of
+ * resets, impacts and conditions, and those at surfaces where there are several, at the states to which lanes integrate:
+ * the guards end a step as those of stops do. No lane's result depends on its neighbours.
  *
  * Modes of a surface are masks: one jet expands them all. The modes off a set, on it and leaving it have a jet and a pool of
  * lanes each; a fourth pool is for states near it. A trajectory waits until all lanes of a pool are filled (fewer run only

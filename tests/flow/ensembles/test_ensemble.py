@@ -315,6 +315,7 @@ def test_lanes_are_compiled_where_that_pays(monkeypatch):
         (bouncing, Section("wall", count=5)),
         (bouncing, Section("impact", count=3, skip=1, every=2)),
         (bouncing, Section("reset", count=50)),
+        (bouncing, Section("wall", count=4, after=True)),
     ],
     ids=lambda own: getattr(own, "__name__", str(own)),
 )

@@ -146,11 +146,14 @@ def test_visits_beyond_a_force_that_jumps(beyond, multiplier):
 
 @pytest.mark.slow
 def test_cycles_from_a_homoclinic_orbit():
-    """Van der Pol and Duffing, y' = x - x^3 + (c + x^2) y / 10: cycles inside a loop of the saddle."""
+    """Van der Pol and Duffing, y' = x - x^3 + (c + x^2) y / 20: cycles around both loops of the saddle, up to a fold."""
     c = ca.SX.sym("c")
-    field = [y, x - x**3 + 0.1 * (c + x**2) * y]
-    duffing = ns.FilippovSystem([x, y], field=field, parameters={c: -0.85})
+    field = [y, x - x**3 + 0.05 * (c + x**2) * y]
+    duffing = ns.FilippovSystem([x, y], field=field, parameters={c: -0.82})
     loop = ns.find_homoclinic(duffing, [0.0, 0.0], "c")
     branch = ns.continue_orbit(event_of(loop), "c", bounds=(-1.2, -0.7))
-    assert min(abs(branch.values - loop.value)) < 5e-3
-    assert "homoclinic" in kinds(branch)
+    assert sorted(kinds(branch)) == ["fold", "homoclinic"]  # none beyond the loop, of several turns
+    assert min(branch.values[branch.values > loop.value] - loop.value) < 5e-4
+    assert next(e for e in branch.events if e.kind == "homoclinic").parameter == pytest.approx(
+        loop.value, abs=1e-12
+    )

@@ -56,14 +56,19 @@ class Units:
         return shown
 
     def row(self, report: dict[str, Any]) -> dict[str, Any]:
-        """Return a report in SI units as a row: nested names joined, units in brackets."""
+        """Return a report in SI units as a row: nested names joined, units in brackets.
+
+        Results have six digits, more than a launch monitor measures; what was typed stays as it was.
+        """
         row: dict[str, Any] = {}
         for name, value in report.items():
             kind = _MEASURES.get(name)
             if isinstance(value, dict):
                 row |= {f"{name}_{inner}": v for inner, v in self.row(value).items()}
             elif kind is not None:
-                row[f"{name} [{self.names[kind]}]"] = self.show(kind, value)
+                shown = self.show(kind, value)
+                typed = isinstance(value, Quantity)
+                row[f"{name} [{self.names[kind]}]"] = shown if typed else float(f"{shown:.6g}")
             else:
                 row[name] = "; ".join(value) if isinstance(value, (list, tuple)) else value
         return row

@@ -179,7 +179,11 @@ static double newton(const double *c, int n, double lo, double hi, double x) {
 /* Power coefficients of degree n on [0, 1] to Bernstein coefficients, in place. */
 static void bernstein(double *b, int n) {
   double binomial = 1;
-  for (int i = 0; i <= n; i++) { b[i] /= binomial; binomial = binomial * (n - i) / (i + 1); }
+  for (int i = 0; 2 * i <= n; i++) {
+    b[i] /= binomial;
+    if (2 * i < n) b[n - i] /= binomial;
+    binomial = binomial * (n - i) / (i + 1);
+  }
   for (int level = 1; level <= n; level++)
     for (int i = n; i >= level; i--) b[i] += b[i - 1];
 }
@@ -241,13 +245,13 @@ static double largest_root(const double *c, int n) {
  * magnitudes of the rest. A tenth of the work of all coefficients. */
 #define FIRST_TERMS 8
 static inline int stays_positive(const double *c, int n, double h) {
-  double b[FIRST_TERMS + 1], power = 1, binomial = 1, rest = 0;
+  const double part[] = {1, 1.0 / 8, 1.0 / 28, 1.0 / 56, 1.0 / 70, 1.0 / 56, 1.0 / 28, 1.0 / 8, 1};
+  double b[FIRST_TERMS + 1], power = 1, rest = 0;
   if (n < FIRST_TERMS) return 0;
   for (int k = n; k > FIRST_TERMS; k--) rest = MULADD(rest, h, fabs(c[k]));
   for (int k = 0; k <= FIRST_TERMS; k++) {
-    b[k] = c[k] * power * (1 / binomial);
+    b[k] = c[k] * power * part[k];
     power *= h;
-    binomial = binomial * (FIRST_TERMS - k) / (k + 1);
   }
   for (int level = 1; level <= FIRST_TERMS; level++)
     for (int i = FIRST_TERMS; i >= level; i--) b[i] += b[i - 1];
@@ -256,19 +260,18 @@ static inline int stays_positive(const double *c, int n, double h) {
   return low > rest * power;
 }
 
-/* Whether a polynomial positive at 0 clearly stays so on [0, h]. */
-static inline int is_far(const double *c, int n, double h) {
-  double rest = rest_of(c, n, h);
+/* Whether a polynomial positive at 0 clearly stays so on [0, h], from the sum of its other terms. */
+static inline int is_far(const double *c, int n, double h, double rest) {
   return c[0] > rest || (rest < LARGEST && stays_positive(c, n, h));
 }
 
-/* Bernstein coefficients of a polynomial that is not far from zero on [0, h], and the number of their sign changes; h is
- * shortened to the range of possible roots. */
-static int isolate(const double *c, int n, double *h, double *b) {
+/* Bernstein coefficients of a polynomial that is not far from zero on [0, h], where the sum of its other terms is ``rest``,
+ * and the number of their sign changes; h is shortened to the range of possible roots. */
+static int isolate(const double *c, int n, double rest, double *h, double *b) {
   double power = 1;
   int changes = 0;
   /* More halvings than there are would be needed, or an overflow. */
-  if (!(rest_of(c, n, *h) < ldexp(c[0], DEPTH))) *h = smaller(*h, largest_root(c, n));
+  if (!(rest < ldexp(c[0], DEPTH))) *h = smaller(*h, largest_root(c, n));
   b[0] = c[0];
   for (int k = 1; k <= n; k++) { power *= *h; b[k] = c[k] * power; }
   /* A minimum that reaches zero only by rounding, ROUNDING sum |c_k| t^k, is no root. */
@@ -281,9 +284,9 @@ static int isolate(const double *c, int n, double *h, double *b) {
 /* First t in (0, h] at which a polynomial positive at 0 stops being positive; 0 if it is not; -1 if
  * it stays positive. */
 static double first_root(const double *c, int n, double h) {
-  double b[P + 1];
+  double b[P + 1], rest = rest_of(c, n, h);
   if (c[0] <= 0) return 0;
-  return is_far(c, n, h) || !isolate(c, n, &h, b) ? -1 : first_in(c, n, b, 0, h, 0);
+  return is_far(c, n, h, rest) || !isolate(c, n, rest, &h, b) ? -1 : first_in(c, n, b, 0, h, 0);
 }
 
 /* First t in (0, h] at which a polynomial is below some of its errors and ``floor``: 0 at once, -1 nowhere. */

@@ -38,7 +38,7 @@ from .arrays import (
 )
 from .building.codegen import interpreter_order
 from .library import core_library
-from .recording import LOOSE, Output, Recorder, Rooms, rooms_of
+from .recording import Output, Recorder, Rooms, loose_rooms, rooms_of
 from .shown import Shown
 from .structures import declare, structure
 
@@ -336,8 +336,9 @@ class Interpreter:
         # ``motion`` and ``mode`` are those of a run or event that is continued.
         width = self._c.rules.width
         motion = None if motion is None else self._checked(motion)
-        rooms = self._rooms if dense else LOOSE
-        output = Output(self.system.extended_dimension, self.order, rooms, width)
+        n = self.system.extended_dimension
+        rooms = self._rooms if dense else loose_rooms(n, self.order)
+        output = Output(n, self.order, rooms, width if dense else 0)
         recorder = Recorder(output, self.system.dimension, dense, read_at)
         x, p = np.array(x, float), self.shown.with_cells(p)
         start, known = self._letters(options.start_mode), self._letters(mode)

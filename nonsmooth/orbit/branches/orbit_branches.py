@@ -611,7 +611,8 @@ class OrbitCurve(OrbitEquations):
     def _smooth_event(self, zero: Zero) -> BranchEvent | None:
         if zero.name == "fold" and not self._turns(zero.point.u):
             return None
-        if zero.name == "branch point" and self._shrunk(zero.point.u, _SMALL) is not None:
+        small = {"branch point": _SMALL, "Neimark-Sacker": _TINY}.get(zero.name)
+        if small is not None and self._shrunk(zero.point.u, small) is not None:
             return None  # all multipliers tend to 1
         if zero.name == "Hopf":
             return self._hopf(zero.point.u)

@@ -180,6 +180,31 @@ def test_what_was_given_is_echoed_as_it_was_typed(command, tmp_path, name, side)
         assert report == dict(speed=speed, angle=10.9, spin=2686.0)
 
 
+@pytest.mark.parametrize("name", [["launch", "--turf", "natural"], ["land"]])
+def test_a_table_has_the_six_digits_that_are_meant(command, table, name):
+    """The table is JSON's to half a unit of the sixth digit, and has no more digits."""
+    (row, *_) = rows_of(command(*name, "--input", table())[1])
+    (report, *_) = json.loads(command(*name, "--input", table(), "--json")[1])["rows"]
+    flat = _flat({key: value for key, value in report.items() if key != _echo(name[0])})
+    found = [
+        (float(row[next(c for c in row if c.split(" [")[0] == key)]), flat[key]) for key in flat
+    ]
+    assert len(found) > 5
+    for short, whole in found:
+        assert short == pytest.approx(whole, rel=5e-6) and short == float(f"{short:.6g}")
+
+
+def _flat(report, head=""):
+    """Nested numbers with joined names."""
+    flat = {}
+    for key, value in report.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f"{head}{key}_")
+        elif isinstance(value, float):
+            flat[head + key] = value
+    return flat
+
+
 def test_a_tilted_axis_takes_a_part_of_the_spin(command):
     argv = "land --speed 25 --angle 53 --spin 9000 --axis-tilt 10 --launch-angle 28 --json".split()
     assert json.loads(command(*argv)[1])["landing"]["spin"] < 9000

@@ -4,6 +4,7 @@ parameter, in two, and where branches of periodic orbits end."""
 from __future__ import annotations
 
 import itertools
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -288,3 +289,20 @@ def test_orbits_are_followed_from_a_hopf_point_to_their_grazing() -> None:
     (grazing,) = branch.events
     assert grazing.kind == "grazing-sliding" and abs(grazing.parameter - 0.64) < 1e-12
     assert branch[0.9].itinerary == "+ s" and not branch[0.9].is_virtual
+
+
+def test_no_solution_is_searched_for_far_from_the_guess():
+    """Where Newton's method diverges, of arctan(v - 3), damped steps integrate no loop beyond ten of its sizes."""
+    seen = list[float]()
+    loop = SimpleNamespace(scales=np.ones_like, iterations=0)
+
+    def equations(v):
+        seen.append(float(abs(v[0])))
+        return np.arctan(v - 3.0), np.array([[1 / (1 + (v[0] - 3.0) ** 2)]])
+
+    loop.equations = equations
+    with pytest.raises(ns.ConvergenceError):
+        homoclinic_orbits._solved(loop, np.zeros(1), "c", 30)
+    far = sum(value > 10 for value in seen)
+    found = homoclinic_orbits._solved(loop, np.zeros(1), "c", 30, damped=True)
+    assert abs(found[0] - 3.0) < 1e-12 and sum(value > 10 for value in seen) == 2 * far

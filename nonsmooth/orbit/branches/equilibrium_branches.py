@@ -54,7 +54,7 @@ _ROUNDING = 1e-13
 #: The solutions that meet at a boundary equilibrium, and the one that continues the branch, by the class of the surface.
 _MEETS = {
     "generic": ("equilibrium and pseudo-equilibrium", "pseudo-equilibrium"),
-    "continuous": ("the equilibria of both sides", "equilibrium"),
+    "smooth": ("the equilibria of both sides", "equilibrium"),
     "velocity continuous": ("equilibrium and rest between the two forces", ""),
     "undecided": ("equilibrium and pseudo-equilibrium", ""),
 }
@@ -172,9 +172,10 @@ class Equilibria(BranchCurve):
         """The boundary equilibrium of F1 (k = 0) or F2 (k = 1) on this curve."""
         x, here = zero.point.u[: self.n], self.local_surface(zero.point.u)
         numbers = here.finite_at(x)
-        kind = here.switching.kind
+        switching = here.switching
         found = boundary_equilibrium_at(here, numbers, k, here.jacobians(x))
-        pair, onward = _MEETS[kind]
+        jumps = switching.slides or switching.force_jumps
+        pair, onward = _MEETS[switching.kind if jumps else "smooth"]
         if isinstance(self, _PseudoEquilibriumCurve):
             onward = "equilibrium"
         verdict = {
@@ -277,11 +278,11 @@ class EquilibriumCurve(Equilibria):
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """Pseudo-equilibria with 0 < alpha < 1, or where the field is continuous equilibria on the other side."""
         x, value, near = zero.point.u[: self.n], zero.point.u[-1], self._on(zero.name)
-        kind = near.local_surface(zero.point.u).switching.kind
-        if kind == "continuous":
+        switching = near.local_surface(zero.point.u).switching
+        if not (switching.slides or switching.force_jumps):
             beyond = EquilibriumCurve(near.where, self.free, self.scale, SIDES[1 - near.k])
             return beyond.entered(zero.point.u)
-        if kind != "generic":
+        if switching.kind != "generic":
             return None
         scale = np.append(self.scale[: self.n], [1.0, self.scale[-1]])
         curve = _PseudoEquilibriumCurve(near.where, self.free, scale)

@@ -245,3 +245,19 @@ def test_an_equilibrium_ends_where_a_force_jumps():
     branch = ns.continue_equilibrium(preload, [0.5, 0.0], "mu", bounds=(0, 5), side="-")
     assert [e.kind for e in branch.events] == ["boundary equilibrium"]
     assert branch.ends[1].name == "EVENT" and branch.values.max() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("stiffness", "verdict"), [(3.0, "persistence"), (-3.0, "nonsmooth fold")])
+def test_a_stop_with_a_damper_has_the_equilibria_of_its_springs(stiffness, verdict):
+    """x = mu on one side and mu/stiffness on the other one; the damper, 1.2 x' beside 0.2 x', does not enter."""
+    sides = [[y, mu - x - 0.2 * y], [y, mu - stiffness * x - 1.2 * y]]
+    system = planar(*sides, 0.4, surface=x)
+    branch = ns.continue_equilibrium(system, [0.4, 0], "mu", bounds=(-1, 1))
+    (event,) = branch.events
+    assert abs(event.parameter) < 1e-15 and verdict in event.far_side.verdict
+    other = 0.3 if stiffness < 0 else -0.3
+    found = sorted(float(one.point[0]) for one in branch.at(other))
+    assert found == pytest.approx(
+        sorted({0.3, other / stiffness} if other > 0 else {other / stiffness})
+    )
+    assert ns.classify(system, [0, 0], parameters={"mu": 0}).label == verdict

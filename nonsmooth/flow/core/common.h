@@ -61,14 +61,17 @@ static inline int shrink_alike(const double *block) {
 /* The data of a run between two steps: lanes pass it to the driver for a step that they cannot decide. */
 typedef struct {
   double t, since, length, shortened; /* since: the last event; length of the step before in this mode, or 0 */
-  int64_t steps, events, segment_steps, history, hits, kept; /* hits: of the section; kept: samples */
+  int64_t steps, events, segment_steps, history, seen, hits, kept; /* seen: history in the driver; hits: of the section; kept: samples */
   int64_t *kinds;
   double *x;
   double *unknowns; /* of a set that is left: its direction, then h; not given back */
-  int8_t *letter, *side; /* side: of stops */
+  int8_t *letter, *side; /* side: of guards of events that are located, doubled where they begin at a zero */
+  double *motion, *jumped; /* of a restart, besides the state; of the last events; or none where all events are stops */
   Recent *past;
   int32_t drop, itinerary, status; /* drop: first coefficients of the first guard that vanish */
+  int32_t driven; /* whether the driver makes the events at surfaces too */
   int32_t near; /* 1 close to a set, 2 if its guard fell: the set is treated instead of a step */
+  int32_t arrived; /* number of the guard of an event that is at its zero, from 1: the event is made instead of a step */
 } Suspended;
 
 /* The driver as lanes call it: a run, and functions that begin it or make a step. */

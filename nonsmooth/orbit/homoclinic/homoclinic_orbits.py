@@ -190,11 +190,11 @@ def _nearest(run: Trajectory, mode: str, here: Spectrum) -> Departure | None:
         times = part.t + part.duration * np.linspace(0.0, 1.0, 201)[1:-1]
         with np.errstate(over="ignore"):
             away = np.linalg.norm(run(times) - here.point, axis=1)
-        for k in range(1, len(times) - 1):
+        for k in range(len(times) - 1):
             peak = max(peak, float(away[k]))
-            back = away[k] < _CLOSE * peak and away[k - 1] >= away[k] <= away[k + 1]
-            if back and part.leg.mode == mode:
-                first = int(np.argmax(away[:k]))
+            falls = away[k - 1] >= away[k] if k else len(chain) > 1  # or is nearest where it lands
+            if falls and away[k] <= min(_CLOSE * peak, away[k + 1]) and part.leg.mode == mode:
+                first = int(np.argmax(away[: max(k, 1)]))
                 required = np.sqrt(away[first] * away[k])  # on the way back, before it turns away
                 k = first + int(np.argmin(np.abs(away[first : k + 1] - required)))
                 chain[-1] = replace(part, leg=Leg(mode), duration=float(times[k]) - part.t)

@@ -116,6 +116,37 @@ def test_a_pseudo_saddle_in_space_is_reached_by_sliding(shear: float) -> None:
     assert np.linalg.norm(last) < 1e-4
 
 
+@pytest.mark.parametrize(
+    ("above", "below", "drives"),
+    [
+        ([1.06, 0.62], [0.35, 0.32], [[0.31, 0.41], [0.11, 0.23]]),
+        (
+            [0.5, 0.8, 1.1, 1.4],
+            [1.3, 0.4, 0.9, 0.6],
+            [[0.4, -0.1, 0.1, 0.3], [0.2, 0.4, -0.3, 0.0]],
+        ),
+    ],
+)
+def test_a_loop_with_decaying_states_has_the_parameter_of_its_plane(above, below, drives):
+    """H1 with states that decay at other rates on each side; it lands nearest to the pseudo-saddle, or comes near later."""
+    n = len(above)
+    state = ca.SX.sym("w", n + 2)
+    turn = np.linalg.qr(np.cos(np.arange((n + 2) ** 2).reshape(n + 2, -1) ** 2))[0]
+    turn = turn if n > 2 else np.eye(n + 2)
+    own = ca.DM(turn.T) @ state
+    u, v, w = own[0], own[1], own[2:]
+    fields = [[0.1 * u - (v - 1), u + 0.1 * (v - 1), drives[0] - ca.DM(above) * w]]
+    fields += [[c, 1, drives[1] - ca.DM(below) * w]]
+    sides = [ca.vertsplit(ca.DM(turn) @ ca.vertcat(*f)) for f in fields]
+    system = ns.FilippovSystem(
+        ca.vertsplit(state), surface=v, above=sides[0], below=sides[1], parameters={c: -0.6}
+    )
+    near = ns.find_pseudo_equilibrium(system, turn @ [-1.34, 0.0, *[0.0] * n])
+    found = ns.find_homoclinic(system, near, "c")
+    assert abs(found.value - float(CASES["H1"]["c_homoclinic"])) < 1e-12
+    assert found.itinerary == "s + s" and not found.faults and found.residual < 1e-12
+
+
 @pytest.mark.slow
 def test_curves_of_pseudo_homoclinics_and_their_neutral_saddle() -> None:
     values = CASES["H1"]

@@ -394,7 +394,16 @@ def test_pages_of_textbook_problems_have_no_errors(browser, tmp_path, name):
 @pytest.mark.slow
 @pytest.mark.browser
 def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
-    for words in ("p=a,b&x=1&t=-3", "box=1,0,0,0&turn=1", "flow=toString", "%E0%A4%A"):
+    wrong = {
+        "p=a,b&x=1&t=-3&flow=short": "p, x, t.",
+        "box=1,0,0,0&turn=1": "box, turn.",
+        "flow=toString": "flow.",
+        "%E0%A4%A": "\ufffd%A.",
+    }
+    for words, left_out in wrong.items():
         browser.open(page, hash=words)
         seen = browser.run(READY)
         assert seen["say"] == "x 0, v 0" and browser.errors() == {}
+        assert browser.left_out() == left_out
+    browser.open(page, hash=seen["hash"].lstrip("#"))
+    assert browser.run(READY)["say"] == "x 0, v 0" and browser.left_out() == ""

@@ -250,7 +250,7 @@ def soft_switch(problem: BoundaryProblem, leg: Leg, surface: int) -> str:
     found = problem.system.switching(surface, mode=mode)
     if found.slides:
         return ""
-    return FORCE if found.kind == "velocity continuous" and found.order == 0 else SOFT
+    return FORCE if found.force_jumps else SOFT
 
 
 def changed_itinerary(
@@ -302,8 +302,8 @@ def _longer(
         times = [duration, *[0.0] * (len(legs) - 1)]
         shift = np.zeros(problem.dimension)
         shift[-1] = problem.advance(p)[0] if problem.forcing is not None else 0.0
-        later = [state + shift for state in states[: len(legs) - 1]]
-        v = whole.pack(np.array([states[-1], *later]), np.array(times))
+        begin = np.linalg.inv(problem.wrap) @ (states[-1] - shift)
+        v = whole.pack(np.array([begin, *states[: len(legs) - 1]]), np.array(times))
         return ChangedItinerary(whole, v, (*[0, *[-1] * len(legs)][: len(legs) - 1], -2))
     for k, (new, start) in enumerate(zip([*between[1:], leg], states, strict=True)):
         editor.insert(i + 1 + k, new, start)

@@ -289,6 +289,15 @@ const Page = (() => {
     return Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
   }
 
+  /** Say which parts of an address the page left out; `read` has those that it could read. */
+  function leftOut(asked, read) {
+    const names = Object.keys(asked).filter((name) => !read[name]);
+    document.getElementById("left-out")?.remove();
+    if (!names.length) return;
+    const words = `The address has parts that cannot be read and were left out: ${names.join(", ")}.`;
+    document.body.prepend(html("p", { id: "left-out", role: "status" }, words));
+  }
+
   /** Say the state in the address, so that it can be kept and sent; no new entry of the history. */
   function setAddress(values) {
     const words = new URLSearchParams(values).toString().replaceAll("%2C", ",");
@@ -314,5 +323,5 @@ const Page = (() => {
 
   const data = (name) => JSON.parse(document.getElementById(`data-${name}`).textContent);
 
-  return { text, svg, html, Plane, draggable, numberInput, address, setAddress, eachFrame, data };
+  return { text, svg, html, Plane, draggable, numberInput, address, leftOut, setAddress, eachFrame, data };
 })();

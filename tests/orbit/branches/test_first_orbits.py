@@ -21,16 +21,35 @@ def two_zones(trace):
     )
 
 
-@pytest.mark.parametrize(("name", "trace"), [("focus_focus_0", -1.0), ("focus_focus_3", -0.501)])
-def test_cycles_from_a_boundary_equilibrium(name, trace):
-    born = ns.continue_equilibrium(two_zones(trace), [1.0, 0.5], "mu", bounds=(-1, 1)).events[0]
-    assert born.kind == "boundary equilibrium"
+def with_dampers(trace):
+    """The same in the position and its speed: the force of a damper jumps where the speed is not zero."""
+    sides = [[y, a * y - x + mu] for a in (0.5, trace)]
+    return ns.FilippovSystem(
+        [x, y], surface=x, above=sides[0], below=sides[1], parameters={mu: 1.0}
+    )
+
+
+@pytest.mark.parametrize(
+    ("system", "name", "trace"),
+    [
+        (two_zones, "focus_focus_0", -1.0),
+        (two_zones, "focus_focus_3", -0.501),
+        (with_dampers, "focus_focus_0", -1.0),
+    ],
+)
+def test_cycles_from_a_boundary_equilibrium(system, name, trace):
+    rest = [1.0, 0.5 if system is two_zones else 0.0]
+    passed = ns.continue_equilibrium(system(trace), rest, "mu", bounds=(-1, 1))
+    (born,) = passed.events
+    assert born.kind == "boundary equilibrium" and "persistence" in born.far_side.verdict
+    assert [one.status for one in passed.at(-1.0)] == ["real"]
     branch = ns.continue_orbit(born, "mu", bounds=(-1, 1))
     assert kinds(branch) == ["boundary equilibrium"] and abs(branch.events[0].parameter) < 1e-12
     (orbit,) = branch.at(0.5)
     assert orbit.period == pytest.approx(float(VALUES[name]["period"]), rel=1e-10)
     assert orbit.multipliers[1] == pytest.approx(float(VALUES[name]["multiplier"]), rel=1e-8)
-    heights = sorted(2 * leg.start[1] for leg in orbit.legs)
+    up = 2 if system is two_zones else -2  # y = trace x - x'
+    heights = sorted(up * leg.start[1] for leg in orbit.legs)
     expected = [float(VALUES[name][key]) for key in ("y_in_over_mu", "y_out_over_mu")]
     assert heights == pytest.approx(expected, rel=1e-8)
 

@@ -2,7 +2,7 @@
 "use strict";
 
 (async () => {
-  const { svg, html, text, draggable, numberInput, address, setAddress, eachFrame } = Page;
+  const { svg, html, text, draggable, numberInput, address, leftOut, setAddress, eachFrame } = Page;
   const given = Page.data("explorer");
   const $ = (id) => document.getElementById(id);
   const TOLERANCE = 1e-10;
@@ -65,12 +65,17 @@
     const box = numbers(a.box, 4);
     const turn = numbers(a.turn, 2);
     const t = numbers(a.t, 1);
+    const read = {
+      ...{ p, x, t: t?.[0] > 0, turn: turn && !view.flat, flow: FLOWS.includes(a.flow) },
+      box: box && box[0] < box[1] && box[2] < box[3],
+    };
     if (p) state.p = p;
     if (x) state.x = x;
-    if (t && t[0] > 0) [state.t] = t;
-    if (box && box[0] < box[1] && box[2] < box[3]) state.limits = [box.slice(0, 2), box.slice(2)];
-    if (turn && !view.flat) view.turn = turn;
-    if (FLOWS.includes(a.flow)) state.flow = a.flow;
+    if (read.t) [state.t] = t;
+    if (read.box) state.limits = [box.slice(0, 2), box.slice(2)];
+    if (read.turn) view.turn = turn;
+    if (read.flow) state.flow = a.flow;
+    leftOut(a, read);
   }
 
   let resting;

@@ -34,6 +34,9 @@ _FEW, _FEW_WITH_SETS = 64, 4000
 #: Least time of an ensemble in the driver, in seconds by estimate, for which lanes are compiled.
 _WORTH = 0.05
 
+#: Largest size of a program that is compiled in a few seconds; the time of others grows as the square of their size.
+_USUAL = 600
+
 #: The work of at least this many trajectories is estimated from three of them, of fewer from one.
 _MANY = 100_000
 
@@ -200,7 +203,7 @@ def _is_worth_lanes(system: FilippovSystem, options: Options, starts: Starts) ->
         if seconds is None:
             return False
         found.append(seconds)
-    return starts.count * max(found) >= _WORTH
+    return starts.count * max(found) >= _WORTH * max(1.0, engine.size / _USUAL) ** 2
 
 
 def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:

@@ -131,10 +131,17 @@ def _read(function: ca.Function, merged: bool) -> tuple[list[Node], list[list[in
     return nodes, rows
 
 
-def uses(expression: ca.SX, names: frozenset[str]) -> bool:
-    """Whether an expression has some operations."""
-    function = ca.Function("graph", [ca.vertcat(*ca.symvar(expression))], [_dense(expression)])
-    return not names.isdisjoint(operations(function))
+def operations_of(expression: ca.SX) -> set[str]:
+    """Names of the operations of a dense expression; those of the last one are kept."""
+    key = tuple(e.element_hash() for e in ca.vertsplit(ca.vec(expression)))
+    if not _LAST or _LAST[0][0] != key:
+        symbols = ca.vertcat(*ca.symvar(expression))
+        _LAST[:] = [(key, expression, operations(function_of([symbols], [_dense(expression)])))]
+    return _LAST[0][2]
+
+
+#: The hashes of the expression whose operations were read last, the expression, so that they stay its, and these.
+_LAST: list[tuple[Hashable, ca.SX, set[str]]] = []
 
 
 def operations(function: ca.Function) -> set[str]:

@@ -52,10 +52,10 @@ class _Nodes:
         self.op = codes[self.at]
         self.args = np.full((len(self.at), 2), -1)
         source, none = function.instruction_input, (ca.OP_CONST, ca.OP_INPUT)
-        for k, (at, op) in enumerate(zip(self.at.tolist(), self.op.tolist(), strict=True)):
-            if op not in none:
-                own = source(at)
-                self.args[k, : len(own)] = own
+        rows = np.flatnonzero(~np.isin(self.op, none))
+        found = [source(at) for at in self.at[rows].tolist()]
+        self.args[rows, 0] = [own[0] for own in found]
+        self.args[rows, 1] = [own[1] if len(own) > 1 else -1 for own in found]
         ends = np.flatnonzero(codes == ca.OP_OUTPUT).tolist()
         self.outputs = [(source(k)[0], function.instruction_output(k)) for k in ends]
         used = self.args[self.args >= 0].tolist() + [k for k, _ in self.outputs]

@@ -115,7 +115,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     factors, unknowns = [ca.SX(1)] * system.surface_count, [*ca.vertsplit(lam)][: lam.numel()]
     known, variables = ca.vertcat(p, lam), ca.vertcat(x, reactions)
     ones = [ca.SX(1)] * system.surface_count
-    roots = gate_roots(plain, _surfaces(system), x, ones)[1]
+    roots = gate_roots(system.definition.field, _surfaces(system), x, ones)[1]
     columns = ca.jacobian(plain, lam)
     for members in system.entries:  # a set has one factor
         if members[0] in (*system.half_lines, *system.joints, *system.definition.breakpoints):

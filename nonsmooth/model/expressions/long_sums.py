@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain, pairwise
 from typing import TypeVar
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ..values import Array
+from .float_arithmetic import BINARY, UNARY
 from .graph import OPERATIONS, function_of, operation, shaped
 from .unused_terms import SAFE
 
@@ -35,12 +38,12 @@ class LongSums:
 
     symbols: ca.SX
     terms: ca.SX
-    factors: list[list[float]]
-    places: list[list[int]]
+    factors: list[Array]
+    places: list[NDArray[np.int64]]
 
     def kinds(self, of_terms: Sequence[K]) -> list[K]:
         """The largest number of the terms of each sum."""
-        return [max(of_terms[k] for k in own) for own in self.places]
+        return [max(of_terms[k] for k in own.tolist()) for own in self.places]
 
 
 class _Nodes:
@@ -51,33 +54,32 @@ class _Nodes:
         self.at = np.flatnonzero(codes != ca.OP_OUTPUT)
         self.op = codes[self.at]
         self.args = np.full((len(self.at), 2), -1)
-        source, none = function.instruction_input, (ca.OP_CONST, ca.OP_INPUT)
-        rows = np.flatnonzero(~np.isin(self.op, none))
-        found = [source(at) for at in self.at[rows].tolist()]
-        self.args[rows, 0] = [own[0] for own in found]
-        self.args[rows, 1] = [own[1] if len(own) > 1 else -1 for own in found]
-        ends = np.flatnonzero(codes == ca.OP_OUTPUT).tolist()
+        for count, names in ((1, UNARY), (2, BINARY)):
+            rows = np.flatnonzero(np.isin(self.op, [_CODES[name] for name in names]))
+            found = chain.from_iterable(map(function.instruction_input, self.at[rows].tolist()))
+            self.args[rows, :count] = np.fromiter(found, int, count * len(rows)).reshape(-1, count)
+        source, ends = function.instruction_input, np.flatnonzero(codes == ca.OP_OUTPUT).tolist()
         self.outputs = [(source(k)[0], function.instruction_output(k)) for k in ends]
-        used = self.args[self.args >= 0].tolist() + [k for k, _ in self.outputs]
-        self.users = np.bincount(used, minlength=len(self.op))
+        used = np.concatenate([self.args[self.args >= 0], [k for k, _ in self.outputs]])
+        self.users = np.bincount(used.astype(int), minlength=len(self.op))
+        constants = np.flatnonzero(self.op == ca.OP_CONST)
+        self.value = np.ones(len(self.op))
+        numbers = map(function.instruction_constant, self.at[constants].tolist())
+        self.value[constants] = np.fromiter(numbers, float, len(constants))
 
-    def value(self, k: int) -> float:
-        """The number of a constant."""
-        return float(self.function.instruction_constant(int(self.at[k])))
-
-    def terms(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """The function in each node that is a number times one, else -1, and the node of the number, -1 for 1 and -2 for -1."""
+    def terms(self) -> tuple[NDArray[np.int64], Array]:
+        """The function in each node that is a number times one, else -1, and the number."""
         is_function = np.isin(self.op, [_CODES[name] for name in _FUNCTIONS])
-        of, number = np.where(is_function, np.arange(len(self.op)), -1), np.full(len(self.op), -1)
+        of, number = np.where(is_function, np.arange(len(self.op)), -1), np.ones(len(self.op))
         is_single = self.users == 1
         for one, two in ((0, 1), (1, 0)):
             a, b = self.args[:, one], self.args[:, two]
             found = (
                 is_single & (self.op == ca.OP_MUL) & (self.op[a] == ca.OP_CONST) & is_function[b]
             )
-            of[found], number[found] = b[found], a[found]
+            of[found], number[found] = b[found], self.value[a[found]]
         negative = is_single & (self.op == ca.OP_NEG) & is_function[self.args[:, 0]]
-        of[negative], number[negative] = self.args[negative, 0], -2
+        of[negative], number[negative] = self.args[negative, 0], -1.0
         return of, number
 
 
@@ -86,8 +88,13 @@ class _Sum:
     """A sum that is added to a node, or to none (-1)."""
 
     rest: int
-    factors: tuple[float, ...]
-    functions: tuple[int, ...]
+    factors: Array
+    functions: NDArray[np.int64]
+
+    @property
+    def key(self) -> tuple[bytes, bytes]:
+        """Equal for equal sums."""
+        return self.factors.tobytes(), self.functions.tobytes()
 
 
 def _sums(nodes: _Nodes) -> dict[int, _Sum]:
@@ -98,36 +105,38 @@ def _sums(nodes: _Nodes) -> dict[int, _Sum]:
     before = np.where(adds & adds[a] & (nodes.users[a] == 1), a, -1)
     is_last = adds.copy()
     is_last[before[before >= 0]] = False
-    first, second, previous = a.tolist(), b.tolist(), before.tolist()
-    subtracts, found = (nodes.op == ca.OP_SUB).tolist(), dict[int, _Sum]()
-
-    def term(k: int, sign: float) -> tuple[float, int]:
-        own = int(number[k])
-        return sign * (nodes.value(own) if own >= 0 else -1.0 if own == -2 else 1.0), int(of[k])
-
+    sign = np.where(nodes.op == ca.OP_SUB, -1.0, 1.0)
+    previous, found = before.tolist(), dict[int, _Sum]()
     for last in np.flatnonzero(is_last).tolist():
-        chain = [last]
-        while previous[chain[-1]] >= 0:
-            chain.append(previous[chain[-1]])
-        if len(chain) < _TERMS:
+        links = [last]
+        while previous[links[-1]] >= 0:
+            links.append(previous[links[-1]])
+        if len(links) < _TERMS:
             continue
-        start = first[chain[-1]]
-        own = [term(second[k], -1.0 if subtracts[k] else 1.0) for k in reversed(chain)]
-        own = own if of[start] < 0 else [term(start, 1.0), *own]
-        factors, functions = zip(*own, strict=True)
-        if len(set(functions)) == len(functions):
-            found[last] = _Sum(start if of[start] < 0 else -1, factors, functions)
+        links.reverse()
+        start, own, signs = int(a[links[0]]), b[links], sign[links]
+        if of[start] >= 0:
+            start, own, signs = -1, np.append(start, own), np.append(1.0, signs)
+        if len(np.unique(of[own])) == len(own):
+            found[last] = _Sum(start, signs * number[own], of[own])
     return found
 
 
 def _have_common_parts(sums: Sequence[_Sum]) -> bool:
     """Whether two terms occur together, up to a sign, in the same sums: they are better added once."""
-    where: dict[int, list[tuple[int, float]]] = {}
-    for i, own in enumerate(sums):
-        for factor, k in zip(own.factors, own.functions, strict=True):
-            where.setdefault(k, []).append((i, factor))
-    several = [own for own in where.values() if len(own) > 1 and len({abs(f) for _, f in own}) == 1]
-    return len({tuple((i, f == own[0][1]) for i, f in own) for own in several}) < len(several)
+    function, factor = (
+        np.concatenate([getattr(own, of) for own in sums]) for of in ("functions", "factors")
+    )
+    number = np.repeat(np.arange(len(sums)), [len(own.factors) for own in sums])
+    order = np.lexsort((number, function))
+    number, factor = number[order], factor[order]
+    ends = [*np.flatnonzero(np.diff(function[order], prepend=-1)).tolist(), len(order)]
+    keys = [
+        (number[i:j].tobytes(), (factor[i:j] == factor[i]).tobytes())
+        for i, j in pairwise(ends)
+        if j > i + 1 and (abs(factor[i:j]) == abs(factor[i])).all()
+    ]
+    return len({*keys}) < len(keys)
 
 
 def long_sums(
@@ -143,27 +152,24 @@ def long_sums(
         return None
     nodes = _Nodes(function, codes)
     found = _sums(nodes)
-    different = [*dict.fromkeys((own.factors, own.functions) for own in found.values())]
-    if not found or _have_common_parts([_Sum(-1, *own) for own in different]):
+    different = {own.key: own for own in found.values()}
+    if not found or _have_common_parts([*different.values()]):
         return None
-    functions = sorted({k for _, own in different for k in own})
+    functions = np.unique(np.concatenate([own.functions for own in different.values()]))
     symbols = ca.SX.sym("sum", len(different))
     of_sum = dict(zip(different, ca.vertsplit(symbols), strict=True))
-    short = _Shortened(
-        nodes, inputs, {k: (own, of_sum[own.factors, own.functions]) for k, own in found.items()}
-    )
-    terms = ca.vertcat(*[short.expression(k) for k in functions])
-    if not short.is_plain(functions):
+    short = _Shortened(nodes, inputs, {k: (own, of_sum[own.key]) for k, own in found.items()})
+    terms = ca.vertcat(*[short.expression(k) for k in functions.tolist()])
+    if not short.is_plain(functions.tolist()):
         return None
     entries = [[ca.SX(0)] * output.numel() for output in outputs]
     for k, (vector, position) in nodes.outputs:
         entries[vector][position] = short.expression(k)
-    place = {k: i for i, k in enumerate(functions)}
     sums = LongSums(
         symbols,
         terms,
-        [[*factors] for factors, _ in different],
-        [[place[k] for k in own] for _, own in different],
+        [own.factors for own in different.values()],
+        [np.searchsorted(functions, own.functions) for own in different.values()],
     )
     return shaped(outputs, [e for own in entries for e in own]), sums
 
@@ -204,7 +210,7 @@ class _Shortened:
             return args[0] + own[1] if args else own[1]
         name, function = self._names[k], self._nodes.function
         if name == "const":
-            return ca.SX(self._nodes.value(k))
+            return ca.SX(self._nodes.value[k])
         if name == "input":
             vector, position = function.instruction_input(int(self._nodes.at[k]))
             return self._inputs[vector][position]

@@ -118,9 +118,11 @@ def with_long_sums(
     known = {j: rule.source[1] - first for j, rule in enumerate(rules) if _is_long(rule, first)}
     users = Counter(a for rule in rules for a in rule.args if a in known)
     users.update(j for row in rows for j in row if j in known)
-    own = {j: [(terms[k], 0) for k in sums.places[i]] for j, i in known.items()}
+    own = {j: [(terms[k], 0) for k in sums.places[i].tolist()] for j, i in known.items()}
     for j, i in known.items():
-        made[j] = Rule("sum", tuple(chain.from_iterable(own[j])), numbers=tuple(sums.factors[i]))
+        made[j] = Rule(
+            "sum", tuple(chain.from_iterable(own[j])), numbers=tuple(sums.factors[i].tolist())
+        )
     for k, rule in enumerate(rules):
         if rule.rule != "sum" or users.keys().isdisjoint(rule.args):
             continue
@@ -128,7 +130,7 @@ def with_long_sums(
         for factor, a, b in zip(rule.numbers, rule.args[::2], rule.args[1::2], strict=True):
             if a in known and b == 0 and users[a] == 1 and abs(factor) == 1.0:
                 pairs += own[a]
-                numbers += [factor * f for f in sums.factors[known[a]]]
+                numbers += (factor * sums.factors[known[a]]).tolist()
                 made[a] = Rule("constant", numbers=(0.0,))
             else:
                 pairs.append((a, b))
@@ -151,7 +153,7 @@ def written_out(
             made.append(rule._replace(args=tuple(number[a] for a in rule.args)))
             continue
         i, total = rule.source[1] - first, -1
-        for factor, k in zip(sums.factors[i], sums.places[i], strict=True):
+        for factor, k in zip(sums.factors[i].tolist(), sums.places[i].tolist(), strict=True):
             at = len(made)
             made += [Rule("constant", numbers=(factor,)), Rule("mul", (at, terms[k]))]
             if total >= 0:

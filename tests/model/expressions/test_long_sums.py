@@ -24,7 +24,9 @@ def loops(sign):
     for i, row in enumerate(WEIGHTS):
         total = -X[i]
         for j, w in enumerate(row):
-            total = total + (sign if j == 15 else w) * TANH[j] if j % 3 else total - w * TANH[j]
+            total = (
+                total + ((-sign) ** i if j == 15 else w) * TANH[j] if j % 3 else total - w * TANH[j]
+            )
         rows.append(total)
     return ca.vertcat(*rows)
 

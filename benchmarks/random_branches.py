@@ -265,7 +265,7 @@ def _of_multipliers(branch: Branch, counts: Counter[str]) -> list[str]:
         if lost and largest < 1e-3 * growth:
             continue
         counts["branches with multipliers by differences"] += 1
-        values = differences(orbit, PARTS if lost else 1)
+        values = differences(orbit, PARTS if lost else 4 if growth > GROWS else 1)
         compared = own[np.abs(own) >= largest * (1 - 1e-9)] if lost else own
         apart = max(float(np.abs(values - m).min()) for m in compared)
         if apart > DIFFERENCE * max(1.0, largest):
@@ -321,6 +321,7 @@ def branch_of(kind: str, seed: int) -> tuple[Branch | None, str]:
 
 def checked(kind: str, seed: int, counts: Counter[str]) -> Branch | None:
     """The branch of a seed, with what is wrong printed and counted."""
+    signal.signal(signal.SIGPROF, signal.default_int_handler)
     signal.setitimer(signal.ITIMER_PROF, LIMIT)
     try:
         branch, reason = branch_of(kind, seed)
@@ -344,7 +345,6 @@ def main(numbers: Sequence[int] = (), classes: Sequence[str] = ()) -> Counter[st
     """Check equally many branches of each class, 200 from seed 0 on by default; counts of what was found."""
     counts, began, chosen = Counter[str](), time.perf_counter(), classes or tuple(CLASSES)
     count, first = [*numbers, *(200, 0)[len(numbers) :]]
-    signal.signal(signal.SIGPROF, signal.default_int_handler)
     warnings.simplefilter("ignore")
     for kind in chosen:
         seed = first

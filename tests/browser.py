@@ -125,6 +125,12 @@ class Browser:
         }
         return {kind: what for kind, what in found.items() if what}
 
+    def left_out(self) -> str:
+        """What an explorer says that it could not read of its address."""
+        return self.run(
+            "return document.getElementById('left-out')?.textContent.split(': ')[1] ?? '';"
+        )
+
     def unnamed(self) -> list[str]:
         """Controls and pictures that have no name for a screen reader."""
         return self.driver.execute_script(_UNNAMED)

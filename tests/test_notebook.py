@@ -13,6 +13,7 @@ import bounce
 import nonsmooth as ns
 from nonsmooth.model.expressions.mathml import equation, symbol
 from nonsmooth.notebook import circle, lines, quadrants, representation
+from testset.problem import RUNS, Problem, cases
 
 
 def parsed(text):
@@ -148,6 +149,12 @@ def test_results_are_well_formed_and_short():
     for one in results():
         assert rows(one), type(one)
         assert len(one._repr_html_()) < 20_000, type(one)
+
+
+def test_systems_of_each_combination_of_parts_show_themselves():
+    parts = {frozenset(one["system"]): one for one in cases(RUNS) if "system" in one}
+    for one in parts.values():
+        assert "states" in rows(Problem(one).system), one["id"]
 
 
 def test_a_run_of_no_length_shows_itself():

@@ -1,82 +1,103 @@
-"""Run the test set and write build/testset/: ``python -m testset [--more] [--record] [TOOL ...]``.
+"""Run the test set and write build/testset/: ``python -m testset [--record] [--python PATH ...] [TOOL ...]``.
 
-``--more`` runs problems that a tool has not run yet, ``--record`` puts the table into README.md.
+Results are kept as they come, and a run goes on where it was interrupted; ``--python`` names further interpreters with
+tools, ``--record`` puts the table into README.md.
 """
 
 from __future__ import annotations
 
+import argparse
+import datetime
 import json
+import shlex
+import signal
 import statistics
+import subprocess
 import sys
-import time
-import warnings
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from . import peers
-from .modes import GaveUp, NotForModes
+from .peers import PEERS
 from .problem import CASES, Problem, cases
+from .worker import OURS
 
-OURS = "nonsmooth"
 ROOT = CASES.parents[1]
 FOLDER = ROOT / "build" / "testset"
 #: Errors above this are wrong; of tools at a tolerance of 1e-10, and of first-order time steps.
 WRONG = 1e-3
-
-
-def outcome(tool: str, data: dict[str, Any]) -> dict[str, Any]:
-    """Error and seconds of a tool on a problem, or why it has none."""
-    problem = Problem(data)
-    begin = time.perf_counter()
+#: Processor seconds of a tool for one problem, with what it compiles.
+LIMIT = 60.0
+OVER = f"over {LIMIT:.0f} s"
+#: Results are valid as long as these stay.
+SOURCES = ("modes", "peers", "problem", "worker")
+#: Finds the version of the distribution that has a module.
+VERSION = """
+import importlib.util as u, importlib.metadata as m, sys
+name = sys.argv[1]
+if u.find_spec(name):
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            if tool == OURS:
-                run = problem.run()
-                x = run.x[-1]
-                problem.check(run)
-            else:
-                x = peers.PEERS[tool][1](problem)
-    except NotForModes as error:
-        return {"not for it": str(error)}
-    except (
-        GaveUp,
-        AssertionError,
-        ArithmeticError,
-        RuntimeError,
-        ValueError,
-        TypeError,
-        KeyError,
-    ) as error:
-        return {
-            "failed": f"{type(error).__name__}: {error}"[:200],
-            "seconds": time.perf_counter() - begin,
-        }
-    seconds = time.perf_counter() - begin
-    error = problem.error(x, problem.data["end"]) if "end" in problem.data else 0.0
-    return {"error": float(error), "seconds": seconds, "within": problem.within("x")}
+        print(m.version(m.packages_distributions().get(name, [name])[0]))
+    except m.PackageNotFoundError:
+        print(__import__(name).__version__)
+"""
+
+
+def version(python: str, module: str) -> str:
+    """Version of a module in an interpreter, empty if it is not there."""
+    asked = subprocess.run(
+        [python, "-c", VERSION, module], cwd=ROOT, capture_output=True, text=True
+    )
+    return asked.stdout.strip()
+
+
+def solve(
+    python: str, tool: str, own: list[dict[str, Any]], path: Path, key: str, limit: float = LIMIT
+) -> None:
+    """Complete the results of a tool; a new process takes over where one ended on a problem."""
+    kept = json.loads(path.read_text()) if path.exists() else {}
+    keys = {
+        data["id"]: zlib.crc32(f"{key} {json.dumps(data, sort_keys=True)}".encode()) for data in own
+    }
+    found = {name: kept[name] for name in keys if kept.get(name, {}).get("key") == keys[name]}
+    while left := [name for name in keys if name not in found]:
+        worker = subprocess.Popen(
+            [python, "-m", "testset.worker", tool, str(limit)],
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        assert worker.stdin and worker.stdout
+        worker.stdin.write(" ".join(left))
+        worker.stdin.close()
+        for name in left:
+            line = worker.stdout.readline()
+            code = 0 if line else worker.wait()
+            over = {"failed": OVER if code == -signal.SIGPROF else f"the process ended ({code})"}
+            found[name] = {**(json.loads(line) if line else over), "key": keys[name]}
+            path.write_text(json.dumps(found, indent=1))
+            if not line:
+                break
 
 
 def wrong(found: dict[str, Any]) -> list[str]:
     """Problems whose end is wrong without a message."""
     done = {name: own for name, own in found.items() if "error" in own}
-    return [name for name, own in done.items() if own["error"] > max(WRONG, own["within"])]
+    return [name for name, own in done.items() if not own["error"] <= max(WRONG, own["within"])]
 
 
 def row(tool: str, found: dict[str, Any]) -> str:
     """A line of the table."""
-    bad, failed, not_for = (
-        wrong(found),
-        *([name for name, own in found.items() if key in own] for key in ("failed", "not for it")),
-    )
-    right = [own for name, own in found.items() if name not in {*bad, *failed, *not_for}]
-    middle = (
-        [statistics.median(own[key] for own in right) for key in ("error", "seconds")]
-        if right
-        else [0.0] * 2
-    )
-    counts = map(len, (found, right, bad, failed, not_for))
+    bad = wrong(found)
+    over = [name for name, own in found.items() if own.get("failed") == OVER]
+    failed = [name for name, own in found.items() if "failed" in own and name not in over]
+    not_for = [name for name, own in found.items() if "not for it" in own]
+    right = [own for name, own in found.items() if name not in {*bad, *over, *failed, *not_for}]
+    middle = [statistics.median([own[key] for own in right] or [0]) for key in ("error", "seconds")]
+    counts = map(len, (found, right, bad, failed, over, not_for))
     return (
         "| " + " | ".join(map(str, (tool, *counts, f"{middle[0]:.0e}", f"{middle[1]:.2f}"))) + " |"
     )
@@ -84,38 +105,50 @@ def row(tool: str, found: dict[str, Any]) -> str:
 
 def table(results: dict[str, dict[str, Any]]) -> str:
     """All tools, and the names of what is silently wrong."""
-    head = "| tool | problems | right | silently wrong | gave up | cannot be written | median error | median s |"
-    lines = [head, "|---|--:|--:|--:|--:|--:|--:|--:|", *(row(*pair) for pair in results.items())]
+    head = (
+        "| tool | problems | right | silently wrong | gave up | "
+        f"{OVER} | cannot be written | median error | median s |"
+    )
+    lines = [head, "|---|" + "--:|" * 8, *(row(*pair) for pair in results.items())]
     names = (f"- {tool}: {', '.join(wrong(found)) or 'none'}" for tool, found in results.items())
     return "\n".join([*lines, "", "Silently wrong are:", "", *names])
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run tools that are installed, keep the results of the others from the last run."""
-    chosen = [*(sys.argv[1:] if arguments is None else arguments)]
-    more, record = "--more" in chosen, "--record" in chosen
-    chosen = [name for name in chosen if not name.startswith("--")]
+    """Run the tools that are installed and print the table."""
+    parser = argparse.ArgumentParser(prog="python -m testset", description=__doc__)
+    parser.add_argument("tools", nargs="*", metavar="TOOL")
+    parser.add_argument("--python", action="append", default=[], metavar="PATH")
+    parser.add_argument("--record", action="store_true", help="put the table into README.md")
+    given = parser.parse_args(arguments)
     FOLDER.mkdir(parents=True, exist_ok=True)
-    tools = {OURS: "nonsmooth"} | {name: own[0] for name, own in peers.PEERS.items()}
+    sources = [CASES.with_name(f"{name}.py").read_bytes() for name in SOURCES]
     results = dict[str, dict[str, Any]]()
-    for tool, module in tools.items():
+    for tool, module in ({OURS: OURS} | {name: own[0] for name, own in PEERS.items()}).items():
+        if given.tools and tool not in given.tools:
+            continue
+        there = ((python, version(python, module)) for python in (sys.executable, *given.python))
+        python, number = next((pair for pair in there if pair[1]), ("", ""))
+        if not python:
+            print(f"{tool}: not installed")
+            continue
         path = FOLDER / f"{tool}.json"
-        if (tool in chosen or not chosen) and peers.installed(module):
-            own = [data for data in cases() if tool == OURS or "end" in Problem(data).data]
-            found = json.loads(path.read_text()) if more and path.exists() else {}
-            for data in own:
-                if data["id"] not in found:
-                    found[data["id"]] = outcome(tool, data)
-                    path.write_text(json.dumps(found, indent=1))
-        if path.exists():
-            results[tool] = json.loads(path.read_text())
-    if record:
-        page = Path(__file__).with_name("README.md")
+        if tool == OURS:
+            path.unlink(missing_ok=True)
+        own = [data for data in cases() if tool == OURS or "end" in Problem(data).data]
+        solve(python, tool, own, path, f"{number} {zlib.crc32(b''.join(sources))}")
+        results[f"{tool} ({number})"] = json.loads(path.read_text())
+    words = shlex.join(
+        ["python", "-m", "testset", *(sys.argv[1:] if arguments is None else arguments)]
+    )
+    text = f"{table(results)}\n\nMade on {datetime.date.today()} by `{words}`."
+    if given.record:
+        page = CASES.with_name("README.md")
         before, _, rest = page.read_text(encoding="utf-8").partition("<!-- results -->\n")
         after = rest.partition("<!-- end of results -->\n")[2]
-        marked = f"<!-- results -->\n{table(results)}\n<!-- end of results -->\n"
+        marked = f"<!-- results -->\n{text}\n<!-- end of results -->\n"
         page.write_text(before + marked + after, encoding="utf-8")
-    print(table(results))
+    print(text)
 
 
 if __name__ == "__main__":

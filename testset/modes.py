@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -87,7 +88,7 @@ class Modes:
         return values
 
     def mode(self, signs: tuple[int, ...]) -> Any:
-        """Leg, multipliers, rates and effects of guards of a mode."""
+        """What makes the leg, multipliers, rates and effects of guards of a mode."""
         if signs not in self.made:
             self.made[signs] = self._mode(signs)
         return self.made[signs]
@@ -135,7 +136,7 @@ class Modes:
             ca.vertcat(ca.SX(0, 1), *(read[k] for k in kept)),
             [effects[k] for k in kept],
         )
-        leg = self.solver(d.states, self.t, field, rows)
+        leg = cache(lambda: self.solver(d.states, self.t, field, rows))  # some compile long
         return leg, self._function(ca.densify(put(lam)), self._rates(field)), effects
 
     def signs(self, x: np.ndarray, t: float, before: Sequence[int | None]) -> tuple[int, ...]:
@@ -183,10 +184,11 @@ class Modes:
             else self.signs(x, t, [None if abs(v) < ON else int(np.sign(v)) for v in values])
         )
         for _ in range(EVENTS):
-            leg, _, effects = self.mode(signs)
-            begin = time.perf_counter()
+            make, _, effects = self.mode(signs)
+            leg = make()
+            begin = time.process_time()
             t, x, hit = leg(t, np.asarray(x, dtype=float), t_end)
-            spent += time.perf_counter() - begin
+            spent += time.process_time() - begin
             if not np.all(np.isfinite(x)):
                 raise GaveUp("not finite")
             if hit is None:

@@ -39,6 +39,12 @@ class Units:
             value = value.si(self._system)
         return value / factor(kind, self.names[kind])
 
+    def cell(self, kind: str, value: float | Quantity) -> float:
+        """Return a value in the chosen units with six digits, more than a launch monitor measures, or as typed."""
+        shown = self.show(kind, value)
+        typed = isinstance(value, Quantity) and value.named(self._system) == self.names[kind]
+        return shown if typed else float(f"{shown:.6g}")
+
     def say(self, kind: str, value: float, digits: int | None = None) -> str:
         """Return a value in SI units as text in the chosen unit; by default two digits, and all before the point."""
         shown = self.show(kind, value)
@@ -63,7 +69,7 @@ class Units:
             if isinstance(value, dict):
                 row |= {f"{name}_{inner}": v for inner, v in self.row(value).items()}
             elif kind is not None:
-                row[f"{name} [{self.names[kind]}]"] = self.show(kind, value)
+                row[f"{name} [{self.names[kind]}]"] = self.cell(kind, value)
             else:
                 row[name] = "; ".join(value) if isinstance(value, (list, tuple)) else value
         return row

@@ -27,7 +27,7 @@ def pages() -> dict[str, str]:
     """Return the pages by their address."""
     found = {
         "changelog.md": text_of("CHANGELOG.md"),
-        "benchmarks.md": text_of("benchmarks/README.md"),
+        "benchmarks.md": benchmarks(),
         "testset.md": text_of("testset/README.md"),
         "cite.md": cite(),
     }
@@ -43,6 +43,13 @@ def pictures() -> dict[str, Path]:
         for path in sorted((ROOT / "build" / name).glob("*.png")):
             found[f"papers/{name}/{path.name}"] = path
     return found
+
+
+def benchmarks() -> str:
+    """The page of the benchmarks: the short table and the picture, then the README without its picture."""
+    title, _, rest = text_of("benchmarks/README.md").partition("\n\n")
+    (picture,) = re.findall(r"^!\[.*\]\(work_precision.png\)$", rest, re.MULTILINE)
+    return f"{title}\n\n## In short\n\n{measured()}\n\n{picture}\n\n## All of it\n\n{rest.replace(picture, '')}"
 
 
 def cite() -> str:

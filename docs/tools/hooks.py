@@ -30,6 +30,10 @@ PICTURES = DOCS.parent / "build" / "gallery"
 #: A list of exceptions in brackets, and a dash before a description that is not there.
 _LISTED = re.compile(r"(?<=<code>)\(((?:<(a|autoref) [^>]*>\w+</\2>(?:, )?)+)\)(?=</code>)")
 _NOTHING = re.compile(r"\s*–\s*<div class=\"doc-md-description\">\s*</div>")
+#: Pages that the search lists after those that explain: lists of names, pictures, records, pages for developers.
+_BEHIND = re.compile(
+    "api/|papers|decisions/|(architecture|benchmarks|changelog|cite|extend|gallery|gpu|testset|textbook|vision)\\.md"
+)
 _ROLE = re.compile(r":(?:class|func|meth|mod|attr):(?=<code>|`)")
 
 
@@ -68,7 +72,9 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put the generated parts into a page, and a tutorial's pictures and notebook."""
+    """Put the generated parts into a page, a tutorial's pictures and notebook, and its weight in the search."""
+    if _BEHIND.match(page.file.src_uri):
+        page.meta["search"] = {"boost": 0.3}
     name = Path(page.file.src_uri).stem
     if name.startswith("tutorial_"):
         title, _, rest = notebooks.with_pictures(markdown, name).partition("\n")

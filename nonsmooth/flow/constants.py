@@ -75,6 +75,9 @@ AT_END = 64 * EPSILON
 #: Lanes leave events closer than this, relative to the time, to the scalar driver.
 NEAR = 1e-13
 
+#: At an event that the driver makes for lanes, other guards are above this part of their terms.
+CROWDED = 1e-6
+
 #: Newton steps that improve a root by the guard itself; a step below this part of the time is the last.
 POLISHED = 3
 CLOSE = 1e-8

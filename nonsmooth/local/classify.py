@@ -341,7 +341,7 @@ class _Classifier:
         """Zero of a field, tangency of both or one, sliding or crossing, in this order."""
         found = self.where.switching
         if not found.slides:
-            return self._without_sliding(found.kind == "continuous")
+            return self._without_sliding(not found.force_jumps)
         vanish = [self.is_zero(self.to_zero[k], f"F{k + 1} = 0") for k in (0, 1)]
         if all(vanish):
             self.margins["F1 = F2 = 0"] = 0.0

@@ -3,7 +3,13 @@
 from .calls import call
 from .checks import is_real, real, real_array, whole
 from .definition import instruction_form
-from .definition.derived_systems import SECTION, reversed_system, surface_of, with_section
+from .definition.derived_systems import (
+    SECTION,
+    reversed_system,
+    surface_of,
+    with_section,
+    with_stops,
+)
 from .definition.events import Clock, Impact, Reset, Stop
 from .definition.events.held_events import HeldEvent, discrete_values, held_events, held_relay
 from .definition.lift import LiftedSwitch

@@ -163,6 +163,7 @@ def explore(
         t_end=t_end,
         box=limits.ravel().tolist(),
         **_surfaces(system),
+        **_held(system),
         flow=system.dimension == 2 and not system.definition.discrete,
         events=bool(system.surface_count or system.impacts or system.resets),
         equations=system._repr_html_(),
@@ -284,6 +285,18 @@ def _surfaces(system: FilippovSystem) -> dict[str, Any]:
         scan=planar and (plain or (smooth and not system.definition.discrete)),
         slides=plain and bool(system.switching(0).slides),
         cuts=_cuts(system) if plain and system.dimension > 2 else None,
+    )
+
+
+def _held(system: FilippovSystem) -> dict[str, Any]:
+    """Values of discrete states; of each clock its state, and its guard counted from the last."""
+    d = system.definition
+    free: list[list[float] | None] = [None] * (system.dimension - len(d.discrete))
+    values = free + [sorted(own) if own else None for own in d.discrete]
+    triggers = [d.rules[len(d.stops) + reset].atoms for reset, _ in d.clocks]
+    guards = [min(own) - d.guards.numel() for own in triggers]
+    return dict(
+        values=values, clocks=[[k, guard] for (_, k), guard in zip(d.clocks, guards, strict=True)]
     )
 
 

@@ -30,5 +30,12 @@ def test_the_record_takes_the_place_of_the_table_of_claims(monkeypatch, tmp_path
     assert "papers/welander_1982/one.png" in elsewhere.pictures()
 
 
+def test_the_benchmarks_begin_with_the_short_table_and_the_picture():
+    page = elsewhere.pages()["benchmarks.md"]
+    first, _, rest = page.partition("\n## All of it\n")
+    assert elsewhere.measured() in first and "](work_precision.png)" in first
+    assert "](work_precision.png)" not in rest and "### Targets" in rest
+
+
 def test_the_picture_of_the_architecture_is_legible():
     assert illegible(architecture.figure()) == []

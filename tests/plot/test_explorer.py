@@ -201,6 +201,14 @@ return {
 """
 
 
+def copied(browser, button):
+    return browser.run(
+        "let kept; navigator.clipboard.writeText = async (words) => { kept = words; };"
+        "document.getElementById(given[0]).click(); return kept;",
+        button,
+    )
+
+
 def state_of(seen):
     return [float(v) for v in re.search(r"state(.*?)events", seen["facts"])[1].split(",")]
 
@@ -273,10 +281,7 @@ def test_the_start_is_dragged(browser, page, width):
 def test_python_and_svg_are_what_is_shown(browser, page):
     browser.open(page, hash="p=0.6,0.3&x=0.1,0.2&t=9")
     browser.run(READY)
-    code = browser.run(
-        "let kept; navigator.clipboard.writeText = async (words) => { kept = words; };"
-        "document.getElementById('python').click(); return kept;"
-    )
+    code = copied(browser, "python")
     names = {"nonsmooth": ns, "system": BELT, "print": lambda *_: None}
     exec(code, names)
     seen = browser.run(READY)
@@ -286,6 +291,44 @@ def test_python_and_svg_are_what_is_shown(browser, page):
         "document.getElementById('save').click(); return await kept.text();"
     )
     assert picture.startswith("<svg") and "var(" not in picture and seen["orbit"] in picture
+
+
+def paced():
+    """A clock whose period is a parameter, and gears, with names that HTML and Python escape."""
+    y, period, gear = (ca.SX.sym(name) for name in ("y", 'T "<b>\\n', "counts"))
+    clock, up = ns.Clock(period), {gear: ca.fmin(gear + 1, 3)}
+    return ns.FilippovSystem(
+        [y],
+        field=[gear - y * ca.cos(clock.phase)],
+        clocks=clock,
+        discrete={gear: (1, 2, 3)},
+        parameters={period: 0.7},
+        resets=ns.Reset(y - 1, up, direction=1),
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_what_is_copied_is_what_is_shown(browser, tmp_path):
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    system, path = paced(), tmp_path / "paced.html"
+    ns.explore(system, start=[1 / 3, 0.1, 1.0], t_end=9.0, path=path)
+    browser.open(path)
+    for keys in (Keys.ARROW_RIGHT * 3, Keys.END, Keys.ARROW_LEFT):
+        for slider in browser.driver.find_elements(By.CSS_SELECTOR, "#inputs input[type=range]"):
+            slider.send_keys(keys)
+        link = copied(browser, "link")
+        seen = browser.run(READY)
+        names = {"nonsmooth": ns, "system": system, "print": lambda *_: None}
+        exec(copied(browser, "python"), names)
+        run = names["run"]
+        assert run.itinerary.split(" ")[-36:] == seen["word"].removeprefix("… ").split(" ")
+        assert state_of(seen) == pytest.approx(run.x[-1], rel=1e-6, abs=1e-9)
+        assert browser.run("return document.querySelectorAll('#word .mode-slide').length") == 0
+        browser.open(path, hash=link.partition("#")[2])
+        assert state_of(browser.run(READY)) == state_of(seen)
 
 
 @pytest.mark.slow
@@ -351,7 +394,16 @@ def test_pages_of_textbook_problems_have_no_errors(browser, tmp_path, name):
 @pytest.mark.slow
 @pytest.mark.browser
 def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
-    for words in ("p=a,b&x=1&t=-3", "box=1,0,0,0&turn=1", "flow=toString", "%E0%A4%A"):
+    wrong = {
+        "p=a,b&x=1&t=-3&flow=short": "p, x, t.",
+        "box=1,0,0,0&turn=1": "box, turn.",
+        "flow=toString": "flow.",
+        "%E0%A4%A": "\ufffd%A.",
+    }
+    for words, left_out in wrong.items():
         browser.open(page, hash=words)
         seen = browser.run(READY)
         assert seen["say"] == "x 0, v 0" and browser.errors() == {}
+        assert browser.left_out() == left_out
+    browser.open(page, hash=seen["hash"].lstrip("#"))
+    assert browser.run(READY)["say"] == "x 0, v 0" and browser.left_out() == ""

@@ -250,7 +250,7 @@
 
   const moveHandle = Page.draggable(map, {
     name: "Landing: speed and spin",
-    step: 0.05,
+    steps: [0.05, 0.05],
     get: () => [state.xdot, state.omega],
     set: ([xdot, omega]) => set({ xdot, omega }),
     say: () => `speed ${text(state.xdot)}, spin ${text(state.omega)}`,
@@ -317,15 +317,19 @@
 
   function read() {
     const asked = Page.address();
+    const read = {};
     for (const [key, { min, max }] of Object.entries(RANGES)) {
       const value = Number(asked[key]);
-      if (asked[key] && Number.isFinite(value)) state[key] = Math.min(Math.max(value, min), max);
+      read[key] = asked[key] && Number.isFinite(value);
+      if (read[key]) state[key] = Math.min(Math.max(value, min), max);
     }
-    if (given.loads.includes(asked.load)) state.load = asked.load;
+    read.load = given.loads.includes(asked.load);
+    if (read.load) state.load = asked.load;
     const inertia = BALLS.map((one) => one[1]).find(
       (one) => Math.abs(one - Number(asked.inertia)) < 1e-6,
     );
     if (inertia) state.inertia = inertia;
+    Page.leftOut(asked, { ...read, inertia });
     refresh();
   }
 

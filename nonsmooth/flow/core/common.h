@@ -61,14 +61,17 @@ static inline int shrink_alike(const double *block) {
 /* The data of a run between two steps: lanes pass it to the driver for a step that they cannot decide. */
 typedef struct {
   double t, since, length, shortened; /* since: the last event; length of the step before in this mode, or 0 */
-  int64_t steps, events, segment_steps, history, hits, kept; /* hits: of the section; kept: samples */
+  int64_t steps, events, segment_steps, history, seen, hits, kept; /* seen: history in the driver; hits: of the section; kept: samples */
   int64_t *kinds;
   double *x;
   double *unknowns; /* of a set that is left: its direction, then h; not given back */
-  int8_t *letter, *side; /* side: of stops */
+  int8_t *letter, *side; /* side: of guards of events that are located, doubled where they begin at a zero */
+  double *motion, *jumped; /* of a restart, besides the state; of the last events; or none where all events are stops */
   Recent *past;
   int32_t drop, itinerary, status; /* drop: first coefficients of the first guard that vanish */
+  int32_t driven; /* whether the driver makes the events at surfaces too */
   int32_t near; /* 1 close to a set, 2 if its guard fell: the set is treated instead of a step */
+  int32_t arrived; /* number of the guard of an event that is at its zero, from 1: the event is made instead of a step */
 } Suspended;
 
 /* The driver as lanes call it: a run, and functions that begin it or make a step. */
@@ -179,7 +182,11 @@ static double newton(const double *c, int n, double lo, double hi, double x) {
 /* Power coefficients of degree n on [0, 1] to Bernstein coefficients, in place. */
 static void bernstein(double *b, int n) {
   double binomial = 1;
-  for (int i = 0; i <= n; i++) { b[i] /= binomial; binomial = binomial * (n - i) / (i + 1); }
+  for (int i = 0; 2 * i <= n; i++) {
+    b[i] /= binomial;
+    if (2 * i < n) b[n - i] /= binomial;
+    binomial = binomial * (n - i) / (i + 1);
+  }
   for (int level = 1; level <= n; level++)
     for (int i = n; i >= level; i--) b[i] += b[i - 1];
 }
@@ -241,13 +248,13 @@ static double largest_root(const double *c, int n) {
  * magnitudes of the rest. A tenth of the work of all coefficients. */
 #define FIRST_TERMS 8
 static inline int stays_positive(const double *c, int n, double h) {
-  double b[FIRST_TERMS + 1], power = 1, binomial = 1, rest = 0;
+  const double part[] = {1, 1.0 / 8, 1.0 / 28, 1.0 / 56, 1.0 / 70, 1.0 / 56, 1.0 / 28, 1.0 / 8, 1};
+  double b[FIRST_TERMS + 1], power = 1, rest = 0;
   if (n < FIRST_TERMS) return 0;
   for (int k = n; k > FIRST_TERMS; k--) rest = MULADD(rest, h, fabs(c[k]));
   for (int k = 0; k <= FIRST_TERMS; k++) {
-    b[k] = c[k] * power * (1 / binomial);
+    b[k] = c[k] * power * part[k];
     power *= h;
-    binomial = binomial * (FIRST_TERMS - k) / (k + 1);
   }
   for (int level = 1; level <= FIRST_TERMS; level++)
     for (int i = FIRST_TERMS; i >= level; i--) b[i] += b[i - 1];
@@ -256,19 +263,18 @@ static inline int stays_positive(const double *c, int n, double h) {
   return low > rest * power;
 }
 
-/* Whether a polynomial positive at 0 clearly stays so on [0, h]. */
-static inline int is_far(const double *c, int n, double h) {
-  double rest = rest_of(c, n, h);
+/* Whether a polynomial positive at 0 clearly stays so on [0, h], from the sum of its other terms. */
+static inline int is_far(const double *c, int n, double h, double rest) {
   return c[0] > rest || (rest < LARGEST && stays_positive(c, n, h));
 }
 
-/* Bernstein coefficients of a polynomial that is not far from zero on [0, h], and the number of their sign changes; h is
- * shortened to the range of possible roots. */
-static int isolate(const double *c, int n, double *h, double *b) {
+/* Bernstein coefficients of a polynomial that is not far from zero on [0, h], where the sum of its other terms is ``rest``,
+ * and the number of their sign changes; h is shortened to the range of possible roots. */
+static int isolate(const double *c, int n, double rest, double *h, double *b) {
   double power = 1;
   int changes = 0;
   /* More halvings than there are would be needed, or an overflow. */
-  if (!(rest_of(c, n, *h) < ldexp(c[0], DEPTH))) *h = smaller(*h, largest_root(c, n));
+  if (!(rest < ldexp(c[0], DEPTH))) *h = smaller(*h, largest_root(c, n));
   b[0] = c[0];
   for (int k = 1; k <= n; k++) { power *= *h; b[k] = c[k] * power; }
   /* A minimum that reaches zero only by rounding, ROUNDING sum |c_k| t^k, is no root. */
@@ -281,9 +287,9 @@ static int isolate(const double *c, int n, double *h, double *b) {
 /* First t in (0, h] at which a polynomial positive at 0 stops being positive; 0 if it is not; -1 if
  * it stays positive. */
 static double first_root(const double *c, int n, double h) {
-  double b[P + 1];
+  double b[P + 1], rest = rest_of(c, n, h);
   if (c[0] <= 0) return 0;
-  return is_far(c, n, h) || !isolate(c, n, &h, b) ? -1 : first_in(c, n, b, 0, h, 0);
+  return is_far(c, n, h, rest) || !isolate(c, n, rest, &h, b) ? -1 : first_in(c, n, b, 0, h, 0);
 }
 
 /* First t in (0, h] at which a polynomial is below some of its errors and ``floor``: 0 at once, -1 nowhere. */

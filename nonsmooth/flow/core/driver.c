@@ -391,11 +391,22 @@ static void leave_singular(Run *r, Expansion *e, double left) {
 /* A step: its length, the guard at its end or -1, whether it reaches the end of the run. */
 typedef struct { double dt; int row, last; } Piece;
 
+/* Whether the expansion at the end of an instant is that of the motion that follows. */
+static int is_expanded(Run *r) {
+  const Expansion *e = &r->e;
+  int same = r->expanded && e->stamp == r->stamp && !memcmp(e->l.letter, r->letter, r->width);
+  r->expanded = 0;
+  for (int i = 0; same && i < r->n; i++) same = e->states[(int64_t)i * r->stride] == r->x[i];
+  for (int j = 0; same && j < e->l.slides; j++)
+    same = e->series[(int64_t)e->l.sliding[j] * r->stride] == r->unknowns[e->l.sliding[j]];
+  return same;
+}
+
 /* Plan a Taylor step; 0 where the run has ended. */
 static int taylor_piece(Run *r, double left, Piece *q) {
   Expansion *e = &r->e;
   double dt = 0;
-  expand(r, r->letter, r->x, r->unknowns, e);
+  if (!is_expanded(r)) expand(r, r->letter, r->x, r->unknowns, e);
   if (!e->finite) { leave_singular(r, e, left); return 0; }
   double by_series = step_size(r, e), far = e->l.bent_count ? leave_out_far(r, e, left, by_series) : 0;
   if (far > 0) by_series = smaller(step_size(r, e), far);

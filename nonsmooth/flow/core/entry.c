@@ -245,13 +245,32 @@ static int is_apart(Run *r, int f) {
   return length_of(h + f, k) > CLOSE * scale_of_set(r, f, scales_of);
 }
 
-/* Whether lanes can continue: no event is due, no zeros coincide, and only a surface's guard has known zeros. */
-static int is_plain(Run *r) {
+/* Rows of the guards of events that are located: those of stops and resets, then surfaces, if they are the driver's, and gaps;
+ * their number. */
+static int located_rows(const Run *r, const Suspended *m, int32_t *row) {
+  int count = 0;
+  for (int a = 0; a < r->s->rules.atoms; a++) if (r->s->rules.way[a] != UNWATCHED) row[count++] = r->now.atoms + a;
+  for (int k = 0; k < r->now.atoms; k++)
+    if (r->now.kind[k] == IMPACT_GUARD || (m->driven && r->now.kind[k] == SURFACE_GUARD)) row[count++] = k;
+  return count;
+}
+
+/* Zeros at which the guard of a row may begin in lanes. */
+static int most_zeros(const Run *r, const Suspended *m, int row) {
+  int kind = r->now.kind[row];
+  if (is_atom(kind) && r->now.side[row] == UNWATCHED) return r->order + 1;
+  if (kind == IMPACT_GUARD || is_atom(kind)) return m->motion != 0;
+  return m->driven ? 1 : row || r->s->sets ? 0 : 2;
+}
+
+/* Whether lanes can continue: no event is due, no zeros coincide, and the known ones are those that lanes know. */
+static int is_plain(Run *r, const Suspended *m) {
   if (r->instant.running || r->due_impact >= 0 || r->hold < INFINITY) return 0;
-  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > (row || !r->m || r->s->sets ? 0 : 2)) return 0;
+  for (int row = 0; row < r->now.rows; row++) if (r->drop[row] > most_zeros(r, m, row)) return 0;
   EACH_SET(r, f) if (!is_apart(r, f)) return 0;
-  for (int j = 0; j < r->s->stops; j++) if (!r->instant.side[j]) return 0;
-  return 1;
+  for (int a = 0; a < r->s->rules.atoms; a++) if (r->s->rules.way[a] != UNWATCHED && !r->instant.side[a]) return 0;
+  for (int j = m->driven ? 0 : r->m; j < r->width; j++) if (r->letter[j] == 0) return 0;
+  return !m->driven || r->now.atoms == r->width; /* each surface has its guard */
 }
 
 /* The data of a run between two steps, here and in lanes. */
@@ -260,6 +279,9 @@ static int is_plain(Run *r) {
   OF(segment_steps, segment_steps) OF(itinerary, itinerary) OF(history, history) OF(hits, hits) OF(kept, kept)
 #define TAKEN(here, there) r->here = m->there;
 #define GIVEN(here, there) m->there = r->here;
+
+/* Kinds of events that lanes count, or keep for the driver. */
+static int kinds_of(const Suspended *m) { return m->motion ? KINDS : SIMPLE_KINDS - 1; }
 
 /* The number of a mode's letters in the driver's table is that of lanes. */
 static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Suspended *m) {
@@ -285,18 +307,38 @@ static void take(Run *r, const Batch *b, const Options *o, int64_t i, const Susp
   r->mode = r->now.mode;
   r->shown = r->segment_mode = shown_number(r, r->letter);
   r->drop[0] = m->drop;
-  memcpy(r->instant.side, m->side, r->s->stops);
-  memcpy(r->instant.view, m->side, r->s->stops);
-  memset(r->instant.residual, 0, sizeof(double) * r->s->stops);
-  memset(r->instant.pending, 0, r->s->rules.triggers);
-  memcpy(r->kinds, m->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
+  if (m->motion) {
+    read_motion(r, m->motion);
+    r->jumped = m->jumped;
+  } else {
+    memset(r->instant.residual, 0, sizeof(double) * r->s->stops);
+    memset(r->instant.pending, 0, r->s->rules.triggers);
+  }
+  int32_t row[r->now.rows + 1];
+  for (int k = located_rows(r, m, row) - 1; k >= 0; k--) {
+    int atom = row[k] - r->now.atoms, side = m->side[k];
+    if (atom >= 0) r->instant.side[atom] = r->instant.view[atom] = (int8_t)sign_of(side);
+    if (abs(side) > 1) r->drop[row[k]] = 1;
+  }
+  memcpy(r->kinds, m->kinds, sizeof(int64_t) * kinds_of(m));
   r->length = m->length;
   if (m->length > 0) r->length_mode = r->mode;
   for (int k = 0; k < HISTORY && k < m->history; k++) {
     int64_t pattern = m->past[k].pattern;
-    Guard guard = {(int)(pattern >> 32 & 255), (int)(int32_t)pattern, 0};
-    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(pattern >> 40), guard};
+    int64_t kinds = (pattern - (int32_t)pattern) >> 32;
+    Guard guard = {(int)(kinds & 255), (int)(int32_t)pattern, 0};
+    r->past[k] = (Happened){m->past[k].interval, pattern, (int32_t)(kinds >> 8), guard};
   }
+}
+
+/* Whether the guard of a row begins at a zero that the motion leaves. */
+static int leaves_zero(Run *r, int row) {
+  int i = r->now.index[row];
+  if (r->drop[row] || r->now.kind[row] != SURFACE_GUARD || degree_of(r, i) < 2) return r->drop[row];
+  const double *h = surface_values(r, r->x), *scale = surface_scales(r, r->x);
+  int rate = element(r, i)->lower;
+  if (!(fabs(h[i]) <= ON_SURFACE * scale[i] && fabs(h[rate]) > ON_SURFACE * scale[rate])) return 0;
+  return h[rate] * r->letter[i] > 0;
 }
 
 /* Return a run to the lanes, or store its end. */
@@ -312,16 +354,22 @@ static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
   if (r->s->timed) m->x[r->n - 1] = r->t;
   memcpy(m->letter, r->letter, r->width);
   m->drop = r->drop[0];
-  memcpy(m->side, r->instant.side, r->s->stops);
-  memcpy(m->kinds, r->kinds, sizeof(int64_t) * (SIMPLE_KINDS - 1));
+  int32_t row[r->now.rows + 1];
+  for (int k = located_rows(r, m, row) - 1; k >= 0; k--) {
+    int atom = row[k] - r->now.atoms, side = atom < 0 ? r->letter[r->now.index[row[k]]] : r->instant.side[atom];
+    m->side[k] = (int8_t)(leaves_zero(r, row[k]) ? 2 * side : side);
+  }
+  if (m->motion) write_motion(r, m->motion);
+  memcpy(m->kinds, r->kinds, sizeof(int64_t) * kinds_of(m));
   m->length = r->length_mode == r->mode ? r->length : 0;
   for (int64_t k = first; k < r->history; k++)
     m->past[k % HISTORY] = (Recent){r->past[k % HISTORY].interval, r->past[k % HISTORY].pattern};
   GOES_ON(GIVEN)
+  m->seen = m->history;
 }
 
 static void go_on_until_plain(Run *r, const Batch *b, int64_t i, Suspended *m) {
-  while (r->status == RUNNING && (r->t >= r->o.t_end || !is_plain(r))) step(r); /* lanes do not decide a mode at the end */
+  while (r->status == RUNNING && (r->t >= r->o.t_end || !is_plain(r, m))) step(r); /* lanes do not decide a mode at the end */
   give(r, b, i, m);
 }
 
@@ -330,6 +378,7 @@ void core_begin(void *run, const Batch *b, const Options *o, int64_t i, Suspende
   static const Output none;
   Run *r = run;
   m->history = m->hits = m->kept = 0;
+  if (m->motion) r->jumped = m->jumped;
   sample_into(r, b, i);
   run_begin(r, o, &none, b->x0 + i * r->n, b->p + i * b->p_stride, 0, b->t0, 0);
   go_on_until_plain(r, b, i, m);
@@ -342,13 +391,27 @@ static void read_kept(Run *r, const Batch *b, int64_t i) {
   memcpy(r->at_x, b->at_x + i * r->s->dimension, sizeof(double) * r->s->dimension);
 }
 
+/* Make the event of a guard that lanes have integrated to its zero. */
+static void make_event(Run *r, const Suspended *m) {
+  int32_t row[r->now.rows + 1];
+  located_rows(r, m, row);
+  int at = row[m->arrived - 1], atom = at - r->now.atoms;
+  r->falls = 0;
+  memset(r->instant.passing, 0, r->s->rules.atoms);
+  if (atom < 0) { serve_between(r, at); return; }
+  if (clock_of(r, atom) < 0) expand(r, r->letter, r->x, r->unknowns, &r->e);
+  r->instant.passing[atom] = 1;
+  arrive(r, &r->e, 0, -1);
+}
+
 /* Make the step that the lanes cannot decide. */
 void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended *m) {
   Run *r = run;
   take(r, b, o, i, m);
   read_kept(r, b, i);
-  if (m->since == 0 && m->history) see_limit(r); /* the last event was a lane's */
+  if (m->since == 0 && m->history != m->seen) see_limit(r); /* the last event was a lane's */
   if (r->status == RUNNING && m->near) near_set(r, 0, m->near == 2);
+  else if (r->status == RUNNING && m->arrived) make_event(r, m);
   else if (r->status == RUNNING) step(r);
   go_on_until_plain(r, b, i, m);
 }
@@ -357,9 +420,10 @@ void core_step(void *run, const Batch *b, const Options *o, int64_t i, Suspended
  * off a set and on it. */
 Tree *lanes_tree(Run *r) {
   const int8_t surface[] = {1, -1, 0}, set[] = {OFF, 0};
-  for (int k = 0; k < (!r->width ? 1 : r->s->sets ? 2 : 3); k++) {
-    memset(r->start, r->s->sets ? set[k] : surface[k], r->width);
-    mode_number(r->table, r->start);
+  for (int k = 0; k < (!r->m ? 1 : r->s->sets ? 2 : 3); k++) {
+    memset(r->start, r->s->sets ? set[k] : surface[k], r->m);
+    memset(r->start + r->m, 1, r->c);
+    numbered(r, r->start, 0);
   }
   return &r->table->tree;
 }

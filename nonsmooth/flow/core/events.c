@@ -295,6 +295,7 @@ static void leave_zeros(Run *r) {
   for (int a = 0; a < atoms; a++) any |= i->zero[a];
   if (!any) return;
   expand(r, r->letter, r->x, r->unknowns, &r->e);
+  r->expanded = !r->s->sets && !r->s->tables && !r->s->combined;
   if (!r->e.finite) return;
   for (int a = 0; a < atoms; a++) {
     double value;
@@ -327,7 +328,7 @@ static void end_instant(Run *r) {
     int64_t k = r->out.events - 1;
     r->out.event_after[k] = r->mode;
     memcpy(r->out.event_after_x + k * r->n, r->x, sizeof(double) * r->n);
-    write_motion(r, r->out.event_motion + k * r->s->rules.width);
+    if (r->out.event_motion) write_motion(r, r->out.event_motion + k * r->s->rules.width);
   }
   if (i->sampled) /* the state after all jumps */
     memcpy(r->sample_x + (i->sampled - 1) * r->s->dimension, r->x, r->s->dimension * sizeof(double));

@@ -183,17 +183,18 @@ static int null_space(const double *e, int rows, int columns, double *z, double 
   return count;
 }
 
-/* Make a vector orthogonal to ``count`` unit vectors of ``z``, and of length 1; 0 where it is dependent on them. */
-static int orthonormal(double *own, const double *z, int count, int n, int passes) {
+/* Make a vector orthogonal to ``count`` unit vectors of ``z``, and of length 1; the length before that, 0 where it is
+ * dependent on them. */
+static double orthonormal(double *own, const double *z, int count, int n, int passes) {
   for (int pass = 0; pass < passes; pass++)
     for (int l = 0; l < count; l++) {
       double part = dot(own, z + (int64_t)l * n, n);
       for (int i = 0; i < n; i++) own[i] -= part * z[(int64_t)l * n + i];
     }
-  double length = dot(own, own, n);
+  double length = sqrt(dot(own, own, n));
   if (!(length > 0)) return 0;
-  for (int i = 0; i < n; i++) own[i] /= sqrt(length);
-  return 1;
+  for (int i = 0; i < n; i++) own[i] /= length;
+  return length;
 }
 
 /* A generalised inverse G, M G M = M: x = G b solves M x = b where possible, with the least sum of squares of x over
@@ -211,7 +212,7 @@ static int invert_any(const double *m, int n, const double *size, double *invers
     for (int j = 0; j < n; j++) inverse[pivot[i] * n + j] = a[2 * (int64_t)i * n + n + j] / unit[pivot[i]];
   for (int j = 0; j < n; j++) { /* orthonormal null vectors */
     double *own = z + (int64_t)count * n;
-    if (free_vector(a, 2 * n, n, rank, pivot, unit, size, j, own)) count += orthonormal(own, z, count, n, 2);
+    if (free_vector(a, 2 * n, n, rank, pivot, unit, size, j, own)) count += orthonormal(own, z, count, n, 2) > 0;
   }
   for (int l = 0; l < count; l++) {
     const double *own = z + (int64_t)l * n;

@@ -26,10 +26,11 @@ static double left_out(const double *c, int count, double time) {
 static double sure_root(Run *r, const Expansion *e, int row, const double *c, int n, double h, double from, int drop,
                         int known) {
   if (!(c[0] > 0)) return 0;
-  if (is_far(c, n, h)) return -1;
+  double rest = rest_of(c, n, h);
+  if (is_far(c, n, h, rest)) return -1;
   const double *g = e->guards + (int64_t)row * r->stride;
   double b[P + 1], within = h, exact = LOCATED * larger(time_scale(r), h), slope, noise = 0, floor = 0;
-  int changes = isolate(c, n, &within, b);
+  int changes = isolate(c, n, rest, &within, b);
   if (!changes) return -1;
   double root = first_in(c, n, b, 0, within, 0), end = root < 0 ? h : root;
   if (changes == 1 && root > 0) {

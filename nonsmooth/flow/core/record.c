@@ -88,7 +88,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
     r->out.event_before[k] = before;
     r->out.event_after[k] = r->mode;
     r->out.event_guard[k] = guard < 0 ? -1 : ((shown_index(r) << 2) + r->guard.side + 1) * 16 + r->guard.kind;
-    write_motion(r, r->out.event_motion + k * r->s->rules.width);
+    if (r->out.event_motion) write_motion(r, r->out.event_motion + k * r->s->rules.width);
   }
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->guard.kind, shown_index(r), r->guard.side, x);
   if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, element(r, r->m)->shown, 0, x); /* impacts that accumulated */

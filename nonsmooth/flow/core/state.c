@@ -207,6 +207,7 @@ typedef struct {
   double since, length, shortened, held_length, t_error;
   int64_t step_count, implicit_count, event_count, kinds[KINDS], segment_steps, history, hits, kept;
   int32_t where, itinerary, over, active_count, several_count, facts, held_steps, wants_program;
+  int32_t expanded; /* whether e may be the expansion of the present state */
   Guard guard;
   Happened past[HISTORY];
   int32_t several[SEVERAL];

@@ -377,8 +377,6 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
     if (value == 0) return -1;
     c = g + drop;
   }
-  /* Most guards have all their terms and no root: test that first. */
-  if (!drop && c[0] > rest_of(c, r->order, h)) return -1;
   if (has_height(kind)) return sure_root(r, e, row, c, r->order - drop, h, 0, drop, 0);
   double dt = first_root(c, r->order - drop, h);
   return kind == SLIP_GUARD && dt > 0 ? slip_root(r, e, row, dt, h) : dt; /* squares lose digits */
@@ -528,10 +526,11 @@ static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   for (int j = 0; j < rows; j++) if (time[j] >= 0 && time[j] < time[first]) first = j;
   /* Atoms whose times coincide to rounding pass together, at the first time; other guards pass one by one. */
   int best = -1, atom = -1, passed_atoms = r->s->rules.atoms;
-  double near = time[first] + TIE * (time_scale(r) + time[first])
-                + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
+  double of_first = blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
+  double near = time[first] + TIE * (time_scale(r) + time[first]) + of_first;
   for (int j = 0; j < rows && (found > 1 || passed_atoms); j++) {
-    if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;
+    double own = j == first || time[j] < 0 ? of_first : blur(e->guards + (int64_t)j * r->stride, r->order, time[j]);
+    if (time[j] < 0 || time[j] > near + own) continue;
     if (is_atom(e->l.kind[j])) {
       r->instant.passing[j - e->l.atoms] = 1;
       if (atom < 0 || time[j] < time[atom]) atom = j;

@@ -233,6 +233,18 @@ class ColumnsEngine(Interpreter):
             room = count
 
 
+def carry_frame(matrices: Array, q: Array) -> tuple[Array, Array]:
+    """Orthonormal directions (m, n, k) behind each of m matrices, from those (n, k) before the first, and their growths
+    (m, k): products of triangular factors."""
+    m, n, k = len(matrices), *q.shape
+    own, growth = np.empty((m + 1, k, n)), np.empty((m, k))
+    own[0] = q.T
+    matrices = np.ascontiguousarray(matrices)
+    pointers = (a.ctypes.data for a in (matrices, own, growth))
+    library().carry_frame(n, k, m, *pointers)
+    return own[1:].swapaxes(1, 2), growth
+
+
 def _freed(state: int, table: int) -> None:
     """Free a run of the driver."""
     library().run_free(state)

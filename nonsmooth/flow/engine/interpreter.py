@@ -36,9 +36,9 @@ from .arrays import (
     options_of,
     words_of,
 )
-from .building.codegen import interpreter_order
+from .building.codegen import driver_decides, interpreter_order, width_of_motion
 from .library import core_library
-from .recording import LOOSE, Output, Recorder, Rooms, rooms_of
+from .recording import Output, Recorder, Rooms, loose_rooms, rooms_of
 from .shown import Shown
 from .structures import declare, structure
 
@@ -277,15 +277,13 @@ class Interpreter:
             "value_at": _ends(values),
         }
         atoms, keeps = d.guards.numel(), any(rule.at_trigger for rule in d.rules)
-        width = 1 + (5 + 4 * atoms + len(conditions) + 3 * len(d.clocks)) * (atoms > 0)
-        width += len(conditions) * self.system.extended_dimension * keeps
         numbers = {
             "atoms": atoms,
             "triggers": len(conditions),
             "clocks": len(d.clocks),
             "discrete": len(d.discrete),
             "keeps": int(keeps),
-            "width": width,
+            "width": width_of_motion(self.system),
             "value": self._at(np.array([*chain(*values), 0.0], float)),
         }
         return self._filled("Rules", tables | numbers)
@@ -336,8 +334,9 @@ class Interpreter:
         # ``motion`` and ``mode`` are those of a run or event that is continued.
         width = self._c.rules.width
         motion = None if motion is None else self._checked(motion)
-        rooms = self._rooms if dense else LOOSE
-        output = Output(self.system.extended_dimension, self.order, rooms, width)
+        n = self.system.extended_dimension
+        rooms = self._rooms if dense else loose_rooms(n, self.order)
+        output = Output(n, self.order, rooms, width if dense else 0)
         recorder = Recorder(output, self.system.dimension, dense, read_at)
         x, p = np.array(x, float), self.shown.with_cells(p)
         start, known = self._letters(options.start_mode), self._letters(mode)
@@ -396,7 +395,7 @@ class Interpreter:
         return int(self._c.series.size + self._c.series.terms) * self.order
 
     def seconds(self, x: Array, p: Array, options: Options) -> float | None:
-        """About how long a run takes, from its first steps; None if it takes implicit ones soon."""
+        """About how long the steps of a run take that lanes could make; None if it takes implicit ones soon."""
         # By what a step has to do, not by the clock: what is decided by it has to be the same again.
         few = replace(options, max_steps=min(options.max_steps, _PROBED), hits=None)
         if not np.isfinite(x).all():
@@ -406,7 +405,10 @@ class Interpreter:
             return None
         done = (float(run.t[-1]) - options.t_start) / (options.t_end - options.t_start)
         steps = len(run.t) / (max(done, 1e-9) if run.status == Status.TOO_MANY_STEPS else 1.0)
-        return steps * (_OF_STEP + _OF_TERM * (series.size + series.terms))
+        closed = "sc" if driver_decides(self.system) else "c"
+        made = [not set(closed) & set(mode) for mode in run.letters]
+        share = np.mean(np.array(made)[run.written["step_mode"]]) if len(run.starts) else 1.0
+        return float(steps * share) * (_OF_STEP + _OF_TERM * (series.size + series.terms))
 
     def _checked(self, motion: Array) -> Array:
         """Data of a run or event for a restart, if it is of this system."""

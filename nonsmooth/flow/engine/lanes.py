@@ -1,4 +1,4 @@
-"""Several trajectories together, from Python: one system of at most one surface, one order."""
+"""Several trajectories together, from Python: one system, one order."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..results import Chunk
 from ..section import Hits
 from .arrays import BURST
 from .building.build import build
-from .building.codegen import lanes_source, supports_lanes
+from .building.codegen import driver_decides, lanes_source, supports_lanes
 from .building.compilers import lane_width
 from .interpreter import interpreter_for
 from .interpreter import library as core_library
@@ -88,9 +88,9 @@ def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
 
 
 def can_sample(system: FilippovSystem, hits: Hits | None) -> bool:
-    """Whether lanes keep samples: at times, or at events of a surface."""
-    stops = {name for name, _ in system.stops}
-    if system.sets or hits is None or hits.after:
+    """Whether lanes keep samples: at times, or at events besides stops."""
+    stops, lanes_decide = {name for name, _ in system.stops}, not driver_decides(system)
+    if system.sets or hits is None or (hits.after and system.surface_count and lanes_decide):
         return not system.sets and hits is None
     named = hits.names is not None and not stops.intersection(hits.names)
     return named or not stops or "stop" not in hits.kinds

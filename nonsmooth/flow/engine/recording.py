@@ -34,12 +34,14 @@ _ARRAYS: dict[str, tuple[type, int]] = {
     "event_guard": (np.int32, EVENT),
 }
 
+_MOTION = [*_ARRAYS].index("event_motion")
+
 #: Numbers of steps, points and events.
 Rooms = tuple[int, int, int]
 #: Room for them at first; the block of a larger run grows from there.
 _FIRST: Rooms = (64, 128, 64)
-#: Room at first where steps are not kept.
-LOOSE: Rooms = (1024, 128, 64)
+#: Bytes of polynomials at a time where steps are not kept.
+_LOOSE = 1 << 22
 #: Free room that C needs before a step.
 _NEEDED: Rooms = (2, 4, 4)
 
@@ -94,7 +96,9 @@ class Output:
         first = address(self._block) or 0
         self._point_to((0, 0, 0), [first + offset for offset in positions])
 
-    def _point_to(self, counts: Sequence[int], positions: Sequence[int]) -> None:
+    def _point_to(self, counts: Sequence[int], positions: list[int]) -> None:
+        if not self.motion:  # C writes none
+            positions[_MOTION] = 0
         self.pointer = ctypes.byref(structure("Output")(*counts, *self._rooms, *positions))
 
     def written(self, counts: Sequence[int]) -> Arrays:
@@ -151,6 +155,11 @@ class Written:
 
 
 Arrays = Written | dict[str, NDArray[Any]]
+
+
+def loose_rooms(n: int, order: int) -> Rooms:
+    """Room at first where steps are not kept: few calls for more of it."""
+    return _LOOSE // (8 * n * (order + 1)), *_FIRST[1:]
 
 
 def rooms_of(counts: Sequence[int]) -> Rooms:

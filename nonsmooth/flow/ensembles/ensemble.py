@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...model import FilippovSystem, OptionError, require_system
 from ..constants import KINDS
+from ..engine.building.codegen import has_driven_events
 from ..engine.building.compilers import ADVICE, CompilerError, find_compiler
 from ..engine.interpreter import interpreter_for, library
 from ..engine.lanes import can_sample, lanes_for
@@ -33,6 +34,9 @@ _FEW, _FEW_WITH_SETS = 64, 4000
 
 #: Least time of an ensemble in the driver, in seconds by estimate, for which lanes are compiled.
 _WORTH = 0.05
+
+#: This many times as long where the driver makes events, as lanes gain less.
+_WITH_EVENTS = 20.0
 
 #: Largest size of a program that is compiled in a few seconds; the time of others grows as the square of their size.
 _USUAL = 600
@@ -203,7 +207,8 @@ def _is_worth_lanes(system: FilippovSystem, options: Options, starts: Starts) ->
         if seconds is None:
             return False
         found.append(seconds)
-    return starts.count * max(found) >= _WORTH * max(1.0, engine.size / _USUAL) ** 2
+    least = _WORTH * (_WITH_EVENTS if has_driven_events(system) else 1.0)
+    return starts.count * max(found) >= least * max(1.0, engine.size / _USUAL) ** 2
 
 
 def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem, OptionError
 from ..constants import SAFETY
-from ..engine.building.codegen import supports_lanes
+from ..engine.building.codegen import supports_device
 from ..engine.device.card import machine_for
 from ..engine.device.kernel import Bins, Given, Kernel, Reduced, Reduction, Source
 from ..engine.device.records import Records, continued, record_type
@@ -57,7 +57,7 @@ def _unsupported(system: FilippovSystem, options: Options) -> str:
     """The first property of a system or its options that no kernel supports; empty if there is none."""
     if system.sets:
         return "a system with a set of directions"
-    if not supports_lanes(system):
+    if not supports_device(system):
         several = system.surface_count > 1
         return "a system of several surfaces" if several else "a system with resets or contacts"
     if options.start_mode is not None:

@@ -31,7 +31,7 @@ static int load(Lanes *s, Work *w, int l, I mine) {
   if (w->next >= b->count) return 0;
   int64_t i = w->next++;
   UNROLL for (int k = 0; k < N; k++) s->x[k] = SELECT(mine, BC(b->x0[i * N + k]), s->x[k]);
-  if (b->p_stride) {
+  if (b->p_stride && !SURFACES) {
     double q[NQ];
     prepare(b->p + i * b->p_stride, q);
     for (int k = 0; k < NQ; k++) s->q[k] = SELECT(mine, BC(q[k]), s->q[k]);
@@ -42,7 +42,7 @@ static int load(Lanes *s, Work *w, int l, I mine) {
   LANE_I(s->own, l) = w->spare[--w->spares];
 #endif
   Past *past = past_of(s, l);
-  past->count = past->steps = past->hits = past->kept = 0;
+  past->count = past->seen = past->steps = past->hits = past->kept = 0;
   await_sample(s, w, l);
   past->row = s->row;
   past->shortened = 0;
@@ -154,14 +154,14 @@ static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree, 
   w->core = core;
   w->words.tree = tree;
   w->groups = b->count >= OFTEN * GROUPS * W ? GROUPS : 1 + (int)(b->count / (OFTEN * W));
-  prepare(b->p, q);
+  if (!SURFACES) prepare(b->p, q);
   for (int i = 0; i < POOLS * GROUPS; i++) {
     Lanes *s = &many->lanes[0][i];
     s->size = o->atol / o->rtol;
     s->pool = i / GROUPS;
     s->past = SET ? w->past : w->past + i * W;
     s->log = &many->log[SET ? 0 : i];
-    for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);
+    for (int k = 0; k < NQ && !SURFACES; k++) s->q[k] = BC(q[k]);
   }
 #if SET
   w->column = WORDS - (b->p_stride ? 0 : NQ);

@@ -35,11 +35,19 @@ typedef struct {
 static void point_to(Packed *a, Past *past) {
   a->m.x = a->x;
   a->m.unknowns = a->unknowns;
+#if EVENTS
+  a->m.kinds = past->kinds;
+  a->m.motion = past->motion;
+  a->m.jumped = past->jumped;
+#else
   a->m.kinds = a->kinds;
+  a->m.motion = 0;
+#endif
   a->m.letter = a->letter;
   a->m.side = a->side;
   a->m.past = past->event;
-  a->m.near = a->m.drop = 0;
+  a->m.near = a->m.drop = a->m.arrived = 0;
+  a->m.driven = SURFACES > 0;
 }
 
 /* Set the time of a run's next sample; infinite if there is none. */
@@ -96,8 +104,9 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   const Past *past = past_of(s, l);
   write_mode(s, l, m);
   UNROLL for (int i = 0; i < N; i++) a->x[i] = LANE(s->x[i], l);
-  for (int k = 0; k < LAST_KIND; k++) a->kinds[k] = LANE_I(s->kinds[k], l);
+  for (int k = 0; k < LAST_KIND; k++) m->kinds[k] = LANE_I(s->kinds[k], l);
   for (int j = 0; j < STOPS; j++) a->side[j] = LANE_I(s->above_stop[j], l) ? 1 : -1;
+  for (int j = 0; EVENTS && j < STOPS; j++) if (LANE_I(s->from_zero[j], l)) a->side[j] *= 2;
   m->t = LANE(s->t, l);
   m->since = LANE(s->since, l);
   m->length = LANE(s->length, l);
@@ -106,9 +115,20 @@ static void pack(const Lanes *s, Work *w, int l, Packed *a) {
   m->events = LANE_I(s->events, l);
   m->segment_steps = m->steps - LANE_I(s->entered, l);
   m->history = past->count;
+  m->seen = past->seen;
+  if (EVENTS) m->arrived = (int32_t)LANE_I(s->arrived, l);
   m->hits = past->hits;
   m->kept = past->kept;
   m->itinerary = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
+}
+
+/* The multipliers of surfaces are parameters of a lane. */
+static void prepare_mode(Lanes *s, const Work *w, int l, const int8_t *letter) {
+  double p[PARAMETERS + SURFACES + 1], q[NQ];
+  memcpy(p, w->b->p + LANE_I(s->index, l) * w->b->p_stride, sizeof(double) * PARAMETERS);
+  for (int k = 0; k < SURFACES; k++) p[PARAMETERS + k] = letter[k];
+  prepare(p, q);
+  for (int k = 0; k < NQ; k++) LANE(s->q[k], l) = q[k];
 }
 
 /* Returns the pool where a lane continues. */
@@ -116,8 +136,9 @@ static int unpack(Lanes *s, const Work *w, int l, const Packed *a) {
   const Suspended *m = &a->m;
   Past *past = past_of(s, l);
   UNROLL for (int i = 0; i < N; i++) LANE(s->x[i], l) = a->x[i];
-  for (int k = 0; k < LAST_KIND; k++) LANE_I(s->kinds[k], l) = a->kinds[k];
+  for (int k = 0; k < LAST_KIND; k++) LANE_I(s->kinds[k], l) = m->kinds[k];
   for (int j = 0; j < STOPS; j++) LANE_I(s->above_stop[j], l) = -(int64_t)(a->side[j] > 0);
+  for (int j = 0; EVENTS && j < STOPS; j++) LANE_I(s->from_zero[j], l) = -(int64_t)(abs(a->side[j]) == 2);
   LANE(s->t, l) = m->t;
   LANE(s->since, l) = m->since;
   LANE(s->length, l) = m->length;
@@ -126,11 +147,13 @@ static int unpack(Lanes *s, const Work *w, int l, const Packed *a) {
   LANE_I(s->events, l) = m->events;
   LANE_I(s->entered, l) = m->steps - m->segment_steps;
   past->count = m->history;
+  past->seen = m->seen;
   past->hits = m->hits;
   past->kept = m->kept;
   await_sample(s, w, l);
   LANE_I(s->base, l) = m->itinerary;
   LANE_I(s->code, l) = 0;
+  if (SURFACES) prepare_mode(s, w, l, m->letter);
   return read_mode(s, l, m);
 }
 
@@ -144,9 +167,12 @@ static void keep_end(Lanes *s, Work *w, int l, int status) {
   UNROLL for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
   b->t[i] = LANE(s->t, l);
   b->itinerary[i] = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
-  int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
+  int32_t *kinds = b->kinds + i * b->kinds_width;
   UNROLL for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
-  kinds[LAST_KIND] = status == REACHED_END;
+#if EVENTS
+  for (int64_t k = LAST_KIND; k < b->kinds_width - 1; k++) kinds[k] = (int32_t)past_of(s, l)->kinds[k];
+#endif
+  kinds[b->kinds_width - 1] = status == REACHED_END;
 }
 
 INLINE void keep_event(const Lanes *s, Work *w, int kind, I which) {

@@ -10,6 +10,10 @@
 
 /* Lanes just loaded get their modes. */
 static void begin(Lanes *s, Work *w, I fresh) {
+#if EVENTS
+  begin_elsewhere(s, w, fresh);
+  return;
+#endif
   I unclear = begin_modes(s, fresh);
 #if STOPS > 0
   T stop[STOPS], gradient[STOPS][N];
@@ -78,11 +82,14 @@ SHORT_OR_CHECKED T step_size(const Lanes *s, const Options *o, Step *e, int mode
 
 /* Roots: polynomials.h --------------------------------------------------------------------------- */
 
-/* After a crossing the guard's first coefficient is zero, after a fold its first two. */
+/* After a crossing the guard's first coefficient is zero, after a fold its first two, after a jump that of its guard. */
 INLINE void drop_zeros(const Lanes *s, T *a, int j) {
+#if M == 1 || EVENTS
+  I by_one = NONE, by_two = NONE;
 #if M == 1
-  if (j) return;
-  I by_one = s->drop == 1, by_two = s->drop == 2;
+  if (j == 0) { by_one = s->drop == 1; by_two = s->drop == 2; }
+#endif
+  if (EVENTS && j >= FIRST_STOP) by_one = s->from_zero[j - FIRST_STOP];
   if (!any(by_one | by_two)) return;
   UNROLL for (int k = 0; k <= P; k++) {
     T c1 = k < P ? a[k < P ? k + 1 : P] : BC(0), c2 = k + 1 < P ? a[k + 1 < P ? k + 2 : P] : BC(0);
@@ -102,7 +109,7 @@ INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j
   if (M > 0 && j == 1 && !any(counts &= second)) return unclear;
   a[0] = g[0];
   UNROLL for (int k = 1; k <= P; k++) a[k] = g[k] * power[k];
-  if (j < FIRST_STOP) drop_zeros(s, a, j);
+  if (EVENTS || j < FIRST_STOP) drop_zeros(s, a, j);
   if (j >= FIRST_STOP) {
     int direction = DIRECTION[j < FIRST_STOP ? 0 : j - FIRST_STOP];
     flipped = a[0] < 0;
@@ -328,11 +335,17 @@ SHORT_OR_CHECKED I verify(const Lanes *s, Step *e, int mode, T *end) {
 
 /* Steps ------------------------------------------------------------------------------------------ */
 
+/* The guard of a stop where a step begins, or its rate if that is at its zero. */
+INLINE T value_of_stop(T g[SERIES][P + 1], int stop, const I *from_zero) {
+  const T *own = g[FIRST_STOP + stop];
+  return EVENTS ? SELECT(from_zero[stop], own[1], own[0]) : own[0];
+}
+
 /* Lanes where a stop was passed between two steps: rounding hid it from the first. */
 INLINE I passed_between(const Lanes *s, T g[SERIES][P + 1]) {
   I passed = {0};
   UNROLL for (int j = 0; j < STOPS; j++) {
-    T value = g[FIRST_STOP + j][0];
+    T value = value_of_stop(g, j, s->from_zero);
     I above = value > 0, was = s->above_stop[j];
     if (DIRECTION[j] <= 0) passed |= was & ~above;
     if (DIRECTION[j] >= 0) passed |= ~was & (I)(value >= 0);
@@ -360,7 +373,7 @@ INLINE void expand_step(Lanes *s, Work *w, Step *e, int mode) {
 #endif
   e->last = time_of(e, h) >= left;
   e->unclear = ~finite;
-#if RARE_CASES_HERE && !SET
+#if RARE_CASES_HERE && M == 1
   I after = (s->since == 0) & (s->events > BLOCKS);
   if (any(after)) e->unclear |= watch_limit(s, e->c, e->allowed, after);
 #endif
@@ -384,6 +397,10 @@ INLINE void keep_start(Lanes *s, Step *e) {
   e->t = s->t;
   e->since = s->since;
   e->length = s->length;
+  for (int j = 0; EVENTS && j < STOPS; j++) {
+    e->from_zero[j] = s->from_zero[j];
+    s->from_zero[j] = NONE;
+  }
   keep_mode(s, e);
 }
 
@@ -393,10 +410,26 @@ OUTLINED void undo_step(Lanes *s, const Step *e, I which) {
   s->t = SELECT(which, e->t, s->t);
   s->since = SELECT(which, e->since, s->since);
   s->length = SELECT(which, e->length, s->length);
+  for (int j = 0; EVENTS && j < STOPS; j++) s->from_zero[j] |= e->from_zero[j] & which;
   undo_mode(s, e, which);
 }
 
-/* Make the step; returns undecided lanes. */
+/* Lanes at an event, or at the end of the run, where another guard is small; values of all guards there. */
+OUTLINED I crowded_lanes(const Lanes *s, const Step *e, int mode, I which, T *value) {
+  I crowded = NONE;
+  for (int j = 0; j < SLOTS; j++) {
+    const T *g = e->g[j];
+    T size = ABS(g[P]);
+    value[j] = g[P];
+    for (int k = P - 1; k >= 0; k--) { value[j] = value[j] * e->dt + g[k]; size = size * e->dt + ABS(g[k]); }
+    I other = e->slot != j + 1;
+    if (M > 0 && j == 1) other &= has_second(s, mode);
+    crowded |= which & other & ~(I)(ABS(value[j]) > CROWDED * size);
+  }
+  return crowded;
+}
+
+/* Make the step; returns undecided lanes, and those at events that the driver makes. */
 INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   const Options *o = limits(w);
   I unclear = e->unclear | by_chance(s, w);
@@ -418,28 +451,37 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   s->steps += 1;
   unclear |= ~finite_lanes(s);
   unclear |= land(s, w, e, mode, s->live & ~unclear);
+  T at_event[S1];
+  I arrived = EVENTS ? e->slot > FIRST_STOP + CLEAR_STOPS : NONE;
+  I tested = EVENTS ? arrived | (e->last & (e->slot == 0)) : NONE; /* ticks are exact, phases are not */
+  if (any(tested)) unclear |= crowded_lanes(s, e, mode, tested, at_event);
   unclear &= s->live;
   if (any(unclear)) {
     undo_step(s, e, unclear);
     s->steps += unclear;
   }
-  I live = s->live & ~unclear, stopped = live & (e->slot > FIRST_STOP);
+  I live = s->live & ~unclear, stopped = live & (e->slot > FIRST_STOP) & ~arrived;
 #if RARE_CASES_HERE && !SET
   I due = live & (s->due < e->t + e->dt);
   if (any(due)) keep_samples(s, w, e, due);
 #endif
 #if STOPS > 0
   for (int j = 0; j < STOPS; j++)
-    s->above_stop[j] = (s->above_stop[j] & ~live) | ((I)(e->g[FIRST_STOP + j][0] > 0) & live);
+    s->above_stop[j] = (s->above_stop[j] & ~live) | ((I)(value_of_stop(e->g, j, e->from_zero) > 0) & live);
+  for (int j = 0; EVENTS && j < STOPS; j++) {
+    I other = live & arrived & (e->slot != FIRST_STOP + 1 + j);
+    s->above_stop[j] = (s->above_stop[j] & ~other) | ((I)(at_event[FIRST_STOP + j] > 0) & other);
+  }
   if (any(stopped)) count(s, w, STOP, stopped);
 #endif
+  if (EVENTS) s->arrived = live & arrived & (e->slot - FIRST_STOP);
   s->t = SELECT(live & e->last, BC(o->t_end), s->t);
   finish_lanes(s, w, stopped, STOPPED);
   finish_lanes(s, w, e->last & live & (e->slot == 0), REACHED_END);
 #if SET
   if (any(e->gone & live)) send(s, w, e->gone & live, mode == AWAY ? NEAR_SET : mode == ON ? GOING : AWAY);
 #endif
-  return unclear;
+  return EVENTS ? unclear | s->arrived != 0 : unclear;
 }
 
 #if SET

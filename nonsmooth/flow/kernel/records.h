@@ -1,8 +1,18 @@
 /* Data common to all kinds of lanes on a CPU: itineraries as nodes of a tree, starts that are not finite, the last events. */
 #define MEMORY 256
 
-/* Data of a trajectory for the driver: the last events, up to a row of a log; halved steps, up to a step; hits of a section, samples. */
-typedef struct { Recent event[HISTORY]; int64_t count, row, steps, hits, kept; double shortened; } Past;
+/* Data of a trajectory for the driver: the last events, up to a row of a log, and their number when it ended; halved steps, up to a step; hits of a section,
+ * samples; what only the driver changes. */
+typedef struct {
+  Recent event[HISTORY];
+  int64_t count, seen, row, steps, hits, kept;
+  double shortened;
+#if EVENTS
+  int64_t kinds[KINDS];
+  int8_t letter[SURFACES + 1];
+  double motion[MOTION], jumped[HISTORY * N];
+#endif
+} Past;
 
 /* Whether events may accumulate: intervals shrink like a geometric series, in blocks of some length, or are zero. */
 static int may_accumulate(const Past *p) {
@@ -45,7 +55,7 @@ static void refuse(const Batch *b, int64_t i) {
   b->t[i] = b->t0;
   b->status[i] = NOT_FINITE;
   b->itinerary[i] = 0;
-  memset(b->kinds + i * SIMPLE_KINDS, 0, LAST_KIND * sizeof(int32_t));
-  b->kinds[i * SIMPLE_KINDS + LAST_KIND] = 1;
+  memset(b->kinds + i * b->kinds_width, 0, (b->kinds_width - 1) * sizeof(int32_t));
+  b->kinds[(i + 1) * b->kinds_width - 1] = 1;
 }
 

@@ -1,19 +1,23 @@
-/* W trajectories together, for systems of at most one surface, or of one set of codimension two or three, without resets.
+/* W trajectories together, for systems of surfaces, or of one set of codimension two or three.
  *
  * Each lane holds one trajectory and is refilled when it ends. Common operations run for all lanes at once: expansion,
- * step size, roots, projection, clear decisions. The driver makes steps with rare cases (tangency, repelling sliding, ties,
- * accumulating events, limits, points that are not finite). No lane's result depends on its neighbours.
+ * step size, roots, projection, clear decisions at one surface or set. The driver makes steps with rare cases (tangency,
+ * repelling sliding, ties, accumulating events, limits, points that are not finite). With EVENTS it makes all events of
+ * resets, impacts and conditions, and those at surfaces where there are several, at the states to which lanes integrate:
+ * the guards end a step as those of stops do. No lane's result depends on its neighbours.
  *
  * Modes of a surface are masks: one jet expands them all. The modes off a set, on it and leaving it have a jet and a pool of
  * lanes each; a fourth pool is for states near it. A trajectory waits until all lanes of a pool are filled (fewer run only
  * when no start is left).
  *
- * The generated text defines, besides what common.h needs: N states with time, ND without, M surfaces,
- * TIMED whether time is a state, W, GROUPS, SLOTS guards (surface or exit to +, exit to -, stops; of a set its guard,
- * friction's limit, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], AFFINE_MODES[3] (above, below, sliding; or off the
- * set, on it, leaving it), LINEAR whether all are, CANCELLED, CURVED, OWN_STATE[M], states that a set's functions are (NAMED:
- * whether they are), prepare(p, q), surface_values, stop_values; ROW[ROWS] of the field and SLOT[GUARDS] of the series
- * are not affine; and the functions of programs.py or set_program.py in nonsmooth/model/printing.
+ * The generated text defines, besides what common.h needs: N states with time, ND without, M surfaces, TIMED whether
+ * time is a state, W, GROUPS, EVENTS (as above), CLEAR_STOPS stops without conditions, the first of STOPS guards of
+ * events, SURFACES at which the driver decides, then CONTACTS gaps, the last of them; PARAMETERS; MOTION (size of the driver's data), SLOTS guards (surface or exit to +, exit to -,
+ * stops; of a set its guard, friction's limit, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], AFFINE_MODES[3] (above,
+ * below, sliding; or off the set, on it, leaving it), LINEAR whether all are, CANCELLED, CURVED, OWN_STATE[M], states
+ * that a set's functions are (NAMED: whether they are), prepare(p, q), surface_values, stop_values; ROW[ROWS] of the
+ * field and SLOT[GUARDS] of the series are not affine; and the functions of programs.py or set_program.py in
+ * nonsmooth/model/printing.
  */
 #define SET (M > 1)
 #define S1 (SLOTS > 0 ? SLOTS : 1)
@@ -22,7 +26,7 @@
 #define FIRST_STOP (SLOTS - STOPS)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 2 * MOST_MODES)
-#define LETTERS M1
+#define LETTERS (M + SURFACES + CONTACTS > 0 ? M + SURFACES + CONTACTS : 1)
 #if SET
 #define LAST_TERM(mode) ((mode) == GOING ? 1.0 : 2.0) /* size of the last two terms in units of the tolerance */
 #define BEFORE_LAST(mode) ((mode) == GOING ? 1.0 : 10.0)
@@ -66,6 +70,8 @@ typedef struct {
   I index, base;
   OWN(T, q, NQ); /* prepared from the parameters */
   double size; /* of states at which both tolerances are equal */
+  I from_zero[STOPS + 1]; /* with EVENTS: whether the step begins at a zero of the guard of a stop */
+  I arrived; /* with EVENTS: number of the guard whose event is due, or 0 */
 #if RARE_CASES_HERE
   Past *past; /* of each lane, or of each ``own`` */
   Log *log; /* of a surface's events */
@@ -95,6 +101,7 @@ typedef struct {
 #else
   I drop, slides, above;
 #endif
+  I from_zero[STOPS + 1];
   Guards v;
 } Step;
 

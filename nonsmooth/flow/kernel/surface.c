@@ -211,6 +211,10 @@ INLINE void undo_mode(Lanes *s, const Step *e, I which) {
 static void write_mode(const Lanes *s, int l, Suspended *m) {
   recall(s, l);
   m->letter[0] = LANE_I(s->slides, l) ? 0 : LANE_I(s->above, l) ? 1 : -1;
+  for (int k = M; k < LETTERS; k++) m->letter[k] = 1; /* an open contact */
+#if EVENTS
+  memcpy(m->letter + M, past_of(s, l)->letter, SURFACES);
+#endif
   m->drop = (int32_t)LANE_I(s->drop, l);
 }
 
@@ -221,6 +225,9 @@ static int read_mode(Lanes *s, int l, const Suspended *m) {
   LANE_I(s->above, l) = -(int64_t)(m->letter[0] > 0);
   LANE(s->lambda, l) = m->letter[0] > 0 ? 1 : -1;
   LANE_I(s->drop, l) = m->drop;
+#if EVENTS
+  memcpy(past_of(s, l)->letter, m->letter + M, SURFACES);
+#endif
   return AWAY;
 }
 #endif

@@ -227,16 +227,17 @@ def boundary_equilibrium_at(
         if where.element and where.element.kind == "contact":
             return _of_a_contact(x, gradient, push, derivatives[0], margin)
         return boundary_equilibrium_of(x, 0, gradient, push, derivatives[0], margin)
-    kind = where.switching.kind
-    if kind == "continuous":
-        return _continuous(x, derivatives, margin)
-    if kind == "velocity continuous":
+    switching = where.switching
+    if switching.slides:
+        return boundary_equilibrium_of(x, k, gradient, other, derivatives[k], margin)
+    if switching.force_jumps:
         return _with_a_jumping_force(x, k, gradient, other, derivatives[k], margin)
-    return boundary_equilibrium_of(x, k, gradient, other, derivatives[k], margin)
+    return _of_both_fields(x, switching.kind, derivatives, margin)
 
 
-def _continuous(x: Array, derivatives: Array, margin: float) -> BoundaryEquilibrium:
-    """The equilibrium of both fields, which differ by a rank one."""
+def _of_both_fields(x: Array, kind: str, derivatives: Array, margin: float) -> BoundaryEquilibrium:
+    """The equilibrium of both fields, which differ by a rank one, or by that and a function of the speed of h."""
+    # a force that vanishes with the speed changes neither the sign of a determinant nor the flow in (h, L) of the plane
     margins, numbers = dict[str, float](), dict[str, float]()
     determinants = [float(np.linalg.det(a)) for a in derivatives]
     for i, (a, det) in enumerate(zip(derivatives, determinants, strict=True), 1):
@@ -251,9 +252,7 @@ def _continuous(x: Array, derivatives: Array, margin: float) -> BoundaryEquilibr
     label = unfolding if min(margins.values()) >= margin else "degenerate"
     own, other = (np.linalg.eigvals(a) for a in derivatives)
     values = ReadOnly(numbers), ReadOnly(margins)
-    return BoundaryEquilibrium(
-        x, "", label, unfolding, False, own, *values, "continuous", other, cycle
-    )
+    return BoundaryEquilibrium(x, "", label, unfolding, False, own, *values, kind, other, cycle)
 
 
 def _persistence(c: Array, a: Array, push: Array) -> tuple[dict[str, float], dict[str, float], str]:

@@ -10,6 +10,8 @@ import casadi as ca
 
 from ..cache import Content
 from ..errors import DefinitionError
+from ..numbering import UNWATCHED
+from ..reading import listed
 from .events.conditions import Rule, passages
 from .parse_definition import read_function
 from .system import FilippovSystem
@@ -68,6 +70,41 @@ def with_section(system: FilippovSystem, function: Any, direction: int) -> Filip
         )
 
     return system.cached((SECTION, Content([known], h), direction), build)
+
+
+def with_stops(system: FilippovSystem, surfaces: bool) -> FilippovSystem:
+    """Return the system that stops at all guards of its events that are located, then at gaps.
+
+    With ``surfaces`` it stops at these before gaps too; their multipliers are the last parameters.
+    """
+    d, none = system.definition, ca.SX(0, 1)
+    found = [(a, way) for a, way in enumerate(d.located) if way != UNWATCHED]
+    h, names = (d.surfaces, listed(d.multipliers)) if surfaces else (none, [])
+    ways = [*[way for _, way in found], *[0] * h.numel(), *[-1] * len(d.impacts)]
+
+    def build() -> FilippovSystem:
+        parts: dict[str, Any] = dict.fromkeys(
+            ("reactions", "gaps", "restitutions", "periods"), none
+        )
+        parts |= dict.fromkeys(("resets", "impacts", "clocks", "discrete"), ())
+        if surfaces:
+            parts |= dict.fromkeys(("multipliers", "surfaces", "hysteresis"), none)
+            parts |= dict.fromkeys(("sizes", "laws", "layer_widths"), ())
+            parts["parameters"] = ca.vertcat(d.parameters, d.multipliers)
+        return _changed(
+            system,
+            field=ca.substitute(d.field, d.reactions, 0) if d.impacts else d.field,
+            defaults={**d.defaults, **{str(name): None for name in names}},
+            guards=ca.vertcat(*[d.guards[a] for a, _ in found], h, d.gaps),
+            maps=d.maps[:, :0],
+            whens=ca.SX.ones(len(ways), 1),
+            priorities=ca.SX.zeros(len(ways), 1),
+            stops=tuple((f"guard {k}", way) for k, way in enumerate(ways)),
+            rules=tuple(Rule(passages(k, way)) for k, way in enumerate(ways)),
+            **parts,
+        )
+
+    return system.cached(("with stops", surfaces), build)
 
 
 def with_input(system: FilippovSystem, output: ca.SX) -> FilippovSystem:

@@ -56,6 +56,11 @@ class Switching:
         """Whether there can be sliding, folds and two-folds: also where the class is undecided."""
         return self.kind in ("generic", "undecided")
 
+    @property
+    def force_jumps(self) -> bool:
+        """Whether the fields differ where an orbit touches the surface and nothing slides, as by a preload."""
+        return self.kind == "velocity continuous" and self.order == 0
+
     def __str__(self) -> str:
         means = "" if self.slides else "; nothing slides here"
         return f"{self.name}{means} (by {self.decided_by})"

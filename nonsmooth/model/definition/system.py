@@ -394,7 +394,8 @@ class FilippovSystem:
         own = self.definition
         parts = (own.extended_states, own.parameters, own.multipliers, own.reactions)
         known = [one for part in parts for one in listed(part)]
-        single = len(self.entries) == 1 and not (self.sets or self.hidden or self.complementarity)
+        others = self.sets or self.hidden or self.complementarity or self.joints
+        single = len(self.entries) == 1 and not others
         fields = {f"field {where}": self.field(mode) for mode, where in _SIDES} if single else {}
         for where, field in (fields or {"field": self.definition.field}).items():
             pairs = list(zip(self.state_names, listed(field), strict=False))[:_EQUATIONS_SHOWN]

@@ -39,7 +39,7 @@ class PlainField:
     #: Columns of derivatives, those by the start first.
     by_start = columns = 0
 
-    @property
+    @cached_property
     def entries(self) -> int:
         """Number of states."""
         return int(self.states.numel())
@@ -124,9 +124,13 @@ class VariationalField(PlainField):
 
     def start(self, x: Array) -> Array:
         """States and columns at the start of a leg without multipliers that are states, as one row."""
-        z = np.eye(1 + self.columns, self.entries, -1)
+        z = self._unit.copy()
         z[0] = x
-        return z.ravel()
+        return z.reshape(-1)
+
+    @cached_property
+    def _unit(self) -> Array:
+        return np.eye(1 + self.columns, self.entries, -1)
 
     def matrix(self, z: Array) -> Array:
         """The matrix (x, X, P) of states and columns, (N + k, 1 + N + q)."""

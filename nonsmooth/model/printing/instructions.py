@@ -269,17 +269,20 @@ def derived_series_of(coupled: Coupled) -> tuple[Series, Series, Entries]:
     program = _rules_of(inputs, coupled.awake(outputs))
     of_sets, time = {n + i for i in coupled.system.set_of}, _time_of(coupled)
     held = {n + i for i, own in enumerate(coupled.scaled) if own} - of_sets
-    target, rows = range(len(outputs) - 1), program.rows[-1]
-    every = _series(
-        program, target, lambda k: k not in held, lambda k: n <= k < size, time, more=rows
-    )
     follow = lambda k: k in of_sets
-    own = [
-        j
-        for j, k in zip(rows, entries.column.tolist(), strict=True)
-        if not n <= k < size or follow(k)
-    ]
-    free = _series(program, target[:-1], lambda k: k < n or follow(k), follow, time, more=own)
+    rows = list(zip(program.rows[-1], entries.row.tolist(), entries.column.tolist(), strict=True))
+    layer = n + coupled.count
+
+    def derived(last: int, own: Sequence[tuple[int, int, int]]) -> tuple[list[int], list[int]]:
+        """Rules of derivatives along a step, and of those of surfaces, gaps and factors, which are read at points."""
+        return [j for j, i, _ in own if i < last], [j for j, i, _ in own if i >= layer]
+
+    moves, target = (lambda k: k not in held), range(len(outputs) - 1)
+    every = _series(program, target, moves, lambda k: n <= k < size, time, *derived(layer, rows))
+    rows = [own for own in rows if not n <= own[2] < size or follow(own[2])]
+    some, last = ((0, 1, 2, 4), layer) if of_sets else ((0, 2, 4), n)
+    moves = lambda k: k < n or follow(k)
+    free = _series(program, some, moves, follow, time, *derived(last, rows))
     return every, free, entries
 
 
@@ -290,8 +293,10 @@ def _series(
     unknown: Callable[[int], bool],
     time: int | None = None,
     more: Sequence[int] = (),
+    valued: Sequence[int] = (),
 ) -> Series:
-    """Rules as the interpreter reads them, with ``more`` whose later coefficients are read only if they move."""
+    """Rules as the interpreter reads them, with ``more`` whose later coefficients are read only if they move, and some
+    that are ``valued`` only."""
     rules, rows = program.rules, program.rows
     still = [_is_still(rule) for rule in rules]
     change = [not own for own in still]
@@ -302,11 +307,12 @@ def _series(
     is_time = [rule.source == (0, time) for rule in rules]
     arguments = [rule.args for rule in rules]
     roots = [j for k in target for j in rows[k]]
-    found = reached(arguments, change, [*roots, *more])
+    found = reached(arguments, change, [*roots, *more, *valued])
+    series = reached(arguments, change, [*roots, *more])
     # Constant nodes have later coefficients, zeros, only where they are read.
-    read = [*roots, *(a for j in found if rules[j].rule == "atan2" for a in rules[j].args)]
+    read = [*roots, *(a for j in series if rules[j].rule == "atan2" for a in rules[j].args)]
     zeros = reached(arguments, change, [j for j in read if not moving[j]])
-    needed = {*zeros, *(j for j in found if moving[j])}
+    needed = {*zeros, *(j for j in series if moving[j])}
     term = _terms(rules, moving)
     rule, second = _written(rules, term["kind"], moving, _lines(rules, still, is_time), needed)
     rule["paired"] = _paired([rule.rule for rule in rules], arguments, is_time)
@@ -318,7 +324,7 @@ def _series(
         set() if _are_knotted(rules, some, second) else some for some in (before, after)
     )
     loop = [j for j in later if j not in before and j not in after]
-    values = reached([_valued(rule) for rule in rules], change, [*roots, *more])
+    values = reached([_valued(rule) for rule in rules], change, [*roots, *more, *valued])
     lists = {
         "still": [j for j, own in enumerate(still) if own],
         "values": [j for j in values if not is_input[j]],

@@ -156,7 +156,10 @@ class _Writer(OfInstructions):
         every = [ca.vertcat(of.field, of.layer, of.factors)]
         every = simplified([of.moving, p], every, [True, False])
         beyond = bent(every[0], ca.vertcat(x, unknowns), system.definition.time)
-        rows, others = [i for i in range(self.n) if beyond[i]], ca.vertcat(p, of.moving[self.n :])
+        rows, others = (
+            [i for i in range(self.n) if beyond[i]],
+            ca.vertcat(p, *ca.vertsplit(of.moving)[self.n :]),
+        )
         for i in reversed(rows):
             rest = [j for j in rows if j != i]
             if in_span([of.field[i]], [of.field[j] for j in rest], x, others)[0]:

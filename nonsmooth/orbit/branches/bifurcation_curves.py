@@ -30,6 +30,7 @@ from .branch import DIVIDE, BranchCurve, BranchEnd, BranchEvent, check_bounds, e
 from .codimension_two import CodimensionTwo, leaving, special_point
 from .event_curves import VIRTUAL, EventCurve
 from .homoclinic_curves import ConnectionCurve, event_of
+from .orbit_branches import OrbitCurve
 
 #: Ends of arcs that are no events.
 _WHOLE = ("bound", "closed", "interrupted", "points", VIRTUAL)
@@ -39,6 +40,9 @@ _DIVISIBLE = (DIVIDE, "lost", "step too small")
 
 #: Points of codimension two closer than this, relative to their sizes, are one.
 _MERGED = 1e-6
+
+#: Relative duration of a leg that has vanished.
+_NO_LEG = 1e-7
 
 
 #: The equations of a point of a curve, and their unknowns.
@@ -227,10 +231,16 @@ def _follow(departure: Departure, **options: Any) -> list[Piece]:
     ):
         every.append((cast("EventCurve | ConnectionCurve", at.curve), arc))
     curve, arc = every[-1]
-    if arc.end in _DIVISIBLE and isinstance(curve, EventCurve):
-        arc.end = curve.comes_to(arc.points[-1].u) or arc.end
-        if arc.end == "Hopf":
-            arc.zeros.append(Zero(arc.end, arc.points[-1], 0.0))
+    located = bool(arc.zeros) and arc.zeros[-1].name == arc.end
+    if isinstance(curve, EventCurve) and (located or arc.end in _DIVISIBLE):
+        limit = curve.comes_to(arc.points[-1].u)
+        if limit == "Hopf":
+            arc.zeros[:] = [
+                *arc.zeros[: len(arc.zeros) - located],
+                Zero(limit, arc.points[-1], 0.0),
+            ]
+        if limit == "Hopf" or not located:
+            arc.end = limit or arc.end
             _drop_singular(arc)
     return every
 
@@ -307,8 +317,14 @@ def _drop_singular(arc: Arc) -> None:
 
 
 def _occurs(curve: EventCurve | ConnectionCurve, zero: Zero) -> bool:
-    u = zero.point.u
-    return isinstance(curve, ConnectionCurve) or curve.base.occurs(zero.name, curve.without(u))
+    if isinstance(curve, ConnectionCurve):
+        return True
+    u = curve.without(zero.point.u)
+    if zero.name == "fold" and isinstance(curve.base, OrbitCurve):
+        durations = curve.problem.split(u[: curve.problem.size])[1]
+        if durations.min() < _NO_LEG * durations.sum():  # the equations are singular
+            return False
+    return curve.base.occurs(zero.name, u)
 
 
 def _merged(points: Sequence[CodimensionTwo]) -> list[CodimensionTwo]:

@@ -7,7 +7,7 @@ event the next one begins with the solutions beyond it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
@@ -120,6 +120,8 @@ class BranchEvent(Tabular):
     curve, point, test
         The equations, the point on their curve and the test that vanishes there, from which
         ``continue_bifurcation`` and branch switching start.
+    family : tuple
+        Where orbits shrink or become infinitely long: those of the branch, from which ``continue_orbit`` starts.
     """
 
     kind: str
@@ -130,6 +132,7 @@ class BranchEvent(Tabular):
     curve: Any = None
     point: Point | None = None
     test: str = ""
+    family: tuple[Any, ...] = ()
 
     @property
     def orbit(self) -> Any:
@@ -541,6 +544,9 @@ class _Half:
 #: Events to which the period diverges.
 _DIVERGES = ("homoclinic", "infinite period at a boundary node")
 
+#: At these the orbits of a branch shrink to a point, or one of them is infinitely long.
+_FAMILY_ENDS = ("Hopf", "boundary equilibrium", "two-fold", "cycle from a two-fold", _DIVERGES[1])
+
 #: Ends of an arc behind which no other itinerary follows.
 _WHOLE = ("bound", "closed", "interrupted", "points")
 
@@ -685,11 +691,14 @@ def end_of(arc: Arc) -> BranchEnd:
 
 def _joined(name: str, backward: _Half, forward: _Half) -> Branch:
     nodes = [*reversed(backward.nodes), *forward.nodes[1 if backward.nodes else 0 :]]
+    solutions = tuple(curve.describe(point.u) for curve, point in nodes)
     events = [*reversed(backward.events), *forward.events]
+    if hasattr(solutions[0], "period"):
+        events = [replace(e, family=solutions) if e.kind in _FAMILY_ENDS else e for e in events]
     return Branch(
         parameter=name,
         values=np.array([curve.value(point.u) for curve, point in nodes]),
-        solutions=tuple(curve.describe(point.u) for curve, point in nodes),
+        solutions=solutions,
         events=tuple(events),
         ends=(backward.end, forward.end),
         reasons=(_sentence(name, backward), _sentence(name, forward)),

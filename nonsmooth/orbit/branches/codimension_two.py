@@ -17,16 +17,20 @@ from typing import Any
 import numpy as np
 
 from ...flow.fixed import first_terms
+from ...local.point.surface_point import SIDES, surface_at
 from ...model import Array, DegenerateError, Guard, NonsmoothError
 from ...model.derivatives.variational import guarded_field, states_at
 from ...solvers.continuation import Departure, Point, Zero
 from ...solvers.newton import Equations, Secant, converge
+from ..periodic.orbit import named
 from ..runs.legs import integrate_leg, surface_of
 from .branch import BranchCurve
 from .conditions import Condition, condition_row, is_smooth, minima
+from .equilibrium_branches import EquilibriumCurve
 from .event_curves import AT_END, AT_START, CUSP, HIGHER, SECOND, TWO_FOLD, EventCurve
 from .homoclinic_curves import ConnectionCurve
 from .itinerary_changes import (
+    SOFT,
     ChangedItinerary,
     changed_itinerary,
     departures,
@@ -47,6 +51,12 @@ _NAMES = {
 #: Of a test that is no event of its own: the kind of a point is named by both.
 _BESIDE = (TWO_FOLD, SECOND, HIGHER, CUSP, AT_START, AT_END)
 _CONTACT = " with contact"
+
+#: Events at which multipliers are continuous.
+_CONTINUOUS = ("crossing-sliding", "switching-sliding", "adding-sliding", SOFT)
+
+#: Duration of a leg that vanishes where others are tangent, relative to the orbit.
+_VANISHES = 1e-3
 
 #: Distance of a point from its guess, and of the states of one event in two itineraries, in scaled unknowns.
 _NEAR, _SAME = 0.05, 1e-4
@@ -126,13 +136,30 @@ def special_point(curve: EventCurve | ConnectionCurve, zero: Zero, event: str) -
     values, touched = u[-2:], getattr(curve, "condition", None)
     if zero.name == "Hopf" and isinstance(base, OrbitCurve) and touched is not None:
         shrunk = base.hopf(u, touched.guard)  # the equilibrium on the surface
-        values = values if shrunk is None else shrunk[1]
+        if shrunk is not None and meeting is not None:
+            values, meeting = (
+                shrunk[1],
+                _at_equilibrium(meeting, touched.guard.element, *shrunk[:2]),
+            )
     return CodimensionTwo(kind, values, solution, meeting)
+
+
+def _at_equilibrium(at: Meeting, surface: int, x: Array, values: Array) -> Meeting:
+    """The same point as one of the curves of the equilibrium to which the orbit has shrunk."""
+    base = at.base
+    assert isinstance(base, OrbitCurve)
+    mode, p = base.problem.legs[0].mode, base.p.copy()
+    p[list(base.free)] = values
+    sliding = None if base.system.surface_count == 1 else mode[:surface] + "s" + mode[surface + 1 :]
+    where, _ = surface_at(base.system, x, named(base.system, p), 0.0, surface, sliding)
+    scale, side = np.append(base.scale[: x.size], base.widths), SIDES["+-".index(mode[surface])]
+    curve = EquilibriumCurve(where, base.free, scale, side)
+    return Meeting(curve, np.append(x, values), at.came, "Hopf")
 
 
 def _kind(curve: EventCurve | ConnectionCurve, zero: Zero, event: str) -> str:
     u = zero.point.u if isinstance(curve, ConnectionCurve) else curve.without(zero.point.u)
-    own, other = (curve.base.named(name, u) for name in (curve.name, zero.name))
+    own, other = (curve.base.named(name, u) for name in (curve.name, _cause(curve, zero)))
     kind = _NAMES.get(frozenset({own, other}), other)
     if zero.name in _BESIDE or zero.name.endswith(_CONTACT):
         kind = f"{event} with {other}"
@@ -145,15 +172,29 @@ def _kind(curve: EventCurve | ConnectionCurve, zero: Zero, event: str) -> str:
 # What meets ---------------------------------------------------------------------------------------
 
 
+def _cause(curve: EventCurve | ConnectionCurve, zero: Zero) -> str:
+    """The test that names a zero: beside a leg that vanishes the others end tangentially too."""
+    at = getattr(curve.base, "known", {}).get(zero.name)
+    if at is None or at.what != "transversality" or not isinstance(curve, EventCurve):
+        return zero.name
+    durations = curve.problem.split(curve.without(zero.point.u)[: curve.problem.size])[1]
+    beside = [(at.leg + k) % len(durations) for k in (1, -1)]
+    shortest = min(beside, key=lambda k: float(durations[k]))
+    vanishes = durations[shortest] < _VANISHES * durations.sum()
+    return Condition("duration", shortest).name if vanishes else zero.name
+
+
 def _meeting(curve: EventCurve, zero: Zero) -> Meeting:
     u, base = curve.without(zero.point.u), curve.base
     touch = float(zero.point.u[curve.columns]) if curve.touches else None
-    plain = Meeting(base, u, curve, zero.name, touch)
+    plain = Meeting(base, u, curve, _cause(curve, zero), touch)
+    if isinstance(base, OrbitCurve) and curve.condition is None and plain.other in base.known:
+        return _on_other_curve(plain)
     if isinstance(base, OrbitCurve) and curve.condition is not None:
         found = _degenerate(curve, base, u, {zero.name, *zero.together})
         if found is not None:
             return found
-        if zero.name in base.known:
+        if plain.other in base.known:
             return _with_fewer_legs(plain)
         if zero.name == SECOND:
             first = replace(curve.condition, t=touch)
@@ -204,6 +245,38 @@ def _with_fewer_legs(at: Meeting) -> Meeting:
         return at
     v = located * regular.scale
     return replace(at, base=shorter, u=regular.without(v), at=(own, second))
+
+
+def _on_other_curve(at: Meeting) -> Meeting:
+    """The same point where an orbit that bifurcates smoothly loses legs: on the curve of orbits without them."""
+    base, came = at.base, at.came
+    assert isinstance(base, OrbitCurve)
+    found = _changed(base, base.known[at.other], at.u)
+    if found is None or not found.test:
+        return at
+    shorter, start = _with(base, at.u, found)
+    if not _known(shorter, start, found.test):
+        return at
+    regular = EventCurve(shorter, found.test, start, whole=False)
+    jumps = (
+        shorter.named(found.test, start) not in _CONTINUOUS
+    )  # the multipliers, as a leg is added
+
+    def test(v: Array) -> Array:
+        tests = regular.tests(Point(v * regular.scale, np.zeros(v.size)))
+        return np.array([tests.get(came.name + _CONTACT * jumps, np.nan)])
+
+    more = Secant(test, 1.0)
+
+    def equations(v: Array) -> tuple[Array, Array]:
+        (values, jacobian), (end, row) = regular.scaled(v), more(v)
+        return np.append(values, end), np.vstack([jacobian, row])
+
+    located = _solved(equations, regular.start / regular.scale)
+    if located is None:
+        return at
+    u = regular.without(located * regular.scale)
+    return replace(at, base=shorter, u=u, other=found.test)
 
 
 def _solved(equations: Equations, guess: Array) -> Array | None:
@@ -362,8 +435,10 @@ def _candidates(meeting: Meeting, base: BranchCurve, u: Array) -> Iterator[Candi
         assert came.condition is not None
         yield from _with_legs(base, u, came.condition, other.removesuffix(_CONTACT))
     elif not isinstance(base, OrbitCurve) or is_smooth(other):
-        if other == "fold" or other in base.tests(Point(u, np.zeros(u.size))):
-            yield _from(base, other, u)
+        of_orbits = isinstance(came.base, OrbitCurve) and not isinstance(base, OrbitCurve)
+        for name in (other, "boundary equilibrium") if of_orbits else (other,):
+            if name == "fold" or name in base.tests(Point(u, np.zeros(u.size))):
+                yield _from(base, name, u)
     elif isinstance(meeting.at, tuple):
         yield from _two_events(base, u, *meeting.at)
     elif _known(base, u, other):

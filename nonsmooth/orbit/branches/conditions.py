@@ -155,6 +155,8 @@ class _Tests:
         own = [field.motion.guards for field in self.guards.fields]
         self.durations = [Condition("duration", i) for i in range(len(legs))]
         self.starts = [_starting(system, i, leg, legs[i - 1]) for i, leg in enumerate(legs)]
+        crossed = [system.definition.hidden and leg.kind == "crossing" for leg in legs]
+        self.hidden = [crossed[i - 1] for i in range(len(legs))]
         self.ends = [_ending(i, leg, own[i]) for i, leg in enumerate(legs)]
         self.inside = [[(Condition("interior", i, g), g) for g in own[i]] for i in range(len(legs))]
 
@@ -167,7 +169,9 @@ class _Tests:
             found.append((self.durations[i], durations[i]))
             for k, order, condition in self.starts[i]:
                 rate, last = _at_start(first[k], order, condition), self.legs[i - 1]
-                rate = _through(self.system, last, self.legs[i], condition, rate, at.starts[i], p)
+                if self.hidden[i]:
+                    given = condition, rate, at.starts[i], p
+                    rate = _through(self.system, last, self.legs[i], *given)
                 found.append((condition, rate))
             own, sign, others = self.ends[i]
             if own is not None:
@@ -299,11 +303,11 @@ def _interior(
 ) -> list[tuple[Condition, float]]:
     """Smallest minimum of each guard inside a leg, where something happens at its zero."""
     least: dict[int, float] = {}
-    for row in rows:
-        number, _, value, bend = row[:4].tolist()
+    turns = rows[rows[:, 3] != 0.0]
+    for row, (number, _, value, bend) in zip(turns, turns[:, :4].tolist(), strict=True):
         k = int(number)
         guard = guards[k][1]
-        if bend and (bend > 0.0 or guard.kind in CONDITIONS) and is_active(field, row, p):
+        if (bend > 0.0 or guard.kind in CONDITIONS) and is_active(field, row, p):
             value = _signed(guard, value)
             least[k] = min(value, least.get(k, np.inf))
     return [(guards[k][0], value) for k, value in least.items()]

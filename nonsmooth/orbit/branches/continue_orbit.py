@@ -155,6 +155,8 @@ def continue_orbit(
         raise DefinitionError(
             f"orbit={orbit!r} is no PeriodicOrbit or event of a branch. Find one with periodic_orbit."
         )
+    if isinstance(orbit, BranchEvent) and orbit.family:
+        orbit = _of_family(orbit, parameter, bounds)
     system = orbit.curve.system if isinstance(orbit, BranchEvent) else orbit.system
     more = [parameter_index(system, name) for name in ([free] if isinstance(free, str) else free)]
     of_user = read_rows(system, events, constraints, cost, more)
@@ -192,6 +194,16 @@ def continue_orbit(
         progress=progress,
         away=away,
     )
+
+
+def _of_family(event: BranchEvent, parameter: str, bounds: Sequence[float]) -> PeriodicOrbit:
+    """An orbit within the bounds, away from the end of its family."""
+    system = event.family[0].system
+    name = system.parameter_names[parameter_index(system, parameter)]
+    low, high = check_bounds(bounds, event.parameter, name)
+    inside = [one for one in event.family if low <= one.parameters[name] <= high]
+    found: PeriodicOrbit = inside[len(inside) // 2] if inside else event.solution
+    return found
 
 
 def _constrained(curve: OrbitCurve, start: Array) -> Array:
@@ -232,7 +244,9 @@ def first_orbits(event: BranchEvent, free: tuple[int, ...], width: float) -> Beg
         curve.scale[: count * n] *= width / moved  # the cycle grows with the parameter
         return curve, rows
     if isinstance(solution, Connection):
-        return curve_of(_beside_loop(solution, free, width), free)
+        curve, rows = curve_of(_beside_loop(solution, free, width), free)
+        curve.longest /= _LONG  # it is long already
+        return curve, rows
     raise DefinitionError(
         f"orbit={event!r} is no event from which periodic orbits start: one of orbits, a Hopf point, a boundary "
         "equilibrium or a two-fold of equilibria, or a homoclinic orbit. continue_bifurcation follows it."

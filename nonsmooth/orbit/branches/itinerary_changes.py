@@ -155,7 +155,7 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     if test.what == "end":
         return "two-fold"
     if test.what == "transversality":
-        if at_two_fold(problem.system, leg, at.flows.end[i], p):
+        if at_two_fold(problem.system, leg, at.flows.end[i], p, at.starts):
             return "two-fold"
         return {
             "impact": "impact grazing",
@@ -195,7 +195,11 @@ def _grazed(
         )[0]
         y = integrate_leg(problem.system, leg, at.starts[test.leg], t, p).end
         ends = replace(leg, kind="exit", element=guard.element, side=guard.side)
-        return "two-fold" if at_two_fold(problem.system, ends, y, p, _BOTH) else "adding-sliding"
+        return (
+            "two-fold"
+            if at_two_fold(problem.system, ends, y, p, at.starts, _BOTH)
+            else "adding-sliding"
+        )
     if is_condition(problem, guard):
         return _touch(
             problem,
@@ -246,7 +250,7 @@ def soft_switch(problem: BoundaryProblem, leg: Leg, surface: int) -> str:
     found = problem.system.switching(surface, mode=mode)
     if found.slides:
         return ""
-    return FORCE if found.kind == "velocity continuous" and found.order == 0 else SOFT
+    return FORCE if found.force_jumps else SOFT
 
 
 def changed_itinerary(
@@ -298,8 +302,8 @@ def _longer(
         times = [duration, *[0.0] * (len(legs) - 1)]
         shift = np.zeros(problem.dimension)
         shift[-1] = problem.advance(p)[0] if problem.forcing is not None else 0.0
-        later = [state + shift for state in states[: len(legs) - 1]]
-        v = whole.pack(np.array([states[-1], *later]), np.array(times))
+        begin = np.linalg.inv(problem.wrap) @ (states[-1] - shift)
+        v = whole.pack(np.array([begin, *states[: len(legs) - 1]]), np.array(times))
         return ChangedItinerary(whole, v, (*[0, *[-1] * len(legs)][: len(legs) - 1], -2))
     for k, (new, start) in enumerate(zip([*between[1:], leg], states, strict=True)):
         editor.insert(i + 1 + k, new, start)
@@ -450,18 +454,24 @@ def _missed(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | No
     return editor.done(test=Condition("interior", i, guard))
 
 
+#: Parts of the period after a touch at which an orbit without events may begin.
+_PARTS = (0.4, 0.02, 0.1, 0.7, 0.9, 0.98)
+
+
 def _smooth(editor: LegEditor, p: Array) -> ChangedItinerary:
     """An orbit left without events: its one leg gets a phase condition."""
     problem, leg, period = editor.problem, editor.legs[0], sum(editor.durations)
     guard, n = _guard(problem, leg), problem.dimension
-    # away from where it touches, which is to be inside the leg
-    start = integrate_leg(problem.system, leg, editor.starts[0], 0.4 * period, p).end[:n]
-    phase = np.zeros(n)
+    ends = [
+        integrate_leg(problem.system, leg, editor.starts[0], part * period, p) for part in _PARTS
+    ]
+    # away from where it touches, which is to be inside the leg, and not where it is slow
+    fastest = max(ends, key=lambda flow: float(np.linalg.norm(flow.rate[:n])))
+    start, phase = fastest.end[:n], np.zeros(n)
     if problem.system.time_dependent:
         phase[-1] = 1.0
     else:
-        rate = leg.field(problem.system).rate.copied(start, p)[0][:n, 0]
-        phase = rate / np.linalg.norm(rate)
+        phase = fastest.rate[:n] / np.linalg.norm(fastest.rate[:n])
     whole = replace(problem, legs=(Leg(leg.mode),), phase=phase, reference=start.copy())
     u = whole.pack(np.array([start]), np.array([period]))
     return ChangedItinerary(whole, u, (editor.origin[0],), Condition("interior", 0, guard).name)

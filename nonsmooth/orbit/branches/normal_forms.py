@@ -92,7 +92,7 @@ def hopf_coefficient(
 # Return maps --------------------------------------------------------------------------------------
 
 #: Steps of differences, relative to the orbit; the first that agrees with the last one is used.
-_STEPS = (4e-3, 2e-3, 5e-4, 1.25e-4, 3e-5)
+_STEPS = (4e-3, 2e-3, 5e-4, 1.25e-4, 3e-5, 8e-6, 2e-6, 5e-7, 1.25e-7)
 
 #: Relative difference at which two steps agree.
 _AGREE = 1e-5

@@ -11,6 +11,7 @@ ch. 9.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from copy import copy
@@ -77,6 +78,8 @@ class OrbitEquations(BranchCurve):
         self.known: dict[str, Condition] = {}
         self.rows = UserRows()
         self._found, self._last = dict[bytes, Evaluation](), b""  # of points, and the last untested
+        self._tested: tuple[bytes, Mapping[str, float]] = b"", {}  # the last point with its tests
+        self._largest = dict[str, float]()  # sizes of L of the other field where slides end
         self.held: tuple[Array, Array, Array] | None = (
             None  # of a family: rows, directions, a point
         )
@@ -188,8 +191,11 @@ _STEEP = 30.0
 #: the branch is lost.
 _TINY, _SMALL = 1e-4, 1e-2
 
-#: L of the other field where a slide ends, relative to its gradient and the state, at the last step to a two-fold.
+#: L of the other field where a slide ends, relative to its gradient and the orbit, at the last step to a two-fold.
 _REACHED = 1e-5
+
+#: Part of its largest value on a branch below which this L may be rounding.
+_NEARING = 1e-3
 
 #: Rounding of this L: the slide of a branch ends at the two-fold, as it tends to it exponentially.
 _ROUNDED = 1e-11
@@ -241,6 +247,7 @@ class OrbitCurve(OrbitEquations):
         if self._on_plane:  # the flow across the plane on which the orbit starts
             assert self.problem.phase is not None
             found["Hopf"] = float(self.problem.phase @ at.by_leg[0].rate[: self.problem.dimension])
+        self._tested = point.u.tobytes(), found
         return found
 
     def restart(self, u: Array) -> None:
@@ -327,7 +334,7 @@ class OrbitCurve(OrbitEquations):
         """``"period diverges"`` where it is long and grows at a constant parameter; else empty."""
         if self.is_to_divide(u) and self.again(u) is not None:
             return DIVIDE
-        if self._at_two_fold(u, _ROUNDED):
+        if self._nears_two_fold(u) and self._at_two_fold(u, _ROUNDED):
             return "two-fold"
         durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
         period = float(u[durations].sum())
@@ -403,6 +410,17 @@ class OrbitCurve(OrbitEquations):
     def diverges(self, u: Array) -> str:
         return passed_saddle(self.describe(u), self._sizes(u)[0])
 
+    def _nears_two_fold(self, u: Array) -> bool:
+        """Whether L of the other field where a slide ends is small relative to its largest value, or unknown."""
+        (point, tests), nears = self._tested, False
+        for i, leg in enumerate(self.problem.legs):
+            if leg.kind == "exit":
+                name = f"end {i} exit {leg.element} {-leg.side}"
+                size = abs(tests.get(name, 0.0)) if point == u.tobytes() else 0.0
+                nears = nears or not size > _NEARING * self._largest.get(name, math.inf)
+                self._largest[name] = max(size, self._largest.get(name, 0.0))
+        return nears
+
     def _at_two_fold(self, u: Array, part: float, inside: bool = False) -> bool:
         """Whether a slide ends at a two-fold, or comes to one ``inside`` its leg."""
         at, p = self.evaluation(u), self.parameters_at(u)
@@ -417,7 +435,7 @@ class OrbitCurve(OrbitEquations):
                 state = integrate_leg(self.system, leg, x, near.t, p).end
                 k = near.guard.element
                 ends = [replace(leg, kind="exit", element=k, side=s) for s in (1, -1)]
-            if all(at_two_fold(self.system, end, state, p, part) for end in ends):
+            if all(at_two_fold(self.system, end, state, p, at.starts, part) for end in ends):
                 return True
         return False
 
@@ -593,7 +611,8 @@ class OrbitCurve(OrbitEquations):
     def _smooth_event(self, zero: Zero) -> BranchEvent | None:
         if zero.name == "fold" and not self._turns(zero.point.u):
             return None
-        if zero.name == "branch point" and self._shrunk(zero.point.u, _SMALL) is not None:
+        small = {"branch point": _SMALL, "Neimark-Sacker": _TINY}.get(zero.name)
+        if small is not None and self._shrunk(zero.point.u, small) is not None:
             return None  # all multipliers tend to 1
         if zero.name == "Hopf":
             return self._hopf(zero.point.u)

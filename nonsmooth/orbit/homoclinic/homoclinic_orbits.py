@@ -190,11 +190,11 @@ def _nearest(run: Trajectory, mode: str, here: Spectrum) -> Departure | None:
         times = part.t + part.duration * np.linspace(0.0, 1.0, 201)[1:-1]
         with np.errstate(over="ignore"):
             away = np.linalg.norm(run(times) - here.point, axis=1)
-        for k in range(1, len(times) - 1):
+        for k in range(len(times) - 1):
             peak = max(peak, float(away[k]))
-            back = away[k] < _CLOSE * peak and away[k - 1] >= away[k] <= away[k + 1]
-            if back and part.leg.mode == mode:
-                first = int(np.argmax(away[:k]))
+            falls = away[k - 1] >= away[k] if k else len(chain) > 1  # or is nearest where it lands
+            if falls and away[k] <= min(_CLOSE * peak, away[k + 1]) and part.leg.mode == mode:
+                first = int(np.argmax(away[: max(k, 1)]))
                 required = np.sqrt(away[first] * away[k])  # on the way back, before it turns away
                 k = first + int(np.argmin(np.abs(away[first : k + 1] - required)))
                 chain[-1] = replace(part, leg=Leg(mode), duration=float(times[k]) - part.t)
@@ -277,6 +277,9 @@ _CLOSER, _SLOWLY = 4.0, 1.2
 
 #: Distance from the saddle, relative to the size of the orbit, that suffices where no step succeeds.
 _ENOUGH = 1e-3
+
+#: Distance from the guess, in scaled unknowns, within which a solution is searched for.
+_FAR = 10.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -542,14 +545,16 @@ def _by_projections(
     return replace(connection_of(loop, u, parameter), complete=complete)
 
 
-def _guarded(equations: Equations) -> Equations:
-    """Equations that are NaN where a leg cannot be integrated."""
+def _guarded(equations: Equations, start: Array) -> Equations:
+    """Equations that are NaN where a leg cannot be integrated, and far from the start."""
 
     def guarded(v: Array) -> tuple[Array, Array]:
         try:
-            return equations(v)
+            if np.abs(v - start).max() < _FAR:
+                return equations(v)
         except NonsmoothError:
-            return np.full(v.size, np.nan), np.full((v.size, v.size), np.nan)
+            pass
+        return np.full(v.size, np.nan), np.full((v.size, v.size), np.nan)
 
     return guarded
 
@@ -572,10 +577,11 @@ def _solved(
     if root is None and damped:
         try:
             what = "homoclinic orbit"
-            root = solve(_guarded(equations), u / scales, tol=1e-10, max_iterations=60, what=what).x
+            near = _guarded(equations, u / scales)
+            root = solve(near, u / scales, tol=1e-10, max_iterations=60, what=what).x
         except NonsmoothError as error:
             reason = f" {error}"
-    if root is None or not np.abs(root - u / scales).max() < 10.0:
+    if root is None or not np.abs(root - u / scales).max() < _FAR:
         raise ConvergenceError(
             f"homoclinic orbit: Newton's method in {parameter!r} did not converge in {loop.iterations} "
             f"steps.{reason} Give a better guess.",

@@ -372,7 +372,6 @@ class BoundaryProblem:
         """Sizes of the unknowns: states by their range over the legs, times by the duration."""
         # With parameters ``p`` the states inside of few legs count, not only where they start.
         starts, durations = self.split(u)
-        span = float(np.abs(durations).sum()) or 1.0
         seen = starts
         if p is not None and len(self.legs) <= _FEW:
             n = self.dimension
@@ -383,13 +382,19 @@ class BoundaryProblem:
                         flow = integrate_leg(self.system, leg, x, part * float(duration), p)
                         inside.append(flow.end[:n])
             seen = np.vstack([starts, *inside])
+        size, span = self.sizes(seen, durations)
+        count = len(self.legs)
+        return np.array(size * count + [span] * count)
+
+    def sizes(self, seen: Array, durations: Array) -> tuple[list[float], float]:
+        """Of the states and the time at (k, n) points, and of the duration."""
+        span = float(np.abs(durations).sum()) or 1.0
         size, n = np.abs(seen).max(axis=0).tolist(), self.system.dimension
         largest = max(*size[:n], 1e-300)  # the time has units of its own
         if self.system.time_dependent and largest < 1e-9 * span:  # all legs begin at zero
             largest = span
         size = [part if part > 1e-6 * largest else largest for part in size[:n]]
-        count, more = len(self.legs), [span] * (self.dimension - n)
-        return np.array((size + more) * count + [span] * count)
+        return size + [span] * (self.dimension - n), span
 
 
 #: Legs of a problem ready to be integrated, by the chosen parameters.

@@ -24,6 +24,9 @@ _LOST = 1e-12
 #: Passes through all factors. Eigenvalues that these do not separate differ by no more than a factor of 12.
 _PASSES = 12
 
+#: Rounding of a factor, relative to its norm.
+_ROUNDED = 16.0 * 2.0**-52
+
 #: Coupling of columns below which eigenvalues are separate.
 _SEPARATE = 1e-13
 
@@ -39,9 +42,11 @@ class Factor:
 
     def image(self, basis: Array) -> Array:
         """Orthonormal basis of the image of some directions (n, r)."""
+        if not basis.shape[1] or (self.beside is None and len(basis) == basis.shape[1]):
+            return basis  # all directions, or none
         moved = self.matrix @ basis
-        if self.beside is None or not basis.shape[1]:
-            return np.linalg.qr(moved)[0] if basis.shape[1] else basis
+        if self.beside is None:
+            return _decomposed(moved)[0]
         size = math.sqrt(float(np.vdot(carried := self.beside @ basis, carried)))
         u, sizes, _ = np.linalg.svd(moved, full_matrices=False)
         return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), size)])
@@ -65,20 +70,25 @@ class Product:
                 return basis
 
     @cached_property
-    def logarithms(self) -> NDArray[np.complex128]:
-        """Logarithms (r,) of the eigenvalues that are not zero, those of the largest first."""
+    def _triangles(self) -> tuple[Array, list[Array]]:
+        """The product is similar to the first (r, r) after those of the list, which are triangular."""
         basis = self.basis
-        if not basis.shape[1]:
-            return np.zeros(0, complex)
         for _ in range(_PASSES):
             first, triangles = basis, list[Array]()
             for factor in self.factors:
-                basis, triangle = np.linalg.qr(factor.matrix @ basis)
+                basis, triangle = _decomposed(factor.matrix @ basis)
                 triangles.append(triangle)
             turned = first.T @ basis
             if np.abs(np.tril(turned, -1)).max() < _SEPARATE:
                 break
-        found = _of_blocks(turned, triangles)
+        return turned, triangles
+
+    @cached_property
+    def logarithms(self) -> NDArray[np.complex128]:
+        """Logarithms (r,) of the eigenvalues that are not zero, those of the largest first."""
+        if not self.basis.shape[1]:
+            return np.zeros(0, complex)
+        found = _of_blocks(*self._triangles)
         return found[np.lexsort((found.imag, -found.real.round(12)))]
 
     @property
@@ -93,7 +103,8 @@ class Product:
     @property
     def error(self) -> float:
         """Error of the eigenvalues, relative to those beyond 1, estimated by the transposed factors in reverse order."""
-        # the difference does not include the rounding of the factors themselves, which is ten times as large
+        # the difference does not include the rounding of the factors themselves, which is ten times as large, and at
+        # least that of their entries
         found = self.logarithms
         other = self.reversed.logarithms if found.size else found
         n = min(
@@ -101,7 +112,30 @@ class Product:
         )  # directions that only one of them loses are as small as that
         lost = np.exp(np.minimum([*found.real[n:], *other.real[n:]], 0.0)).max(initial=0.0)
         apart = np.exp(np.minimum(found.real[:n], 0.0)) * np.abs(found.real[:n] - other.real[:n])
-        return 10.0 * float(max(apart.max(initial=0.0), lost))
+        return max(10.0 * float(max(apart.max(initial=0.0), lost)), self._rounding)
+
+    @property
+    def _rounding(self) -> float:
+        """Error of the eigenvalues, relative to those beyond 1, by the rounding of the factors."""
+        if not self.logarithms.size:
+            return 0.0
+        kept = np.abs([np.diagonal(triangle) for triangle in self._triangles[1]])
+        sizes = np.array([np.linalg.norm(factor.matrix) for factor in self.factors])
+        parts = _ROUNDED * np.linalg.norm(
+            sizes[:, None] / kept, axis=0
+        )  # independent of each other
+        return float((parts * np.exp(np.minimum(np.log(kept).sum(axis=0), 0.0))).max())
+
+
+def _decomposed(matrix: Array) -> tuple[Array, Array]:
+    """QR decomposition; of one column by its length."""
+    largest = float(np.abs(matrix).max()) if matrix.shape[1] == 1 else 0.0
+    if not 0.0 < largest < math.inf:
+        q, r = np.linalg.qr(matrix)
+        return q, r
+    matrix = matrix / largest  # whose square does not overflow
+    size = math.sqrt(float(np.vdot(matrix, matrix)))
+    return matrix / size, np.array([[largest * size]])
 
 
 def _like(matrix: Array) -> Array:

@@ -154,10 +154,10 @@ def _divisible(problem: BoundaryProblem) -> bool:
 
 def to_divide(problem: BoundaryProblem, at: Evaluation) -> bool:
     """Whether derivatives grow so much on a leg, or a part of one, that it should be divided."""
-    n = problem.dimension
-    units = problem.scales(problem.pack(at.starts, at.durations))[:n]
     if not _divisible(problem):
         return False
+    n = problem.dimension
+    units = np.array(problem.sizes(at.starts, at.durations)[0])
     flows = (at.parts or at).flows
     with np.errstate(over="ignore", invalid="ignore"):
         sizes = np.abs(flows.by_start[:, :n] * units / units[:, None])

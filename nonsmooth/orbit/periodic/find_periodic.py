@@ -662,19 +662,21 @@ def require_duration(problem: BoundaryProblem, at: Evaluation, about: float | No
     )
 
 
-#: L of the other field at an exit, relative to its gradient and the state, at which the exit is at a two-fold.
+#: L of the other field at an exit, relative to its gradient and the orbit, at which the exit is at a two-fold.
 _TWO_FOLD = 1e-9
 
 
 def at_two_fold(
-    system: FilippovSystem, leg: Leg, end: Array, p: Array, part: float = _TWO_FOLD
+    system: FilippovSystem, leg: Leg, end: Array, p: Array, starts: Array, part: float = _TWO_FOLD
 ) -> bool:
-    """Whether a slide on one surface ends where L_F1 h and L_F2 h both vanish."""
+    """Whether a slide of an orbit with these starts of legs ends where L_F1 h and L_F2 h both vanish, on one surface."""
     if leg.kind != "exit" or system.coupled:
         return False
     other = replace(leg, side=-leg.side).at_event(system, end, p)
-    size = float(np.linalg.norm(other.gradient) * np.linalg.norm(end)) or 1.0
-    return abs(other.value) <= part * size
+    largest = max(
+        float(np.linalg.norm(x)) for x in (end, *starts)
+    )  # the two-fold may be at the origin
+    return abs(other.value) <= part * (float(np.linalg.norm(other.gradient)) * largest or 1.0)
 
 
 def require_simple(orbit: PeriodicOrbit) -> None:
@@ -682,7 +684,7 @@ def require_simple(orbit: PeriodicOrbit) -> None:
     system, p, flows = orbit.system, orbit.parameter_vector, orbit.evaluation.flows
     for i, leg in enumerate(orbit.problem.legs):
         end = flows.end[i]
-        if at_two_fold(system, leg, end, p):
+        if at_two_fold(system, leg, end, p, orbit.evaluation.starts):
             raise DegenerateError(
                 f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
                 f"{leg_name(system, leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "

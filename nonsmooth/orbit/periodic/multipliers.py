@@ -10,20 +10,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, ConvergenceError, DegenerateError
-from ..runs.legs import Leg, integrate_leg, leg_name
+from ..runs.legs import Leg, integrate_leg, leg_name, rate_at
 from ..runs.saltation import passages, saltations
 from .boundary_value_problem import BoundaryProblem, Evaluation, jacobian_indices
 from .cyclic_qr import Factor, Product
 
-#: States below this part of the way of a leg are zero.
-_AT_ZERO = 1e-9
+#: States below this part of the way of a leg are zero, and states below this part of the largest are small.
+_AT_ZERO, _SMALL = 1e-9, 1e-6
+
+#: States below this many residuals are rounding.
+_CLOSED = 10.0
 
 #: Condition number of the derivatives of a leg above which it is divided.
 _STIFF = 1e4
@@ -164,7 +167,7 @@ class Multipliers:
     @cached_property
     def _units(self) -> Array:
         # sizes decide what is lost, and states and time have different units
-        return _units(self.problem, self.at)
+        return _units(self.problem, self.at, self.p)
 
     @cached_property
     def _held(self) -> Array:
@@ -221,9 +224,11 @@ def _across(field: Array) -> Array:
     """Orthonormal basis (n, n - 1) of the directions across a field."""
     # columns of a Householder reflection
     v = field / (float(np.abs(field).max()) or 1.0)  # whose square does not overflow
-    v /= float(np.linalg.norm(v)) or 1.0
+    v /= math.sqrt(float(v @ v)) or 1.0
     v[0] += math.copysign(1.0, v[0])
-    return np.asarray(np.eye(len(v))[:, 1:] - np.outer(v, v[1:] / abs(v[0])))
+    found: Array = np.multiply.outer(v, v[1:] / -abs(v[0]))
+    found.reshape(-1)[len(v) - 1 :: len(v)] += 1.0  # below the diagonal
+    return found
 
 
 def event_maps(problem: BoundaryProblem, at: Evaluation) -> Array:
@@ -267,17 +272,33 @@ def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
     return found if np.isfinite(found).all() else None
 
 
-def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
-    """Sizes of states and time; of states that are zero where all legs begin by how far these lead."""
-    n, own = problem.dimension, problem.system.dimension
-    units = problem.scales(problem.pack(at.starts, at.durations))[:n]
+def _units(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
+    """Sizes of states and time; of states that are zero all the time by how far the fields beside them lead."""
+    own, span = problem.system.dimension, float(np.abs(at.durations).sum()) or 1.0
+    far = np.abs(at.flows.rate[:, :own] * at.durations[:, None]).max(axis=0)
+    size, beside = np.abs(at.starts[:, :own]).max(axis=0), _beside(problem, at, p)
+    zero = np.maximum(size, far) <= _AT_ZERO * beside
+    size = np.where(zero & (size.max() < _SMALL * beside), beside, size)
     if problem.system.time_dependent:
-        ways = np.abs(at.flows.rate[: len(at.durations), :own] * at.durations[:, None]).max(
-            initial=0.0
-        )
-        if np.abs(at.starts[:, :own]).max() < _AT_ZERO * ways:
-            units[:own] = ways
-    return units
+        states = at.residual[: -len(at.durations)].reshape(-1, problem.dimension)[:, :own]
+        if size.max() < _AT_ZERO * far.max():
+            size[:] = far.max()
+        elif not size.max() > _CLOSED * np.abs(states).max():  # rounding of zero
+            size[:] = span
+    size = np.where(size > _SMALL * size.max(), size, float(size.max()) or span)
+    return np.append(size, [span] * (problem.dimension - own))
+
+
+def _beside(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
+    """How far the fields off the surfaces on which the orbit is all the time lead during its legs, (n,)."""
+    system, ways = problem.system, np.zeros(problem.system.dimension)
+    kept = [i for i in problem.kept if i not in system.joints and not system.sets]
+    for leg, x, duration in zip(problem.legs, at.starts, at.durations.tolist(), strict=True):
+        for i, side in ((i, side) for i in kept for side in "+-"):
+            letter = side if i < system.surface_count else "o"
+            off = replace(leg, mode=leg.mode[:i] + letter + leg.mode[i + 1 :])
+            ways = np.maximum(ways, np.abs(rate_at(system, off, x, p)[: ways.size] * duration))
+    return ways
 
 
 def events_of(

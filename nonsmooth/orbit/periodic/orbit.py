@@ -169,8 +169,9 @@ class PeriodicOrbit(Tabular):
     @cached_property
     def trajectory(self) -> Trajectory:
         """One period as a run, with dense output."""
-        legs = self._legs_of(self.problem.of_parts, self.evaluation.parts or self.evaluation)
-        return orbit_run(self.system, self.parameters, legs)
+        at = self.evaluation.parts or self.evaluation
+        legs, ends = self._legs_of(self.problem.of_parts, at), at.flows.end[:, : len(self.start)]
+        return orbit_run(self.system, self.parameters, legs, ends)
 
     # stability ----------------------------------------------------------------------------------
 

@@ -96,6 +96,7 @@ class LegGuards:
         self._cells, cells = [f for f in self.fields if isinstance(f, CellField)], cells_of(system)
         self._system, self._legs = cells.system, [cells.leg(leg) for leg in legs]
         self._driven = [guarded_field(cells.system, leg.mode) for leg in self._legs]
+        self._explicit = all(field.entries == system.extended_dimension for field in self._driven)
         self._limits = [i for i, leg in enumerate(legs) if leg.repeats]
         self._watch = None if system.sets else LegsWatch(self._driven)
 
@@ -125,8 +126,10 @@ class LegGuards:
             legs = [_by_steps(self._system, leg, f, x, t, own) for leg, f, x, t, own in given]
             rows, begins, values = zip(*legs, strict=True)
             return [*rows], [*begins], [*values]
-        given_states = zip(self._legs, starts, p, strict=True)
-        states = [states_at(self._system, leg.mode, x, own) for leg, x, own in given_states]
+        states = list(starts)
+        if not self._explicit:
+            given_states = zip(self._legs, starts, p, strict=True)
+            states = [states_at(self._system, leg.mode, x, own) for leg, x, own in given_states]
         return self._watch(states, p, durations, _ENDS)
 
 

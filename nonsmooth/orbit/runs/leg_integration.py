@@ -119,7 +119,13 @@ class LegIntegrator:
         """States of each leg; those of infinitely many events have the time to their limit."""
         return tuple(self.system.extended_dimension + bool(leg.repeats) for leg in self.legs)
 
-    @property
+    @cached_property
+    def _units(self) -> Array:
+        """States of zero with the identity as their derivatives, leg by leg."""
+        n = self.system.extended_dimension
+        return np.tile(np.eye(1 + n + len(self.chosen), n, -1), (len(self.legs), 1, 1))
+
+    @cached_property
     def _most(self) -> int:
         return max(self.sizes)
 
@@ -176,8 +182,8 @@ class LegIntegrator:
             return self._by_modes(starts, durations, p)
         n = starts.shape[1]
         columns = 1 + n + len(self.chosen)
-        z = np.tile(np.eye(columns, n, -1), (len(starts), 1, 1))
-        z[:, 0], z[:, 1 + n :] = starts, 0.0
+        z = self._units.copy()
+        z[:, 0] = starts
         flow = self._program(z, p, durations, tol, MOST_STEPS)
         if flow.failed >= 0:
             i = flow.failed

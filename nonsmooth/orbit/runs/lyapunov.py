@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...flow.constants import AT_END
+from ...flow.engine.columns import carry_frame
 from ...flow.ensembles.progress import progress_bar
 from ...flow.fixed import TOLERANCE
 from ...flow.options import tolerances
@@ -238,6 +238,15 @@ def _ended(run: Trajectory, t_end: float) -> str:
     )
 
 
+class _Link(NamedTuple):
+    """Derivatives (n, n) over a part of a leg, or of an event at its end, which takes no time."""
+
+    part: Stretch
+    matrix: Array
+    begin: float
+    end: float
+
+
 class _Frame:
     """Orthonormal directions along a run, and the logarithms of their growth."""
 
@@ -247,7 +256,6 @@ class _Frame:
         # Directions in general position: coordinate axes may lie in invariant subspaces.
         self.q = np.linalg.qr(np.random.default_rng(0).normal(size=(self.n, count)))[0]
         self.bounds = np.linspace(begin, float(run.t[-1]), _BLOCKS + 1)
-        self._edges = self.bounds.tolist()
         self.logs = np.zeros((_BLOCKS, count))
         self.volume, self.rate, self.t = 0.0, 0.0, float(run.t[0])
         loose = Precision(max(TOLERANCE, _OF_RUN * rtol), _APART)
@@ -258,16 +266,16 @@ class _Frame:
         parts = stretches(self.run, driven=True)
         limits = {found.points[0]: i for i, (found, _) in limits_of(parts).items()}
         bar = progress_bar(len(parts), progress, "leg")
-        complete, j = True, 0
+        complete, j, whole = True, 0, self._whole(parts)
         try:
             while j < len(parts):
                 end = limits.get(j, j) + 1
                 if j in limits:
                     self._limit(parts, j, end - 1)
                 else:
-                    own = self._pieces(parts[j])
+                    own = list(self._pieces(parts[j], whole[j]))
                     while end < len(parts) and end not in limits and len(own) < _AT_A_TIME:
-                        own += self._pieces(parts[end])
+                        own += self._pieces(parts[end], whole[end])
                         end += 1
                     self._follow_pieces(own, parts[end] if end < len(parts) else None)
                 bar.update(end - j)
@@ -280,8 +288,20 @@ class _Frame:
             bar.close()
         return self._spectrum(complete)
 
-    def _pieces(self, part: Stretch) -> list[Stretch]:
+    def _whole(self, parts: Sequence[Stretch]) -> list[bool]:
+        """Which legs have few steps and no bound of a block inside."""
+        spans = np.array([(part.t, part.t + part.duration) for part in parts]).T
+        inside = [
+            np.searchsorted(times, spans[1]) - np.searchsorted(times, spans[0], side="right")
+            for times in (self.run.steps.starts, self.bounds)
+        ]
+        found: list[bool] = ((inside[0] < _STEPS) & (inside[1] <= 0)).tolist()
+        return found
+
+    def _pieces(self, part: Stretch, whole: bool) -> Sequence[Stretch]:
         """Pieces of a leg that end at the bounds of blocks and after some steps of the run."""
+        if whole and not part.system.sets:
+            return (part,)
         rate = self.rate if part.system.sets else 0.0  # others are divided as they are carried
         pieces = self._cut(part, np.union1d(self.bounds, self._inner(part, rate)))
         return [beginning_of(part), *pieces] if part.system.sets else pieces
@@ -320,27 +340,72 @@ class _Frame:
     def _follow_pieces(self, pieces: Sequence[Stretch], following: Stretch | None) -> None:
         """Carry directions over pieces of legs and through the events between them."""
         after = [] if following is None else [beginning_of(following)]
-        found = passages_over(self.run, [*pieces, *after], precision=self.precision)
-        for one in found[: len(pieces)]:
-            part = one.stretch
-            if self.q.shape[1] and part.duration:
-                self._grow(part, one.flow, _LOOSE_RATIO if self.precision.ratio else _RATIO)
-            elif self.q.shape[1]:  # neighbours of a state on a set reach it at once
-                self._lose(one.flow.by_start[: self.n, : self.n], part, part.t)
-            if one.event is not None and self.q.shape[1]:
-                self._lose(_cleaned(one.event)[: self.n, : self.n], part, self.t)
+        found = passages_over(self.run, [*pieces, *after], precision=self.precision)[: len(pieces)]
+        maps = iter(_cleaned([one.event for one in found if one.event is not None], self.n))
+        links = list[_Link]()
+        for one in found:
+            links += self._links(one.stretch, one.flow)
+            if one.event is not None:
+                end = one.stretch.t + one.stretch.duration
+                links.append(_Link(one.stretch, next(maps), end, end))
+        self._follow(links, _LOOSE_RATIO if self.precision.ratio else _RATIO)
         if self.q.shape[1] == self.n:
             self._add_divergence(pieces)
 
-    def _grow(self, part: Stretch, flow: LegFlow, most: float = _RATIO) -> None:
-        """Carry directions over a piece of a leg, divided where one grows so much more that another is lost in it."""
+    def _links(self, part: Stretch, flow: LegFlow) -> list[_Link]:
+        """Derivatives of a piece of a leg, divided where one direction grows so much more that another is lost in it."""
         since, matrices = flow.parts
         edges = [part.t, *(part.t + since).tolist(), part.t + part.duration]
-        for matrix, begin, end in zip([*matrices, flow.by_start], edges, edges[1:], strict=False):
-            self._grow_by(matrix[: self.n, : self.n], part, begin, end, most)
+        own = zip([*matrices, flow.by_start], edges, edges[1:], strict=False)
+        return [_Link(part, a[: self.n, : self.n], begin, end) for a, begin, end in own]
 
-    def _grow_by(self, matrix: Array, part: Stretch, begin: float, end: float, most: float) -> None:
-        """The same over a part of it, with the largest ratio."""
+    def _follow(self, links: Sequence[_Link], most: float) -> None:
+        """Carry directions over derivatives, in which they may grow apart by a ratio."""
+        if not (links and self.q.shape[1]):
+            return
+        matrices = np.array([link.matrix for link in links])
+        spans = np.array([link[2:] for link in links])
+        i = 0
+        while i < len(links) and self.q.shape[1]:
+            i += self._follow_regular(matrices[i:], spans[i:], most)
+            if i < len(links) and self.q.shape[1]:
+                self._follow_one(links[i], most)
+                i += 1
+
+    def _follow_regular(self, matrices: Array, spans: Array, most: float) -> int:
+        """Carry directions until they grow apart, or one may be lost; by how many matrices."""
+        q, growth = carry_frame(matrices, self.q)
+        begin, end = spans.T
+        moves, least, largest = begin < end, growth.min(axis=1), growth.max(axis=1)
+        with np.errstate(all="ignore"):
+            apart = np.where(least > 0.0, np.log(largest / least), math.inf)
+            size = np.abs(matrices).max(axis=(1, 2))
+            is_kept = (least > _LOST * np.linalg.norm(matrices, axis=(1, 2))) & (size < _HUGE)
+        regular = np.where(moves, apart <= math.log(most), is_kept) & np.isfinite(growth).all(
+            axis=1
+        )
+        count = len(regular) if regular.all() else int(regular.argmin())
+        if not count:
+            return 0
+        blocks, flows = self._blocks((begin + end)[:count] / 2), np.flatnonzero(moves[:count])
+        counted = blocks >= 0
+        np.add.at(self.logs[:, : growth.shape[1]], blocks[counted], np.log(growth[:count][counted]))
+        events = counted & ~moves[:count]
+        with np.errstate(divide="ignore"):
+            sizes = np.log(np.abs(np.linalg.det(matrices[:count][events])))
+        self.volume += float(np.where(np.isfinite(sizes), sizes, math.nan).sum())
+        self.q = q[count - 1]
+        if len(flows):
+            last = flows[-1]
+            self.t, self.rate = float(end[last]), float(apart[last] / (end[last] - begin[last]))
+        return count
+
+    def _follow_one(self, link: _Link, most: float) -> None:
+        """Carry directions that grow apart, or of which some are lost."""
+        part, matrix, begin, end = link
+        if not begin < end:
+            self._lose(matrix, part, self.t)
+            return
         q, r = np.linalg.qr(matrix @ self.q)
         growth = np.abs(r.diagonal())
         least, largest = float(growth.min()), float(growth.max())
@@ -350,8 +415,8 @@ class _Frame:
         if spread > math.log(most) and (finite or not part.system.sets):
             own = next(one for one in self._cut(part, np.array([begin, end])) if one.t == begin)
             pieces = self._cut(own, self._inner(own, self.rate))
-            for piece, its_flow in zip(pieces, flows_over(self.run, pieces), strict=True):
-                self._grow(piece, its_flow)
+            for piece, flow in zip(pieces, flows_over(self.run, pieces), strict=True):
+                self._follow(self._links(piece, flow), _RATIO)
         elif part.system.sets and not least > _LOST * largest:
             self._lose(matrix, part, self.t)  # a set is reached at its end
         else:
@@ -407,8 +472,12 @@ class _Frame:
 
     def _block(self, t: float) -> int:
         """Number of the block of a time, its end included; negative before the first."""
-        found = bisect_left(self._edges, t - AT_END * max(1.0, abs(t)))
-        return min(found - 1, _BLOCKS - 1)
+        return int(self._blocks(np.array([t]))[0])
+
+    def _blocks(self, t: Array) -> NDArray[np.int64]:
+        """The same of many times."""
+        found = np.searchsorted(self.bounds, t - AT_END * np.maximum(1.0, np.abs(t)))
+        return np.minimum(found - 1, _BLOCKS - 1)
 
     def _add_divergence(self, pieces: Sequence[Stretch]) -> None:
         """Add the integral of the divergence of the fields along legs, by Gauss's rule on each step."""
@@ -417,25 +486,33 @@ class _Frame:
             if part.t >= self.bounds[0] and part.duration:
                 kinds.setdefault(part.leg.mode, []).append(part)
         for mode, parts in kinds.items():
-            system, steps = parts[0].system, self.run.steps.starts
+            system = parts[0].system
             unknown = system.sets or len(mode) > system.surface_count or mode.count("s") > 1
             if unknown or any(system.nonlinear):
                 self.volume = math.nan
                 return
-            edges = np.array([(part.t, part.t + part.duration) for part in parts])
-            inside = np.searchsorted(steps, edges).tolist()
-            spans = [
-                np.unique([a, *steps[i:j], b])
-                for (a, b), (i, j) in zip(edges.tolist(), inside, strict=True)
-            ]
-            low = np.concatenate([span[:-1] for span in spans])
-            half = (np.concatenate([span[1:] for span in spans]) - low) / 2
+            divergence = self._divergence(system, mode)
+            spans = np.array([(part.t, part.t + part.duration) for part in parts])
+            if divergence.jac_sparsity(0, 0).nnz() == 0:
+                value = float(divergence(parts[0].start, parts[0].p))
+                self.volume += value * float((spans[:, 1] - spans[:, 0]).sum())
+                continue
+            low, half = self._steps_in(spans)
             times = (low[:, None] + half[:, None] * (1.0 + _NODES)).ravel()
             x = self.run(times)
             if system.time_dependent:
                 x = np.column_stack([x, times])
-            values = np.array(self._divergence(system, mode)(x.T, parts[0].p)).reshape(-1, 8)
+            values = np.array(divergence(x.T, parts[0].p)).reshape(-1, 8)
             self.volume += float(half @ (values @ _WEIGHTS))
+
+    def _steps_in(self, spans: Array) -> tuple[Array, Array]:
+        """Beginnings and half lengths of the steps of the run, and of their parts, within spans of time (m, 2) in order."""
+        starts = self.run.steps.starts
+        first, last = np.searchsorted(starts, (spans[0, 0], spans[-1, 1]))
+        edges = np.unique([*spans.ravel(), *starts[first:last]])
+        low, high = edges[:-1], edges[1:]
+        inside = low < spans[np.searchsorted(spans[:, 0], low, side="right") - 1, 1]
+        return low[inside], ((high - low) / 2)[inside]
 
     def _divergence(self, system: FilippovSystem, mode: str) -> Any:
         def build() -> list[object]:
@@ -478,10 +555,15 @@ def _spread(matrix: Array, q: Array) -> tuple[Array, Array] | None:
     return turned[:, :m], np.exp(logs[:m])
 
 
-def _cleaned(event: Saltation) -> Array:
-    """The saltation matrix (N, N) with zeros where its terms cancel to rounding."""
-    terms = np.abs(event.after_state) + np.abs(np.outer(event.jump, event.time_by_state))
-    return np.where(np.abs(event.matrix) > _ROUNDED * terms, event.matrix, 0.0)
+def _cleaned(events: Sequence[Saltation], n: int) -> Array:
+    """Saltation matrices (m, n, n) with zeros where their terms cancel to rounding."""
+    maps = np.array([event.after_state[:n, :n] for event in events]).reshape(-1, n, n)
+    jumps = np.array([event.jump[:n] for event in events]).reshape(-1, n, 1)
+    times = np.array([event.time_by_state[:n] for event in events]).reshape(-1, 1, n)
+    kept = np.array([event.kept for event in events], bool).reshape(-1, 1, 1)
+    moved = jumps * times
+    found = maps - np.where(kept, 0.0, moved)
+    return np.where(np.abs(found) > _ROUNDED * (np.abs(maps) + np.abs(moved)), found, 0.0)
 
 
 def _regular(matrix: Array) -> bool:

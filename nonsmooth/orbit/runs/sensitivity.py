@@ -58,8 +58,9 @@ def sensitivity(
         is always included.
     side : array_like (n,) or mapping, optional
         Direction of the start, or of ``"x0"`` and parameters by name, for one-sided derivatives: of the neighbours in that
-        direction. At a corner, a grazing or an event at the very end, others have other derivatives; without ``side``
-        they are refused. Its length, in the units of the states, is a distance over which events change little.
+        direction. At a corner, a grazing or an event at the very end, others have other derivatives. Without ``side``
+        those of corners and grazings are refused, and those of an event at the very end hold for neighbours at which
+        it has happened. Its length, in the units of the states, is a distance over which events change little.
 
     Returns
     -------
@@ -79,8 +80,7 @@ def sensitivity(
     Notes
     -----
     A run that starts on a sliding surface has the derivatives of the sliding field: they hold along the
-    surface, not for starts off it; of a run that starts at rest, for starts that rest too. Where a reset happens exactly at the end of the run, they hold for
-    neighbours that have jumped.
+    surface, not for starts off it; of a run that starts at rest, for starts that rest too.
 
     Where impacts, resets or crossings accumulate the derivatives are those of their limit, extrapolated from events
     before it; they are exact to about 1e-12. A run with the status ACCUMULATION has those of the limit as its end.

@@ -241,10 +241,11 @@ const Page = (() => {
     handle.addEventListener("keydown", (event) => {
       const move = ARROWS[event.key];
       if (!move) return;
-      const { step } = given; // which may follow the plane's ranges
-      const by = step * (event.shiftKey ? 10 : 1);
+      const { steps } = given; // which may follow the plane's ranges
+      const far = event.shiftKey ? 10 : 1;
       // the coordinate that moves to multiples of the step, so that steps back and forth cancel
-      set(clamp(get().map((v, k) => (move[k] ? Math.round((v + by * move[k]) / step) * step : v))));
+      const moved = (v, k) => Math.round(v / steps[k] + far * move[k]) * steps[k];
+      set(clamp(get().map((v, k) => (move[k] ? moved(v, k) : v))));
       event.preventDefault();
     });
     return () => {
@@ -288,6 +289,15 @@ const Page = (() => {
     return Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
   }
 
+  /** Say which parts of an address the page left out; `read` has those that it could read. */
+  function leftOut(asked, read) {
+    const names = Object.keys(asked).filter((name) => !read[name]);
+    document.getElementById("left-out")?.remove();
+    if (!names.length) return;
+    const words = `The address has parts that cannot be read and were left out: ${names.join(", ")}.`;
+    document.body.prepend(html("p", { id: "left-out", role: "status" }, words));
+  }
+
   /** Say the state in the address, so that it can be kept and sent; no new entry of the history. */
   function setAddress(values) {
     const words = new URLSearchParams(values).toString().replaceAll("%2C", ",");
@@ -313,5 +323,5 @@ const Page = (() => {
 
   const data = (name) => JSON.parse(document.getElementById(`data-${name}`).textContent);
 
-  return { text, svg, html, Plane, draggable, numberInput, address, setAddress, eachFrame, data };
+  return { text, svg, html, Plane, draggable, numberInput, address, leftOut, setAddress, eachFrame, data };
 })();

@@ -247,7 +247,7 @@ class Engine {
     };
     const surfaces = entries.map(letters);
     const contacts = Array.from(signs.subarray(m), (sign) => "co"[+!!sign]);
-    const labels = discrete.map((name, k) => `${name}=${Number(values[k].toPrecision(6))}`);
+    const labels = discrete.map((name, k) => `${name}=${Engine.general(values[k])}`);
     return [[...surfaces, ...contacts].join(""), ...labels].filter((part) => part).join(",");
   }
 
@@ -341,6 +341,16 @@ class Engine {
     return made;
   }
 }
+
+/** A number with six digits at most, as Python's format "g" writes it: a tie goes to the even digit. */
+Engine.general = (value) => {
+  const [, even] = value.toExponential(99).match(/^(.*[02468])50*e/) ?? [];
+  const isTie = even?.replace(/\D/g, "").length === 6;
+  const [rounded, power] = value.toExponential(5).split("e");
+  const digits = String(Number(isTie ? even : rounded));
+  if (value === 0 || (power >= -4 && power < 6)) return String(Number(`${digits}e${power}`));
+  return `${digits}e${power[0]}${power.slice(1).padStart(2, "0")}`;
+};
 
 /** States and rates of a step of a run at a time since its start. */
 Engine.onStep = (run, { n, order, dimension }, step, s) => {

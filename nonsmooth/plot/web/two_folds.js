@@ -475,7 +475,7 @@
   });
   const moveHandle = Page.draggable(map, {
     name: "ν₁ and ν₂",
-    step: 0.05,
+    steps: [0.05, 0.05],
     get: () => state.nu,
     set: (nu) => set({ nu }),
     say: () => `ν₁ = ${text(state.nu[0])}, ν₂ = ${text(state.nu[1])}`,
@@ -519,10 +519,15 @@
   const refresh = Page.eachFrame(draw);
 
   function read() {
-    const { folds, nu } = Page.address();
-    const values = (nu || "").split(",").map(Number);
-    if (Object.hasOwn(TwoFolds.SIGMA, folds ?? "")) state.folds = folds;
-    if (nu && values.length === 2 && values.every(Number.isFinite)) state.nu = values.map(clamp);
+    const asked = Page.address();
+    const values = (asked.nu || "").split(",").map(Number);
+    const read = {
+      folds: Object.hasOwn(TwoFolds.SIGMA, asked.folds ?? ""),
+      nu: asked.nu && values.length === 2 && values.every(Number.isFinite),
+    };
+    if (read.folds) state.folds = asked.folds;
+    if (read.nu) state.nu = values.map(clamp);
+    Page.leftOut(asked, read);
     refresh();
   }
 

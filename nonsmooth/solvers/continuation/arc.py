@@ -33,6 +33,8 @@ BEND = 0.3
 _ROWS = 6  # points of the predictor
 #: Steps are not shortened below this share of the largest to look for hidden ends.
 _SEEN = 1e-5
+#: Errors of equations that cannot be evaluated at a point.
+_REFUSED = (ConvergenceError, DegenerateError, PointError, np.linalg.LinAlgError)
 
 
 @dataclass(eq=False)
@@ -128,7 +130,7 @@ def trace(
                 report(arc.points[-1])
     except KeyboardInterrupt:
         arc.end = "interrupted"
-    except (ConvergenceError, DegenerateError, PointError, np.linalg.LinAlgError) as error:
+    except _REFUSED as error:
         arc.end, arc.reason = "failed", str(error)
     if arc.end in ("lost", "step too small"):
         arc.reason = curve.refused
@@ -184,7 +186,14 @@ class _Tracing:
         if new is None or bend > BEND:
             self._shorten(last, fault, bend, failed=trial is None)
             return
-        self._accept(last, new)
+        zeros, points = len(self.arc.zeros), len(self.arc.points)
+        try:
+            self._accept(last, new)
+        except _REFUSED as error:  # the step is too long for what is computed inside it
+            del self.arc.zeros[zeros:], self.arc.points[points:]
+            self.arc.end, curve.refused = "", str(error)
+            self._shorten(last, "", bend, failed=True)
+            return
         if not self.closing and bend < BEND / 3:
             straight = 10.0 if bend < 1e-6 else 4.0 if bend < 0.01 else 1.0
             self.size = min(1.6 * self.size, straight * self.step)

@@ -7,6 +7,7 @@ hyperplane across a direction (pseudo-arclength; Keller 1977), so turning points
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -589,8 +590,9 @@ class _Segment:
             )
             near = points[int(np.argmin(np.abs(nodes - middle)))]
             s = self.a.arclength + middle * (self.b.arclength - self.a.arclength)
-            jacobian = self.curve.scaled(u / self.curve.scale)[1]
-            point = replace(near, u=u, arclength=s, jacobian=jacobian)
+            point = replace(near, u=u, arclength=s)
+            with suppress(NonsmoothError):  # there may be none at the zero itself
+                point = replace(point, jacobian=self.curve.scaled(u / self.curve.scale)[1])
             width *= 0.2
         return point
 

@@ -175,9 +175,36 @@ def test_what_was_given_is_echoed_as_it_was_typed(command, tmp_path, name, side)
     for units, speed in (("us", 40.1), ("golf", 40.1 * 0.44704)):
         (row,) = rows_of(command(name, "--input", path, "--units", units, *side)[1])
         assert [row[f"{what}_angle [deg]"], row[f"{what}_spin [rpm]"]] == ["10.9", "2686.0"]
+        speed_said = {"us": "40.1", "golf": "17.9263"}[units]
+        assert speed_said in [row.get(f"{what}_speed [{unit}]") for unit in ("mph", "m/s")]
         typed = "--speed 40.1mph --angle 10.9 --spin 2686 --json --units".split()
         report = json.loads(command(name, *typed, units, *side)[1])[what]
         assert report == dict(speed=speed, angle=10.9, spin=2686.0)
+
+
+@pytest.mark.parametrize("name", [["launch", "--turf", "natural"], ["land"]])
+def test_a_table_has_the_six_digits_that_are_meant(command, table, name):
+    """The table is JSON's to half a unit of the sixth digit, and has no more digits."""
+    (row, *_) = rows_of(command(*name, "--input", table())[1])
+    (report, *_) = json.loads(command(*name, "--input", table(), "--json")[1])["rows"]
+    flat = _flat({key: value for key, value in report.items() if key != _echo(name[0])})
+    found = [
+        (float(row[next(c for c in row if c.split(" [")[0] == key)]), flat[key]) for key in flat
+    ]
+    assert len(found) > 5
+    for short, whole in found:
+        assert short == pytest.approx(whole, rel=5e-6) and short == float(f"{short:.6g}")
+
+
+def _flat(report, head=""):
+    """Nested numbers with joined names."""
+    flat = {}
+    for key, value in report.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f"{head}{key}_")
+        elif isinstance(value, float):
+            flat[head + key] = value
+    return flat
 
 
 def test_a_tilted_axis_takes_a_part_of_the_spin(command):

@@ -396,10 +396,17 @@ def test_keys_and_fields_move_everything(browser, page):
 @pytest.mark.slow
 @pytest.mark.browser
 def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
-    for words in ("mu=abc&eta=&xdot=NaN", "load=toString&inertia=7", "%E0%A4%A&=&"):
+    wrong = {
+        "mu=abc&eta=&xdot=NaN&ydot=-1": "mu, eta, xdot.",
+        "load=toString&inertia=7": "load, inertia.",
+        "%E0%A4%A&=&": "\ufffd%A, .",
+    }
+    for words, left_out in wrong.items():
         browser.open(page, hash=words)
         assert browser.run(SHOWN)["verdict"] == "S+ R S−" and browser.errors() == {}
+        assert browser.left_out() == left_out
     browser.open(page, hash="mu=0&eta=0&xdot=1e9&omega=-1e9&ydot=5")  # as far as the sliders go
+    assert browser.left_out() == ""
     assert browser.run(SHOWN)["say"] == "speed 3, spin −6"
 
 

@@ -9,7 +9,9 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.flow.engine import interpreter_for
 from nonsmooth.flow.options import Options
+from nonsmooth.model import driven_of
 from nonsmooth.model.expressions import graph
+from nonsmooth.model.printing.instructions import derived_series_of, instructions_of
 
 
 def lattice(size):
@@ -81,3 +83,12 @@ def test_graphs_are_read_a_few_times(make, times, monkeypatch):
     monkeypatch.setattr(ca, "is_linear", lambda *args: found.append(own) or linear(*args))
     interpreter_for(system, Options(t_end=1.0))
     assert sum(found) < times * own
+
+
+def test_without_sliding_derivatives_have_series_of_the_field_alone():
+    """Of Lorenz's field the derivatives are the states, constants and 28 - z: one rule more."""
+    x, y, z = (ca.SX.sym(name) for name in "xyz")
+    above, below = ([10 * (y - x), x * (28 - z) - y, x * y - z + push] for push in (-2, 2))
+    of = driven_of(ns.FilippovSystem([x, y, z], surface=x, above=above, below=below))
+    plain, derived = instructions_of(of).free, derived_series_of(of)[1]
+    assert len(derived.lists["later"]) <= len(plain.lists["later"]) + 3

@@ -43,6 +43,15 @@ def tabulated():
     return ns.FilippovSystem.from_expression([x, v], rates)
 
 
+def counted():
+    """Discrete states that are counted up through values which Python shows with an exponent."""
+    import casadi as ca
+
+    x, small, large = (ca.SX.sym(name) for name in ("x", "small", "large"))
+    tick = ns.Reset(ca.sin(x), {small: small / 10, large: 10.5 * large}, name="tick")
+    return ns.FilippovSystem([x], field=[1], discrete=[small, large], resets=tick)
+
+
 def textbook(name):
     problem = ns.textbook.PROBLEMS[name]()
     run = problem.run()
@@ -99,6 +108,7 @@ def test_comments_and_spaces_leave_the_key():
 def test_runs_are_python_s():
     cases = [textbook(name) for name in FEW]
     cases += [(stiff(), [0.0, 2.0], 3.0, None), (tabulated(), [0.0, 0.0], 20.0, None)]
+    cases += [(counted(), [0.0, 1.0, 1.0], 30.0, None)]
     assert wrong(cases) == [""] * len(cases)
 
 

@@ -24,6 +24,7 @@ from nonsmooth.flow.section import Section
 from nonsmooth.model import (
     DefinitionError,
     FilippovSystem,
+    Impact,
     OptionError,
     ParameterError,
     PointError,
@@ -45,6 +46,14 @@ def make_system():
         parameters={belt: 0.3, friction: 0.4},
         stops=[Stop(x + 1.5, -1, "far")],
     )
+
+
+def bouncing():
+    """A forced mass on a stiff floor, with a wall."""
+    x, v, t = (ca.SX.sym(s) for s in "xvt")
+    floor, wall = Impact(x + 1, 0.8, name="floor"), Reset(x - 0.5, {v: -0.6 * v}, 1, name="wall")
+    field = [v, -x + 1.3 * ca.cos(1.7 * t)]
+    return FilippovSystem([x, v], field=field, time=t, impacts=floor, resets=wall)
 
 
 @pytest.fixture(scope="module")
@@ -306,21 +315,25 @@ def test_programs_that_are_compiled_for_long_are_not_compiled_for_short_ensemble
 
 @needs_compiler
 @pytest.mark.parametrize(
-    "section",
+    ("made", "section"),
     [
-        Section("crossing", count=5),
-        Section("h0", count=7),
-        Section("h0", count=2, skip=1, every=2),
-        Section("h0", direction=-1, count=50),
-        Section("entry", count=3),
-        Section("exit", count=100),
+        (make_system, Section("crossing", count=5)),
+        (make_system, Section("h0", count=7)),
+        (make_system, Section("h0", count=2, skip=1, every=2)),
+        (make_system, Section("h0", direction=-1, count=50)),
+        (make_system, Section("entry", count=3)),
+        (make_system, Section("exit", count=100)),
+        (bouncing, Section("wall", count=5)),
+        (bouncing, Section("impact", count=3, skip=1, every=2)),
+        (bouncing, Section("reset", count=50)),
+        (bouncing, Section("wall", count=4, after=True)),
     ],
-    ids=str,
+    ids=lambda own: getattr(own, "__name__", str(own)),
 )
-def test_sections_in_lanes_are_those_of_the_driver(section, monkeypatch):
-    starts = np.random.default_rng(2).normal(size=(100, 2))
+def test_sections_in_lanes_are_those_of_the_driver(made, section, monkeypatch):
+    starts = np.random.default_rng(2).normal(size=(100, 2)) / (1 + 3 * (made is bouncing))
     starts[7] = np.nan
-    run = lambda: ensemble(make_system(), starts, 30.0, at=section)
+    run = lambda: ensemble(made(), starts, 30.0, at=section)
     lanes = run()
     monkeypatch.setattr("nonsmooth.flow.ensembles.ensemble._WORTH", math.inf)
     core = run()

@@ -1,10 +1,14 @@
 """Problems of other tools' collections (``testset/problems.json``): closed forms and integrators of their own."""
 
+import json
+import sys
+
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from testset.__main__ import OVER, solve
 from testset.problem import Problem, cases
 
 from ..independent.contacts import Mechanism, follow
@@ -105,3 +109,15 @@ def test_derivatives_of_a_bounce():
     speed = np.sqrt(2 * 9.8)
     expected = [[1.8 / speed - 0.5, speed - 2], [1.8 / speed - 1, speed]]
     assert np.allclose(found.dx_dp, expected, rtol=0, atol=1e-10)
+
+
+def test_results_of_a_tool_are_kept_and_a_problem_has_a_limit(tmp_path):
+    tool, path, problems = "scipy, modes by hand", tmp_path / "scipy.json", cases()[:2]
+    solve(sys.executable, tool, problems, path, "a")
+    kept = {name: own["seconds"] for name, own in json.loads(path.read_text()).items()}
+    assert [*kept] == [own["id"] for own in problems]
+    solve("none", tool, problems[1:], path, "a")  # nothing is left to do
+    found = json.loads(path.read_text())
+    assert {name: own["seconds"] for name, own in found.items()}.items() <= kept.items()
+    solve(sys.executable, tool, problems[1:], path, "b", limit=1e-3)
+    assert [own["failed"] for own in json.loads(path.read_text()).values()] == [OVER]

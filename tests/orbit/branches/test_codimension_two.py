@@ -301,6 +301,67 @@ def test_a_double_crossing_sliding() -> None:
         assert_real(one)
 
 
+@pytest.mark.slow
+def test_grazing_of_cycles_begins_where_their_focus_is_on_the_surface() -> None:
+    """Cycles of radius sqrt(a) touch x = b at a = b^2; at a = b = 0 the focus does, at a Hopf point."""
+    grown = a - x**2 - y**2
+    system = ns.FilippovSystem(
+        [x, y], surface=b - x, above=[x * grown - y, y * grown + x], below=[-1, 0.3],
+        parameters={a: 0.25, b: 0.7},
+    )  # fmt: skip
+    box = [(-0.2, 0.9), (-0.5, 1.0)]
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.1, 0.1], 100.0))
+    event = ns.continue_orbit(orbit, "a", bounds=(0.2, 0.6)).events[0]
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=box, step=0.1)
+    (point,) = curve.special
+    assert point.kind == "grazing-sliding with Hopf" and np.abs(point.values).max() < 1e-12
+    found = ns.continue_bifurcation(point, ("a", "b"), bounds=box, step=0.1)
+    assert sorted(one.kind for one in found) == ["Hopf", *["boundary equilibrium"] * 2]
+    for one in found:
+        assert np.abs(one.values[:, 0 if one.kind == "Hopf" else 1]).max() < 1e-12
+    assert min(one.values[:, 1].min() for one in found if one.kind == "Hopf") > -1e-12
+
+
+@pytest.mark.slow
+def test_an_orbit_with_contact_doubles_up_to_its_grazing() -> None:
+    """y = 0.1 + b Y - Y^3 grows to Y by sigma^2 + ..., sigma^2 = -(a + Y/2): doubling there at b = 3 Y^2 - 1/2."""
+    reset = ns.Reset(s - 1, [1 + a + y / 2, 0.1 + b * y - y**3, -1.0], direction=1)
+    system = ns.FilippovSystem(
+        [x, y, s], surface=x, above=[2 * s, 0, 1], below=[5, 5, 1], parameters={a: 0.2, b: -0.5},
+        resets=[reset],
+    )  # fmt: skip
+    box = [(-0.06, 0.06), (-0.6, -0.4)]
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [1.2, 0.05, -1.0], 80.0))
+    event = ns.continue_orbit(orbit, "a", bounds=(-0.06, 0.3)).events[0]
+    assert event.kind == "period doubling"
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=box, step=0.1)
+    edge = next(z.real for z in np.roots([2, 0, -1.5, 0.1]) if 0 < z.real < 0.5)
+    (point,) = curve.special
+    assert point.kind == "period doubling with grazing-sliding"
+    assert point.values == pytest.approx([-edge / 2, 3 * edge**2 - 0.5], abs=1e-12)
+    found = ns.continue_bifurcation(point, ("a", "b"), bounds=box, step=0.1)
+    assert [one.kind for one in found] == ["grazing-sliding"] * 2  # both ways
+    for one in found:
+        assert_real(one)
+        z = -2 * one.values[:, 0]  # touches at a + Y/2 = 0
+        assert np.abs(0.1 + one.values[:, 1] * z - z**3 - z).max() < 1e-12
+
+
+@pytest.mark.slow
+def test_curves_leave_a_point_found_from_orbits_with_a_short_leg() -> None:
+    """CT4 from A > 1, where the flight that vanishes at A = 1 lasts like a cube root."""
+    system = forced(0.5, 3.0)
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0], 60.0))
+    branch, box = ns.continue_orbit(orbit, "b", bounds=(0.2, 4.0)), [(-3, 3), (0.05, 4.0)]
+    event = next(e for e in branch.events if abs(e.parameter - 1.5) < 1e-9)
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=box, step=0.05)
+    point = next(p for p in curve.special if p.kind == "adding-sliding with adding-sliding")
+    assert point.values == pytest.approx([0.0, 1.0], abs=1e-12)
+    found = ns.continue_bifurcation(point, ("a", "b"), bounds=box, step=0.05)
+    assert [one.kind for one in found] == ["adding-sliding"] * 3
+    assert all(np.abs(LINE["adding-sliding"](*one.values.T)).max() < 1e-10 for one in found)
+
+
 def test_pseudo_saddle_nodes_have_no_pairs() -> None:
     """The sliding flow of the plane has one eigenvalue."""
     system = ns.FilippovSystem(

@@ -33,6 +33,13 @@ def boundary_focus(slope: float, away: float = 0.0) -> ns.FilippovSystem:
     )
 
 
+def assert_starts(branch, bounds):
+    """Its first event is where its orbits begin, from which they are followed again."""
+    again = ns.continue_orbit(branch.events[0], "mu", bounds=bounds)
+    assert [e.kind for e in again.events] == [e.kind for e in branch.events]
+    assert len(again) < 2 * len(branch) and ns.orbit.BranchEnd.STEP_TOO_SMALL not in again.ends
+
+
 @pytest.mark.parametrize("step", [0.01, 0.05, 0.3])
 @pytest.mark.parametrize(
     ("slope", "label", "unfolding"), [(1.0, "BF1", "persistence"), (0.0, "BF2", "nonsmooth fold")]
@@ -68,8 +75,10 @@ def test_crossing_cycles_end_where_both_foci_are_on_the_surface():
         [X, Y], surface=Y, above=focus(0.1), below=focus(-0.3), parameters={MU: 0.3}
     )
     orbit = ns.periodic_orbit(system, [1.0, 0.01])
-    (event,) = ns.continue_orbit(orbit, "mu", bounds=(-0.5, 0.5)).events
+    branch = ns.continue_orbit(orbit, "mu", bounds=(-0.5, 0.5))
+    (event,) = branch.events
     assert event.kind == "boundary equilibrium" and abs(event.parameter) < 1e-15
+    assert_starts(branch, (-0.5, 0.5))
 
 
 @pytest.mark.parametrize("bend", [pytest.param(0.3, marks=pytest.mark.slow), -0.3])
@@ -85,6 +94,7 @@ def test_crossing_cycles_end_at_a_two_fold(bend):
     (event,) = branch.events
     assert event.kind == "two-fold" and abs(event.parameter) < 1e-15
     assert "shrinks to a two-fold" in event.far_side.verdict
+    assert_starts(branch, (-0.2, 0.2))
     # starts s < e have the mean mu, as below h is a parabola; above e = -s + (2/3) bend s^2 + O(s^3)
     for size in (0.01, 1e-3):
         small = branch[mu / 0.05 * size]
@@ -114,6 +124,7 @@ def test_an_orbit_that_comes_slowly_to_a_boundary_equilibrium_has_an_infinite_pe
     assert [event.kind for event in branch.events] == ["infinite period at a boundary node"]
     assert abs(branch.events[0].parameter) < 1e-12 and "logarithm" in branch.reasons[0]
     assert branch.ends[0] is ns.orbit.BranchEnd.PERIOD_DIVERGES
+    assert_starts(branch, (-0.3, 0.6))
 
 
 @pytest.mark.parametrize("slope", [0.0, 1.0])
@@ -133,6 +144,25 @@ def test_a_slide_that_comes_to_a_two_fold_inside_ends_its_branch_there(slope, sh
     branch = ns.continue_orbit(orbit, "mu", bounds=(-0.3, 0.6))
     assert [event.kind for event in branch.events] == ["two-fold"]
     assert abs(branch.events[0].parameter) < 1e-12 and "unique" in branch.reasons[0]
+
+
+@pytest.mark.parametrize("away", [0.0, 3.0])
+def test_a_slide_whose_exit_comes_to_a_two_fold_ends_its_branch_there(away):
+    """x = mu + s^2 lands at s = -sqrt(-mu); while it slides z' = 1.6 s/(z - 2 s), which has the ray z = -k s into z = s = 0."""
+    x, z, s = (ca.SX.sym(name) for name in "xzs")
+    system = ns.FilippovSystem(
+        [x, z, s],
+        surface=x,
+        above=[2 * s, 0, 1],
+        below=[z - away, -0.8, 1],
+        resets=[ns.Reset(s - 1, [1 + MU, away + 0.5, -1], direction=1)],
+        parameters={MU: 0.3},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [1.3, away + 0.5, -1.0], 10.0))
+    branch = ns.continue_orbit(orbit, "mu", bounds=(-0.9, 0.4))
+    assert [event.kind for event in branch.events] == ["two-fold", "grazing-sliding"]
+    slope = np.sqrt(2.6) - 1.0  # k (k + 2) = 1.6
+    assert branch.events[0].parameter == pytest.approx(-((0.5 / slope) ** 2), abs=1e-10)
 
 
 @pytest.mark.parametrize("located", [True, False])

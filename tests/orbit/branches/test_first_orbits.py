@@ -21,16 +21,35 @@ def two_zones(trace):
     )
 
 
-@pytest.mark.parametrize(("name", "trace"), [("focus_focus_0", -1.0), ("focus_focus_3", -0.501)])
-def test_cycles_from_a_boundary_equilibrium(name, trace):
-    born = ns.continue_equilibrium(two_zones(trace), [1.0, 0.5], "mu", bounds=(-1, 1)).events[0]
-    assert born.kind == "boundary equilibrium"
+def with_dampers(trace):
+    """The same in the position and its speed: the force of a damper jumps where the speed is not zero."""
+    sides = [[y, a * y - x + mu] for a in (0.5, trace)]
+    return ns.FilippovSystem(
+        [x, y], surface=x, above=sides[0], below=sides[1], parameters={mu: 1.0}
+    )
+
+
+@pytest.mark.parametrize(
+    ("system", "name", "trace"),
+    [
+        (two_zones, "focus_focus_0", -1.0),
+        (two_zones, "focus_focus_3", -0.501),
+        (with_dampers, "focus_focus_0", -1.0),
+    ],
+)
+def test_cycles_from_a_boundary_equilibrium(system, name, trace):
+    rest = [1.0, 0.5 if system is two_zones else 0.0]
+    passed = ns.continue_equilibrium(system(trace), rest, "mu", bounds=(-1, 1))
+    (born,) = passed.events
+    assert born.kind == "boundary equilibrium" and "persistence" in born.far_side.verdict
+    assert [one.status for one in passed.at(-1.0)] == ["real"]
     branch = ns.continue_orbit(born, "mu", bounds=(-1, 1))
     assert kinds(branch) == ["boundary equilibrium"] and abs(branch.events[0].parameter) < 1e-12
     (orbit,) = branch.at(0.5)
     assert orbit.period == pytest.approx(float(VALUES[name]["period"]), rel=1e-10)
     assert orbit.multipliers[1] == pytest.approx(float(VALUES[name]["multiplier"]), rel=1e-8)
-    heights = sorted(2 * leg.start[1] for leg in orbit.legs)
+    up = 2 if system is two_zones else -2  # y = trace x - x'
+    heights = sorted(up * leg.start[1] for leg in orbit.legs)
     expected = [float(VALUES[name][key]) for key in ("y_in_over_mu", "y_out_over_mu")]
     assert heights == pytest.approx(expected, rel=1e-8)
 
@@ -146,11 +165,14 @@ def test_visits_beyond_a_force_that_jumps(beyond, multiplier):
 
 @pytest.mark.slow
 def test_cycles_from_a_homoclinic_orbit():
-    """Van der Pol and Duffing, y' = x - x^3 + (c + x^2) y / 10: cycles inside a loop of the saddle."""
+    """Van der Pol and Duffing, y' = x - x^3 + (c + x^2) y / 20: cycles around both loops of the saddle, up to a fold."""
     c = ca.SX.sym("c")
-    field = [y, x - x**3 + 0.1 * (c + x**2) * y]
-    duffing = ns.FilippovSystem([x, y], field=field, parameters={c: -0.85})
+    field = [y, x - x**3 + 0.05 * (c + x**2) * y]
+    duffing = ns.FilippovSystem([x, y], field=field, parameters={c: -0.82})
     loop = ns.find_homoclinic(duffing, [0.0, 0.0], "c")
     branch = ns.continue_orbit(event_of(loop), "c", bounds=(-1.2, -0.7))
-    assert min(abs(branch.values - loop.value)) < 5e-3
-    assert "homoclinic" in kinds(branch)
+    assert sorted(kinds(branch)) == ["fold", "homoclinic"]  # none beyond the loop, of several turns
+    assert min(branch.values[branch.values > loop.value] - loop.value) < 5e-4
+    assert next(e for e in branch.events if e.kind == "homoclinic").parameter == pytest.approx(
+        loop.value, abs=1e-12
+    )

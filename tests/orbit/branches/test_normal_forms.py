@@ -70,13 +70,20 @@ def test_the_third_doubling_of_the_walker_has_its_coefficient_too():
     )  # Feigenbaum: 4.669 in the limit
 
 
-def test_a_subcritical_doubling_is_named():
-    """x -> -r x - x^3: f''' = -6 at x = 0, c = -1."""
-    orbit = fixed(ticking([Y], [-R * Y - Y**3], r=0.8), [0.0])
+@pytest.mark.parametrize(
+    ("image", "coefficient", "verdict", "error"),
+    [
+        (-R * Y - Y**3, -1.0, "(subcritical)", 1e-9),
+        (-R * Y * ca.sqrt(1 - (Y / 1e-5) ** 2), 0.5e10, "(supercritical, stable)", 1e-7),
+    ],
+)
+def test_a_doubling_has_the_coefficient_of_its_map(image, coefficient, verdict, error):
+    """x -> -r x + c x^3 + ... at r = 1; the second map is defined beside x = 0 only."""
+    orbit = fixed(ticking([Y], [image], r=0.8), [0.0])
     (event,) = ns.continue_orbit(orbit, "r", bounds=(0.5, 1.3)).events
     assert event.kind == "period doubling" and abs(event.parameter - 1) < 1e-12
-    assert event.coefficients["cubic coefficient"] == pytest.approx(-1.0, rel=1e-9)
-    assert event.far_side.verdict.endswith("(subcritical)")
+    assert event.coefficients["cubic coefficient"] == pytest.approx(coefficient, rel=error)
+    assert event.far_side.verdict.endswith(verdict)
 
 
 def test_the_torus_of_the_delayed_logistic_map_has_the_predicted_radius():

@@ -495,3 +495,25 @@ def test_a_reset_that_changes_nothing_is_added_and_left_out():
     assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
     for value in (0.1, 0.16, 0.175, 0.2):
         assert len(branch[value].legs) == (4 if found[0] < value < found[1] else 2)
+
+
+@pytest.mark.parametrize(
+    ("level", "itinerary", "period", "least", "kinds"),
+    [
+        (1.2, "+ -", 230.4114882, 7.3e-57, ["crossing-sliding", "switching-sliding", "homoclinic"]),
+        (1.6, "- + s", 299.95866648, 5.2e-81, ["switching-sliding"]),
+        (2.0, "- s", 372.70790638188, 1.2e-106, []),
+        (2.3, "-", 381.93555709071, 6.0e-110, ["grazing-sliding"]),
+    ],
+)
+def test_branches_of_relaxation_oscillations(level, itinerary, period, least, kinds):
+    """Harvested predators at b = 0.05: the period and the fewest prey by scipy, in logarithms of the states."""
+    system, given = ns.textbook.harvested_prey_predator().system, {"alpha": level, "b": 0.3}
+    run = ns.simulate(system, [0.5, 0.5], 600.0, parameters=given)
+    orbit = ns.periodic_orbit(system, run, parameters=given)
+    branch = ns.continue_orbit(orbit, "b", bounds=(0.05, 0.35))
+    assert [event.kind for event in branch.events] == kinds
+    orbit = branch.orbits[0]
+    assert orbit.itinerary == itinerary and orbit.period == pytest.approx(period, rel=1e-10)
+    fewest = orbit.trajectory.x[:, 0].min()
+    assert np.log(fewest) == pytest.approx(np.log(least), rel=1e-3)

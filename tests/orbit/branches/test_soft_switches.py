@@ -62,7 +62,8 @@ def test_the_other_way_the_visits_end():
     assert [branch.at(a)[0].itinerary for a in (0.3, 0.38)] == ["-", "- +"]
 
 
-def test_two_walls_are_touched_at_once():
+@pytest.mark.parametrize("symmetry", [None, "odd"])
+def test_two_walls_are_touched_at_once(symmetry):
     true = CASES["gap_1e-4"]["values"]
     force = 5 * ((x - 1) * (1 + l1) / 2 + (x + 1) * (1 - l2) / 2)
     gap = ns.FilippovSystem(
@@ -74,7 +75,8 @@ def test_two_walls_are_touched_at_once():
         time=t,
     )
     amplitude = float(true["A"])
-    branch = ns.continue_orbit(ns.periodic_orbit(gap, [0, 0]), "A", bounds=(0.2, amplitude))
+    orbit = ns.periodic_orbit(gap, [0, 0], symmetry=symmetry)
+    branch = ns.continue_orbit(orbit, "A", bounds=(0.2, amplitude))
     assert [event.kind for event in branch.events] == ["grazing of a soft switch"]
     expected = multipliers_of(true["multipliers"])
     found = np.sort_complex(branch.at(amplitude)[0].multipliers)

@@ -4,6 +4,7 @@ parameter, in two, and where branches of periodic orbits end."""
 from __future__ import annotations
 
 import itertools
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -113,6 +114,37 @@ def test_a_pseudo_saddle_in_space_is_reached_by_sliding(shear: float) -> None:
     assert close(flight, CASES["H1"]["flight"])
     last = found.trajectory.x[-1] - found.saddle.point
     assert np.linalg.norm(last) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("above", "below", "drives"),
+    [
+        ([1.06, 0.62], [0.35, 0.32], [[0.31, 0.41], [0.11, 0.23]]),
+        (
+            [0.5, 0.8, 1.1, 1.4],
+            [1.3, 0.4, 0.9, 0.6],
+            [[0.4, -0.1, 0.1, 0.3], [0.2, 0.4, -0.3, 0.0]],
+        ),
+    ],
+)
+def test_a_loop_with_decaying_states_has_the_parameter_of_its_plane(above, below, drives):
+    """H1 with states that decay at other rates on each side; it lands nearest to the pseudo-saddle, or comes near later."""
+    n = len(above)
+    state = ca.SX.sym("w", n + 2)
+    turn = np.linalg.qr(np.cos(np.arange((n + 2) ** 2).reshape(n + 2, -1) ** 2))[0]
+    turn = turn if n > 2 else np.eye(n + 2)
+    own = ca.DM(turn.T) @ state
+    u, v, w = own[0], own[1], own[2:]
+    fields = [[0.1 * u - (v - 1), u + 0.1 * (v - 1), drives[0] - ca.DM(above) * w]]
+    fields += [[c, 1, drives[1] - ca.DM(below) * w]]
+    sides = [ca.vertsplit(ca.DM(turn) @ ca.vertcat(*f)) for f in fields]
+    system = ns.FilippovSystem(
+        ca.vertsplit(state), surface=v, above=sides[0], below=sides[1], parameters={c: -0.6}
+    )
+    near = ns.find_pseudo_equilibrium(system, turn @ [-1.34, 0.0, *[0.0] * n])
+    found = ns.find_homoclinic(system, near, "c")
+    assert abs(found.value - float(CASES["H1"]["c_homoclinic"])) < 1e-12
+    assert found.itinerary == "s + s" and not found.faults and found.residual < 1e-12
 
 
 @pytest.mark.slow
@@ -257,3 +289,20 @@ def test_orbits_are_followed_from_a_hopf_point_to_their_grazing() -> None:
     (grazing,) = branch.events
     assert grazing.kind == "grazing-sliding" and abs(grazing.parameter - 0.64) < 1e-12
     assert branch[0.9].itinerary == "+ s" and not branch[0.9].is_virtual
+
+
+def test_no_solution_is_searched_for_far_from_the_guess():
+    """Where Newton's method diverges, of arctan(v - 3), damped steps integrate no loop beyond ten of its sizes."""
+    seen = list[float]()
+    loop = SimpleNamespace(scales=np.ones_like, iterations=0)
+
+    def equations(v):
+        seen.append(float(abs(v[0])))
+        return np.arctan(v - 3.0), np.array([[1 / (1 + (v[0] - 3.0) ** 2)]])
+
+    loop.equations = equations
+    with pytest.raises(ns.ConvergenceError):
+        homoclinic_orbits._solved(loop, np.zeros(1), "c", 30)
+    far = sum(value > 10 for value in seen)
+    found = homoclinic_orbits._solved(loop, np.zeros(1), "c", 30, damped=True)
+    assert abs(found[0] - 3.0) < 1e-12 and sum(value > 10 for value in seen) == 2 * far

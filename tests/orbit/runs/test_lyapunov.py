@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.flow.engine.columns import carry_frame
 from nonsmooth.orbit.runs import lyapunov
 from tests.orbit.interrupts import interrupt
 from tests.orbit.periodic_cases import (
@@ -210,3 +211,16 @@ def test_an_entry_to_sliding_loses_its_direction_in_any_unit(scale):
     found = ns.lyapunov_spectrum(system, [scale, scale], t_end=20.0, transient=10.0)
     assert found.exponents[0] == pytest.approx(-3.0, rel=1e-12)
     assert found.exponents[1] == -math.inf
+
+
+def test_a_chain_of_decompositions_is_that_of_householder():
+    rng = np.random.default_rng(3)
+    matrices = rng.normal(size=(40, 5, 5)) * 10.0 ** rng.uniform(-3, 3, size=(40, 5, 1))
+    q = np.linalg.qr(rng.normal(size=(5, 3)))[0]
+    frames, growth = carry_frame(matrices, q)
+    for matrix, frame, own in zip(matrices, frames, growth, strict=True):
+        q, r = np.linalg.qr(matrix @ q)
+        assert np.allclose(own, np.abs(np.diag(r)), rtol=1e-9)
+        assert np.allclose(frame.T @ frame, np.eye(3), atol=1e-14)
+        assert np.allclose(np.abs(np.diag(frame.T @ q)), 1.0, atol=1e-9)
+        q = frame

@@ -237,10 +237,18 @@ def test_classes_have_the_colours_of_the_atlas_and_boundaries_of_many_are_listed
 @pytest.mark.slow
 @pytest.mark.browser
 def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
-    for words in ("folds=toString&nu=a,b", "folds=XX&nu=1", "nu=NaN,1", "%E0%A4%A"):
+    wrong = {
+        "folds=toString&nu=a,b": "folds, nu.",
+        "folds=II&nu=1": "nu.",
+        "nu=NaN,1": "nu.",
+        "%E0%A4%A": "\ufffd%A.",
+    }
+    for words, left_out in wrong.items():
         browser.open(page, hash=words)
         assert shown(browser)["label"] == "Class II-C" and browser.errors() == {}
+        assert browser.left_out() == left_out
     browser.open(page, hash="folds=II&nu=1e9,-1e9")  # as far as the map goes
+    assert browser.left_out() == ""
     assert shown(browser)["say"] == "ν₁ = 3, ν₂ = −3"
 
 

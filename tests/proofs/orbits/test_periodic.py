@@ -310,7 +310,7 @@ REFUSED = {
 def test_other_orbits_are_refused_in_words(name):
     system, guess, changes, parameters, words = REFUSED[name]
     orbit = moved(ns.periodic_orbit(system, guess=guess), **changes)
-    proof = ns.certify(orbit, parameters=parameters, max_bits=128)
+    proof = ns.certify(orbit, parameters=parameters, max_bits=64)
     assert not proof.proven and not proof.exists and words in str(proof).replace("\n ", ""), proof
 
 

@@ -108,12 +108,19 @@ def test_an_interrupt_returns_what_was_computed():
     assert len(arc.points) > 3
 
 
-def test_an_error_of_the_equations_ends_the_arc_where_they_end():
+@pytest.mark.parametrize("reach", [0, 1])
+def test_an_error_of_the_equations_ends_the_arc_where_they_end(reach):
+    """Also an error at a point that is only tested, ``reach`` steps beyond the last one."""
+
     class Root(Curve):
         def equations(self, u):
             if u[0] < 0:
                 raise ns.PointError("outside")
             return np.array([u[1] - np.sqrt(u[0])]), np.array([[-0.5 / np.sqrt(u[0]), 1.0]])
+
+        def passed(self, last, new, ending):
+            self.equations(new.u + reach * (new.u - last.u))
+            return False
 
     arc = trace(Root(), [np.array([1.0, 1.0])], np.array([-1.0, -0.5]), step=0.1)
     assert arc.end in ("lost", "step too small")

@@ -241,3 +241,14 @@ int32_t pull_row(Run *r, Leg *l) {
   free(memory);
   return status;
 }
+
+/* Carry k orthonormal directions (k, n) by matrices (n, n) one after the other: ``q`` has the first ones and gets those
+ * behind each matrix, ``growth`` the diagonals (k) of the triangular factors. */
+void carry_frame(int64_t n, int64_t k, int64_t count, const double *matrix, double *q, double *growth) {
+  for (; count > 0; count--, matrix += n * n, growth += k)
+    for (int64_t j = 0; j < k; j++, q += n) {
+      double *own = q + k * n;
+      for (int64_t i = 0; i < n; i++) own[i] = dot(matrix + i * n, q, n);
+      growth[j] = orthonormal(own, own - j * n, j, n, 2);
+    }
+}

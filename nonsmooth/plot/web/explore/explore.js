@@ -2,7 +2,7 @@
 "use strict";
 
 (async () => {
-  const { svg, html, text, draggable, numberInput, address, setAddress, eachFrame } = Page;
+  const { svg, html, text, draggable, numberInput, address, leftOut, setAddress, eachFrame } = Page;
   const given = Page.data("explorer");
   const $ = (id) => document.getElementById(id);
   const TOLERANCE = 1e-10;
@@ -37,7 +37,8 @@
   // what is shown --------------------------------------------------------------------------------------
 
   const view = new Orbit.View(given.box, dimension);
-  const short = (v) => String(Number(v.toPrecision(7)));
+  const rounded = (v) => Number(v.toPrecision(7));
+  const short = (v) => String(rounded(v));
   const FLOWS = ["short", "long", "none"];
   const initial = () => ({
     p: given.sliders.map((slider) => slider.value),
@@ -64,29 +65,44 @@
     const box = numbers(a.box, 4);
     const turn = numbers(a.turn, 2);
     const t = numbers(a.t, 1);
+    const read = {
+      ...{ p, x, t: t?.[0] > 0, turn: turn && !view.flat, flow: FLOWS.includes(a.flow) },
+      box: box && box[0] < box[1] && box[2] < box[3],
+    };
     if (p) state.p = p;
     if (x) state.x = x;
-    if (t && t[0] > 0) [state.t] = t;
-    if (box && box[0] < box[1] && box[2] < box[3]) state.limits = [box.slice(0, 2), box.slice(2)];
-    if (turn && !view.flat) view.turn = turn;
-    if (FLOWS.includes(a.flow)) state.flow = a.flow;
+    if (read.t) [state.t] = t;
+    if (read.box) state.limits = [box.slice(0, 2), box.slice(2)];
+    if (read.turn) view.turn = turn;
+    if (read.flow) state.flow = a.flow;
+    leftOut(a, read);
   }
 
   let resting;
   function writeAddress() {
+    clearTimeout(resting);
+    const turn = view.flat ? {} : { turn: view.turn.map(short) };
+    const box = state.limits.flat().map(short);
+    setAddress({ p: state.p, x: state.x, t: state.t, box, ...turn, flow: state.flow });
+  }
+
+  function writeAddressAtRest() {
     clearTimeout(resting); // browsers limit how often the address may change
-    resting = setTimeout(() => {
-      const turn = view.flat ? {} : { turn: view.turn.map(short) };
-      const box = state.limits.flat().map(short);
-      setAddress({
-        p: state.p.map(short),
-        x: state.x.map(short),
-        t: short(state.t),
-        box,
-        ...turn,
-        flow: state.flow,
-      });
-    }, 200);
+    resting = setTimeout(writeAddress, 200);
+  }
+
+  /** A start that runs take: discrete states have one of their values, clocks a phase below their periods. */
+  function fitted(x) {
+    const nearest = (v, values) =>
+      values.reduce((a, b) => (Math.abs(b - v) < Math.abs(a - v) ? b : a));
+    const made = x.map((v, i) => (given.values[i] ? nearest(v, given.values[i]) : v));
+    for (const [i, guard] of given.clocks) {
+      const at = Float64Array.from(system.n > dimension ? [...made, 0] : made);
+      const late = engine.sample(at, state.p, Array(engine.width).fill(1)).at(guard);
+      const period = made[i] - late;
+      made[i] = Math.max(0, late < 0 ? made[i] : 0.999 * period);
+    }
+    return made;
   }
 
   // pictures -------------------------------------------------------------------------------------------
@@ -105,6 +121,7 @@
   const refreshers = [];
 
   const update = eachFrame(() => {
+    state.x = fitted(state.x);
     const begun = performance.now();
     const run = engine.simulate(state.x, state.p, { ...LIMITS, tEnd: state.t });
     const took = performance.now() - begun;
@@ -119,7 +136,7 @@
     drawKey();
     moveHandle();
     for (const refresh of refreshers) refresh();
-    writeAddress();
+    writeAddressAtRest();
     sweep();
     document.body.dataset.milliseconds = (performance.now() - begun).toFixed(1);
     document.body.dataset.ready = "yes";
@@ -182,12 +199,13 @@
 
   moveHandle = draggable(portrait.plane, {
     name: "Start of the orbit",
-    get step() {
-      return (state.limits[0][1] - state.limits[0][0]) / 400;
+    get steps() {
+      const fine = (state.limits[0][1] - state.limits[0][0]) / 400;
+      return [0, 1].map((k) => (view.flat && gaps[k]) || fine);
     },
     get: () => view.at(state.x),
     set: (point) => {
-      state.x = view.moved(state.x, point);
+      state.x = view.moved(state.x, point).map(rounded);
       update();
     },
     say: () => system.states.map((name, k) => `${name} ${text(state.x[k])}`).join(", "),
@@ -229,10 +247,15 @@
     };
   }
 
+  /** How far apart the values of a discrete state are; 0 of another state. */
+  const gaps = given.values.map((values) =>
+    values?.length > 1 ? Math.min(...values.slice(1).map((v, k) => Math.abs(v - values[k]))) : 0,
+  );
+
   // inputs ---------------------------------------------------------------------------------------------
 
   const fine = (low, high) => Number(((high - low) / 400).toPrecision(2));
-  const input = (id, name, title, [min, max], get, set) =>
+  const input = (id, name, title, [min, max], get, set, gap = 0) =>
     refreshers.push(
       numberInput($("inputs"), {
         id,
@@ -240,7 +263,7 @@
         title,
         min,
         max,
-        step: fine(min, max),
+        step: gap || fine(min, max),
         get,
         set: (v) => (set(v), update()),
       }),
@@ -257,14 +280,16 @@
   });
   system.states.forEach((name, k) => {
     const [low, high] = view.pairs[k];
-    const range = [Math.min(low, given.start[k]), Math.max(high, given.start[k])];
+    const usual = [Math.min(low, given.start[k]), Math.max(high, given.start[k])];
+    const values = given.values[k];
     input(
       `x-${k}`,
       name,
       "at the start",
-      range,
+      gaps[k] ? [Math.min(...values), Math.max(...values)] : usual,
       () => state.x[k],
       (v) => (state.x[k] = v),
+      gaps[k],
     );
   });
   input(
@@ -336,7 +361,7 @@
   const setSwept = (event) => {
     const { low, high } = given.sliders[state.over];
     const [value] = cloud.plane.underPointer(event);
-    state.p[state.over] = Math.min(Math.max(value, low), high);
+    state.p[state.over] = Math.min(Math.max(rounded(value), low), high);
     update();
   };
   $("sweep").addEventListener("pointerdown", (event) => {
@@ -397,13 +422,17 @@
   }
 
   function python() {
-    const values = given.sliders.map(({ name }, k) => `"${name}": ${short(state.p[k])}`).join(", ");
+    const values = given.sliders
+      .map(({ name }, k) => `${JSON.stringify(name)}: ${state.p[k]}`)
+      .join(", ");
     const parameters = values && `, parameters={${values}}`;
-    const start = state.x.map(short).join(", ");
-    return `run = nonsmooth.simulate(system, [${start}], t_end=${short(state.t)}${parameters})\nprint(run)\n`;
+    return `run = nonsmooth.simulate(system, [${state.x.join(", ")}], t_end=${state.t}${parameters})\nprint(run)\n`;
   }
 
-  $("link").addEventListener("click", () => Saving.copy(location.href, "Link").then(say));
+  $("link").addEventListener("click", () => {
+    writeAddress();
+    Saving.copy(location.href, "Link").then(say);
+  });
   $("python").addEventListener("click", () => Saving.copy(python(), "Python").then(say));
   $("save").addEventListener("click", () => {
     const href = URL.createObjectURL(

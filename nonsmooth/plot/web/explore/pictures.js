@@ -5,14 +5,20 @@ const Pictures = (() => {
   const { svg, html, text, Plane } = Page;
   const isPhone = () => innerWidth < 900;
 
+  /** Letters of a mode, without the values of discrete states. */
+  function lettersOf(mode) {
+    const [first] = mode.split(",");
+    return first.includes("=") ? "" : first;
+  }
+
   /** A class of lines for each mode: off surfaces and sets, below, sliding or in contact, and three for others. */
   class Modes {
     others = [];
 
     of(mode) {
-      const [letters] = mode.split(",");
+      const letters = lettersOf(mode);
       if (/[sc]/.test(letters)) return "mode-slide";
-      if (mode.includes(",")) return this.further(mode);
+      if (mode !== letters) return this.further(mode);
       if (/^[+o*]*$/.test(letters)) return "mode-above";
       if (/^-+$/.test(letters)) return "mode-below";
       return this.further(mode);
@@ -73,7 +79,7 @@ const Pictures = (() => {
       const { states, dimension } = this.system;
       const rows = Math.min(dimension, Series.MOST);
       plane.limits([0, end], [0, 1]);
-      const slid = pieces.filter(({ mode }) => /^[^,]*s/.test(mode));
+      const slid = pieces.filter(({ mode }) => lettersOf(mode).includes("s"));
       const parts = slid.map(({ t }) =>
         plane.polygon(
           [

@@ -4,7 +4,7 @@ import casadi as ca
 
 import nonsmooth as ns
 import nonsmooth.textbook as textbook
-from nonsmooth.flow.engine.building.codegen import supports_lanes
+from nonsmooth.flow.engine.building.codegen import supports_device
 from nonsmooth.flow.engine.device.kernel import Given, Kernel, Source
 from nonsmooth.flow.results import Chunk
 
@@ -12,7 +12,7 @@ from nonsmooth.flow.results import Chunk
 TAKEN = sorted(
     name
     for name in textbook.PROBLEMS
-    if supports_lanes(textbook.by_name(name).system) and not textbook.by_name(name).system.sets
+    if supports_device(textbook.by_name(name).system) and not textbook.by_name(name).system.sets
 )
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engine import find_compiler, interpreter_for, lanes_for
+from nonsmooth.flow.engine import find_compiler, interpreter_for
 from nonsmooth.flow.engine import lanes as engine
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
@@ -56,7 +56,77 @@ def oscillators():
     return ns.FilippovSystem([x, y, z], surface=x - 0.2 * z * z, stops=stops, **fields), 9.0, 2.0
 
 
-SYSTEMS = {f.__name__: f for f in (pendulum, relay, converter, oscillators)}
+def impacts():
+    """A forced mass between two stiff stops, on one of which it may rest."""
+    walls = [ns.Impact(1.2 - x, 0.8, name="right"), ns.Impact(x + 0.6, 0.2, name="left")]
+    field = [y, -x - 0.1 * y + 1.2 * ca.cos(1.7 * t)]
+    return ns.FilippovSystem([x, y], field=field, impacts=walls, time=t), 12.0, 0.5
+
+
+def kicks():
+    """Friction, a wall as a reset, and a kick that a large speed makes due, whichever way it becomes so."""
+    wall = ns.Reset(x - 0.6, {y: -0.7 * y}, 1, name="wall")
+    kick = ns.Reset(ca.logic_or(y > 1, x < -1.2), {y: 0.2 * y, x: 0.5 * x}, name="kick")
+    above, below = [y, -x - 0.1], [y, -x + 0.1]
+    resets, stops = [wall, kick], [ns.Stop(y + 0.04 * x + 1.6, -1)]
+    return (
+        ns.FilippovSystem(
+            [x, y], surface=y - 0.2, above=above, below=below, resets=resets, stops=stops
+        ),
+        9.0,
+        1.0,
+    )
+
+
+def sampled():
+    """A control that is sampled by one clock and switched by the phase of another."""
+    one, two = ns.Clock(0.7, {z: -2 * x - y}, name="sample"), ns.Clock(0.4, name="carrier")
+    duty = two.phase - 0.2 - 0.1 * ca.tanh(z)
+    above, below = [y, -x - 0.4, 0], [y, -x + z, 0]
+    rest = {"clocks": [one, two], "stops": ns.Stop(x - 1.2)}
+    return ns.FilippovSystem([x, y, z], surface=duty, above=above, below=below, **rest), 8.4, 1.0
+
+
+def heating():
+    """A relay with hysteresis as a discrete state, and a window that opens while it is on."""
+    on = ns.Reset(x < 18 - y, {z: 1}, level=True, when=z == 0, name="on")
+    off = ns.Reset(x > 22 + y, {z: 0}, level=True, when=z == 1, name="off")
+    window = ns.Reset(x - 20, {x: x - 0.4}, 1, when=y > 0, values="trigger", name="window")
+    return (
+        ns.FilippovSystem(
+            [x, y],
+            field=[30 * z - x + ca.sin(t), ca.cos(3 * t)],
+            discrete={z: (0, 1)},
+            resets=[on, off, window],
+            time=t,
+        ),
+        6.0,
+        0.9,
+    )
+
+
+def walls():
+    """Springs that a mass meets at both ends, friction, and a multiplier that enters nonlinearly."""
+    a, b, c = (ca.SX.sym(s) for s in "abc")
+    push = -x - 2 * (1 + a) * (x - 0.5) + 2 * (b - 1) * (x + 0.6) - 0.2 * c + 0.1 * c**2
+    system = ns.FilippovSystem(
+        [x, y],
+        field=[y, push + 0.9 * ca.cos(1.3 * t)],
+        surfaces=[x - 0.5, x + 0.6, y - 0.1],
+        multipliers=[a, b, c],
+        hidden=True,
+        time=t,
+    )
+    return system, 9.0, 1.0
+
+
+SYSTEMS = {
+    f.__name__: f
+    for f in (pendulum, relay, converter, oscillators, impacts, kicks, sampled, heating, walls)
+}
+
+#: Systems with events that the driver makes.
+EVENTS = [impacts, kicks, sampled, heating, walls]
 
 
 def lanes_of(system, order, width, monkeypatch):
@@ -66,6 +136,8 @@ def lanes_of(system, order, width, monkeypatch):
 
 def starts_of(system, size, count):
     start = np.random.default_rng(7).uniform(-size, size, (count, system.dimension))
+    still = len(system.definition.clocks) + len(system.definition.discrete)
+    start[:, system.dimension - still :] = 0
     return np.hstack([start, np.zeros((count, int(system.time_dependent)))])
 
 
@@ -83,6 +155,9 @@ def same(one, two, digits):
             np.testing.assert_allclose(*pair, rtol=0, atol=digits, err_msg=name)
 
 
+@pytest.mark.slow_cases(
+    *("4-kicks", "4-heating", *[f"{w}-{f.__name__}" for f in EVENTS for w in (1, 8)])
+)
 @pytest.mark.parametrize("name", SYSTEMS)
 @pytest.mark.parametrize("width", [1, 4, 8])
 def test_steps_made_by_the_driver_at_random(width, name, monkeypatch):
@@ -101,7 +176,9 @@ def test_steps_made_by_the_driver_at_random(width, name, monkeypatch):
     lanes.random = 5
     mixed = lanes.run_many(start, p, options, at, rows(), times=times)
     same(mixed, scalar, 1e-7)
-    assert 0.45 < mixed.totals[2] / mixed.totals[0] < 0.6
+    steps, driven = mixed.totals[[0, 2]]
+    events = 0 if SYSTEMS[name] not in EVENTS else 60 + scalar.totals[1]
+    assert 0.45 < driven / steps < 0.6 + events / steps
 
 
 def test_runs_that_begin_late(monkeypatch):
@@ -129,13 +206,6 @@ def test_parameters_of_each_start(monkeypatch):
     lanes.random = 3
     scalar = interpreter_for(system, options).run_many(start, p, options, (1, 1))
     same(lanes.run_many(start, p, options, (1, 1)), scalar, 1e-7)
-
-
-def test_stops_with_conditions_are_not_for_lanes():
-    half = {"when": y > 0}, {"level": True}, {"initially": True}
-    for more in ({}, *half):
-        system = ns.FilippovSystem([x, y], field=[y, -x], stops=[ns.Stop(x - 1, 1, **more)])
-        assert (lanes_for(system, Options(t_end=1.0)) is None) == bool(more)
 
 
 @pytest.mark.parametrize("base", [1.05, 2.0, 50.0])

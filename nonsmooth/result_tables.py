@@ -79,6 +79,7 @@ class ResultTable:
         axes, data = self.coordinates(), dict[str, Any]()
         sizes = [own if isinstance(own, int) else len(v) for own, (_, _, v) in
                  zip(self.index.values(), axes, strict=True)]  # fmt: skip
+        single = {name for name, more, _ in self.variables() if not more}
         for name, more, array in self.variables():
             if not more:
                 data[name] = array.ravel()
@@ -89,7 +90,7 @@ class ResultTable:
             plain = {*more} <= self.labels.keys() & _PLAIN
             for label, column in zip(product(*labels), flat.T, strict=True):
                 key = "_".join(map(str, label))
-                rest = f"{key}_{name.removeprefix('x_')}" if key in data else key
+                rest = f"{key}_{name.removeprefix('x_')}" if key in {*data, *single} else key
                 data[rest if plain else f"{name}_{key}"] = column
         index = None
         if len(axes) > 1:

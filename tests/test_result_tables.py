@@ -151,6 +151,16 @@ def test_axes_of_runs_and_ensembles():
     assert points.index.name == "t" and list(points) == ["x", "v"]
 
 
+def test_states_with_the_names_of_columns_keep_their_values():
+    pytest.importorskip("pandas")
+    names = ("t", "status", "itinerary")
+    system = ns.FilippovSystem([ca.SX.sym(name) for name in names], field=[1, 0, 0])
+    many = ns.ensemble(system, [[1.0, 2.0, 3.0]], 1.0)
+    frame = many.to_pandas()
+    assert frame.loc[0, [f"{name}_x" for name in names]].tolist() == many.x[0].tolist()
+    assert frame.loc[0, "status"] == "REACHED_END"
+
+
 def test_every_result_of_the_notebooks_becomes_tables():
     pytest.importorskip("pandas")
     pytest.importorskip("xarray")

@@ -191,7 +191,7 @@ def _begins(row: dict[str, str], start: Start, units: Units) -> bool:
     for name in ("speed", "angle"):
         column = f"{name} [{units.names[name]}]"
         value = row.get(f"launch_{column}") or row.get(f"landing_{column}")
-        if value and (start.state is None or value != str(units.show(name, start.typed[name]))):
+        if value and (start.state is None or value != str(units.cell(name, start.typed[name]))):
             return False
     return True
 

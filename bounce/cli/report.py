@@ -39,6 +39,12 @@ class Units:
             value = value.si(self._system)
         return value / factor(kind, self.names[kind])
 
+    def cell(self, kind: str, value: float | Quantity) -> float:
+        """Return a value in the chosen units with six digits, more than a launch monitor measures, or as typed."""
+        shown = self.show(kind, value)
+        typed = isinstance(value, Quantity) and value.named(self._system) == self.names[kind]
+        return shown if typed else float(f"{shown:.6g}")
+
     def say(self, kind: str, value: float, digits: int | None = None) -> str:
         """Return a value in SI units as text in the chosen unit; by default two digits, and all before the point."""
         shown = self.show(kind, value)
@@ -56,19 +62,14 @@ class Units:
         return shown
 
     def row(self, report: dict[str, Any]) -> dict[str, Any]:
-        """Return a report in SI units as a row: nested names joined, units in brackets.
-
-        Results have six digits, more than a launch monitor measures; what was typed stays as it was.
-        """
+        """Return a report in SI units as a row: nested names joined, units in brackets."""
         row: dict[str, Any] = {}
         for name, value in report.items():
             kind = _MEASURES.get(name)
             if isinstance(value, dict):
                 row |= {f"{name}_{inner}": v for inner, v in self.row(value).items()}
             elif kind is not None:
-                shown = self.show(kind, value)
-                typed = isinstance(value, Quantity)
-                row[f"{name} [{self.names[kind]}]"] = shown if typed else float(f"{shown:.6g}")
+                row[f"{name} [{self.names[kind]}]"] = self.cell(kind, value)
             else:
                 row[name] = "; ".join(value) if isinstance(value, (list, tuple)) else value
         return row

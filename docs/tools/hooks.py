@@ -32,7 +32,7 @@ _LISTED = re.compile(r"(?<=<code>)\(((?:<(a|autoref) [^>]*>\w+</\2>(?:, )?)+)\)(
 _NOTHING = re.compile(r"\s*–\s*<div class=\"doc-md-description\">\s*</div>")
 #: Pages that the search lists after those that explain: lists of names, pictures, records, pages for developers.
 _BEHIND = re.compile(
-    "api/|papers/|decisions/|(architecture|benchmarks|changelog|cite|extend|gallery|testset|textbook|vision)\\.md"
+    "api/|papers|decisions/|(architecture|benchmarks|changelog|cite|extend|gallery|gpu|testset|textbook|vision)\\.md"
 )
 _ROLE = re.compile(r":(?:class|func|meth|mod|attr):(?=<code>|`)")
 

@@ -134,3 +134,27 @@ def test_pages_request_each_name_and_are_in_the_navigation():
     assert len([shown for shown, _ in requested if shown]) > 20
     navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
     assert [uri for uri in pages if f": {uri}\n" not in navigation] == []
+
+
+def test_parameters_are_described_where_they_are_listed():
+    """What the pages show in place of "As in" another function, and what is left of it."""
+    shared = pytest.importorskip("docs.tools.shared_entries", reason="griffe is of the docs extra")
+
+    def shown(thing):
+        return shared.one_each(inspect.getdoc(thing) or "", thing.__module__)
+
+    assert "\nt\n    Time, where the system depends on it.\nsurface\n" in shown(ns.classify)
+    assert "mode`` chooses sides" in shown(ns.classify).partition("\nmode\n")[2]
+    left = {
+        path
+        for path, thing in OBJECTS.items()
+        if inspect.isfunction(thing)
+        and "As in :func:" in "".join(shown(thing).partition("Returns\n---")[:1])
+    }
+    kept = {
+        "bounce.lift_off",
+        "bounce.maps.dividing_surface",
+        "bounce.maps.proven_map",
+        "nonsmooth.attractors",
+    }
+    assert left == kept

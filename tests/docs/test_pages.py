@@ -54,13 +54,20 @@ def test_blocks_run_and_print_what_the_page_says(page, tmp_path, monkeypatch):
         check_block(page.name, line, found["source"], found["output"], namespace)
 
 
-def test_each_program_of_the_readme_runs_by_itself():
-    """Every name that a block reads is one of its own."""
+def test_programs_run_by_themselves():
+    """Each of the README, and with the imports of the page each section of the recipes by trade, has all its names."""
     text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
-    for found in BLOCK.finditer(text):
-        names = [n for n in ast.walk(ast.parse(found["source"])) if isinstance(n, ast.Name)]
+    programs = [found["source"] for found in BLOCK.finditer(text)]
+    imports, *sections = re.split(
+        "^###? ", (DOCS / "trades.md").read_text(encoding="utf-8"), flags=re.M
+    )
+    head = "".join(found["source"] for found in BLOCK.finditer(imports))
+    programs += [head + "".join(f["source"] for f in BLOCK.finditer(part)) for part in sections]
+    for source in programs:
+        nodes = [*ast.walk(ast.parse(source))]
+        names = [n for n in nodes if isinstance(n, ast.Name)]
         own = {n.id for n in names if isinstance(n.ctx, ast.Store)} | set(dir(builtins))
-        own |= set(re.findall(r"^import (?:\w+ as )?(\w+)", found["source"], re.MULTILINE))
+        own |= set(re.findall(r"^import (?:\w+ as )?(\w+)", source, re.MULTILINE))
         assert {n.id for n in names} <= own
 
 

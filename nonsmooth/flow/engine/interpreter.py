@@ -389,6 +389,11 @@ class Interpreter:
                 self.add_implicit()
         return int(status)
 
+    @property
+    def size(self) -> int:
+        """Rules and terms of a step in all orders."""
+        return int(self._c.series.size + self._c.series.terms) * self.order
+
     def seconds(self, x: Array, p: Array, options: Options) -> float | None:
         """About how long the steps of a run take that lanes could make; None if it takes implicit ones soon."""
         # By what a step has to do, not by the clock: what is decided by it has to be the same again.

@@ -46,8 +46,9 @@ class PseudoEquilibrium(Tabular):
     status : {"real", "virtual"}
         Virtual if $alpha$ is outside (0, 1): the fields are parallel there, not opposite. On several
         surfaces: if a multiplier is outside (-1, 1).
-    region : Region
-        On several surfaces: whether sliding along their intersection attracts or repels, else MIXED.
+    region : Region or None
+        On several surfaces: whether sliding along their intersection attracts or repels, else MIXED. None for rest
+        between two forces, without sliding, on branches of :func:`continue_equilibrium`.
     kind : str
         ``"stable pseudo-node"``, ``"unstable pseudo-node"``, ``"pseudo-saddle"``, with complex
         eigenvalues ``"stable pseudo-focus"``, ...; ``"pseudo-saddle-node"`` or ``"degenerate"``
@@ -71,7 +72,7 @@ class PseudoEquilibrium(Tabular):
     point: Array
     alpha: float
     status: str
-    region: Region
+    region: Region | None
     kind: str
     eigenvalues: NDArray[Any]
     stable: bool
@@ -88,10 +89,10 @@ class PseudoEquilibrium(Tabular):
         if self.multipliers.size > 1:
             weights = f"multipliers {', '.join(f'{v:.6g}' for v in self.multipliers)}"
             surface = f"the intersection {self.mode}"
-        return (
-            f"{self.status} {self.kind} at {self.point.tolist()} in {self.region}, "
-            f"{weights}, eigenvalues along {surface} {values}."
-        )
+        where = f"{self.status} {self.kind} at {self.point.tolist()}"
+        if self.region is None:
+            return f"{where}, {weights}."
+        return f"{where} in {self.region}, {weights}, eigenvalues along {surface} {values}."
 
 
 def pseudo_kind(kind: str, region: Region) -> str:

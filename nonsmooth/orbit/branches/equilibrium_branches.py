@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...local.checks import parameter_index, require_autonomous, require_linear
+from ...local.classify import classify
 from ...local.discrete_states import with_discrete_states_held
 from ...local.point.surface_point import SIDES, LocalSurface, Side, side_index, surface_at
 from ...local.read_only import ReadOnly
@@ -30,6 +31,7 @@ from ...local.searches.equilibria import (
     needs_mode,
 )
 from ...local.searches.pseudo_equilibria import (
+    PseudoEquilibrium,
     find_pseudo_equilibrium,
     pseudo_equilibrium_at,
     sliding_matrix,
@@ -47,6 +49,9 @@ START = 1e-4
 #: A switching function or weight below minus this is that of a virtual equilibrium.
 VIRTUAL = 1e-9
 
+#: The test of a boundary equilibrium that changes its class.
+_TURNS = "persistence turns into nonsmooth fold"
+
 #: Relative error of a state.
 _ROUNDING = 1e-13
 
@@ -55,7 +60,7 @@ _ROUNDING = 1e-13
 _MEETS = {
     "generic": ("equilibrium and pseudo-equilibrium", "pseudo-equilibrium"),
     "smooth": ("the equilibria of both sides", "equilibrium"),
-    "velocity continuous": ("equilibrium and rest between the two forces", ""),
+    "velocity continuous": ("equilibrium and rest between the two forces", "rest"),
     "undecided": ("equilibrium and pseudo-equilibrium", ""),
 }
 
@@ -189,16 +194,16 @@ class Equilibria(BranchCurve):
     def boundary_numbers(self, u: Array, k: int) -> Mapping[str, float]:
         """Functions that vanish where a boundary equilibrium of F1 (k = 0) or F2 (k = 1) changes class."""
         x, here = u[: self.n], self.local_surface(u)
-        numbers, a = here.finite_at(x), here.jacobians(x)[k]
-        other, sign = numbers.fields[1 - k], 1.0 - 2.0 * k
+        numbers, switching, both = here.finite_at(x), here.switching, here.jacobians(x)
+        a, other, sign = both[k], numbers.fields[1 - k], 1.0 - 2.0 * k
         bordered = np.block([[a, other[:, None]], [numbers.gradient[None, :], np.zeros((1, 1))]])
         values = by_real_part(a)
         i, j = np.triu_indices(self.n, 1)
-        found = {
-            "the other field is tangent": sign * float(numbers.gradient @ other),
-            "persistence turns into nonsmooth fold": -sign * float(np.linalg.det(bordered)),
-            "fold": float(np.linalg.det(a)),
-        }
+        vanishes = not (switching.slides or switching.force_jumps)  # the other field too
+        change = np.linalg.det(both[1 - k]) if vanishes else -sign * np.linalg.det(bordered)
+        found = {_TURNS: float(change), "fold": float(np.linalg.det(a))}
+        if switching.slides:
+            found["the other field is tangent"] = sign * float(numbers.gradient @ other)
         if self.n > 1:
             found["Hopf"] = float(np.prod(values[i] + values[j]).real)
         return found
@@ -282,10 +287,11 @@ class EquilibriumCurve(Equilibria):
         if not (switching.slides or switching.force_jumps):
             beyond = EquilibriumCurve(near.where, self.free, self.scale, SIDES[1 - near.k])
             return beyond.entered(zero.point.u)
-        if switching.kind != "generic":
+        if switching.kind == "undecided":
             return None
         scale = np.append(self.scale[: self.n], [1.0, self.scale[-1]])
-        curve = _PseudoEquilibriumCurve(near.where, self.free, scale)
+        of = _RestCurve if switching.force_jumps else _PseudoEquilibriumCurve
+        curve = of(near.where, self.free, scale)
         return _leave(curve, np.concatenate([x, [float(near.k), value]]), 1.0 - 2.0 * near.k)
 
 
@@ -377,6 +383,42 @@ class _PseudoEquilibriumCurve(Equilibria):
         return curve.entered(np.append(u[: self.n], u[-1]))
 
 
+class _RestCurve(_PseudoEquilibriumCurve):
+    """The same equations where a force jumps with the position: rest between the two forces, without sliding."""
+
+    def eigenvalues(self, u: Array) -> NDArray[Any]:
+        return np.zeros(0)  # orbits turn round it, or leave it
+
+    def tests(self, point: Point) -> Mapping[str, float]:
+        u = point.u
+        switches = self.local_surface(u).switches(u[: self.n])
+        found = {"alpha = 0": float(u[self.n]), "alpha = 1": float(1 - u[self.n])}
+        return found | {name: float(switches[j]) for name, j in self._surfaces.items()}
+
+    def describe(self, u: Array) -> PseudoEquilibrium:
+        here, x, alpha = self.local_surface(u), u[: self.n], float(u[self.n])
+        mode = here.mode if self.system.surface_count > 1 else None
+        label = classify(
+            self.system, x, parameters=here.values, surface=here.surface, mode=mode
+        ).label
+        stable, inside = label.startswith("stable"), min(alpha, 1.0 - alpha)
+        return PseudoEquilibrium(
+            point=x,
+            alpha=alpha,
+            status="real" if inside > 0.0 else "virtual",
+            region=None,
+            kind=f"rest between two forces, {label}",
+            eigenvalues=self.eigenvalues(u),
+            stable=stable,
+            margin=abs(inside),
+            distance=0.0,
+            residual=0.0,
+            iterations=0,
+            mode=self.where.mode,
+            multipliers=np.array([1.0 - 2.0 * alpha]),
+        )
+
+
 def _critical_pair(values: NDArray[Any]) -> list[int]:
     """Indices of the two eigenvalues whose sum is nearest to zero."""
     k, l = np.triu_indices(values.size, 1)
@@ -444,7 +486,8 @@ def continue_equilibrium(
     Returns
     -------
     Branch
-        Its ``solutions`` are Equilibrium and PseudoEquilibrium. Events: ``"fold"``, ``"Hopf"`` (with
+        Its ``solutions`` are Equilibrium and PseudoEquilibrium, also rest between two forces where a force jumps with the
+        position. Events: ``"fold"``, ``"Hopf"`` (with
         its first Lyapunov coefficient, for an eigenvector of length one), ``"branch point"``,
         ``"pseudo-saddle-node"``, ``"boundary equilibrium"`` of any surface, condition or contact (persistence or
         nonsmooth fold, in its ``far_side``), ``"two-fold"`` (sliding changes its stability), ``"intersection"``

@@ -175,6 +175,8 @@ def test_what_was_given_is_echoed_as_it_was_typed(command, tmp_path, name, side)
     for units, speed in (("us", 40.1), ("golf", 40.1 * 0.44704)):
         (row,) = rows_of(command(name, "--input", path, "--units", units, *side)[1])
         assert [row[f"{what}_angle [deg]"], row[f"{what}_spin [rpm]"]] == ["10.9", "2686.0"]
+        speed_said = {"us": "40.1", "golf": "17.9263"}[units]
+        assert speed_said in [row.get(f"{what}_speed [{unit}]") for unit in ("mph", "m/s")]
         typed = "--speed 40.1mph --angle 10.9 --spin 2686 --json --units".split()
         report = json.loads(command(name, *typed, units, *side)[1])[what]
         assert report == dict(speed=speed, angle=10.9, spin=2686.0)

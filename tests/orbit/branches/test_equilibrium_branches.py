@@ -240,13 +240,6 @@ def test_equilibria_of_a_continuous_field_go_on_or_meet_on_its_surface():
         assert found.point[0] == pytest.approx(at, abs=1e-12) and found.status == "real"
 
 
-def test_an_equilibrium_ends_where_a_force_jumps():
-    preload = planar([y, mu - x - y - 1], [y, mu - x - y], 0.5, surface=x - 1)
-    branch = ns.continue_equilibrium(preload, [0.5, 0.0], "mu", bounds=(0, 5), side="-")
-    assert [e.kind for e in branch.events] == ["boundary equilibrium"]
-    assert branch.ends[1].name == "EVENT" and branch.values.max() == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize(("stiffness", "verdict"), [(3.0, "persistence"), (-3.0, "nonsmooth fold")])
 def test_a_stop_with_a_damper_has_the_equilibria_of_its_springs(stiffness, verdict):
     """x = mu on one side and mu/stiffness on the other one; the damper, 1.2 x' beside 0.2 x', does not enter."""
@@ -261,3 +254,44 @@ def test_a_stop_with_a_damper_has_the_equilibria_of_its_springs(stiffness, verdi
         sorted({0.3, other / stiffness} if other > 0 else {other / stiffness})
     )
     assert ns.classify(system, [0, 0], parameters={"mu": 0}).label == verdict
+
+
+@pytest.mark.parametrize("force", [1.5, -1.5])
+def test_equilibria_continue_with_rest_between_two_forces(force):
+    """A force that jumps by 1.5 holds x = 0 against 0 < -mu < 1.5, or leaves it where it points away from there."""
+    system = planar([y, mu - 2 * x - 0.3 * y], [y, mu - x - 0.1 * y + force], 0.4, surface=x)
+    branch = ns.continue_equilibrium(system, [0.2, 0], "mu", bounds=(-3, 3))
+    assert (
+        named(branch)
+        == sorted([("boundary equilibrium", -force), ("boundary equilibrium", 0.0)])[
+            :: 1 if force > 0 else -1
+        ]
+    )
+    word = "persistence" if force > 0 else "nonsmooth fold"
+    assert all(word in event.far_side.verdict for event in branch.events)
+    found = branch.at(-force / 2)
+    (rest,) = (one for one in found if "rest" in one.kind)
+    assert np.abs(rest.point).max() < 1e-15 and rest.alpha == pytest.approx(0.5)
+    assert rest.stable == (force > 0) and "two-fold" not in str(rest)
+    assert len(found) == (1 if force > 0 else 3)
+
+
+@pytest.mark.parametrize(
+    "sides",
+    [
+        ([y, mu - x - 0.2 * y], [y, mu - a * x - 1.2 * y]),  # a damper
+        ([-y - 0.2 * x, x - mu], [-y - 0.2 * x, a * x - mu]),  # a spring
+        ([y, mu - x - 0.2 * y], [y, mu - x - 0.2 * y + a]),  # a force
+    ],
+)
+def test_a_boundary_equilibrium_changes_its_class(sides):
+    system = ns.FilippovSystem(
+        [x, y], surface=x, above=sides[0], below=sides[1], parameters={mu: 0.4, a: 1.0}
+    )
+    rest = ns.find_equilibrium(system, [0.4, 0.0]).point
+    events = ns.continue_equilibrium(system, rest, "mu", bounds=(-3, 1)).events
+    event = next(e for e in events if abs(e.parameter) < 1e-12)
+    curve = ns.continue_bifurcation(event, ("mu", "a"), bounds=[(-3, 1), (-2, 2)])
+    (point,) = curve.special
+    assert point.kind == "persistence turns into nonsmooth fold"
+    assert np.abs(point.values).max() < 1e-12

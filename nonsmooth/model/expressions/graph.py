@@ -44,13 +44,17 @@ NOT_SMOOTH: dict[str, str] = {
 
 
 #: Operations that may be a power that is not a whole number.
-POWERS = ("sqrt", "pow", "constpow")
+POWERS = frozenset(("sqrt", "pow", "constpow"))
 
 #: Smooth operations that are no longer so where one of their arguments is always zero.
 _BESIDE_ZERO: dict[str, str] = {
     "atan2": "atan2 with an argument that is zero (a jump where the other one changes its sign)",
     "hypot": "hypot with an argument that is zero (the absolute value of the other one)",
 }
+
+
+#: Operations that are smooth whatever their arguments are.
+_SMOOTH = {*UNARY, *BINARY, "const", "input", "output"} - NOT_SMOOTH.keys() - _BESIDE_ZERO.keys()
 
 
 class Node(NamedTuple):
@@ -71,7 +75,7 @@ def instructions(
 ) -> tuple[list[Node], list[list[int]]]:
     """Value-number the graph of dense ``outputs`` over ``inputs``, unless not ``merged``."""
     outputs = [_dense(o) for o in outputs]
-    read = lambda: _read(ca.Function("graph", list(inputs), outputs), merged)
+    read = lambda: _read(function_of(inputs, outputs), merged)
     own, given = (sum(e.numel() for e in some) for some in (outputs, inputs))
     if 4 * own < given:  # small, and sooner read than compared
         return read()
@@ -87,29 +91,31 @@ def instructions(
 _READ: list[tuple[Hashable, tuple[list[Node], list[list[int]]], list[ca.SX]]] = []
 
 
+def function_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> ca.Function:
+    """A Function whose instructions, without those of outputs, are numbered by their results."""
+    return ca.Function("graph", list(inputs), list(outputs), {"live_variables": False})
+
+
 def _read(function: ca.Function, merged: bool) -> tuple[list[Node], list[list[int]]]:
     nodes: list[Node] = []
     known: dict[Node, int] = {}
-    register: dict[int, int] = {}
+    register: list[int] = []
     rows: list[list[int]] = [[-1] * function.numel_out(k) for k in range(function.n_out())]
-    code, source_of, target_of = (
-        function.instruction_id,
-        function.instruction_input,
-        function.instruction_output,
-    )
-    for k in range(function.n_instructions()):
-        op, source, target = OPERATIONS[code(k)], source_of(k), target_of(k)
+    source_of = function.instruction_input
+    for k, code in enumerate(map(function.instruction_id, range(function.n_instructions()))):
+        op = OPERATIONS[code]
         if op == "const":
             node = Node(op, (), float(function.instruction_constant(k)))
         elif op == "input":
-            node = Node(op, (), (source[0], source[1]))
+            node = Node(op, (), tuple(source_of(k)))
         elif op == "output":
-            rows[target[0]][target[1]] = register[source[0]]
+            vector, position = function.instruction_output(k)
+            rows[vector][position] = register[source_of(k)[0]]
             continue
         elif op == "call":
             refuse_call(function.instructions_sx()[k].which_function(), "expression")
         elif op == "printme":  # prints its second argument where CasADi evaluates it
-            register[target[0]] = register[source[0]]
+            register.append(register[source_of(k)[0]])
             continue
         elif op not in UNARY and op not in BINARY:
             raise DefinitionError(
@@ -117,19 +123,31 @@ def _read(function: ca.Function, merged: bool) -> tuple[list[Node], list[list[in
                 f"arithmetic and elementary functions: {', '.join((*UNARY, *BINARY))}."
             )
         else:
-            node = Node(op, tuple([register[a] for a in source]))
+            node = Node(op, tuple([register[a] for a in source_of(k)]))
         number = known.setdefault(node, len(nodes)) if merged else len(nodes)
         if number == len(nodes):
             nodes.append(node)
-        register[target[0]] = number
+        register.append(number)
     return nodes, rows
 
 
-def uses(expression: ca.SX, operations: Sequence[str]) -> bool:
-    """Whether an expression has some operations."""
-    function = ca.Function("graph", [ca.vertcat(*ca.symvar(expression))], [_dense(expression)])
-    codes = {code for code, op in OPERATIONS.items() if op in operations}
-    return any(function.instruction_id(k) in codes for k in range(function.n_instructions()))
+def operations_of(expression: ca.SX) -> set[str]:
+    """Names of the operations of a dense expression; those of the last one are kept."""
+    key = tuple(e.element_hash() for e in ca.vertsplit(ca.vec(expression)))
+    if not _LAST or _LAST[0][0] != key:
+        symbols = ca.vertcat(*ca.symvar(expression))
+        _LAST[:] = [(key, expression, operations(function_of([symbols], [_dense(expression)])))]
+    return _LAST[0][2]
+
+
+#: The hashes of the expression whose operations were read last, the expression, so that they stay its, and these.
+_LAST: list[tuple[Hashable, ca.SX, set[str]]] = []
+
+
+def operations(function: ca.Function) -> set[str]:
+    """Names of the operations of a graph."""
+    codes = {*map(function.instruction_id, range(function.n_instructions()))}
+    return {OPERATIONS[code] for code in codes}
 
 
 def _dense(output: ca.SX) -> ca.SX:
@@ -247,6 +265,8 @@ def require_smooth(
     expression: ca.SX, variables: ca.SX, others: ca.SX, what: str, advice: str = IN_A_FIELD
 ) -> None:
     """Refuse an expression that is not smooth in ``variables``; in ``others`` it need not be."""
+    if operations(function_of([variables, others], [_dense(expression)])) <= _SMOOTH:
+        return
     nodes, _ = instructions([variables, others], [expression])
     moving = depends_on(nodes, [True, False])
     for node, moves in zip(nodes, moving, strict=True):

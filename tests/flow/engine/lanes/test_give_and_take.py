@@ -181,6 +181,15 @@ def test_steps_made_by_the_driver_at_random(width, name, monkeypatch):
     assert 0.45 < driven / steps < 0.6 + events / steps
 
 
+@pytest.mark.parametrize(("count", "share"), [(1, 1), (2, 0)])
+def test_slides_of_several_surfaces_are_no_work_for_lanes(count, share):
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    given = {"surfaces": [x, y][:count], "multipliers": [a, b][:count]}
+    system = ns.FilippovSystem([x, y], field=[-a, -b if count > 1 else x], **given)
+    options, p = Options(t_end=1.0), system.parameter_vector()
+    assert (interpreter_for(system, options).seconds(np.zeros(2), p, options) > 0) == share
+
+
 def test_runs_that_begin_late(monkeypatch):
     """The time of a state is since the start in the driver, and that of the clock in lanes."""
     above, below = [y, -x - 0.4], [y, -x + 0.4]

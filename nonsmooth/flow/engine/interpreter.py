@@ -407,7 +407,8 @@ class Interpreter:
         steps = len(run.t) / (max(done, 1e-9) if run.status == Status.TOO_MANY_STEPS else 1.0)
         closed = "sc" if driver_decides(self.system) else "c"
         made = [not set(closed) & set(mode) for mode in run.letters]
-        share = np.mean(np.array(made)[run.written["step_mode"]]) if len(run.starts) else 1.0
+        modes = run.written["step_mode"]
+        share = np.mean(np.array(made)[modes]) if len(modes) else 1.0
         return float(steps * share) * (_OF_STEP + _OF_TERM * (series.size + series.terms))
 
     def _checked(self, motion: Array) -> Array:

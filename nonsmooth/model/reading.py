@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import chain, islice
@@ -213,15 +212,3 @@ def require_known(
             f"{what}: it contains {[str(s) for s in foreign]}, but the states are {list(states)} and "
             f"the parameters {list(parameters)}. {cause}"
         )
-
-
-def require_finite(expression: ca.SX, known: ca.SX, what: str) -> None:
-    """Refuse NaN and infinite constants."""
-    f = ca.Function("constants", [known], [expression])
-    for k, code in enumerate(map(f.instruction_id, range(f.n_instructions()))):
-        if code == ca.OP_CONST and not math.isfinite(f.instruction_constant(k)):
-            raise DefinitionError(
-                f"{what}: expected finite constants, received {f.instruction_constant(k)} in "
-                f"{expression}. Functions of Python's math turn a symbol into NaN: write casadi.sin(x), "
-                "not math.sin(x)."
-            )

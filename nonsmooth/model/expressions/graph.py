@@ -6,6 +6,7 @@ codes are used here only.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from itertools import accumulate, pairwise
 from typing import NamedTuple, Protocol, TypeVar, cast
@@ -131,23 +132,32 @@ def _read(function: ca.Function, merged: bool) -> tuple[list[Node], list[list[in
     return nodes, rows
 
 
-def operations_of(expression: ca.SX) -> set[str]:
-    """Names of the operations of a dense expression; those of the last one are kept."""
-    key = tuple(e.element_hash() for e in ca.vertsplit(ca.vec(expression)))
-    if not _LAST or _LAST[0][0] != key:
-        symbols = ca.vertcat(*ca.symvar(expression))
-        _LAST[:] = [(key, expression, operations(function_of([symbols], [_dense(expression)])))]
-    return _LAST[0][2]
+class Content(NamedTuple):
+    """Names of the operations of an expression, and a constant that is no finite number."""
+
+    expression: ca.SX  # so that the hashes stay its
+    hashes: frozenset[int]
+    operations: frozenset[str]
+    infinite: float | None
 
 
-#: The hashes of the expression whose operations were read last, the expression, so that they stay its, and these.
-_LAST: list[tuple[Hashable, ca.SX, set[str]]] = []
+def content_of(expression: ca.SX) -> Content:
+    """What an expression contains, or one that was read before and has all of its entries."""
+    expression, last = _dense(expression), next(iter(_LAST), None)
+    hashes = frozenset(e.element_hash() for e in ca.vertsplit(ca.vec(expression)))
+    if last and (last.hashes == hashes or (last.hashes > hashes and last.infinite is None)):
+        return last
+    function = function_of([ca.vertcat(*ca.symvar(expression))], [expression])
+    codes = [*map(function.instruction_id, range(function.n_instructions()))]
+    numbers = (function.instruction_constant(k) for k, c in enumerate(codes) if c == ca.OP_CONST)
+    infinite = next((number for number in numbers if not math.isfinite(number)), None)
+    found = Content(expression, hashes, frozenset(OPERATIONS[c] for c in {*codes}), infinite)
+    _LAST[:] = [found]
+    return found
 
 
-def operations(function: ca.Function) -> set[str]:
-    """Names of the operations of a graph."""
-    codes = {*map(function.instruction_id, range(function.n_instructions()))}
-    return {OPERATIONS[code] for code in codes}
+#: The content that was read last.
+_LAST: list[Content] = []
 
 
 def _dense(output: ca.SX) -> ca.SX:
@@ -261,11 +271,20 @@ IN_A_SURFACE = (
 IN_A_GAP = "Give each smooth piece of the gap an Impact of its own."
 
 
+def require_finite(expression: ca.SX, what: str) -> None:
+    """Refuse NaN and infinite constants."""
+    if (found := content_of(expression).infinite) is not None:
+        raise DefinitionError(
+            f"{what}: expected finite constants, received {found} in {expression}. Functions of Python's math turn a "
+            "symbol into NaN: write casadi.sin(x), not math.sin(x)."
+        )
+
+
 def require_smooth(
     expression: ca.SX, variables: ca.SX, others: ca.SX, what: str, advice: str = IN_A_FIELD
 ) -> None:
     """Refuse an expression that is not smooth in ``variables``; in ``others`` it need not be."""
-    if operations(function_of([variables, others], [_dense(expression)])) <= _SMOOTH:
+    if content_of(expression).operations <= _SMOOTH:
         return
     nodes, _ = instructions([variables, others], [expression])
     moving = depends_on(nodes, [True, False])

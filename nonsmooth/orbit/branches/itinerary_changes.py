@@ -123,8 +123,9 @@ _NEIGHBOURS = 1e-5
 #: Sine of the angle at which a field is tangent to a surface.
 _TANGENT = 1e-7
 
-#: L of the other field, relative to its gradient and the state, where a slide touches both folds.
-_BOTH = 1e-9
+#: L of the other field, relative to its gradient and the state, where a slide touches both folds, and where it ends
+#: beside both, as at a two-fold the equations are singular.
+_BOTH, _BESIDE = 1e-9, 1e-7
 
 SOFT, FORCE = "grazing of a soft switch", "grazing of a jumping force"
 CHATTER_END, PLASTIC = "end of complete chatter", "plastic impact"
@@ -155,7 +156,7 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     if test.what == "end":
         return "two-fold"
     if test.what == "transversality":
-        if at_two_fold(problem.system, leg, at.flows.end[i], p, at.starts):
+        if at_two_fold(problem.system, leg, at.flows.end[i], p, at.starts, _BESIDE):
             return "two-fold"
         return {
             "impact": "impact grazing",

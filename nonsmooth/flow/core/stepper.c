@@ -404,6 +404,16 @@ static double tick_of(const Run *r, int c, double *low) {
   return sum;
 }
 
+/* The time after a step, in one number: that of a tick which ends it, or of the run's end. */
+static double time_after(const Run *r, double dt) {
+  double to = pair_sum((Pair){r->t, r->t_low}, (Pair){dt, 0}).high, low;
+  for (int c = 0; c < r->s->rules.clocks; c++) {
+    double tick = tick_of(r, c, &low);
+    if (fabs(tick - to) <= ROUNDING * fabs(to)) to = tick;
+  }
+  return smaller(to, r->o.t_end);
+}
+
 /* Improve the root of a guard's polynomial by the guard itself along the motion, unless its slope is rounding or the guard
  * does not pass zero near it. */
 static double polished(Run *r, const Expansion *e, int row, double root) {

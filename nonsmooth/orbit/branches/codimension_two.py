@@ -55,8 +55,8 @@ _CONTACT = " with contact"
 #: Events at which multipliers are continuous.
 _CONTINUOUS = ("crossing-sliding", "switching-sliding", "adding-sliding", SOFT)
 
-#: Duration of a leg that vanishes where others are tangent, relative to the orbit.
-_VANISHES = 1e-3
+#: Duration of a leg that vanishes where others are tangent, relative to the orbit: a cube root of rounding.
+_VANISHES = 1e-4
 
 #: Distance of a point from its guess, and of the states of one event in two itineraries, in scaled unknowns.
 _NEAR, _SAME = 0.05, 1e-4

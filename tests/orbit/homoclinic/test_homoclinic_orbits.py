@@ -241,6 +241,7 @@ def test_lorenz_has_his_homoclinic_orbit() -> None:
     assert abs(found.value - 13.926557) < 1e-6  # Sparrow 1982; Doedel, Krauskopf & Osinga 2006
 
 
+@pytest.mark.slow
 def test_an_orbit_that_comes_along_the_strongly_stable_direction() -> None:
     """The value where orbits of the unstable manifold turn from x > 1 to x < 1: bisection with scipy's DOP853."""
     force = x**2 - 1 + 0.2 * (mu + x) * y + 0.1 * z

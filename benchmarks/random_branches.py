@@ -325,6 +325,8 @@ def checked(kind: str, seed: int, counts: Counter[str]) -> Branch | None:
     signal.setitimer(signal.ITIMER_PROF, LIMIT)
     try:
         branch, reason = branch_of(kind, seed)
+        if branch is not None and BranchEnd.INTERRUPTED in branch.ends:
+            raise KeyboardInterrupt
         wrong = [] if branch is None else errors_on(branch, counts)
     except KeyboardInterrupt:
         branch, reason, wrong = None, f"longer than {LIMIT} s", [f"takes longer than {LIMIT} s"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import chain, islice
 from typing import Any, NoReturn
@@ -179,7 +179,7 @@ def symbols(values: Any, what: str) -> ca.SX:
 def require_unique(symbols: ca.SX) -> None:
     """Refuse symbols of one name."""
     names = [str(s) for s in ca.vertsplit(symbols)]
-    twice = sorted({n for n in names if names.count(n) > 1})
+    twice = sorted(n for n, times in Counter(names).items() if times > 1)
     if twice:
         raise DefinitionError(
             f"symbols: expected one name for each state, parameter, multiplier and time, received "
@@ -212,15 +212,3 @@ def require_known(
             f"{what}: it contains {[str(s) for s in foreign]}, but the states are {list(states)} and "
             f"the parameters {list(parameters)}. {cause}"
         )
-
-
-def require_finite(expression: ca.SX, known: ca.SX, what: str) -> None:
-    """Refuse NaN and infinite constants."""
-    f = ca.Function("constants", [known], [expression])
-    for k in range(f.n_instructions()):
-        if f.instruction_id(k) == ca.OP_CONST and not math.isfinite(f.instruction_constant(k)):
-            raise DefinitionError(
-                f"{what}: expected finite constants, received {f.instruction_constant(k)} in "
-                f"{expression}. Functions of Python's math turn a symbol into NaN: write casadi.sin(x), "
-                "not math.sin(x)."
-            )

@@ -66,8 +66,8 @@ _ROWS = 4096
 #: States at rest that are compared with what is known in one call.
 _TOGETHER = 256
 
-#: Numbers that samples may hold in one call.
-_HELD = 2**24
+#: Numbers that samples may hold in one call; those of one that come into memory that was used before.
+_HELD, _AGAIN = 2**24, 2**21
 
 #: Largest number of returns in a cycle that is recognised before the end of the run.
 _LONGEST = 8
@@ -246,7 +246,7 @@ class Search:
         late = np.full((len(self.x0), min(self.samples, count), self.x0.shape[1]), np.nan)
         self._failures = 0
         while len(left):
-            rows = max(1, _HELD // (count * dense * self.x0.shape[1]))
+            rows = max(1, _AGAIN // (count * dense * self.x0.shape[1]))
             going = list[NDArray[np.intp]]()
             for part in np.split(left, range(rows, len(left), rows)):
                 at = self._sample(self.x0[part], count, what, dense)

@@ -50,8 +50,8 @@ static int rests_unstably(const Run *r, const int8_t *letter) {
 static int spirals_out(Run *r, const int8_t *letter) {
   int w = r->width, is_read = 0;
   for (int i = 0; i < r->m; i++)
-    for (int j = 0; j < r->m; j++) {
-      if (letter[i] || letter[j] || degree_of(r, i) != 2 || degree_of(r, j) != 1) continue;
+    for (int j = 0; j < r->m && !letter[i] && degree_of(r, i) == 2; j++) {
+      if (letter[j] || degree_of(r, j) != 1) continue;
       if (!has_law(r, i, SURFACE_LAW) || !has_law(r, j, SURFACE_LAW) || !(r->letter[i] || r->letter[j])) continue;
       if (!is_read++) {
         aim(r, letter, r->x, r->chosen.unknowns);

@@ -345,6 +345,7 @@ static int leaves_zero(Run *r, int row) {
 static void give(Run *r, const Batch *b, int64_t i, Suspended *m) {
   int64_t first = m->history > r->history - HISTORY ? m->history : r->history - HISTORY;
   m->status = r->status;
+  m->steps = r->step_count;
   if (r->status != RUNNING) { keep(r, b, i); return; }
   if (b->at_x && isfinite(r->at_t)) {
     b->at_t[i] = r->at_t;

@@ -21,14 +21,12 @@ static void guard_rows(Run *r, const Layout *l, const double *series, int count,
 }
 
 /* Coefficients k of sliding multipliers, which keep those of the layer's rates at zero. */
-static void follow_layer(Run *r, Expansion *e, int k, const int32_t *start) {
+static void follow_layer(Run *r, Expansion *e, int k) {
   int slides = e->l.slides;
   for (int i = 0; i < slides; i++) {
     double sum = 0;
-    for (int q = start[i]; q < start[i + 1]; q++) {
-      int j = start[slides + 1 + q];
-      sum += e->inverse[i * slides + j] * row_of(r, r->n + e->l.sliding[j])[k];
-    }
+    for (int q = e->from[i]; q < e->to[i]; q++)
+      sum += e->inverse[q] * row_of(r, r->n + e->l.sliding[e->column[q]])[k];
     e->series[(int64_t)e->l.sliding[i] * r->stride + k] = -sum;
   }
 }
@@ -109,8 +107,8 @@ static void keep_rates(Run *r, Expansion *e) {
   }
 }
 
-/* All coefficients of a mode with sets; ``start`` are offsets in the inverse. */
-static void set_series(Run *r, Expansion *e, const int32_t *start) {
+/* All coefficients of a mode with sets. */
+static void set_series(Run *r, Expansion *e) {
   int leaving = 0;
   EACH_LEAVING(r, e, f) leaving = 1;
   for (int k = 0; k <= r->order; k++) {
@@ -122,7 +120,7 @@ static void set_series(Run *r, Expansion *e, const int32_t *start) {
         open_order(r, e, k);
         leave_sets(r, e, k, 0);
       }
-    } else if (k && e->l.slides) follow_layer(r, e, k, start);
+    } else if (k && e->l.slides) follow_layer(r, e, k);
     if (k && (leaving || e->l.slides)) close_order(r, e, k);
     close_sets(r, e, k);
     if (k < r->order) next_states(r, e, k);
@@ -131,7 +129,7 @@ static void set_series(Run *r, Expansion *e, const int32_t *start) {
 }
 
 /* All coefficients of a mode without sets: those of the field give the next ones of the states. */
-static void mode_series(Run *r, Expansion *e, const int32_t *start) {
+static void mode_series(Run *r, Expansion *e) {
   const Series *t = e->l.is_free ? &r->s->free : &r->s->series;
   int order = r->order, stride = r->stride, slides = e->l.slides;
   double *s = r->series;
@@ -148,7 +146,7 @@ static void mode_series(Run *r, Expansion *e, const int32_t *start) {
   for (int k = 1; k <= order; k++) {
     series_rules(t, &t->loop, k, k, stride, s);
     if (slides) {
-      follow_layer(r, e, k, start);
+      follow_layer(r, e, k);
       inputs_of(r, e, k);
       for (int32_t l = t->states; l < t->inputs; l++) s[t->input[l] + k] = r->input[t->index[l]];
       series_rules(t, &t->loop_late, k, k, stride, s);
@@ -189,18 +187,11 @@ static void weigh_rounding(Run *r, int is_free, double size) {
 }
 
 static void jets(Run *r, Expansion *e) {
-  int slides = e->l.slides;
-  int32_t *start = r->sparse, *column = start + slides + 1, count = 0;
   r->expansion = e;
-  for (int i = 0; i < slides; i++) {
-    start[i] = count;
-    for (int j = 0; j < slides; j++) if (e->inverse[i * slides + j] != 0) column[count++] = j;
-  }
-  start[slides] = count;
   if (r->s->sets) {
-    set_series(r, e, start);
+    set_series(r, e);
     measure_limits(r, e);
-  } else mode_series(r, e, start);
+  } else mode_series(r, e);
   guard_rows(r, &e->l, e->series, r->order + 1, e->guards);
 }
 
@@ -262,6 +253,84 @@ static int invert_layer(Run *r, const Layout *l, const double *unknowns, double 
   return invert_any(m, n, size, inverse, size + n, r->pending) && 0;
 }
 
+static int root_of_group(int32_t *root, int i) {
+  while (root[i] != i) i = root[i] = root[root[i]];
+  return i;
+}
+
+/* Groups of those that slide which the layer's slope couples: positions ``member``, of each group from ``first`` on, in order.
+ * Returns their number. */
+static int groups_of_layer(const Run *r, const Layout *l, const int32_t **member, const int32_t **first) {
+  int n = l->slides, w = r->width, groups = 0;
+  const Entries *slope = &r->s->slope;
+  int32_t *own = r->groups, *from = own + n, *at = from + n + 1, *root = at + w, *number = root + n;
+  for (int i = 0; i < w; i++) at[i] = -1;
+  for (int i = 0; i < n; i++) { at[l->sliding[i]] = root[i] = i; from[i + 1] = 0; }
+  for (int e = 0; e < slope->count; e++) {
+    int i = at[slope->row[e]], j = at[slope->column[e]];
+    if (i < 0 || j < 0 || i == j || r->slope[slope->row[e] * w + slope->column[e]] == 0) continue;
+    i = root_of_group(root, i);
+    j = root_of_group(root, j);
+    root[i < j ? j : i] = i < j ? i : j;
+  }
+  for (int i = 0; i < n; i++) {
+    int head = root_of_group(root, i);
+    number[i] = head == i ? groups++ : number[head];
+    from[number[i] + 1]++;
+  }
+  from[0] = 0;
+  for (int g = 0; g < groups; g++) from[g + 1] += from[g];
+  for (int i = 0; i < n; i++) at[i] = 0;
+  for (int i = 0; i < n; i++) own[from[number[i]] + at[number[i]]++] = i;
+  *member = own;
+  *first = from;
+  return groups;
+}
+
+/* The layer's slope among some of those that slide. */
+static void slope_among(const Run *r, const Layout *l, const int32_t *member, int n, double *a) {
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) a[i * n + j] = r->slope[l->sliding[member[i]] * r->width + l->sliding[member[j]]];
+}
+
+/* Add nonzero entries of rows of the inverse. */
+static void add_inverse(Expansion *e, const int32_t *member, int n, const double *inverse) {
+  for (int i = 0; i < n; i++) {
+    int own = member ? member[i] : i;
+    e->from[own] = e->entries;
+    for (int j = 0; j < n; j++) {
+      if (inverse[i * n + j] == 0) continue;
+      e->column[e->entries] = member ? member[j] : j;
+      e->inverse[e->entries++] = inverse[i * n + j];
+    }
+    e->to[own] = e->entries;
+  }
+}
+
+/* Inverse of the layer's slope of an expansion, group by group where all of them have one. */
+static int invert_groups(Run *r, Expansion *e, const double *unknowns) {
+  const Layout *l = &e->l;
+  const int32_t *member, *first;
+  int is_regular = !r->s->combined, groups = is_regular ? groups_of_layer(r, l, &member, &first) : 0;
+  e->entries = 0;
+  for (int g = 0; g < groups && is_regular; g++) {
+    const int32_t *own = member + first[g];
+    int n = first[g + 1] - first[g];
+    double *a = r->work, *inverse = a + (int64_t)n * n;
+    slope_among(r, l, own, n, a);
+    is_regular = invert(a, n, inverse);
+    slope_among(r, l, own, n, a);
+    for (int i = 0; l->slides > 1 && i < n; i++)
+      for (int j = 0; j < n; j++) is_regular &= fabs(a[i * n + j] * inverse[j * n + i]) < 1 / SINGULAR;
+    add_inverse(e, own, n, inverse);
+  }
+  if (is_regular || (!r->s->combined && !may_be_singular(r, l))) return 1;
+  is_regular = invert_layer(r, l, unknowns, r->matrix);
+  e->entries = 0;
+  add_inverse(e, 0, l->slides, r->matrix);
+  return is_regular;
+}
+
 /* Near a surface with a root h has a relative tolerance: the root magnifies errors of h. */
 static void allow_for_roots(Run *r, Expansion *e) {
   const Entries *g = &r->s->surface_gradient;
@@ -285,7 +354,7 @@ static void expand(Run *r, const int8_t *letter, const double *x, const double *
   aim(r, letter, x, unknowns);
   weigh_point(r, e, x, unknowns);
   int slides = e->l.slides;
-  if (slides && !invert_layer(r, &e->l, unknowns, e->inverse)) r->dependent = e->l.mode;
+  if (slides && !invert_groups(r, e, unknowns)) r->dependent = e->l.mode;
   if (!e->l.is_free || r->s->sets) memset(e->series, 0, sizeof(double) * w * stride);
   else for (int i = 0; i < w; i++) e->series[(int64_t)i * stride] = 0;
   for (int i = 0; i < r->n; i++) e->states[(int64_t)i * stride] = x[i];
@@ -328,6 +397,22 @@ static int step_dependent(Run *r, const Layout *l, const double *unknowns, doubl
   return 0;
 }
 
+/* Changes of those that slide by Newton's method, group by group; 0 where a group is singular. */
+static int solve_groups(Run *r, const Layout *l, double *b) {
+  const int32_t *member, *first;
+  int groups = groups_of_layer(r, l, &member, &first);
+  for (int g = 0; g < groups; g++) {
+    const int32_t *own = member + first[g];
+    int n = first[g + 1] - first[g];
+    double *right = b + l->slides;
+    slope_among(r, l, own, n, r->work);
+    for (int i = 0; i < n; i++) right[i] = layer_of(r, l->sliding[own[i]]);
+    if (!solve(r->work, right, n)) return 0;
+    for (int i = 0; i < n; i++) b[own[i]] = right[i];
+  }
+  return 1;
+}
+
 /* Multipliers that keep the state on the sliding surfaces: one Newton step, as they enter linearly, and one against
  * rounding. 0 where there are none. */
 static int improve(Run *r, const Layout *l, const double *x, double *unknowns, int steps) {
@@ -336,12 +421,9 @@ static int improve(Run *r, const Layout *l, const double *x, double *unknowns, i
     double largest = 0, most = 0;
     aim(r, l->letter, x, unknowns);
     error_scales(r, x, held_of(r, l->letter), unknowns);
-    double *a = r->work, *b = a + slides * slides;
-    for (int i = 0; i < slides; i++) {
-      for (int j = 0; j < slides; j++) a[i * slides + j] = r->slope[l->sliding[i] * w + l->sliding[j]];
-      b[i] = layer_of(r, l->sliding[i]);
-    }
-    if (r->dependent == l->mode || r->s->combined || !solve(a, b, slides)) if (!step_dependent(r, l, unknowns, b)) return 0;
+    double *b = r->work + (int64_t)slides * slides;
+    int is_known = r->dependent != l->mode && !r->s->combined && solve_groups(r, l, b);
+    if (!is_known && !step_dependent(r, l, unknowns, b)) return 0;
     for (int i = 0; i < slides; i++) {
       unknowns[l->sliding[i]] -= b[i];
       largest = larger(fabs(b[i]), largest);

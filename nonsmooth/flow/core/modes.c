@@ -229,10 +229,7 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
         for (int k = 0; k < slides; k++) layer[l->sliding[j]] += fabs(r->slope[l->sliding[j] * w + l->sliding[k]]) * through[k];
       for (int i = 0; i < slides; i++) {
         through[i] = 0;
-        for (int j = 0; j < slides; j++) {
-          double a = fabs(e->inverse[i * slides + j]);
-          if (a != 0) through[i] += a * layer[l->sliding[j]];
-        }
+        for (int q = e->from[i]; q < e->to[i]; q++) through[i] += fabs(e->inverse[q]) * layer[l->sliding[e->column[q]]];
       }
     }
     for (int i = 0; r->s->combined && i < r->m; i++)

@@ -103,12 +103,13 @@ typedef struct {
 
 typedef struct {
   Layout l;
-  int finite, scaled, steepened; /* whether scale and steep are known */
+  int finite, scaled, steepened, entries; /* whether scale and steep are known; entries: of the inverse */
   int64_t stamp; /* of the values of the program ``point`` */
 #define EXPANSION_ARRAYS(OF) \
   OF(double, states, n * stride) OF(double, guards, rows * stride) OF(double, series, width * stride) \
   OF(double, allowed, n) OF(double, of_guards, rows) OF(double, scale, rows) OF(double, steep, rows) \
-  OF(double, inverse, width * width) \
+  /* the inverse of the layer's slope: nonzero entries of each row of those that slide, from ``from`` to ``to`` */ \
+  OF(double, inverse, width * width) OF(int32_t, column, width * width) OF(int32_t, from, width) OF(int32_t, to, width) \
   /* of sets: multipliers, h in units of |h|, its root, distances when leaving, slopes then, |h| at the start */ \
   OF(double, lambda, of_sets * stride) OF(double, apart, of_sets * stride) OF(double, root, sets * stride) \
   OF(double, rates, sets * (stride + 1)) OF(double, slopes, of_sets * width) OF(double, radius, sets) \
@@ -131,12 +132,14 @@ typedef struct { int8_t *state, *order, *before; int32_t terms; double *nu, *ser
 /* The law of the active elements at a point; see decide.c. Matrices are (count, count), arrays with orders (orders, count). */
 typedef struct {
   int32_t count, blocks, motions, branches, unstable, last; /* last: order that growth decides instead of coefficients */
-  int32_t is_imposed; /* whether states are given: those of a mode */
+  int32_t is_imposed, is_shared; /* whether states are given: those of a mode; whether bounds depend on reactions */
   int32_t ending, ended; /* a block (from 1) that holds up to this instant, and the last whose limit was found */
   const int8_t *letter;
 #define DECISION_ARRAYS(OF) /* Lemke's method on one block of all elements needs most of them */ \
   OF(int32_t, own, w) OF(int32_t, order, w) OF(int32_t, first, w + 1) OF(int32_t, mark, 4 * w) \
   OF(int32_t, pivot, 8 * w + 8) OF(int32_t, proved, w) \
+  /* columns of the nonzero entries of each row of the law, ascending; the place of each element in the order of blocks */ \
+  OF(int32_t, link_at, w + 1) OF(int32_t, link, w * w) OF(int32_t, place, w) \
   OF(int8_t, is_contact, w) OF(int8_t, is_idle, w) OF(int8_t, is_touched, w) OF(int8_t, is_known, w) \
   OF(int8_t, state, orders + w) OF(int8_t, block_state, 4 * w) OF(int8_t, large_class, w) \
   /* of vectors: letters in which they are held, rows of each, as in Block; the order at which their law is posed; \
@@ -244,7 +247,7 @@ typedef struct {
   OF(double, rates, 2 * all + 2 * c) OF(double, lam, 2 * w) OF(double, matrix, w * w + 9 * w + all + 2 * c) \
   OF(double, small, 4 * w + s->rules.atoms) OF(double, atom_work, pair_room(s->atoms.size, 1)) \
   OF(double, choice_work, pair_room(s->choices.size, 1)) \
-  OF(int32_t, pending, 6 * w + 2 * (all + q)) OF(int32_t, sparse, w * w + 2 * w + 1) \
+  OF(int32_t, pending, 6 * w + 2 * (all + q)) OF(int32_t, groups, 5 * w + 1) \
   /* of sets: multipliers, room, whether they move */ \
   OF(double, direction, w) OF(double, later, w) OF(double, heights_of, w) OF(double, aside, 2 * n) \
   OF(int8_t, moving, w) OF(int8_t, turned, rows) OF(double, rates_of_several, SEVERAL * n) \

@@ -243,10 +243,8 @@ static void sampled(Run *r, const Expansion *e, const double *x, const double *l
   for (int i = 0; i < n; i++) *found++ = row_of(r, i)[0];
   for (int i = 0; i < slides; i++, found++) {
     *found = 0;
-    for (int j = 0; j < slides; j++) {
-      double a = fabs(e->inverse[i * slides + j]);
-      if (a != 0) *found += a * fabs(row_of(r, n + e->l.sliding[j])[0]);
-    }
+    for (int q = e->from[i]; q < e->to[i]; q++)
+      *found += fabs(e->inverse[q]) * fabs(row_of(r, n + e->l.sliding[e->column[q]])[0]);
   }
   if (!e->l.bent_count) return;
   const double *g = guards_at(r, e, lam);

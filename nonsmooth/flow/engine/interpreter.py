@@ -389,6 +389,11 @@ class Interpreter:
                 self.add_implicit()
         return int(status)
 
+    @property
+    def size(self) -> int:
+        """Rules and terms of a step in all orders."""
+        return int(self._c.series.size + self._c.series.terms) * self.order
+
     def seconds(self, x: Array, p: Array, options: Options) -> float | None:
         """About how long the steps of a run take that lanes could make; None if it takes implicit ones soon."""
         # By what a step has to do, not by the clock: what is decided by it has to be the same again.
@@ -402,7 +407,8 @@ class Interpreter:
         steps = len(run.t) / (max(done, 1e-9) if run.status == Status.TOO_MANY_STEPS else 1.0)
         closed = "sc" if driver_decides(self.system) else "c"
         made = [not set(closed) & set(mode) for mode in run.letters]
-        share = np.mean(np.array(made)[run.written["step_mode"]]) if len(run.starts) else 1.0
+        modes = run.written["step_mode"]
+        share = np.mean(np.array(made)[modes]) if len(modes) else 1.0
         return float(steps * share) * (_OF_STEP + _OF_TERM * (series.size + series.terms))
 
     def _checked(self, motion: Array) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array
-from ..constants import IMPLICIT_STEP, KINDS
+from ..constants import IMPLICIT_STEP
 from ..trajectory import Steps
 from .arrays import address
 from .structures import structure
@@ -258,14 +258,19 @@ def states_of_events(own: Arrays, x: Array) -> tuple[Array, NDArray[np.int64], N
 
 def codes_of(own: Arrays) -> tuple[NDArray[np.int32], list[tuple[int, ...]]]:
     """Numbers of the different kinds of events, with their modes and guards, and these."""
-    columns = [
-        own[f"event_{name}"].astype(np.int64) for name in ("kind", "before", "after", "guard")
-    ]
-    sizes, packed = [len(KINDS), *(int(c.max(initial=0)) + 1 for c in columns[1:3])], 0
-    kind, before, after, guard = columns
-    packed = kind + sizes[0] * (before + sizes[1] * (after + sizes[2] * (guard + 1)))
-    _, first, inverse = np.unique(packed, return_index=True, return_inverse=True)
-    return inverse.astype(np.int32), [*zip(*(c[first].tolist() for c in columns), strict=True)]
+    columns = [own[f"event_{name}"] for name in ("guard", "after", "before", "kind")]
+    sizes = [int(column.max(initial=0)) + 1 for column in columns]
+    packed = np.zeros(len(columns[0]), np.int64)
+    for column, size in zip(columns, sizes, strict=True):
+        packed *= size
+        packed += column
+    packed += math.prod(sizes[1:])  # guards begin at -1
+    values = np.unique(packed)
+    codes, keys = np.searchsorted(values, packed).astype(np.int32), list[NDArray[np.int64]]()
+    for size in sizes[:0:-1]:
+        values, key = np.divmod(values, size)
+        keys.append(key)
+    return codes, [*zip(*(key.tolist() for key in (*keys, values - 1)), strict=True)]
 
 
 def _differ(one: Array, other: Array) -> NDArray[np.bool_]:

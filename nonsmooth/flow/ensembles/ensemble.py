@@ -38,6 +38,9 @@ _WORTH = 0.05
 #: This many times as long where the driver makes events, as lanes gain less.
 _WITH_EVENTS = 20.0
 
+#: Largest size of a program that is compiled in a few seconds; the time of others grows as the square of their size.
+_USUAL = 600
+
 #: The work of at least this many trajectories is estimated from three of them, of fewer from one.
 _MANY = 100_000
 
@@ -205,7 +208,7 @@ def _is_worth_lanes(system: FilippovSystem, options: Options, starts: Starts) ->
             return False
         found.append(seconds)
     least = _WORTH * (_WITH_EVENTS if has_driven_events(system) else 1.0)
-    return starts.count * max(found) >= least
+    return starts.count * max(found) >= least * max(1.0, engine.size / _USUAL) ** 2
 
 
 def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:

@@ -184,6 +184,7 @@ int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, const Cor
   Work *w = &many->work;
   Step *e = many->steps;
   if (!many->begun) begin_all(many, b, o, tree, core);
+  w->budget = budget;
   for (;;) {
     int pool = chosen(w);
     if (pool < 0) return 0;
@@ -196,9 +197,10 @@ int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, const Cor
         I fresh = refill(&s[i], w);
         if (any(fresh)) begin(&s[i], w, fresh);
       }
+      if (w->budget < 0) return 1;
       continue;
     }
-    if ((budget -= w->groups) < 0) return 1;
+    if ((w->budget -= w->groups) < 0) return 1;
 #if SET
     if (pool == NEAR_SET) { near_all(s, w, e, w->groups); continue; }
 #endif

@@ -15,7 +15,7 @@ struct Work {
   const Options *o;
   const Core *core;
   Words words;
-  int64_t next;
+  int64_t next, budget; /* steps until the end of a call */
   int groups, alive[POOLS], waiting[POOLS]; /* trajectories in lanes of a pool, and those that wait for one */
   Past past[WAITING];
 #if SET
@@ -210,8 +210,11 @@ INLINE I by_chance(const Lanes *s, const Work *w) {
 static __attribute__((noinline)) int driven(Lanes *s, Work *w, int l, int begun) {
   Packed a;
   point_to(&a, past_of(s, l));
+  a.m.steps = 0;
   if (begun) pack(s, w, l, &a);
+  w->budget += a.m.steps;
   (begun ? w->core->step : w->core->begin)(w->core->run, w->b, w->o, LANE_I(s->index, l), &a.m);
   w->b->totals[2]++;
+  w->budget -= a.m.steps;
   return a.m.status == RUNNING ? unpack(s, w, l, &a) : -1;
 }

@@ -205,7 +205,8 @@ class PlaneScan:
         """Folds of both fields, those in one point where a force jumps; none of a continuous surface."""
         if not self.where.mode:
             return []
-        soft = not self.where.one_sided and self.where.switching.kind == "continuous"
+        switching = None if self.where.one_sided else self.where.switching
+        soft = switching is not None and not (switching.slides or switching.force_jumps)
         return [] if soft else self._apart(self.tangencies)
 
     @cached_property

@@ -19,7 +19,14 @@ import casadi as ca
 from ..checks import real
 from ..errors import DefinitionError, ParameterError
 from ..expressions.cancel import cancel_common_factor, powers
-from ..expressions.graph import IN_A_FIELD, IN_A_GAP, IN_A_GUARD, IN_A_SURFACE, require_smooth
+from ..expressions.graph import (
+    IN_A_FIELD,
+    IN_A_GAP,
+    IN_A_GUARD,
+    IN_A_SURFACE,
+    require_finite,
+    require_smooth,
+)
 from ..expressions.linearity import bent, enters_nonlinearly
 from ..numbering import IMPACT_LAWS
 from ..reading import (
@@ -28,7 +35,6 @@ from ..reading import (
     column,
     items_of,
     listed,
-    require_finite,
     require_known,
     require_unique,
     scalar,
@@ -589,7 +595,7 @@ def require_consistent(d: Definition, given: bool = True) -> None:
     every, names = [*named, *[(w, e, False) for w, e in switched]], d.names
     _of_all(lambda what, e: require_known(e, known, what, **names), [own[:2] for own in every])
     _of_all(lambda what, e: _require_bare(what, e, d), [(w, e) for w, e, has in every if not has])
-    _of_all(lambda what, e: require_finite(e, known, what), [own[:2] for own in every])
+    _of_all(lambda what, e: require_finite(e, what), [own[:2] for own in every])
     _require_smooth_functions(d, gaps, [(what, e) for what, e, _ in named])
     for period in listed(d.periods):
         if ca.depends_on(period, d.extended_states):

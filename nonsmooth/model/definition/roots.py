@@ -10,11 +10,11 @@ import numpy as np
 from ..expressions.graph import (
     POWERS,
     Expressions,
+    content_of,
     evaluate,
     instructions,
     operation,
     power_of,
-    uses,
 )
 from ..expressions.identity import vanish_on
 
@@ -68,7 +68,7 @@ def gate_roots(
 ) -> tuple[ca.SX, dict[int, float]]:
     """Multiply each root of a switching function by its gate; also the smallest exponent for each surface."""
     # A gate is 1 or -1, the side, or 0; a root is multiplied by 1 on the side where it is defined, else by 0.
-    if not field.numel() or not uses(field, POWERS):
+    if not field.numel() or POWERS.isdisjoint(content_of(field).operations):
         return field, {}
     symbols = ca.vertcat(*ca.symvar(field))
     nodes, rows = instructions([symbols], [field])

@@ -6,6 +6,7 @@ codes are used here only.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from itertools import accumulate, pairwise
 from typing import NamedTuple, Protocol, TypeVar, cast
@@ -44,13 +45,17 @@ NOT_SMOOTH: dict[str, str] = {
 
 
 #: Operations that may be a power that is not a whole number.
-POWERS = ("sqrt", "pow", "constpow")
+POWERS = frozenset(("sqrt", "pow", "constpow"))
 
 #: Smooth operations that are no longer so where one of their arguments is always zero.
 _BESIDE_ZERO: dict[str, str] = {
     "atan2": "atan2 with an argument that is zero (a jump where the other one changes its sign)",
     "hypot": "hypot with an argument that is zero (the absolute value of the other one)",
 }
+
+
+#: Operations that are smooth whatever their arguments are.
+_SMOOTH = {*UNARY, *BINARY, "const", "input", "output"} - NOT_SMOOTH.keys() - _BESIDE_ZERO.keys()
 
 
 class Node(NamedTuple):
@@ -71,7 +76,7 @@ def instructions(
 ) -> tuple[list[Node], list[list[int]]]:
     """Value-number the graph of dense ``outputs`` over ``inputs``, unless not ``merged``."""
     outputs = [_dense(o) for o in outputs]
-    read = lambda: _read(ca.Function("graph", list(inputs), outputs), merged)
+    read = lambda: _read(function_of(inputs, outputs), merged)
     own, given = (sum(e.numel() for e in some) for some in (outputs, inputs))
     if 4 * own < given:  # small, and sooner read than compared
         return read()
@@ -87,29 +92,31 @@ def instructions(
 _READ: list[tuple[Hashable, tuple[list[Node], list[list[int]]], list[ca.SX]]] = []
 
 
+def function_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> ca.Function:
+    """A Function whose instructions, without those of outputs, are numbered by their results."""
+    return ca.Function("graph", list(inputs), list(outputs), {"live_variables": False})
+
+
 def _read(function: ca.Function, merged: bool) -> tuple[list[Node], list[list[int]]]:
     nodes: list[Node] = []
     known: dict[Node, int] = {}
-    register: dict[int, int] = {}
+    register: list[int] = []
     rows: list[list[int]] = [[-1] * function.numel_out(k) for k in range(function.n_out())]
-    code, source_of, target_of = (
-        function.instruction_id,
-        function.instruction_input,
-        function.instruction_output,
-    )
-    for k in range(function.n_instructions()):
-        op, source, target = OPERATIONS[code(k)], source_of(k), target_of(k)
+    source_of = function.instruction_input
+    for k, code in enumerate(map(function.instruction_id, range(function.n_instructions()))):
+        op = OPERATIONS[code]
         if op == "const":
             node = Node(op, (), float(function.instruction_constant(k)))
         elif op == "input":
-            node = Node(op, (), (source[0], source[1]))
+            node = Node(op, (), tuple(source_of(k)))
         elif op == "output":
-            rows[target[0]][target[1]] = register[source[0]]
+            vector, position = function.instruction_output(k)
+            rows[vector][position] = register[source_of(k)[0]]
             continue
         elif op == "call":
             refuse_call(function.instructions_sx()[k].which_function(), "expression")
         elif op == "printme":  # prints its second argument where CasADi evaluates it
-            register[target[0]] = register[source[0]]
+            register.append(register[source_of(k)[0]])
             continue
         elif op not in UNARY and op not in BINARY:
             raise DefinitionError(
@@ -117,19 +124,40 @@ def _read(function: ca.Function, merged: bool) -> tuple[list[Node], list[list[in
                 f"arithmetic and elementary functions: {', '.join((*UNARY, *BINARY))}."
             )
         else:
-            node = Node(op, tuple([register[a] for a in source]))
+            node = Node(op, tuple([register[a] for a in source_of(k)]))
         number = known.setdefault(node, len(nodes)) if merged else len(nodes)
         if number == len(nodes):
             nodes.append(node)
-        register[target[0]] = number
+        register.append(number)
     return nodes, rows
 
 
-def uses(expression: ca.SX, operations: Sequence[str]) -> bool:
-    """Whether an expression has some operations."""
-    function = ca.Function("graph", [ca.vertcat(*ca.symvar(expression))], [_dense(expression)])
-    codes = {code for code, op in OPERATIONS.items() if op in operations}
-    return any(function.instruction_id(k) in codes for k in range(function.n_instructions()))
+class Content(NamedTuple):
+    """Names of the operations of an expression, and a constant that is no finite number."""
+
+    expression: ca.SX  # so that the hashes stay its
+    hashes: frozenset[int]
+    operations: frozenset[str]
+    infinite: float | None
+
+
+def content_of(expression: ca.SX) -> Content:
+    """What an expression contains, or one that was read before and has all of its entries."""
+    expression, last = _dense(expression), next(iter(_LAST), None)
+    hashes = frozenset(e.element_hash() for e in ca.vertsplit(ca.vec(expression)))
+    if last and (last.hashes == hashes or (last.hashes > hashes and last.infinite is None)):
+        return last
+    function = function_of([ca.vertcat(*ca.symvar(expression))], [expression])
+    codes = [*map(function.instruction_id, range(function.n_instructions()))]
+    numbers = (function.instruction_constant(k) for k, c in enumerate(codes) if c == ca.OP_CONST)
+    infinite = next((number for number in numbers if not math.isfinite(number)), None)
+    found = Content(expression, hashes, frozenset(OPERATIONS[c] for c in {*codes}), infinite)
+    _LAST[:] = [found]
+    return found
+
+
+#: The content that was read last.
+_LAST: list[Content] = []
 
 
 def _dense(output: ca.SX) -> ca.SX:
@@ -243,10 +271,21 @@ IN_A_SURFACE = (
 IN_A_GAP = "Give each smooth piece of the gap an Impact of its own."
 
 
+def require_finite(expression: ca.SX, what: str) -> None:
+    """Refuse NaN and infinite constants."""
+    if (found := content_of(expression).infinite) is not None:
+        raise DefinitionError(
+            f"{what}: expected finite constants, received {found} in {expression}. Functions of Python's math turn a "
+            "symbol into NaN: write casadi.sin(x), not math.sin(x)."
+        )
+
+
 def require_smooth(
     expression: ca.SX, variables: ca.SX, others: ca.SX, what: str, advice: str = IN_A_FIELD
 ) -> None:
     """Refuse an expression that is not smooth in ``variables``; in ``others`` it need not be."""
+    if content_of(expression).operations <= _SMOOTH:
+        return
     nodes, _ = instructions([variables, others], [expression])
     moving = depends_on(nodes, [True, False])
     for node, moves in zip(nodes, moving, strict=True):

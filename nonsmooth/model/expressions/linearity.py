@@ -14,6 +14,7 @@ from enum import IntEnum
 import casadi as ca
 
 from .graph import evaluate, instructions
+from .long_sums import LongSums
 
 _NO_TIME = ca.SX(0, 1)
 
@@ -48,18 +49,19 @@ def linearity(
     unknowns: ca.SX,
     smooth: bool = True,
     time: ca.SX = _NO_TIME,
+    sums: LongSums | None = None,
 ) -> Linearity:
-    """Determine which parts of a system are affine."""
+    """Determine which parts of a system, with symbols for long sums, are affine."""
     outputs = [field, guards, layer, factors]
-    every = _bent(outputs, x, unknowns, time, True)
-    (rows, guard_rows, *_), free_rows = every, _bent(outputs, x, unknowns, time, False)[0]
+    every = _bent(outputs, x, unknowns, time, True, sums)
+    (rows, guard_rows, *_), free_rows = every, _bent(outputs, x, unknowns, time, False, sums)[0]
     return Linearity(
         everywhere=smooth and not any(b for own in every for b in own),
         free=smooth and not any(free_rows + guard_rows),
         bent_rows=rows if smooth else [True] * field.numel(),
         bent_free_rows=free_rows if smooth else [True] * field.numel(),
         bent_guards=guard_rows,
-        curved_guards=_bent([guards], x, unknowns, _NO_TIME, True)[0],
+        curved_guards=_bent([guards], x, unknowns, _NO_TIME, True, sums)[0],
     )
 
 
@@ -76,13 +78,15 @@ class _Kind(IntEnum):
 class _Kinds:
     """The algebra of kinds."""
 
-    def __init__(self, time: int | None, moves: bool):
-        self._time, self._moves = time, moves
+    def __init__(self, time: int | None, moves: bool, sums: Sequence[_Kind] = ()):
+        self._time, self._moves, self._sums = time, moves, sums
 
     def constant(self, value: float) -> _Kind:
         return _Kind.CONSTANT
 
     def symbol(self, vector: int, position: int) -> _Kind:
+        if vector == 3:
+            return self._sums[position]
         if vector == 2 or (vector and not self._moves):
             return _Kind.CONSTANT
         return _Kind.LINE if (vector, position) == (0, self._time) else _Kind.AFFINE
@@ -106,15 +110,35 @@ def bent(expressions: ca.SX, x: ca.SX, time: ca.SX = _NO_TIME) -> list[bool]:
 
 
 def _bent(
-    outputs: Sequence[ca.SX], x: ca.SX, unknowns: ca.SX, time: ca.SX, moves: bool
+    outputs: Sequence[ca.SX],
+    x: ca.SX,
+    unknowns: ca.SX,
+    time: ca.SX,
+    moves: bool,
+    sums: LongSums | None = None,
 ) -> list[list[bool]]:
     """The same of several, in unknowns too where these move."""
+    own = [] if sums is None else sums.kinds(_kinds([sums.terms], x, unknowns, time, moves)[0])
+    symbols = _NO_TIME if sums is None else sums.symbols
+    rows = _kinds(outputs, x, unknowns, time, moves, symbols, own)
+    return [[kind is _Kind.BENT for kind in row] for row in rows]
+
+
+def _kinds(
+    outputs: Sequence[ca.SX],
+    x: ca.SX,
+    unknowns: ca.SX,
+    time: ca.SX,
+    moves: bool,
+    sums: ca.SX = _NO_TIME,
+    of_sums: Sequence[_Kind] = (),
+) -> list[list[_Kind]]:
+    """Kinds of the entries of several expressions."""
     positions = {s.element_hash(): i for i, s in enumerate(ca.vertsplit(x))}
-    known = {*positions, *(s.element_hash() for s in ca.vertsplit(unknowns))}
+    known = {*positions, *(s.element_hash() for own in (unknowns, sums) for s in ca.vertsplit(own))}
     symbols = ca.symvar(ca.vertcat(*map(ca.vec, outputs)))
     others = ca.vertcat(*[s for s in symbols if s.element_hash() not in known])
-    nodes, rows = instructions([x, unknowns, others], outputs)
-    kinds = evaluate(
-        nodes, _Kinds(positions.get(time.element_hash()) if time.numel() else None, moves)
-    )
-    return [[kinds[j] is _Kind.BENT for j in row] for row in rows]
+    nodes, rows = instructions([x, unknowns, others, sums], outputs)
+    at = positions.get(time.element_hash()) if time.numel() else None
+    kinds = evaluate(nodes, _Kinds(at, moves, of_sums))
+    return [[kinds[j] for j in row] for row in rows]

@@ -129,8 +129,10 @@ class _Reader:
         ((product, coefficient),) = terms.items()
         for f in product:
             own = self.factors[f].sums[0] if self.factors[f].node is None else {}
-            u = next((p for p in own if p), ())
-            if len(own) == 2 and own.get((), ca.SX(0)).is_one() and abs(_number(own[u])) == 1.0:
+            if len(own) != 2 or () not in own or not own[()].is_one():
+                continue
+            u = next(p for p in own if p)
+            if abs(_number(own[u])) == 1.0:
                 k = product.index(f)
                 rest = product[:k] + product[k + 1 :]
                 whole = len(rest) == 1 and self.factors[rest[0]].node is None
@@ -322,20 +324,23 @@ class _Writer:
             self._expressions[j] = args[0] if node is None else self._reader.apply(node, args)
 
     def _write(self, terms: Sum) -> ca.SX:
-        total = ca.SX(0)
+        total = None
         for product, coefficient in terms.items():
             code = ca.OP_SUB if coefficient.is_minus_one() else ca.OP_ADD
             term = self._multiply(product)
             if code == ca.OP_ADD and not coefficient.is_one():
                 term = _times(coefficient, term)
-            total = ca.SX.binary(code, total, term)
-        return total
+            if total is None:
+                total = term if code == ca.OP_ADD else -term
+            else:
+                total = ca.SX.binary(code, total, term)
+        return ca.SX(0) if total is None else total
 
     def _multiply(self, product: Product) -> ca.SX:
+        if len(product) == 1:
+            return self._expressions[product[0]]
         result = ca.SX(1)
-        for factor, n in (
-            Counter(product).items() if len(product) > 1 else [(f, 1) for f in product]
-        ):
+        for factor, n in Counter(product).items():
             result = _times(result, _power(self._expressions[factor], n))
         return result
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import accumulate, chain
 
 from .graph import reached
+from .long_sums import LongSums
 from .taylor_rules import Rule
 
 #: A number and two rules, of which ``_ONE`` is none.
@@ -98,3 +100,63 @@ class _Joining:
 
 def _times(terms: Sequence[_Term], factor: float) -> list[_Term]:
     return [(factor * own, a, b) for own, a, b in terms]
+
+
+# Long sums ----------------------------------------------------------------------------------------
+
+
+def _is_long(rule: Rule, first: int) -> bool:
+    """Whether a rule is the input that stands for a long sum."""
+    return rule.rule == "input" and rule.source[0] == 0 and rule.source[1] >= first
+
+
+def with_long_sums(
+    rules: Sequence[Rule], rows: Sequence[Sequence[int]], sums: LongSums, first: int
+) -> list[Rule]:
+    """Rules with long sums in place of their inputs, from ``first`` on, of terms in the first row."""
+    made, terms = [*rules], rows[0]
+    known = {j: rule.source[1] - first for j, rule in enumerate(rules) if _is_long(rule, first)}
+    users = Counter(a for rule in rules for a in rule.args if a in known)
+    users.update(j for row in rows for j in row if j in known)
+    own = {j: [(terms[k], 0) for k in sums.places[i].tolist()] for j, i in known.items()}
+    for j, i in known.items():
+        made[j] = Rule(
+            "sum", tuple(chain.from_iterable(own[j])), numbers=tuple(sums.factors[i].tolist())
+        )
+    for k, rule in enumerate(rules):
+        if rule.rule != "sum" or users.keys().isdisjoint(rule.args):
+            continue
+        pairs, numbers = list[tuple[int, int]](), list[float]()
+        for factor, a, b in zip(rule.numbers, rule.args[::2], rule.args[1::2], strict=True):
+            if a in known and b == 0 and users[a] == 1 and abs(factor) == 1.0:
+                pairs += own[a]
+                numbers += (factor * sums.factors[known[a]]).tolist()
+                made[a] = Rule("constant", numbers=(0.0,))
+            else:
+                pairs.append((a, b))
+                numbers.append(factor)
+        made[k] = Rule("sum", tuple(chain.from_iterable(pairs)), numbers=tuple(numbers))
+    return made
+
+
+def written_out(
+    rules: Sequence[Rule], rows: Sequence[Sequence[int]], sums: LongSums, first: int
+) -> tuple[list[Rule], list[list[int]]]:
+    """Plain rules with products and additions in place of the inputs that stand for long sums."""
+    sizes = [
+        3 * len(sums.places[r.source[1] - first]) - 1 if _is_long(r, first) else 1 for r in rules
+    ]
+    number, made = [end - 1 for end in accumulate(sizes)], list[Rule]()
+    terms = [number[j] for j in rows[0]]
+    for rule in rules:
+        if not _is_long(rule, first):
+            made.append(rule._replace(args=tuple(number[a] for a in rule.args)))
+            continue
+        i, total = rule.source[1] - first, -1
+        for factor, k in zip(sums.factors[i].tolist(), sums.places[i].tolist(), strict=True):
+            at = len(made)
+            made += [Rule("constant", numbers=(factor,)), Rule("mul", (at, terms[k]))]
+            if total >= 0:
+                made.append(Rule("add", (total, at + 1)))
+            total = len(made) - 1
+    return made, [[number[j] for j in row] for row in rows[1:]]

@@ -183,8 +183,12 @@ def touched(rules: Sequence[Rule], states: int) -> list[int]:
 def entered(rules: Sequence[Rule], target: Callable[[int], bool]) -> list[bool]:
     """Return whether each rule depends on some of the inputs of the moving vector."""
     found = [False] * len(rules)
-    for _ in range(2):  # a sine and its cosine refer to each other
-        for j, rule in enumerate(rules):
-            own = rule.source[0] == 0 and target(rule.source[1])
-            found[j] = found[j] or own or any(found[a] for a in rule.args)
+    for j, rule in enumerate(
+        rules
+    ):  # of a sine and its cosine, the first has no other inputs than its argument
+        found[j] = rule.source[0] == 0 and target(rule.source[1])
+        for a in rule.args:
+            if found[a]:
+                found[j] = True
+                break
     return found

@@ -16,7 +16,7 @@ from .float_arithmetic import BINARY, UNARY
 from .graph import Node, evaluate, instructions, operation, shaped
 
 #: Operations that have a finite value wherever their arguments have one of moderate size.
-_SAFE = frozenset(
+SAFE = frozenset(
     "assign neg twice sq add sub mul sin cos atan tanh asinh erf sign fabs fmin fmax copysign lt le eq ne not "
     "and or".split()
 )
@@ -60,7 +60,7 @@ def _is_safe(node: Node, nodes: Sequence[Node]) -> bool:
     """Whether a node has a finite value wherever its arguments have one of moderate size."""
     divisor = nodes[node.args[1]] if node.op == "div" else None
     by_number = divisor is not None and divisor.op == "const" and divisor.payload != 0.0
-    return by_number or node.op in _SAFE or node.op in ("const", "input")
+    return by_number or node.op in SAFE or node.op in ("const", "input")
 
 
 class _Sides:
@@ -80,7 +80,7 @@ class _Sides:
 
     def apply(self, op: str, args: Sequence[_Term]) -> _Term:
         e = operation(op, [a.e for a in args])
-        safe = op in _SAFE or (op == "div" and bool(args[1].always))
+        safe = op in SAFE or (op == "div" and bool(args[1].always))
         partial = not safe or any(a.partial for a in args)
         at = self._values(op, args)
         if partial and op in ("mul", "div"):

@@ -28,6 +28,7 @@ from ..definition.system import FilippovSystem
 from ..expressions.cancel import cancel_common_factor
 from ..expressions.identity import that_vanish_on, vanish_on
 from ..expressions.linearity import linearity
+from ..expressions.long_sums import LongSums, long_sums
 from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .evaluators import Evaluator, evaluator
@@ -114,7 +115,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     factors, unknowns = [ca.SX(1)] * system.surface_count, [*ca.vertsplit(lam)][: lam.numel()]
     known, variables = ca.vertcat(p, lam), ca.vertcat(x, reactions)
     ones = [ca.SX(1)] * system.surface_count
-    roots = gate_roots(plain, _surfaces(system), x, ones)[1]
+    roots = gate_roots(system.definition.field, _surfaces(system), x, ones)[1]
     columns = ca.jacobian(plain, lam)
     for members in system.entries:  # a set has one factor
         if members[0] in (*system.half_lines, *system.joints, *system.definition.breakpoints):
@@ -224,10 +225,16 @@ class Coupled:
         self.outputs = [field, self.layer, heights, factor, stops]
         every = ca.vertcat(*unknowns, d.reactions)
         self.slope, self._every = ca.jacobian(self.layer, every), every
+        #: The same with symbols for long sums, and these.
+        self._short: list[ca.SX] = self.outputs
+        self.sums: LongSums | None = None
+        if (shortened := long_sums(self._symbols, self.outputs)) is not None:
+            self._short, self.sums = shortened
         #: Whether the unknown multipliers of a mode enter linearly together.
         self.affine = bool(ca.is_linear(field, every))
-        guards, rest = ca.vertcat(heights, stops), (x, every, not system.sets, d.time)
-        self.linearity = linearity(field, self.layer, guards, factor, *rest)
+        *short, of_stops = self._short
+        guards, rest = ca.vertcat(short[2], of_stops), (x, every, not system.sets, d.time)
+        self.linearity = linearity(short[0], short[1], guards, short[3], *rest, self.sums)
         #: Of layer, of surfaces and gaps, of stops and resets, and of factors, by the states.
         self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)
@@ -415,6 +422,14 @@ class Coupled:
         """Dense expressions in ``moving``, for numbers: terms without effect in a mode are not evaluated."""
         dense = [ca.densify(e) for e in expressions]
         return without_unused_terms(self._symbols, dense, self._values_held)
+
+    def series(self, more: Sequence[ca.SX]) -> tuple[list[ca.SX], list[ca.SX]]:
+        """Two vectors of symbols and what is expanded in them: terms of long sums, ``outputs``, and ``more``."""
+        if self.sums is None:
+            return self._symbols, self.awake([*self.outputs, *more])
+        inputs = [ca.vertcat(self.moving, self.sums.symbols), self._symbols[1]]
+        dense = [self.sums.terms, *self._short, *map(ca.densify, more)]
+        return inputs, without_unused_terms(inputs, dense, self._values_held)
 
     @property
     def _values_held(self) -> dict[int, tuple[float, ...]]:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
 from typing import NamedTuple, cast
 
 import casadi as ca
@@ -15,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..expressions.graph import Node, depends_on, instructions, reached
+from ..expressions.long_sums import LongSums
 from ..expressions.simplification import simplified
-from ..expressions.sums import summed
+from ..expressions.sums import summed, with_long_sums, written_out
 from ..expressions.taylor_rules import Rule, entered, lower
 from ..laws.coupled import Coupled
 from ..numbering import OPERATIONS, TAYLOR_RULES
@@ -52,7 +55,7 @@ LISTS = "still values moving later late early loop loop_late before after".split
 
 @dataclass(frozen=True)
 class Series:
-    """Rules of power series as C reads them; ``rules`` and ``rows`` before products are summed, to be printed."""
+    """Rules of power series as C reads them."""
 
     rule: NDArray[np.void]
     term: NDArray[np.void]
@@ -60,8 +63,12 @@ class Series:
     index: Integers
     outputs: Integers
     lists: Mapping[str, Integers]
-    rules: Sequence[Rule]
-    rows: Sequence[Sequence[int]]
+    program: Program
+
+    @cached_property
+    def printed(self) -> tuple[Sequence[Rule], Sequence[Sequence[int]]]:
+        """Rules and numbers of those of each output, to be printed."""
+        return self.program.printed()
 
 
 @dataclass(frozen=True)
@@ -211,8 +218,7 @@ def series_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Series:
 def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
     """Rules of any mode, and those of a mode without sliding, with the same numbers."""
     n, m = coupled.system.extended_dimension, coupled.system.surface_count
-    inputs = [coupled.moving, coupled.parameter_symbols]
-    program = _rules_of(inputs, coupled.awake([*coupled.outputs, slopes]))
+    program = _rules_of(*coupled.series([slopes]), coupled.sums)
     of_sets = {n + i for i in coupled.system.set_of}
     held = {n + i for i in range(m) if coupled.scaled[i]} - of_sets
     time = _time_of(coupled)
@@ -222,22 +228,36 @@ def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
     return every, _series(program, free, lambda k: k < n or follow(k), follow, time)
 
 
-class _Rules(NamedTuple):
+class Program(NamedTuple):
     """Rules of expressions and the numbers of those of each output, and the same with sums."""
 
     plain: list[Rule]
     plain_rows: list[list[int]]
     rules: list[Rule]
     rows: list[list[int]]
+    sums: LongSums | None
+    first: int  # input of the first long sum
+
+    def printed(self) -> tuple[list[Rule], list[list[int]]]:
+        """Rules before products are summed."""
+        if self.sums is None:
+            return self.plain, self.plain_rows
+        return written_out(self.plain, self.plain_rows, self.sums, self.first)
 
 
-def _rules_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> _Rules:
-    """Rules of expressions."""
+def _rules_of(
+    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], sums: LongSums | None = None
+) -> Program:
+    """Rules of expressions, of which the last inputs and the first outputs are those of long sums."""
     outputs = [ca.densify(o) for o in outputs]
     nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
-    rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
-    rows = [[rule_of[j] for j in row] for row in rows]
-    return _Rules(rules, rows, *summed(rules, rows))
+    plain, rule_of = lower(nodes, depends_on(nodes, [True, False]))
+    plain_rows = [[rule_of[j] for j in row] for row in rows]
+    rules, rows = summed(plain, plain_rows)
+    first = inputs[0].numel() - (0 if sums is None else sums.symbols.numel())
+    if sums is not None:
+        rules, rows = with_long_sums(rules, rows, sums, first), rows[1:]
+    return Program(plain, plain_rows, rules, rows, sums, first)
 
 
 def derived_series_of(coupled: Coupled) -> tuple[Series, Series, Entries]:
@@ -267,7 +287,7 @@ def derived_series_of(coupled: Coupled) -> tuple[Series, Series, Entries]:
 
 
 def _series(
-    program: _Rules,
+    program: Program,
     target: Sequence[int],
     moves: Callable[[int], bool],
     unknown: Callable[[int], bool],
@@ -325,8 +345,7 @@ def _series(
         index=_integers([k for k, _ in inputs]),
         outputs=_integers([j for row in rows for j in row]),
         lists={name: _integers(own) for name, own in lists.items()},
-        rules=program.plain,
-        rows=program.plain_rows,
+        program=program,
     )
 
 
@@ -380,14 +399,14 @@ _SPECIAL = {"div": ("under", "over"), "chosen": ("gated", "")}
 
 def _terms(rules: Sequence[Rule], moving: Sequence[bool]) -> NDArray[np.void]:
     """Terms of all sums; a constant factor is the second one."""
-    made = []
-    for rule in rules:
-        if rule.rule == "sum":
-            for factor, a, b in zip(rule.numbers, rule.args[::2], rule.args[1::2], strict=True):
-                first, other = (a, b) if moving[a] else (b, a)
-                kind = moving[a] + moving[b] + (moving[a] and a == b)
-                made.append((factor, first, other, kind, 0))
-    return np.array(made, TERM)
+    sums = [rule for rule in rules if rule.rule == "sum"]
+    args = np.fromiter(chain.from_iterable(rule.args for rule in sums), int).reshape(-1, 2)
+    a, b, moves = args[:, 0], args[:, 1], np.array(moving, bool)
+    made = np.zeros(len(args), TERM)
+    made["factor"] = np.fromiter(chain.from_iterable(rule.numbers for rule in sums), float)
+    made["a"], made["b"] = np.where(moves[a], a, b), np.where(moves[a], b, a)
+    made["kind"] = moves[a].astype(int) + moves[b] + (moves[a] & (a == b))
+    return made
 
 
 def _are_knotted(rules: Sequence[Rule], some: set[int], second: set[int]) -> bool:

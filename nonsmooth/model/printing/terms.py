@@ -276,7 +276,7 @@ class OfInstructions:
         self.x = self.graph.inputs(0, self.n)
         self.p = self.graph.inputs(1, len(system.parameter_names))
         #: Rules that multipliers enter.
-        self.late = touched(self.lists.series.rules, self.n)
+        self.late = touched(self.lists.series.printed[0], self.n)
 
     def begun(self) -> list[list[Term | None]]:
         """Rows of coefficients of the states, with their values."""
@@ -289,9 +289,8 @@ class OfInstructions:
 
     def expansion(self, outputs: Sequence[int]) -> Expansion:
         """The series of some of field, layer, heights, factors, stops."""
-        series = self.lists.series
-        rows = [series.rows[i] for i in outputs]
-        return Expansion(series.rules, rows, self.p, self.graph)
+        rules, rows = self.lists.series.printed
+        return Expansion(rules, [rows[i] for i in outputs], self.p, self.graph)
 
     def point(self, acting: Terms) -> Point:
         """Values for some multipliers and unknowns."""

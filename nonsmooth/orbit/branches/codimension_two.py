@@ -55,8 +55,8 @@ _CONTACT = " with contact"
 #: Events at which multipliers are continuous.
 _CONTINUOUS = ("crossing-sliding", "switching-sliding", "adding-sliding", SOFT)
 
-#: Duration of a leg that vanishes where others are tangent, relative to the orbit.
-_VANISHES = 1e-3
+#: Duration of a leg that vanishes where others are tangent, relative to the orbit: a cube root of rounding.
+_VANISHES = 1e-4
 
 #: Distance of a point from its guess, and of the states of one event in two itineraries, in scaled unknowns.
 _NEAR, _SAME = 0.05, 1e-4
@@ -441,6 +441,8 @@ def _candidates(meeting: Meeting, base: BranchCurve, u: Array) -> Iterator[Candi
                 yield _from(base, name, u)
     elif isinstance(meeting.at, tuple):
         yield from _two_events(base, u, *meeting.at)
+    elif other == CUSP and came.condition is not None:
+        yield from _beyond_cusp(base, u, came.condition)
     elif _known(base, u, other):
         if came.condition is None:  # a smooth bifurcation
             yield _from(base, base.known[other], u)
@@ -461,6 +463,18 @@ def _with_legs(base: OrbitCurve, u: Array, at: Condition, name: str) -> Iterator
     if beyond is not None and beyond.fresh:
         longer, start = _with(base, u, beyond)
         yield _from(longer, name, start, beyond.fresh)
+
+
+def _beyond_cusp(base: OrbitCurve, u: Array, at: Condition) -> Iterator[Candidate]:
+    """Crossing-sliding turns into switching-sliding where the tangency at which a long leg begins is degenerate."""
+    beyond = _changed(base, at, u, "crossing-sliding")
+    if beyond is None or not beyond.fresh:
+        return
+    (longer, start), k = _with(base, u, beyond), beyond.fresh[0]
+    slide = longer.problem.legs[k]
+    for guard in guarded_field(longer.system, slide.mode).motion.guards:
+        if guard.ends("exit", slide.element, slide.side):
+            yield _from(longer, Condition("start", k, guard), start, beyond.fresh)
 
 
 def _two_events(

@@ -27,6 +27,9 @@ _PASSES = 12
 #: Rounding of a factor, relative to its norm.
 _ROUNDED = 16.0 * 2.0**-52
 
+#: Sine of the angle of a pair of eigenvalues above which they are not two real ones with rounding.
+_TURNED = 1e-3
+
 #: Coupling of columns below which eigenvalues are separate.
 _SEPARATE = 1e-13
 
@@ -73,13 +76,14 @@ class Product:
     def _triangles(self) -> tuple[Array, list[Array]]:
         """The product is similar to the first (r, r) after those of the list, which are triangular."""
         basis = self.basis
-        for _ in range(_PASSES):
+        for k in range(_PASSES):
             first, triangles = basis, list[Array]()
             for factor in self.factors:
                 basis, triangle = _decomposed(factor.matrix @ basis)
                 triangles.append(triangle)
             turned = first.T @ basis
-            if np.abs(np.tril(turned, -1)).max() < _SEPARATE:
+            separate = np.abs(np.tril(turned, -1)).max() < _SEPARATE
+            if separate or (k == 0 and len(turned) == 2 and _is_complex(turned, triangles)):
                 break
         return turned, triangles
 
@@ -141,6 +145,12 @@ def _decomposed(matrix: Array) -> tuple[Array, Array]:
 def _like(matrix: Array) -> Array:
     """The identity in the size of a matrix."""
     return np.asarray(np.linalg.norm(matrix) * np.eye(len(matrix)))
+
+
+def _is_complex(turned: Array, triangles: Sequence[Array]) -> bool:
+    """Whether two eigenvalues are a pair of equal size, which no pass separates."""
+    with np.errstate(divide="ignore"):  # the smaller of two real ones may be lost
+        return bool(np.abs(np.sin(_of_blocks(turned, triangles).imag)).min() > _TURNED)
 
 
 def _of_blocks(turned: Array, triangles: Sequence[Array]) -> NDArray[np.complex128]:

@@ -673,9 +673,8 @@ def at_two_fold(
     if leg.kind != "exit" or system.coupled:
         return False
     other = replace(leg, side=-leg.side).at_event(system, end, p)
-    largest = max(
-        float(np.linalg.norm(x)) for x in (end, *starts)
-    )  # the two-fold may be at the origin
+    states = np.vstack([end[: system.dimension], starts[:, : system.dimension]])
+    largest = float(np.linalg.norm(states, axis=1).max())  # the two-fold may be at the origin
     return abs(other.value) <= part * (float(np.linalg.norm(other.gradient)) * largest or 1.0)
 
 

@@ -285,7 +285,7 @@ def _units(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
             size[:] = far.max()
         elif not size.max() > _CLOSED * np.abs(states).max():  # rounding of zero
             size[:] = span
-    size = np.where(size > _SMALL * size.max(), size, size.max())
+    size = np.where(size > _SMALL * size.max(), size, float(size.max()) or span)
     return np.append(size, [span] * (problem.dimension - own))
 
 

@@ -36,6 +36,9 @@ _MOST_STATES = 8
 #: Starts of legs that are as near as this, relative to the orbit, are one.
 _SAME = 1e-7
 
+#: Multiple of the distance by which an orbit does not close below which its states are zero.
+_OPEN = 10.0
+
 
 def prime_period(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryProblem, Array]:
     """Reduce an orbit that is traversed several times to its prime period."""
@@ -67,18 +70,17 @@ def _prime_period_of_leg(
     problem: BoundaryProblem, x: Array, duration: float, p: Array
 ) -> tuple[BoundaryProblem, Array]:
     """The same for an orbit without events."""
-    n, half = problem.system.dimension, problem.symmetry is not None
+    n, half, leg = problem.system.dimension, problem.symmetry is not None, problem.legs[0]
     size = np.abs(x[:n]).max() or 1.0
     multiplicity = round(2 * problem.periods) if half else round(problem.periods)
     most = multiplicity if problem.forcing is not None else _MOST_MULTIPLICITY
+    after = lambda t: problem.wrap[:n, :n] @ integrate_leg(problem.system, leg, x, t, p).end[:n]
+    if size <= _OPEN * np.abs(after(duration) - x[:n]).max():  # rounding of zero, which repeats
+        size = np.inf
     for k in range(most, 1, -1):
         if (half and k % 2 == 0) or (problem.forcing is not None and multiplicity % k):
             continue
-        there = (
-            problem.wrap[:n, :n]
-            @ integrate_leg(problem.system, problem.legs[0], x, duration / k, p).end[:n]
-        )
-        if np.abs(there - x[:n]).max() < _SAME * size:
+        if np.abs(after(duration / k) - x[:n]).max() < _SAME * size:
             once = replace(problem, periods=problem.periods / k)
             return once, once.pack(x, np.array([duration / k]))
     return problem, problem.pack(x, np.array([duration]))

@@ -137,6 +137,12 @@ def test_where_a_field_is_undefined_the_scan_continues():
     assert len(p.curves) == 1
 
 
+@pytest.mark.parametrize(("force", "folds"), [(2 * x, 0), (2 * x + y, 0), (2 * x + 1, 2)])
+def test_folds_of_mechanical_surfaces_are_where_a_force_jumps(force, folds):
+    """A spring, one with a damper, and one with a preload: the speed y of x = 0 vanishes on both sides."""
+    assert len(plane([y, 0.4 - x], [y, 0.4 - x - force], x).folds) == folds
+
+
 def test_an_equilibrium_on_the_surface_is_no_fold_and_no_pseudo_equilibrium():
     """The prey's level where the equilibrium with harvest meets the threshold: a boundary node, also
     to the digits of a rounded level; far from it a fold, visible or not."""

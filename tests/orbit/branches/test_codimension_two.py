@@ -207,6 +207,10 @@ def test_a_half_orbit_that_loses_its_stop() -> None:
     curve = ns.continue_bifurcation(event, ("f", "w"), bounds=[(0.1, 1.0), (0.3, 0.95)], step=0.1)
     assert_real(curve)
     assert np.abs(curve.special[0].values - [1 / 3, 1 / 2]).max() < 1e-9
+    box = [(0.25, 1.0), (0.3, 0.95)]
+    (one,) = ns.continue_bifurcation(curve.special[0], ("f", "w"), bounds=box, step=0.1)
+    assert one.kind == "switching-sliding" and len(one) > 5
+    assert_real(one)
 
 
 @pytest.mark.slow

@@ -149,6 +149,16 @@ def test_multipliers_and_their_error_do_not_depend_on_the_unit_of_a_state_that_i
     assert wrong <= orbit.error_estimate < 3e-14 and orbit.floquet.zeros == 1
 
 
+def test_an_orbit_that_is_zero_has_the_period_of_its_forcing():
+    """What rounding leaves of the states does not repeat; the guess comes back best after several periods."""
+    x, y, z, t = (ca.SX.sym(s) for s in "xyzt")
+    sides = [[ca.cos(t) - 2 * s, x - 0.05 * y + 1.29 * z, -1.29 * y - 0.05 * z] for s in (1, -1)]
+    system = ns.FilippovSystem([x, y, z], surface=x, above=sides[0], below=sides[1], time=t)
+    orbit = ns.periodic_orbit(system, [0.0, 0.1, 0.1], itinerary=["s"])
+    assert orbit.period == pytest.approx(2 * np.pi, rel=1e-15)
+    np.testing.assert_allclose(np.abs(orbit.multipliers[:2]), np.exp(-0.1 * np.pi), rtol=1e-13)
+
+
 def test_an_orbit_without_finite_derivatives_of_an_event_says_so(monkeypatch):
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     clock = ns.FilippovSystem([x, v], surface=v, above=[v, 0.5 - x - v], below=[v, -0.5 - x - v])

@@ -15,18 +15,30 @@
 static void turn_bound(Decision *d, int i, double *b) {
   int k = d->count;
   double all = *b;
-  for (int j = 0; j < k; j++) if (all == 0) all = d->share[i * k + j];
+  for (int j = 0; j < k && d->is_shared; j++) if (all == 0) all = d->share[i * k + j];
   if (!(all < 0)) return;
   *b = -*b;
   d->sign[i] = -d->sign[i];
   for (int j = 0; j < k; j++) { d->share[i * k + j] *= -1; d->matrix[j * k + i] *= -1; }
 }
 
-/* Edges of the graph: row i of the law contains the unknown j. */
+/* Edges of the graph: row i of the law contains the unknown j, or they are of one vector. */
 static int holds(const Decision *d, int i, int j) {
   if (abs(i - j) == 1 && d->span[i > j ? i : j] < 0) return 1;
-  return i != j && (d->matrix[i * d->count + j] != 0 || d->share[i * d->count + j] != 0);
+  return d->matrix[(int64_t)i * d->count + j] != 0 || (d->is_shared && d->share[(int64_t)i * d->count + j] != 0);
 }
+
+/* List them row by row. */
+static void list_links(Decision *d) {
+  int count = 0;
+  for (int i = 0; i < d->count; i++) {
+    d->link_at[i] = count;
+    for (int j = 0; j < d->count; j++) if (holds(d, i, j)) d->link[count++] = j;
+  }
+  d->link_at[d->count] = count;
+}
+#define EACH_LINK(d, i, j) \
+  for (int at_link = (d)->link_at[i], j; at_link < (d)->link_at[(i) + 1] && (j = (d)->link[at_link], 1); at_link++)
 
 /* Depth-first search of the strongly connected components (Tarjan 1972), in topological order. */
 static void visit(Decision *d, int i, int *time, int *top) {
@@ -34,8 +46,8 @@ static void visit(Decision *d, int i, int *time, int *top) {
   index[i] = low[i] = ++*time;
   stack[(*top)++] = i;
   on[i] = 1;
-  for (int j = 0; j < d->count; j++) {
-    if (!holds(d, i, j)) continue;
+  EACH_LINK(d, i, j) {
+    if (j == i) continue;
     if (!index[j]) { visit(d, j, time, top); if (low[j] < low[i]) low[i] = low[j]; }
     else if (on[j] && index[j] < low[i]) low[i] = index[j];
   }
@@ -54,6 +66,7 @@ static void find_blocks(Decision *d) {
   d->blocks = d->first[0] = 0;
   memset(d->mark, 0, sizeof(int32_t) * 4 * d->count);
   for (int i = 0; i < d->count; i++) if (!d->mark[i]) visit(d, i, &time, &top);
+  for (int q = 0; q < d->count; q++) d->place[d->order[q]] = q;
 }
 
 /* Reactions of joints follow from the other unknowns and are eliminated: row i less the parts ``d->through`` (count, joints)
@@ -119,8 +132,10 @@ static int read_rows(Run *r, Decision *d, const double *x, double *a, double *b,
 /* Dependence of friction's bounds on the reactions, which is affine; negative bounds made positive. */
 static void read_shares(Run *r, Decision *d, const double *x) {
   int k = d->count;
-  memset(d->share, 0, sizeof(double) * k * k);
-  for (int j = 0; j < k; j++) {
+  d->is_shared = 0;
+  for (int j = 0; j < k; j++) d->is_shared |= d->own[j] >= r->m;
+  if (r->c) memset(d->share, 0, sizeof(double) * k * k);
+  for (int j = 0; j < k && d->is_shared; j++) {
     int carries = 0;
     for (int i = 0; i < r->m && d->is_contact[j] && d->own[j] >= r->m; i++) carries |= r->s->carries[i * r->c + d->own[j] - r->m];
     if (!carries) continue;
@@ -133,10 +148,37 @@ static void read_shares(Run *r, Decision *d, const double *x) {
   for (int i = 0; i < k; i++) { d->sign[i] = 1; turn_bound(d, i, d->b + i); }
 }
 
+/* The matrix, and its nonzero entries: without joints those of the layer's slope. */
+static void read_matrix(Run *r, Decision *d) {
+  const Entries *slope = &r->s->slope;
+  int k = d->count, w = r->width, joints = r->s->joints;
+  int32_t *at = d->mark, *to = d->link_at;
+  for (int64_t i = 0; joints && i < (int64_t)k * k; i++)
+    d->matrix[i] = d->is_idle[i % k] ? 0 : -d->turn[i / k] * beside_joints(r, d, (int)(i / k), r->slope + d->own[i % k], w);
+  if (joints) return;
+  memset(d->matrix, 0, sizeof(double) * k * k);
+  memset(to, 0, sizeof(int32_t) * (k + 1));
+  for (int i = 0; i < w; i++) at[i] = -1;
+  for (int i = 0; i < k; i++) at[d->own[i]] = i;
+  for (int pass = 0; pass < 2; pass++) {
+    for (int e = 0; e < slope->count; e++) { /* column by column */
+      int i = at[slope->row[e]], j = at[slope->column[e]];
+      if (i < 0 || j < 0 || d->is_idle[j]) continue;
+      double of = -d->turn[i] * r->slope[(int64_t)d->own[i] * w + d->own[j]];
+      if (of == 0) continue;
+      if (pass) d->link[to[i]++] = j;
+      else { d->matrix[(int64_t)i * k + j] = of; to[i + 1]++; }
+    }
+    for (int i = 0; i < k && !pass; i++) to[i + 1] += to[i];
+    for (int i = k; i > 0 && pass; i--) to[i] = to[i - 1];
+  }
+  to[0] = 0;
+}
+
 /* Rows, matrix and bounds at the present point; 0 where they are not finite. */
 static int read_law(Run *r, Decision *d) {
-  int k = d->count, w = r->width;
-  memcpy(d->base, d->letter, w);
+  int k = d->count;
+  memcpy(d->base, d->letter, r->width);
   for (int i = 0; i < k; i++) {
     int own = d->own[i] = r->active[i], set = set_of(r, own);
     d->span[i] = (int8_t)(set < 0 ? 0 : own == set ? size_of(r, own) : -1);
@@ -147,11 +189,11 @@ static int read_law(Run *r, Decision *d) {
     d->is_idle[i] = element(r, own)->flags & CONTINUOUS;
   }
   if (!read_rows(r, d, r->x, d->a, d->b, d->floor, d->work)) return 0;
-  for (int i = 0; i < k; i++)
-    for (int j = 0; j < k; j++)
-      d->matrix[i * k + j] = d->is_idle[j] ? 0 : -d->turn[i] * beside_joints(r, d, i, r->slope + d->own[j], w);
+  read_matrix(r, d);
   read_shares(r, d, r->x);
-  return finite_all(d->matrix, k * k);
+  if (r->s->joints || r->s->sets || d->is_shared) list_links(d);
+  for (int i = 0; i < k; i++) EACH_LINK(d, i, j) if (!isfinite(d->matrix[(int64_t)i * k + j])) return 0;
+  return 1;
 }
 
 /* The unknowns of the previous mode; those whose guard ended it are at their bounds. */
@@ -166,7 +208,7 @@ static void read_old(const Run *r, Decision *d, const int8_t *letter, const Know
       int own = d->own[i], side = letter[own];
       double bound = d->b[i];
       if (d->is_contact[i] != contacts) continue;
-      for (int j = 0; j < k; j++) bound += d->share[i * k + j] * d->old[j];
+      if (d->is_shared) for (int j = 0; j < k; j++) bound += d->share[i * k + j] * d->old[j];
       for (int q = 0; q < known_count; q++) if (known[q].index == own && known[q].kind == EXIT_GUARD) side = known[q].side;
       int is_old = side == 0 && (!d->is_known[i] || d->span[i]);
       d->old[i] = is_old ? d->sign[i] * r->unknowns[own] : d->is_contact[i] || d->span[i] ? 0 : side * bound;
@@ -177,7 +219,7 @@ static void read_old(const Run *r, Decision *d, const int8_t *letter, const Know
 static int is_at_bound(const Decision *d, int i) {
   double bound = d->b[i];
   if (d->is_contact[i]) return d->old[i] <= TIED * d->room[i];
-  for (int j = 0; j < d->count; j++) bound += d->share[i * d->count + j] * d->old[j];
+  if (d->is_shared) for (int j = 0; j < d->count; j++) bound += d->share[i * d->count + j] * d->old[j];
   if (d->span[i]) return d->span[i] > 0 && bound - length_of(d->old + i, d->span[i]) <= TIED * d->room[i];
   return bound - fabs(d->old[i]) <= TIED * d->room[i];
 }
@@ -193,9 +235,7 @@ static void find_touched(Decision *d, const int8_t *letter) {
   while (any && changed) {
     changed = 0;
     for (int i = 0; i < k; i++)
-      for (int j = 0; j < k; j++)
-        if (d->is_touched[i] != d->is_touched[j] && (holds(d, i, j) || holds(d, j, i)))
-          changed = d->is_touched[i] = d->is_touched[j] = 1;
+      EACH_LINK(d, i, j) if (d->is_touched[i] != d->is_touched[j]) changed = d->is_touched[i] = d->is_touched[j] = 1;
   }
 }
 
@@ -398,14 +438,16 @@ static Block part_of_law(Decision *d, int order, int which) {
     b.floor[i] = d->floor[at + own];
     b.state[i] = d->state[at + own];
     b.is_contact[i] = d->is_contact[own];
-    for (int q = 0; q < first; q++) {
+    int earlier = 0;
+    EACH_LINK(d, own, j) earlier += d->place[j] < first;
+    for (int q = 0; q < first && earlier; q++) {
       int j = d->order[q];
       b.a[i] -= d->matrix[own * k + j] * nu[j];
-      b.b[i] += d->share[own * k + j] * nu[j];
+      if (d->is_shared) b.b[i] += d->share[own * k + j] * nu[j];
     }
     for (int j = 0; j < n; j++) {
       b.matrix[i * n + j] = d->matrix[own * k + b.own[j]];
-      b.share[i * n + j] = d->share[own * k + b.own[j]];
+      b.share[i * n + j] = d->is_shared ? d->share[own * k + b.own[j]] : 0;
       b.is_coupled |= b.share[i * n + j] != 0;
     }
   }
@@ -584,7 +626,7 @@ static int layer_matrix(const Run *r, const Decision *d, int which, int orders, 
   }
   for (int i = 0; i < n; i++) {
     double bound = d->b[own[i]];
-    for (int j = 0; j < k; j++) bound += d->share[own[i] * k + j] * d->nu[j];
+    if (d->is_shared) for (int j = 0; j < k; j++) bound += d->share[own[i] * k + j] * d->nu[j];
     weight[i] = (bound > 0 ? bound : 1) / element(r, d->own[own[i]])->width;
     for (int j = 0; j < n; j++) a[i * n + j] = d->matrix[own[i] * k + own[j]];
   }
@@ -681,7 +723,7 @@ static void take_solution(Decision *d, int order, int which, const double *nu, c
   }
   for (int i = 0; i < n; i++) {
     d->bound[at + own[i]] = d->b[at + own[i]];
-    for (int j = 0; j < d->first[which + 1]; j++) d->bound[at + own[i]] += d->share[own[i] * k + d->order[j]] * d->nu[at + d->order[j]];
+    for (int j = 0; j < d->first[which + 1] && d->is_shared; j++) d->bound[at + own[i]] += d->share[own[i] * k + d->order[j]] * d->nu[at + d->order[j]];
   }
   for (int i = 0; i < n; i++) if (d->span[own[i]] > 0) keep_vector(d, own[i], order);
 }
@@ -710,7 +752,7 @@ static int leave_limit(Decision *d, int which, int order) {
     slope[i] = d->b[k + own];
     for (int q = 0; q < d->first[which]; q++) {
       rate[i] -= d->matrix[own * k + d->order[q]] * d->nu[k + d->order[q]];
-      slope[i] += d->share[own * k + d->order[q]] * d->nu[k + d->order[q]];
+      if (d->is_shared) slope[i] += d->share[own * k + d->order[q]] * d->nu[k + d->order[q]];
     }
     table[i] = d->nu[own];
     most = larger(most, larger(fabs(table[i]), bound[i]));
@@ -878,6 +920,17 @@ static int hold(Run *r, Continuation *to, int may_depend) {
   return r->status == RUNNING;
 }
 
+/* The position of an element among the active ones, which are in order, or -1. */
+static int position_of(const Decision *d, int element) {
+  int low = 0, high = d->count;
+  while (low < high) {
+    int middle = (low + high) / 2;
+    if (d->own[middle] < element) low = middle + 1;
+    else high = middle;
+  }
+  return low < d->count && d->own[low] == element ? low : -1;
+}
+
 /* The mode of a motion to r->chosen, with the zeros of its guards. */
 static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   Continuation *to = &r->chosen;
@@ -892,8 +945,8 @@ static void choose_motion(Run *r, const Decision *d, const Motion *own) {
   for (int row = 0; row < l->rows; row++) {
     int kind = l->kind[row], of = l->index[row], is_off = kind == SURFACE_GUARD || kind == IMPACT_GUARD || kind == NEAR_GUARD;
     if (kind == NEAR_GUARD && to->letter[of] == 0) continue; /* ends steps only */
-    for (int i = 0; i < d->count; i++) {
-      if (row >= l->atoms || d->own[i] != of) continue;
+    int i = row < l->atoms ? position_of(d, of) : -1;
+    if (i >= 0) {
       int both = kind == RELEASE_GUARD || own->before[i] == UNDECIDED || is_idle(r, to->letter, of);
       int near = both || own->before[i] == (l->side[row] < 0 ? AT_BOTTOM : AT_TOP);
       to->drop[row] = is_off ? own->order[i] + degree_of(r, of) : near ? own->order[i] : 0;
@@ -921,14 +974,14 @@ static void begin_decision(const Run *r, Decision *d) {
   for (int i = 0; i < k; i++) { /* what reactions can be, then rows */
     double own = fabs(d->matrix[i * (k + 1)]);
     d->room[i] = d->is_contact[i] ? own > 0 ? fabs(d->a[i]) / own : 0 : fabs(d->b[i]);
-    for (int j = 0; j < k; j++) d->most = larger(fabs(d->matrix[i * k + j]), d->most);
+    EACH_LINK(d, i, j) d->most = larger(fabs(d->matrix[i * k + j]), d->most);
   }
   for (int i = 0; i < k; i++)
-    for (int j = 0; j < k && !d->is_contact[i]; j++) d->room[i] += fabs(d->share[i * k + j]) * d->room[j];
+    for (int j = 0; j < k && d->is_shared && !d->is_contact[i]; j++) d->room[i] += fabs(d->share[i * k + j]) * d->room[j];
   estimate_multipliers(r, d);
   for (int i = 0; i < k; i++) {
     d->yard[i] = fabs(d->a[i]);
-    for (int j = 0; j < k; j++) d->yard[i] += fabs(d->matrix[i * k + j]) * d->room[j];
+    EACH_LINK(d, i, j) d->yard[i] += fabs(d->matrix[i * k + j]) * d->room[j];
     d->floor[i] = larger(d->floor[i], tie_of(d) * d->yard[i]);
     d->state[i] = UNDECIDED;
   }

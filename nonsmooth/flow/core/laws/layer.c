@@ -582,7 +582,10 @@ static int reach_fold(Run *r, const Expansion *e, double left) {
   memset(f->states, 0, sizeof(double) * r->n * stride);
   for (int i = 0; i < r->n; i++) f->states[(int64_t)i * stride] = r->x[i];
   for (int i = 0; i < slides; i++) f->series[(int64_t)e->l.sliding[i] * stride] = r->unknowns[e->l.sliding[i]];
-  memcpy(f->inverse, e->inverse, sizeof(double) * slides * slides);
+  memcpy(f->inverse, e->inverse, sizeof(double) * e->entries);
+  memcpy(f->column, e->column, sizeof(int32_t) * e->entries);
+  memcpy(f->from, e->from, sizeof(int32_t) * slides);
+  memcpy(f->to, e->to, sizeof(int32_t) * slides);
   memcpy(f->allowed, e->allowed, sizeof(double) * r->n);
   f->scaled = f->steepened = 0;
   weigh_point(r, f, r->x, r->unknowns);

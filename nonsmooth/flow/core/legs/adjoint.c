@@ -95,9 +95,10 @@ static void pull_land(Run *r, Leg *l, Slopes *g) {
   pull_links(g, LATE, 0);
   for (int i = 0; i < r->m; i++) if (set_of(r, i) < 0 || e->l.letter[i] == 0) c->h[i] = 0;
   for (int i = 0; i < slides; i++)
-    for (int j = 0; j < slides; j++)
-      if (set_of(r, e->l.sliding[j]) >= 0)
-        c->h[e->l.sliding[j]] -= e->inverse[i * slides + j] * c->series[(int64_t)e->l.sliding[i] * r->stride];
+    for (int q = e->from[i]; q < e->to[i]; q++) {
+      int j = e->l.sliding[e->column[q]];
+      if (set_of(r, j) >= 0) c->h[j] -= e->inverse[q] * c->series[(int64_t)e->l.sliding[i] * r->stride];
+    }
   clear_variation(c);
   pull_surfaces(r, g, c->h);
   for (int i = 0; i < r->n; i++) l->row[i] += c->states[(int64_t)i * r->stride];

@@ -220,9 +220,9 @@ static void link_up(Run *r, const Expansion *e, Slopes *g) {
         add_single(g, v->rates + f * (stride + 1), v->series + i * stride, e->lambda + i * stride, PLUS);
     }
     for (int i = 0; i < slides && group == UNKNOWNS && !g->leaving; i++)
-      for (int j = 0; j < slides; j++) {
-        const double *a = e->inverse + i * slides + j;
-        if (*a != 0) add_single(g, v->series + e->l.sliding[i] * stride, v->sum + (r->n + e->l.sliding[j]) * stride, a, MINUS);
+      for (int q = e->from[i]; q < e->to[i]; q++) {
+        const double *sum = v->sum + (r->n + e->l.sliding[e->column[q]]) * stride;
+        add_single(g, v->series + e->l.sliding[i] * stride, sum, e->inverse + q, MINUS);
       }
     if (group == UNKNOWNS && g->leaving) link_right_sides(r, e, g);
     if (group == NEXT) link_next(r, e, g);
@@ -319,9 +319,10 @@ static void move_onto(const Run *r, const Slopes *g, const double *h, double *y)
   const Variation *v = g->v;
   int64_t n = r->n, slides = e->l.slides, stride = r->stride;
   for (int i = 0; i < slides; i++)
-    for (int j = 0; j < slides; j++)
-      if (set_of(r, e->l.sliding[j]) >= 0)
-        v->series[e->l.sliding[i] * stride] -= e->inverse[i * slides + j] * h[e->l.sliding[j]];
+    for (int q = e->from[i]; q < e->to[i]; q++) {
+      int j = e->l.sliding[e->column[q]];
+      if (set_of(r, j) >= 0) v->series[e->l.sliding[i] * stride] -= e->inverse[q] * h[j];
+    }
   memset(v->sum, 0, sizeof(double) * n * stride);
   follow_links(g, LATE, LATE, 0);
   for (int i = 0; i < n; i++) y[i] += v->sum[i * stride];

@@ -181,6 +181,25 @@ def test_steps_made_by_the_driver_at_random(width, name, monkeypatch):
     assert 0.45 < driven / steps < 0.6 + events / steps
 
 
+@pytest.mark.parametrize(("count", "share"), [(1, 1), (2, 0)])
+def test_slides_of_several_surfaces_are_no_work_for_lanes(count, share):
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    given = {"surfaces": [x, y][:count], "multipliers": [a, b][:count]}
+    system = ns.FilippovSystem([x, y], field=[-a, -b if count > 1 else x], **given)
+    options, p = Options(t_end=1.0), system.parameter_vector()
+    assert (interpreter_for(system, options).seconds(np.zeros(2), p, options) > 0) == share
+
+
+def test_an_interrupt_is_heard_while_the_driver_slides(monkeypatch):
+    """All of 200 runs slide from their starts on, for 1,000 steps each."""
+    system = ns.FilippovSystem([x, y], field=[-z, -t], surfaces=[x, y], multipliers=[z, t])
+    options, asked = Options(t_end=1.0, max_step=1e-3), []
+    lanes = lanes_of(system, 6, 4, monkeypatch)
+    stop = lambda: bool(asked.append(0))
+    found = lanes.run_many(np.zeros((200, 2)), system.parameter_vector(), options, None, stop=stop)
+    assert len(asked) > found.totals[0] / 20_000 > 5
+
+
 def test_runs_that_begin_late(monkeypatch):
     """The time of a state is since the start in the driver, and that of the clock in lanes."""
     above, below = [y, -x - 0.4], [y, -x + 0.4]

@@ -89,13 +89,13 @@ def read_rows(
 ) -> Rows:
     """Read the columns ``name [unit]`` of a file row by row, also under other headings; a bad row keeps its error."""
     titles, cells = _csv(Path(path))
-    positions = [(*_title(title), k) for k, title in enumerate(titles)]
+    read = [(*_title(title), k) for k, title in enumerate(titles)]
+    positions = [(name.replace("_", ""), unit, k) for name, unit, k in read]
     there = [name for name, _, _ in positions]
-    known = {
-        heading: name
-        for name in kinds
-        for heading in [one for one in (name, *headings.get(name, ())) if one in there][:1]
+    ways = {
+        name: [one.replace("_", "") for one in (name, *headings.get(name, ()))] for name in kinds
     }
+    known = {one: name for name, own in ways.items() for one in [o for o in own if o in there][:1]}
     positions = [(known[name], unit, k) for name, unit, k in positions if name in known]
     rest = {titles[k]: k for k in range(len(titles)) if k not in [place[2] for place in positions]}
     _require_each_once([(name, titles[k]) for name, _, k in positions])
@@ -136,11 +136,10 @@ def _in_si(read: list[tuple[str, str | None, str]], kinds: Mapping[str, str]) ->
 
 
 def _title(title: Any) -> tuple[str, str | None]:
-    """Name and unit of ``name [unit]``; names in lower case, their words apart by underscores."""
+    """Name and unit of ``name [unit]``; names in lower case, with underscores."""
     match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(](.*)[\])])?\s*", str(title), re.DOTALL)
     assert match is not None
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", match[1].strip())
-    name = re.sub(r"[\s.-]+", "_", words.lower())
+    name = re.sub(r"[\s.-]+", "_", match[1].strip().lower())
     unit = None if match[2] is None else match[2].strip()
     return name, _UNITS.get(unit.lower(), unit) if unit else unit
 

@@ -236,6 +236,15 @@ ANSWERS = {
     "division": "statuses.html#division-by-zero-00",
     "schmitt trigger": "trades.html#a-thermostat-simulate-a-relay-with-hysteresis-a-hybrid-automaton",
     "diabolo": "two_folds.html",
+    "parallel": "start.html#many-in-parallel-sweep-starts-or-a-parameter",
+    "speed": "index.html#measured-speed-and-accuracy",
+    "restitution": "recipes.html#impacts-restitution-and-coming-to-rest",
+    "dead zone": "trades.html#saturation-and-a-pi-controller-with-anti-windup",
+    "font size": "recipes.html#plot-in-your-style-save-a-figure",
+    "svg": "recipes.html#plot-in-your-style-save-a-figure",
+    "sawtooth": "recipes.html#switching-with-a-clock-pulse-width-modulation-pwm",
+    "licence": "cite.html",
+    "backspin": "golf.html#the-first-bounce",
 }
 
 

@@ -442,7 +442,8 @@ class _Solver:
             return root
         try:
             values, jacobian = equations(v)
-            closes = float(np.abs(values / self._sizes(jacobian)).max())
+            moving = np.abs(v) > _ROUNDING  # states that are zero have the unit of others
+            closes = float(np.abs(values / self._sizes(jacobian * moving)).max())
             far = _FAR * math.sqrt(closes)
             if far > 1.0 or (root is not None and np.abs(root - v).max() <= far):
                 return root

@@ -56,6 +56,7 @@ def cite() -> str:
     """The page on how to cite, from CITATION.cff."""
     return (
         "# How to cite\n\n"
+        "The licence is Apache-2.0 (file `LICENSE`). "
         "Cite the software, and the papers whose mathematics you used. This is `CITATION.cff`, which "
         "reference managers read:\n\n```yaml\n" + text_of("CITATION.cff").rstrip() + "\n```\n"
     )

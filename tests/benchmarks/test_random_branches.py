@@ -25,6 +25,7 @@ def test_nothing_is_wrong_on_a_random_branch(kind, capsys):
         ("filippov", 50124, ["homoclinic"]),
         ("filippov", 81564, ["cycle from a two-fold"]),
         ("filippov", 82037, ["period doubling", *["switching-sliding"] * 2, "two-fold"]),
+        ("relay", 83057, ["adding-sliding", "boundary equilibrium"]),
     ],
 )
 def test_ends_of_branches_that_simulation_could_not_follow_are_named(kind, seed, events, capsys):

@@ -117,18 +117,7 @@ def test_built_site_loads_nothing_from_elsewhere_and_everything_it_loads_is_ther
 class _Prose(html.parser.HTMLParser):
     """The text of a page without what is no prose: code, formulas, heads, navigation, scripts."""
 
-    LEFT_OUT = {
-        "pre",
-        "code",
-        "math",
-        "script",
-        "style",
-        "nav",
-        "header",
-        "footer",
-        "title",
-        "b",
-    } | {f"h{k}" for k in range(1, 7)}
+    LEFT_OUT = {*"pre code math script style nav header footer title b h1 h2 h3 h4 h5 h6".split()}
 
     def __init__(self):
         super().__init__()
@@ -236,6 +225,15 @@ ANSWERS = {
     "division": "statuses.html#division-by-zero-00",
     "schmitt trigger": "trades.html#a-thermostat-simulate-a-relay-with-hysteresis-a-hybrid-automaton",
     "diabolo": "two_folds.html",
+    "parallel": "start.html#many-in-parallel-sweep-starts-or-a-parameter",
+    "speed": "index.html#measured-speed-and-accuracy",
+    "restitution": "recipes.html#impacts-restitution-and-coming-to-rest",
+    "dead zone": "trades.html#saturation-and-a-pi-controller-with-anti-windup",
+    "font size": "recipes.html#plot-in-your-style-save-a-figure",
+    "svg": "recipes.html#plot-in-your-style-save-a-figure",
+    "sawtooth": "recipes.html#switching-with-a-clock-pulse-width-modulation-pwm",
+    "licence": "cite.html",
+    "backspin": "golf.html#the-first-bounce",
 }
 
 

@@ -606,26 +606,28 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         if last is not None and last.point is not None and _elsewhere(last, at):
             half.nodes[-1] = (last.curve, last.point)  # regular in the other itinerary
         found = [known[id(zero)] for zero in arc.zeros]
-        half.events += _distinct(found)
+        half.events += _distinct(found, last)
         half.end, half.reason = end_of(arc), arc.reason
     if half.end in (BranchEnd.PERIOD_DIVERGES, BranchEnd.STEP_TOO_SMALL, BranchEnd.FAILED):
         half.name_end()
     return half
 
 
-#: Distance of a turning point from a pitchfork, relative to the step, at which it is the pitchfork itself.
-_SAME = 1e-8
+#: Distance of a turning point from a pitchfork and from the end of an arc, relative to the parameter, at which it is
+#: that event itself.
+_SAME, _ROUNDING = 1e-8, 1e-12
 
 
-def _distinct(events: Sequence[BranchEvent | None]) -> list[BranchEvent]:
-    """Events without the turning points of branches at the pitchforks where these begin."""
+def _distinct(events: Sequence[BranchEvent | None], last: BranchEvent | None) -> list[BranchEvent]:
+    """Events without the turning points of branches that begin at pitchforks, or at the last event, as a square root."""
     found = [event for event in events if event is not None]
-    forks = [event.parameter for event in found if event.kind == "pitchfork"]
+    ends = [(event.parameter, _SAME) for event in found if event.kind == "pitchfork"]
+    ends += [] if last is None else [(last.parameter, _ROUNDING)]
     return [
         event
         for event in found
         if event.kind != "fold"
-        or all(abs(event.parameter - fork) > _SAME * (1e-3 + abs(fork)) for fork in forks)
+        or all(abs(event.parameter - end) > part * (1e-3 + abs(end)) for end, part in ends)
     ]
 
 

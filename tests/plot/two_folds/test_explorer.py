@@ -63,15 +63,8 @@ def expected(folds, nu):
     c = two_folds.classify_two_fold(SIGMA[folds], nu)
     real = flow.discriminant >= 0
     numbers = [
-        *(
-            c.canards,
-            c.faux_canards,
-            c.margin,
-            c.into.low,
-            c.into.high,
-            c.out_of.low,
-            c.out_of.high,
-        ),
+        *(c.canards, c.faux_canards, c.margin),
+        *(c.into.low, c.into.high, c.out_of.low, c.out_of.high),
         *(flow.trace, flow.determinant, flow.discriminant, flow.gap),
         two_folds.max_flights(SIGMA[folds], nu),
         *(flow.eigenvalues if real else ()),

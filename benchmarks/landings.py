@@ -38,8 +38,11 @@ WAYS = ("default", "tight", "bounce")
 
 
 @lru_cache
-def ball(load: str) -> ns.FilippovSystem:
-    """A sphere on a spring with Coulomb friction, until the load falls to zero; the spin is a state."""
+def ball(load: str = "contact", slip_as_state: bool = False) -> ns.FilippovSystem:
+    """A sphere on a spring with Coulomb friction, until the load falls to zero.
+
+    States x1, x2, v1, v2, w1, w2, y, ydot with h = v + w; or h in the place of w.
+    """
     x = [ca.SX.sym(n) for n in ("x1", "x2", "v1", "v2", "w1", "w2", "y", "ydot")]
     lam = ca.vertcat(ca.SX.sym("l1"), ca.SX.sym("l2"))
     mu, d1, d2, eta, weight, k = p = [ca.SX.sym(name) for name in PARAMETERS]
@@ -47,11 +50,13 @@ def ball(load: str) -> ns.FilippovSystem:
     carried = normal - weight if load == "net" else normal
     force = -mu * carried * lam
     spring = [-2 * d1 * eta * x[2 + i] - eta**2 * x[i] for i in range(2)]
-    rates = [x[2], x[3], *[spring[i] + force[i] for i in range(2)], force[0] / k, force[1] / k]
+    h = ca.vertcat(x[4], x[5]) if slip_as_state else ca.vertcat(x[2] + x[4], x[3] + x[5])
+    turned = force * (1 + 1 / k) + ca.vertcat(*spring) if slip_as_state else force / k
+    rates = [x[2], x[3], *[spring[i] + force[i] for i in range(2)], turned[0], turned[1]]
     return ns.FilippovSystem(
         x,
         field=[*rates, x[7], normal - weight],
-        surfaces=[ca.vertcat(x[2] + x[4], x[3] + x[5])],
+        surfaces=[h],
         multipliers=[lam],
         parameters=p,
         stops=[ns.Stop(carried, direction=-1, name="lift-off")],

@@ -13,24 +13,10 @@ from intervals import CheckError
 #: Bytes of a file; instructions of a graph, and how deep they are nested; exponent of a power; states.
 _LARGEST, _MOST, _DEEPEST, _EXPONENT, _STATES = 1 << 28, 100_000, 1_000, 1_000, 200
 
-_ONE = (
-    *(
-        "exp",
-        "expm1",
-        "log",
-        "log1p",
-        "sqrt",
-        "sq",
-        "inv",
-        "sin",
-        "cos",
-        "tan",
-        "atan",
-        "asin",
-        "acos",
-    ),
-    *("sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "neg", "twice"),
-)
+_ONE = """
+    exp expm1 log log1p sqrt sq inv sin cos tan atan asin acos
+    sinh cosh tanh asinh acosh atanh erf neg twice
+""".split()
 _TWO = ("add", "sub", "mul", "div", "pow", "hypot", "atan2")
 _ARITY = {**dict.fromkeys(_ONE, 1), **dict.fromkeys(_TWO, 2), "pi": 0}
 

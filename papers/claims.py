@@ -30,6 +30,18 @@ def close(what: str, value: float, expected: float, tolerance: float) -> Check:
     )
 
 
+def named(what: str, found: Any, status: str, kind: str) -> Check:
+    """Check the status and the kind of a point that was found."""
+    return Check(f"{what}{found.status} {found.kind}", (found.status, found.kind) == (status, kind))
+
+
+def value_of(problem: Any, quantity: str) -> float:
+    """A reference value of a problem of the textbook that is a number."""
+    value = problem[quantity].value
+    assert isinstance(value, float)
+    return value
+
+
 class Row(Protocol):
     """A row of a table: it holds if all of its checks do."""
 

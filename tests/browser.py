@@ -83,6 +83,10 @@ class Browser:
         self.complaints: list[str] = []
         self.requests: list[str] = []
 
+    def find(self, selector: str):
+        """The first element of a CSS selector."""
+        return self.driver.find_element("css selector", selector)
+
     def open(self, path: Path, width: int = 1366, height: int = 900, hash: str = "") -> None:
         """Open a file at a width in pixels; a phone's width comes with touch and its pixel ratio."""
         self.driver.get("about:blank")  # a changed hash alone would not load the page

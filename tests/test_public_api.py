@@ -7,47 +7,24 @@ import pytest
 
 import nonsmooth as ns
 
-TWO_FOLDS = {
-    "Boundary",
-    "Classification",
-    "NormalForm",
-    "ReducedFlow",
-    "Slopes",
-    "accumulation_time",
-    "classify_two_fold",
-    "diabolo_slopes",
-    "flight_above",
-    "flight_below",
-    "max_flights",
-    "normal_form",
-    "return_matrix",
-}
-RESULTS = {
-    "BoundaryBifurcation",
-    "BoundaryEquilibrium",
-    "Continuation",
-    "Equilibrium",
-    "Fold",
-    "FoldFold",
-    "Intersection",
-    "LocalObject",
-    "PseudoEquilibrium",
-    "SlidingBranch",
-}
-ORBITS = {
-    "Basins",
-    "BifurcationCurve",
-    "Branch",
-    "BranchEvent",
-    "CodimensionTwo",
-    "Connection",
-    "FarSide",
-    "Funnel",
-    "Gradient",
-    "LyapunovSpectrum",
-    "Manifold",
-    "PoincareOrbit",
-}
+TWO_FOLDS = set(
+    """
+    Boundary Classification NormalForm ReducedFlow Slopes accumulation_time classify_two_fold
+    diabolo_slopes flight_above flight_below max_flights normal_form return_matrix
+""".split()
+)
+RESULTS = set(
+    """
+    BoundaryBifurcation BoundaryEquilibrium Continuation Equilibrium Fold FoldFold Intersection
+    LocalObject PseudoEquilibrium SlidingBranch
+""".split()
+)
+ORBITS = set(
+    """
+    Basins BifurcationCurve Branch BranchEvent CodimensionTwo Connection FarSide Funnel Gradient
+    LyapunovSpectrum Manifold PoincareOrbit
+""".split()
+)
 
 
 def test_dir_is_the_public_api_and_nothing_else():

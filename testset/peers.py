@@ -230,6 +230,8 @@ def pathsim(x: ca.SX, t: ca.SX, field: ca.SX, guards: ca.SX) -> Any:
     rhs, values = numbers(x, t, field), numbers(x, t, guards)
 
     def leg(t: float, x: np.ndarray, t_end: float) -> Any:
+        if t >= t_end:
+            return t, x, None
         block, hits = ODE(lambda x, u, s: rhs(t + s, x), np.array(x)), list[Any]()
 
         def act(k: int) -> Any:

@@ -28,33 +28,12 @@ DOCS = Path(__file__).parents[1]
 EXAMPLES = DOCS / "examples"
 
 #: The gallery, in the order of the page.
-GALLERY = (
-    "two_fold",
-    "two_fold_space",
-    "atlas",
-    "funnel",
-    "stick_slip",
-    "leine",
-    "friction_drive",
-    "pushed_block",
-    "belt",
-    "relay",
-    "plane_friction",
-    "harvest",
-    "stommel",
-    "hybrid",
-    "buck",
-    "conduction",
-    "walker",
-    "impact",
-    "soft_impact",
-    "chatter",
-    "synchrony",
-    "basins",
-    "wells",
-    "friction_cone",
-    "outcome_map",
-    "slip_directions",
+GALLERY = tuple(
+    """
+    two_fold two_fold_space atlas funnel stick_slip leine friction_drive pushed_block belt relay
+    plane_friction harvest stommel hybrid buck conduction walker impact soft_impact chatter
+    synchrony basins wells friction_cone outcome_map slip_directions
+""".split()
 )
 
 

@@ -5,13 +5,14 @@ Statements marked so are quoted from memory, as are the parameters: the paper wa
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 import nonsmooth as ns
 
-from ..claims import Check, Found, Statements, close
+from ..claims import Check, Found, Statements, close, named, value_of
 from .model import (
     BOUNDARY_FOCUS,
     BOUNDARY_NODE,
@@ -32,10 +33,7 @@ from .model import (
 claim = Statements(Path(__file__).with_name("README.md"))
 
 
-def _reference(quantity: str) -> float:
-    value = PROBLEM[quantity].value
-    assert isinstance(value, float)
-    return value
+_reference = partial(value_of, PROBLEM)
 
 
 def _kind(point: list[float], alpha: float) -> str:
@@ -158,14 +156,8 @@ def boundary_node() -> Found:
             (found.label, found.side) == ("BN1", "+"),
         ),
         Check(found.detail.unfolding, found.detail.unfolding == "persistence"),
-        Check(
-            f"before: {before.status} {before.kind}",
-            (before.status, before.kind) == ("real", "stable node"),
-        ),
-        Check(
-            f"after: {after.status} {after.kind}",
-            (after.status, after.kind) == ("real", "stable pseudo-node"),
-        ),
+        named("before: ", before, "real", "stable node"),
+        named("after: ", after, "real", "stable pseudo-node"),
     )
 
 

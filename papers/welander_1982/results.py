@@ -5,13 +5,14 @@ Statements marked so are quoted from memory, as are the parameters: the paper wa
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 import nonsmooth as ns
 
-from ..claims import Check, Found, Statements, close
+from ..claims import Check, Found, Statements, close, named, value_of
 from .model import (
     BOUNDARY_MIXED,
     BOUNDARY_RESTING,
@@ -32,10 +33,7 @@ from .model import (
 claim = Statements(Path(__file__).with_name("README.md"))
 
 
-def _reference(quantity: str) -> float:
-    value = PROBLEM[quantity].value
-    assert isinstance(value, float)
-    return value
+_reference = partial(value_of, PROBLEM)
 
 
 @claim("oscillation")
@@ -79,11 +77,8 @@ def resting_equilibrium() -> Found:
             f"class {found.label} of the field on the side {found.side}",
             (found.label, found.side) == ("BN1", "-"),
         ),
-        Check(f"{real.status} {real.kind}", (real.status, real.kind) == ("real", "stable node")),
-        Check(
-            f"{pseudo.status} {pseudo.kind}",
-            (pseudo.status, pseudo.kind) == ("real", "stable pseudo-node"),
-        ),
+        named("", real, "real", "stable node"),
+        named("", pseudo, "real", "stable pseudo-node"),
     )
 
 
@@ -173,14 +168,8 @@ def mixed_equilibrium() -> Found:
             found.label == "UN2" and found.detail.time_reversed,
         ),
         Check(found.detail.unfolding, found.detail.unfolding == "nonsmooth fold"),
-        Check(
-            f"below: {real.status} {real.kind}",
-            (real.status, real.kind) == ("real", "stable node"),
-        ),
-        Check(
-            f"below: {saddle.status} {saddle.kind}",
-            (saddle.status, saddle.kind) == ("real", "pseudo-saddle"),
-        ),
+        named("below: ", real, "real", "stable node"),
+        named("below: ", saddle, "real", "pseudo-saddle"),
         Check(f"above: {virtual.status}", virtual.status == "virtual"),
     )
 

@@ -20,23 +20,7 @@ import numpy as np
 import nonsmooth as ns
 
 JUNK = (
-    *(
-        None,
-        True,
-        -1,
-        0,
-        1,
-        2,
-        7,
-        10**6,
-        2**31,
-        2**63,
-        10**40,
-        0.5,
-        -1e308,
-        float("nan"),
-        float("inf"),
-    ),
+    *(None, True, -1, 0, 1, 2, 7, 10**6, 2**31, 2**63, 10**40, 0.5, -1e308, np.nan, np.inf),
     *(
         "",
         "s",
@@ -52,23 +36,10 @@ JUNK = (
         [[]],
         [None, -1],
     ),
-    *(
-        {"array": ["float64", 0, [1]]},
-        {"array": ["float64", -1, [2]]},
-        {"array": ["int32", 0, [2**40]]},
-    ),
-    *(
-        {"array": ["float64", 0, [2**40, 2**40]]},
-        {"array": ["float64", 0, [0, 2**47]]},
-        {"system": 0},
-    ),
-    *(
-        {"system": -1},
-        {"of": "Event", "fields": {}},
-        {"tuple": [1]},
-        {"mapping": [[[], 1]]},
-        {"status": 99},
-    ),
+    *({"array": ["float64", 0, [1]]}, {"array": ["float64", -1, [2]]}),
+    *({"array": ["int32", 0, [2**40]]}, {"array": ["float64", 0, [2**40, 2**40]]}),
+    *({"array": ["float64", 0, [0, 2**47]]}, {"system": 0}, {"system": -1}, {"tuple": [1]}),
+    *({"of": "Event", "fields": {}}, {"mapping": [[[], 1]]}, {"status": 99}),
 )
 
 

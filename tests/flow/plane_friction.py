@@ -8,6 +8,7 @@ from pathlib import Path
 import casadi as ca
 
 import nonsmooth as ns
+from benchmarks.landings import ball
 
 _FILE = Path(__file__).parents[1] / "data" / "vector_friction.json"
 
@@ -18,33 +19,6 @@ CASES = {case["name"]: case for case in json.loads(_FILE.read_text())["cases"]}
 def columns(*names):
     """Symbols of these names."""
     return [ca.SX.sym(name) for name in names]
-
-
-@lru_cache
-def ball(load="contact", slip_as_state=False):
-    """A sphere on a spring with Coulomb friction, until the load falls to zero.
-
-    States x1, x2, v1, v2, w1, w2, y, ydot with h = v + w; or h in the place of w.
-    """
-    x = columns("x1", "x2", "v1", "v2", "w1", "w2", "y", "ydot")
-    lam, p = ca.SX.sym("lam", 2), columns("mu", "d1", "d2", "eta", "G", "k")
-    mu, d1, d2, eta, weight, k = p
-    lam = ca.vertcat(*columns("l1", "l2"))
-    normal = -2 * d2 * x[7] - x[6]
-    carried = normal - weight if load == "net" else normal
-    force = -mu * carried * lam
-    spring = [-2 * d1 * eta * x[2 + i] - eta**2 * x[i] for i in range(2)]
-    h = ca.vertcat(x[4], x[5]) if slip_as_state else ca.vertcat(x[2] + x[4], x[3] + x[5])
-    turned = force * (1 + 1 / k) + ca.vertcat(*spring) if slip_as_state else force / k
-    rates = [x[2], x[3], *[spring[i] + force[i] for i in range(2)], turned[0], turned[1]]
-    return ns.FilippovSystem(
-        x,
-        field=[*rates, x[7], normal - weight],
-        surfaces=[h],
-        multipliers=[lam],
-        parameters=p,
-        stops=[ns.Stop(carried, direction=-1, name="lift-off")],
-    )
 
 
 @lru_cache

@@ -34,7 +34,7 @@ TOLERANCE = 1e-9
 T_END = 3.0
 
 
-class _Text:
+class Text:
     """Expressions whose numbers are parameters, so that a system with other numbers is the same text."""
 
     def __init__(self, rng: np.random.Generator):
@@ -56,7 +56,7 @@ class _Text:
         return "+".join(f"{self.number(w)}*{name}" for w, name in zip(weights, names, strict=True))
 
 
-def _field(text: _Text, has: dict[str, bool], states: list[str]) -> list[str]:
+def _field(text: Text, has: dict[str, bool], states: list[str]) -> list[str]:
     rng, n = text.rng, len(states)
     rates = 0.6 * rng.normal(size=(n, n)) - 0.4 * np.eye(n)
     field = [f"{text.form(row, states)}+{text.normal()}" for row in rates]
@@ -70,7 +70,7 @@ def _field(text: _Text, has: dict[str, bool], states: list[str]) -> list[str]:
 
 
 def _surfaces(
-    text: _Text, has: dict[str, bool], states: list[str], field: list[str], m: int
+    text: Text, has: dict[str, bool], states: list[str], field: list[str], m: int
 ) -> list[str]:
     """Surfaces, whose multipliers are added to the field."""
     rng, n = text.rng, len(states)
@@ -98,7 +98,7 @@ def _surfaces(
     return surfaces
 
 
-def _jump(text: _Text, has: dict[str, bool], states: list[str], k: int) -> Jump:
+def _jump(text: Text, has: dict[str, bool], states: list[str], k: int) -> Jump:
     rng, n = text.rng, len(states)
     guard = f"{text.form(rng.normal(size=n), states)}-{text.normal(0.7)}"
     if rng.random() < 0.3:
@@ -135,7 +135,7 @@ def draw(seed: int, more: bool = True) -> tuple[Problem, frozenset[str]]:
         hidden=m == 1 and rng.random() < 0.3,
     )
     has["impacts"] &= not has["hidden"]
-    text, states = _Text(rng), [f"x{i}" for i in range(n)]
+    text, states = Text(rng), [f"x{i}" for i in range(n)]
     field = _field(text, has, states)
     surfaces = _surfaces(text, has, states, field, m)
     count = int(rng.integers(1, 4)) if has["resets"] else 0
@@ -165,7 +165,7 @@ def draw(seed: int, more: bool = True) -> tuple[Problem, frozenset[str]]:
 
 def _with_more(problem: Problem, rng: np.random.Generator, kinds: set[str]) -> Problem:
     """Add what ``draw`` has not: discrete states, conditions of two, cascades, tables, friction in the plane."""
-    text = _Text(rng)
+    text = Text(rng)
     text.numbers = problem.numbers
     x = [s for s in problem.states if s.startswith("x")]
     jumps, changes = list(problem.jumps), {}

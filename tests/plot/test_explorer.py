@@ -232,7 +232,6 @@ def test_page_fits_and_shows_the_run_of_python(browser, page, width):
 @pytest.mark.slow
 @pytest.mark.browser
 def test_keys_sliders_and_the_address(browser, page):
-    from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
 
     browser.open(page, hash="p=0.5,0.2&x=0.4,-0.2003&t=12&box=-1,1,-1,1")
@@ -240,17 +239,17 @@ def test_keys_sliders_and_the_address(browser, page):
     run = ns.simulate(BELT, [0.4, -0.2003], 12.0, parameters={"belt": 0.5, "friction": 0.2})
     assert seen["word"] == run.itinerary and state_of(seen) == pytest.approx(run.x[-1], abs=1e-6)
     browser.run("document.querySelector('.handle').focus()")
-    handle = browser.driver.find_element(By.CSS_SELECTOR, ".handle")
+    handle = browser.find(".handle")
     handle.send_keys(Keys.SHIFT, Keys.ARROW_LEFT * 2)
     seen = browser.run(READY)
     assert seen["say"] == "x 0.3, v -0.2003" and "&x=0.3,-0.2003&" in seen["hash"]
-    browser.driver.find_element(By.ID, "p-0-range").send_keys(Keys.ARROW_RIGHT * 5)
+    browser.find("#p-0-range").send_keys(Keys.ARROW_RIGHT * 5)
     seen = browser.run(READY)
     (belt,) = re.findall(r"p=([\d.]+),0.2", seen["hash"])
     assert float(belt) > 0.5
     run = ns.simulate(BELT, [0.3, -0.2003], 12.0, parameters={"belt": float(belt), "friction": 0.2})
     assert seen["word"] == run.itinerary and state_of(seen) == pytest.approx(run.x[-1], abs=1e-6)
-    browser.driver.find_element(By.ID, "reset").click()
+    browser.find("#reset").click()
     assert "p=0.3,0.4&x=0,0&t=30" in browser.run(READY)["hash"]
     assert browser.errors() == {}
 
@@ -260,14 +259,13 @@ def test_keys_sliders_and_the_address(browser, page):
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_start_is_dragged(browser, page, width):
     from selenium.webdriver.common.action_chains import ActionChains
-    from selenium.webdriver.common.by import By
 
     browser.open(page, width, hash="box=-1,1,-1,1")
     browser.run(READY)
     frame = browser.run(
         "return document.querySelector('#plane .frame').getBoundingClientRect().width"
     )
-    dot = browser.driver.find_element(By.CSS_SELECTOR, "#plane .handle .dot")
+    dot = browser.find("#plane .handle .dot")
     by = int(frame / 4)
     ActionChains(browser.driver).click_and_hold(dot).move_by_offset(by, 0).release().perform()
     seen = browser.run(READY)
@@ -310,14 +308,13 @@ def paced():
 @pytest.mark.slow
 @pytest.mark.browser
 def test_what_is_copied_is_what_is_shown(browser, tmp_path):
-    from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
 
     system, path = paced(), tmp_path / "paced.html"
     ns.explore(system, start=[1 / 3, 0.1, 1.0], t_end=9.0, path=path)
     browser.open(path)
     for keys in (Keys.ARROW_RIGHT * 3, Keys.END, Keys.ARROW_LEFT):
-        for slider in browser.driver.find_elements(By.CSS_SELECTOR, "#inputs input[type=range]"):
+        for slider in browser.driver.find_elements("css selector", "#inputs input[type=range]"):
             slider.send_keys(keys)
         link = copied(browser, "link")
         seen = browser.run(READY)
@@ -356,20 +353,19 @@ def test_a_sweep_shows_the_states_of_python(browser, page):
 @pytest.mark.browser
 def test_a_system_in_space_is_turned_and_its_start_moved(browser, space):
     from selenium.webdriver.common.action_chains import ActionChains
-    from selenium.webdriver.common.by import By
 
     browser.open(space)
     before = browser.run(READY)
     problem = ns.textbook.PROBLEMS["two_fold"]()
     assert before["word"] == ns.simulate(problem.system, [0.3, 0.5, 0.4], 3.0).itinerary
     assert before["cuts"]
-    frame = browser.driver.find_element(By.CSS_SELECTOR, "#plane .frame")
+    frame = browser.find("#plane .frame")
     drag = ActionChains(browser.driver).move_to_element_with_offset(frame, -150, 100)
     drag.click_and_hold().move_by_offset(90, 20).release().perform()
     turned = browser.run(READY)
     assert "turn=1.2,0.48" in turned["hash"] and turned["word"] == before["word"]
     assert turned["orbit"] != before["orbit"] and turned["say"] == before["say"]
-    dot = browser.driver.find_element(By.CSS_SELECTOR, "#plane .handle .dot")
+    dot = browser.find("#plane .handle .dot")
     ActionChains(browser.driver).click_and_hold(dot).move_by_offset(25, 0).release().perform()
     assert browser.run(READY)["say"] != turned["say"]
     assert browser.errors() == {} and browser.unnamed() == []

@@ -15,20 +15,11 @@ from tests.plot.examples import EXAMPLES, basins, cut, harvest, run
 
 
 @pytest.mark.slow_cases(
-    "bifurcation_curves",
-    "branch1",
-    "dividing_curves",
-    "phase_portrait",
-    "sliding_portrait",
-    "two_fold0",
-    "two_fold1",
-    "two_fold2",
-    "two_fold_3d0",
-    "two_fold_3d1",
-    "two_fold_atlas",
-    "two_fold_atlas_pages",
-    "outcome_map",
-    "proven_map",
+    *"""
+    bifurcation_curves branch1 dividing_curves phase_portrait sliding_portrait two_fold0
+    two_fold1 two_fold2 two_fold_3d0 two_fold_3d1 two_fold_atlas two_fold_atlas_pages
+    outcome_map proven_map
+    """.split()
 )
 @pytest.mark.parametrize(
     ("name", "example"),

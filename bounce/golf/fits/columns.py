@@ -6,6 +6,7 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -24,8 +25,9 @@ Array = NDArray[np.float64]
 LARGEST = 1 << 28
 
 
-#: Units as launch monitors write them.
-_UNITS = {"°": "deg", "degrees": "deg", "MPH": "mph", "RPM": "rpm", "yards": "yd", "yds": "yd"}
+#: Units as launch monitors write them, apart from capitals.
+_UNITS = {"°": "deg", "degrees": "deg", "yards": "yd", "yds": "yd"}
+_UNITS |= {unit: unit for known in UNITS.values() for unit in known}
 
 
 class DataError(ns.NonsmoothError, ValueError):
@@ -87,13 +89,13 @@ def read_rows(
 ) -> Rows:
     """Read the columns ``name [unit]`` of a file row by row, also under other headings; a bad row keeps its error."""
     titles, cells = _csv(Path(path))
-    positions = [(*_title(title), k) for k, title in enumerate(titles)]
+    read = [(*_title(title), k) for k, title in enumerate(titles)]
+    positions = [(name.replace("_", ""), unit, k) for name, unit, k in read]
     there = [name for name, _, _ in positions]
-    known = {
-        heading: name
-        for name in kinds
-        for heading in [one for one in (name, *headings.get(name, ())) if one in there][:1]
+    ways = {
+        name: [one.replace("_", "") for one in (name, *headings.get(name, ()))] for name in kinds
     }
+    known = {one: name for name, own in ways.items() for one in [o for o in own if o in there][:1]}
     positions = [(known[name], unit, k) for name, unit, k in positions if name in known]
     rest = {titles[k]: k for k in range(len(titles)) if k not in [place[2] for place in positions]}
     _require_each_once([(name, titles[k]) for name, _, k in positions])
@@ -137,9 +139,9 @@ def _title(title: Any) -> tuple[str, str | None]:
     """Name and unit of ``name [unit]``; names in lower case, with underscores."""
     match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(](.*)[\])])?\s*", str(title), re.DOTALL)
     assert match is not None
-    name = re.sub(r"[\s-]+", "_", match[1].strip().lower())
+    name = re.sub(r"[\s.-]+", "_", match[1].strip().lower())
     unit = None if match[2] is None else match[2].strip()
-    return name, _UNITS.get(unit, unit) if unit else unit
+    return name, _UNITS.get(unit.lower(), unit) if unit else unit
 
 
 def _require_each_once(columns: list[tuple[str, str]]) -> None:
@@ -201,6 +203,15 @@ def _csv(path: Path) -> tuple[list[str], list[list[str]]]:
         raise DataError(
             f"{path.name}: {titles[0]!r} has {mark[0]!r} between the columns. Save it with commas, and with "
             "points in numbers."
+        )
+    if (
+        len(rows) > 1
+        and any(rows[1])
+        and all(re.fullmatch(r"\s*(\[.*\])?\s*", own) for own in rows[1])
+    ):
+        titles, rows = (
+            [f"{a} {b}".strip() for a, b in zip_longest(*rows[:2], fillvalue="")],
+            rows[1:],
         )
     return titles, rows[1:]
 

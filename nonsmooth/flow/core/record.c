@@ -46,10 +46,10 @@ static void sample(Run *r, double t, const double *x) {
   memcpy(r->sample_x + r->kept++ * r->s->dimension, x, r->s->dimension * sizeof(double));
 }
 
-/* Samples at the times from the present one to less than that plus dt. */
+/* Samples at the times from the present one to less than that after a step. */
 static void sample_step(Run *r, const Expansion *e, double dt) {
-  double *x = r->vector, ignored;
-  while (r->kept < r->room && r->times[r->kept] - r->t - r->t_low < dt) {
+  double *x = r->vector, end = time_after(r, dt), ignored;
+  while (r->kept < r->room && r->times[r->kept] < end) {
     double s = r->times[r->kept] - r->t - r->t_low;
     for (int i = 0; i < r->s->dimension; i++) x[i] = horner(e->states + (int64_t)i * r->stride, r->order, s, &ignored);
     sample(r, r->times[r->kept], x);

@@ -404,8 +404,18 @@ static double tick_of(const Run *r, int c, double *low) {
   return sum;
 }
 
-/* Improve the root of a guard's polynomial by the guard itself along the motion, unless its slope is rounding or the guard
- * does not pass zero near it. */
+/* The time after a step, in one number: that of a tick which ends it, or of the run's end. */
+static double time_after(const Run *r, double dt) {
+  double to = pair_sum((Pair){r->t, r->t_low}, (Pair){dt, 0}).high, low;
+  for (int c = 0; c < r->s->rules.clocks; c++) {
+    double tick = tick_of(r, c, &low);
+    if (fabs(tick - to) <= ROUNDING * fabs(to)) to = tick;
+  }
+  return smaller(to, r->o.t_end);
+}
+
+/* Improve the root of a guard's polynomial by the guard itself along the motion, unless its slope is rounding, or the guard
+ * does not pass zero near it, or is zero there to rounding, which moves slow impacts, where a zero is left out. */
 static double polished(Run *r, const Expansion *e, int row, double root) {
   const double *c = e->guards + (int64_t)row * r->stride;
   double *x = r->vector, *lam = x + r->n, slope, time = root;
@@ -415,7 +425,8 @@ static double polished(Run *r, const Expansion *e, int row, double root) {
     at_time(r, e, time, x, lam);
     if (e->l.kind[row] == EXIT_GUARD && !improve(r, &e->l, x, lam, 1)) return root;
     evaluate(r, e, x, lam);
-    double change = guards_at(r, e, lam)[(int64_t)row * r->stride] / slope;
+    double value = guards_at(r, e, lam)[(int64_t)row * r->stride], change = value / slope;
+    if (r->drop[row] && fabs(value) <= LOW * guard_noise(r, e, row, time)) return time;
     if (!(fabs(change) < 0.5 * time)) return root;
     time -= change;
     if (fabs(change) <= CLOSE * time) return time;

@@ -76,6 +76,21 @@ static __attribute__((noinline)) void keep_samples(Lanes *s, Work *w, const Step
     while (LANE(s->due, l) < LANE(end, l)) keep_sample(s, w, l, e->c[0], P, LANE(s->due, l) - LANE(e->t, l));
 }
 
+#if EVENTS
+/* Lanes with a sample at their time, to rounding: the driver decides whether it is before an event there. */
+static I sampled_there(const Lanes *s, const Work *w, I which) {
+  if (!w->b->times) return NONE;
+  for EACH(l, which) {
+    const double *time = w->b->times + LANE_I(s->index, l) * w->b->times_stride;
+    double t = LANE(s->t, l), near = NEAR * larger(1, fabs(t));
+    int64_t k = past_of(s, l)->kept;
+    while (k < w->b->room && time[k] < t - near) k++;
+    if (k == w->b->room || time[k] > t + near) LANE_I(which, l) = 0;
+  }
+  return which;
+}
+#endif
+
 #if !SET
 /* Lanes whose next event may be the last that is sampled: the driver ends their runs. */
 static I ends_sampling(const Lanes *s, const Work *w, I which) {

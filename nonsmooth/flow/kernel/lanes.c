@@ -455,6 +455,9 @@ INLINE I take_step(Lanes *s, Work *w, Step *e, int mode) {
   I arrived = EVENTS ? e->slot > FIRST_STOP + CLEAR_STOPS : NONE;
   I tested = EVENTS ? arrived | (e->last & (e->slot == 0)) : NONE; /* ticks are exact, phases are not */
   if (any(tested)) unclear |= crowded_lanes(s, e, mode, tested, at_event);
+#if EVENTS
+  unclear |= sampled_there(s, w, arrived & s->live);
+#endif
   unclear &= s->live;
   if (any(unclear)) {
     undo_step(s, e, unclear);

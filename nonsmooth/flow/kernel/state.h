@@ -115,6 +115,7 @@ INLINE I by_chance(const Lanes *s, const Work *w);
 INLINE void count(Lanes *s, Work *w, int kind, I which);
 #if RARE_CASES_HERE
 static void keep_samples(Lanes *s, Work *w, const Step *e, I which);
+static I sampled_there(const Lanes *s, const Work *w, I which);
 static I ends_sampling(const Lanes *s, const Work *w, I which);
 static void keep_hits(Lanes *s, Work *w, int kind, int guard, I which, I above);
 #endif

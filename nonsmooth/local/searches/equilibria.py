@@ -243,8 +243,9 @@ def equilibrium_of_mode(system: FilippovSystem, mode: str, found: Found, p: Arra
     least = float(guards.min(initial=np.inf))
     near_zero = abs(least) <= TOLERANCE * (1 + float(np.linalg.norm(found.x)))
     status = "boundary" if near_zero else "real" if least > 0.0 else "virtual"
-    numbers_of = (found.distance, found.residual, found.iterations)
-    return Equilibrium(found.x, "+", status, kind, eigenvalues, least, margin, *numbers_of, mode)
+    return Equilibrium(
+        found.x, "+", status, kind, eigenvalues, least, margin, **found.effort, mode=mode
+    )
 
 
 def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium:
@@ -263,19 +264,7 @@ def equilibrium_at(where: LocalSurface, found: Found, side: Side) -> Equilibrium
     gap, touching = _least_gap(where, x), TOLERANCE * (1 + float(np.linalg.norm(x)))
     if gap <= touching and status != "virtual":
         status = "boundary" if gap >= -touching else "virtual"
-    return Equilibrium(
-        x,
-        side,
-        status,
-        kind,
-        eigenvalues,
-        h,
-        margin,
-        found.distance,
-        found.residual,
-        found.iterations,
-        mode,
-    )
+    return Equilibrium(x, side, status, kind, eigenvalues, h, margin, **found.effort, mode=mode)
 
 
 def _least_gap(where: LocalSurface, x: Array) -> float:

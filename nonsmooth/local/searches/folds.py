@@ -131,17 +131,8 @@ def fold_at(where: LocalSurface, found: Found, side: Side, max_order: int, tol: 
     order = int(nonzero[0]) + 2 if nonzero.size else None
     kind = _kind(order, float(lie[order]) if order else 0.0, side)
     other = float(where.at(found.x).lie[1 - side_index(side)])
-    return Fold(
-        found.x[: where.system.dimension],
-        side,
-        order,
-        kind,
-        lie,
-        other,
-        found.distance,
-        found.residual,
-        found.iterations,
-    )
+    x = found.x[: where.system.dimension]
+    return Fold(x, side, order, kind, lie, other, **found.effort)
 
 
 def _check_order(max_order: int) -> None:

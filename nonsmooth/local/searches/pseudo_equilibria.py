@@ -233,9 +233,7 @@ def pseudo_equilibrium_at(where: LocalSurface, found: Found) -> PseudoEquilibriu
         eigenvalues=eigenvalues,
         stable=region is Region.ATTRACTING and kind.startswith("stable"),
         margin=min(abs(alpha), abs(1 - alpha), margin),
-        distance=found.distance,
-        residual=found.residual,
-        iterations=found.iterations,
+        **found.effort,
         mode=where.mode,
         multipliers=np.array([1.0 - 2.0 * alpha]),
     )
@@ -376,9 +374,7 @@ def equilibrium_of(meeting: Meeting, multipliers: Array, found: Found) -> Pseudo
         eigenvalues=eigenvalues,
         stable=region is Region.ATTRACTING and inside > 0.0 and kind.startswith("stable"),
         margin=min(abs(inside), margin),
-        distance=found.distance,
-        residual=found.residual,
-        iterations=found.iterations,
+        **found.effort,
         mode="".join("s" if i in chosen else "+" if v > 0 else "-" for i, v in enumerate(lam)),
         multipliers=multipliers,
     )

@@ -31,6 +31,11 @@ class Found:
     iterations: int = 0
     linear: bool = False
 
+    @property
+    def effort(self) -> dict[str, Any]:
+        """What results keep of it."""
+        return dict(distance=self.distance, residual=self.residual, iterations=self.iterations)
+
 
 def search(
     equations: Equations,

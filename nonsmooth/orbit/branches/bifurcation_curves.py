@@ -27,8 +27,8 @@ from ...result_tables import ResultTable, Tabular, stacked
 from ...solvers.continuation import Arc, Curve, Departure, Zero, directions, pieces, trace
 from ..homoclinic.homoclinic_orbits import Connection
 from .branch import DIVIDE, BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of
-from .codimension_two import CodimensionTwo, leaving, special_point
-from .event_curves import VIRTUAL, EventCurve
+from .codimension_two import AT_SADDLE, CodimensionTwo, leaving, special_point
+from .event_curves import SECOND, VIRTUAL, EventCurve
 from .homoclinic_curves import ConnectionCurve, event_of
 from .orbit_branches import OrbitCurve
 
@@ -234,12 +234,13 @@ def _follow(departure: Departure, **options: Any) -> list[Piece]:
     located = bool(arc.zeros) and arc.zeros[-1].name == arc.end
     if isinstance(curve, EventCurve) and (located or arc.end in _DIVISIBLE):
         limit = curve.comes_to(arc.points[-1].u)
-        if limit == "Hopf":
+        # an extremum beside a saddle is so flat that a second one is seen
+        if limit == "Hopf" or (limit and arc.end in (SECOND, *_DIVISIBLE)):
             arc.zeros[:] = [
                 *arc.zeros[: len(arc.zeros) - located],
-                Zero(limit, arc.points[-1], 0.0),
+                Zero(limit if limit == "Hopf" else AT_SADDLE, arc.points[-1], 0.0),
             ]
-        if limit == "Hopf" or not located:
+        if limit == "Hopf" or not located or arc.zeros[-1].name == AT_SADDLE:
             arc.end = limit or arc.end
             _drop_singular(arc)
     return every
@@ -295,13 +296,12 @@ def _curve_of(kind: str, names: tuple[str, str], halves: list[list[Piece]]) -> B
             curve.limits.append(arc.rows[-1])
     for at, u in (nodes[0], nodes[-1]):
         at.base.require_valid(u if isinstance(at, ConnectionCurve) else at.without(u))
+    located = [special_point(at, zero, kind) for at, zero in zeros if _occurs(at, zero)]
     return BifurcationCurve(
         kind=kind,
         parameters=names,
         values=np.array([u[-2:] for _, u in nodes]),
-        special=tuple(
-            _merged([special_point(at, zero, kind) for at, zero in zeros if _occurs(at, zero)])
-        ),
+        special=tuple(_merged([point for point in located if point is not None])),
         ends=(end_of(halves[0][-1][1]), end_of(halves[-1][-1][1])),
         nodes=tuple(nodes),
     )

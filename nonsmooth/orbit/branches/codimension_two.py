@@ -3,7 +3,8 @@
 Two events at one time: each is followed in the itinerary with and without the legs that the other adds. Landing
 or exit at a degenerate tangency (L1 = L11 = 0): three sliding bifurcations meet, or two. At a fold, a doubling or
 a Hopf point on the curve of another event its own curve leaves; with contact it is that of the orbit with one more
-leg.
+leg. Where an orbit becomes homoclinic to a saddle at which it touches a surface, the curves of the boundary
+equilibrium and of the homoclinic orbit leave.
 
 Source: Kowalczyk & di Bernardo 2005 (Physica D 204, 204); Kuznetsov 2004, ch. 8 and 9.
 """
@@ -11,6 +12,7 @@ Source: Kowalczyk & di Bernardo 2005 (Physica D 204, 204); Kuznetsov 2004, ch. 8
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,15 +22,17 @@ from ...flow.fixed import first_terms
 from ...local.point.surface_point import SIDES, surface_at
 from ...model import Array, DegenerateError, Guard, NonsmoothError
 from ...model.derivatives.variational import guarded_field, states_at
-from ...solvers.continuation import Departure, Point, Zero
+from ...solvers.continuation import Departure, Point, Zero, directions
 from ...solvers.newton import Equations, Secant, converge
+from ..homoclinic.homoclinic_orbits import Connection
+from ..homoclinic.loops import SaddleLoop
 from ..periodic.orbit import named
 from ..runs.legs import integrate_leg, surface_of
 from .branch import BranchCurve
 from .conditions import Condition, condition_row, is_smooth, minima
 from .equilibrium_branches import EquilibriumCurve
 from .event_curves import AT_END, AT_START, CUSP, HIGHER, SECOND, TWO_FOLD, EventCurve
-from .homoclinic_curves import ConnectionCurve
+from .homoclinic_curves import ConnectionCurve, boundary_homoclinic
 from .itinerary_changes import (
     SOFT,
     ChangedItinerary,
@@ -54,6 +58,9 @@ _CONTACT = " with contact"
 
 #: Events at which multipliers are continuous.
 _CONTINUOUS = ("crossing-sliding", "switching-sliding", "adding-sliding", SOFT)
+
+#: Where the touch of an orbit comes to a saddle.
+AT_SADDLE = "boundary equilibrium"
 
 #: Duration of a leg that vanishes where others are tangent, relative to the orbit: a cube root of rounding.
 _VANISHES = 1e-4
@@ -90,6 +97,7 @@ class Meeting:
     other: str
     touch: float | None = None
     at: Degenerate | tuple[Condition, Condition] | None = None
+    loop: Connection | None = None  # a homoclinic orbit whose saddle is on a surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +125,12 @@ class CodimensionTwo:
         return f"{self.kind} at ({self.values[0]:.10g}, {self.values[1]:.10g})"
 
 
-def special_point(curve: EventCurve | ConnectionCurve, zero: Zero, event: str) -> CodimensionTwo:
-    """The point at a located zero of a test."""
+def special_point(
+    curve: EventCurve | ConnectionCurve, zero: Zero, event: str
+) -> CodimensionTwo | None:
+    """The point at a located zero of a test; None where there is none at a limit of a touch."""
+    if zero.name == AT_SADDLE and isinstance(curve, EventCurve) and curve.touches:
+        return _at_saddle(curve, zero.point.u, event)
     base: BranchCurve = curve.base
     u, meeting = zero.point.u, None
     if isinstance(curve, EventCurve):
@@ -148,13 +160,32 @@ def _at_equilibrium(at: Meeting, surface: int, x: Array, values: Array) -> Meeti
     """The same point as one of the curves of the equilibrium to which the orbit has shrunk."""
     base = at.base
     assert isinstance(base, OrbitCurve)
-    mode, p = base.problem.legs[0].mode, base.p.copy()
+    assert at.came.condition is not None
+    mode, p = base.problem.legs[at.came.condition.leg].mode, base.p.copy()
     p[list(base.free)] = values
     sliding = None if base.system.surface_count == 1 else mode[:surface] + "s" + mode[surface + 1 :]
     where, _ = surface_at(base.system, x, named(base.system, p), 0.0, surface, sliding)
     scale, side = np.append(base.scale[: x.size], base.widths), SIDES["+-".index(mode[surface])]
     curve = EquilibriumCurve(where, base.free, scale, side)
     return Meeting(curve, np.append(x, values), at.came, "Hopf")
+
+
+def _at_saddle(curve: EventCurve, u: Array, event: str) -> CodimensionTwo | None:
+    """Where an orbit becomes homoclinic to a saddle at which it touches a surface."""
+    base, at = curve.base, curve.condition
+    assert isinstance(base, OrbitCurve) and at is not None and at.guard is not None
+    inner, touch, surface = curve.without(u), float(u[curve.columns]), at.guard.element
+    if at.guard.kind != "surface" or base.problem.symmetry is not None:
+        return None
+    k, p = base.problem.size, base.parameters_at(inner)
+    loop = boundary_homoclinic(base.problem, inner[:k], p, base.free, at.leg, touch, surface)
+    values = u[-2:] if loop is None else loop.unknowns[-2:]
+    if loop is None or np.abs((values - u[-2:]) / curve.scale[-2:]).max() > _NEAR:
+        return None
+    plain = Meeting(base, inner, curve, AT_SADDLE)
+    meeting = _at_equilibrium(plain, surface, loop.saddle.point, values)
+    meeting = replace(meeting, other=AT_SADDLE, loop=loop)
+    return CodimensionTwo(f"{event} with {AT_SADDLE}", values, loop, meeting)
 
 
 def _kind(curve: EventCurve | ConnectionCurve, zero: Zero, event: str) -> str:
@@ -396,7 +427,7 @@ Candidate = tuple[EventCurve, list[Departure]]
 
 def leaving(
     meeting: Meeting, free: tuple[int, ...], widths: Array
-) -> Iterator[tuple[str, EventCurve, Departure]]:
+) -> Iterator[tuple[str, EventCurve | ConnectionCurve, Departure]]:
     """Kinds, equations and starts of the real curves that leave a point of codimension two."""
     base, u = meeting.base.freed(meeting.u, free, widths)
     for curve, ways in _candidates(meeting, base, u):
@@ -409,6 +440,23 @@ def leaving(
             kind = curve.base.named(curve.name, inner)
             curve.settle(way.rows[-1])
             yield kind, curve, way
+    if meeting.loop is not None:
+        yield from _homoclinic(meeting.loop, free, widths)
+
+
+def _homoclinic(
+    at: Connection, free: tuple[int, ...], widths: Array
+) -> Iterator[tuple[str, ConnectionCurve, Departure]]:
+    """The curve of a homoclinic orbit from where its saddle is on a surface to where it is real."""
+    loop = copy(at.loop)
+    assert isinstance(loop, SaddleLoop)
+    loop.surface = None
+    curve, u = ConnectionCurve(loop, at.unknowns).freed(at.unknowns, free, widths)
+    assert isinstance(curve, ConnectionCurve)
+    for way in directions(curve, u):
+        found = curve.correct(u + _SIZES[0] * way * curve.scale, way)
+        if found is not None and not curve.describe(found).faults:
+            yield curve.name, curve, Departure(curve, [u, found], way)
 
 
 def _is_known(meeting: Meeting, curve: EventCurve) -> bool:
@@ -436,7 +484,7 @@ def _candidates(meeting: Meeting, base: BranchCurve, u: Array) -> Iterator[Candi
         yield from _with_legs(base, u, came.condition, other.removesuffix(_CONTACT))
     elif not isinstance(base, OrbitCurve) or is_smooth(other):
         of_orbits = isinstance(came.base, OrbitCurve) and not isinstance(base, OrbitCurve)
-        for name in (other, "boundary equilibrium") if of_orbits else (other,):
+        for name in dict.fromkeys((other, AT_SADDLE) if of_orbits else (other,)):
             if name == "fold" or name in base.tests(Point(u, np.zeros(u.size))):
                 yield _from(base, name, u)
     elif isinstance(meeting.at, tuple):

@@ -9,10 +9,18 @@ import numpy as np
 from ...local import Equilibrium, PseudoEquilibrium
 from ...model import Array, DefinitionError, NonsmoothError
 from ...solvers.continuation import Point
-from ..homoclinic.homoclinic_orbits import Connection, connection_of, find_homoclinic, saddle_at
-from ..homoclinic.loops import Loop
+from ..homoclinic.homoclinic_orbits import (
+    Connection,
+    by_projections,
+    connection_of,
+    find_homoclinic,
+    in_parts,
+    saddle_at,
+)
+from ..homoclinic.loops import NEAR, Loop, spectrum_of
+from ..periodic.boundary_value_problem import BoundaryProblem
 from ..periodic.orbit import PeriodicOrbit
-from ..runs.legs import integrate_leg
+from ..runs.legs import Leg, integrate_leg
 from .branch import BranchCurve, BranchEvent, FarSide
 
 #: Largest distance of the parameters of a periodic and a homoclinic orbit, relative to the bounds.
@@ -53,6 +61,9 @@ class ConnectionCurve(BranchCurve):
         with np.errstate(all="ignore"):  # a trial may diverge
             return self.loop.equations(u)
 
+    def ends(self, name: str) -> bool:
+        return name.startswith("boundary equilibrium")
+
     def tests(self, point: Point) -> Mapping[str, float]:
         return {k: v for k, v in self.loop.tests(point.u).items() if np.isfinite(v)}
 
@@ -78,6 +89,50 @@ def event_of(connection: Connection) -> BranchEvent:
         point=point,
         test="homoclinic",
     )
+
+
+def boundary_homoclinic(
+    problem: BoundaryProblem,
+    u: Array,
+    p: Array,
+    free: tuple[int, ...],
+    leg: int,
+    touch: float,
+    surface: int,
+) -> Connection | None:
+    """The homoclinic orbit to a saddle on a surface, beside a long orbit whose leg touches the surface there; None if
+    there is none."""
+    system, n, (starts, durations) = problem.system, problem.dimension, problem.split(u)
+    whole = [(*one, False) for one in zip(problem.legs, starts, durations.tolist(), strict=True)]
+    own, x, duration, _ = whole[leg]
+    flow = lambda x, t: integrate_leg(system, own, x, t, p).end[:n]
+    y, smooth = flow(x, touch), len(whole) == 1 and own.timed
+    if smooth:  # it begins anywhere
+        x, touch = flow(y, duration / 2.0), duration / 2.0
+    try:
+        here = spectrum_of(system, own.mode, y, p)
+        after, before = (np.linspace(0.0, end, 401)[1:] for end in (duration - touch, touch))
+        out, back = (
+            np.array([flow(z, t) - here.point for t in ts]) for z, ts in ((y, after), (x, before))
+        )
+        far = [np.linalg.norm(each, axis=1) for each in (out, back)]
+        size = float(max(each.max() for each in far))
+        middle = np.log(np.linalg.norm(y - here.point) * size) / 2.0
+        i, j = (int(np.argmin(np.abs(np.log(each) - middle))) for each in far)
+        away = here.unstable @ (here.left_unstable @ out[i])
+        length, near = float(np.linalg.norm(away)), NEAR * size
+        beside = here.point + near / length * away
+        parts = [
+            (own, beside, float(np.log(length / near)) / here.leading(False), True),
+            (own, here.point + out[i], float(duration - touch - after[i]), smooth),
+            *whole[leg + 1 :],
+            *whole[:leg],
+            (Leg(own.mode), x, float(before[j]), False),
+        ]
+        start = in_parts(system, parts, p, here, float(far[1][j]), size)
+        return by_projections(system, own.mode, start, p, free, surface=surface)
+    except (NonsmoothError, np.linalg.LinAlgError, ValueError):
+        return None
 
 
 def homoclinic_end(orbit: PeriodicOrbit, parameter: str, width: float) -> BranchEvent | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -36,7 +36,7 @@ from ...result_tables import ResultTable, Tabular, stacked
 from ...solvers.newton import Equations, converge, solve
 from ..periodic.orbit import OrbitLeg, named
 from ..periodic.orbit_run import orbit_run
-from ..runs.legs import Leg, Stretch, stretches
+from ..runs.legs import Leg, Stretch, integrate_leg, stretches
 from .loops import NEAR, Loop, PseudoSaddleLoop, SaddleLoop, Spectrum, equilibrium_of, spectrum_of
 
 # Guesses: orbits of an unstable manifold that return near the saddle -------------------------------
@@ -198,26 +198,36 @@ def _nearest(run: Trajectory, mode: str, here: Spectrum) -> Departure | None:
                 required = np.sqrt(away[first] * away[k])  # on the way back, before it turns away
                 k = first + int(np.argmin(np.abs(away[first : k + 1] - required)))
                 chain[-1] = replace(part, leg=Leg(mode), duration=float(times[k]) - part.t)
-                return _in_parts(run, chain, here, float(away[k]), peak)
+                whole = [(one.leg, one.start, one.duration, False) for one in chain]
+                p = run.system.parameter_vector(run.parameters)
+                return in_parts(run.system, whole, p, here, float(away[k]), peak)
     return None
 
 
-def _in_parts(
-    run: Trajectory, chain: list[Stretch], here: Spectrum, miss: float, size: float
+def in_parts(
+    system: FilippovSystem,
+    chain: Sequence[tuple[Leg, Array, float, bool]],
+    p: Array,
+    here: Spectrum,
+    miss: float,
+    size: float,
 ) -> Departure:
-    """Legs divided into parts over which neighbours separate by a bounded factor."""
-    growth, n = float(here.values.real.max()), run.system.dimension
+    """Legs, given by start, duration and whether the next one continues them, divided into parts over which neighbours
+    separate by a bounded factor."""
+    growth, n = float(here.values.real.max()), system.dimension
     legs, starts, durations = list[Leg](), list[Array](), list[float]()
     held: list[float | None] = []
-    for part in chain:
-        count = max(1, round(part.duration * growth / _GROWTH))
-        step = part.duration / count
+    for leg, x, duration, continued in chain:
+        count = max(1, round(duration * growth / _GROWTH))
+        step = duration / count
         for k in range(count):
-            legs.append(part.leg)
-            starts.append(part.start[:n] if not k else run(part.t + k * step))
+            legs.append(leg)
+            starts.append(
+                x[:n] if not k else integrate_leg(system, leg, starts[-1], step, p).end[:n]
+            )
             durations.append(step)
-            inside = step if part.leg.timed else 0.0
-            held.append(inside if k + 1 < count else None)
+            inside = step if leg.timed or continued else 0.0
+            held.append(inside if continued or k + 1 < count else None)
     return Departure(
         here.point, tuple(legs), np.array(starts), np.array(durations), tuple(held), miss, size
     )
@@ -274,6 +284,10 @@ def _flight_to(
 
 #: Factor by which the end of an orbit approaches the saddle in one step, and its least value.
 _CLOSER, _SLOWLY = 4.0, 1.2
+
+#: Change of the parameter, for a distance smaller by a factor e, at which it is known. An orbit that comes along another than the leading direction
+#: has a larger error than the estimate of ``SaddleLoop.target``.
+_SETTLED = 1e-13
 
 #: Distance from the saddle, relative to the size of the orbit, that suffices where no step succeeds.
 _ENOUGH = 1e-3
@@ -496,7 +510,7 @@ def find_homoclinic(
     reasons = list[str]()
     for start in departures(system, mode, at.point, p):
         try:
-            return _by_projections(system, mode, start, p, index, max_iterations, progress)
+            return by_projections(system, mode, start, p, (index,), max_iterations, progress)
         except ConvergenceError as error:
             reasons.append(str(error))
     raise ConvergenceError(
@@ -506,36 +520,44 @@ def find_homoclinic(
     )
 
 
-def _by_projections(
+def by_projections(
     system: FilippovSystem,
     mode: str,
     start: Departure,
     p: Array,
-    index: int,
-    max_iterations: int,
-    progress: bool,
+    index: tuple[int, ...],
+    max_iterations: int = 30,
+    progress: bool = False,
+    surface: int | None = None,
 ) -> Connection:
     """Solve for the orbit with the end of the guess, then move its end to the saddle."""
     far, near = start.miss, float(np.linalg.norm(start.starts[0] - start.saddle))
-    parameter = system.parameter_names[index]
-    loop = SaddleLoop(system, start.legs, (index,), p, mode, start.saddle, near, far, start.held)
-    u = np.concatenate([np.ravel(start.starts), start.durations, [p[index]]])
+    parameter = system.parameter_names[index[-1]]
+    loop = SaddleLoop(system, start.legs, index, p, mode, start.saddle, near, far, start.held)
+    loop.surface = surface
+    u = np.concatenate([np.ravel(start.starts), start.durations, p[list(index)]])
     u = _solved(loop, u, parameter, max_iterations, damped=True)
     target, factor, complete = loop.target() * start.size, _CLOSER, True
     bar, whole = progress_bar(100, progress, "%"), math.log(max(far / target, _SLOWLY))
+    moved, k = np.inf, len(index)
     try:
-        while far > target:
-            closer = max(target, far / factor)
+        while far > target or moved > _SETTLED:
+            closer = max(target, far / factor) if far > target else far / factor
             wait = np.log(far / closer) / -loop.reference.leading(True)
             longer, guess = loop.prolonged(u, wait, closer)
             try:
                 found = _solved(longer, guess, parameter, max_iterations)
-                bar.update(100.0 * math.log(far / closer) / whole)
+                if far > target:
+                    bar.update(100.0 * math.log(far / closer) / whole)
+                last, change = moved, (found[-k:] - u[-k:]) / loop.scales(u)[-k:]
+                moved = float(np.abs(change).max()) / math.log(far / closer)
+                if far <= target and moved >= last:  # rounding
+                    break
                 u, loop, far, factor = found, longer, closer, _CLOSER
             except ConvergenceError:
                 factor **= 0.5
                 if factor < _SLOWLY:
-                    if far > _ENOUGH * start.size:
+                    if far > max(target, _ENOUGH * start.size):
                         raise
                     break
     except KeyboardInterrupt:

@@ -308,6 +308,7 @@ class SaddleLoop(Loop):
         self.mode, self.near, self.far = mode, near, far
         self.reference = spectrum_of(system, mode, point, p)
         self._at = self.reference.point  # the last position of the saddle
+        self.surface: int | None = None  # on which the saddle is required to be
 
     def spectrum(self, p: Array) -> Spectrum:
         """The saddle at other parameters."""
@@ -327,13 +328,13 @@ class SaddleLoop(Loop):
         legs = (*self.legs, self.legs[-1])
         point = self.spectrum(p).point
         other = SaddleLoop(self.system, legs, self.free, p, self.mode, point, self.near, far, held)
-        other.iterations = self.iterations
+        other.iterations, other.surface = self.iterations, self.surface
         chain = [starts.ravel(), last[: self.system.dimension], durations]
         return other, np.concatenate([*chain, np.array([wait]), u[-len(self.free) :]])
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         n, k, p = self.system.dimension, len(self.free), self.parameters_at(u)
-        values = np.zeros(u.size - k + 1)
+        values = np.zeros(u.size - k + (1 if self.surface is None else 2))
         jacobian = np.zeros((values.size, u.size))
         held = [surface_map(self.system, i) for i, c in enumerate(self.mode) if c == "s"]
         row, first = 0, self.split(u)[0][0]
@@ -361,6 +362,11 @@ class SaddleLoop(Loop):
                 jacobian[rows, len(self.legs) * n + last] = by_x @ flow.rate
                 jacobian[rows, -k:] += by_x @ flow.by_parameters
             row += found.size
+        if self.surface is not None:
+            h = surface_map(self.system, self.surface)(here.point, p)
+            values[row], jacobian[row, -k:] = h.value, h.by_parameters[list(self.free)]
+            moves = [(high.point - low.point) / width for low, high, width in around]
+            jacobian[row, -k:] += np.array(moves) @ h.gradient
         return values, jacobian
 
     def _at_end(self, here: Spectrum, x: Array, begins: bool) -> tuple[Array, Array]:
@@ -379,7 +385,13 @@ class SaddleLoop(Loop):
 
     def tests(self, u: Array) -> dict[str, float]:
         found = super().tests(u)
-        here = self.spectrum(self.parameters_at(u))
+        p = self.parameters_at(u)
+        here = self.spectrum(p)
+        for k, letter in enumerate(self.mode):
+            if letter != "s":
+                of = f" of surface {k}" if len(self.mode) > 1 else ""
+                h = surface_map(self.system, k)(here.point, p).value
+                found[f"boundary equilibrium{of}"] = h if letter == "+" else -h
         found["neutral saddle"] = here.leading(True) + here.leading(False)
         for stable in (True, False):
             side = here.values[(here.values.real < 0) == stable]

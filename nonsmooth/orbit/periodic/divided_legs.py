@@ -133,13 +133,14 @@ def _joined(parts: LegFlows, first: NDArray[Any], last: NDArray[Any]) -> LegFlow
     by_start, by_parameters = parts.by_start[last].copy(), parts.by_parameters[last].copy()
     for i, (a, b) in enumerate(zip(first, last, strict=True)):
         x, by_p = np.eye(n), np.zeros((n, by_parameters.shape[2]))
-        for k in range(a, b):
-            x, by_p = (
-                parts.by_start[k, :n] @ x,
-                parts.by_start[k, :n] @ by_p + parts.by_parameters[k, :n],
-            )
-        by_parameters[i] += by_start[i] @ by_p
-        by_start[i] = by_start[i] @ x
+        with np.errstate(over="ignore", invalid="ignore"):  # far from the orbit
+            for k in range(a, b):
+                x, by_p = (
+                    parts.by_start[k, :n] @ x,
+                    parts.by_start[k, :n] @ by_p + parts.by_parameters[k, :n],
+                )
+            by_parameters[i] += by_start[i] @ by_p
+            by_start[i] = by_start[i] @ x
     taken = {f.name: getattr(parts, f.name)[last] for f in fields(parts) if f.name != "sizes"}
     taken |= {"before": parts.before[first], "by_start": by_start, "by_parameters": by_parameters}
     return LegFlows(tuple(parts.sizes[k] for k in last), **taken)
@@ -154,14 +155,16 @@ def _divisible(problem: BoundaryProblem) -> bool:
 
 def to_divide(problem: BoundaryProblem, at: Evaluation) -> bool:
     """Whether derivatives grow so much on a leg, or a part of one, that it should be divided."""
+    return not growth(problem, at, (at.parts or at).flows) <= _GROWN
+
+
+def growth(problem: BoundaryProblem, at: Evaluation, flows: LegFlows) -> float:
+    """The largest derivative of the end of a leg, or a part of one, by its start, in units of the orbit."""
     if not _divisible(problem):
-        return False
-    n = problem.dimension
-    units = np.array(problem.sizes(at.starts, at.durations)[0])
-    flows = (at.parts or at).flows
+        return 0.0
+    n, units = problem.dimension, np.array(problem.sizes(at.starts, at.durations)[0])
     with np.errstate(over="ignore", invalid="ignore"):
-        sizes = np.abs(flows.by_start[:, :n] * units / units[:, None])
-    return not float(sizes.max(initial=0.0)) <= _GROWN
+        return float(np.abs(flows.by_start[:, :n] * units / units[:, None]).max(initial=0.0))
 
 
 def divided(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryProblem, Array]:

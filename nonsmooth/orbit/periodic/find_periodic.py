@@ -29,7 +29,7 @@ from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
 from ..runs.legs import Leg, integrate_leg, leg_name, shown_itinerary
 from .boundary_value_problem import BoundaryProblem, Evaluation
-from .divided_legs import divided, to_divide
+from .divided_legs import divided, growth, to_divide
 from .guess import Start, about_of, equations_of, is_about, starts_of
 from .orbit import PeriodicOrbit, named, violations_of
 from .symmetry import prime_period, require_symmetric, symmetry_matrix
@@ -353,6 +353,9 @@ _CLOSES = 1e-7
 #: Equations of which singular values would take minutes, and residuals that cannot be smaller.
 _LARGE, _CLOSED = 1000, 1e-9
 
+#: Growth of derivatives along a leg with which a run ends anywhere: rounding becomes as large as the orbit.
+_RESOLVED = 1e16
+
 
 class _Solver:
     """Newton's method on the equations of an orbit, with diagnostics on failure."""
@@ -360,6 +363,7 @@ class _Solver:
     def __init__(self, problem: BoundaryProblem, p: Array, budget: _Budget):
         self.problem, self.p, self.iterations, self.budget = problem, p, 0, budget
         self.last: tuple[Array, Evaluation | None] = (np.zeros(0), None)
+        self.growth = 0.0  # of derivatives along a leg of the guess
 
     def solve(self, u: Array, max_iterations: int, damped: bool = True) -> tuple[Array, Evaluation]:
         """The orbit, to rounding; with damped steps where full ones fail."""
@@ -388,6 +392,7 @@ class _Solver:
             at = self.problem.evaluate(u, self.p, tol=tol)
             if not last:
                 first.append((v, at))
+                self.growth = growth(self.problem, at, at.flows)
             last.append(v)
             self.last = u, at
             self.iterations += 1
@@ -437,7 +442,8 @@ class _Solver:
             return root
         try:
             values, jacobian = equations(v)
-            closes = float(np.abs(values / self._sizes(jacobian)).max())
+            moving = np.abs(v) > _ROUNDING  # states that are zero have the unit of others
+            closes = float(np.abs(values / self._sizes(jacobian * moving)).max())
             far = _FAR * math.sqrt(closes)
             if far > 1.0 or (root is not None and np.abs(root - v).max() <= far):
                 return root
@@ -555,12 +561,22 @@ class _Solver:
         if at is not None and not backward:
             backward = [self._largest(at)]
         where = f" At the last iterate {backward[0]}." if backward else ""
+        advice = (
+            "Simulate longer, start closer to the orbit, or try the itinerary of a run from there."
+        )
+        if not self.growth < _RESOLVED:
+            why, where = (
+                f" Derivatives grow by {self.growth:.0e} along a leg: runs leave the orbit.",
+                "",
+            )
+            advice = (
+                "Give itinerary= with a state near it, or continue an orbit of other parameters."
+            )
         modes = shown_itinerary(self.problem.system, legs[:40])
         modes += f" ... ({len(legs)} legs)" * (len(legs) > 40)
         return ConvergenceError(
             f"periodic orbit: Newton's method did not converge with the itinerary {modes!r} in "
-            f"{self.iterations} evaluations of the equations, residual {size:.2g}.{why}{where} Simulate "
-            "longer, start closer to the orbit, or try the itinerary of a run from there.",
+            f"{self.iterations} evaluations of the equations, residual {size:.2g}.{why}{where} {advice}",
             residual=size,
             point=u,
         )

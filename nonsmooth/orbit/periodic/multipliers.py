@@ -22,8 +22,8 @@ from ..runs.saltation import passages, saltations
 from .boundary_value_problem import BoundaryProblem, Evaluation, jacobian_indices
 from .cyclic_qr import Factor, Product
 
-#: States below this part of the way of a leg are zero, and states below this part of the largest are small.
-_AT_ZERO, _SMALL = 1e-9, 1e-6
+#: States below this part of what leads away from them are zero, and those below this part of the largest are rounding.
+_AT_ZERO, _ROUNDED = 1e-9, 1e-13
 
 #: States below this many residuals are rounding.
 _CLOSED = 10.0
@@ -57,10 +57,14 @@ class Multipliers:
     @cached_property
     def refusal(self) -> str:
         """Why the orbit has no multipliers; empty if it has some."""
+        given = self.at.flows.ended, *events_of(self.problem, self.at)
         try:
-            passages(self.at.flows.ended, *events_of(self.problem, self.at))
-        except DegenerateError as error:
-            return str(error)
+            passages(*given)
+        except DegenerateError:
+            try:  # not by the units of states alone
+                passages(*given, units=self._units)
+            except DegenerateError as error:
+                return str(error)
         along = np.abs((self.at.parts or self.at).flows.by_start).max(initial=1.0)
         maps = event_maps(self.problem, self.at)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -273,19 +277,36 @@ def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
 
 
 def _units(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
-    """Sizes of states and time; of states that are zero all the time by how far the fields beside them lead."""
+    """Sizes of states and time, each in its own unit; of a state that is zero by what leads away from it."""
     own, span = problem.system.dimension, float(np.abs(at.durations).sum()) or 1.0
-    far = np.abs(at.flows.rate[:, :own] * at.durations[:, None]).max(axis=0)
-    size, beside = np.abs(at.starts[:, :own]).max(axis=0), _beside(problem, at, p)
-    zero = np.maximum(size, far) <= _AT_ZERO * beside
-    size = np.where(zero & (size.max() < _SMALL * beside), beside, size)
-    if problem.system.time_dependent:
-        states = at.residual[: -len(at.durations)].reshape(-1, problem.dimension)[:, :own]
-        if size.max() < _AT_ZERO * far.max():
-            size[:] = far.max()
-        elif not size.max() > _CLOSED * np.abs(states).max():  # rounding of zero
-            size[:] = span
-    size = np.where(size > _SMALL * size.max(), size, float(size.max()) or span)
+    states = at.residual[: -len(at.durations)].reshape(-1, problem.dimension)[:, :own]
+    size = np.abs(at.starts[:, :own]).max(axis=0)
+    rounding = np.maximum(_CLOSED * np.abs(states).max(axis=0), _ROUNDED * size.max())
+    fields = np.array([at.flows.rate[:, :own], at.flows.before[:, :own]])
+    ways = np.abs(fields * at.durations[:, None]).max(axis=(0, 1))
+    beside = _beside(problem, at, p)
+    ways = np.maximum(ways, beside)
+    derivatives = np.abs((at.parts or at).flows.by_start[:, :own]).max(axis=0)
+    derivatives /= np.maximum(np.diagonal(derivatives), 1.0)[
+        :, None
+    ]  # its own growth is none from others
+    np.fill_diagonal(derivatives, 0.0)
+    zero = size <= rounding
+    for _ in range(own):  # what the time and other states, which may be zero as well, lead to
+        moved = derivatives * np.append(size, [span] * (derivatives.shape[1] - own))
+        reach = np.maximum(ways, moved.max(axis=1))
+        zero |= size <= _AT_ZERO * reach
+        size = np.where(zero, reach, size)
+    moved = derivatives[:, :own] * size
+    excess = (moved / np.where(size > 0.0, size, np.inf)[:, None]).max(axis=0)
+    size = np.where(
+        zero, size / np.maximum(excess, 1.0), size
+    )  # moves no other by more than its size
+    projected = bool(
+        problem.system.sets or problem.system.joints
+    )  # its rounding is that of the largest state
+    known = (size > _ROUNDED * size.max() * projected) | (beside > 0.0)
+    size = np.where(known, size, float(size.max()) or span)
     return np.append(size, [span] * (problem.dimension - own))
 
 

@@ -124,14 +124,20 @@ def passages(
     named: Callable[[int], str],
     events: NDArray[np.bool_] | None = None,
     slow: NDArray[np.bool_] | None = None,
+    units: Array | None = None,
 ) -> Passed:
-    """Passages of the events of many legs, none of which may be grazed but those that are ``slow``, as they accumulate."""
+    """Passages of the events of many legs, none of which may be grazed but those that are ``slow``, as they accumulate.
+
+    Angles are in the units (N,) of the states."""
     e, rate, g = ends.gradient, ends.rate, ends.after_state
+    n = after.shape[1]
+    own = np.append(np.ones(n) if units is None else units, np.ones(e.shape[1] - n))
     speed = (e * rate).sum(axis=1)
     carried = (g @ rate[:, :, None])[:, :, 0]
     jump = after - carried
     with np.errstate(over="ignore"):
-        of_e, of_rate, of_jump, of_after, of_carried = map(_norms, (e, rate, jump, after, carried))
+        scaled = (e * own, rate / own, *(v / own[:n] for v in (jump, after, carried)))
+        of_e, of_rate, of_jump, of_after, of_carried = map(_norms, scaled)
     size = of_e * of_rate
     angle = np.abs(speed) / np.where(size > 0.0, size, np.inf)
     kept = of_jump <= _CONTINUOUS * np.maximum(of_after, of_carried)

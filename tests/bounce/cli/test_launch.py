@@ -87,6 +87,23 @@ def test_headings_of_launch_monitors_are_taken_and_other_columns_kept(command, t
     assert rows[1]["others"]["Club"] == "7-iron" and rows[1]["carry"] > 100
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        "BALL SPEED (MPH),LAUNCH ANGLE (DEG),SPIN RATE (RPM)",
+        "BallSpeed [mph],LaunchAngle [deg],BackSpin [rpm]",
+        "Ball Speed,Launch Angle,Spin Rate\n[mph],[deg],[rpm]",
+        "Ball Speed [mph],Launch V [°],Total Spin [rpm]",
+    ],
+)
+def test_headings_may_have_capitals_and_units_a_row_of_their_own(command, tmp_path, head):
+    path = tmp_path / "shots.csv"
+    path.write_text(f"{head}\n167,10.9,2686\n", encoding="utf-8")
+    code, out, _ = command("launch", "--input", path, "--json")
+    (row,) = json.loads(out)["rows"]
+    assert code == 0 and row["carry"] == pytest.approx(244.1, abs=0.1)
+
+
 def test_an_exact_heading_counts_before_those_of_launch_monitors(command, tmp_path):
     path = tmp_path / "shots.csv"
     path.write_text("speed,angle,spin,ball speed\n70,11,2700,not this\n", encoding="utf-8")

@@ -364,31 +364,30 @@ def test_the_enlarged_end_lies_on_no_curve(browser, page, width, sign):
 @pytest.mark.slow
 @pytest.mark.browser
 def test_keys_and_fields_move_everything(browser, page):
-    from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
 
     browser.open(page, hash="xdot=1&omega=0.5&ydot=-1&eta=0&mu=0.1")
     before = browser.run(SHOWN)
     assert before["verdict"] == "S+"
     browser.run("document.querySelector('.handle').focus()")
-    handle = browser.driver.find_element(By.CSS_SELECTOR, ".handle")
+    handle = browser.find(".handle")
     handle.send_keys(Keys.SHIFT, Keys.ARROW_DOWN * 4)
     seen = browser.run(SHOWN)
     assert "&omega=-1.5&" in seen["hash"] and seen["say"] == "speed 1, spin −1.5"
     assert seen["verdict"] == "S− R"  # nothing pulls it along the ground: it rolls to the end
-    slider = browser.driver.find_element(By.ID, "eta-range")
+    slider = browser.find("#eta-range")
     slider.send_keys(Keys.ARROW_RIGHT * 40)
     seen = browser.run(SHOWN)
     assert "eta=0.4&" in seen["hash"]
     soft = bounce.KelvinVoigt(mu=0.1, d1=0.1, d2=0.1, eta=0.4, G=1e-4)
     assert seen["verdict"] == name_of(bounce.simulate(soft, 1.0, -1.0, -1.5))
-    field = browser.driver.find_element(By.ID, "G")
+    field = browser.find("#G")
     field.clear()
     field.send_keys("0.45")
     browser.run("document.getElementById('d2').focus()")
-    browser.driver.find_element(By.CSS_SELECTOR, "input[value=net]").click()
+    browser.find("input[value=net]").click()
     assert "load=net" in browser.run(SHOWN)["hash"]
-    browser.driver.find_element(By.ID, "reset").click()
+    browser.find("#reset").click()
     assert browser.run(SHOWN)["verdict"] == "S+ R S−"
     assert browser.errors() == {}
 

@@ -12,8 +12,8 @@ import nonsmooth as ns
 from nonsmooth.flow.engine import interpreter_for
 from nonsmooth.flow.options import Options
 
-from ..independent import blocks
-from ..independent.integrator import Run
+from ..independent.hybrid import Problem, follow, package_system
+from ..random_systems import package_events
 
 
 def row(k, force, belt=0.0, coupling=1.0, **others):
@@ -29,33 +29,30 @@ def row(k, force, belt=0.0, coupling=1.0, **others):
     )
 
 
-def chain(k):
-    """The chain of ``independent.blocks``."""
-    force = lambda i, q, v, lam: (
-        -blocks.SPRING * q - blocks.friction(k)[i] * lam + blocks.FALL * (v - blocks.BELT)
-    )
-    return row(k, force, blocks.BELT, blocks.COUPLING)
+def chain(k, start):
+    """Blocks with friction of 1, 1.2, ... on a belt."""
+    v = [f"v{i}" for i in range(k)]
+    forces = [
+        f"-0.1*q{i}-{1 + i / 5}*l{i}+0.1*(v{i}-0.3)"
+        + "".join(f"+q{j}-q{i}" for j in (i - 1, i + 1) if 0 <= j < k)
+        for i in range(k)
+    ]
+    states, surfaces = [*[f"q{i}" for i in range(k)], *v], [f"v{i}-0.3" for i in range(k)]
+    return Problem(states, [*v, *forces], start.tolist(), 15.0, surfaces)
 
 
-@pytest.mark.parametrize(
-    "k",
-    [
-        1,
-        pytest.param(2, marks=pytest.mark.slow),
-        pytest.param(3, marks=pytest.mark.slow),
-        pytest.param(4, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.parametrize("k", [1, *[pytest.param(k, marks=pytest.mark.slow) for k in (2, 3, 4)]])
 def test_blocks_agree_with_an_independent_integrator(k):
-    rng, t_end = np.random.default_rng(k), 15.0
-    starts = np.hstack([rng.normal(size=(2, k)), rng.uniform(-0.5, 0.2, (2, k))])
-    for start, path in zip(starts, Run(blocks.Blocks(starts), t_end).run(), strict=True):
-        run = ns.simulate(chain(k), start, t_end, tol=1e-12)
-        assert not path.trouble and run.itinerary == path.itinerary
-        assert len(path.times) >= k
-        assert np.abs(run.x[-1] - path.x).max() < 1e-9
-        times = [event.t for event in run.events[:-1]]
-        assert np.abs(np.array(times) - path.times).max() < 1e-9
+    rng = np.random.default_rng(k)
+    for start in np.hstack([rng.normal(size=(2, k)), rng.uniform(-0.5, 0.2, (2, k))]):
+        problem = chain(k, start)
+        exact, run = follow(problem), ns.simulate(package_system(problem), start, 15.0, tol=1e-12)
+        events = package_events(run, problem)
+        assert not exact.trouble and len(events) >= k
+        assert [own[1:] for own in events] == [own[1:] for own in exact.events]
+        assert np.abs(run.x[-1] - exact.x).max() < 1e-9
+        late = [one[0] - two[0] for one, two in zip(events, exact.events, strict=True)]
+        assert np.abs(late).max() < 1e-9
 
 
 def test_a_long_chain_keeps_its_symmetry():

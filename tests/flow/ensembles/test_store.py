@@ -41,16 +41,7 @@ def whole():
 
 
 def assert_same(a, b):
-    for name in (
-        "x",
-        "t",
-        "status",
-        "itinerary_code",
-        "event_x",
-        "event_t",
-        "sample_x",
-        "sample_t",
-    ):
+    for name in "x t status itinerary_code event_x event_t sample_x sample_t".split():
         one, two = getattr(a, name), getattr(b, name)
         assert one.dtype == two.dtype and one.tobytes() == two.tobytes(), name
     assert a.itineraries == b.itineraries

@@ -14,6 +14,12 @@ _G, _E = 9.81, 0.8
 #: A ball dropped from height 1 is at rest after this time, by the geometric series of its flights.
 _LIMIT = math.sqrt(2 / _G) * (1 + 2 * _E / (1 - _E))
 
+#: A ball on a table that is accelerated by ``force`` from rest at the height s and the time w.
+_TABLE = ns.FilippovSystem(
+    [y, v], field=[v, -2], time=t, parameters={force: 0, s: 0, w: 0, lam: 0.5},
+    impacts=ns.Impact(y - s - force * (t - w) ** 2 / 2, restitution=lam),
+)  # fmt: skip
+
 
 def _ball(restitution=_E, **more):
     """Build a ball with a state that is the time."""
@@ -53,6 +59,22 @@ def test_the_limit_of_flights_whose_ratio_still_changes(tol, restitution, growth
     run = ns.simulate(system, [0, 0.2], limit + 0.02, tol=tol)
     contact = [event.t for event in run.events if event.kind == "contact"]
     assert contact == pytest.approx([limit], abs=tol)
+
+
+@pytest.mark.parametrize("begin", [0.0, 1e3])
+@pytest.mark.parametrize("place", [0.0, 1.0, 1e3])
+@pytest.mark.parametrize("restitution", [0.3, 0.7, 0.95])
+@pytest.mark.parametrize("push", [-0.7, 0.5, 3.0])
+def test_rounding_of_a_gap_from_a_moving_table_moves_no_limit(push, restitution, place, begin):
+    """The limit is that of a heavier ball."""
+    given = {force: push, s: place, w: begin, lam: restitution}
+    pull, last = 2.0 + push, 1.0 - restitution
+    limit = (0.3 + math.sqrt(0.09 + 2 * pull) * (1 + restitution) / last) / pull
+    start, t_end = [place + 1.0, 0.3], begin + limit + 1
+    run = ns.simulate(_TABLE, start, t_end, t_start=begin, parameters=given, tol=1e-12)
+    contact = next(event.t for event in run.events if event.kind == "contact")
+    near = 1e-13 + (begin + place) * 1e-15 + 1e-13 / last**2
+    assert contact == pytest.approx(begin + limit, abs=near, rel=0) and run.facts.t_error == 0
 
 
 def test_run_that_ends_before_the_limit_does_not_reach_it():

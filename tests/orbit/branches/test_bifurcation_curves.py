@@ -290,7 +290,10 @@ def test_legs_are_divided_along_a_curve():
 
 @pytest.mark.parametrize(
     ("tilt", "push", "kind"),
-    [(0.0, 0.0, "grazing of a jumping force"), (0.3, 0.4, "grazing-sliding")],
+    [
+        pytest.param(0.0, 0.0, "grazing of a jumping force", marks=pytest.mark.slow),
+        (0.3, 0.4, "grazing-sliding"),
+    ],
 )
 def test_a_grazing_curve_ends_at_the_hopf_point_and_at_the_saddle_on_the_surface(tilt, push, kind):
     """x'' = x^2 - 1 + e (mu + x) x': cycles between the Hopf point at mu = 1 and the homoclinic orbit, mu = 5/7 + O(e^2)."""
@@ -308,6 +311,18 @@ def test_a_grazing_curve_ends_at_the_hopf_point_and_at_the_saddle_on_the_surface
     event = next(event for event in branch.events if event.kind == kind)
     curve = ns.continue_bifurcation(event, ("mu", "c"), bounds=[(0.5, 1.3), (-2, 2)])
     assert curve.ends == (BranchEnd.EVENT, BranchEnd.PERIOD_DIVERGES)
-    (point,) = curve.special
+    point, last = curve.special
     assert point.kind == f"{kind} with Hopf" and np.abs(point.values - [1, -1]).max() < 1e-12
-    assert np.abs(curve.values[-1] - [5 / 7, 1]).max() < 2e-3
+    smooth = ns.FilippovSystem([x, y], field=[y, force], parameters={mu: 0.715})
+    value = ns.find_homoclinic(smooth, [1.0, 0.0], "mu").value
+    assert last.kind == f"{kind} with boundary equilibrium"
+    assert np.abs(last.values - [value, 1]).max() < 1e-12 and abs(value - 5 / 7) < 2e-3
+    *boundary, loop = ns.continue_bifurcation(last, ("mu", "c"), bounds=[(0.5, 1.3), (-2, 2)])
+    assert [one.kind for one in boundary] == ["boundary equilibrium"] * 2
+    assert max(np.abs(one.values[:, 1] - 1).max() for one in boundary) < 1e-12
+    assert loop.kind == "homoclinic" and not loop.special and loop.values[-1, 1] == 2
+    assert np.abs(loop.values[:, 0] - value).max() < 1e-12 and not loop.solution(5).faults
+    back = ns.continue_bifurcation(loop.solution(5), ("mu", "c"), bounds=[(0.5, 1.3), (-2, 2)])
+    (point,) = back.special
+    assert point.kind == "homoclinic with boundary equilibrium" and BranchEnd.EVENT in back.ends
+    assert np.abs(point.values - [value, 1]).max() < 1e-12

@@ -241,6 +241,16 @@ def test_lorenz_has_his_homoclinic_orbit() -> None:
     assert abs(found.value - 13.926557) < 1e-6  # Sparrow 1982; Doedel, Krauskopf & Osinga 2006
 
 
+@pytest.mark.slow
+def test_an_orbit_that_comes_along_the_strongly_stable_direction() -> None:
+    """The value where orbits of the unstable manifold turn from x > 1 to x < 1: bisection with scipy's DOP853."""
+    force = x**2 - 1 + 0.2 * (mu + x) * y + 0.1 * z
+    field = [y, force, -0.3 * z + 0.2 * x * y]
+    system = ns.FilippovSystem([x, y, z], field=field, parameters={mu: 0.7286})
+    found = ns.find_homoclinic(system, [1.0, 0.0, 0.0], "mu")
+    assert abs(found.value - 0.728617915451457) < 1e-12
+
+
 def oscillator() -> ns.FilippovSystem:
     """x'' = x - x^2 + (c + k x) x': Melnikov's c/k = -6/7 for small k, a Hopf point at c = -k."""
     field = [y, x - x**2 + (c + k * x) * y]

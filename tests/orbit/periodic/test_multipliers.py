@@ -149,6 +149,31 @@ def test_multipliers_and_their_error_do_not_depend_on_the_unit_of_a_state_that_i
     assert wrong <= orbit.error_estimate < 3e-14 and orbit.floquet.zeros == 1
 
 
+@pytest.mark.parametrize("slides", [False, True])
+@pytest.mark.parametrize("units", [(1e3, 1e-3, 1.0), (1e6, 1e-6, 1.0), (1e-9, 1.0, 1e4)])
+def test_multipliers_do_not_depend_on_the_units_of_states(units, slides):
+    """A forced relay, which may slide on 0 all the time, and two states that follow it."""
+    x, y, z, t = (ca.SX.sym(s) for s in "xyzt")
+    own = [x / units[0], y / units[1], z / units[2]]
+    drive = (1.0 if slides else 2.5) * ca.cos(t)
+    rest = [-0.3 * own[1] + own[0] + ca.cos(t), -0.1 * own[2] + own[1]]
+    sides = [
+        [u * f for u, f in zip(units, [drive - s * (1 + slides), *rest], strict=True)]
+        for s in (1, -1)
+    ]
+    system = ns.FilippovSystem([x, y, z], surface=x, above=sides[0], below=sides[1], time=t)
+    if slides:
+        orbit = ns.periodic_orbit(system, [0.0, 0.1 * units[1], units[2]], itinerary=["s"])
+    else:
+        run = ns.simulate(system, 0.5 * np.array(units), 200.0, rtol=1e-10, atol=1e-10 * min(units))
+        orbit = ns.periodic_orbit(system, run)
+    c = 2.5 * np.sqrt(1 - (np.pi / 5) ** 2)
+    relay = 0.0 if slides else ((c - 1) / (c + 1)) ** 2
+    expected = [np.exp(-0.2 * np.pi), np.exp(-0.6 * np.pi), relay]
+    wrong = np.abs(orbit.multipliers - sorted(expected, reverse=True)).max()
+    assert wrong <= orbit.error_estimate < 1e-12 and orbit.stability == "asymptotically stable"
+
+
 def test_an_orbit_that_is_zero_has_the_period_of_its_forcing():
     """What rounding leaves of the states does not repeat; the guess comes back best after several periods."""
     x, y, z, t = (ca.SX.sym(s) for s in "xyzt")

@@ -11,12 +11,20 @@ from tests.orbit.periodic_cases import forced_friction, scalar_relay, stick_slip
 X, Y = ca.SX.sym("x"), ca.SX.sym("y")
 EARLY = r"guess.*leg 2 \(s, ended by lambda0 = 1\)"
 NO_FRICTION = {"parameters": {"f": 0.0}}
+AT_PASSENGER = [-6.386823184357734, 0.0, -0.15958604063869292, -0.018239069591006747]
 
 
 def damped():
     return ns.FilippovSystem([X, Y], field=[Y, -X - Y / 2])
 
 
+def with_an_unstable_passenger():
+    z, w = ca.SX.sym("z"), ca.SX.sym("w")
+    above, below = ([Y, s - X - Y / 5, X - 40 * z, 20 * w + Y] for s in (1, -1))
+    return ns.FilippovSystem([X, Y, z, w], surface=Y, above=above, below=below)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize(
     ("build", "guess", "options", "error", "message"),
     [
@@ -27,6 +35,7 @@ def damped():
         (welander, [0.4, 0.3], {"max_iterations": 0}, ns.OptionError, "max_iterations"),
         (damped, [1.0, 0.0], {}, ns.ConvergenceError, "shrank.*equilibrium"),
         (stick_slip, [1.0, 0.5], {"itinerary": "- s +"}, ns.ConvergenceError, EARLY),
+        (with_an_unstable_passenger, AT_PASSENGER, {}, ns.ConvergenceError, r"grow by 3e\+27 .*itinerary="),
         (stick_slip, [1.0, 0.5], {"itinerary": "- s", **NO_FRICTION}, ns.DegenerateError, "leg 2.*two-fold"),
     ],
 )  # fmt: skip

@@ -63,15 +63,8 @@ def expected(folds, nu):
     c = two_folds.classify_two_fold(SIGMA[folds], nu)
     real = flow.discriminant >= 0
     numbers = [
-        *(
-            c.canards,
-            c.faux_canards,
-            c.margin,
-            c.into.low,
-            c.into.high,
-            c.out_of.low,
-            c.out_of.high,
-        ),
+        *(c.canards, c.faux_canards, c.margin),
+        *(c.into.low, c.into.high, c.out_of.low, c.out_of.high),
         *(flow.trace, flow.determinant, flow.discriminant, flow.gap),
         two_folds.max_flights(SIGMA[folds], nu),
         *(flow.eigenvalues if real else ()),
@@ -180,12 +173,11 @@ def test_page_fits_complains_of_nothing_and_names_every_control(browser, page, f
 @pytest.mark.slow
 @pytest.mark.browser
 def test_keys_move_the_point_and_everything_follows(browser, page):
-    from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
 
     browser.open(page, hash="folds=II&nu=-2,-0.5")
     assert shown(browser)["label"] == "On a boundary: Δ=0, between II-C and II-F"
-    handle = browser.driver.find_element(By.CSS_SELECTOR, ".handle")
+    handle = browser.find(".handle")
     browser.run("document.querySelector('.handle').focus()")
     handle.send_keys(Keys.ARROW_DOWN)
     seen = shown(browser)
@@ -196,10 +188,10 @@ def test_keys_move_the_point_and_everything_follows(browser, page):
     handle.send_keys(Keys.SHIFT, Keys.ARROW_LEFT * 5)
     assert shown(browser)["hash"] == "#folds=II&nu=-3,-0.55"  # the edge of the map
     # Tab reaches the numbers, the kinds by arrow keys as radio buttons do
-    browser.driver.find_element(By.CSS_SELECTOR, "input[value=II]").send_keys(Keys.ARROW_RIGHT)
+    browser.find("input[value=II]").send_keys(Keys.ARROW_RIGHT)
     seen = shown(browser)
     assert seen["hash"] == "#folds=VI&nu=-3,-0.55" and seen["label"] == "Class mix-C"
-    field = browser.driver.find_element(By.ID, "nu2")
+    field = browser.find("#nu2")
     field.clear()
     field.send_keys("2.5")
     assert shown(browser)["label"] == "Class mix-S"
@@ -257,10 +249,9 @@ def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_point_is_dragged(browser, page, width):
     from selenium.webdriver.common.action_chains import ActionChains
-    from selenium.webdriver.common.by import By
 
     browser.open(page, width, hash="folds=VV&nu=0,0")
-    dot = browser.driver.find_element(By.CSS_SELECTOR, ".handle .dot")
+    dot = browser.find(".handle .dot")
     frame = browser.run(
         "const {width, height} = document.querySelector('#map .frame').getBoundingClientRect();"
         "return [width, height]"

@@ -48,47 +48,16 @@ ENDS = {"belt_oscillator": 13.0, "buck_converter": 0.0199}
 
 
 @pytest.mark.slow_cases(
-    "ambiguous_exit",
-    "backlash",
-    "belt_oscillator",
-    "block_on_disc",
-    "block_on_incline",
-    "bouncing_ball",
-    "buck_converter",
-    "chua_circuit",
-    "dry_friction",
-    "forced_dry_friction",
-    "gearbox",
-    "glacial_cycles",
-    "glass_loop",
-    "harvested_prey_predator",
-    "hidden_dynamics",
-    "impact_oscillator",
-    "integrate_and_fire",
-    "integrate_and_fire_network",
-    "integrate_and_fire_pair",
-    "kelvin_voigt_bounce",
-    "leine_stick_slip",
-    "mckean_neuron",
-    "multi_sliding_relay",
-    "painleve_rod",
-    "piecewise_cycle",
-    "planar_relay",
-    "pseudo_hopf",
-    "rocking_block",
-    "scalar_sliding",
-    "shaken_block",
-    "simplest_walker",
-    "state_dependent_jump",
-    "stick_slip_exponential",
-    "tank_cascade",
-    "thermostat",
-    "turntable",
-    "twisting",
-    "two_fold",
-    "two_relay_spiral",
-    "welander_box",
-    "woodpecker",
+    *"""
+    ambiguous_exit backlash belt_oscillator block_on_disc block_on_incline bouncing_ball
+    buck_converter chua_circuit dry_friction forced_dry_friction gearbox glacial_cycles
+    glass_loop harvested_prey_predator hidden_dynamics impact_oscillator integrate_and_fire
+    integrate_and_fire_network integrate_and_fire_pair kelvin_voigt_bounce leine_stick_slip
+    mckean_neuron multi_sliding_relay painleve_rod piecewise_cycle planar_relay pseudo_hopf
+    rocking_block scalar_sliding shaken_block simplest_walker state_dependent_jump
+    stick_slip_exponential tank_cascade thermostat turntable twisting two_fold two_relay_spiral
+    welander_box woodpecker
+    """.split()
 )
 @pytest.mark.parametrize("name", sorted({*textbook.PROBLEMS} - {"slider_crank"}))
 def test_textbook_problems(name):

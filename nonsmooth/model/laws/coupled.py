@@ -207,15 +207,9 @@ class Coupled:
         self.combined = list(combinable(system)) if combines else []
         weights = self._combine(h)
         self._symbols = [self.moving, ca.vertcat(system.parameter_symbols, weights)]
-        #: Of each surface, derivatives that vanish while it rests; the layer has the next one.
-        self.lower: list[tuple[ca.SX, ...]] = [()] * self._surfaces
         degrees = self.degrees(field, lam, unknowns) if by_degree or system.joints else []
-        for i, found in enumerate(degrees):
-            if by_degree or i in system.joints:
-                self.lower[i], self.layer[i] = found.lower, found.row
-        for i in system.remembering:  # h at multiplier +1, the further function at -1
-            self.lower[i] = (h[i] - d.hysteresis[i],)
-            h[i] -= (1 - lam[i]) / 2 * d.hysteresis[i]
+        #: Of each surface, derivatives that vanish while it rests; the layer has the next one.
+        self.lower: list[tuple[ca.SX, ...]] = self._rest(h, lam, degrees, by_degree)
         stops = ca.densify(d.guards) if d.guards.numel() else ca.SX(0, 1)
         heights = ca.densify(ca.vertcat(h, d.gaps))
         factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
@@ -238,6 +232,19 @@ class Coupled:
         #: Of layer, of surfaces and gaps, of stops and resets, and of factors, by the states.
         self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)
+
+    def _rest(
+        self, h: ca.SX, lam: ca.SX, degrees: Sequence[Degree], by_degree: bool
+    ) -> list[tuple[ca.SX, ...]]:
+        lower: list[tuple[ca.SX, ...]] = [()] * self._surfaces
+        for i, found in enumerate(degrees):
+            if by_degree or i in self.system.joints:
+                lower[i], self.layer[i] = found.lower, found.row
+        for i in self.system.remembering:  # h at multiplier +1, the further function at -1
+            further = self.system.definition.hysteresis[i]
+            lower[i] = (h[i] - further,)
+            h[i] -= (1 - lam[i]) / 2 * further
+        return lower
 
     def _combine(self, h: ca.SX) -> ca.SX:
         """Rows of conditions of degree 0: y, or sums of all y and of their rates with weights, which are returned."""

@@ -23,7 +23,7 @@ from .boundary_value_problem import BoundaryProblem, Evaluation, jacobian_indice
 from .cyclic_qr import Factor, Product
 
 #: States below this part of what leads away from them are zero, and those below this part of the largest are rounding.
-_AT_ZERO, _ROUNDED = 1e-9, 1e-13
+_AT_ZERO, _ROUNDED = 1e-6, 1e-13
 
 #: States below this many residuals are rounding.
 _CLOSED = 10.0

@@ -285,8 +285,8 @@ def _flight_to(
 #: Factor by which the end of an orbit approaches the saddle in one step, and its least value.
 _CLOSER, _SLOWLY = 4.0, 1.2
 
-#: Change of the parameter, for a distance smaller by a factor e, at which it is known. An orbit that comes along another than the leading direction
-#: has a larger error than the estimate of ``SaddleLoop.target``.
+#: Change of the parameter, for a distance smaller by a factor e, at which it is known. An orbit that comes along another
+#: than the leading direction has a larger error than the estimate of ``SaddleLoop.target``.
 _SETTLED = 1e-13
 
 #: Distance from the saddle, relative to the size of the orbit, that suffices where no step succeeds.

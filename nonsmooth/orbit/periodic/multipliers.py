@@ -287,9 +287,8 @@ def _units(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     beside = _beside(problem, at, p)
     ways = np.maximum(ways, beside)
     derivatives = np.abs((at.parts or at).flows.by_start[:, :own]).max(axis=0)
-    derivatives /= np.maximum(np.diagonal(derivatives), 1.0)[
-        :, None
-    ]  # its own growth is none from others
+    # its own growth is none from others
+    derivatives /= np.maximum(np.diagonal(derivatives), 1.0)[:, None]
     np.fill_diagonal(derivatives, 0.0)
     zero = size <= rounding
     for _ in range(own):  # what the time and other states, which may be zero as well, lead to
@@ -299,12 +298,10 @@ def _units(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
         size = np.where(zero, reach, size)
     moved = derivatives[:, :own] * size
     excess = (moved / np.where(size > 0.0, size, np.inf)[:, None]).max(axis=0)
-    size = np.where(
-        zero, size / np.maximum(excess, 1.0), size
-    )  # moves no other by more than its size
-    projected = bool(
-        problem.system.sets or problem.system.joints
-    )  # its rounding is that of the largest state
+    # it moves no other by more than its size
+    size = np.where(zero, size / np.maximum(excess, 1.0), size)
+    # of a state that is projected rounding is that of the largest state
+    projected = bool(problem.system.sets or problem.system.joints)
     known = (size > _ROUNDED * size.max() * projected) | (beside > 0.0)
     size = np.where(known, size, float(size.max()) or span)
     return np.append(size, [span] * (problem.dimension - own))

@@ -233,16 +233,18 @@ static int with_touched(Run *r, int32_t *onto, int kept) {
   return all;
 }
 
-/* Set rates of contacts to zero that are so after an impact to the rounding of the state before it. */
+/* Set rates of contacts to zero that are so after an impact to the rounding of the state before it; their gaps stay. */
 static void keep_rates_zero(Run *r, const double *before, int32_t *involved, int count) {
   double *scale = r->small;
-  int n = 0;
+  int n = count;
   surface_scales(r, before);
-  for (int k = 0; k < count; k++) scale[k] = r->rates[r->kept_rows + (involved[k] = rate_row(r, r->m + involved[k]))];
+  for (int k = 0; k < count; k++) scale[k] = r->rates[r->kept_rows + rate_row(r, involved[k] += r->m)];
   surface_values(r, r->x);
-  for (int k = 0; k < count; k++)
-    if (r->rates[involved[k]] != 0 && fabs(r->rates[involved[k]]) <= ON_SURFACE * scale[k]) involved[n++] = involved[k];
-  project(r, involved, n);
+  for (int k = 0; k < count; k++) {
+    int rate = rate_row(r, involved[k]);
+    if (r->rates[rate] != 0 && fabs(r->rates[rate]) <= ON_SURFACE * scale[k]) involved[n++] = rate;
+  }
+  if (n > count) project(r, involved, n);
 }
 
 /* Apply the impulses of a gap that closes and of the contacts that are closed. */

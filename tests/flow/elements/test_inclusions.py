@@ -199,3 +199,13 @@ def test_both_lower_contacts_of_a_slider_crank_open_at_one_instant():
         -14.6168908684568787,
     ]
     assert run.x[-1, :5] == pytest.approx(end, rel=1e-8, abs=1e-8)
+
+
+@pytest.mark.slow
+def test_rounding_of_a_start_ends_no_run_of_a_slider_crank():
+    """Rates that are zero after an impact to rounding are made zero on the gaps, not behind them."""
+    problem = ns.textbook.slider_crank()
+    start = problem.run(t_end=1e-9).x[0]
+    for k in range(-40, 41):
+        run = ns.simulate(problem.system, start * (1 + k * 2.2e-16), 0.2)
+        assert run.status is ns.Status.REACHED_END, (k, run.message)

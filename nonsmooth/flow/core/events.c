@@ -122,9 +122,10 @@ static void reset_map(Run *r, int index, const double *x, double *after) {
 /* Count the ticks of a clock from its next one, whose time is two numbers. */
 static void count_ticks(Run *r, int c) {
   double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
-  double left = period - r->x[r->s->rules.clock_state[c]], sum = r->t + left, moved = sum - r->t;
-  r->instant.tick[2 * c] = sum;
-  r->instant.tick[2 * c + 1] = (r->t - (sum - moved)) + (left - moved) + r->t_low;
+  Pair left = pair_sum((Pair){period, 0}, (Pair){-r->x[r->s->rules.clock_state[c]], 0});
+  Pair next = pair_sum((Pair){r->t, r->t_low}, left);
+  r->instant.tick[2 * c] = next.high;
+  r->instant.tick[2 * c + 1] = next.low;
   r->instant.count[c] = 0;
 }
 

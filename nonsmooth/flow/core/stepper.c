@@ -395,13 +395,14 @@ static int is_steep(const Run *r, const Expansion *e, int row, double dt) {
   return blur(e->guards + (int64_t)row * r->stride, r->order, dt) > 0;
 }
 
-/* The time of a clock's next tick, in two numbers, from the number of its ticks. */
+/* The time of a clock's next tick, as the nearest number and what is left, from the number of its ticks. */
 static double tick_of(const Run *r, int c, double *low) {
   double period = out_of(&r->s->choices, r->choice_work, 2 * (r->s->stops + r->s->resets) + c);
-  double first = r->instant.tick[2 * c], count = (double)r->instant.count[c], since = count * period;
-  double sum = first + since, moved = sum - first;
-  *low = (first - (sum - moved)) + (since - moved) + fma(count, period, -since) + r->instant.tick[2 * c + 1];
-  return sum;
+  const double *first = r->instant.tick + 2 * c;
+  Pair since = pair_product((Pair){(double)r->instant.count[c], 0}, (Pair){period, 0});
+  Pair time = pair_sum((Pair){first[0], first[1]}, since);
+  *low = time.low;
+  return time.high;
 }
 
 /* The time after a step, in one number: that of a tick which ends it, or of the run's end. */

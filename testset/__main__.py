@@ -1,6 +1,6 @@
 """Run the test set and write build/testset/: ``python -m testset [--record] [--python PATH ...] [TOOL ...]``.
 
-Results are kept as they come, and a run goes on where it was interrupted; ``--python`` names further interpreters with
+Results are kept as they come, and a run continues where it was interrupted; ``--python`` names further interpreters with
 tools, ``--record`` puts the table into README.md.
 """
 
